@@ -1,0 +1,269 @@
+"""Compile and CompileNode (paper, section 5): from a PAG to a factory F = (R, ~, N).
+
+Guarantees: the net is composed of one gear per robot and is a gear net (Theorem 5.1); `factory.nets.
+verify` proves it again, independently. What would break that is refused here. Linear in the PAG.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from factory.errors import Diagnostic, InputError, Position, did_you_mean
+from factory.factory import Factory, Operation, Robot
+from factory.nets.gears import Gear, GearNet
+from factory.nets.petri import PetriNet, Place, Transition
+from factory.nets.threaded import Redistribution, ThreadedNet
+from factory.pag import NOPART, PAG, Assembly
+from factory.prepared import check_prepared
+from factory.robots import Catalogue
+from factory.template import Template
+
+DROPOFF = "dropoff"
+
+
+@dataclass(frozen=True, slots=True)
+class Node:
+    """An operation to compile: a node of the PAG, or one pile of a node with many inputs.
+
+    `size` counts the operation instances of its subtree, itself included.
+    """
+
+    label: str
+    template: Template
+    inputs: tuple[str, ...]
+    dwell: float
+    size: int
+    position: Position | None
+
+
+@dataclass(slots=True)
+class _Draft:
+    """What CompileNode has allocated so far: types, operations and, per robot, its operations from
+    the last of its cycle to the first."""
+
+    types: list[str]
+    births: list[Position | None]
+    visits: list[list[int]]
+    operations: list[Operation]
+    parents: list[int]
+    troubles: list[Diagnostic]
+
+    def allocate(self, robot_type: str, position: Position | None) -> int:
+        self.types.append(robot_type)
+        self.births.append(position)
+        self.visits.append([])
+        return len(self.types) - 1
+
+
+def compile_pag(pag: PAG, templates: Mapping[str, Template], catalogue: Catalogue) -> Factory:
+    """The factory that makes the product `pag`.
+
+    Raises InputError with every TypeMismatch and NotPrepared found. Robots and operations are
+    numbered as in the specification of the net: the output robot is r1; an operation numbers all its
+    new robots at once, the input with fewest operation instances first, tools last.
+    """
+    nodes = expand(pag, templates)
+    draft = _Draft([], [], [], [], [], [])
+    output = templates[DROPOFF]
+    carrier = draft.allocate(output.robots[0], pag[pag.root].position)
+    _compile_nodes(nodes, pag.root, carrier, draft, catalogue)
+    _add_dropoff(output, pag, carrier, draft)
+    if not draft.troubles:
+        robots = _robots(draft)
+        operations = tuple(draft.operations)
+        draft.troubles.extend(check_prepared(robots, operations))
+    if draft.troubles:
+        raise InputError(draft.troubles)
+    return Factory(pag, robots, operations, gear_net(robots, operations), tuple(draft.parents))
+
+
+def expand(pag: PAG, templates: Mapping[str, Template]) -> dict[str, Node]:
+    """The operation instances by label, with the inputs of each beyond those of its template
+    inserted one by one: `mate(a, b, c)` becomes `x/2 = mate(a, b)`, `x = insert(x/2, c)`."""
+    nodes: dict[str, Node] = {}
+    for assembly in pag.postorder():
+        template = templates[assembly.operation]
+        taken = len(template.inputs)
+        inputs, spare = assembly.inputs[:taken], assembly.inputs[taken:]
+        label = f"{assembly.label}/{taken}" if spare else assembly.label
+        _add_node(nodes, label, template, inputs, assembly)
+        for number, further in enumerate(spare, start=taken + 1):
+            pile, label = label, f"{assembly.label}/{number}"
+            if number == len(assembly.inputs):
+                label = assembly.label
+            _add_node(nodes, label, templates[template.further], (pile, further), assembly)
+    return nodes
+
+
+def _add_node(
+    nodes: dict[str, Node],
+    label: str,
+    template: Template,
+    inputs: tuple[str, ...],
+    assembly: Assembly,
+) -> None:
+    size = 1 + sum(nodes[i].size for i in inputs)
+    dwell = _dwell(template, assembly)
+    nodes[label] = Node(label, template, inputs, dwell, size, assembly.position)
+
+
+def _dwell(template: Template, assembly: Assembly) -> float:
+    wanted = template.law.dwell
+    if isinstance(wanted, str):
+        wanted = assembly.parameter(wanted, dict(template.parameters).get(wanted))  # type: ignore[assignment]
+    return float(wanted) if isinstance(wanted, int | float) else 0.0
+
+
+def _compile_nodes(
+    nodes: Mapping[str, Node], root: str, output: int, draft: _Draft, catalogue: Catalogue
+) -> None:
+    """CompileNode(P, carrier) for every node in preorder, with a stack in place of recursion."""
+    stack: list[tuple[str, int, int]] = [(root, output, -1)]
+    while stack:
+        label, carrier, parent = stack.pop()
+        node = nodes[label]
+        index = len(draft.operations)
+        brought = _brought(node)
+        _claim_carrier(node, carrier, draft, catalogue)
+        robots = _allocate(node, carrier, brought, nodes, draft, catalogue)
+        before = tuple(brought)
+        after = tuple(NOPART if b == NOPART else label for b in node.template.after)
+        draft.operations.append(
+            Operation(index, label, node.template, robots, before, after, node.dwell, node.position)
+        )
+        draft.parents.append(parent)
+        for robot in robots:
+            draft.visits[robot].append(index)
+        inputs = sorted((r, l) for r, l in zip(robots, before, strict=True) if l != NOPART)
+        stack.extend((l, robot, index) for robot, l in reversed(inputs))
+
+
+def _brought(node: Node) -> list[str]:
+    """a, with the template's label variables replaced by the labels of the inputs."""
+    variables = sorted(node.template.inputs, key=_number)
+    actual = dict(zip(variables, node.inputs, strict=True))
+    return [actual.get(variable, NOPART) for variable in node.template.before]
+
+
+def _number(variable: str) -> tuple[int, str]:
+    digits = "".join(c for c in variable if c.isdigit())
+    return int(digits or 0), variable
+
+
+def _claim_carrier(node: Node, carrier: int, draft: _Draft, catalogue: Catalogue) -> None:
+    """The carrier takes the role T_j: its type becomes the more special of the two."""
+    wanted, given = node.template.robots[node.template.carrier - 1], draft.types[carrier]
+    met = catalogue.meet(given, wanted)
+    if met is None:
+        message = (
+            f"robot r{carrier + 1} carries '{node.label}' and must be a '{wanted}' for"
+            f" {node.template.name}, but its next role asks for a '{given}'"
+        )
+        hint = f"use an operation whose carrier is a '{given}', or a type that extends both"
+        draft.troubles.append(Diagnostic("TypeMismatch", message, node.position, hint))
+    else:
+        draft.types[carrier] = met
+
+
+def _allocate(
+    node: Node,
+    carrier: int,
+    brought: list[str],
+    nodes: Mapping[str, Node],
+    draft: _Draft,
+    catalogue: Catalogue,
+) -> tuple[int, ...]:
+    """r_1, ..., r_k: the carrier and the new robots, numbered smallest input first, tools last."""
+    template = node.template
+    robots = {template.carrier - 1: carrier}
+    new = [i for i in range(len(template.robots)) if i != template.carrier - 1]
+    argument = {label: i for i, label in enumerate(node.inputs)}
+
+    def order(i: int) -> tuple[int, int, int]:
+        label = brought[i]
+        return (1, 0, i) if label == NOPART else (0, nodes[label].size, argument[label])
+
+    for i in sorted(new, key=order):
+        if template.robots[i] not in catalogue.types:
+            hint = did_you_mean(template.robots[i], list(catalogue.types), "robot types")
+            message = f"{template.name} asks for a robot of unknown type '{template.robots[i]}'"
+            draft.troubles.append(
+                Diagnostic("TypeMismatch", message, template.position or node.position, hint)
+            )
+        robots[i] = draft.allocate(template.robots[i], node.position)
+    return tuple(robots[i] for i in range(len(template.robots)))
+
+
+def _add_dropoff(output: Template, pag: PAG, carrier: int, draft: _Draft) -> None:
+    index = len(draft.operations)
+    draft.operations.append(
+        Operation(
+            index, DROPOFF, output, (carrier,), (pag.root,), (NOPART,), 0.0, pag[pag.root].position
+        )
+    )
+    draft.parents = [index if p == -1 else p for p in draft.parents] + [-1]
+    draft.visits[carrier].insert(0, index)
+
+
+def _robots(draft: _Draft) -> tuple[Robot, ...]:
+    return tuple(
+        Robot(i, f"r{i + 1}", draft.types[i], tuple(reversed(visits)), draft.births[i])
+        for i, visits in enumerate(draft.visits)
+    )
+
+
+def gear_net(robots: tuple[Robot, ...], operations: tuple[Operation, ...]) -> GearNet:
+    """N: for each operation a start, an end and a place; for each robot a gear through them.
+
+    Operation i has transitions 2i and 2i + 1 and place i; the wait places follow, robot by robot.
+    """
+    transitions = tuple(
+        Transition(f"{o.name}_{end}", o.position) for o in operations for end in ("s", "e")
+    )
+    places = [
+        Place(
+            o.name,
+            (o.start,),
+            (o.end,),
+            o.template.name,
+            "" if o.after[o.template.carrier - 1] == NOPART else o.label,
+            len(o.robots),
+            o.position,
+        )
+        for o in operations
+    ]
+    slots = [o.robots for o in operations]
+    slot_of = [{robot: i for i, robot in enumerate(o.robots)} for o in operations]
+    pairs: list[list[tuple[tuple[int, int], tuple[int, int]]]] = [[] for _ in transitions]
+    gears = []
+    for robot in robots:
+        gear_places, gear_events = [], []
+        for step, number in enumerate(robot.operations):
+            before, operation = operations[robot.operations[step - 1]], operations[number]
+            slot = slot_of[number][robot.index]
+            label = operation.before[slot]
+            stays = label != NOPART and operation.after[slot] != NOPART
+            wait = len(places)
+            places.append(
+                Place(
+                    f"{robot.name}:{label}",
+                    (before.end,),
+                    (operation.start,),
+                    "hold" if stays else "wait",
+                    label,
+                    1,
+                    operation.position,
+                )
+            )
+            slots.append((robot.index,))
+            pairs[operation.start].append(((wait, 0), (number, slot)))
+            pairs[before.end].append(
+                ((before.place, slot_of[before.index][robot.index]), (wait, 0))
+            )
+            gear_places += [wait, number]
+            gear_events += [before.end, operation.start]
+        gears.append(Gear(robot.name, robot.type, tuple(gear_places), tuple(gear_events)))
+    redistribution: tuple[Redistribution, ...] = tuple(tuple(sorted(p)) for p in pairs)
+    net = ThreadedNet(PetriNet(transitions, tuple(places)), redistribution)
+    return GearNet(net, tuple(gears), tuple(g.places[0] for g in gears), tuple(slots))

@@ -1,0 +1,103 @@
+"""One tree of errors, with codes and places in the user's file.
+
+A `Diagnostic` says where, what was found and what would have been valid; a `FactoryError`
+carries every diagnostic of one stage. The command line prints them and takes its exit status
+from the class.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+from difflib import get_close_matches
+
+
+@dataclass(frozen=True, slots=True)
+class Position:
+    """A place in a text: file name, line and column, both counted from 1, and the line itself."""
+
+    file: str
+    line: int
+    column: int
+    text: str = field(default="", compare=False)
+
+    def __str__(self) -> str:
+        return f"{self.file}:{self.line}:{self.column}"
+
+
+@dataclass(frozen=True, slots=True)
+class Diagnostic:
+    """One error or warning: a documented code, what was found, where, and a way out."""
+
+    code: str
+    message: str
+    position: Position | None = None
+    hint: str = ""
+
+    def __str__(self) -> str:
+        """`file:line:col: CODE message`, then the source line with a caret, then the hint."""
+        where = f"{self.position}: " if self.position else ""
+        lines = [f"{where}{self.code} {self.message}"]
+        if self.position and self.position.text:
+            start, caret = _window(self.position.text, self.position.column - 1)
+            shown = "".join(c if c.isprintable() else " " for c in start).rstrip()
+            lines += [f"    {shown}", f"    {' ' * caret}^"]
+        if self.hint:
+            lines.append(f"    {self.hint}")
+        return "\n".join(lines)
+
+    def as_json(self) -> dict[str, object]:
+        """The diagnostic as the `--json` document lists it."""
+        at = self.position
+        return {
+            "file": at.file if at else None,
+            "line": at.line if at else None,
+            "col": at.column if at else None,
+            "code": self.code,
+            "message": self.message,
+            "hint": self.hint,
+        }
+
+
+def _window(source: str, caret: int, width: int = 100) -> tuple[str, int]:
+    """The part of a long source line around the caret, and the caret's column in it."""
+    start = max(0, caret - width // 2) if len(source) > width else 0
+    return source[start : start + width], caret - start
+
+
+class FactoryError(Exception):
+    """What a stage of the factory refuses, as one or more diagnostics. Exit status 2."""
+
+    exit_status = 2
+
+    def __init__(self, diagnostics: Diagnostic | Iterable[Diagnostic]) -> None:
+        many = [diagnostics] if isinstance(diagnostics, Diagnostic) else list(diagnostics)
+        self.diagnostics: tuple[Diagnostic, ...] = tuple(many)
+        super().__init__("\n".join(str(d) for d in self.diagnostics))
+
+
+class InputError(FactoryError):
+    """Bad input: a PAG, a template, a net, a log, an option. Exit status 2."""
+
+
+class RunError(FactoryError):
+    """A factory that failed a check, or a run that failed. Exit status 1."""
+
+    exit_status = 1
+
+
+class MissingError(FactoryError):
+    """Something is missing on this machine; the message says what to install. Exit status 3."""
+
+    exit_status = 3
+
+
+def did_you_mean(found: str, valid: Sequence[str], noun: str = "") -> str:
+    """A hint that suggests the nearest valid name, or lists what there is (at most twelve)."""
+    near = get_close_matches(found, valid, n=1, cutoff=0.6)
+    if near:
+        return f"did you mean '{near[0]}'?"
+    if not valid:
+        return f"there is no {noun} to choose from" if noun else ""
+    shown = ", ".join(valid[:12]) + (", ..." if len(valid) > 12 else "")
+    return f"valid {noun or 'names'}: {shown}"

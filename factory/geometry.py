@@ -1,0 +1,370 @@
+"""The geometry of a product: a solid for each part, in the frame of the finished product.
+
+Shapes written in the PAG are taken as they are; meshes are read with trimesh; parts with no geometry
+get a box in a cubic lattice of at most 0.2 m. A mesh that the engine cannot use falls back to its convex
+hull or its box, with a warning that names it.
+"""
+
+from __future__ import annotations
+
+import colorsys
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from types import MappingProxyType
+
+import numpy as np
+from numpy.typing import NDArray
+
+from factory.errors import Diagnostic, InputError, Position
+from factory.pag import PAG, Assembly
+
+Array = NDArray[np.float64]
+
+DENSITY = 1000.0
+"""Density of a part that states neither mass nor density [kg/m³]."""
+
+LATTICE = 0.2
+"""Longest edge of the lattice of parts with no geometry [m]."""
+
+CELL = 0.06
+"""Largest cell of that lattice [m]."""
+
+LONGEST, SHORTEST = 5.0, 0.005
+"""A product outside these lengths [m] gets a warning."""
+
+MOST_FACES = 150_000
+"""A mesh of more faces is replaced by its convex hull."""
+
+
+@dataclass(frozen=True, slots=True)
+class Mesh:
+    """A triangle mesh in metres, in its own frame: vertices (n, 3), faces (m, 3)."""
+
+    name: str
+    vertices: Array = field(repr=False)
+    faces: NDArray[np.int64] = field(repr=False)
+
+
+@dataclass(frozen=True, slots=True)
+class Solid:
+    """A part as a solid. Arrays are in the frame of the finished product unless said otherwise.
+
+    `kind` is box, cylinder, sphere or mesh; `size` its half lengths as MJCF writes them [m]; `position`
+    (3,) and `quaternion` (4,) place it; `mass` [kg], `centre` (3,) of mass, `inertia` (3, 3) about it
+    [kg m²]; `low`, `high` (3,) its bounding box; `corners` (n, 3) the vertices of its hull.
+    """
+
+    label: str
+    kind: str
+    size: tuple[float, ...]
+    position: Array
+    quaternion: Array
+    mass: float
+    centre: Array
+    inertia: Array
+    low: Array
+    high: Array
+    rgba: tuple[float, ...]
+    mesh: Mesh | None = None
+    corners: Array = field(default_factory=lambda: np.zeros((0, 3)), repr=False)
+
+
+@dataclass(frozen=True)
+class Product:
+    """The solids of a product's parts by label, its bounding box and what there is to warn about."""
+
+    solids: Mapping[str, Solid]
+    low: Array
+    high: Array
+    warnings: tuple[Diagnostic, ...] = ()
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "solids", MappingProxyType(dict(self.solids)))
+
+    @property
+    def middle(self) -> Array:
+        """The centre of the bounding box (3,) [m]."""
+        return (self.low + self.high) / 2
+
+    @property
+    def mass(self) -> float:
+        """[kg]"""
+        return float(sum(solid.mass for solid in self.solids.values()))
+
+
+def product_geometry(pag: PAG) -> Product:
+    """The solids of all parts. Raises InputError (BadMesh) where a mesh cannot be read."""
+    reader = _Reader(Path(pag.folder))
+    leaves = [node for node in pag.postorder() if not node.inputs]
+    plain = [node for node in leaves if not _has_shape(node)]
+    cells = _lattice(len(plain))
+    solids: dict[str, Solid] = {}
+    for number, node in enumerate(leaves):
+        if _has_shape(node):
+            solid = reader.solid(node, number)
+            if solid is not None:
+                solids[node.label] = solid
+    base = np.max([s.high[2] for s in solids.values()], initial=-np.inf)
+    lift = 0.0 if base == -np.inf else float(base)
+    for number, node in enumerate(plain):
+        solids[node.label] = _box_in_lattice(node, number, cells, lift)
+    if reader.errors:
+        raise InputError(reader.errors)
+    low = np.min([s.low for s in solids.values()], axis=0)
+    high = np.max([s.high for s in solids.values()], axis=0)
+    warnings = (*reader.warnings, *_size_warnings(pag, low, high))
+    return Product(solids, low, high, warnings)
+
+
+def _has_shape(node: Assembly) -> bool:
+    return any(p.name in ("mesh", "box", "cylinder", "sphere") for p in node.parameters)
+
+
+def _lattice(count: int) -> tuple[int, float]:
+    """Cells along an edge, and the edge of a cell [m], for `count` parts."""
+    edge = 1
+    while edge**3 < count:
+        edge += 1
+    return edge, min(CELL, LATTICE / edge)
+
+
+def _box_in_lattice(node: Assembly, number: int, cells: tuple[int, float], lift: float) -> Solid:
+    """A box in the cell `number` of a path that goes to and fro, so neighbours stay neighbours."""
+    edge, cell = cells
+    layer, rest = divmod(number, edge * edge)
+    row, column = divmod(rest, edge)
+    if layer % 2:
+        row = edge - 1 - row
+    if (row + layer) % 2:
+        column = edge - 1 - column
+    middle = (edge - 1) / 2
+    place = np.array([(column - middle) * cell, (row - middle) * cell, (layer + 0.5) * cell + lift])
+    given = node.parameter("pos")
+    if given is not None:
+        place = np.array(given, float)
+    half = np.full(3, 0.49 * cell)
+    return _primitive(node, "box", half, place, np.array([1.0, 0, 0, 0]), number)
+
+
+@dataclass(frozen=True, slots=True)
+class _Measured:
+    """A mesh, what was wrong with it, and its mass properties for unit density."""
+
+    mesh: Mesh
+    trouble: str
+    volume: float
+    centre: Array
+    inertia: Array
+    hull: Array
+
+
+class _Reader:
+    """Reads shapes, collecting errors and warnings; a mesh file is read once."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self.errors: list[Diagnostic] = []
+        self.warnings: list[Diagnostic] = []
+        self._meshes: dict[tuple[str, float], _Measured | None] = {}
+
+    def solid(self, node: Assembly, number: int) -> Solid | None:
+        place = np.array(node.parameter("pos", (0.0, 0.0, 0.0)), float)
+        quaternion = np.array(node.parameter("quat", (1.0, 0.0, 0.0, 0.0)), float)
+        quaternion /= np.linalg.norm(quaternion)
+        for kind in ("box", "cylinder", "sphere"):
+            given = node.parameter(kind)
+            if given is not None:
+                size = _half(kind, np.atleast_1d(np.array(given, float)))
+                return _primitive(node, kind, size, place, quaternion, number)
+        return self._mesh_solid(node, place, quaternion, number)
+
+    def _mesh_solid(
+        self, node: Assembly, place: Array, quaternion: Array, number: int
+    ) -> Solid | None:
+        path = str(node.parameter("mesh"))
+        scale = float(node.parameter("scale", 1.0))  # type: ignore[arg-type]
+        key = (path, scale)
+        first = key not in self._meshes
+        if first:
+            self._meshes[key] = self._read(node, path, scale)
+        found = self._meshes[key]
+        if found is None:
+            return None
+        if found.trouble and first:
+            position = _value_position(node, "mesh")
+            hint = "repair the mesh to have it used as it is"
+            self.warnings.append(Diagnostic("BadMesh", f"{path} {found.trouble}", position, hint))
+        return _from_mesh(node, found, place, quaternion, number)
+
+    def _read(self, node: Assembly, path: str, scale: float) -> _Measured | None:
+        import trimesh
+
+        try:
+            loaded = trimesh.load(self.folder / path, force="mesh", process=True)
+            vertices = np.asarray(loaded.vertices, float) * scale
+            faces = np.asarray(loaded.faces, np.int64)
+            if len(faces) == 0 or not np.isfinite(vertices).all():
+                raise ValueError("it has no triangles, or vertices that are not finite")
+            mesh, trouble = usable(f"m{len(self._meshes)}", vertices, faces)
+            return _Measured(mesh, trouble, *_mass_properties(mesh))
+        except Exception as error:  # trimesh's readers raise anything on a broken file
+            position = _value_position(node, "mesh")
+            hint = "export it again as .obj, .stl, .ply or .glb with triangles"
+            self.errors.append(Diagnostic("BadMesh", f"cannot read '{path}': {error}", position, hint))
+            return None
+
+
+def usable(name: str, vertices: Array, faces: NDArray[np.int64]) -> tuple[Mesh, str]:
+    """A mesh that the engine accepts, and what was wrong with the one given ("" if nothing)."""
+    import trimesh
+
+    low, high = vertices.min(axis=0), vertices.max(axis=0)
+    extent = high - low
+    if extent.min() < 1e-3 * extent.max() or extent.min() < 1e-5:
+        thin = np.maximum(extent, max(1e-4, 2e-3 * float(extent.max())))
+        box = trimesh.creation.box(thin)
+        box.apply_translation((low + high) / 2)
+        return Mesh(name, box.vertices, box.faces), "is flat; its box is used instead"
+    if len(faces) > MOST_FACES:
+        hull = trimesh.Trimesh(vertices, faces, process=False).convex_hull
+        return Mesh(name, hull.vertices, hull.faces), (
+            f"has {len(faces)} triangles; its convex hull is used instead"
+        )
+    return Mesh(name, vertices, faces), ""
+
+
+def _value_position(node: Assembly, name: str) -> Position | None:
+    return next((p.position for p in node.parameters if p.name == name), node.position)
+
+
+def _half(kind: str, given: Array) -> Array:
+    """Full lengths as the PAG writes them, to the half lengths of MJCF."""
+    if kind == "cylinder":
+        return np.array([given[0], given[1] / 2])
+    return given / 2 if kind == "box" else given
+
+
+def _primitive(
+    node: Assembly, kind: str, size: Array, place: Array, quaternion: Array, number: int
+) -> Solid:
+    if kind == "box":
+        x, y, z = 2 * size
+        volume, diagonal = x * y * z, np.array([y * y + z * z, x * x + z * z, x * x + y * y]) / 12
+    elif kind == "cylinder":
+        radius, height = size[0], 2 * size[1]
+        side = (3 * radius**2 + height**2) / 12
+        volume, diagonal = np.pi * radius**2 * height, np.array([side, side, radius**2 / 2])
+    else:
+        volume, diagonal = 4 / 3 * np.pi * size[0] ** 3, np.full(3, 0.4 * size[0] ** 2)
+    mass = _mass(node, float(volume))
+    turn = rotation(quaternion)
+    corners = _corners(kind, size) @ turn.T + place
+    reach = np.abs(turn) @ size if kind == "box" else _round_reach(kind, size, turn)
+    inertia = turn @ np.diag(mass * diagonal) @ turn.T
+    return Solid(
+        node.label,
+        kind,
+        tuple(float(s) for s in size),
+        place,
+        quaternion,
+        mass,
+        place,
+        inertia,
+        place - reach,
+        place + reach,
+        colour(node, number),
+        None,
+        corners,
+    )
+
+
+def _corners(kind: str, size: Array) -> Array:
+    """Points on the surface whose displacement tells that of the whole."""
+    if kind == "sphere":
+        return np.concatenate([np.eye(3), -np.eye(3)]) * size[0]
+    half = np.array([size[0], size[0], size[1]]) if kind == "cylinder" else size
+    signs = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], float)
+    return signs * half
+
+
+def _round_reach(kind: str, size: Array, turn: Array) -> Array:
+    """Half extents of a sphere, or of a cylinder whose axis is the third column of `turn`."""
+    if kind == "sphere":
+        return np.full(3, size[0])
+    axis = np.abs(turn[:, 2])
+    return np.asarray(size[1] * axis + size[0] * np.sqrt(np.maximum(0.0, 1 - axis**2)))
+
+
+def _from_mesh(
+    node: Assembly, found: _Measured, place: Array, quaternion: Array, number: int
+) -> Solid:
+    turn = rotation(quaternion)
+    mass = _mass(node, found.volume)
+    corners = found.hull @ turn.T + place
+    return Solid(
+        node.label,
+        "mesh",
+        (),
+        place,
+        quaternion,
+        mass,
+        turn @ found.centre + place,
+        turn @ (found.inertia * mass / found.volume) @ turn.T,
+        corners.min(axis=0),
+        corners.max(axis=0),
+        colour(node, number),
+        found.mesh,
+        corners,
+    )
+
+
+def _mass_properties(mesh: Mesh) -> tuple[float, Array, Array, Array]:
+    """Volume, centre of mass, inertia for unit density, vertices of the hull. An open mesh has
+    those of its convex hull."""
+    import trimesh
+
+    body = trimesh.Trimesh(mesh.vertices, mesh.faces, process=False)
+    hull = body.convex_hull
+    solid = body if body.is_watertight and body.volume > 0 else hull
+    properties = solid.mass_properties
+    inertia = np.asarray(properties.inertia) / float(properties.density)
+    centre = np.asarray(properties.center_mass)
+    return float(properties.volume), centre, inertia, np.asarray(hull.vertices)
+
+
+def _mass(node: Assembly, volume: float) -> float:
+    mass = node.parameter("mass")
+    if mass is not None:
+        return float(mass)  # type: ignore[arg-type]
+    return float(node.parameter("density", DENSITY)) * volume  # type: ignore[arg-type]
+
+
+def colour(node: Assembly, number: int) -> tuple[float, ...]:
+    """The colour written in the PAG, else one of a sequence in which neighbours differ."""
+    given = node.parameter("rgba")
+    if isinstance(given, tuple):
+        return given
+    hue = (0.07 + 0.381966 * number) % 1.0
+    return (*(round(c, 3) for c in colorsys.hsv_to_rgb(hue, 0.62, 0.92)), 1.0)
+
+
+def rotation(quaternion: Array) -> Array:
+    """The rotation matrix (3, 3) of a unit quaternion (w, x, y, z)."""
+    w, x, y, z = quaternion
+    return np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+        ]
+    )
+
+
+def _size_warnings(pag: PAG, low: Array, high: Array) -> list[Diagnostic]:
+    longest = float((high - low).max())
+    if SHORTEST <= longest <= LONGEST:
+        return []
+    hint = "is a mesh in millimetres? then write scale = 0.001"
+    message = f"the product is {longest:g} m long"
+    return [Diagnostic("Size", message, pag[pag.root].position, hint)]

@@ -1,0 +1,42 @@
+"""The sizes of robots and the heights of the two layers of a factory [m]; see docs/design.md.
+
+Robots live below the plane z0 = PAYLOAD, payloads above it, so a robot passes under any payload. From the
+floor up: carriages; arms, above any carriage, met by masts only; fingers, above any mast; payloads.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+CARRIAGE = 0.06
+"""Width and length W of a carriage."""
+
+CARRIAGE_TOP = 0.05
+ARM_LOW, ARM_TOP = 0.066, 0.084
+FINGER_LOW, FINGER_TOP = 0.09, 0.096
+PAYLOAD = 0.1
+"""z0: the lowest point of a product is carried at this height."""
+
+MAST = 0.02
+"""Width of a mast; arms and fingers are narrower."""
+
+POST = 0.03
+"""Width of a feeder's post."""
+
+TOOL_TRAVEL = 0.12
+"""How far a tool comes from its home to its station."""
+
+BELT_GAP = 3e-4
+"""The outfeed lies this much below z0, so that the output robot brings its product without touching."""
+
+
+@dataclass(frozen=True, slots=True)
+class Clearance:
+    """c: the least distance between two things that are not meant to touch [m]."""
+
+    c: float = 0.02
+
+    @property
+    def rim(self) -> float:
+        """How far an arm's end stays behind the line of another robot's carriage."""
+        return CARRIAGE / 2 + self.c

@@ -1,0 +1,128 @@
+"""A layout: the embedding f of the quotient workspace W in the plane (paper, section 5.1).
+
+Every part is carried in its place in the finished product, relative to the product's middle. Where that
+middle is in the world is the robot's *station*: at a mate the middles of all robots coincide, so the parts
+are assembled when they meet. A guidepath is the straight line of that point.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from types import MappingProxyType
+
+from factory.factory import Factory
+from factory.geometry import Product
+
+Box = tuple[float, float, float, float]
+"""(xlo, xhi, ylo, yhi) [m]."""
+
+Point2 = tuple[float, float]
+
+
+@dataclass(frozen=True, slots=True)
+class Guidepath:
+    """The guidepath of one robot and how the robot is stretched to its payload.
+
+    `heading` u, a unit vector towards A, and `side` t, to the left or right of it; `a`: the product's
+    middle when the robot delivers (x, y); `travel`: how far before that it receives (the station
+    at its B end); `reach` = 2r: how far the carriage stays behind the product's middle; `offset`: how far
+    the carriage's line is to the side t; `arm`: how far behind the middle the arm ends; `nest`: where
+    ahead of the middle the payload's own middle is, reached by the finger. All lengths in [m].
+
+    Arc length x of the carriage runs from A = 0; delivering at x = reach, receiving at B = reach + travel.
+    """
+
+    heading: Point2
+    side: Point2
+    a: Point2
+    travel: float
+    reach: float
+    offset: float
+    arm: float
+    nest: float
+
+    @property
+    def length(self) -> float:
+        """B - A [m]."""
+        return self.reach + self.travel
+
+    @property
+    def r(self) -> float:
+        """The robot's width r [m], of which the templates' goals are multiples."""
+        return self.reach / 2
+
+    def middle(self, x: float) -> Point2:
+        """Where the product's middle is when the carriage is at arc length x."""
+        back = x - self.reach
+        return self.a[0] - self.heading[0] * back, self.a[1] - self.heading[1] * back
+
+    def carriage(self, x: float) -> Point2:
+        """f: where the carriage's centre is at arc length x."""
+        return (
+            self.a[0] - self.heading[0] * x + self.side[0] * self.offset,
+            self.a[1] - self.heading[1] * x + self.side[1] * self.offset,
+        )
+
+
+@dataclass(frozen=True)
+class Layout:
+    """A factory laid out: a guidepath for each robot, and for each operation the arc length at which
+    each of its robots has its goal.
+
+    `stations[i]`: distance [m] of operation i from its carrier's B end; `payloads[label]`: the box of a
+    sub-assembly about the product's middle; `outfeed`: the box of the conveyor in the world.
+    """
+
+    factory: Factory
+    product: Product
+    clearance: float
+    guidepaths: tuple[Guidepath, ...] = field(repr=False)
+    stations: tuple[float, ...] = field(repr=False)
+    payloads: Mapping[str, Box] = field(repr=False)
+    outfeed: Box = (0.0, 0.0, 0.0, 0.0)
+    floor: Box = (0.0, 0.0, 0.0, 0.0)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "payloads", MappingProxyType(dict(self.payloads)))
+
+    @cached_property
+    def guidepath_length(self) -> float:
+        """Total length of the guidepaths [m]."""
+        return float(sum(g.length for g in self.guidepaths))
+
+    @property
+    def area(self) -> float:
+        """Floor area [m²] of the bounding box."""
+        xlo, xhi, ylo, yhi = self.floor
+        return (xhi - xlo) * (yhi - ylo)
+
+    def goal(self, operation: int, slot: int) -> float:
+        """Arc length of the goal of the robot in `slot` of an operation.
+
+        A non-carrier delivers at A + 2r; a carrier stands `stations[operation]` from its B end.
+        """
+        chosen = self.factory.operations[operation]
+        path = self.guidepaths[chosen.robots[slot]]
+        point = chosen.template.law.goals[slot]
+        if slot != chosen.template.carrier - 1 or point.end == "A":
+            return point.multiple * path.r
+        exact = {"B": 0.0, "S": 2.0}[point.end]
+        return path.length - self.stations[operation] + (point.multiple - exact) * path.r
+
+    def home(self, robot: int, operation: int) -> float:
+        """Arc length at which a robot waits before an operation: the goal of the one before, or B
+        where it waits with no part at the beginning of its cycle."""
+        gear = self.factory.robots[robot].operations
+        step = gear.index(operation)
+        if step == 0:
+            return self.guidepaths[robot].length
+        before = self.factory.operations[gear[step - 1]]
+        return self.goal(before.index, before.robots.index(robot))
+
+    @cached_property
+    def product_length(self) -> float:
+        """Length of the finished product along the output robot's heading [m]."""
+        xlo, xhi, _, _ = self.payloads[self.factory.pag.root]
+        return xhi - xlo

@@ -1,0 +1,270 @@
+"""The only writer of MJCF: a layout as one XML with its mesh files, that stock MuJoCo loads.
+
+Guarantees: every weld that a run can switch is there, with its nominal frame compiled from nest and product
+pose; robots come before parts; nothing depends on hashing, so the same factory gives the same bytes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from math import prod
+from pathlib import Path
+from types import MappingProxyType
+from xml.etree import ElementTree
+from xml.etree.ElementTree import Element
+
+from factory.factory import Factory
+from factory.layout.dimensions import PAYLOAD
+from factory.layout.plan import Layout
+from factory.mjcf import names
+from factory.mjcf.elements import add, number, numbers
+from factory.mjcf.parts import add_meshes, add_parts, feeder_middle, parked_at, place_in
+from factory.mjcf.robots import Drive, heading_quaternion, instantiate, load_robot_model
+from factory.mjcf.scene import add_assets, add_follower, add_scene, add_visuals
+from factory.robots import Catalogue
+from factory.settings import Settings
+
+CARRIAGE_MASS = 1.9
+"""What a `dot` weighs without payload [kg]; only used to size gains and forces."""
+
+STIFFNESS = 70.0
+"""Natural frequency of a robot's position loop at full payload [rad/s]."""
+
+BITS = 24
+"""Units whose parts can be told apart by contact masks; bit 0 is that of robots and stations."""
+
+
+@dataclass(frozen=True)
+class Model:
+    """A factory as MJCF: the XML, its mesh files by name, and the numbers the run needs.
+
+    `copies`: bodies of each part; `masses`: of each label carried [kg]; `drives`: of each robot.
+    """
+
+    layout: Layout
+    settings: Settings
+    copies: Mapping[str, int]
+    masses: Mapping[str, float]
+    drives: tuple[Drive, ...]
+    xml: str = field(repr=False)
+    files: Mapping[str, bytes] = field(repr=False)
+    joints: int = 0
+    welds: int = 0
+
+    def __post_init__(self) -> None:
+        for name in ("copies", "masses", "files"):
+            object.__setattr__(self, name, MappingProxyType(dict(getattr(self, name))))
+
+    @property
+    def factory(self) -> Factory:
+        """The factory the model is of."""
+        return self.layout.factory
+
+    @cached_property
+    def bodies(self) -> int:
+        """How many bodies of parts there are."""
+        return sum(self.copies.values())
+
+
+def part_copies(pool: Mapping[str, int], units: int | None, wip: int | None = None) -> dict[str, int]:
+    """Bodies of each part: the pool and one shown at the feeder, or the units asked for if less."""
+    copies = {}
+    for label, most in pool.items():
+        inside = min(most, wip) if wip else most
+        copies[label] = inside + 1 if units is None else max(1, min(inside + 1, units))
+    return copies
+
+
+def build_model(
+    layout: Layout, catalogue: Catalogue, copies: Mapping[str, int], settings: Settings
+) -> Model:
+    """The model of a laid-out factory. Raises InputError where the MJCF of a robot type is unusable."""
+    factory, product = layout.factory, layout.product
+    masses = {
+        label: sum(product.solids[part].mass for part in parts)
+        for label, parts in factory.contents.items()
+    }
+    drives = tuple(_drive(factory, robot.index, masses, settings) for robot in factory.robots)
+    root = Element("mujoco", {"model": product_name(factory)})
+    add(root, "compiler", angle="radian", autolimits=True, meshdir="meshes")
+    _options(root, settings, sum(copies.values()) + len(factory.robots))
+    add_visuals(root, layout)
+    defaults = _defaults(root)
+    asset = add(root, "asset")
+    add_assets(asset)
+    files = add_meshes(asset, product)
+    world = add(root, "worldbody")
+    add_scene(world, layout, settings.outfeed)
+    equality, actuator = Element("equality"), Element("actuator")
+    _robots(layout, catalogue, drives, defaults, asset, world, actuator)
+    add_parts(world, layout, copies)
+    _welds(equality, layout, copies)
+    root.extend([equality, actuator])
+    ElementTree.indent(root)
+    xml = ElementTree.tostring(root, encoding="unicode") + "\n"
+    joints = len(factory.robots) + sum(copies.values())
+    return Model(
+        layout, settings, copies, masses, drives, xml, files, joints, len(equality)
+    )
+
+
+def product_name(factory: Factory) -> str:
+    """The name of the model: that of the PAG file, without folder and ending."""
+    return Path(factory.pag.file).stem or "factory"
+
+
+def write_model(model: Model, path: Path) -> list[Path]:
+    """Writes the XML and, beside it, its mesh folder `NAME_meshes`; both or nothing. Gives the files."""
+    folder = path.with_name(f"{path.stem}_meshes")
+    xml = model.xml.replace('meshdir="meshes"', f'meshdir="{folder.name}"', 1)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    if model.files:
+        folder.mkdir(exist_ok=True)
+    written = []
+    for name, content in model.files.items():
+        written.append(folder / name)
+        _replace(folder / name, content)
+    _replace(path, xml.encode())
+    return [path, *written]
+
+
+def _replace(path: Path, content: bytes) -> None:
+    """Writes a file under another name and moves it into place, so that no half of it is ever seen."""
+    partial = path.with_name(f".{path.name}.part")
+    try:
+        partial.write_bytes(content)
+        partial.replace(path)
+    finally:
+        partial.unlink(missing_ok=True)
+
+
+def _drive(factory: Factory, robot: int, masses: Mapping[str, float], settings: Settings) -> Drive:
+    """Gains for the heaviest load a robot carries, critically damped; force for its acceleration."""
+    operations = factory.operations
+    load = max(
+        masses.get(operations[o].after[operations[o].robots.index(robot)], 0.0)
+        for o in factory.robots[robot].operations
+    )
+    mass = CARRIAGE_MASS + load
+    kp, kv = mass * STIFFNESS**2, 2 * mass * STIFFNESS
+    return Drive(round(kp, 3), round(kv, 3), round(settings.force * mass * settings.acceleration + 5, 3))
+
+
+def _options(root: Element, settings: Settings, bodies: int) -> None:
+    option = add(
+        root,
+        "option",
+        timestep=settings.timestep,
+        integrator="implicitfast",
+        cone="elliptic",
+        impratio=1,
+    )
+    add(option, "flag", sleep="enable")
+    add(root, "size", memory=f"{64 + prod((4, bodies, bodies)) // 2**20}M")
+
+
+def _defaults(root: Element) -> Element:
+    default = add(root, "default")
+    add(default, "equality", solref="0.004 1", solimp="0.99 0.999 0.001 0.5 2")
+    part = add(default, "default", class_="part")
+    add(part, "geom", contype=2, conaffinity=number(2 ** (BITS + 1) - 1 - 2), condim=3,
+        friction="0.6 0.005 0.0001", group=0)
+    station = add(default, "default", class_="station")
+    add(station, "geom", contype=1, conaffinity=1, group=0)
+    shown = add(default, "default", class_="shown")
+    add(shown, "geom", contype=0, conaffinity=0, mass=0, group=1)
+    return default
+
+
+def _robots(
+    layout: Layout,
+    catalogue: Catalogue,
+    drives: tuple[Drive, ...],
+    defaults: Element,
+    asset: Element,
+    world: Element,
+    actuator: Element,
+) -> None:
+    factory, product = layout.factory, layout.product
+    models = {}
+    for robot, path, drive in zip(factory.robots, layout.guidepaths, drives, strict=True):
+        if robot.type not in models:
+            model = models[robot.type] = load_robot_model(catalogue[robot.type])
+            defaults.append(model.defaults)
+            asset.extend(model.assets)
+        carried = _delivered(factory, robot.index)
+        parts = factory.contents[carried] if carried else ()
+        low = min((float(product.solids[p].low[2]) for p in parts), default=float(product.low[2]))
+        body, actuators = instantiate(
+            models[robot.type], robot.name, path, drive, low - float(product.low[2])
+        )
+        if robot.index == 0:
+            add_follower(body, layout)
+        world.append(body)
+        actuator.extend(actuators)
+
+
+def _delivered(factory: Factory, robot: int) -> str:
+    """The label a robot carries to its A end, "" for a tool."""
+    operation = factory.operations[factory.robots[robot].operations[-1]]
+    label = operation.before[operation.robots.index(robot)]
+    return label if label in factory.contents else ""
+
+
+def _welds(equality: Element, layout: Layout, copies: Mapping[str, int]) -> None:
+    """Grips, feeders, parking places, and the star that holds a finished product together."""
+    factory, product = layout.factory, layout.product
+    for robot, path in zip(factory.robots, layout.guidepaths, strict=True):
+        w, _, _, z = heading_quaternion(path)
+        label = _delivered(factory, robot.index)
+        for part in factory.contents[label] if label else ():
+            pose = (*grip_position(layout, robot.index, part), w, 0, 0, -z)
+            _weld(equality, names.grip(robot.name, part), names.carriage(robot.name), names.part(part, 1), pose)
+    for operation in factory.leaves:
+        part = operation.label
+        path = layout.guidepaths[operation.carrier]
+        w, _, _, z = heading_quaternion(path)
+        offset = place_in(product, part, (0.0, 0.0))
+        pose = (*_turned(offset, path.heading), w, 0, 0, -z)
+        _weld(equality, names.feed(part), names.feeder(part), names.part(part, 1), pose, True)
+        for n in range(1, copies[part] + 1):
+            at = (*parked_at(layout, part, n), 1, 0, 0, 0)
+            _weld(equality, names.park(part, n), "world", names.part(part, n), at, n > 1)
+    first, *others = factory.contents[factory.pag.root]
+    base = product.solids[first].centre
+    for part in others:
+        offset = tuple(float(v) for v in product.solids[part].centre - base)
+        for n in range(1, copies[part] + 1):
+            body1, body2 = names.part(first, 1), names.part(part, n)
+            _weld(equality, names.hold(part, n), body1, body2, (*offset, 1, 0, 0, 0))
+
+
+def grip_position(layout: Layout, robot: int, part: str) -> tuple[float, float, float]:
+    """Where a robot holds a part's centre of mass, in the frame of its carriage [m]."""
+    path = layout.guidepaths[robot]
+    at = path.middle(0.0)
+    foot = path.carriage(0.0)
+    x, y, z = place_in(layout.product, part, (at[0] - foot[0], at[1] - foot[1]))
+    return _turned((x, y, z), path.heading)
+
+
+def _turned(v: tuple[float, float, float], heading: tuple[float, float]) -> tuple[float, float, float]:
+    """A vector of the world in a frame whose x is the heading."""
+    u, w = heading
+    return (v[0] * u + v[1] * w, -v[0] * w + v[1] * u, v[2])
+
+
+def _weld(
+    equality: Element,
+    name: str,
+    body1: str,
+    body2: str,
+    pose: tuple[float, ...],
+    active: bool = False,
+) -> None:
+    add(equality, "weld", name=name, body1=body1, body2=body2, relpose=numbers(pose), active=active)
+
+
+__all__ = ["PAYLOAD", "Model", "build_model", "feeder_middle", "part_copies", "write_model"]

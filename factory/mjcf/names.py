@@ -1,0 +1,64 @@
+"""The names in a model, made and read in one place: they carry meaning, parts by `/`."""
+
+from __future__ import annotations
+
+
+def carriage(robot: str) -> str:
+    """The body of a robot, `r3/carriage`."""
+    return f"{robot}/carriage"
+
+
+def slide(robot: str) -> str:
+    """The joint of a robot along its guidepath, `r3/slide`."""
+    return f"{robot}/slide"
+
+
+def drive(robot: str) -> str:
+    """The actuator of a robot, `r3/drive`."""
+    return f"{robot}/drive"
+
+
+def copy(label: str, number: int) -> str:
+    """The name of a part's copy, counted from 1: `part1#2`."""
+    return f"{label}#{number}"
+
+
+def part(label: str, number: int) -> str:
+    """The body of a part's copy, `part/part1#2`."""
+    return f"part/{copy(label, number)}"
+
+
+def grip(robot: str, label: str) -> str:
+    """The weld by which a robot holds a part, `grip/r3/part1`; it is aimed at the copy it holds."""
+    return f"grip/{robot}/{label}"
+
+
+def feed(label: str) -> str:
+    """The weld by which a feeder presents a part, `feed/part1`."""
+    return f"feed/{label}"
+
+
+def feeder(label: str) -> str:
+    """The static body of a feeder, `feeder/part1`."""
+    return f"feeder/{label}"
+
+
+def hold(label: str, number: int) -> str:
+    """The weld that joins a copy to the product's first part once nobody carries it, `hold/part2#1`."""
+    return f"hold/{copy(label, number)}"
+
+
+def park(label: str, number: int) -> str:
+    """The weld that keeps a spare copy out of sight, `park/part1#3`."""
+    return f"park/{copy(label, number)}"
+
+
+def kind(name: str) -> str:
+    """`part` for a part's body, `robot` for a robot's, else the first word of the name."""
+    head = name.partition("/")[0]
+    return "robot" if head[:1] == "r" and head[1:].isdigit() else head
+
+
+def label_of(name: str) -> str:
+    """The label in a part's body name, `part/part1#2` -> `part1`."""
+    return name.partition("/")[2].rpartition("#")[0]

@@ -1,0 +1,113 @@
+"""Parts as MJCF: free bodies with explicit mass and inertia, whose origin is their centre of mass."""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Mapping
+from xml.etree.ElementTree import Element
+
+import numpy as np
+
+from factory.geometry import Array, Mesh, Product, Solid
+from factory.layout.dimensions import PAYLOAD
+from factory.layout.plan import Layout, Point2
+from factory.mjcf.elements import add, exact, numbers
+from factory.mjcf.names import copy, part
+
+PARKED = -0.6
+"""Height at which the first spare copy of a part is kept, under the floor [m]."""
+
+
+def place_in(product: Product, label: str, middle: Point2) -> tuple[float, float, float]:
+    """Where a part's centre of mass is when the product's middle is there, z0 under its lowest point."""
+    centre = product.solids[label].centre
+    x, y, _ = product.middle
+    return (
+        float(middle[0] + centre[0] - x),
+        float(middle[1] + centre[1] - y),
+        float(PAYLOAD + centre[2] - product.low[2]),
+    )
+
+
+def feeder_middle(layout: Layout, label: str) -> Point2:
+    """The product's middle for a robot at the feeder of a part."""
+    operation = layout.factory.by_label[label]
+    path = layout.guidepaths[operation.carrier]
+    return path.middle(layout.goal(operation.index, operation.template.carrier - 1))
+
+
+def parked_at(layout: Layout, label: str, number: int) -> tuple[float, float, float]:
+    """Where a spare copy is kept: under its feeder, out of sight."""
+    x, y = feeder_middle(layout, label)
+    return x, y, PARKED - 0.4 * (number - 1)
+
+
+def add_parts(world: Element, layout: Layout, copies: Mapping[str, int]) -> None:
+    """All copies of all parts; the first of each in its feeder, the others parked."""
+    for operation in layout.factory.leaves:
+        label = operation.label
+        solid = layout.product.solids[label]
+        home = place_in(layout.product, label, feeder_middle(layout, label))
+        for number in range(1, copies[label] + 1):
+            at = home if number == 1 else parked_at(layout, label, number)
+            _add_part(world, solid, number, at)
+
+
+def _add_part(world: Element, solid: Solid, number: int, at: tuple[float, float, float]) -> None:
+    name = part(solid.label, number)
+    body = add(world, "body", name=name, pos=at)
+    add(body, "freejoint", name=name)
+    i = solid.inertia
+    add(
+        body,
+        "inertial",
+        pos="0 0 0",
+        mass=exact([solid.mass]),
+        fullinertia=exact([i[0, 0], i[1, 1], i[2, 2], i[0, 1], i[0, 2], i[1, 2]]),
+    )
+    add(
+        body,
+        "geom",
+        name=name,
+        class_="part",
+        type=solid.kind,
+        mesh=f"mesh/{solid.mesh.name}" if solid.mesh else None,
+        size=None if solid.mesh else solid.size,
+        pos=numbers(solid.position - solid.centre),
+        quat=numbers(solid.quaternion),
+        rgba=solid.rgba,
+        contype=None if number == 1 else 0,
+        conaffinity=None if number == 1 else 0,
+    )
+
+
+def add_meshes(asset: Element, product: Product) -> dict[str, bytes]:
+    """The meshes as assets, and the content of their files by name."""
+    files: dict[str, bytes] = {}
+    for mesh in used_meshes(product):
+        file = f"{mesh.name}.stl"
+        add(asset, "mesh", name=f"mesh/{mesh.name}", file=file)
+        files[file] = stl(mesh)
+    return files
+
+
+def used_meshes(product: Product) -> list[Mesh]:
+    """Each mesh once, in the order in which the parts use them."""
+    found = {s.mesh.name: s.mesh for s in product.solids.values() if s.mesh is not None}
+    return list(found.values())
+
+
+def stl(mesh: Mesh) -> bytes:
+    """A mesh as a binary STL file."""
+    corners: Array = mesh.vertices[mesh.faces]
+    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    length = np.linalg.norm(normal, axis=1, keepdims=True)
+    normal = np.divide(normal, length, out=np.zeros_like(normal), where=length > 0)
+    record = np.zeros(
+        len(corners), dtype=[("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("spare", "<u2")]
+    )
+    record["normal"], record["corners"] = normal, corners
+    return b"\0" * 80 + struct.pack("<I", len(corners)) + record.tobytes()
+
+
+__all__ = ["add_meshes", "add_parts", "copy", "feeder_middle", "parked_at", "place_in"]

@@ -1,0 +1,137 @@
+"""Robots as MJCF: the file of a type, instantiated for each robot and stretched to its payload."""
+
+from __future__ import annotations
+
+from copy import deepcopy
+from dataclasses import dataclass, field
+from pathlib import Path
+from xml.etree import ElementTree
+from xml.etree.ElementTree import Element
+
+from factory.errors import Diagnostic, InputError, Position
+from factory.layout.dimensions import FINGER_TOP, PAYLOAD
+from factory.layout.plan import Guidepath
+from factory.mjcf.elements import number, numbers
+from factory.mjcf.names import carriage
+from factory.robots import RobotType
+
+
+@dataclass(frozen=True, slots=True)
+class RobotModel:
+    """The MJCF file of a robot type, taken apart: body, actuators, and the shared defaults and assets,
+    whose names are prefixed by the type's."""
+
+    name: str
+    body: Element = field(repr=False)
+    actuators: tuple[Element, ...] = field(repr=False)
+    defaults: Element = field(repr=False)
+    assets: tuple[Element, ...] = field(repr=False)
+
+
+@dataclass(frozen=True, slots=True)
+class Drive:
+    """Gains and limit of a robot's actuator: kp [N/m], kv [N s/m], force [N]."""
+
+    kp: float
+    kv: float
+    force: float
+
+
+def load_robot_model(robot: RobotType) -> RobotModel:
+    """Reads the file of a type. Raises InputError (BadTemplate) where it is no MJCF of one robot."""
+    path = Path(robot.mjcf)
+    try:
+        root = ElementTree.parse(path).getroot()
+        body = root.findall("worldbody/body")[0]
+        actuators = tuple(root.findall("actuator/*"))
+        if not actuators:
+            raise ValueError("no actuator")
+    except (OSError, ElementTree.ParseError, IndexError, ValueError) as error:
+        message = f"the file of robot type '{robot.name}' is unusable: {error or 'it has no body'}"
+        hint = "it needs one body with a joint `slide` and an actuator `drive`, like dot.xml"
+        raise InputError(Diagnostic("BadTemplate", message, Position(str(path), 1, 1), hint)) from error
+    defaults = Element("default", {"class": robot.name})
+    for child in root.findall("default/*"):
+        defaults.append(_prefixed(child, robot.name, names=False))
+    assets = tuple(_prefixed(a, robot.name, names=True) for a in root.findall("asset/*"))
+    return RobotModel(robot.name, body, actuators, defaults, assets)
+
+
+def _prefixed(element: Element, prefix: str, names: bool) -> Element:
+    """A copy in which references to classes and assets are prefixed, and names too if wanted."""
+    copy = deepcopy(element)
+    for node in copy.iter():
+        for key in ("class", "childclass", "material", "mesh", "texture"):
+            if key in node.attrib:
+                node.set(key, f"{prefix}/{node.get(key)}")
+        if names and "name" in node.attrib:
+            node.set("name", f"{prefix}/{node.get('name')}")
+    return copy
+
+
+def instantiate(
+    model: RobotModel, robot: str, path: Guidepath, drive: Drive, lift: float
+) -> tuple[Element, list[Element]]:
+    """The body of one robot at its B end and its actuators.
+
+    `lift`: how far above z0 the payload's own lowest point is; the finger's pin reaches up to it [m].
+    """
+    body = _prefixed(model.body, model.name, names=False)
+    for node in body.iter():
+        if "name" in node.attrib:
+            node.set("name", f"{robot}/{node.get('name')}")
+    body.set("name", carriage(robot))
+    x, y = path.carriage(path.length)
+    body.set("pos", numbers((x, y, 0)))
+    body.set("quat", numbers(heading_quaternion(path)))
+    body.set("sleep", "allowed")
+    _stretch(body, path, lift)
+    joint = next(j for j in body.iter("joint") if j.get("name") == f"{robot}/slide")
+    joint.set("ref", number(path.length))
+    actuators = []
+    for actuator in model.actuators:
+        copy = _prefixed(actuator, model.name, names=False)
+        copy.set("name", f"{robot}/{actuator.get('name')}")
+        copy.set("joint", f"{robot}/{actuator.get('joint')}")
+        if actuator.get("name") == "drive":
+            copy.set("kp", number(drive.kp))
+            copy.set("kv", number(drive.kv))
+            copy.set("forcerange", numbers((-drive.force, drive.force)))
+        actuators.append(copy)
+    return body, actuators
+
+
+def heading_quaternion(path: Guidepath) -> tuple[float, float, float, float]:
+    """The orientation of a robot: its local x is the heading, one of four world directions."""
+    half = 0.5**0.5
+    east = {(1, 0): (1.0, 0.0), (0, 1): (half, half), (-1, 0): (0.0, 1.0), (0, -1): (half, -half)}
+    w, z = east[round(path.heading[0]), round(path.heading[1])]
+    return (w, 0.0, 0.0, z)
+
+
+def _stretch(body: Element, path: Guidepath, lift: float) -> None:
+    """Arm to the rim, finger to the nest, pin up to the payload."""
+    rim = path.reach - path.arm
+    nest = max(path.reach + path.nest, rim + 0.01)
+    for geom in body.iter("geom"):
+        kind = (geom.get("name") or "").rpartition("/")[2]
+        if kind.startswith("arm"):
+            _span(geom, 0.0, rim)
+        elif kind.startswith("finger"):
+            _span(geom, rim - 0.01, nest)
+        elif kind.startswith("pin"):
+            top = PAYLOAD + lift - 1e-4
+            radius = (geom.get("size") or "0.006").split()[0]
+            geom.set("size", f"{radius} {number(max(top - FINGER_TOP, 1e-3) / 2)}")
+            geom.set("pos", numbers((nest, 0, (top + FINGER_TOP) / 2)))
+    for site in body.iter("site"):
+        if (site.get("name") or "").endswith("/nest"):
+            site.set("pos", numbers((nest, 0, PAYLOAD)))
+
+
+def _span(geom: Element, start: float, end: float) -> None:
+    """Make a box reach from start to end along the local x."""
+    _, y, z = (float(v) for v in (geom.get("pos") or "0 0 0").split())
+    half = [float(v) for v in (geom.get("size") or "1 1 1").split()]
+    geom.set("pos", numbers(((start + end) / 2, y, z)))
+    geom.set("size", numbers(((end - start) / 2, half[1], half[2])))

@@ -1,0 +1,189 @@
+"""The scene: floor, light, cameras, guidepaths, feeders and the outfeed. Nothing here moves by itself."""
+
+from __future__ import annotations
+
+from math import cos, radians, sin, tan
+from xml.etree.ElementTree import Element
+
+from factory.layout.dimensions import (
+    BELT_GAP,
+    CARRIAGE,
+    FINGER_TOP,
+    PAYLOAD,
+    POST,
+)
+from factory.layout.plan import Layout
+from factory.mjcf.elements import add, numbers
+from factory.mjcf.names import carriage, feeder
+from factory.mjcf.parts import feeder_middle
+from factory.mjcf.robots import heading_quaternion
+
+VIEW = 32.0
+"""Vertical field of view of the cameras [degrees]: narrow, for a calm perspective."""
+
+SHED = (0.22, 0.25, 0.30, 1.0)
+
+
+def add_visuals(root: Element, layout: Layout) -> None:
+    """Sky, haze and the quality of light."""
+    visual = add(root, "visual")
+    add(visual, "headlight", ambient="0.32 0.32 0.32", diffuse="0.22 0.22 0.22", specular="0 0 0")
+    add(visual, "quality", shadowsize=4096, offsamples=4)
+    add(visual, "map", znear=0.02, zfar=60, shadowclip=1.0)
+    add(visual, "global", offwidth=1920, offheight=1080, fovy=VIEW)
+    x, y = _centre(layout)
+    size = _radius(layout)
+    add(root, "statistic", center=(x, y, 0.1), extent=size)
+
+
+def add_assets(asset: Element) -> None:
+    """The materials of the hall."""
+    add(asset, "texture", name="sky", type="skybox", builtin="gradient",
+        rgb1="0.93 0.95 0.97", rgb2="0.72 0.78 0.85", width=64, height=384)
+    add(asset, "texture", name="floor", type="2d", builtin="checker", mark="edge",
+        rgb1="0.80 0.81 0.82", rgb2="0.78 0.79 0.80", markrgb="0.72 0.73 0.74",
+        width=256, height=256)
+    add(asset, "material", name="floor", texture="floor", texuniform="true", texrepeat="2 2",
+        reflectance=0.04, specular=0.1, shininess=0.1)
+    add(asset, "material", name="rail", rgba="0.42 0.45 0.49 1", specular=0.5, shininess=0.5)
+    add(asset, "material", name="post", rgba="0.93 0.72 0.16 1", specular=0.3, shininess=0.3)
+    add(asset, "material", name="belt", rgba="0.13 0.14 0.16 1", specular=0.1, shininess=0.1)
+    add(asset, "material", name="frame", rgba="0.62 0.65 0.69 1", specular=0.5, shininess=0.6)
+
+
+def add_scene(world: Element, layout: Layout, outfeed_speed: float) -> None:
+    """Everything that stands still."""
+    _floor_and_light(world, layout)
+    _cameras(world, layout)
+    for robot, path in zip(layout.factory.robots, layout.guidepaths, strict=True):
+        a, b = path.carriage(path.reach), path.carriage(path.length)
+        middle = ((a[0] + b[0]) / 2, (a[1] + b[1]) / 2, 0.004)
+        half = path.travel / 2 + CARRIAGE / 2
+        add(world, "geom", name=f"{robot.name}/rail", class_="shown", type="box",
+            pos=middle, quat=heading_quaternion(path), size=(half, 0.010, 0.004), material="rail")
+    for operation in layout.factory.leaves:
+        _feeder(world, layout, operation.label)
+    _outfeed(world, layout, outfeed_speed)
+
+
+def _centre(layout: Layout) -> tuple[float, float]:
+    xlo, xhi, ylo, yhi = layout.floor
+    return (xlo + xhi) / 2, (ylo + yhi) / 2
+
+
+def _radius(layout: Layout) -> float:
+    xlo, xhi, ylo, yhi = layout.floor
+    return 0.5 * ((xhi - xlo) ** 2 + (yhi - ylo) ** 2) ** 0.5
+
+
+def _floor_and_light(world: Element, layout: Layout) -> None:
+    x, y = _centre(layout)
+    radius = _radius(layout)
+    add(world, "geom", name="floor", type="plane", size=(radius * 20, radius * 20, 0.1),
+        material="floor", contype=1, conaffinity=1)
+    key = (0.42, 0.30, -0.86)
+    add(world, "light", name="key", type="directional", castshadow=True, dir=key,
+        pos=(x - key[0] * 3 * radius, y - key[1] * 3 * radius, -key[2] * 3 * radius),
+        diffuse="0.62 0.60 0.56", specular="0.25 0.25 0.25")
+    fill = (-0.55, -0.35, -0.75)
+    add(world, "light", name="fill", type="directional", castshadow=False, dir=fill,
+        pos=(x - fill[0] * 3 * radius, y - fill[1] * 3 * radius, -fill[2] * 3 * radius),
+        diffuse="0.18 0.19 0.22", specular="0 0 0")
+
+
+def _cameras(world: Element, layout: Layout) -> None:
+    x, y = _centre(layout)
+    distance = look_distance(layout, 16 / 9)
+    up, around = radians(42), radians(-62)
+    offset = (distance * cos(up) * cos(around), distance * cos(up) * sin(around), distance * sin(up))
+    right = (-sin(around), cos(around), 0.0)
+    above = (-sin(up) * cos(around), -sin(up) * sin(around), cos(up))
+    add(world, "camera", name="overview", pos=(x + offset[0], y + offset[1], 0.05 + offset[2]),
+        xyaxes=numbers((*right, *above)), fovy=VIEW)
+    xlo, xhi, ylo, yhi = layout.floor
+    tall = max(yhi - ylo, (xhi - xlo) * 9 / 16) * 1.12 + 0.2
+    add(world, "camera", name="top", pos=(x, y, tall / 2 / tan(radians(VIEW / 2))),
+        xyaxes="1 0 0 0 1 0", fovy=VIEW)
+
+
+def look_distance(layout: Layout, aspect: float) -> float:
+    """How far the overview camera stands so that the floor fills the picture [m]."""
+    xlo, xhi, ylo, yhi = layout.floor
+    up, around = radians(42), radians(-62)
+    wide = abs((xhi - xlo) * sin(around)) + abs((yhi - ylo) * cos(around))
+    deep = abs((xhi - xlo) * cos(around)) + abs((yhi - ylo) * sin(around))
+    tall = deep * sin(up) + 0.25 * cos(up)
+    half = tan(radians(VIEW / 2))
+    return max(tall / 2 / half, wide / 2 / half / aspect) * 1.04 + deep / 2 * cos(up) * 0.8
+
+
+def add_follower(body: Element, layout: Layout) -> None:
+    """The camera `product`, which rides with the output robot and looks at its nest."""
+    size = float(max(layout.product.high - layout.product.low)) + 0.1
+    distance = 2.2 * size + 0.15
+    up, around = radians(32), radians(-125)
+    nest = layout.guidepaths[0].reach
+    pos = (nest + distance * cos(up) * cos(around), distance * cos(up) * sin(around),
+           PAYLOAD + 0.3 * size + distance * sin(up))
+    right = (-sin(around), cos(around), 0.0)
+    above = (-sin(up) * cos(around), -sin(up) * sin(around), cos(up))
+    add(body, "camera", name="product", pos=pos, xyaxes=numbers((*right, *above)), fovy=VIEW)
+
+
+def _feeder(world: Element, layout: Layout, label: str) -> None:
+    """A post behind the robot's rear stop and a boom over the place where the part is presented."""
+    operation = layout.factory.by_label[label]
+    path = layout.guidepaths[operation.carrier]
+    solid, product = layout.product.solids[label], layout.product
+    x, y = feeder_middle(layout, label)
+    body = add(world, "body", name=feeder(label), pos=(x, y, 0.0), quat=heading_quaternion(path))
+    across = path.offset * _handedness(path.heading, path.side)
+    back = -path.reach - CARRIAGE / 2 - layout.clearance - POST / 2
+    top = PAYLOAD + float(solid.high[2] - product.low[2]) + layout.clearance
+    beam = 0.014
+    add(body, "geom", name=f"{feeder(label)}/post", class_="station", type="box",
+        pos=(back, across, (top + beam) / 2), size=(POST / 2, POST / 2, (top + beam) / 2),
+        material="post")
+    ahead = path.nest
+    add(body, "geom", name=f"{feeder(label)}/boom", class_="station", type="box",
+        pos=((back + ahead) / 2, across, top + beam / 2),
+        size=((ahead - back) / 2, 0.008, beam / 2), material="post")
+    add(body, "geom", name=f"{feeder(label)}/head", class_="shown", type="cylinder",
+        pos=(ahead, across, top + beam / 2), size=(0.016, beam / 2 + 0.003), rgba=solid.rgba)
+
+
+def _handedness(u: tuple[float, float], t: tuple[float, float]) -> int:
+    """+1 where the side t is to the left of the heading u, else -1."""
+    return 1 if u[0] * t[1] - u[1] * t[0] > 0 else -1
+
+
+def _outfeed(world: Element, layout: Layout, speed: float) -> None:
+    """A conveyor under the product at the output robot's A end, into a shed."""
+    xlo, xhi, ylo, yhi = layout.outfeed
+    top, thick = PAYLOAD - BELT_GAP, (PAYLOAD - BELT_GAP - FINGER_TOP) * 0.8
+    middle, half = ((xlo + xhi) / 2, (ylo + yhi) / 2), ((xhi - xlo) / 2, (yhi - ylo) / 2)
+    body = add(world, "body", name="outfeed", pos=(middle[0], middle[1], 0.0))
+    add(body, "geom", name="outfeed/belt", class_="station", type="box", priority=1,
+        pos=(0, 0, top - thick / 2), size=(half[0], half[1], thick / 2), material="belt",
+        friction="0.8 0.005 0.0001", surfacevel=(speed, 0, 0, 0, 0, 0))
+    tall = float(layout.product.high[2] - layout.product.low[2])
+    length = layout.product_length + 0.1
+    shed = half[0] - length / 2
+    for side in (-1, 1):
+        add(body, "geom", name=f"outfeed/side{side}", class_="shown", type="box",
+            pos=(0, side * (half[1] + 0.006), top - 0.012), size=(half[0], 0.006, 0.016),
+            material="frame")
+        for end in (-1, 1):
+            add(body, "geom", name=f"outfeed/leg{side}{end}", class_="shown", type="box",
+                pos=(end * (half[0] - 0.03), side * (half[1] + 0.006), (top - 0.02) / 2),
+                size=(0.008, 0.006, (top - 0.02) / 2), material="frame")
+        add(body, "geom", name=f"outfeed/wall{side}", class_="shown", type="box",
+            pos=(shed, side * (half[1] + 0.004), top + tall / 2),
+            size=(length / 2, 0.004, tall / 2 + 0.03), rgba=SHED)
+    add(body, "geom", name="outfeed/roof", class_="shown", type="box",
+        pos=(shed, 0, top + tall + 0.032), size=(length / 2, half[1] + 0.008, 0.004), rgba=SHED)
+    add(body, "geom", name="outfeed/back", class_="shown", type="box",
+        pos=(half[0], 0, top + tall / 2), size=(0.004, half[1] + 0.008, tall / 2 + 0.03), rgba=SHED)
+
+
+__all__ = ["add_assets", "add_follower", "add_scene", "add_visuals", "carriage", "look_distance"]

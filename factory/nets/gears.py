@@ -1,0 +1,49 @@
+"""Gears and gear nets: Definitions 3.5 and 3.6, as values. `factory.nets.verify` checks them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property
+
+from factory.nets.petri import Marking
+from factory.nets.threaded import Slot, ThreadedMarking, ThreadedNet
+
+
+@dataclass(frozen=True, slots=True)
+class Gear:
+    """The cycle of places and transitions that is one robot's program (Definition 3.5).
+
+    `places[i]` leads from `transitions[i]` to `transitions[i + 1]`, cyclically; the first place is
+    `wait(nopart)`. `robot` is its name, r1, r2, ...; `type` the robot's type.
+    """
+
+    robot: str
+    type: str
+    places: tuple[int, ...]
+    transitions: tuple[int, ...]
+
+
+@dataclass(frozen=True)
+class GearNet:
+    """A threaded net that is claimed to be composed of gears, one for each robot (Definition 3.6).
+
+    `initial` is the marked place of each gear, in the gears' order; slot i of an operation's place
+    belongs to robot `slots[place][i]` (an index into `gears`). A claim only: `verify` proves it.
+    """
+
+    threaded: ThreadedNet
+    gears: tuple[Gear, ...]
+    initial: tuple[int, ...]
+    slots: tuple[tuple[int, ...], ...] = field(repr=False)
+
+    @cached_property
+    def initial_marking(self) -> Marking:
+        """m_0."""
+        return frozenset(self.initial)
+
+    def marking_of(self, marked: Marking) -> ThreadedMarking:
+        """(m, f_m) where every slot holds the robot that owns it."""
+        threads: dict[Slot, int] = {
+            (p, i): robot for p in sorted(marked) for i, robot in enumerate(self.slots[p])
+        }
+        return ThreadedMarking(threads)

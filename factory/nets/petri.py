@@ -1,0 +1,101 @@
+"""Petri nets as the paper defines them (Definition 3.1), with places that have identity.
+
+Transitions and places are numbered by their index in the tuples. The paper's P is a subset of
+2^T x 2^T, which would merge two places of equal pre- and postset (two tools of one operation);
+here they stay two.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from functools import cached_property
+
+from factory.errors import Position
+
+Marking = frozenset[int]
+"""m, a subset of P: the indices of the marked places."""
+
+
+@dataclass(frozen=True, slots=True)
+class Transition:
+    """An element of T: a discrete change of the dynamics. `position` is the user's line."""
+
+    name: str
+    position: Position | None = field(default=None, compare=False)
+
+
+@dataclass(frozen=True, slots=True)
+class Place:
+    """p = [left; right]: the transitions that mark it and those that unmark it.
+
+    `mode` names the controlled dynamics: an operation, `wait` or `hold`; `label` the sub-assembly
+    it is about; `size` is l_p, the number of robots the mode acts on.
+    """
+
+    name: str
+    left: tuple[int, ...]
+    right: tuple[int, ...]
+    mode: str = ""
+    label: str = ""
+    size: int = 1
+    position: Position | None = field(default=None, compare=False)
+
+
+@dataclass(frozen=True)
+class PetriNet:
+    """A Petri net (T, P) (Definition 3.1). It may have choice: nothing here assumes a marked graph."""
+
+    transitions: tuple[Transition, ...]
+    places: tuple[Place, ...]
+
+    @cached_property
+    def preset(self) -> tuple[tuple[int, ...], ...]:
+        """For each transition e the places of its preset, •e."""
+        return self._adjacent("right")
+
+    @cached_property
+    def postset(self) -> tuple[tuple[int, ...], ...]:
+        """For each transition e the places of its postset, e•."""
+        return self._adjacent("left")
+
+    @cached_property
+    def place_index(self) -> dict[str, int]:
+        """Place indices by name."""
+        return {place.name: i for i, place in enumerate(self.places)}
+
+    @cached_property
+    def transition_index(self) -> dict[str, int]:
+        """Transition indices by name."""
+        return {transition.name: i for i, transition in enumerate(self.transitions)}
+
+    def _adjacent(self, side: str) -> tuple[tuple[int, ...], ...]:
+        found: list[list[int]] = [[] for _ in self.transitions]
+        for index, place in enumerate(self.places):
+            for event in getattr(place, side):
+                found[event].append(index)
+        return tuple(tuple(places) for places in found)
+
+    def enabled(self, marking: Marking) -> tuple[int, ...]:
+        """The transitions e with •e inside m and e• outside m (Definition 3.4, condition 1)."""
+        return tuple(e for e in range(len(self.transitions)) if self.is_enabled(e, marking))
+
+    def is_enabled(self, event: int, marking: Marking) -> bool:
+        """Whether •e is inside m and e• outside m (Definition 3.4, condition 1)."""
+        return all(p in marking for p in self.preset[event]) and not any(
+            p in marking for p in self.postset[event]
+        )
+
+    def is_detached(self, events: Iterable[int]) -> bool:
+        """Whether the presets are pairwise disjoint, and the postsets too (section 3.1)."""
+        chosen = tuple(events)
+        before = [p for e in chosen for p in self.preset[e]]
+        after = [p for e in chosen for p in self.postset[e]]
+        return len(before) == len(set(before)) and len(after) == len(set(after))
+
+    def follower(self, marking: Marking, events: Iterable[int]) -> Marking:
+        """m' = (m - •G) ∪ G• for a detached set G of enabled events (section 3.1)."""
+        chosen = tuple(events)
+        before = {p for e in chosen for p in self.preset[e]}
+        after = {p for e in chosen for p in self.postset[e]}
+        return (marking - before) | after

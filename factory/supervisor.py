@@ -1,0 +1,215 @@
+"""The supervisor fires the net over any world (Definitions 3.3 and 3.4).
+
+It knows nothing of physics: a `World` senses positions, moves robots along the field of the active modes,
+and hands parts over when a transition fires. Python runs only for what fires; a waiting robot costs nothing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from factory.control.mode import Array, Index, Limits, Mode
+from factory.control.navigation import Bundle
+from factory.factory import Factory, Operation
+from factory.nets.petri import Marking
+from factory.trace import Event
+
+
+class World(Protocol):
+    """Where a factory runs: the ideal one or MuJoCo."""
+
+    time: float
+
+    def sense(self) -> tuple[Array, Array]:
+        """Positions x (R,) [m] and speeds (R,) [m/s] of all robots, in arc length."""
+
+    def prepared(self, operation: Operation, unit: int) -> bool:
+        """Whether the world is in the domain of an operation's mode as far as parts go: a feeder has a
+        part to give, the outfeed is free."""
+
+    def apply(self, started: Sequence[tuple[Operation, int]], ended: Sequence[tuple[Operation, int]]) -> None:
+        """Operations that start or end now, each with the number of the unit it works on."""
+
+    def step(self, bundle: Bundle | None, robots: Index) -> None:
+        """One tick: the robots of the active modes follow their field, all others stand."""
+
+    def delivered(self) -> int:
+        """Products that have left the factory."""
+
+
+@dataclass(slots=True)
+class _Active:
+    """The modes under way: operations, their bundle, the robots of each slot, and the clocks."""
+
+    operations: tuple[int, ...]
+    bundle: Bundle | None
+    robots: Index
+    clocks: Array
+
+
+class Supervisor:
+    """Runs the gear net of a factory from a legal marking over a world.
+
+    `threads` is f_m: the robot in each slot of a marked place; every firing moves robots by the
+    redistribution functions and asserts that the marking stays legal.
+    """
+
+    REST = 0.01
+    """Robots hand over only when slower than this [m/s]."""
+
+    def __init__(
+        self,
+        factory: Factory,
+        modes: Sequence[Mode],
+        limits: Limits,
+        world: World,
+        tick: float,
+        start: Marking | None = None,
+        counts: dict[int, int] | None = None,
+    ) -> None:
+        self.factory, self.modes, self.limits, self.world, self.tick = factory, modes, limits, world, tick
+        self.net = factory.net.threaded
+        marking = factory.net.initial_marking if start is None else start
+        self.threads = dict(factory.net.marking_of(marking).threads)
+        self.marked = bytearray(len(self.net.places))
+        self.fired = [0] * len(self.net.transitions)
+        for transition, count in (counts or {}).items():
+            self.fired[transition] = count
+        self.missing = [len(places) for places in self.net.net.preset]
+        self.ready: set[int] = set()
+        for place in marking:
+            self._mark(place)
+        self.events: list[Event] = []
+        self.busy = [0.0] * len(factory.robots)
+        self.since: dict[int, float] = {}
+        self.last_event = world.time
+        self.active = _Active((), None, np.empty(0, np.intp), np.empty(0))
+        self._activate(o.index for o in factory.operations if self.marked[o.place])
+
+    def step(self) -> None:
+        """Fire what is enabled as one detached set, then let the world go on for one tick."""
+        started = self._startable()
+        ended = self._finished()
+        if started or ended:
+            self._fire(started, ended)
+        self.world.step(self.active.bundle, self.active.robots)
+
+    def marking(self) -> tuple[str, ...]:
+        """The names of the marked places."""
+        return tuple(p.name for p, m in zip(self.net.places, self.marked, strict=True) if m)
+
+    def _startable(self) -> list[int]:
+        """Operations X with X_s enabled: waits marked (their goals are everything), the robots in the
+        domain of X's mode, and the world prepared."""
+        found = []
+        positions: Array | None = None
+        for event in sorted(self.ready):
+            operation = self.factory.operations[event // 2]
+            if self.marked[operation.place]:
+                continue
+            if not self.world.prepared(operation, self.fired[operation.start]):
+                continue
+            if positions is None:
+                positions = self.world.sense()[0]
+            robots = list(operation.robots)
+            mode = Bundle.of([self.modes[operation.index]], [self._limits(operation)])
+            if mode.in_domain(positions[robots])[0]:
+                found.append(operation.index)
+        return found
+
+    def _finished(self) -> list[int]:
+        """Operations X with X_e enabled: robots in the goal ball, at rest, and the clock run out."""
+        active = self.active
+        if active.bundle is None:
+            return []
+        x, v = self.world.sense()
+        x, v = x[active.robots], v[active.robots]
+        active.clocks = active.bundle.tick(active.clocks, x, self.tick)
+        done = active.bundle.finished(x, active.clocks)
+        if not done.any():
+            return []
+        still = np.logical_and.reduceat(np.abs(v) < self.REST, active.bundle.starts)
+        return [o for o, ends in zip(active.operations, done & still, strict=True) if ends]
+
+    def _fire(self, started: list[int], ended: list[int]) -> None:
+        operations = self.factory.operations
+        events = [operations[o].start for o in started] + [operations[o].end for o in ended]
+        if not self.net.net.is_detached(events):
+            raise AssertionError("the enabled transitions are not a detached set")
+        starts = [(operations[o], self.fired[operations[o].start]) for o in started]
+        ends = [(operations[o], self.fired[operations[o].end]) for o in ended]
+        for event in events:
+            self._redistribute(event)
+            self.events.append(Event(self.world.time, self.net.transitions[event].name))
+        self._account(started, ended)
+        self.world.apply(starts, ends)
+        self._activate([o for o in self.active.operations if o not in ended] + started)
+        self.last_event = self.world.time
+
+    def _redistribute(self, event: int) -> None:
+        """m' = (m - •e) ∪ e•, f_m' = f_m ∘ d_e^-1; asserts that it is legal again."""
+        net = self.net.net
+        if not net.is_enabled(event, self._near(event)):
+            raise AssertionError(f"{self.net.transitions[event].name} fires but is not enabled")
+        for place in net.preset[event]:
+            self._unmark(place)
+        moved = [(self.threads.pop(b), after) for b, after in self.net.redistribution[event]]
+        for robot, after in moved:
+            if after in self.threads:
+                raise AssertionError(f"two robots in one slot of {net.places[after[0]].name}")
+            self.threads[after] = robot
+        for place in net.postset[event]:
+            self._mark(place)
+        self.fired[event] += 1
+        if len(self.threads) != len(self.factory.robots):
+            raise AssertionError("the marking is not legal: some robot is in no mode")
+
+    def _near(self, event: int) -> frozenset[int]:
+        """The marked places among the pre- and postset of an event."""
+        net = self.net.net
+        return frozenset(p for p in (*net.preset[event], *net.postset[event]) if self.marked[p])
+
+    def _mark(self, place: int) -> None:
+        self.marked[place] = 1
+        for event in self.net.places[place].right:
+            self.missing[event] -= 1
+            if self.missing[event] == 0 and event % 2 == 0:
+                self.ready.add(event)
+
+    def _unmark(self, place: int) -> None:
+        self.marked[place] = 0
+        for event in self.net.places[place].right:
+            self.missing[event] += 1
+            self.ready.discard(event)
+
+    def _account(self, started: Iterable[int], ended: Iterable[int]) -> None:
+        now = self.world.time
+        for number in started:
+            self.since[number] = now
+        for number in ended:
+            spent = now - self.since.pop(number, 0.0)
+            for robot in self.factory.operations[number].robots:
+                self.busy[robot] += spent
+
+    def _activate(self, operations: Iterable[int]) -> None:
+        """Rebuild the bundle of active modes; clocks of those that go on are kept."""
+        numbers = tuple(operations)
+        clocks = dict(zip(self.active.operations, self.active.clocks, strict=True))
+        chosen = [self.factory.operations[o] for o in numbers]
+        bundle = (
+            Bundle.of([self.modes[o] for o in numbers], [self._limits(o) for o in chosen])
+            if numbers
+            else None
+        )
+        robots = np.array([r for o in chosen for r in o.robots], np.intp)
+        self.active = _Active(
+            numbers, bundle, robots, np.array([clocks.get(o, 0.0) for o in numbers])
+        )
+
+    def _limits(self, operation: Operation) -> Limits:
+        robots = list(operation.robots)
+        return Limits(self.limits.speed[robots], self.limits.acceleration[robots])

@@ -1,0 +1,84 @@
+"""Operation templates O = (R, j, ~, <a; b>, F): Definition 4.1, as values.
+
+The text of a template is read by `factory.lang.read_template`; the shipped ones lie in
+`templates/`, one file each.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from factory.errors import Position
+from factory.pag import NOPART, Value
+
+
+@dataclass(frozen=True, slots=True)
+class Point:
+    """A point of robot i's guidepath [A_i, B_i]: `end` + `multiple` * r_i, e.g. A1 + 2r.
+
+    `robot` counts from 1 as in the paper; `end` is A, B or S, an interior station.
+    """
+
+    end: str
+    robot: int
+    multiple: float = 0.0
+    position: Position | None = field(default=None, compare=False)
+
+    def __str__(self) -> str:
+        if not self.multiple:
+            return f"{self.end}{self.robot}"
+        sign = "+" if self.multiple > 0 else "-"
+        return f"{self.end}{self.robot} {sign} {abs(self.multiple):g}r"
+
+
+@dataclass(frozen=True, slots=True)
+class Law:
+    """F: the name of a control law, its goal point for each robot, the goal ball's radius eps
+    (a number [m], or the word `eps` for the factory's own) and a dwell: a number of seconds or
+    the name of a parameter, None without one."""
+
+    name: str
+    goals: tuple[Point, ...]
+    eps: float | str = "eps"
+    dwell: float | str | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Template:
+    """An operation template (Definition 4.1).
+
+    `robots` R: the type of each robot; `carrier` j, from 1; `identifications` ~: classes of points
+    that are one; `before` a and `after` b: the label each robot carries, NOPART or a variable such
+    as LAB1; `law` F; `further`: the template that takes inputs beyond those in a, "" if none does;
+    `parameters`: keyword arguments and their defaults; `geometry`: True where the operation makes a
+    part and takes mesh, pos, box and so on.
+    """
+
+    name: str
+    robots: tuple[str, ...]
+    carrier: int
+    identifications: tuple[tuple[Point, ...], ...]
+    before: tuple[str, ...]
+    after: tuple[str, ...]
+    law: Law
+    further: str = ""
+    parameters: tuple[tuple[str, Value], ...] = ()
+    geometry: bool = False
+    position: Position | None = field(default=None, compare=False)
+    further_position: Position | None = field(default=None, compare=False)
+
+    @property
+    def inputs(self) -> tuple[str, ...]:
+        """The distinct label variables of a, in the order of the robots: the sub-assemblies."""
+        return tuple(dict.fromkeys(label for label in self.before if label != NOPART))
+
+    @property
+    def result(self) -> str:
+        """b_j, the label the carrier holds afterwards; NOPART for dropoff."""
+        return self.after[self.carrier - 1]
+
+    def tools(self) -> tuple[int, ...]:
+        """Indices (from 0) of the robots that bring nothing and are not the carrier."""
+        return tuple(
+            i for i, label in enumerate(self.before) if label == NOPART and i != self.carrier - 1
+        )

@@ -1,0 +1,106 @@
+"""What a run leaves behind: its events and its figures, the same for either world."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from factory.errors import Diagnostic
+
+
+@dataclass(frozen=True, slots=True)
+class Event:
+    """A transition that fired at time t [s]."""
+
+    t: float
+    transition: str
+
+
+@dataclass(frozen=True, slots=True)
+class PhysicsFigures:
+    """What only the engine can tell; see the specification of `run` for each."""
+
+    handoffs: int = 0
+    handoff_gap_max_mm: float = 0.0
+    weld_residual_max_mm: float = 0.0
+    product_error_max_mm: float | None = None
+    unintended_contacts: int = 0
+    engine_warnings: int = 0
+    contacts: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Run:
+    """The record of a run: figures and events. `trouble` is None for a run that reached its end."""
+
+    world: str
+    units: int
+    products: int
+    robots: int
+    sim_time_s: float
+    wall_time_s: float
+    physics_time_s: float
+    supervisor_time_s: float
+    predicted_cycle_time_s: float | None
+    bottleneck: str
+    refines_net: bool
+    events: tuple[Event, ...] = field(repr=False)
+    dropoffs: tuple[float, ...] = field(repr=False)
+    busy: tuple[float, ...] = field(repr=False)
+    physics: PhysicsFigures | None = None
+    seed: int = 0
+    jitter: float = 0.0
+    trouble: Diagnostic | None = None
+
+    @property
+    def realtime_factor(self) -> float:
+        """Simulated seconds per second of the run loop."""
+        return self.sim_time_s / self.wall_time_s if self.wall_time_s else 0.0
+
+    @property
+    def cycle_time_s(self) -> float | None:
+        """Mean interval between dropoffs over the last half of the units; None below 4."""
+        if len(self.dropoffs) < 4:
+            return None
+        start = len(self.dropoffs) // 2
+        last = self.dropoffs[start - 1 :]
+        return (last[-1] - last[0]) / (len(last) - 1)
+
+    @property
+    def utilisation(self) -> tuple[float, ...]:
+        """For each robot the share of the time it was in an operation."""
+        total = self.sim_time_s or 1.0
+        return tuple(b / total for b in self.busy)
+
+    def as_json(self) -> dict[str, object]:
+        """The document that `run --json` prints."""
+        physics = self.physics
+        keys = (
+            "handoffs",
+            "handoff_gap_max_mm",
+            "weld_residual_max_mm",
+            "product_error_max_mm",
+            "unintended_contacts",
+            "engine_warnings",
+        )
+        return {
+            "schema": 1,
+            "world": self.world,
+            "units": self.units,
+            "products": self.products,
+            "robots": self.robots,
+            "seed": self.seed,
+            "jitter": self.jitter,
+            "sim_time_s": round(self.sim_time_s, 6),
+            "wall_time_s": self.wall_time_s,
+            "physics_time_s": self.physics_time_s,
+            "supervisor_time_s": self.supervisor_time_s,
+            "realtime_factor": self.realtime_factor,
+            "cycle_time_s": self.cycle_time_s,
+            "predicted_cycle_time_s": self.predicted_cycle_time_s,
+            "bottleneck": self.bottleneck,
+            "transitions_fired": len(self.events),
+            "refines_net": self.refines_net,
+            **{key: getattr(physics, key) if physics else None for key in keys},
+            "contacts": list(physics.contacts) if physics else None,
+            "events": [{"t": round(e.t, 6), "transition": e.transition} for e in self.events],
+        }

@@ -1,0 +1,55 @@
+"""The ideal world: the paper's DotFactory (section 6). Robots obey ẋ = F_p(x) exactly, parts move with the
+robots that carry them, transfers are instantaneous."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from factory.control.mode import Array, Index
+from factory.control.navigation import Bundle
+from factory.factory import Operation
+
+
+class IdealWorld:
+    """A DotFactory. Asserts that no configuration in Δ occurs: no two robots coupled by a mode touch."""
+
+    def __init__(self, start: Array, dropoff: int, units: int, tick: float, delivered: int = 0) -> None:
+        self.time = 0.0
+        self.x = np.array(start, float)
+        self.v = np.zeros_like(self.x)
+        self.dropoff, self.units, self.tick = dropoff, units, tick
+        self.count = delivered
+        self.dropoffs: list[float] = []
+
+    def sense(self) -> tuple[Array, Array]:
+        """Positions; speeds count as zero, since ẋ = F has no inertia."""
+        return self.x, self.v
+
+    def prepared(self, operation: Operation, unit: int) -> bool:
+        """A feeder gives a part for every unit asked for."""
+        return bool(operation.inputs) or unit < self.units or operation.index == self.dropoff
+
+    def apply(
+        self, started: Sequence[tuple[Operation, int]], ended: Sequence[tuple[Operation, int]]
+    ) -> None:
+        """Parts follow labels; only finished products are counted."""
+        for operation, _ in ended:
+            if operation.index == self.dropoff:
+                self.count += 1
+                self.dropoffs.append(self.time)
+
+    def step(self, bundle: Bundle | None, robots: Index) -> None:
+        """ẋ = F_p(x) for one tick."""
+        if bundle is not None:
+            x = self.x[robots]
+            x = x + bundle.field(x, self.tick) * self.tick
+            if not bundle.in_domain(x).all():
+                raise AssertionError("a configuration in Δ: two robots touch")
+            self.x[robots] = x
+        self.time += self.tick
+
+    def delivered(self) -> int:
+        """Products dropped off."""
+        return self.count

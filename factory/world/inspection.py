@@ -1,0 +1,91 @@
+"""What is measured in the engine while a factory runs: gaps, residuals, contacts, finished products."""
+
+from __future__ import annotations
+
+import mujoco
+import numpy as np
+
+from factory.mjcf.model import Model
+from factory.trace import PhysicsFigures
+from factory.world.stock import Switched
+
+BELT = "outfeed/belt"
+
+
+class Inspection:
+    """Keeps the worst figures of a run. Contacts are looked at after every step of the engine."""
+
+    def __init__(self, m: mujoco.MjModel, d: mujoco.MjData, model: Model) -> None:
+        self.m, self.d, self.model = m, d, model
+        self.belt = m.geom(BELT).id
+        self.handoffs = 0
+        self.gap = self.residual = 0.0
+        self.error: float | None = None
+        self.unintended: list[tuple[str, str]] = []
+        self._touching: frozenset[tuple[int, int]] = frozenset()
+        factory, product = model.factory, model.layout.product
+        self.parts = factory.contents[factory.pag.root]
+        solids = [product.solids[part] for part in self.parts]
+        self._owner = np.repeat(np.arange(len(solids)), [len(s.corners) for s in solids])
+        self._local = np.concatenate([s.corners - s.centre for s in solids])
+        self._nominal = np.concatenate([s.corners for s in solids]) - solids[0].centre
+
+    def handed_over(self, switched: Switched) -> None:
+        """Count a hand-off and keep the largest gap."""
+        self.handoffs += switched.count
+        self.gap = max(self.gap, switched.gap)
+
+    def tick(self) -> None:
+        """Keep the largest residual of the active welds' positions."""
+        rows = self.d.ne
+        if rows:
+            position = self.d.efc_pos[:rows].reshape(-1, 6)[:, :3]
+            self.residual = max(self.residual, float(np.abs(position).max()))
+        if not self.d.ncon:
+            self._touching = frozenset()
+
+    def contacts(self) -> None:
+        """Count the onsets of contacts that nothing intends: all but the product's on the belt."""
+        pairs = self.d.contact.geom[: self.d.ncon]
+        touching = self.d.contact.dist[: self.d.ncon] < 0
+        unintended = touching & ~self._on_belt(pairs)
+        now = frozenset((int(a), int(b)) for a, b in pairs[unintended])
+        for a, b in sorted(now - self._touching):
+            self.unintended.append((self.m.geom(a).name, self.m.geom(b).name))
+        self._touching = now
+
+    def _on_belt(self, pairs: np.ndarray) -> np.ndarray:
+        """Parts may touch the belt."""
+        other = np.where(pairs[:, 0] == self.belt, pairs[:, 1], pairs[:, 0])
+        free = self.m.body_dofnum[self.m.geom_bodyid[other]] == 6
+        return (pairs == self.belt).any(axis=1) & free
+
+    def measure(self, bodies: np.ndarray) -> float:
+        """The largest displacement [m] of any vertex of any part from its place in the product, after
+        a rigid fit on the first part."""
+        turn = self.d.xmat[bodies].reshape(-1, 3, 3)
+        here = np.einsum("nij,nj->ni", turn[self._owner], self._local) + self.d.xpos[bodies][self._owner]
+        fitted = (here - self.d.xpos[bodies[0]]) @ turn[0]
+        return float(np.linalg.norm(fitted - self._nominal, axis=1).max())
+
+    def measured(self, bodies: np.ndarray) -> None:
+        """Keep the error of a finished product."""
+        self.error = max(self.error or 0.0, self.measure(bodies))
+
+    def figures(self) -> PhysicsFigures:
+        """The figures of the run so far."""
+        pairs = dict.fromkeys(f"{a} - {b}" for a, b in self.unintended)
+        return PhysicsFigures(
+            self.handoffs,
+            1e3 * self.gap,
+            1e3 * self.residual,
+            None if self.error is None else 1e3 * self.error,
+            len(self.unintended),
+            int(sum(w.number for w in self.d.warning)),
+            tuple(pairs),
+        )
+
+
+
+
+

@@ -1,0 +1,249 @@
+"""The bodies of parts: which copy is in which unit, who holds it, and the welds that say so."""
+
+from __future__ import annotations
+
+from collections import deque
+
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+
+
+from factory.factory import Operation
+from factory.mjcf import names
+from factory.mjcf.model import BITS, Model
+from factory.mjcf.parts import feeder_middle, parked_at, place_in
+from factory.pag import NOPART
+
+
+@dataclass(frozen=True, slots=True)
+class Switched:
+    """Grips switched by one operation: how many, and the largest gap between the joined frames [m]."""
+
+    count: int
+    gap: float
+
+
+class Stock:
+    """Copies of parts, fed in the order of units: the n-th part of each label is for unit n.
+
+    A weld is aimed at the copy it holds by writing its body at run time; its nominal frame is the same for
+    all copies. Copies of one unit never collide with each other, those of different units do.
+    """
+
+    def __init__(self, m: mujoco.MjModel, d: mujoco.MjData, model: Model, units: int) -> None:
+        self.m, self.d, self.model, self.units = m, d, model, units
+        factory = model.factory
+        self.parts = factory.contents[factory.pag.root]
+        self.first = self.parts[0]
+        self.body = {
+            label: np.array([m.body(names.part(label, n + 1)).id for n in range(count)])
+            for label, count in model.copies.items()
+        }
+        self.grip = self._grips()
+        self.feed = {label: m.equality(names.feed(label)).id for label in self.parts}
+        self.free: dict[str, deque[int]] = {
+            label: deque(range(count)) for label, count in model.copies.items()
+        }
+        self.copy_of: dict[tuple[str, int], int] = {}
+        self.shown: dict[str, int] = {}
+        self.taken: set[str] = set()
+        self.next_unit = dict.fromkeys(self.parts, 0)
+        self.feeds_robot = {o.carrier: o.label for o in factory.leaves}
+        self.on_outfeed: deque[int] = deque()
+        self.left: list[float] = []
+        self.exit_at = self._exit()
+        self._hide_spares()
+        for label in self.parts:
+            self.feed_next(label)
+
+    # --- feeding -------------------------------------------------------------------------------
+
+    def presents(self, label: str, unit: int) -> bool:
+        """Whether the feeder shows the part for that unit."""
+        return self.shown.get(label) == unit
+
+    def feed_next(self, label: str) -> None:
+        """Put the next copy into its empty feeder, if there is one to spare and a unit that needs it,
+        and the robot has delivered the part it took last: until then it may still stand there."""
+        unit = self.next_unit[label]
+        if label in self.taken or label in self.shown or unit >= self.units or not self.free[label]:
+            return
+        copy = self.free[label].popleft()
+        self.copy_of[label, unit] = copy
+        self.shown[label] = unit
+        self.next_unit[label] += 1
+        body = int(self.body[label][copy])
+        middle = feeder_middle(self.model.layout, label)
+        self._place(body, place_in(self.model.layout.product, label, middle))
+        self._mask(body, unit)
+        self._switch(self._park(label, copy), False)
+        self._switch(self.feed[label], True, body)
+
+    # --- handing over --------------------------------------------------------------------------
+
+    def hand_over(self, operation: Operation, unit: int) -> Switched:
+        """Switch the grips that an operation's end asks for; a feeder's too, and at dropoff all of
+        the output robot's against the star that holds the product together."""
+        if not operation.inputs:
+            switched = self._take(operation, unit)
+        elif operation.index == self.model.factory.dropoff.index:
+            switched = self._release(operation, unit)
+        else:
+            switched = self._pass_on(operation, unit)
+        for robot in operation.robots:
+            label = self.feeds_robot.get(robot)
+            if label and operation.after[operation.robots.index(robot)] == NOPART:
+                self.taken.discard(label)
+                self.feed_next(label)
+        return switched
+
+    def _take(self, operation: Operation, unit: int) -> Switched:
+        label = operation.label
+        del self.shown[label]
+        self.taken.add(label)
+        gap = self._gap([(operation.carrier, label)], unit)
+        self._switch(self.feed[label], False)
+        self._switch(self.grip[operation.carrier, label], True, self.body_of(label, unit))
+        return Switched(1, gap)
+
+    def _pass_on(self, operation: Operation, unit: int) -> Switched:
+        contents, carrier = self.model.factory.contents, operation.carrier
+        moved = [
+            (robot, part)
+            for robot, label in zip(operation.robots, operation.before, strict=True)
+            if robot != carrier and label in contents
+            for part in contents[label]
+        ]
+        gap = self._gap([(carrier, part) for _, part in moved], unit)
+        for robot, part in moved:
+            self._switch(self.grip[robot, part], False)
+            self._switch(self.grip[carrier, part], True, self.body_of(part, unit))
+        return Switched(len(moved), gap)
+
+    def _release(self, operation: Operation, unit: int) -> Switched:
+        base = self.body_of(self.first, unit)
+        for part in self.parts:
+            self._switch(self.grip[operation.carrier, part], False)
+            if part != self.first:
+                hold = self._hold(part, self.copy_of[part, unit])
+                self.m.eq_obj1id[hold] = base
+                self._switch(hold, True)
+        self.on_outfeed.append(unit)
+        return Switched(len(self.parts), 0.0)
+
+    def body_of(self, label: str, unit: int) -> int:
+        """The body of the part `label` in a unit."""
+        return int(self.body[label][self.copy_of[label, unit]])
+
+    def bodies_of(self, unit: int) -> np.ndarray:
+        """The bodies of all parts of a unit, in the order of `parts`."""
+        return np.array([self.body_of(part, unit) for part in self.parts])
+
+    # --- the outfeed ---------------------------------------------------------------------------
+
+    def outfeed_is_free(self) -> bool:
+        """Whether the last product has moved on by its own length."""
+        if not self.on_outfeed:
+            return True
+        length = self.model.layout.product_length + self.model.settings.clearance
+        return self._way_gone(self.on_outfeed[-1]) > length
+
+    def clear_outfeed(self) -> list[int]:
+        """The units that have left the factory now."""
+        gone = []
+        while self.on_outfeed and self._way_gone(self.on_outfeed[0]) > self.exit_at:
+            gone.append(self.on_outfeed.popleft())
+            self.left.append(float(self.d.time))
+        return gone
+
+    def recycle(self, unit: int) -> None:
+        """Return the bodies of a unit that has left to their feeders, out of sight."""
+        for part in self.parts:
+            copy = self.copy_of.pop((part, unit))
+            if part != self.first:
+                self._switch(self._hold(part, copy), False)
+            self._put_away(part, copy)
+            self.free[part].append(copy)
+            self.feed_next(part)
+
+    def _way_gone(self, unit: int) -> float:
+        """How far a product on the outfeed has moved on [m]."""
+        start = place_in(self.model.layout.product, self.first, self.model.layout.guidepaths[0].a)
+        return float(self.d.xpos[self.body_of(self.first, unit)][0]) - start[0]
+
+    def _exit(self) -> float:
+        """The way after which a product is inside the shed [m]."""
+        return self.model.layout.product_length + 0.12
+
+    # --- welds and bodies ----------------------------------------------------------------------
+
+    def _grips(self) -> dict[tuple[int, str], int]:
+        found: dict[tuple[int, str], int] = {}
+        for robot in self.model.factory.robots:
+            operation = self.model.factory.operations[robot.operations[-1]]
+            label = operation.before[operation.robots.index(robot.index)]
+            for part in self.model.factory.contents.get(label, ()):
+                found[robot.index, part] = self.m.equality(names.grip(robot.name, part)).id
+        return found
+
+    def _gap(self, joins: list[tuple[int, str]], unit: int) -> float:
+        """The largest distance between the frames that the grips (robot, part) would join now [m]."""
+        if not joins:
+            return 0.0
+        grips = [self.grip[join] for join in joins]
+        bodies = [self.body_of(part, unit) for _, part in joins]
+        holder = self.m.eq_obj1id[grips]
+        turn = self.d.xmat[holder].reshape(-1, 3, 3)
+        wanted = self.d.xpos[holder] + np.einsum("nij,nj->ni", turn, self.m.eq_data[grips, 3:6])
+        return float(np.linalg.norm(self.d.xpos[bodies] - wanted, axis=1).max())
+
+    def _switch(self, weld: int, on: bool, body: int | None = None) -> None:
+        """Switch a weld, aimed at `body` first; the bodies it joins are woken."""
+        if body is not None:
+            self.m.eq_obj2id[weld] = body
+        self.d.eq_active[weld] = on
+        for joined in (self.m.eq_obj1id[weld], self.m.eq_obj2id[weld]):
+            self._wake(int(joined))
+
+    def _wake(self, body: int) -> None:
+        dofs = slice(self.m.body_dofadr[body], self.m.body_dofadr[body] + self.m.body_dofnum[body])
+        if self.m.body_dofnum[body]:
+            speeds = self.d.qvel[dofs]
+            speeds[speeds == 0.0] = -0.0
+
+    def _place(self, body: int, at: tuple[float, float, float]) -> None:
+        joint = self.m.body_jntadr[body]
+        q, v = self.m.jnt_qposadr[joint], self.m.jnt_dofadr[joint]
+        self.d.qpos[q : q + 7] = (*at, 1, 0, 0, 0)
+        self.d.qvel[v : v + 6] = 0
+
+    def _put_away(self, label: str, copy: int) -> None:
+        body = int(self.body[label][copy])
+        self._place(body, parked_at(self.model.layout, label, copy + 1))
+        self._mask(body, None)
+        self._switch(self._park(label, copy), True)
+
+    def _mask(self, body: int, unit: int | None) -> None:
+        """Contact masks: the parts of a unit share a bit and ignore it; spare copies touch nothing."""
+        start = self.m.body_geomadr[body]
+        geoms = slice(start, start + self.m.body_geomnum[body])
+        own = 0 if unit is None else 1 << (1 + unit % BITS)
+        others = 0 if unit is None else (1 << (BITS + 1)) - 1 - own
+        self.m.geom_contype[geoms] = self.m.body_contype[body] = own
+        self.m.geom_conaffinity[geoms] = self.m.body_conaffinity[body] = others
+
+    def _hide_spares(self) -> None:
+        for label, bodies in self.body.items():
+            self._switch(self.feed[label], False)
+            for copy in range(len(bodies)):
+                self._put_away(label, copy)
+
+    def _park(self, label: str, copy: int) -> int:
+        return int(self.m.equality(names.park(label, copy + 1)).id)
+
+    def _hold(self, label: str, copy: int) -> int:
+        return int(self.m.equality(names.hold(label, copy + 1)).id)
+
+
