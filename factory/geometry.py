@@ -320,17 +320,28 @@ def _from_mesh(
 
 
 def _mass_properties(mesh: Mesh) -> tuple[float, Array, Array, Array]:
-    """Volume, centre of mass, inertia for unit density, vertices of the hull. An open mesh has
-    those of its convex hull."""
+    """Volume, centre of mass, inertia for unit density, vertices of the hull. An open mesh, or one
+    that is inside out somewhere, has those of its convex hull."""
     import trimesh
 
     body = trimesh.Trimesh(mesh.vertices, mesh.faces, process=False)
     hull = body.convex_hull
-    solid = body if body.is_watertight and body.volume > 0 else hull
-    properties = solid.mass_properties
-    inertia = np.asarray(properties.inertia) / float(properties.density)
+    for solid in (body, hull, hull.bounding_box):
+        if not solid.is_watertight or not solid.volume > 0:
+            continue
+        properties = solid.mass_properties
+        inertia = np.asarray(properties.inertia) / float(properties.density)
+        if is_inertia(inertia):
+            break
     centre = np.asarray(properties.center_mass)
     return float(properties.volume), centre, inertia, np.asarray(hull.vertices)
+
+
+def is_inertia(matrix: Array) -> bool:
+    """Whether a symmetric matrix (3, 3) can be the inertia of a body: principal moments positive, and
+    none larger than the sum of the others."""
+    low, middle, high = np.linalg.eigvalsh(matrix)
+    return bool(low > 1e-6 * high and high <= (low + middle) * (1 + 1e-6))
 
 
 def _mass(node: Assembly, volume: float) -> float:

@@ -40,3 +40,8 @@ class Clearance:
     def rim(self) -> float:
         """How far an arm's end stays behind the line of another robot's carriage."""
         return CARRIAGE / 2 + self.c
+
+    def post(self, reach: float, rear: float) -> float:
+        """How far behind the product's middle the centre of a feeder's post stands: behind the
+        carriage's rear stop and behind the part, whose rear end is at `rear`."""
+        return max(reach + CARRIAGE / 2, -rear) + self.c + POST / 2

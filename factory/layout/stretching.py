@@ -135,7 +135,7 @@ class _Builder:
         if self.count == 0:
             self._choose_mates(guests)
             if not guests:
-                self._feeder()
+                self._feeder(operation.index)
         elif self.choose:
             self._choose_sides(guests)
         if self.count:
@@ -156,9 +156,9 @@ class _Builder:
             self.tree.travel = TOOL_TRAVEL
         return self.tree
 
-    def _feeder(self) -> None:
-        """A post behind the carriage's rear stop."""
-        post = self.shape.reach(self.c) + CARRIAGE / 2 + self.c.c + POST
+    def _feeder(self, operation: int) -> None:
+        """A post behind the carriage's rear stop and behind the part."""
+        post = self.c.post(self.shape.reach(self.c), self.shape.piles[operation][0]) + POST / 2
         self.tree.include(-post - self.half, 0.0, -self.strip[-1], self.strip[+1])
 
     def _earliest(self, guest: int) -> float:

@@ -63,6 +63,11 @@ class Model:
         return self.layout.factory
 
     @cached_property
+    def base(self) -> str:
+        """The part that a finished product's other parts are welded to."""
+        return heaviest(self.layout)
+
+    @cached_property
     def bodies(self) -> int:
         """How many bodies of parts there are."""
         return sum(self.copies.values())
@@ -232,13 +237,20 @@ def _welds(equality: Element, layout: Layout, copies: Mapping[str, int]) -> None
         for n in range(1, copies[part] + 1):
             at = (*parked_at(layout, part, n), 1, 0, 0, 0)
             _weld(equality, names.park(part, n), "world", names.part(part, n), at, n > 1)
-    first, *others = factory.contents[factory.pag.root]
+    first = heaviest(layout)
     base = product.solids[first].centre
-    for part in others:
+    for part in (p for p in factory.contents[factory.pag.root] if p != first):
         offset = tuple(float(v) for v in product.solids[part].centre - base)
         for n in range(1, copies[part] + 1):
             body1, body2 = names.part(first, 1), names.part(part, n)
             _weld(equality, names.hold(part, n), body1, body2, (*offset, 1, 0, 0, 0))
+
+
+def heaviest(layout: Layout) -> str:
+    """The part that the others are held to on the outfeed: a weld is as stiff as the lighter of the
+    bodies it joins is heavy."""
+    solids = layout.product.solids
+    return max(layout.factory.contents[layout.factory.pag.root], key=lambda part: solids[part].mass)
 
 
 def grip_position(layout: Layout, robot: int, part: str) -> tuple[float, float, float]:

@@ -11,7 +11,9 @@ from factory.layout.dimensions import (
     FINGER_TOP,
     PAYLOAD,
     POST,
+    Clearance,
 )
+from factory.layout.embedding import project
 from factory.layout.plan import Layout
 from factory.mjcf.elements import add, numbers
 from factory.mjcf.names import carriage, feeder
@@ -138,7 +140,8 @@ def _feeder(world: Element, layout: Layout, label: str) -> None:
     x, y = feeder_middle(layout, label)
     body = add(world, "body", name=feeder(label), pos=(x, y, 0.0), quat=heading_quaternion(path))
     across = path.offset * _handedness(path.heading, path.side)
-    back = -path.reach - CARRIAGE / 2 - layout.clearance - POST / 2
+    rear = project(layout.payloads[label], path.heading, path.side)[0]
+    back = -Clearance(layout.clearance).post(path.reach, rear)
     top = PAYLOAD + float(solid.high[2] - product.low[2]) + layout.clearance
     beam = 0.014
     add(body, "geom", name=f"{feeder(label)}/post", class_="station", type="box",
@@ -165,7 +168,7 @@ def _outfeed(world: Element, layout: Layout, speed: float) -> None:
     body = add(world, "body", name="outfeed", pos=(middle[0], middle[1], 0.0))
     add(body, "geom", name="outfeed/belt", class_="station", type="box", priority=1,
         pos=(0, 0, top - thick / 2), size=(half[0], half[1], thick / 2), material="belt",
-        friction="0.8 0.005 0.0001", surfacevel=(speed, 0, 0, 0, 0, 0))
+        friction="0.8 0.005 0.0001", solref="0.004 1", solimp="0.99 0.9999 0.0001 0.5 2", surfacevel=(speed, 0, 0, 0, 0, 0))
     tall = float(layout.product.high[2] - layout.product.low[2])
     length = layout.product_length + 0.1
     shed = half[0] - length / 2

@@ -36,7 +36,7 @@ class Stock:
         self.m, self.d, self.model, self.units = m, d, model, units
         factory = model.factory
         self.parts = factory.contents[factory.pag.root]
-        self.first = self.parts[0]
+        self.first = model.base
         self.body = {
             label: np.array([m.body(names.part(label, n + 1)).id for n in range(count)])
             for label, count in model.copies.items()

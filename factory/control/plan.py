@@ -1,0 +1,104 @@
+"""The modes of a laid-out factory: each operation's control law composed with the stretching f.
+
+Stretching changes B - A alone, never r, eps or a speed (paper, section 5.1).
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import lru_cache
+
+import numpy as np
+
+from factory.control.laws import Setting, mode_of
+from factory.control.mode import Limits, Mode
+from factory.factory import Operation
+from factory.layout.dimensions import CARRIAGE
+from factory.layout.plan import Layout
+from factory.layout.stretching import is_tool
+from factory.pag import NOPART
+from factory.settings import Settings
+from factory.template import Point, Template
+
+
+def operation_modes(layout: Layout, eps: float) -> tuple[Mode, ...]:
+    """F_p, D_p and G_p of every operation, in arc length. Raises InputError (NotPrepared)."""
+    return tuple(operation_mode(layout, operation, eps) for operation in layout.factory.operations)
+
+
+def operation_mode(layout: Layout, operation: Operation, eps: float) -> Mode:
+    """The mode of one operation. A robot that brings something to a carrier that brings something too
+    keeps its distance until the carrier stands: they would meet diagonally."""
+    paths = [layout.guidepaths[robot] for robot in operation.robots]
+    carrier = operation.template.carrier - 1
+    gate, standoff = np.full(len(paths), -1), np.zeros(len(paths))
+    if operation.before[carrier] != NOPART:
+        for slot, label in enumerate(operation.before):
+            if slot != carrier and label != NOPART:
+                gate[slot], standoff[slot] = carrier, _standoff(layout, operation, slot)
+    r = np.array([path.r for path in paths])
+    stations = [
+        path.length - layout.stations[operation.index] - path.reach if slot == carrier else np.nan
+        for slot, path in enumerate(paths)
+    ]
+    setting = Setting(
+        lower=np.zeros(len(paths)),
+        upper=np.array([path.length for path in paths]),
+        r=r,
+        eps=eps,
+        station=np.array(stations),
+        width=np.minimum(r, CARRIAGE),
+        dwell=operation.dwell,
+        gate=gate,
+        standoff=standoff,
+    )
+    template = operation.template
+    return mode_of(_inside(template) if template.before[carrier] != NOPART else template, setting)
+
+
+def _standoff(layout: Layout, operation: Operation, slot: int) -> float:
+    """How far short of the meeting point a payload is clear of the carrier's on its way there [m]."""
+    guest = layout.guidepaths[operation.robots[slot]]
+    host = layout.guidepaths[operation.carrier]
+    ahead = _extent(layout, operation.before[slot], guest.heading)
+    aside = _extent(layout, operation.label, (-guest.heading[0], -guest.heading[1]))
+    lane = CARRIAGE / 2 + abs(host.offset)
+    wanted = ahead + max(aside, lane) + layout.clearance
+    return min(max(wanted, 0.0), guest.travel)
+
+
+def _extent(layout: Layout, label: str, direction: tuple[float, float]) -> float:
+    """How far a payload reaches from the product's middle in one of the four directions [m]."""
+    xlo, xhi, ylo, yhi = layout.payloads[label]
+    x, y = round(direction[0]), round(direction[1])
+    return {(1, 0): xhi, (-1, 0): -xlo, (0, 1): yhi, (0, -1): -ylo}[x, y]
+
+
+@lru_cache(maxsize=256)
+def _inside(template: Template) -> Template:
+    """A template whose carrier brings something, with its B end written as the station where the
+    layout puts it: B = S + 2r."""
+    j = template.carrier
+
+    def moved(point: Point) -> Point:
+        if point.robot == j and point.end == "B":
+            return replace(point, end="S", multiple=point.multiple + 2)
+        return point
+
+    law = replace(template.law, goals=tuple(moved(p) for p in template.law.goals))
+    identified = tuple(tuple(moved(p) for p in points) for points in template.identifications)
+    return replace(template, law=law, identifications=identified)
+
+
+def robot_limits(
+    layout: Layout, settings: Settings, seed: int = 0, jitter: float = 0.0
+) -> tuple[Limits, np.ndarray]:
+    """Each robot's speed and acceleration, and the factor (R,) on its controller's gain, drawn within
+    ± jitter by the seed."""
+    count = len(layout.guidepaths)
+    draw = np.random.default_rng(seed).uniform(1 - jitter, 1 + jitter, size=(2, count))
+    speed = settings.speed * draw[0]
+    return Limits(speed, np.full(count, settings.acceleration)), draw[1]
+
+
+__all__ = ["is_tool", "operation_mode", "operation_modes", "robot_limits"]

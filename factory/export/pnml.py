@@ -1,0 +1,119 @@
+"""PNML 2009 (ISO/IEC 15909-2), place/transition nets: the net for other tools, and back.
+
+What the standard has no place for (the gears, modes, labels, slots and redistribution functions)
+stands in `toolspecific` elements of tool `factory`, version 1. `read_pnml` of what `write_pnml`
+gives for a legally marked gear net is equal to that net.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Iterator
+from xml.sax.saxutils import escape, quoteattr
+
+from factory.errors import Position
+from factory.export import net_of
+from factory.export.pnml_reader import NET_TYPE, PNML, TOOL, VERSION, read_pnml
+from factory.factory import Factory
+from factory.nets.gears import Gear, GearNet
+from factory.nets.marked import MarkedNet, marked
+from factory.nets.petri import Place, Transition
+from factory.nets.threaded import Redistribution
+
+__all__ = ["FORMAT", "export", "read_pnml", "write_pnml"]
+
+FORMAT = "pnml"
+
+_ILLEGAL = re.compile("[^\t\n\r\u0020-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
+
+
+def export(subject: Factory | GearNet | MarkedNet) -> str:
+    """The net as PNML."""
+    return write_pnml(net_of(subject))
+
+
+def write_pnml(net: GearNet | MarkedNet) -> str:
+    """The net and its initial marking as a PNML document, the same bytes for the same net."""
+    return "\n".join(_lines(net)) + "\n"
+
+
+def _lines(net: GearNet | MarkedNet) -> Iterator[str]:
+    subject = marked(net)
+    moves: tuple[Redistribution, ...] = ()
+    if isinstance(net, GearNet):
+        moves = net.threaded.redistribution
+    yield '<?xml version="1.0" encoding="UTF-8"?>'
+    yield f"<pnml xmlns={quoteattr(PNML)}>"
+    yield f'<net id="net" type={quoteattr(NET_TYPE)}>'
+    if subject.gears:
+        yield _tool(_gear(gear) for gear in subject.gears)
+    yield '<page id="page">'
+    for index, place in enumerate(subject.net.places):
+        yield from _place(subject, index, place)
+    for index, transition in enumerate(subject.net.transitions):
+        yield from _transition(index, transition, moves[index] if moves else None)
+    yield from _arcs(subject)
+    yield "</page>\n</net>\n</pnml>"
+
+
+def _tool(content: Iterable[str]) -> str:
+    inner = "".join(content)
+    return f'<toolspecific tool="{TOOL}" version="{VERSION}">{inner}</toolspecific>'
+
+
+def _attribute(name: str, value: object) -> str:
+    return f" {name}={quoteattr(_ILLEGAL.sub('?', str(value)))}"
+
+
+def _gear(gear: Gear) -> str:
+    attributes = (
+        _attribute("robot", gear.robot),
+        _attribute("type", gear.type),
+        _attribute("places", " ".join(f"p{p}" for p in gear.places)),
+        _attribute("transitions", " ".join(f"t{e}" for e in gear.transitions)),
+    )
+    return f"\n<gear{''.join(attributes)}/>"
+
+
+def _name(name: str) -> str:
+    return f"<name><text>{escape(_ILLEGAL.sub('?', name))}</text></name>"
+
+
+def _source(at: Position | None) -> str:
+    if at is None:
+        return ""
+    where = _attribute("file", at.file) + _attribute("line", at.line)
+    return f"<source{where}{_attribute('column', at.column)}/>"
+
+
+def _place(net: MarkedNet, index: int, place: Place) -> Iterator[str]:
+    attributes = [_attribute("mode", place.mode), _attribute("label", place.label)]
+    attributes.append(_attribute("size", place.size))
+    if net.slots:
+        robots = " ".join(net.gears[g].robot for g in net.slots[index] if 0 <= g < len(net.gears))
+        attributes.append(_attribute("slots", robots))
+    tokens = net.tokens[index]
+    yield f'<place id="p{index}">{_name(place.name)}'
+    if tokens:
+        yield f"<initialMarking><text>{tokens}</text></initialMarking>"
+    yield _tool([f"<mode{''.join(attributes)}/>", _source(place.position)]) + "</place>"
+
+
+def _transition(index: int, transition: Transition, moves: Redistribution | None) -> Iterator[str]:
+    content = []
+    if moves is not None:
+        pairs = "".join(f'<move from="p{p} {i}" to="p{q} {j}"/>' for (p, i), (q, j) in moves)
+        content.append(f"<redistribution>{pairs}</redistribution>")
+    content.append(_source(transition.position))
+    extra = _tool(content) if any(content) else ""
+    yield f'<transition id="t{index}">{_name(transition.name)}{extra}</transition>'
+
+
+def _arcs(net: MarkedNet) -> Iterator[str]:
+    number = 0
+    for index, place in enumerate(net.net.places):
+        pairs = [(f"t{e}", f"p{index}") for e in place.left]
+        pairs += [(f"p{index}", f"t{e}") for e in place.right]
+        for source, target in pairs:
+            yield f'<arc id="a{number}" source="{source}" target="{target}"/>'
+            number += 1

@@ -1,0 +1,190 @@
+"""What one statement of a PAG says, checked against its operation's template."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from lark import Token
+
+from factory.errors import Position, did_you_mean
+from factory.lang.pag_syntax import Definition, Keyword
+from factory.lang.source import Findings, Source, near_file, quoted
+from factory.lang.values import GEOMETRY, SHAPES, Kind, ValueReader, kind_of
+from factory.lang.words import LABEL_HINT, is_label, is_number
+from factory.pag import RESERVED, Assembly, Parameter
+from factory.template import Template
+
+MESHES = (".obj", ".stl", ".ply", ".glb")
+
+
+@dataclass(frozen=True, slots=True)
+class Signature:
+    """What an operation takes: how many inputs at least, whether more, and which parameters."""
+
+    name: str
+    inputs: int
+    further: bool
+    parameters: Mapping[str, Kind]
+
+    @property
+    def takes(self) -> str:
+        """The number of inputs in words."""
+        if not self.inputs and not self.further:
+            return "no sub-assembly"
+        number = ("no", "one", "two", "three", "four", "five")[self.inputs : self.inputs + 1]
+        words = (number[0] if number else str(self.inputs)) + " or more" * self.further
+        return f"{words} sub-assembl{'y' if words == 'one' else 'ies'}"
+
+
+def signature(template: Template) -> Signature:
+    """The signature of a template."""
+    kinds = dict(GEOMETRY) if template.geometry else {}
+    kinds.update({name: kind_of(default) for name, default in template.parameters})
+    return Signature(template.name, len(template.inputs), bool(template.further), kinds)
+
+
+@dataclass(slots=True)
+class AssemblyReader:
+    """Makes assemblies of definitions; what is wrong goes to the findings.
+
+    `folder` is where mesh paths start.
+    """
+
+    source: Source
+    findings: Findings
+    signatures: Mapping[str, Signature]
+    folder: str
+    values: ValueReader = field(init=False)
+    meshes: dict[str, tuple[str, str] | None] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        self.values = ValueReader(self.source, self.findings)
+
+    def read(self, definition: Definition) -> Assembly:
+        """The assembly a definition stands for (incomplete if errors were noted)."""
+        label, operation, arguments = definition
+        at = self.source.at
+        inputs = [argument for argument in arguments if isinstance(argument, Token)]
+        keywords: list[Keyword] = []
+        if len(inputs) < len(arguments):
+            keywords = [argument for argument in arguments if isinstance(argument, Keyword)]
+            self._check_order(arguments)
+        self._check_label(label)
+        entry = self.signatures.get(operation)
+        if entry is None or operation in RESERVED:
+            self._unknown(operation)
+        else:
+            self._check_inputs(entry, operation, inputs)
+        return Assembly(
+            str(label),
+            str(operation),
+            tuple([str(token) for token in inputs]),
+            self._parameters(entry, keywords) if entry and keywords else (),
+            at(label),
+            at(operation),
+            tuple([at(token) for token in inputs]),
+        )
+
+    def _check_label(self, label: Token) -> None:
+        if not is_label(label):
+            message = f"{quoted(label)} is no label"
+            self.findings.add("Syntax", message, self.source.at(label), LABEL_HINT)
+        elif label in RESERVED:
+            taken = ", ".join(sorted(RESERVED))
+            hint = f"choose another label; reserved are {taken}"
+            if label == "root":
+                hint = "write: root = label; and define that label in a statement of its own"
+            message = f"{quoted(label)} is reserved and cannot be a label"
+            self.findings.add("ReservedLabel", message, self.source.at(label), hint)
+
+    def _check_order(self, arguments: list[Token | Keyword]) -> None:
+        named = False
+        for argument in arguments:
+            if isinstance(argument, Keyword):
+                named = True
+            elif named:
+                message = f"the input {quoted(argument)} stands behind a parameter"
+                hint = "write the inputs first, then the parameters"
+                self.findings.add("Syntax", message, self.source.at(argument), hint)
+
+    def _unknown(self, operation: Token) -> None:
+        hint = did_you_mean(operation, sorted({*self.signatures} - RESERVED), "operations")
+        message = f"there is no operation {quoted(operation)}"
+        if operation == "dropoff":
+            message = "'dropoff' is not an operation of a PAG"
+            hint = "the factory drops the product off by itself: name it with root = label;"
+        self.findings.add("UnknownOperation", message, self.source.at(operation), hint)
+
+    def _check_inputs(self, entry: Signature, operation: Token, inputs: list[Token]) -> None:
+        count = len(inputs)
+        if count == entry.inputs or (count > entry.inputs and entry.further):
+            return
+        at = self.source.at(inputs[entry.inputs] if count > entry.inputs else operation)
+        names = ", ".join(f"input{i}" for i in range(1, entry.inputs + 1))
+        hint = f"write: {entry.name} ( {names}{', ...' * entry.further} )"
+        if not entry.inputs:
+            hint = f"write: {entry.name}(); it makes a part out of nothing else"
+        elif count > entry.inputs and is_number(inputs[entry.inputs]) and entry.parameters:
+            name = next(iter(entry.parameters))
+            hint = f"a parameter needs its name, for example: {name} = {inputs[entry.inputs]}"
+        message = f"{quoted(entry.name)} takes {entry.takes}, not {count or 'none'}"
+        self.findings.add("WrongInputs", message, at, hint)
+
+    def _parameters(self, entry: Signature, keywords: list[Keyword]) -> tuple[Parameter, ...]:
+        seen: dict[str, Token] = {}
+        made: list[Parameter] = []
+        for name, raw in keywords:
+            kind = entry.parameters.get(name)
+            if kind is None:
+                self._unknown_parameter(entry, name)
+            elif name in seen:
+                self._twice(name, seen[name])
+            elif (value := self.values.read(name, kind, raw)) is not None:
+                position = self.values.place(raw)
+                made.append(Parameter(str(name), value, position))
+                if kind is GEOMETRY["mesh"]:
+                    self._check_mesh(str(value), position)
+            seen.setdefault(name, name)
+        if len(seen) > 1 and entry.parameters.get("mesh") is GEOMETRY["mesh"]:
+            self._check_shapes([token for name, token in seen.items() if name in SHAPES])
+        return tuple(made)
+
+    def _unknown_parameter(self, entry: Signature, name: Token) -> None:
+        message = f"{quoted(entry.name)} has no parameter {quoted(name)}"
+        hint = did_you_mean(name, list(entry.parameters), "parameters")
+        if not entry.parameters:
+            hint = "remove it: that operation has no parameters"
+        self.findings.add("UnknownParameter", message, self.source.at(name), hint)
+
+    def _twice(self, name: Token, first: Token) -> None:
+        where = f"line {first.line}" if first.line != name.line else f"column {first.column}"
+        message = f"{quoted(name)} is given twice, first at {where}"
+        self.findings.add("BadValue", message, self.source.at(name), "remove one of the two")
+
+    def _check_shapes(self, shapes: list[Token]) -> None:
+        for shape in shapes[1:]:
+            message = f"a part has one shape, but {quoted(shapes[0])} and {quoted(shape)} are given"
+            hint = f"keep one of {', '.join(SHAPES)}"
+            self.findings.add("BadValue", message, self.source.at(shape), hint)
+
+    def _check_mesh(self, path: str, position: Position) -> None:
+        if path not in self.meshes:
+            self.meshes[path] = _mesh_problem(self.folder, path)
+        problem = self.meshes[path]
+        if problem:
+            self.findings.add("BadMesh", problem[0], position, problem[1])
+
+
+def _mesh_problem(folder: str, path: str) -> tuple[str, str] | None:
+    """What is wrong with a mesh path, and a way out."""
+    full = os.path.join(folder, path)
+    if os.path.splitext(path)[1].lower() not in MESHES:
+        return f"{quoted(path)} is not a mesh file", f"mesh files end in {', '.join(MESHES)}"
+    if os.path.isfile(full):
+        return None
+    if os.path.isdir(full):
+        return f"{quoted(path)} is a folder", "name a mesh file in it"
+    hint = near_file(folder, path) or "mesh paths start at the folder of the PAG file"
+    return f"there is no mesh file {quoted(path)}", hint

@@ -1,0 +1,38 @@
+"""From text to PAG: what `check` sees first.
+
+The stage reports every error of a text at once, in the order of the text; a PAG it returns is one
+tree over its labels, each made by a known operation with the inputs and values that it takes.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+
+from factory.lang.operations import AssemblyReader, signature
+from factory.lang.pag_syntax import draft_of
+from factory.lang.source import Findings, collector_paused, read_text, source_of
+from factory.lang.tree import TreeCheck, count_of, root_of
+from factory.pag import PAG
+from factory.template import Template
+
+
+def read_pag(
+    text: str, templates: Mapping[str, Template], file: str = "<text>", folder: str = "."
+) -> PAG:
+    """The PAG a text stands for; mesh paths start at `folder`. Raises InputError."""
+    with collector_paused():
+        source, findings = source_of(text, file), Findings()
+        draft = draft_of(source, findings)
+        signatures = {name: signature(template) for name, template in templates.items()}
+        reader = AssemblyReader(source, findings, signatures, folder)
+        nodes = tuple([reader.read(definition) for definition in draft.definitions])
+        TreeCheck(draft, nodes, source, findings).run()
+        findings.raise_if_any()
+        return PAG(root_of(draft), nodes, count_of(draft), folder, file)
+
+
+def load_pag(path: str | os.PathLike[str], templates: Mapping[str, Template]) -> PAG:
+    """The PAG in a file. Raises InputError, also if the file cannot be read (BadFile)."""
+    name = os.fspath(path)
+    return read_pag(read_text(name), templates, name, os.path.dirname(name) or ".")

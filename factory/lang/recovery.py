@@ -1,0 +1,113 @@
+"""Reading on after a syntax error: a text is cut into pieces, each parsed alone.
+
+What to say about a piece that does not parse is taught by example, as Lark's own
+`match_examples` does: a `Lesson` lists malformed pieces, and the parser's state and the token it
+stuck at in each of them recall the lesson when a user's piece gets stuck in the same way.
+"""
+
+from __future__ import annotations
+
+import unicodedata
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Literal
+
+from lark import Lark, Token, UnexpectedToken
+from lark.parsers.lalr_interactive_parser import InteractiveParser
+
+from factory.lang.source import quoted
+
+END = "$END"
+UNLAWFUL = frozenset({"STRAY", "UNCLOSED"})
+
+SIGNS = frozenset(";,()=<>{}~.+-")
+
+
+@dataclass(frozen=True, slots=True)
+class Stuck:
+    """Where a parse of one piece stopped: the token's index, the token, the parser's state."""
+
+    index: int
+    token: Token
+    state: object
+    expected: frozenset[str]
+
+
+@dataclass(frozen=True, slots=True)
+class Lesson:
+    """A mistake: what to say, the way out, the place to show, and malformed pieces (between bars)
+    that show it. Places: the token `found`, `behind` the last good one, behind the `first`,
+    at the `start`."""
+
+    message: str
+    hint: str
+    place: Literal["found", "behind", "first", "start"]
+    examples: str
+
+
+def drive(lark: Lark, start: str, tokens: Sequence[Token]) -> Any | Stuck:
+    """Parse tokens from the symbol `start`: what the tree builder makes of them, or a Stuck."""
+    parser = lark.parse_interactive(None, start=start)
+    last = tokens[-1] if tokens else Token(END, "", 0, 1, 1)
+    end = Token.new_borrow_pos(END, "", last)
+    result: Any = None
+    for index, token in enumerate([*tokens, end]):
+        try:
+            result = parser.feed_token(token)
+        except UnexpectedToken as error:
+            accepted = frozenset(_accepted(parser))
+            return Stuck(index, token, error.state.position, accepted)
+    return result
+
+
+def _accepted(parser: InteractiveParser) -> Iterable[str]:
+    kinds: Iterable[str] = parser.accepts()  # type: ignore[no-untyped-call]
+    return kinds
+
+
+def learn(
+    lark: Lark, start: str, lessons: Iterable[Lesson], lex: Callable[[str], list[Token]]
+) -> Mapping[tuple[object, str], Lesson]:
+    """The lessons by the parser's state and the kind of token it stuck at."""
+    table: dict[tuple[object, str], Lesson] = {}
+    for lesson in lessons:
+        for example in lesson.examples.split(" | ") if lesson.examples else ():
+            stuck = drive(lark, start, lex(example))
+            if not isinstance(stuck, Stuck):
+                raise ValueError(f"the example {example!r} is well formed")
+            table.setdefault((stuck.state, stuck.token.type), lesson)
+    return table
+
+
+def unlawful_words(token: Token) -> tuple[str, str]:
+    """What to say of a character that no statement contains, or of a text that is not closed."""
+    if token.type == "UNCLOSED":
+        return "the text is not closed", 'close it with " on the same line'
+    return f"{quoted(token)} has no meaning here", _way_out(token)
+
+
+def _way_out(token: Token) -> str:
+    first = token[0]
+    plain = _plain(first)
+    if plain:
+        return f"write {plain} instead"
+    if first == "/":
+        return "no word contains it; a comment runs from // to the end of the line"
+    if first == "#":
+        return "a comment runs from // to the end of the line"
+    if first in "'`":
+        return 'write texts in double quotes, as in "base.stl"'
+    if first == ":":
+        return "write = between a name and what it is"
+    return "remove it, or put it in a comment: // ..."
+
+
+def _plain(character: str) -> str:
+    """The sign that a typographic variant (full width, dash, curly quote) stands for, or ""."""
+    folded = unicodedata.normalize("NFKC", character)
+    if folded != character and folded in SIGNS:
+        return folded
+    category = unicodedata.category(character)
+    if category == "Pd" or character == "\N{MINUS SIGN}":
+        return "-"
+    return '"' if category in ("Pi", "Pf") else ""

@@ -1,0 +1,283 @@
+"""From the clauses of a template to its value, checked: what would break Theorem 5.1 is refused."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Mapping, Sequence
+
+from lark import Token
+
+from factory.errors import Position, did_you_mean
+from factory.lang.source import Findings, Source, quoted
+from factory.lang.template_syntax import Defaults, Labels, RawLaw, TemplateDraft, Words
+from factory.lang.values import GEOMETRY, ValueReader
+from factory.lang.words import LABEL_HINT, is_label, is_number, number
+from factory.pag import NOPART, RESERVED, Value
+from factory.template import Law, Point, Template
+
+_POINT = re.compile(r"([ABS])([0-9]+)(?:([+-])([0-9.]*(?:[eE][+-]?[0-9]+)?)r)?")
+_VARIABLE = re.compile(r"LAB([1-9][0-9]{0,8})")
+_LABELS_HINT = "<a; b> = < LAB1, LAB2, nopart; nopart, nopart, LAB3 >;"
+
+
+class TemplateMaker:
+    """Makes the template of a draft; what is wrong goes to the findings."""
+
+    def __init__(self, draft: TemplateDraft, source: Source, findings: Findings) -> None:
+        self.draft = draft
+        self.source = source
+        self.findings = findings
+
+    def make(self) -> Template | None:
+        """The template, or None where its header or a clause is missing."""
+        contents = {kind: clause.content for kind, clause in self.draft.clauses.items()}
+        name, robots = self.draft.name, contents.get("R")
+        count = self._robots(robots)
+        carrier = self._carrier(contents.get("j"), count)
+        classes = [self._class(points, count) for points in contents.get("~", ())]
+        labels: Labels | None = contents.get("<a; b>")
+        parameters = self._parameters(contents.get("parameters"))
+        law = self._law(contents.get("F"), count, parameters)
+        further: Token | None = contents.get("further")
+        if name is not None:
+            self._check_name(name)
+        if labels is not None:
+            self._check_labels(labels, count, carrier)
+        geometry = self._geometry(contents.get("parameters"), labels)
+        if further is not None:
+            self._check_further(further, labels)
+        if name is None or robots is None or carrier is None or labels is None or law is None:
+            return None
+        return Template(
+            str(name),
+            tuple(map(str, robots)),
+            carrier,
+            tuple(tuple(point for point in points if point) for points in classes),
+            tuple(map(str, labels.before)),
+            tuple(map(str, labels.after)),
+            law,
+            str(further or ""),
+            tuple(parameters.items()),
+            geometry,
+            self.source.at(name),
+            self.source.at(further) if further else None,
+        )
+
+    def _bad(self, message: str, at: Token | Position, hint: str) -> None:
+        place = self.source.at(at) if isinstance(at, Token) else at
+        self.findings.add("BadTemplate", message, place, hint)
+
+    def _head(self, kind: str) -> Token:
+        return self.draft.clauses[kind].head
+
+    def _check_name(self, name: Token) -> None:
+        at = self.source.at(name)
+        if not is_label(name):
+            self.findings.add("Syntax", f"{quoted(name)} is no name", at, LABEL_HINT)
+        elif name in RESERVED - {"dropoff"}:
+            message = f"{quoted(name)} is reserved and cannot name a template"
+            self.findings.add("ReservedLabel", message, at, "choose another name")
+
+    def _robots(self, robots: Words | None) -> int | None:
+        """k, the number of robots, if it is known."""
+        if robots is None:
+            return None
+        if not robots:
+            hint = "name the type of each robot: R = < dot, dot, dot >;"
+            self._bad("R is empty: an operation needs a robot", self._head("R"), hint)
+            return None
+        for robot in robots:
+            if not is_label(robot):
+                self._bad(f"{quoted(robot)} is no robot type", robot, LABEL_HINT)
+        return len(robots)
+
+    def _carrier(self, found: Token | None, count: int | None) -> int | None:
+        """j, if 1 <= j <= k."""
+        if found is None:
+            return None
+        j = int(found) if re.fullmatch("[0-9]{1,6}", found) else 0
+        if j < 1 or (count is not None and j > count):
+            most = count or "the number of robots in R"
+            hint = f"j counts the robots from 1: write a whole number from 1 to {most}"
+            self._bad(f"j = {found} names no robot of R", found, hint)
+            return None
+        return j
+
+    def _class(self, points: Sequence[Words], count: int | None) -> list[Point | None]:
+        return [self._point(words, count) for words in points]
+
+    def _point(self, words: Words, count: int | None) -> Point | None:
+        """A point from its words; its robot is one of the k."""
+        text, first = "".join(words), words[0]
+        match = _POINT.fullmatch(text)
+        multiple = _multiple(match) if match else None
+        if match is None or multiple is None:
+            hint = "a point is A1, B1 or S1 (start, end or a station of robot 1's path), or A1 + 2r"
+            message = f"{quoted(' '.join(words))} is no point"
+            self.findings.add("Syntax", message, self.source.at(first), hint)
+            return None
+        robot = int(match[2]) if len(match[2]) < 9 else 0
+        if robot < 1 or (count is not None and robot > count):
+            most = _counted(count, "robot") if count else "robots from 1 on"
+            hint = f"R has {most}; points are named {match[1]}1 to {match[1]}{count or 'k'}"
+            self._bad(f"{quoted(' '.join(words))} names robot {match[2]}", first, hint)
+            return None
+        return Point(match[1], robot, multiple, self.source.at(first))
+
+    def _law(
+        self, raw: RawLaw | None, count: int | None, parameters: Mapping[str, Value]
+    ) -> Law | None:
+        if raw is None:
+            return None
+        points = [self._point(words, count) for words in raw.goals]
+        if count is not None and len(points) != count:
+            hint = "F moves every robot of R: write one point for each, in order"
+            at = raw.goals[0][0] if raw.goals else raw.name
+            goals, robots = _counted(len(points), "goal"), _counted(count, "robot")
+            self._bad(f"F has {goals} for {robots}", at, hint)
+        eps = self._radius(raw.eps)
+        dwell = self._dwell(raw.dwell, parameters) if raw.dwell else None
+        return Law(str(raw.name), tuple(point for point in points if point), eps, dwell)
+
+    def _radius(self, found: Token) -> float | str:
+        """eps: a positive number, or the word."""
+        value = number(found)
+        if found == "eps":
+            return "eps"
+        if value is None or value <= 0:
+            hint = "the goal ball needs a radius: write eps, or a positive number of metres"
+            self._bad(f"{quoted(found)} is no radius", found, hint)
+            return "eps"
+        return value
+
+    def _dwell(self, found: Token, parameters: Mapping[str, Value]) -> float | str | None:
+        """A number of seconds, or the name of a parameter that is one."""
+        if is_number(found):
+            value = number(found)
+            if value is None or value < 0:
+                hint = "write a number of seconds, not negative, or the name of a parameter"
+                self._bad(f"{quoted(found)} is no time to dwell", found, hint)
+            return value
+        default = parameters.get(found)
+        if "parameters" in self.draft.broken:
+            return str(found)
+        if not isinstance(default, float) or default < 0:
+            what = "is no parameter" if default is None else "is no time to dwell"
+            hint = did_you_mean(found, list(parameters))
+            if not hint.startswith("did"):
+                hint = f"add the clause: parameters = ( {found} = 1.0 );"
+            if default is not None:
+                hint = f"its default is a number of seconds, not negative: {found} = 1.0"
+            self._bad(f"{quoted(found)} {what}", found, hint)
+        return str(found)
+
+    def _parameters(self, raw: Defaults | None) -> dict[str, Value]:
+        made: dict[str, Value] = {}
+        values = ValueReader(self.source, self.findings)
+        for name, found in raw.values if raw else ():
+            if not is_label(name):
+                self.findings.add(
+                    "Syntax", f"{quoted(name)} is no name", self.source.at(name), LABEL_HINT
+                )
+            elif name in made:
+                self._bad(f"{quoted(name)} is given twice", name, "remove one of the two")
+            elif raw and raw.geometry and name in GEOMETRY:
+                hint = "choose another name: geometry brings " + ", ".join(GEOMETRY)
+                self._bad(f"{quoted(name)} is a parameter of geometry", name, hint)
+            elif (value := values.any(name, found)) is not None:
+                made[str(name)] = value
+        return made
+
+    def _check_further(self, further: Token, labels: Labels | None) -> None:
+        """Further inputs come after first ones, and are added to a result."""
+        taken = [label for label in labels.before if label != NOPART] if labels else [further]
+        if not taken or self.draft.name == "dropoff":
+            message = f"{self.draft.name} cannot pass further inputs on"
+            hint = "leave this clause out: it is for operations that take and make something"
+            self._bad(message, further, hint)
+
+    def _geometry(self, raw: Defaults | None, labels: Labels | None) -> bool:
+        """Whether the operation makes a part; then it takes no sub-assembly."""
+        taken = [label for label in labels.before if label != NOPART] if labels else []
+        if raw and raw.geometry and taken:
+            hint = "leave out 'geometry', or let every robot come with nopart"
+            message = "geometry belongs to parts, but the operation takes sub-assemblies"
+            self._bad(message, self._head("parameters"), hint)
+        return bool(raw and raw.geometry)
+
+    def _check_labels(self, labels: Labels, count: int | None, carrier: int | None) -> None:
+        """The conditions on <a; b>, each with its code."""
+        for side, words in zip("ab", labels, strict=True):
+            if count is not None and len(words) != count:
+                hint = f"write one label for each robot of R, as in {_LABELS_HINT}"
+                labelled, robots = _counted(len(words), "label"), _counted(count, "robot")
+                message = f"{side} has {labelled} for {robots}"
+                self._bad(message, words[0] if words else self._head("<a; b>"), hint)
+            for word in words:
+                if word != NOPART and not _VARIABLE.fullmatch(word):
+                    hint = "write LAB1, LAB2, ... for labels, or nopart"
+                    self._bad(f"{quoted(word)} is no label variable", word, hint)
+        self._check_inputs(labels.before)
+        if self.draft.name == "dropoff":
+            self._check_dropoff(labels)
+        elif carrier is not None and carrier <= len(labels.after):
+            self._check_gears(labels, carrier)
+
+    def _check_inputs(self, before: Words) -> None:
+        """The variables of a are LAB1 to LABm, each once."""
+        seen: dict[int, Token] = {}
+        for word in before:
+            match = _VARIABLE.fullmatch(word)
+            if match and int(match[1]) in seen:
+                hint = "a sub-assembly is brought by one robot: give the other a label of its own"
+                message = f"{quoted(word)} is brought twice"
+                self.findings.add("DuplicateInput", message, self.source.at(word), hint)
+            elif match:
+                seen[int(match[1])] = word
+        wanted = next(i for i in range(1, len(seen) + 2) if i not in seen)
+        odd = any(word != NOPART and not _VARIABLE.fullmatch(word) for word in before)
+        if not odd and any(found > wanted for found in seen):
+            last = seen[max(seen)]
+            message = f"no robot brings LAB{wanted}: that sub-assembly would be lost"
+            hint = f"number the labels in a from LAB1 to LAB{len(seen)}"
+            self.findings.add("LostSubtree", message, self.source.at(last), hint)
+
+    def _check_dropoff(self, labels: Labels) -> None:
+        if [list(map(str, words)) for words in labels] != [["LAB1"], [NOPART]]:
+            hint = "the output robot drops the product: <a; b> = < LAB1; nopart >;"
+            self._bad("dropoff takes one product and leaves nothing", self._head("<a; b>"), hint)
+
+    def _check_gears(self, labels: Labels, carrier: int) -> None:
+        """b_j is a fresh label, every other b_i is nopart: each robot's gear closes."""
+        result = labels.after[carrier - 1]
+        if result == NOPART:
+            message = f"the carrier, robot {carrier}, is left with nothing"
+            hint = "b_j is the label of what has been made; the others are nopart"
+            self.findings.add("GearNotClosed", message, self.source.at(result), hint)
+        elif str(result) in map(str, labels.before):
+            message = f"the result {quoted(result)} is also an input"
+            brought = {str(label) for label in labels.before} - {NOPART}
+            hint = f"give the result a new label: LAB{len(brought) + 1}"
+            self.findings.add("LabelReuse", message, self.source.at(result), hint)
+        for index, word in enumerate(labels.after, 1):
+            if index != carrier and word != NOPART:
+                message = (
+                    f"robot {index} is not the carrier (j = {carrier}) but keeps {quoted(word)}"
+                )
+                hint = "only the carrier holds something afterwards: write nopart"
+                self.findings.add("GearNotClosed", message, self.source.at(word), hint)
+
+
+def _counted(count: int, noun: str) -> str:
+    return f"{count} {noun}" + "s" * (count != 1)
+
+
+def _multiple(match: re.Match[str]) -> float | None:
+    """The offset of a point in radii; None if it is no finite number."""
+    if match[3] is None:
+        return 0.0
+    size = 1.0 if not match[4] else number(match[4])
+    if size is None or not math.isfinite(size):
+        return None
+    return -size if match[3] == "-" else size

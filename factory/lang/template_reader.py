@@ -1,0 +1,98 @@
+"""From text to template, and all templates of some folders.
+
+A template that is returned has one label per robot before and after, one carrier that ends up with
+the result, one input for each sub-assembly, and a goal for each robot (Definition 4.1): the nets
+made of such templates are those of Theorem 5.1.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from types import MappingProxyType
+
+from factory.errors import Diagnostic, InputError, Position, did_you_mean
+from factory.lang.source import Findings, quoted, read_text, source_of
+from factory.lang.template_checks import TemplateMaker
+from factory.lang.template_syntax import template_draft_of
+from factory.pag import NOPART
+from factory.template import Template
+
+Folder = str | os.PathLike[str]
+
+
+def read_template(text: str, file: str = "<text>") -> Template:
+    """The template a text stands for. Raises InputError with every error of the text.
+
+    Whether the template named by `further` exists is seen only among others: `load_templates`.
+    """
+    source, findings = source_of(text, file), Findings()
+    draft = template_draft_of(source, findings)
+    template = TemplateMaker(draft, source, findings).make()
+    findings.raise_if_any()
+    if template is None:
+        raise AssertionError("a draft without errors gives a template")
+    return template
+
+
+def load_templates(folders: Sequence[Folder]) -> Mapping[str, Template]:
+    """The templates of all `*.op` files in some folders, by name, in the order of the search.
+
+    In each folder the files are read in sorted order; where two folders have a template of the
+    same name, the first folder's counts. Raises InputError with every error of every file.
+    """
+    merged: dict[str, Template] = {}
+    diagnostics: list[Diagnostic] = []
+    for folder in folders:
+        found: dict[str, Template] = {}
+        for template in _templates_in(folder, diagnostics):
+            if template.name in found:
+                diagnostics.append(_twice(template, found[template.name]))
+            found.setdefault(template.name, template)
+        merged = {**merged, **{name: t for name, t in found.items() if name not in merged}}
+    if not diagnostics:
+        diagnostics.extend(_check_further(merged))
+    if diagnostics:
+        raise InputError(diagnostics)
+    return MappingProxyType(merged)
+
+
+def _templates_in(folder: Folder, diagnostics: list[Diagnostic]) -> Iterator[Template]:
+    try:
+        names = sorted(name for name in os.listdir(folder) if name.endswith(".op"))
+    except (OSError, ValueError) as error:
+        why = getattr(error, "strerror", None) or str(error)
+        message = f"the templates in {quoted(os.fspath(folder))} cannot be read: {why}"
+        at = Position(os.fspath(folder), 1, 1)
+        hint = "give a folder that holds templates (*.op)"
+        diagnostics.append(Diagnostic("BadFile", message, at, hint))
+        return
+    for name in names:
+        path = str(Path(folder) / name)
+        try:
+            yield read_template(read_text(path), path)
+        except InputError as error:
+            diagnostics.extend(error.diagnostics)
+
+
+def _twice(second: Template, first: Template) -> Diagnostic:
+    message = f"the template {quoted(second.name)} is defined twice, first at {first.position}"
+    return Diagnostic("BadTemplate", message, second.position, "rename one of the two")
+
+
+def _check_further(templates: Mapping[str, Template]) -> Iterator[Diagnostic]:
+    """What is wrong with the templates that others pass their further inputs on to."""
+    for template in templates.values():
+        at = template.further_position or template.position
+        if not template.further:
+            continue
+        other = templates.get(template.further)
+        if other is None:
+            hint = did_you_mean(template.further, list(templates), "templates")
+            message = f"there is no template {quoted(template.further)}"
+            yield Diagnostic("BadTemplate", message, at, hint)
+        elif len(other.inputs) != 2 or other.before[other.carrier - 1] == NOPART:
+            message = f"{quoted(other.name)} cannot take further inputs one by one"
+            hint = "that takes two inputs, one of which its carrier brings, as insert does"
+            yield Diagnostic("BadTemplate", message, at, hint)

@@ -1,0 +1,161 @@
+"""Values of parameters: what each takes, and the geometry a part may have."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from types import MappingProxyType
+
+from lark import Token
+
+from factory.errors import Position
+from factory.lang.pag_syntax import Vector, spelled
+from factory.lang.source import Findings, Source, quoted
+from factory.lang.words import is_number, number
+from factory.pag import Value
+
+HUGE = 1e150  # a vector within is safe to normalise
+
+
+@dataclass(frozen=True, slots=True)
+class Kind:
+    """What a parameter takes: `length` 0 is a text, 1 a number, n a vector of n numbers.
+
+    Each number lies in [low, high], `positive` ones above 0; `zero` tells whether a vector may be
+    all zero. `example` is shown with an error.
+    """
+
+    length: int
+    example: str
+    low: float = -math.inf
+    high: float = math.inf
+    positive: bool = False
+    zero: bool = True
+
+    def glimpse(self, token: Token) -> tuple[float, ...] | None:
+        """The value of a VECTOR token if all is plainly well with it."""
+        words = [word.strip() for word in token[token.index("(") + 1 : -1].split(",")]
+        if self.length < 2 or len(words) != self.length or not all(map(is_number, words)):
+            return None
+        numbers = tuple(map(float, words))
+        small, large = min(numbers), max(numbers)
+        if not (self.low <= small and large <= self.high and small > -HUGE and large < HUGE):
+            return None
+        if (self.positive and small <= 0) or not (self.zero or any(numbers)):
+            return None
+        return numbers
+
+    @property
+    def wanted(self) -> str:
+        """The kind in words."""
+        if self.length == 0:
+            return "a text in double quotes"
+        sort = "positive " if self.positive else ""
+        among = f" from {self.low:g} to {self.high:g}" if math.isfinite(self.high) else ""
+        if self.low == 0 and not among:
+            among = " >= 0"
+        return (
+            f"a {sort}number{among}" if self.length == 1 else f"{self.length} {sort}numbers{among}"
+        )
+
+
+GEOMETRY: Mapping[str, Kind] = MappingProxyType(
+    {
+        "mesh": Kind(0, '"bricks/3001.obj"'),
+        "scale": Kind(1, "0.001", positive=True),
+        "pos": Kind(3, "( 0, 0, 0.1 )"),
+        "quat": Kind(4, "( 1, 0, 0, 0 )", zero=False),
+        "density": Kind(1, "1050", positive=True),
+        "mass": Kind(1, "0.1", positive=True),
+        "rgba": Kind(4, "( 0.8, 0.1, 0.1, 1 )", low=0.0, high=1.0),
+        "box": Kind(3, "( 0.1, 0.1, 0.05 )", positive=True),
+        "cylinder": Kind(2, "( 0.02, 0.1 )", positive=True),
+        "sphere": Kind(1, "0.05", positive=True),
+    }
+)
+SHAPES = ("mesh", "box", "cylinder", "sphere")
+
+
+def kind_of(default: Value) -> Kind:
+    """The kind a template's parameter has, read off its default; numbers like it stay >= 0."""
+    if isinstance(default, str):
+        return Kind(0, f'"{default}"')
+    if isinstance(default, tuple):
+        return Kind(len(default), "( " + ", ".join(map(repr, default)) + " )")
+    return Kind(1, repr(default), low=0.0 if default >= 0 else -math.inf)
+
+
+def text_of(token: Token) -> str:
+    """What a quoted text says: a doubled quote in it is one."""
+    return token[1:-1].replace('""', '"')
+
+
+class ValueReader:
+    """Reads values of one source; what is wrong goes to its findings."""
+
+    def __init__(self, source: Source, findings: Findings) -> None:
+        self.source = source
+        self.findings = findings
+
+    def place(self, raw: Token | Vector) -> Position:
+        """Where a value starts."""
+        if isinstance(raw, Vector):
+            return self.source.at(raw.opening)
+        at = self.source.at(raw)
+        return replace(at, column=at.column + raw.index("(")) if raw.type == "VECTOR" else at
+
+    def read(self, name: str, kind: Kind, raw: Token | Vector) -> Value | None:
+        """The value of the parameter `name`, or None after an error (BadValue) has been noted."""
+        if isinstance(raw, Token) and raw.type == "VECTOR":
+            return kind.glimpse(raw) or self._vector(name, kind, spelled(raw))
+        if isinstance(raw, Vector):
+            return self._vector(name, kind, raw)
+        if raw.type == "STRING" and kind.length == 0:
+            return text_of(raw)
+        if raw.type == "STRING" or kind.length != 1:
+            self._refuse(name, kind, raw, f"takes {kind.wanted}, not {quoted(raw)}")
+            return None
+        return self._number(name, kind, raw)
+
+    def any(self, name: str, raw: Token | Vector) -> Value | None:
+        """A value of whatever kind it is: a template's default."""
+        if isinstance(raw, Token) and raw.type == "VECTOR":
+            raw = spelled(raw)
+        if isinstance(raw, Vector):
+            return self._vector(name, Kind(len(raw.words), "( 0, 0, 1 )"), raw)
+        return text_of(raw) if raw.type == "STRING" else self._number(name, Kind(1, "1.0"), raw)
+
+    def _vector(self, name: str, kind: Kind, raw: Vector) -> Value | None:
+        if kind.length < 2 or len(raw.words) != kind.length:
+            count = f"{len(raw.words)} number{'s' * (len(raw.words) != 1)} in parentheses"
+            self._refuse(name, kind, raw.opening, f"takes {kind.wanted}, not {count}")
+            return None
+        values = [self._number(name, kind, word) for word in raw.words]
+        numbers = tuple(value for value in values if value is not None)
+        if len(numbers) < len(values):
+            return None
+        if not kind.zero and not 0 < math.hypot(*numbers) < math.inf:
+            size = "all zero" if not any(numbers) else "too long to normalise"
+            self._refuse(name, kind, raw.opening, f"is {size}")
+            return None
+        return numbers
+
+    def _number(self, name: str, kind: Kind, word: Token) -> float | None:
+        value = number(word)
+        if value is None:
+            why = "overflows" if is_number(word) else "is not a number"
+            if word.lower().lstrip("+-") in ("inf", "infinity", "nan"):
+                why = "is not a finite number"
+            self._refuse(name, kind, word, f"takes {kind.wanted}; {quoted(word)} {why}")
+        elif not kind.low <= value <= kind.high or (kind.positive and value <= 0):
+            self._refuse(name, kind, word, f"takes {kind.wanted}, not {quoted(word)}")
+        else:
+            return value
+        return None
+
+    def _refuse(self, name: str, kind: Kind, token: Token, problem: str) -> None:
+        hint = f"for example: {name} = {kind.example}"
+        if kind.length == 0 and token.type == "WORD":
+            hint = f'in quotes: {name} = "{token}"'
+        self.findings.add("BadValue", f"{quoted(name)} {problem}", self.source.at(token), hint)

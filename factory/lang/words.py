@@ -1,0 +1,29 @@
+"""Words of the languages: labels and numbers."""
+
+from __future__ import annotations
+
+import math
+import re
+
+LABEL_HINT = "a label has letters, digits, '_', '-' and '.'"
+
+_NUMBER = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
+_LABEL = re.compile(r"[^\s+;,()=<>{}~\"/]+")
+
+
+def is_number(word: str) -> bool:
+    """Whether a word is written as a number: a sign, decimals and an exponent are allowed."""
+    return _NUMBER.fullmatch(word) is not None
+
+
+def number(word: str) -> float | None:
+    """The finite number a word stands for; None if it is none or overflows."""
+    if not is_number(word):
+        return None
+    value = float(word)
+    return value if math.isfinite(value) else None
+
+
+def is_label(word: str) -> bool:
+    """Whether a word (already cut out by a lexer) may be a label."""
+    return _LABEL.fullmatch(word) is not None

@@ -1,0 +1,244 @@
+"""The certificate of a verdict: a JSON document that another program can check.
+
+Keys: `schema` 1; `net` with `transitions` (name, `moves`: its redistribution function as quadruples
+place, slot, place, slot, or null) and `places` (name, mode, label, `left`, `right`, `tokens`, and
+`slots`: the robots it acts on); `robots` with name, type and gear (`places`, `transitions`) and
+`initial` place. Everything is by number, from 0. Then one section for each property with `holds`:
+
+* `gear_net`: the `order` in which the gears are added, each with the `place` [a; b] it shares, the
+  gears it `meets` there and `c`, or why condition (b) is `exempt`;
+* `safe`: for each place the circuit with at most one token that covers it (`cover`: the number of
+  a robot, or, beyond the robots, of a row of `circuits`);
+* `live`: an `order` of the places without token in which each comes after those it waits for;
+* `reversible`: trees of ways from a `root` to every transition, `there` and `back`;
+* `legal`: the marked place of each robot.
+
+A section that does not hold has a `reason` and what shows it (a firing sequence, a circuit). One
+that holds by exploration only has `holds` null, with the reason: it is not certified. `digest` is
+the SHA-256 of the rest. `check_certificate` gives the faults of such a document.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from factory.nets.behaviour import cover
+from factory.nets.certificate_check import CLAIMS, SCHEMA, check_certificate
+from factory.nets.certificate_net import digest
+from factory.nets.composition import Composition, compose
+from factory.nets.gears import GearNet
+from factory.nets.general import with_gears
+from factory.nets.marked import NONE, MarkedNet, marked, overfill, token_free
+from factory.nets.verdict import Verdict, Witness
+
+__all__ = ["certificate", "check_certificate"]
+
+Json = dict[str, Any]
+
+
+def certificate(net: GearNet | MarkedNet, verdict: Verdict) -> Json:
+    """The certificate for the verdict that `verify` or `analyse` gave on the net. Linear.
+
+    Raises ValueError where two places or transitions of the net have one name.
+    """
+    subject = marked(net)
+    if verdict.gears and not subject.gears:
+        subject = with_gears(subject, verdict.gears)
+    if len(subject.net.place_index) < len(subject.tokens):
+        raise ValueError("two places have one name")
+    if len(subject.net.transition_index) < len(subject.net.transitions):
+        raise ValueError("two transitions have one name")
+    document: Json = {
+        "schema": SCHEMA,
+        "net": _listing(net, subject),
+        "robots": _robots(net, subject),
+    }
+    composition = compose(subject)
+    for claim in CLAIMS:
+        document[claim] = _section(claim, subject, composition, verdict)
+    document["digest"] = digest(document)
+    return document
+
+
+def _listing(net: GearNet | MarkedNet, subject: MarkedNet) -> Json:
+    moves: list[list[list[int]] | None] = [None] * len(subject.net.transitions)
+    if isinstance(net, GearNet):
+        functions = net.threaded.redistribution
+        moves = [[[p, i, q, j] for (p, i), (q, j) in pairs] for pairs in functions]
+    slots = subject.slots or ((),) * len(subject.tokens)
+    return {
+        "transitions": [
+            {"name": t.name, "moves": move}
+            for t, move in zip(subject.net.transitions, moves, strict=True)
+        ],
+        "places": [
+            {
+                "name": place.name,
+                "mode": place.mode,
+                "label": place.label,
+                "left": list(place.left),
+                "right": list(place.right),
+                "tokens": tokens,
+                "slots": list(own),
+            }
+            for place, tokens, own in zip(subject.net.places, subject.tokens, slots, strict=True)
+        ],
+    }
+
+
+def _robots(net: GearNet | MarkedNet, subject: MarkedNet) -> list[Json]:
+    found = [_marked_place(subject, gear.places) for gear in subject.gears]
+    if isinstance(net, GearNet):
+        found = [*net.initial, *[None] * len(net.gears)][: len(net.gears)]
+    return [
+        {
+            "name": gear.robot,
+            "type": gear.type,
+            "places": list(gear.places),
+            "transitions": list(gear.transitions),
+            "initial": initial,
+        }
+        for gear, initial in zip(subject.gears, found, strict=True)
+    ]
+
+
+def _marked_place(net: MarkedNet, places: tuple[int, ...]) -> int | None:
+    return next((p for p in places if net.tokens[p]), None)
+
+
+def _section(claim: str, net: MarkedNet, composition: Composition, verdict: Verdict) -> Json:
+    holds = getattr(verdict, claim)
+    if holds is None or (holds and verdict.method != "structure" and claim not in _BY_GEARS):
+        reason = "undecided" if holds is None else "found by exploring every marking: not certified"
+        return {"holds": None, "reason": reason}
+    if holds:
+        evidence = _EVIDENCE[claim](net, composition)
+        if evidence is None:
+            return {"holds": None, "reason": "proved, but not by circuits alone: not certified"}
+        return {"holds": True, **evidence}
+    witness = next(w for w in verdict.witness if w.property == claim)
+    return _failure(claim, net, witness)
+
+
+_BY_GEARS = ("gear_net", "legal")
+
+
+def _gear_net(net: MarkedNet, composition: Composition) -> Json:
+    order = []
+    present: list[list[int]] = [[] for _ in net.tokens]
+    for joint in composition.joints:
+        first = joint.place == NONE
+        order.append(
+            {
+                "gear": joint.gear,
+                "place": None if first else joint.place,
+                "a": None if first else joint.a,
+                "b": None if first else joint.b,
+                "c": joint.c,
+                "meets": [] if first else list(present[joint.place]),
+                "exempt": None if first or joint.c is not None else "tool of one operation",
+            }
+        )
+        for place in net.gears[joint.gear].places:
+            present[place].append(joint.gear)
+    return {"order": order}
+
+
+def _safe(net: MarkedNet, composition: Composition) -> Json | None:
+    covered = cover(net, composition.closed)
+    circuits: list[list[int]] = []
+    for place, gear in enumerate(covered):
+        if gear != NONE:
+            continue
+        circuit = overfill(net, place, frozenset()).circuit
+        if not circuit:
+            return None
+        for other in circuit:
+            if covered[other] == NONE:
+                covered[other] = len(net.gears) + len(circuits)
+        circuits.append(list(circuit))
+    return {"cover": covered, "circuits": circuits}
+
+
+def _live(net: MarkedNet, composition: Composition) -> Json:
+    """The order of the transitions gives one of the places they mark."""
+    events = token_free(net).order
+    postset, tokens = net.net.postset, net.tokens
+    order = [p for event in events for p in postset[event] if not tokens[p]]
+    order += [p for p, producer in enumerate(net.left) if producer == NONE and not tokens[p]]
+    return {"order": order}
+
+
+def _reversible(net: MarkedNet, composition: Composition) -> Json:
+    there = _tree(net, net.net.postset, net.right)
+    back = _tree(net, net.net.preset, net.left)
+    if there is None or back is None:
+        return {"root": None}
+    return {"root": 0, "there": there, "back": back}
+
+
+def _tree(
+    net: MarkedNet, beside: tuple[tuple[int, ...], ...], onward: tuple[int, ...]
+) -> Json | None:
+    """A breadth-first tree from transition 0: by which place each is reached, and how deep."""
+    size = len(net.net.transitions)
+    place: list[int | None] = [None] * size
+    depth = [NONE] * size
+    queue = [0] if size else []
+    depth[:1] = [0] * len(queue)
+    for event in queue:
+        for p in beside[event]:
+            after = onward[p]
+            if after != NONE and depth[after] == NONE:
+                place[after], depth[after] = p, depth[event] + 1
+                queue.append(after)
+    return None if len(queue) < size or not size else {"place": place, "depth": depth}
+
+
+def _legal(net: MarkedNet, composition: Composition) -> Json:
+    return {"marked": [_marked_place(net, gear.places) for gear in net.gears]}
+
+
+_EVIDENCE = {
+    "gear_net": _gear_net,
+    "safe": _safe,
+    "live": _live,
+    "reversible": _reversible,
+    "legal": _legal,
+}
+
+
+def _failure(claim: str, net: MarkedNet, witness: Witness) -> Json:
+    """Why a property fails, with what a checker needs to see it."""
+    places = [net.net.place_index[name] for name in witness.places]
+    events = [net.net.transition_index[name] for name in witness.transitions]
+    section: Json = {"holds": False, "kind": witness.kind, "reason": witness.reason}
+    section["robots"] = list(witness.robots)
+    if witness.kind == "dead transition" or (claim == "reversible" and _lasting(net, witness)):
+        return {"holds": None, "reason": f"{witness.reason}; found by exploring: not certified"}
+    if claim == "safe":
+        return {**section, "place": places[0], "firing": events}
+    if claim == "live":
+        dead = witness.kind == "deadlock"
+        return {**section, "circuit": None if dead else places, "firing": events if dead else None}
+    if claim == "reversible":
+        structural = net.is_marked_graph
+        event = events[0] if structural else None
+        return {**section, "transition": event, "firing": None if structural else events}
+    stray = [p for p in places if not net.slots or not net.slots[p]]
+    return {**section, "places": places, "transitions": events, "stray": stray}
+
+
+def _lasting(net: MarkedNet, witness: Witness) -> bool:
+    """Whether a net with choice does not come back although it goes on: no deadlock shows it."""
+    if net.is_marked_graph:
+        return False
+    tokens = list(net.tokens)
+    for name in witness.transitions:
+        event = net.net.transition_index[name]
+        for p in net.net.preset[event]:
+            tokens[p] -= 1
+        for p in net.net.postset[event]:
+            tokens[p] += 1
+    ready = (all(tokens[p] for p in needs) for needs in net.net.preset)
+    return any(on and e not in net.blocked for e, on in enumerate(ready))

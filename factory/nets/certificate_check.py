@@ -1,0 +1,201 @@
+"""Checking a certificate from the document alone, in linear time.
+
+Nothing that made the certificate is used here: any program that reads JSON can do the same. A
+certificate that claims a failure must show it, too.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from typing import Any
+
+from factory.nets.certificate_net import Net, Section, digest, number
+from factory.nets.certificate_refute import refute
+
+SCHEMA = 1
+CLAIMS = ("gear_net", "safe", "live", "reversible", "legal")
+
+
+def check_certificate(document: object) -> list[str]:
+    """The faults of a certificate, [] where every claim in it is proved by it."""
+    try:
+        return list(_check(document))
+    except (KeyError, TypeError, IndexError, ValueError, AttributeError, OverflowError) as error:
+        return [f"the certificate is not of the documented form: {type(error).__name__} {error}"]
+
+
+def _check(document: Any) -> Iterator[str]:
+    if document["schema"] != SCHEMA:
+        yield f"schema {document['schema']} is not {SCHEMA}"
+    if document["digest"] != digest(document):
+        yield "the digest is not that of the document"
+    net = Net(document["net"], document["robots"])
+    faults = list(net.faults())
+    yield from faults
+    if not faults:
+        for claim in CLAIMS:
+            yield from _claim(net, claim, document)
+
+
+def _claim(net: Net, claim: str, document: dict[str, Any]) -> Iterator[str]:
+    section = document[claim]
+    if section["holds"] is True:
+        yield from _PROOFS[claim](net, section, document)
+    elif section["holds"] is False:
+        yield from refute(net, claim, section)
+    elif not (section["holds"] is None and section["reason"]):
+        yield f"{claim}: holds is {section['holds']!r}, without a reason"
+
+
+def _prove_gear_net(net: Net, section: Section, document: Section) -> Iterator[str]:
+    """Definition 3.6: replay the order in which the gears are added."""
+    if not all(net.closed(robot) for robot in range(len(net.gears))):
+        yield "gear_net: some robot's gear is no cycle (Definition 3.5)"
+        return
+    order = [number(step["gear"]) for step in section["order"]]
+    if sorted(order) != list(range(len(net.gears))) or not order:
+        yield "gear_net: the order does not add every gear once"
+        return
+    at_place: list[list[int]] = [[] for _ in net.names]
+    passing = [0] * len(net.events)
+    for turn, step in enumerate(section["order"]):
+        yield from _added(net, step, turn, at_place, passing)
+        for p, e in zip(net.gears[step["gear"]], net.turns[step["gear"]], strict=True):
+            at_place[p].append(step["gear"])
+            passing[e] += 1
+    if not all(at_place) or not all(passing):
+        yield "gear_net: some place or transition is in no gear"
+    if any(sorted(own) != sorted(row) for own, row in zip(at_place, net.slots, strict=True)):
+        yield "gear_net: the slots of some place are not its gears'"
+    yield from _prove_moves(net)
+
+
+def _added(
+    net: Net, step: Section, turn: int, at_place: list[list[int]], passing: list[int]
+) -> Iterator[str]:
+    """Conditions (a) and (b) for one gear."""
+    gear, name = net.gears[step["gear"]], net.robots[step["gear"]]
+    old_places = [p for p in gear if at_place[p]]
+    old_events = [e for e in net.turns[step["gear"]] if passing[e]]
+    if turn == 0:
+        if any(step[key] is not None for key in ("place", "a", "b", "c", "exempt")):
+            yield f"gear_net: {name} comes first and is joined to nothing"
+        return
+    place, a, b = number(step["place"]), number(step["a"]), number(step["b"])
+    if old_places != [place] or net.edge(place) != (a, b) or sorted(old_events) != sorted((a, b)):
+        yield f"gear_net: (a) {name} shares more or less than place [a; b] with the gears before"
+        return
+    meets = at_place[place]
+    if sorted(step["meets"]) != sorted(meets) or not passing[a] == passing[b] == len(meets):
+        yield f"gear_net: (a) some gear meets {name} outside of the place they share"
+    before = gear[gear.index(place) - 1]
+    c = net.left[before][0]
+    if step["c"] is None:
+        if len(gear) != 2 or step["exempt"] != "tool of one operation":
+            yield f"gear_net: (b) is demanded of {name}"
+    elif step["c"] != c or passing[c] or net.edge(before) != (c, a) or step["exempt"] is not None:
+        yield f"gear_net: (b) fails for {name}: c is not new, or [c; a] not its place"
+
+
+def _prove_moves(net: Net) -> Iterator[str]:
+    """Every redistribution function is a bijection that leaves each robot itself."""
+    for event, moves in enumerate(net.moves):
+        if moves is None:
+            continue
+        before = [(number(p), number(i)) for p, i, _, _ in moves]
+        after = [(number(q), number(j)) for _, _, q, j in moves]
+        here = sorted((p, i) for p in net.preset[event] for i in range(len(net.slots[p])))
+        there = sorted((q, j) for q in net.postset[event] for j in range(len(net.slots[q])))
+        if sorted(before) != here or sorted(after) != there:
+            yield f"gear_net: the redistribution of {net.events[event]} is no bijection"
+        elif any(
+            net.slots[p][i] != net.slots[q][j] for (p, i), (q, j) in zip(before, after, strict=True)
+        ):
+            yield f"gear_net: {net.events[event]} moves a robot into another's slot"
+
+
+def _prove_safe(net: Net, section: Section, document: Section) -> Iterator[str]:
+    """Each place lies on a circuit with at most one token: a robot's gear, or one listed."""
+    circuits = [gear if net.closed(robot) else [] for robot, gear in enumerate(net.gears)]
+    circuits += [row if net.circuit(row) else [] for row in section["circuits"]]
+    good = [set(row) if sum(net.tokens[p] for p in row) <= 1 else set() for row in circuits]
+    cover = [number(c) for c in section["cover"]]
+    if len(cover) != len(net.names):
+        yield "safe: the cover does not name one circuit for each place"
+    elif not all(0 <= c < len(good) and p in good[c] for p, c in enumerate(cover)):
+        yield "safe: a place is not on the circuit that is to cover it, or that has two tokens"
+
+
+def _prove_live(net: Net, section: Section, document: Section) -> Iterator[str]:
+    """The places without tokens, in an order in which each comes after all that it waits for."""
+    if not net.marked_graph():
+        yield "live: an order of places proves nothing for a net with choice"
+        return
+    order = [number(p) for p in section["order"]]
+    empty = [p for p, tokens in enumerate(net.tokens) if not tokens]
+    if sorted(order) != empty:
+        yield "live: the order does not name every place without token once"
+        return
+    rank = {p: i for i, p in enumerate(order)}
+    for event, (before, after) in enumerate(zip(net.preset, net.postset, strict=True)):
+        last = max((rank[p] for p in before if p in rank), default=-1)
+        first = min((rank[p] for p in after if p in rank), default=len(order))
+        if last >= first or set(before) & set(after):
+            yield f"live: the places around {net.events[event]} are out of order"
+    if any(not row and net.right[p] for p, row in enumerate(net.left)):
+        yield "live: some place has no producer"
+
+
+def _prove_reversible(net: Net, section: Section, document: Section) -> Iterator[str]:
+    """A live marked graph is reversible (Murata 1989, Theorem 21); one that is connected shows a
+    tree of ways from a root to every transition and one of ways back, each with its depths."""
+    if document["live"]["holds"] is not True or not net.marked_graph():
+        yield "reversible: this follows for live marked graphs only"
+        return
+    if section["root"] is None:
+        if not all(net.edge(p) for p in range(len(net.names))):
+            yield "reversible: some place has no producer or no consumer"
+        return
+    root = number(section["root"])
+    if not 0 <= root < len(net.events):
+        yield "reversible: the root is no transition"
+        return
+    for key, toward, end in (("there", net.left, 1), ("back", net.right, 0)):
+        tree = section[key]
+        if len(tree["place"]) != len(net.events) or len(tree["depth"]) != len(net.events):
+            yield f"reversible: the tree {key} does not name every transition"
+            continue
+        for event, (place, depth) in enumerate(zip(tree["place"], tree["depth"], strict=True)):
+            if event == root:
+                good = place is None and depth == 0
+            else:
+                edge = net.edge(number(place)) if 0 <= number(place) < len(net.names) else None
+                good = edge is not None and edge[end] == event
+                good = good and tree["depth"][toward[place][0]] == number(depth) - 1 >= 0
+            if not good:
+                yield f"reversible: {net.events[event]} is not joined to the root {key}"
+                break
+
+
+def _prove_legal(net: Net, section: Section, document: Section) -> Iterator[str]:
+    """Each gear is marked once, and f_m is a bijection onto the robots."""
+    marked = [number(p) for p in section["marked"]]
+    if len(marked) != len(net.gears):
+        yield "legal: not every robot has its place"
+        return
+    for robot, gear in enumerate(net.gears):
+        on = [p for p in gear if net.tokens[p]]
+        if on != [marked[robot]] or net.tokens[on[0]] != 1 or net.initial[robot] != on[0]:
+            yield f"legal: {net.robots[robot]} is not marked exactly once, where it says"
+    threads = [r for p, tokens in enumerate(net.tokens) if tokens for r in net.slots[p]]
+    if sorted(threads) != list(range(len(net.robots))):
+        yield "legal: f_m is no bijection"
+
+
+_PROOFS: dict[str, Callable[[Net, Section, Section], Iterator[str]]] = {
+    "gear_net": _prove_gear_net,
+    "safe": _prove_safe,
+    "live": _prove_live,
+    "reversible": _prove_reversible,
+    "legal": _prove_legal,
+}

@@ -1,0 +1,158 @@
+"""The state space of a small net, marking by marking. Assumes nothing about its shape."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from factory.nets.marked import MarkedNet
+
+LIMIT = 200_000
+"""How many markings are explored at most."""
+
+Firing = tuple[int, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Exploration:
+    """The markings reached, by number, and what they show; a firing sequence is a witness.
+
+    `complete`: whether these are all the reachable markings. `deadlock`: fires nothing any more;
+    `unsafe`: ends with two tokens on a place; `starved`: a transition that can fire no more after
+    the sequence; `one_way`: a marking from which the initial one is out of reach.
+    """
+
+    markings: int
+    complete: bool
+    deadlock: Firing | None = None
+    unsafe: tuple[Firing, int] | None = None
+    starved: tuple[Firing, int] | None = None
+    one_way: Firing | None = None
+
+
+class StateSpace:
+    """The markings reachable from m_0 with what fires between them; at most `limit` of them."""
+
+    def __init__(self, net: MarkedNet, limit: int = LIMIT) -> None:
+        self.net, self.limit = net, limit
+        self.index: dict[bytes, int] = {}
+        self.origin: list[tuple[int, int]] = []
+        self.edges: list[list[tuple[int, int]]] = []
+        self.unsafe: tuple[int, int] | None = None
+        self.complete = self._grow()
+
+    def _grow(self) -> bool:
+        if max(self.net.tokens, default=0) > 254:
+            return False
+        self._note(bytes(self.net.tokens), -1, -1)
+        markings = list(self.index)
+        for number, marking in enumerate(markings):
+            self.edges.append([])
+            for event in self._enabled(marking):
+                after = self._fire(marking, event)
+                if max(after) == 255 or (after not in self.index and len(markings) >= self.limit):
+                    return False
+                if after not in self.index:
+                    self._note(after, number, event)
+                    markings.append(after)
+                self.edges[number].append((event, self.index[after]))
+        return True
+
+    def _note(self, marking: bytes, before: int, event: int) -> None:
+        number = len(self.index)
+        self.index[marking] = number
+        self.origin.append((before, event))
+        if self.unsafe is None and max(marking, default=0) > 1:
+            self.unsafe = (number, marking.index(max(marking)))
+
+    def _enabled(self, marking: bytes) -> list[int]:
+        net, places = self.net.net, self.net.net.places
+        near = {e for p, count in enumerate(marking) if count for e in places[p].right}
+        near.update(e for e, needs in enumerate(net.preset) if not needs)
+        ready = (e for e in near if all(marking[p] for p in net.preset[e]))
+        return sorted(e for e in ready if e not in self.net.blocked)
+
+    def _fire(self, marking: bytes, event: int) -> bytes:
+        after = bytearray(marking)
+        for p in self.net.net.preset[event]:
+            after[p] -= 1
+        for p in self.net.net.postset[event]:
+            after[p] += 1
+        return bytes(after)
+
+    def firing(self, number: int) -> Firing:
+        """A sequence that leads to a marking."""
+        events = []
+        while self.origin[number][0] >= 0:
+            number, event = self.origin[number]
+            events.append(event)
+        return tuple(reversed(events))
+
+    def bottoms(self) -> list[list[int]]:
+        """The strongly connected components that nothing leaves (Tarjan, without recursion)."""
+        low = [0] * len(self.edges)
+        order, on_stack = [0] * len(self.edges), bytearray(len(self.edges))
+        component = [-1] * len(self.edges)
+        parts: list[list[int]] = []
+        stack: list[int] = []
+        count = 1
+        calls = [(0, iter(self.edges[0]))]
+        order[0] = low[0] = 1
+        stack.append(0)
+        on_stack[0] = 1
+        while calls:
+            node, rest = calls[-1]
+            for _, after in rest:
+                if not order[after]:
+                    count += 1
+                    order[after] = low[after] = count
+                    stack.append(after)
+                    on_stack[after] = 1
+                    calls.append((after, iter(self.edges[after])))
+                    break
+                if on_stack[after]:
+                    low[node] = min(low[node], order[after])
+            else:
+                calls.pop()
+                if calls:
+                    low[calls[-1][0]] = min(low[calls[-1][0]], low[node])
+                if low[node] == order[node]:
+                    part = []
+                    while not part or part[-1] != node:
+                        part.append(stack.pop())
+                        on_stack[part[-1]] = 0
+                        component[part[-1]] = len(parts)
+                    parts.append(part)
+        leaves = (
+            component[n]
+            for n, out in enumerate(self.edges)
+            for _, m in out
+            if component[n] != component[m]
+        )
+        left = set(leaves)
+        return [part for number, part in enumerate(parts) if number not in left]
+
+
+def explore(net: MarkedNet, limit: int = LIMIT) -> Exploration:
+    """Decide by exploring: liveness, safety, reversibility, deadlock; bounded by `limit` markings.
+
+    A net is live where every transition fires in every component of markings that is never left,
+    reversible where there is just one component.
+    """
+    space = StateSpace(net, limit)
+    ends = (n for n, out in enumerate(space.edges[: None if space.complete else -1]) if not out)
+    stop = next(ends, None)
+    deadlock = None if stop is None else space.firing(stop)
+    unsafe = space.unsafe and (space.firing(space.unsafe[0]), space.unsafe[1])
+    if not space.complete:
+        return Exploration(len(space.index), False, deadlock, unsafe)
+    bottoms = space.bottoms()
+    starved = next(filter(None, (_starved(space, part) for part in bottoms)), None)
+    outside = next((part[0] for part in bottoms if 0 not in set(part)), None)
+    one_way = None if outside is None else space.firing(outside)
+    return Exploration(len(space.index), True, deadlock, unsafe, starved, one_way)
+
+
+def _starved(space: StateSpace, part: list[int]) -> tuple[Firing, int] | None:
+    fired = {event for number in part for event, _ in space.edges[number]}
+    never = set(range(len(space.net.net.transitions))) - fired
+    return (space.firing(part[-1]), min(never)) if never else None

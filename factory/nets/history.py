@@ -1,0 +1,117 @@
+"""Legal markings of a gear net other than the initial one: by name, and how one gets there."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from factory.errors import Diagnostic, InputError, Position, did_you_mean
+from factory.nets.gears import GearNet
+from factory.nets.petri import Marking
+
+
+def firings(net: GearNet, marking: Marking) -> dict[int, int]:
+    """For each transition how often it fires on the least way from m_0 to a legal marking.
+
+    Along each gear a place has as many tokens more as its producer fires oftener than its consumer,
+    which fixes all counts up to a constant; the least is 0. Such counts can be fired, since no
+    circuit is free of tokens. Linear. Raises ValueError where the marking does not mark each gear
+    exactly once, or the gears hang together in no tree.
+    """
+    through: dict[int, list[int]] = {}
+    for number, gear in enumerate(net.gears):
+        if sum(p in marking for p in gear.places) != 1:
+            raise ValueError(f"the marking does not mark the gear of {gear.robot} exactly once")
+        for event in gear.transitions:
+            through.setdefault(event, []).append(number)
+    potential = {net.gears[0].transitions[0]: 0}
+    queue, seen = [0], {0}
+    for number in queue:
+        _climb(net, number, marking, potential)
+        for event in net.gears[number].transitions:
+            fresh = [other for other in through[event] if other not in seen]
+            queue += fresh
+            seen.update(fresh)
+    if len(seen) < len(net.gears) or len(potential) < len(net.threaded.transitions):
+        raise ValueError("some gear or transition is not connected to the rest")
+    least = min(potential.values())
+    return {event: potential[event] - least for event in sorted(potential)}
+
+
+def _climb(net: GearNet, number: int, marking: Marking, potential: dict[int, int]) -> None:
+    """Extend the counts along one gear, from a transition that has one."""
+    gear, initial = net.gears[number], net.initial_marking
+    start = next(i for i, event in enumerate(gear.transitions) if event in potential)
+    count = potential[gear.transitions[start]]
+    size = len(gear.places)
+    for step in range(size):
+        place = gear.places[(start + step) % size]
+        count += (place in initial) - (place in marking)
+        event = gear.transitions[(start + step + 1) % size]
+        if potential.setdefault(event, count) != count:
+            raise ValueError(f"the gear of {gear.robot} contradicts the others")
+
+
+def legal_marking(net: GearNet, names: str) -> Marking:
+    """The marking that a text such as `sub1, r1:sub3` describes; robots it leaves out wait where
+    they do initially.
+
+    An operation place is named by the label that it makes, and takes all its robots; a wait place
+    by robot and label, `r3:sub1`. Raises InputError (BadMarking) with every fault found: an unknown
+    place, or a robot marked twice.
+    """
+    faults: list[Diagnostic] = []
+    at: dict[int, int] = {}
+    for name, position in _items(names):
+        place = net.threaded.net.place_index.get(name)
+        if place is None:
+            known = list(net.threaded.net.place_index)
+            message = f"the net has no place '{name}'"
+            faults.append(_bad(message, position, did_you_mean(name, known, "places")))
+            continue
+        for robot in net.slots[place]:
+            if at.setdefault(robot, place) != place:
+                faults.append(_twice(net, robot, (at[robot], place), position))
+    if faults:
+        raise InputError(faults)
+    for robot, place in enumerate(net.initial):
+        at.setdefault(robot, place)
+    return _whole(net, at, names)
+
+
+def _items(names: str) -> Iterable[tuple[str, Position]]:
+    start = 0
+    for item in names.split(","):
+        name = item.strip()
+        column = start + len(item) - len(item.lstrip()) + 1
+        if name:
+            yield name, Position("--from", 1, column, names)
+        start += len(item) + 1
+
+
+def _bad(message: str, position: Position, hint: str) -> Diagnostic:
+    return Diagnostic("BadMarking", message, position, hint)
+
+
+def _twice(net: GearNet, robot: int, places: tuple[int, int], position: Position) -> Diagnostic:
+    """Robot `robot` is at two places."""
+    named = [net.threaded.places[p].name for p in places]
+    message = f"{net.gears[robot].robot} is marked twice: at {named[0]} and at {named[1]}"
+    hints = [
+        f"{named[i]} needs all its robots, " + ", ".join(net.gears[r].robot for r in net.slots[p])
+        for i, p in enumerate(places)
+        if len(net.slots[p]) > 1
+    ]
+    return _bad(message, position, "; ".join(hints) or "name one place for each robot")
+
+
+def _whole(net: GearNet, at: dict[int, int], names: str) -> Marking:
+    """The marking, where no operation place lacks one of its robots."""
+    for robot, place in sorted(at.items()):
+        missing = [r for r in net.slots[place] if at.get(r) != place]
+        if missing:
+            lacking = ", ".join(net.gears[r].robot for r in missing)
+            name = net.threaded.places[place].name
+            message = f"{net.gears[robot].robot} is at {name}, which also needs {lacking}"
+            hint = f"name {name}, which takes all its robots"
+            raise InputError(_bad(message, Position("--from", 1, 1, names), hint))
+    return frozenset(at.values())

@@ -1,0 +1,140 @@
+"""What is found out about a net: values, with a witness for every failure."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+
+from factory.errors import Position
+from factory.nets.gears import Gear
+from factory.nets.marked import MarkedNet
+from factory.pag import NOPART
+
+PROPERTIES = ("gear_net", "live", "safe", "reversible", "legal")
+
+
+@dataclass(frozen=True, slots=True)
+class Fault:
+    """Why a property fails, or is undecided, by numbers of gears, places and transitions.
+
+    `kind` is one of a few fixed phrases (`lost token`, `unclosed gear`, ...); `reason` says it in
+    full. `transitions` is a firing sequence where the kind speaks of one.
+    """
+
+    property: str
+    kind: str
+    reason: str
+    gears: tuple[int, ...] = ()
+    places: tuple[int, ...] = ()
+    transitions: tuple[int, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Witness:
+    """A fault by names: robots, labels, places and transitions, and where they come from."""
+
+    property: str
+    kind: str
+    reason: str
+    robots: tuple[str, ...] = ()
+    labels: tuple[str, ...] = ()
+    places: tuple[str, ...] = ()
+    transitions: tuple[str, ...] = ()
+    sources: tuple[Position, ...] = ()
+
+    @property
+    def lines(self) -> tuple[str, ...]:
+        """The source lines, as `file:line`."""
+        return tuple(dict.fromkeys(f"{at.file}:{at.line}" for at in self.sources))
+
+    def as_json(self) -> dict[str, object]:
+        """The witness as the `--json` document lists it."""
+        return {
+            "property": self.property,
+            "kind": self.kind,
+            "reason": self.reason,
+            "robots": list(self.robots),
+            "labels": list(self.labels),
+            "places": list(self.places),
+            "transitions": list(self.transitions),
+            "lines": list(self.lines),
+        }
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """Which properties a net has: True, False, or None where that is undecided.
+
+    For each that is not True there is a witness. `gears` are the gears it was judged by, claimed or
+    discovered; `method` says how the behaviour was found: `structure` or `exploration`.
+    """
+
+    gear_net: bool | None
+    live: bool | None
+    safe: bool | None
+    reversible: bool | None
+    legal: bool | None
+    witness: tuple[Witness, ...] = ()
+    gears: tuple[Gear, ...] = field(default=(), repr=False)
+    method: str = "structure"
+
+    @property
+    def holds(self) -> bool:
+        """Whether every property is proved."""
+        return all(getattr(self, name) is True for name in PROPERTIES)
+
+    def as_json(self) -> dict[str, object]:
+        """The verdict's keys of the `--json` document."""
+        found: dict[str, object] = {name: getattr(self, name) for name in PROPERTIES}
+        return {**found, "method": self.method, "witness": [w.as_json() for w in self.witness]}
+
+
+def testify(
+    net: MarkedNet,
+    gears: tuple[Gear, ...],
+    faults: Iterable[Fault],
+    sources: Mapping[str, Position] | None = None,
+) -> tuple[Witness, ...]:
+    """The faults by names. `sources` adds the source positions of robots, by their names."""
+    return tuple(_witness(net, gears, fault, sources or {}) for fault in faults)
+
+
+def _witness(
+    net: MarkedNet, gears: tuple[Gear, ...], fault: Fault, sources: Mapping[str, Position]
+) -> Witness:
+    places, events = net.net.places, net.net.transitions
+    robots = dict.fromkeys(gears[g].robot for g in fault.gears)
+    if not robots and net.slots:
+        owners = (g for p in fault.places for g in net.slots[p])
+        robots = dict.fromkeys(gears[g].robot for g in owners if 0 <= g < len(gears))
+    subjects = list(fault.places)
+    labels = _labels(net, subjects)
+    if not labels:
+        near = [q for e in fault.transitions for q in net.net.preset[e] + net.net.postset[e]]
+        subjects = near or [p for g in fault.gears for p in gears[g].places]
+        labels = _labels(net, subjects)
+    at = [places[p].position for p in subjects]
+    at += [events[e].position for e in fault.transitions]
+    at += [sources.get(robot) for robot in robots]
+    return Witness(
+        fault.property,
+        fault.kind,
+        fault.reason,
+        tuple(robots),
+        labels,
+        tuple(places[p].name for p in fault.places),
+        tuple(events[e].name for e in fault.transitions),
+        tuple(dict.fromkeys(position for position in at if position)),
+    )
+
+
+def _labels(net: MarkedNet, places: Iterable[int]) -> tuple[str, ...]:
+    named = (net.net.places[p].label for p in places)
+    return tuple(dict.fromkeys(label for label in named if label not in ("", NOPART)))
+
+
+def listing(names: Iterable[str], most: int = 6) -> str:
+    """Names in a sentence: the first few, then how many more."""
+    every = list(names)
+    shown = ", ".join(every[:most])
+    return shown + (f" and {len(every) - most} more" if len(every) > most else "")
