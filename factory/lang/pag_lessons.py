@@ -26,7 +26,7 @@ LESSONS = (
     Lesson(
         "'{first}' alone is no statement",
         FORM,
-        "start",
+        "first",
         'a | a "b" | a , b | a )',
     ),
     Lesson(
@@ -44,7 +44,7 @@ LESSONS = (
     Lesson(
         "missing '=' after '{first}'",
         "write: {first} = operation ( ... );",
-        "first",
+        "second",
         'a mate ( b ) | a mate = b | a mate b | a mate , b | a mate ) | a mate "b"',
     ),
     Lesson(
@@ -124,8 +124,13 @@ LESSONS = (
         "missing ')': the list of numbers is not closed",
         NUMBERS,
         "behind",
-        "a = m ( b = ( | a = m ( b = ( 1 | a = m ( b = ( 1 , | a = m ( b = ( 1 = 2 | "
-        "a = m ( b = ( 1 , 2 | a = m ( b = ( 1 , c = 2",
+        "a = m ( b = ( | a = m ( b = ( 1 | a = m ( b = ( 1 , | a = m ( b = ( 1 , 2",
+    ),
+    Lesson(
+        "missing ')' before {before}: the list of numbers is not closed",
+        NUMBERS,
+        "last",
+        "a = m ( b = ( c = 2 | a = m ( b = ( 1 , c = 2",
     ),
     Lesson(
         "{found} is not a number",

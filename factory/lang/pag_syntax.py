@@ -238,13 +238,16 @@ def _report_stuck(stuck: Stuck, piece: list[Token], source: Source, findings: Fi
         "first": piece[0],
         "operation": quoted(_operation(piece)),
     }
-    at = source.at(stuck.token)
-    if lesson.place == "first":
-        at = source.after(piece[0])
-    elif lesson.place == "start":
-        at = source.at(piece[0])
-    elif stuck.index and (lesson.place == "behind" or not stuck.token):
-        at = source.after(piece[stuck.index - 1])
+    last = piece[max(stuck.index - 1, 0)]
+    place = lesson.place if stuck.token or lesson.place != "found" else "behind"
+    places = {
+        "found": source.at(stuck.token),
+        "last": source.at(last),
+        "behind": source.after(last),
+        "first": source.at(piece[0]),
+        "second": source.after(piece[0]),
+    }
+    at = places[place]
     findings.add("Syntax", lesson.message.format(**words), at, lesson.hint.format(**words))
 
 

@@ -36,12 +36,12 @@ class Stuck:
 @dataclass(frozen=True, slots=True)
 class Lesson:
     """A mistake: what to say, the way out, the place to show, and malformed pieces (between bars)
-    that show it. Places: the token `found`, `behind` the last good one, behind the `first`,
-    at the `start`."""
+    that show it. Places: the token `found`, the `last` good one or `behind` it, the `first` one or
+    behind it (`second`)."""
 
     message: str
     hint: str
-    place: Literal["found", "behind", "first", "start"]
+    place: Literal["found", "last", "behind", "first", "second"]
     examples: str
 
 

@@ -132,8 +132,10 @@ class TreeCheck:
         known = [*(label for label in free if label not in self.draft.broken), *known]
         taken = {diagnostic.position for diagnostic in self.findings.diagnostics}
         for number, (label, positions) in enumerate(self.undefined.items()):
-            near = [other for other in known if abs(len(other) - len(label)) <= 2][:CANDIDATES]
-            hint = did_you_mean(label, near) if number < SUGGESTIONS else ""
+            near: list[str] = []
+            if number < SUGGESTIONS:
+                near = [other for other in known if abs(len(other) - len(label)) <= 2]
+            hint = did_you_mean(label, near[:CANDIDATES])
             if hint.startswith("did you mean"):
                 self.excused.update(other for other in near if f"'{other}'" in hint)
             elif is_number(label):
@@ -147,7 +149,7 @@ class TreeCheck:
     def _check_unreachable(self, free: Sequence[str]) -> None:
         doubtful = self.draft.broken | self.excused
         roots = self.draft.roots
-        if not roots or roots[0] in self.undefined:
+        if not roots or roots[0] not in self.defined.keys() | self.draft.broken:
             return
         root = str(roots[0])
         for label in free:

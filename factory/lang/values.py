@@ -123,7 +123,8 @@ class ValueReader:
         if isinstance(raw, Token) and raw.type == "VECTOR":
             raw = spelled(raw)
         if isinstance(raw, Vector):
-            return self._vector(name, Kind(len(raw.words), "( 0, 0, 1 )"), raw)
+            length = len(raw.words)
+            return self._vector(name, Kind(length, "( 0, 0, 1 )" if length > 1 else "1.0"), raw)
         return text_of(raw) if raw.type == "STRING" else self._number(name, Kind(1, "1.0"), raw)
 
     def _vector(self, name: str, kind: Kind, raw: Vector) -> Value | None:

@@ -16,6 +16,7 @@ from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
 
 from factory.factory import Factory
+from factory.files import write_bytes
 from factory.layout.dimensions import PAYLOAD
 from factory.layout.plan import Layout
 from factory.mjcf import names
@@ -73,12 +74,19 @@ class Model:
         return sum(self.copies.values())
 
 
-def part_copies(pool: Mapping[str, int], units: int | None, wip: int | None = None) -> dict[str, int]:
-    """Bodies of each part: the pool and one shown at the feeder, or the units asked for if less."""
+def part_copies(
+    pool: Mapping[str, int],
+    units: int | None,
+    wip: int | None = None,
+    under_way: Mapping[str, int] | None = None,
+) -> dict[str, int]:
+    """Bodies of each part: the pool and one shown at the feeder, or the units asked for if less; at
+    least as many as are `under_way` where a run starts, and one."""
     copies = {}
     for label, most in pool.items():
         inside = min(most, wip) if wip else most
-        copies[label] = inside + 1 if units is None else max(1, min(inside + 1, units))
+        wanted = inside + 1 if units is None else min(inside + 1, units)
+        copies[label] = max(1, wanted, (under_way or {}).get(label, 0))
     return copies
 
 
@@ -130,19 +138,9 @@ def write_model(model: Model, path: Path) -> list[Path]:
     written = []
     for name, content in model.files.items():
         written.append(folder / name)
-        _replace(folder / name, content)
-    _replace(path, xml.encode())
+        write_bytes(folder / name, content)
+    write_bytes(path, xml.encode())
     return [path, *written]
-
-
-def _replace(path: Path, content: bytes) -> None:
-    """Writes a file under another name and moves it into place, so that no half of it is ever seen."""
-    partial = path.with_name(f".{path.name}.part")
-    try:
-        partial.write_bytes(content)
-        partial.replace(path)
-    finally:
-        partial.unlink(missing_ok=True)
 
 
 def _drive(factory: Factory, robot: int, masses: Mapping[str, float], settings: Settings) -> Drive:

@@ -10,7 +10,8 @@ place, slot, place, slot, or null) and `places` (name, mode, label, `left`, `rig
 * `safe`: for each place the circuit with at most one token that covers it (`cover`: the number of
   a robot, or, beyond the robots, of a row of `circuits`);
 * `live`: an `order` of the places without token in which each comes after those it waits for;
-* `reversible`: trees of ways from a `root` to every transition, `there` and `back`;
+* `reversible`: trees of ways from a `root` to every transition, `there` and `back`; `root` is null
+  where the net falls into parts, of which each lives or lies still;
 * `legal`: the marked place of each robot.
 
 A section that does not hold has a `reason` and what shows it (a firing sequence, a circuit). One
@@ -170,6 +171,8 @@ def _live(net: MarkedNet, composition: Composition) -> Json:
 
 
 def _reversible(net: MarkedNet, composition: Composition) -> Json:
+    if token_free(net).stuck:
+        return {"root": None}
     there = _tree(net, net.net.postset, net.right)
     back = _tree(net, net.net.preset, net.left)
     if there is None or back is None:

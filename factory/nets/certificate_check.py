@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator
 from typing import Any
 
 from factory.nets.certificate_net import Net, Section, digest, number
-from factory.nets.certificate_refute import refute
+from factory.nets.certificate_refute import one_way, refute
 
 SCHEMA = 1
 CLAIMS = ("gear_net", "safe", "live", "reversible", "legal")
@@ -147,15 +147,17 @@ def _prove_live(net: Net, section: Section, document: Section) -> Iterator[str]:
 
 
 def _prove_reversible(net: Net, section: Section, document: Section) -> Iterator[str]:
-    """A live marked graph is reversible (Murata 1989, Theorem 21); one that is connected shows a
-    tree of ways from a root to every transition and one of ways back, each with its depths."""
-    if document["live"]["holds"] is not True or not net.marked_graph():
-        yield "reversible: this follows for live marked graphs only"
+    """A live marked graph that is strongly connected, as a tree of ways from a root to every
+    transition shows, and one of ways back, each with its depths. Without a root: see `one_way`."""
+    if not net.marked_graph():
+        yield "reversible: this follows for marked graphs only"
         return
     if section["root"] is None:
-        if not all(net.edge(p) for p in range(len(net.names))):
-            yield "reversible: some place has no producer or no consumer"
+        if one_way(net):
+            yield "reversible: something can fire that cannot be undone"
         return
+    if document["live"]["holds"] is not True:
+        yield "reversible: this follows from the trees for live nets only"
     root = number(section["root"])
     if not 0 <= root < len(net.events):
         yield "reversible: the root is no transition"

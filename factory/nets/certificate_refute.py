@@ -179,8 +179,13 @@ def _not_reversible(net: Net, section: Section) -> bool:
         stop = tokens is not None and not any(enabled(net, tokens, e) for e in events(net))
         return stop and len(section["firing"]) > 0
     first = number(section["transition"])
-    if not net.marked_graph() or not enabled(net, net.tokens, first):
-        return False
+    return net.marked_graph() and first in one_way(net)
+
+
+def one_way(net: Net) -> list[int]:
+    """The enabled transitions of a marked graph in a component where something fires finitely
+    often: then everything in it does. Without any, the net is reversible: components where all
+    goes on return (Murata 1989, Theorem 21), and in the others nothing ever happens."""
     sets = _Sets(len(net.events))
     for before, after in zip(net.left, net.right, strict=True):
         if before and after:
@@ -189,7 +194,7 @@ def _not_reversible(net: Net, section: Section) -> bool:
     for before, after in zip(net.left, net.right, strict=True):
         if not before or not after:
             finite.update(sets.root(e) for e in before + after)
-    return sets.root(first) in finite
+    return [e for e in events(net) if sets.root(e) in finite and enabled(net, net.tokens, e)]
 
 
 def _stuck(net: Net) -> list[int]:

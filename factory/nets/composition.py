@@ -1,10 +1,14 @@
 """Whether claimed gears compose a gear net: Definitions 3.5 and 3.6, gear by gear, in linear time.
 
-Two gears that meet must share one place [a; b], the transitions a and b, and nothing else; seen
-from a transition: all gears through it share one of its places, and that place with no others. The
-incidence graph of gears and shared places must be a tree. Then the simple circuits are exactly the
-gears: a circuit that leaves [a; b] along one gear can come back along that gear only. So condition
-(a) holds for each gear, added in the order of a search through that tree, over all simple circuits.
+The text of condition (a) intersects all the gears that meet the new one, so that two of them could
+share more if a third does not. It is read strictly: the new gear S and the net so far have exactly
+one place [a; b] and the transitions a and b in common, and every gear that meets S runs through it.
+
+So two gears that meet share one place [a; b], the transitions a and b, and nothing else; seen from
+a transition: all gears through it share one of its places, and that place with no others. And the
+incidence graph of gears and shared places is a tree. Then the simple circuits are exactly the
+gears: a circuit that leaves [a; b] along one gear can come back along that gear only. Conversely,
+where both hold, (a) holds for each gear, added in the order of a search through that tree.
 """
 
 from __future__ import annotations

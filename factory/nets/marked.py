@@ -123,7 +123,7 @@ def stuck_circuit(net: MarkedNet, stuck: Iterable[int]) -> tuple[int, ...]:
     of tokens, or one place that its transition both needs and gives back. The last of the places
     is alone where it has no producer."""
     never = frozenset(stuck)
-    event, path, visited = min(never), [], dict[int, int]()
+    event, path, visited = min(never), list[int](), dict[int, int]()
     while event not in visited:
         visited[event] = len(path)
         place = _barren(net, event, never)
@@ -199,7 +199,7 @@ def overfill(net: MarkedNet, place: int, stuck: frozenset[int]) -> Bound:
 
 def _back(net: MarkedNet, onward: Mapping[int, int], event: int, place: int) -> tuple[int, ...]:
     """The circuit from the consumer of a place back to the place."""
-    circuit = []
+    circuit: list[int] = []
     while not circuit or circuit[-1] != place:
         circuit.append(onward[event])
         event = net.right[onward[event]]

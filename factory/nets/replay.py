@@ -54,8 +54,8 @@ class _Game:
                     return f"the initial marking has {self.net.gears[robot].robot} twice"
                 self.at[robot] = place
         if -1 in self.at:
-            robot = self.net.gears[self.at.index(-1)].robot
-            return f"the initial marking leaves out {robot}"
+            missing = self.net.gears[self.at.index(-1)].robot
+            return f"the initial marking leaves out {missing}"
         return ""
 
     def fire(self, name: str) -> str:
@@ -104,6 +104,7 @@ class _Game:
 
     @property
     def marking(self) -> Marking:
+        """The marked places."""
         return frozenset(place for place, count in enumerate(self.tokens) if count)
 
 

@@ -110,7 +110,7 @@ def _around(net: MarkedNet, entry: Sequence[int], event: int) -> tuple[int, ...]
     """The circuit that the entries run into, backwards from an event."""
     for _ in entry:
         event = net.left[entry[event]]
-    places, here = [], event
+    places, here = list[int](), event
     while not places or here != event:
         places.append(entry[here])
         here = net.left[entry[here]]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import builtins
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 
@@ -42,7 +43,7 @@ class Witness:
     transitions: tuple[str, ...] = ()
     sources: tuple[Position, ...] = ()
 
-    @property
+    @builtins.property
     def lines(self) -> tuple[str, ...]:
         """The source lines, as `file:line`."""
         return tuple(dict.fromkeys(f"{at.file}:{at.line}" for at in self.sources))
@@ -93,7 +94,7 @@ def testify(
     net: MarkedNet,
     gears: tuple[Gear, ...],
     faults: Iterable[Fault],
-    sources: Mapping[str, Position] | None = None,
+    sources: Mapping[str, Position] | None,
 ) -> tuple[Witness, ...]:
     """The faults by names. `sources` adds the source positions of robots, by their names."""
     return tuple(_witness(net, gears, fault, sources or {}) for fault in faults)
@@ -103,15 +104,13 @@ def _witness(
     net: MarkedNet, gears: tuple[Gear, ...], fault: Fault, sources: Mapping[str, Position]
 ) -> Witness:
     places, events = net.net.places, net.net.transitions
-    robots = dict.fromkeys(gears[g].robot for g in fault.gears)
-    if not robots and net.slots:
-        owners = (g for p in fault.places for g in net.slots[p])
-        robots = dict.fromkeys(gears[g].robot for g in owners if 0 <= g < len(gears))
+    concerned = fault.gears or _owners(net, fault.places)
+    robots = [gears[g].robot for g in concerned]
     subjects = list(fault.places)
     labels = _labels(net, subjects)
     if not labels:
         near = [q for e in fault.transitions for q in net.net.preset[e] + net.net.postset[e]]
-        subjects = near or [p for g in fault.gears for p in gears[g].places]
+        subjects += near or [p for g in concerned for p in gears[g].places]
         labels = _labels(net, subjects)
     at = [places[p].position for p in subjects]
     at += [events[e].position for e in fault.transitions]
@@ -126,6 +125,16 @@ def _witness(
         tuple(events[e].name for e in fault.transitions),
         tuple(dict.fromkeys(position for position in at if position)),
     )
+
+
+def _owners(net: MarkedNet, places: tuple[int, ...]) -> tuple[int, ...]:
+    """The gears through all the places; where there is none, through any of them."""
+    if not net.slots or not places:
+        return ()
+    known = range(len(net.gears))
+    rows = [[g for g in net.slots[p] if g in known] for p in places]
+    common = set(rows[0]).intersection(*rows)
+    return tuple(dict.fromkeys(g for row in rows for g in row if g in common or not common))
 
 
 def _labels(net: MarkedNet, places: Iterable[int]) -> tuple[str, ...]:

@@ -15,12 +15,23 @@ from factory.factory import Operation
 class IdealWorld:
     """A DotFactory. Asserts that no configuration in Δ occurs: no two robots coupled by a mode touch."""
 
-    def __init__(self, start: Array, dropoff: int, units: int, tick: float, delivered: int = 0) -> None:
+    def __init__(
+        self,
+        start: Array,
+        dropoff: int,
+        units: int,
+        tick: float,
+        delivered: int = 0,
+        wip: int | None = None,
+        timestep: float = 0.002,
+    ) -> None:
         self.time = 0.0
         self.x = np.array(start, float)
         self.v = np.zeros_like(self.x)
         self.dropoff, self.units, self.tick = dropoff, units, tick
-        self.count = delivered
+        self.count, self.wip, self.timestep = delivered, wip, timestep
+        self._plan = np.zeros((len(self.x), 4))
+        self._plan[:, 1] = self.x
         self.dropoffs: list[float] = []
 
     def sense(self) -> tuple[Array, Array]:
@@ -28,8 +39,10 @@ class IdealWorld:
         return self.x, self.v
 
     def prepared(self, operation: Operation, unit: int) -> bool:
-        """A feeder gives a part for every unit asked for."""
-        return bool(operation.inputs) or unit < self.units or operation.index == self.dropoff
+        """A feeder gives a part for every unit asked for, and that may be let in."""
+        if operation.inputs:
+            return True
+        return unit < self.units and (self.wip is None or unit < self.count + self.wip)
 
     def apply(
         self, started: Sequence[tuple[Operation, int]], ended: Sequence[tuple[Operation, int]]
@@ -49,6 +62,21 @@ class IdealWorld:
                 raise AssertionError("a configuration in Δ: two robots touch")
             self.x[robots] = x
         self.time += self.tick
+
+    def move(self, robots: Index, x: Array, v: Array, a: Array) -> None:
+        """From now on `robots` run from x [m] at speed v under acceleration a [m/s²]."""
+        self._plan[robots, 0] = self.time
+        self._plan[robots, 1], self._plan[robots, 2], self._plan[robots, 3] = x, v, a
+
+    def advance(self, substeps: int) -> None:
+        """Timesteps of robots that move on their own (a distributed run)."""
+        self.time += substeps * self.timestep
+        begun, x, v, a = self._plan.T
+        tau = self.time - begun
+        self.x = x + tau * (v + 0.5 * tau * a)
+
+    def settle(self) -> None:
+        """Nothing settles in an ideal world."""
 
     def delivered(self) -> int:
         """Products dropped off."""

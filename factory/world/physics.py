@@ -33,8 +33,17 @@ class MujocoWorld:
     refuses the model, with the engine's own words.
     """
 
-    def __init__(self, model: Model, start: Array, gains: Array, units: int) -> None:
-        self.model, self.settings, self.units = model, model.settings, units
+    def __init__(
+        self,
+        model: Model,
+        start: Array,
+        gains: Array,
+        units: int,
+        counts: Mapping[int, int] | None = None,
+        wip: int | None = None,
+    ) -> None:
+        self.model, self.settings = model, model.settings
+        self.done = (counts or {}).get(model.factory.dropoff.end, 0)
         self.m = load(model)
         self.d = mujoco.MjData(self.m)
         factory = model.factory
@@ -46,10 +55,12 @@ class MujocoWorld:
         self.m.actuator_biasprm[actuator, 1:3] *= np.asarray(gains)[:, None]
         self.reference = np.array(start, float)
         self.speed = np.zeros_like(self.reference)
+        self._plan = np.zeros((len(start), 4))
+        self._moving = np.zeros(len(start), bool)
         self.mass = np.full(len(start), CARRIAGE_MASS)
         self.d.qpos[self.qpos] = start
         self.d.ctrl[self.control] = start
-        self.stock = Stock(self.m, self.d, model, units)
+        self.stock = Stock(self.m, self.d, model, units, counts or {}, wip)
         self.inspection = Inspection(self.m, self.d, model)
         self.physics_time = 0.0
         mujoco.mj_forward(self.m, self.d)
@@ -79,6 +90,8 @@ class MujocoWorld:
     ) -> None:
         """Hand the parts of ended operations over: welds off and on in one tick."""
         for operation, unit in ended:
+            if operation.index == self.model.factory.dropoff.index:
+                self.inspection.measured(self.stock.bodies_of(unit))
             switched = self.stock.hand_over(operation, unit)
             self.inspection.handed_over(switched)
             for slot, robot in enumerate(operation.robots):
@@ -86,37 +99,55 @@ class MujocoWorld:
 
     def step(self, bundle: Bundle | None, robots: Index) -> None:
         """One tick of the engine, the drives following a reference that obeys F_p under the limits."""
-        dt, substeps = self.settings.timestep, self.settings.substeps
-        d, m = self.d, self.m
-        pos = self.control[robots]
-        dof = self.dof[robots]
         if bundle is not None:
             x, v = self.reference[robots], self.speed[robots]
             x1, v1, a = follow(bundle, x, v, self.settings.tick)
+            self.move(robots, x, v, a)
+        self.advance(self.settings.substeps)
+        if bundle is not None:
             self.reference[robots], self.speed[robots] = x1, v1
-            d.ctrl[pos + 2] = self.mass[robots] * a
-        for k in range(substeps):
-            if bundle is not None:
-                tau = k * dt
-                d.ctrl[pos] = x + v * tau + (0.5 * tau * tau) * a
-                d.ctrl[pos + 1] = v + a * tau
-                still = dof[d.qvel[dof] == 0.0]
-                d.qvel[still] = AWAKE
+            still = np.zeros(len(robots))
+            self.move(robots, x1, still, still)
+            self.d.ctrl[self.control[robots] + 1] = v1
+        self.settle()
+
+    def move(self, robots: Index, x: Array, v: Array, a: Array) -> None:
+        """From now on the references of `robots` run from x [m] at speed v under acceleration a."""
+        self._plan[robots, 0] = self.d.time
+        self._plan[robots, 1], self._plan[robots, 2], self._plan[robots, 3] = x, v, a
+        ctrl = self.control[robots]
+        self.d.ctrl[ctrl], self.d.ctrl[ctrl + 1] = x, v
+        self.d.ctrl[ctrl + 2] = self.mass[robots] * a
+        self._moving[robots] = (v != 0) | (a != 0)
+
+    def advance(self, substeps: int) -> None:
+        """Timesteps of the engine, with the setpoints of all moving robots kept up to date."""
+        m, d = self.m, self.d
+        moving = np.flatnonzero(self._moving)
+        ctrl, dof = self.control[moving], self.dof[moving]
+        begun, x, v, a = self._plan[moving].T
+        for _ in range(substeps):
+            if len(moving):
+                tau = d.time - begun
+                d.ctrl[ctrl] = x + tau * (v + 0.5 * tau * a)
+                d.ctrl[ctrl + 1] = v + a * tau
+                d.qvel[dof[d.qvel[dof] == 0.0]] = AWAKE
             begin = perf_counter()
             mujoco.mj_step(m, d)
             self.physics_time += perf_counter() - begin
             if d.ncon:
                 self.inspection.contacts()
-        if bundle is not None:
-            d.ctrl[pos], d.ctrl[pos + 1], d.ctrl[pos + 2] = x1, v1, 0.0
+
+    def settle(self) -> None:
+        """After a tick: look at welds and the outfeed."""
         self.inspection.tick()
         for unit in self.stock.clear_outfeed():
             self.inspection.measured(self.stock.bodies_of(unit))
             self.stock.recycle(unit)
 
     def delivered(self) -> int:
-        """Products that have left the outfeed."""
-        return len(self.stock.left)
+        """Products that have left the outfeed, since the beginning of time."""
+        return self.done + len(self.stock.left)
 
 
 def load(model: Model) -> mujoco.MjModel:

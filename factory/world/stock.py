@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Mapping
 
 from dataclasses import dataclass
 
@@ -32,8 +33,16 @@ class Stock:
     all copies. Copies of one unit never collide with each other, those of different units do.
     """
 
-    def __init__(self, m: mujoco.MjModel, d: mujoco.MjData, model: Model, units: int) -> None:
-        self.m, self.d, self.model, self.units = m, d, model, units
+    def __init__(
+        self,
+        m: mujoco.MjModel,
+        d: mujoco.MjData,
+        model: Model,
+        units: int,
+        counts: Mapping[int, int],
+        wip: int | None = None,
+    ) -> None:
+        self.m, self.d, self.model, self.wip = m, d, model, wip
         factory = model.factory
         self.parts = factory.contents[factory.pag.root]
         self.first = model.base
@@ -49,20 +58,24 @@ class Stock:
         self.copy_of: dict[tuple[str, int], int] = {}
         self.shown: dict[str, int] = {}
         self.taken: set[str] = set()
-        self.next_unit = dict.fromkeys(self.parts, 0)
+        self.released = counts.get(factory.dropoff.end, 0)
+        self.units = self.released + units
+        self.next_unit = {o.label: counts.get(o.end, 0) for o in factory.leaves}
         self.feeds_robot = {o.carrier: o.label for o in factory.leaves}
         self.on_outfeed: deque[int] = deque()
         self.left: list[float] = []
         self.exit_at = self._exit()
         self._hide_spares()
+        self._hand_out(counts)
         for label in self.parts:
             self.feed_next(label)
 
     # --- feeding -------------------------------------------------------------------------------
 
     def presents(self, label: str, unit: int) -> bool:
-        """Whether the feeder shows the part for that unit."""
-        return self.shown.get(label) == unit
+        """Whether the feeder shows the part for that unit, and it may be let in."""
+        allowed = self.wip is None or unit < self.released + self.wip
+        return allowed and self.shown.get(label) == unit
 
     def feed_next(self, label: str) -> None:
         """Put the next copy into its empty feeder, if there is one to spare and a unit that needs it,
@@ -131,6 +144,7 @@ class Stock:
                 self.m.eq_obj1id[hold] = base
                 self._switch(hold, True)
         self.on_outfeed.append(unit)
+        self.released += 1
         return Switched(len(self.parts), 0.0)
 
     def body_of(self, label: str, unit: int) -> int:
@@ -233,6 +247,33 @@ class Stock:
         others = 0 if unit is None else (1 << (BITS + 1)) - 1 - own
         self.m.geom_contype[geoms] = self.m.body_contype[body] = own
         self.m.geom_conaffinity[geoms] = self.m.body_conaffinity[body] = others
+
+    def _hand_out(self, counts: Mapping[int, int]) -> None:
+        """Give the parts that are under way in a marking to the robots that carry them: that of the
+        last operation on its way that has ended for its unit."""
+        factory = self.model.factory
+        for leaf in factory.leaves:
+            for unit in range(self.released, counts.get(leaf.end, 0)):
+                holder = operation = leaf
+                while operation.index != factory.dropoff.index and counts.get(operation.end, 0) > unit:
+                    holder = operation
+                    operation = factory.operations[factory.parents[operation.index]]
+                if holder is leaf:
+                    self.taken.add(leaf.label)
+                self._give(leaf.label, unit, holder.carrier)
+
+    def _give(self, label: str, unit: int, robot: int) -> None:
+        """Put a copy into a robot's hands."""
+        copy = self.free[label].popleft()
+        self.copy_of[label, unit] = copy
+        body, weld = int(self.body[label][copy]), self.grip[robot, label]
+        mujoco.mj_kinematics(self.m, self.d)
+        holder = self.m.eq_obj1id[weld]
+        at = self.d.xpos[holder] + self.d.xmat[holder].reshape(3, 3) @ self.m.eq_data[weld, 3:6]
+        self._place(body, (float(at[0]), float(at[1]), float(at[2])))
+        self._mask(body, unit)
+        self._switch(self._park(label, copy), False)
+        self._switch(weld, True, body)
 
     def _hide_spares(self) -> None:
         for label, bodies in self.body.items():

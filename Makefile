@@ -1,0 +1,47 @@
+# factory: make demo, make test. Each sets up what it needs.
+PY := .venv/bin/python
+FACTORY := .venv/bin/factory
+
+.PHONY: help demo test test-all bench lint golden wheel setup clean
+
+help:
+	@echo "make demo      run the paper's example: a video and a poster in renders/"
+	@echo "make test      the test suite (under 10 minutes on 2 cores)"
+	@echo "make test-all  the long campaigns too"
+	@echo "make bench     times and sizes, written to docs/benchmarks.md"
+	@echo "make lint      ruff and mypy"
+	@echo "make golden    renew the golden texts (review the diff)"
+	@echo "make wheel     build the wheel in dist/"
+
+setup:
+	@tools/setup test
+
+demo: setup
+	$(FACTORY) check examples/paper.pag
+	$(FACTORY) run examples/paper.pag --units 3 --video renders/paper.mp4
+	$(FACTORY) render examples/paper.pag -o renders/paper.png --units 1 --at 5
+	@echo "see renders/paper.mp4 and renders/paper.png"
+
+test: setup
+	$(PY) -m pytest -q -n 2 -m "not slow" $(ARGS)
+
+test-all: setup
+	$(PY) -m pytest -q -n 2 $(ARGS)
+
+bench: setup
+	$(PY) -m tests.bench
+
+lint:
+	@tools/setup dev
+	.venv/bin/ruff check factory tests
+	.venv/bin/ruff format --check factory tests
+	.venv/bin/mypy
+
+golden: setup
+	$(PY) -m pytest -q -n 2 -m "not slow" --update-golden
+
+wheel: setup
+	.venv/bin/pip wheel --quiet --no-deps --wheel-dir dist .
+
+clean:
+	rm -rf .venv build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis

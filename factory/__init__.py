@@ -1,0 +1,112 @@
+"""factory: compile a product assembly graph into a factory that is proved live and runs in MuJoCo.
+
+The main job is four calls:
+
+>>> import factory
+>>> pag = factory.load_pag("examples/paper.pag")
+>>> plan = factory.compile(pag)
+>>> [robot.name for robot in plan.robots]
+['r1', 'r2', 'r3', 'r4', 'r5', 'r6']
+>>> layout = factory.lay_out(plan)
+>>> run = factory.run(layout, world="ideal", units=3)
+>>> run.products, run.refines_net
+(3, True)
+
+With `world="mujoco"`, the default, the same net runs over rigid-body physics. `factory.verify(plan)` proves
+that the net is a gear net, live, safe and reversible.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from os import PathLike
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+from factory.errors import Diagnostic, FactoryError, InputError, MissingError, RunError
+from factory.settings import Settings
+
+if TYPE_CHECKING:
+    from factory.factory import Factory
+    from factory.layout.plan import Layout
+    from factory.nets.verdict import Verdict
+    from factory.pag import PAG
+    from factory.trace import Run
+
+__version__ = "0.1.0"
+
+__all__ = [
+    "Diagnostic",
+    "FactoryError",
+    "InputError",
+    "MissingError",
+    "RunError",
+    "Settings",
+    "compile",
+    "lay_out",
+    "load_pag",
+    "run",
+    "verify",
+]
+
+
+def load_pag(path: str | PathLike[str], templates: Sequence[Path] = ()) -> PAG:
+    """The product assembly graph in a file.
+
+    `templates`: folders with further operations, searched before the shipped ones. Raises InputError
+    with every error of the file.
+    """
+    from factory.pipeline import read
+
+    return read(path, templates).pag
+
+
+def compile(pag: PAG, templates: Sequence[Path] = ()) -> Factory:
+    """The factory (R, ~, N) that makes a product (paper, section 5). Raises InputError."""
+    from factory.compiler import compile_pag
+    from factory.pipeline import all_templates
+    from factory.robots import load_catalogue
+
+    return compile_pag(pag, all_templates(templates), load_catalogue())
+
+
+def verify(plan: Factory) -> Verdict:
+    """The proof that a factory's net is a gear net, live, safe, reversible and legally marked, or
+    witnesses of what fails."""
+    from factory.nets.verify import verify as prove
+
+    return prove(plan.net)
+
+
+def lay_out(
+    plan: Factory, clearance: float = 0.02, floor: tuple[float, float] | None = None
+) -> Layout:
+    """The stretched tree of guidepaths (paper, section 5.1), sized by the parts' real geometry.
+
+    `clearance` and `floor` (width, depth) in [m]. Raises InputError for a mesh that cannot be read,
+    RunError where the factory does not fit the floor.
+    """
+    from factory.geometry import product_geometry
+    from factory.layout.embedding import lay_out as embed
+
+    return embed(plan, product_geometry(plan.pag), clearance, floor)
+
+
+def run(
+    layout: Layout,
+    world: Literal["mujoco", "ideal"] = "mujoco",
+    units: int = 1,
+    seed: int = 0,
+    jitter: float = 0.0,
+    settings: Settings | None = None,
+    **options: Any,
+) -> Run:
+    """Run the net over a world until `units` products are dropped off.
+
+    `seed` and `jitter` draw each robot's speed and gain within ± jitter. Raises RunError for a run
+    that stalls, InputError where the engine refuses a mesh.
+    """
+    from factory.simulation import Simulation, require
+
+    simulation = Simulation(layout, world, units, seed, jitter, settings, **options)
+    return require(simulation.run())

@@ -1,0 +1,125 @@
+"""The command `check`: what a PAG compiles to and what is proved of it, or of a net in PNML."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from factory.console import say, table
+from factory.errors import Diagnostic, InputError
+from factory.factory import Factory
+from factory.nets.gears import Gear, GearNet
+from factory.nets.marked import MarkedNet, marked
+from factory.nets.verdict import Verdict
+
+SHOWN = 24
+"""Robots in the table for people; `--json` and `-v` list all."""
+
+
+@dataclass(frozen=True)
+class Checked:
+    """A net with its verdict; `factory` is None where the net was read from PNML."""
+
+    name: str
+    labels: int
+    net: GearNet | MarkedNet
+    verdict: Verdict
+    factory: Factory | None
+    pool: dict[str, int]
+
+    def certificate(self) -> str:
+        """The proof as a document that another program can check."""
+        from factory.nets.certificate import certificate
+
+        return json.dumps(certificate(self.net, self.verdict), ensure_ascii=False) + "\n"
+
+    def as_json(self) -> dict[str, Any]:
+        """The keys of `check --json`."""
+        subject = marked(self.net)
+        places = subject.net.places
+        return {
+            "product": self.name,
+            "labels": self.labels,
+            "robots": len(self.verdict.gears),
+            "places": len(places),
+            "transitions": len(subject.net.transitions),
+            "tokens": sum(subject.tokens),
+            "largest_mode": max((p.size for p in places), default=0),
+            **self.verdict.as_json(),
+            "gears": [gear_json(gear, self.net) for gear in self.verdict.gears],
+            "part_pool": self.pool,
+        }
+
+
+def gear_json(gear: Gear, net: GearNet | MarkedNet) -> dict[str, Any]:
+    """One robot's gear as `check --json` lists it."""
+    places = marked(net).net.places
+    return {
+        "robot": gear.robot,
+        "type": gear.type,
+        "places": [
+            {"name": places[p].name, "mode": places[p].mode, "label": places[p].label}
+            for p in gear.places
+        ],
+    }
+
+
+def check_file(file: Path, folders: Sequence[Path], wip: int | None = None) -> Checked:
+    """Check a PAG, or a net in PNML by its ending. Raises InputError."""
+    if file.suffix.lower() == ".pnml":
+        return check_net(file)
+    from factory.nets.pool import part_pool
+    from factory.nets.verify import verify
+    from factory.pipeline import read
+
+    source = read(file, folders)
+    factory = source.compile()
+    sources = {r.name: r.position for r in factory.robots if r.position}
+    verdict = verify(factory.net, sources)
+    pool = dict(part_pool(factory, wip))
+    return Checked(source.pag.root, len(source.pag), factory.net, verdict, factory, pool)
+
+
+def check_net(file: Path) -> Checked:
+    """Check a net from elsewhere; it may well fail. Raises InputError."""
+    from factory.export.pnml import read_pnml
+    from factory.lang.source import read_text
+    from factory.nets.general import analyse
+
+    net = read_pnml(read_text(file), str(file))
+    if isinstance(net, tuple):
+        message = "the net cannot be analysed"
+        raise InputError(Diagnostic("BadNet", message, None, "give a place/transition net"))
+    verdict = analyse(net)
+    return Checked(file.stem, 0, net, verdict, None, {})
+
+
+def describe(checked: Checked, verbose: bool) -> None:
+    """A summary for people: the gears, the counts and the verdict."""
+    document = checked.as_json()
+    gears = document["gears"]
+    shown = gears if verbose else gears[:SHOWN]
+    rows = (
+        (g["robot"], g["type"], " · ".join(f"{p['mode']} {p['label']}".strip() for p in g["places"]))
+        for g in shown
+    )
+    table("", ("robot", "type", "gear"), rows)
+    if len(shown) < len(gears):
+        say(f"... and {len(gears) - len(shown)} more robots (-v shows all)")
+    say(
+        f"{checked.name}: {document['robots']} robots, {document['places']} places,"
+        f" {document['transitions']} transitions, {document['tokens']} tokens,"
+        f" largest mode {document['largest_mode']}"
+    )
+    words = {True: "yes", False: "NO", None: "undecided"}
+    names = ("gear_net", "live", "safe", "reversible", "legal")
+    say(", ".join(f"{name.replace('_', ' ')}: {words[document[name]]}" for name in names))
+    for witness in checked.verdict.witness:
+        say(f"  {witness}")
+    if checked.pool:
+        most = sorted(checked.pool.items(), key=lambda item: -item[1])[:8]
+        listed = ", ".join(f"{label} {count}" for label, count in most)
+        say(f"copies inside at once: {listed}{', ...' if len(checked.pool) > 8 else ''}")

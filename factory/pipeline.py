@@ -1,0 +1,46 @@
+"""The first stages in a row, for the command line and the Python API: templates, PAG, factory."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from os import PathLike
+from pathlib import Path
+
+from factory.assets import templates_folder
+from factory.compiler import compile_pag
+from factory.errors import Diagnostic, InputError
+from factory.factory import Factory
+from factory.lang.pag_reader import load_pag
+from factory.lang.template_reader import load_templates
+from factory.pag import PAG
+from factory.robots import Catalogue, load_catalogue
+from factory.template import Template
+
+
+@dataclass(frozen=True, slots=True)
+class Source:
+    """A PAG with the templates and robot types it is to be compiled with."""
+
+    pag: PAG
+    templates: Mapping[str, Template]
+    catalogue: Catalogue
+
+    def compile(self) -> Factory:
+        """Compile(P)."""
+        return compile_pag(self.pag, self.templates, self.catalogue)
+
+
+def all_templates(folders: Sequence[Path] = ()) -> Mapping[str, Template]:
+    """The templates of the user's folders and the shipped ones. Raises InputError."""
+    for folder in folders:
+        if not Path(folder).is_dir():
+            message = f"the templates folder '{folder}' is no directory"
+            raise InputError(Diagnostic("BadTemplate", message, None, "--templates takes a directory"))
+    return load_templates([*map(Path, folders), templates_folder()])
+
+
+def read(path: str | PathLike[str], folders: Sequence[Path] = ()) -> Source:
+    """A PAG file with what it needs. Raises InputError with every error found."""
+    templates = all_templates(folders)
+    return Source(load_pag(path, templates), templates, load_catalogue())

@@ -1,0 +1,44 @@
+"""Predict a run before it: the delay of each operation, and the cycle time they give.
+
+A robot starts an operation where the one before has left it. In either world a transition costs a tick,
+since those enabled in one tick fire as one set; in MuJoCo the drives settle within eps besides.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from factory.control.mode import Limits, Mode
+from factory.control.profile import World, mode_time
+from factory.layout.plan import Layout
+from factory.nets.timing import CycleTime, cycle_time
+from factory.settings import Settings
+
+
+def operation_delays(
+    layout: Layout, modes: Sequence[Mode], limits: Limits, settings: Settings, world: World
+) -> list[float]:
+    """The time [s] from X_s to X_e of every operation, and the tick until what follows can fire."""
+    factory = layout.factory
+    left: dict[tuple[int, int], float] = {}
+    for robot in factory.robots:
+        for step, number in enumerate(robot.operations):
+            before = factory.operations[robot.operations[step - 1]]
+            left[number, robot.index] = layout.goal(before.index, before.robots.index(robot.index))
+    settle = settings.settle if world == "mujoco" else 0.0
+    delays = []
+    for operation, mode in zip(factory.operations, modes, strict=True):
+        robots = list(operation.robots)
+        start = np.array([left[operation.index, robot] for robot in robots])
+        chosen = Limits(limits.speed[robots], limits.acceleration[robots])
+        delays.append(mode_time(mode, start, chosen, world) + settle + settings.tick)
+    return delays
+
+
+def predict(
+    layout: Layout, modes: Sequence[Mode], limits: Limits, settings: Settings, world: World
+) -> CycleTime:
+    """The cycle time of the compiled net (the greatest sum of delays along a gear) and its bottleneck."""
+    return cycle_time(layout.factory, operation_delays(layout, modes, limits, settings, world))

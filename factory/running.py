@@ -1,0 +1,118 @@
+"""The commands `run` and `render`: a simulation with its film, log and progress."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Any
+
+from factory.console import say, table
+from factory.errors import Diagnostic, InputError
+from factory.factory import Factory
+from factory.layout.plan import Layout
+from factory.nets.history import legal_marking
+from factory.pipeline import Source
+from factory.settings import Settings
+from factory.simulation import Observer, Simulation
+from factory.trace import Run
+
+Size = tuple[int, int]
+
+
+def simulation(
+    source: Source, layout: Layout, settings: Settings, options: dict[str, Any]
+) -> Simulation:
+    """The simulation that the options of the command line ask for. Raises InputError."""
+    start = options.get("start")
+    net = layout.factory.net
+    return Simulation(
+        layout,
+        options.get("world", "mujoco"),
+        options.get("units", 1),
+        options.get("seed", 0),
+        options.get("jitter", 0.0),
+        settings,
+        source.catalogue,
+        legal_marking(net, start) if start else None,
+        options.get("wip"),
+        bool(options.get("distributed")),
+    )
+
+
+def run_file(
+    source: Source,
+    layout: Layout,
+    settings: Settings,
+    video: Path | None,
+    log: Path | None,
+    size: Size | None,
+    quiet: bool,
+    options: dict[str, Any],
+) -> Run:
+    """One run, filmed and logged as asked. Raises MissingError where a film needs GL that is not
+    there, before anything is written."""
+    from factory.building import refuse_unproved
+    from factory.progress import Progress
+
+    refuse_unproved(layout.factory)
+    if video is not None:
+        if options.get("world") == "ideal":
+            message = "the ideal world has no bodies to film"
+            raise InputError(Diagnostic("Usage", message, None, "leave out --world ideal"))
+        from factory.gl import probe
+        from factory.render import check_output
+
+        check_output(video, size or (1280, 720))
+        probe()
+    made = simulation(source, layout, settings, options)
+    with ExitStack() as stack:
+        observers: list[Observer] = []
+        if log is not None:
+            from factory.log import LogWriter
+
+            observers.append(stack.enter_context(LogWriter(log, made, source)).observe)
+        if video is not None:
+            from factory.render import Film
+
+            film = Film(made, video, size or (1280, 720), options["fps"], options["camera"])
+            observers.append(stack.enter_context(film).observe)
+        observers.append(stack.enter_context(Progress(made.units, quiet)).observe)
+        return made.run(observers, options.get("max_time"))
+
+
+def render_file(
+    file: Path,
+    folders: Sequence[Path],
+    output: Path,
+    at: str,
+    floor: str | None,
+    size: Size | None,
+    quiet: bool,
+    options: dict[str, Any],
+) -> dict[str, Any]:
+    """A film or still of a PAG that is run for it, or of a log."""
+    raise NotImplementedError
+
+
+def summarise(record: Run, factory: Factory, verbose: bool) -> None:
+    """A run in a few lines for people."""
+    cycle = f"{record.cycle_time_s:.3f} s" if record.cycle_time_s is not None else "not yet steady"
+    say(f"{record.products} of {record.units} products in {record.sim_time_s:.2f} s "
+        f"({record.realtime_factor:.1f} times real time, {record.world})")
+    say(f"cycle time {cycle}, predicted {record.predicted_cycle_time_s:.3f} s; "
+        f"bottleneck {record.bottleneck}")
+    say(f"{len(record.events)} transitions fired, "
+        f"the record {'refines' if record.refines_net else 'DOES NOT REFINE'} the net")
+    physics = record.physics
+    if physics is not None:
+        error = physics.product_error_max_mm
+        say(f"{physics.handoffs} hand-offs, gap at most {physics.handoff_gap_max_mm:.3f} mm; "
+            f"product error {'none measured' if error is None else f'{error:.3f} mm'}; "
+            f"{physics.unintended_contacts} unintended contacts, "
+            f"{physics.engine_warnings} engine warnings")
+        for pair in physics.contacts[:8]:
+            say(f"  touched: {pair}")
+    busy = sorted(zip(factory.robots, record.utilisation, strict=True), key=lambda p: -p[1])
+    rows = [(r.name, r.type, f"{100 * u:.0f} %") for r, u in (busy if verbose else busy[:6])]
+    table("Utilisation", ("robot", "type", "busy"), rows)

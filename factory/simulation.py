@@ -1,0 +1,210 @@
+"""Run a laid-out factory in one of the two worlds until its products are dropped off."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from time import perf_counter
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+
+from factory.control.plan import operation_modes, robot_limits
+from factory.distributed import DistributedSupervisor
+from factory.errors import Diagnostic, InputError, RunError
+from factory.layout.plan import Layout
+from factory.nets.history import firings
+from factory.nets.petri import Marking
+from factory.nets.pool import part_pool
+from factory.nets.replay import replay
+from factory.prediction import operation_delays, predict
+from factory.robots import Catalogue, load_catalogue
+from factory.settings import Settings
+from factory.supervisor import Supervisor
+from factory.trace import PhysicsFigures, Run
+from factory.world.ideal import IdealWorld
+
+if TYPE_CHECKING:
+    from factory.mjcf.model import Model
+
+Observer = Callable[[Any, Supervisor], None]
+"""Called after every tick with the world and the supervisor: to render, to log, to show progress."""
+
+PATIENCE = 10.0
+"""A run has stalled when nothing fires for this many times the longest predicted delay."""
+
+
+class Simulation:
+    """One run, ready to go: `run()` does it; `model` is what the engine is given (mujoco only).
+
+    Raises InputError where the engine refuses the model, and RunError (Stalled, Timeout) from `run` only
+    where `strict`; otherwise the Run carries the trouble.
+    """
+
+    def __init__(
+        self,
+        layout: Layout,
+        world: Literal["mujoco", "ideal"] = "mujoco",
+        units: int = 1,
+        seed: int = 0,
+        jitter: float = 0.0,
+        settings: Settings | None = None,
+        catalogue: Catalogue | None = None,
+        start: Marking | None = None,
+        wip: int | None = None,
+        distributed: bool = False,
+    ) -> None:
+        self.layout, self.kind, self.units = layout, world, units
+        self.seed, self.jitter = seed, jitter
+        self.settings = settings or Settings()
+        factory = layout.factory
+        self.modes = operation_modes(layout, self.settings.eps)
+        self.limits, gains = robot_limits(layout, self.settings, seed, jitter)
+        self.start = factory.net.initial_marking if start is None else start
+        self.counts = firings(factory.net, self.start)
+        positions = start_positions(layout, self.start)
+        self.model: Model | None = None
+        self.world: Any
+        if world == "ideal":
+            done = self.counts.get(factory.dropoff.end, 0)
+            self.world = IdealWorld(
+                positions,
+                factory.dropoff.index,
+                units + done,
+                self.settings.tick,
+                done,
+                wip,
+                self.settings.timestep,
+            )
+        else:
+            self.model = physical_model(
+                layout, units, self.settings, catalogue, wip, self.under_way()
+            )
+            self.world = _mujoco(self.model, positions, gains, units, self.counts, wip)
+        self.before = self.world.delivered()
+        self.supervisor = self._distributed() if distributed else self._central()
+
+    def _central(self) -> Supervisor:
+        tick = self.settings.tick
+        return Supervisor(
+            self.layout.factory, self.modes, self.limits, self.world, tick, self.start, self.counts
+        )
+
+    def _distributed(self) -> DistributedSupervisor:
+        settings, factory = self.settings, self.layout.factory
+        if self.start != factory.net.initial_marking:
+            message = "a distributed run starts where every robot waits with no part"
+            raise InputError(Diagnostic("BadMarking", message, None, "leave out --from"))
+        return DistributedSupervisor(
+            factory, self.modes, self.limits, self.world, settings.timestep, settings.substeps, self.seed
+        )
+
+    def under_way(self) -> dict[str, int]:
+        """How many copies of each part are in the factory in the marking where the run starts."""
+        factory, counts = self.layout.factory, self.counts
+        gone = counts.get(factory.dropoff.end, 0)
+        return {o.label: counts.get(o.end, 0) - gone for o in factory.leaves}
+
+    def run(self, observers: Sequence[Observer] = (), max_time: float | None = None) -> Run:
+        """Tick until `units` products have been dropped off, the run stalls or `max_time` [s] passes."""
+        delays = operation_delays(
+            self.layout, self.modes, self.limits, self.settings, self.kind
+        )
+        patience = PATIENCE * max(delays)
+        begin, watched, trouble = perf_counter(), 0.0, None
+        supervisor, world, goal = self.supervisor, self.world, self.before + self.units
+        while world.delivered() < goal and trouble is None:
+            supervisor.step()
+            if observers:
+                pause = perf_counter()
+                for observe in observers:
+                    observe(world, supervisor)
+                watched += perf_counter() - pause
+            if world.time - supervisor.last_event > patience:
+                trouble = self._stalled(patience)
+            elif max_time is not None and world.time >= max_time:
+                trouble = self._stalled(max_time, "Timeout")
+        return self._record(perf_counter() - begin - watched, trouble)
+
+    def _record(self, wall: float, trouble: Diagnostic | None) -> Run:
+        supervisor, world, factory = self.supervisor, self.world, self.layout.factory
+        physics = getattr(world, "physics_time", 0.0)
+        predicted = predict(self.layout, self.modes, self.limits, self.settings, self.kind)
+        verdict = replay(factory.net, [e.transition for e in supervisor.events], self.start)
+        figures: PhysicsFigures | None = None
+        if self.model is not None:
+            figures = world.inspection.figures()
+        return Run(
+            self.kind,
+            self.units,
+            world.delivered() - self.before,
+            len(factory.robots),
+            world.time,
+            wall,
+            physics,
+            wall - physics,
+            predicted.seconds,
+            predicted.bottleneck,
+            verdict.refines,
+            tuple(supervisor.events),
+            tuple(world.dropoffs),
+            tuple(supervisor.busy),
+            figures,
+            self.seed,
+            self.jitter,
+            trouble,
+        )
+
+    def _stalled(self, seconds: float, code: str = "Stalled") -> Diagnostic:
+        """Names the robots that are in an operation, or else those that wait for one that cannot start."""
+        factory, supervisor = self.layout.factory, self.supervisor
+        numbers = supervisor.active.operations or tuple(
+            event // 2 for event in sorted(supervisor.ready)
+        )
+        places = [factory.operations[n] for n in numbers[:3]]
+        robots = ", ".join(
+            f"{factory.robots[r].name} in {o.template.name}({o.label})" for o in places for r in o.robots
+        )
+        waits = "nothing fired for" if code == "Stalled" else "not finished after"
+        message = f"{waits} {seconds:.2f} s of simulated time; {robots or 'no robot can start'}"
+        position = places[0].position if places else None
+        hint = "look at these robots in `factory render`, or give --max-time more"
+        return Diagnostic(code, message, position, hint)
+
+
+def physical_model(
+    layout: Layout,
+    units: int | None = None,
+    settings: Settings | None = None,
+    catalogue: Catalogue | None = None,
+    wip: int | None = None,
+    under_way: Mapping[str, int] | None = None,
+) -> Model:
+    """The MJCF model of a layout with the pool of parts it needs for `units` (None: for ever)."""
+    from factory.mjcf.model import build_model, part_copies
+
+    copies = part_copies(part_pool(layout.factory), units, wip, under_way)
+    return build_model(layout, catalogue or load_catalogue(), copies, settings or Settings())
+
+
+def start_positions(layout: Layout, marking: Marking) -> np.ndarray:
+    """Arc length of every robot in a marking: where its last operation left it, or its B end where
+    it waits with no part at the beginning of its cycle."""
+    net = layout.factory.net
+    positions = np.zeros(len(layout.factory.robots))
+    for robot, gear in zip(layout.factory.robots, net.gears, strict=True):
+        step = next(i for i, place in enumerate(gear.places) if place in marking) // 2
+        positions[robot.index] = layout.home(robot.index, robot.operations[step])
+    return positions
+
+
+def _mujoco(*arguments: Any) -> Any:
+    from factory.world.physics import MujocoWorld
+
+    return MujocoWorld(*arguments)
+
+
+def require(run: Run) -> Run:
+    """The run itself, or RunError with what troubled it."""
+    if run.trouble is not None:
+        raise RunError(run.trouble)
+    return run

@@ -1,0 +1,198 @@
+"""Certificates: what `certificate` writes passes the check, and nothing tampered with does."""
+
+from __future__ import annotations
+
+import ast
+import copy
+import json
+import random
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import factory.nets
+from factory.factory import Factory
+from factory.nets.certificate import certificate, check_certificate
+from factory.nets.certificate_net import digest
+from factory.nets.gears import GearNet
+from factory.nets.general import analyse
+from factory.nets.marked import MarkedNet, marked
+from tests.net_values import (
+    crossed_twice,
+    doubled_token,
+    lost_token,
+    missing_producer,
+    net_from,
+    random_marked_net,
+    unclosed_gear,
+)
+from tests.pag_values import factories, factory_of, paper, random_pag
+
+Json = dict[str, Any]
+
+
+def certified(net: GearNet | MarkedNet) -> Json:
+    """The certificate of a net, through JSON text."""
+    found: Json = json.loads(json.dumps(certificate(net, analyse(net))))
+    return found
+
+
+@given(factories())
+def test_certificates_of_factories_pass(factory: Factory) -> None:
+    document = certified(factory.net)
+    assert check_certificate(document) == []
+    assert all(document[claim]["holds"] is True for claim in _CLAIMS)
+
+
+_CLAIMS = ("gear_net", "live", "safe", "reversible", "legal")
+
+
+def test_a_large_certificate() -> None:
+    net = factory_of(random_pag(5_000, 2, "chain")).net
+    assert check_certificate(certificate(net, analyse(net))) == []
+
+
+@given(factories(), st.randoms(use_true_random=False), st.integers(0, 4))
+def test_certificates_of_broken_factories_pass(
+    factory: Factory, rng: random.Random, which: int
+) -> None:
+    net = factory.net
+    robot = rng.randrange(len(net.gears))
+    broken = (
+        lost_token(net, robot),
+        doubled_token(net, robot),
+        missing_producer(net, rng.randrange(len(net.threaded.places))),
+        crossed_twice(net, robot, 0) or lost_token(net, robot),
+        unclosed_gear(net, robot, 0, net.gears[robot].transitions[0]),
+    )[which]
+    document = certified(broken)
+    assert check_certificate(document) == []
+    assert any(document[claim]["holds"] is False for claim in _CLAIMS)
+    sealed = copy.deepcopy(document)
+    for claim in _CLAIMS:
+        if document[claim]["holds"] is False:
+            sealed[claim] = certified(net)[claim]
+            assert check_certificate(seal(sealed)) != []
+
+
+@given(st.integers(0, 10**9))
+@settings(max_examples=300)
+def test_certificates_of_marked_graphs_pass(seed: int) -> None:
+    assert check_certificate(certified(random_marked_net(random.Random(seed)))) == []
+
+
+@pytest.mark.parametrize(
+    "edges",
+    [
+        [("b c", "a", 1), ("a", "b c", 0)],
+        [("b", "a c", 1), ("a", "b", 0)],
+        [("b", "a c", 1), ("a", "b", 0), ("c e", "d", 0), ("d", "e", 0)],
+        [("", "x", 3), ("a", "b c", 0), ("b c x", "a", 1), ("a", "", 0)],
+    ],
+)
+def test_certificates_of_nets_with_choice_pass(edges: list[tuple[str, str, int]]) -> None:
+    document = certified(net_from(edges))
+    assert check_certificate(document) == []
+    assert document["gear_net"]["holds"] is False
+
+
+def test_a_bare_net_is_certified_by_the_gears_found() -> None:
+    subject = marked(factory_of(paper()).net)
+    document = certified(MarkedNet(subject.net, subject.tokens))
+    assert [robot["name"] for robot in document["robots"]] == [f"g{i}" for i in range(1, 7)]
+    assert check_certificate(document) == []
+
+
+def seal(document: Json) -> Json:
+    """The document with the digest that belongs to it: what a forger would do."""
+    return {**document, "digest": digest(document)}
+
+
+def leaves(node: Any, path: tuple[Any, ...] = ()) -> Iterator[tuple[Any, ...]]:
+    """The paths to every scalar."""
+    pairs = node.items() if isinstance(node, dict) else enumerate(node)
+    for key, value in pairs:
+        if isinstance(value, dict | list):
+            yield from leaves(value, (*path, key))
+        else:
+            yield (*path, key)
+
+
+def tampered(document: Json, path: tuple[Any, ...]) -> Json:
+    """The document with one scalar changed."""
+    changed = copy.deepcopy(document)
+    node: Any = changed
+    for key in path[:-1]:
+        node = node[key]
+    value = node[path[-1]]
+    if isinstance(value, bool):
+        node[path[-1]] = not value
+    elif isinstance(value, int):
+        node[path[-1]] = value + 1
+    else:
+        node[path[-1]] = 0 if value is None else f"{value}x"
+    return changed
+
+
+def test_tampering_with_any_field_is_caught() -> None:
+    document = certified(factory_of(paper()).net)
+    for path in leaves(document):
+        assert check_certificate(tampered(document, path)) != [], path
+
+
+_FREE = {"name", "mode", "label", "type", "cover"}
+"""What a forger may change without a lie: names, and a gear that covers as well."""
+
+
+def test_tampering_is_caught_although_sealed_again() -> None:
+    document = certified(factory_of(paper()).net)
+    for path in leaves(document):
+        other_way = path[0] == "reversible" and "place" in path
+        if path != ("digest",) and not other_way and not _FREE & set(path):
+            assert check_certificate(seal(tampered(document, path))) != [], path
+
+
+def test_leaving_anything_out_is_caught() -> None:
+    document = certified(factory_of(paper()).net)
+    for path in leaves(document):
+        changed = copy.deepcopy(document)
+        node: Any = changed
+        for key in path[:-1]:
+            node = node[key]
+        del node[path[-1]]
+        if path != ("digest",):
+            changed = seal(changed)
+        if not {"mode", "label", "type"} & set(path) and path[:2] != ("gear_net", "meets"):
+            assert check_certificate(changed) != [], path
+
+
+@pytest.mark.parametrize("claim", _CLAIMS)
+def test_a_false_refutation_is_caught(claim: str) -> None:
+    document = certified(factory_of(paper()).net)
+    for evidence in (
+        {"circuit": [0, 1], "firing": None, "stray": []},
+        {"circuit": None, "firing": [6], "place": 0, "stray": []},
+        {"circuit": [7], "firing": None, "transition": 6, "stray": []},
+    ):
+        forged = {**document, claim: {"holds": False, "reason": "said so", **evidence}}
+        assert check_certificate(seal(forged)) != []
+    undecided = {**document, claim: {"holds": None, "reason": ""}}
+    assert check_certificate(seal(undecided)) != []
+
+
+@pytest.mark.parametrize("junk", [None, 3, [], {}, {"schema": 1}, {"schema": 2, "digest": ""}, "x"])
+def test_junk_is_no_certificate(junk: object) -> None:
+    assert len(check_certificate(junk)) >= 1
+
+
+def test_the_checker_uses_nothing_that_made_the_certificate() -> None:
+    folder = Path(factory.nets.__file__ or "").parent
+    for name in ("certificate_check", "certificate_net", "certificate_refute"):
+        tree = ast.parse((folder / f"{name}.py").read_text("utf-8"))
+        froms = [n.module or "" for n in ast.walk(tree) if isinstance(n, ast.ImportFrom)]
+        inside = {module for module in froms if module.startswith("factory")}
+        assert all(module.startswith("factory.nets.certificate_") for module in inside)

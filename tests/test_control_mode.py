@@ -1,0 +1,100 @@
+"""Modes: what is refused, what is derived."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from factory.control import Bundle, Limits, Mode
+
+R = 0.1
+
+
+def two(**changes: Any) -> Mode:
+    """Two robots; robot 1's guidepath ends at 0.5 of robot 0's."""
+    values: dict[str, Any] = {
+        "goals": [0.5 + 2 * R, 2 * R],
+        "lower": [0.0, 0.0],
+        "upper": [1.0, 1.0],
+        "eps": 1e-3,
+        "pairs": [[0, 1]],
+        "meet": [[0.5, 0.0]],
+        "touch": [R],
+    }
+    return Mode(**(values | changes))
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"goals": []}, "shape"),
+        ({"eps": 0.0}, "eps 0"),
+        ({"dwell": -1.0}, "dwell -1"),
+        ({"goals": [0.5, 1.5]}, r"robot 1: goal 1.5 with standoff 0 is not inside \[0, 1\]"),
+        ({"goals": [float("nan"), 0.2]}, "robot 0: goal nan"),
+        ({"gate": [-1, 0], "standoff": [0.0, 0.9]}, "robot 1: goal 0.2 with standoff 0.9"),
+        ({"gate": [-1, 2], "standoff": [0.0, 0.1]}, "there are 2 robots"),
+        ({"gate": [1, 0], "standoff": [0.1, 0.1]}, r"robots \[0, 1\] wait for each other"),
+        ({"gate": [1, -1], "standoff": [0.1, 0.0]}, "robot 0 waits for a gate"),
+        ({"pairs": [[0, 5]]}, "pairs"),
+        ({"touch": [R, R]}, "1 pairs, 1 meet, 2 touch"),
+        ({"touch": [4 * R]}, "robots 0 and 1 at their goals touch"),
+        ({"pairs": [[1, 1]]}, "robots 1 and 1"),
+        ({"lower": [0.0]}, r"lower of shape \(1,\), expected \(2,\)"),
+    ],
+)
+def test_refuses_what_is_no_mode(changes: dict[str, Any], message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        two(**changes)
+
+
+def test_values_are_copied_and_locked() -> None:
+    goals = np.array([0.7, 0.2])
+    mode = two(goals=goals)
+    goals[0] = 0.9
+    assert mode.goals[0] == 0.7
+    with pytest.raises(ValueError, match="read-only"):
+        mode.goals[0] = 0.9
+
+
+def test_reach_keeps_the_goal_clear_of_obstacles() -> None:
+    assert two().reach == pytest.approx([1.5 * R])
+    assert two(goals=[0.5 + 2 * R, 1.2 * R]).reach == pytest.approx([1.2 * R])
+    assert two().trapped == ()
+
+
+def test_a_tool_that_parks_at_the_junction_may_trap_the_carrier() -> None:
+    """But from the side it comes from the carrier never meets it; or shorten its interval."""
+    parked = two(goals=[0.5 + 2 * R, 0.0])
+    assert parked.trapped == ((0, 1),)
+    assert parked.clear_from(np.array([1.0, 0.5]))
+    assert not parked.clear_from(np.array([0.2, 0.5]))
+    assert two(goals=[0.5 + 2 * R, 0.0], lower=[0.5, 0.0]).trapped == ()
+
+
+def test_a_trapped_mode_traps() -> None:
+    bundle = Bundle.of([two(goals=[0.5 + 2 * R, 0.0])], [Limits(np.ones(2), np.ones(2))])
+    x = np.array([0.2, 0.0])
+    for _ in range(5000):
+        x = x + bundle.field(x, 1e-3) * 1e-3
+    assert bundle.in_domain(x) == [True]
+    assert bundle.at_goal(x) == [False]
+
+
+def test_each_robot_is_ordered_after_its_gate() -> None:
+    gate, standoff = [2, 0, -1], [0.1, 0.1, 0.0]
+    mode = Mode(np.zeros(3), np.zeros(3), np.ones(3), 1e-3, gate=np.array(gate), standoff=standoff)  # type: ignore[arg-type]
+    assert mode.order == (2, 0, 1)
+
+
+@pytest.mark.parametrize("limits", [([1.0], [0.0]), ([np.inf], [1.0]), ([1.0, 1.0], [1.0])])
+def test_limits_are_positive_and_complete(limits: tuple[list[float], list[float]]) -> None:
+    with pytest.raises(ValueError, match=r"limits|speeds"):
+        Limits(*map(np.array, limits))
+
+
+def test_a_bundle_wants_limits_for_every_robot() -> None:
+    with pytest.raises(ValueError, match="mode 1: 1 limits, 2 robots"):
+        Bundle.of([two(), two()], [Limits(np.ones(2), np.ones(2)), Limits(np.ones(1), np.ones(1))])

@@ -1,0 +1,116 @@
+"""Predicted times against the field and the governor, integrated."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from factory.control import (
+    Bundle,
+    Limits,
+    Mode,
+    follow,
+    ideal_time,
+    mode_time,
+    staged_time,
+    trapezoid_time,
+)
+from factory.control.mode import Array
+from factory.control.profile import travelled
+
+R, EPS = 0.06, 2e-4
+
+
+def mate(lengths: Array) -> Mode:
+    goals = np.array([2 * R, 2 * R, lengths[2]])
+    pairs = np.array([[0, 1], [0, 2], [1, 2]])
+    meet = np.array([0.0, 0.0, lengths[2] - 2 * R])[pairs]
+    return Mode(goals, np.zeros(3), lengths, EPS, pairs, meet, np.full(3, R))
+
+
+def staged(lengths: Array, standoffs: Array) -> Mode:
+    """A chain of robots, each waiting for the one before."""
+    k = lengths.size
+    gate = np.arange(k) - 1
+    return Mode(np.zeros(k), np.zeros(k), lengths, EPS, gate=gate, standoff=standoffs, dwell=0.1)
+
+
+def measured(mode: Mode, x: Array, limits: Limits, world: str, dt: float) -> float:
+    """When the field's flow enters the goal ball, or the governed reference rests in it [s]."""
+    bundle, v = Bundle.of([mode], [limits]), np.zeros_like(x)
+    for tick in range(100_000):
+        if bundle.at_goal(x)[0] and np.abs(v).max() <= 1e-9:
+            return tick * dt + mode.dwell
+        if world == "ideal":
+            x = x + bundle.field(x, dt) * dt
+        else:
+            x, v, _ = follow(bundle, x, v, dt)
+    raise AssertionError("the goal was never reached")
+
+
+def random_limits(rng: np.random.Generator, k: int) -> Limits:
+    return Limits(rng.uniform(0.3, 1.0, k), rng.uniform(1.0, 5.0, k))
+
+
+@pytest.mark.parametrize("world", ["ideal", "mujoco"])
+@pytest.mark.parametrize("dt", [1e-3, 4e-3, 10e-3])
+def test_mode_time_is_that_of_the_integrated_mode(world: str, dt: float) -> None:
+    rng = np.random.default_rng(0)
+    for _ in range(8):
+        long = rng.uniform(0.5, 1.5, 3)
+        for mode, x0 in (
+            (mate(long), np.array([long[0], long[1], 0.0])),
+            (staged(long[:2], np.array([0.0, 0.6 * long[1]])), long[:2]),
+            (staged(long, 0.9 * long * rng.uniform(0, 1, 3)), long),
+            (staged(long[:2], np.array([0.0, 0.1])), np.array([1e-4, 1.0]) * long[:2]),
+        ):
+            limits = random_limits(rng, mode.size)
+            assert mode.clear_from(x0)
+            predicted = mode_time(mode, x0, limits, world)  # type: ignore[arg-type]
+            ticks = max(mode.size, 2) if mode.gate.max() >= 0 else 2
+            assert abs(predicted - measured(mode, x0, limits, world, dt)) <= ticks * dt
+
+
+def test_known_times() -> None:
+    assert trapezoid_time(2.0, 1.0, 1.0) == 3.0
+    assert trapezoid_time(0.25, 1.0, 1.0) == 1.0
+    assert ideal_time(2.0, 1.0, 1.0) == 2.5
+    assert ideal_time(0.125, 1.0, 1.0) == 0.5
+    assert trapezoid_time(0.0, 1.0, 1.0) == 0.0
+    assert trapezoid_time(np.array([2.0, 0.25]), 1.0, 1.0).tolist() == [3.0, 1.0]
+
+
+@settings(max_examples=200, deadline=None)
+@given(
+    st.floats(0.01, 5.0), st.floats(0.0, 1.0), st.floats(0.0, 9.0), st.floats(0.05, 2.0),
+    st.floats(0.2, 9.0),
+)  # fmt: skip
+def test_staged_time_lies_between_going_through_and_stopping(
+    distance: float, share: float, opens: float, v: float, a: float
+) -> None:
+    standoff = share * distance
+    direct = trapezoid_time(distance, v, a)
+    found = staged_time(distance, standoff, opens, v, a)
+    stopped = np.maximum(opens, trapezoid_time(distance - standoff, v, a))
+    assert direct - 1e-6 <= found <= stopped + trapezoid_time(standoff, v, a) + 1e-6
+    assert staged_time(distance, standoff, 0.0, v, a) == pytest.approx(float(direct))
+    late = 1e3
+    expected = late + float(trapezoid_time(standoff, v, a))
+    assert staged_time(distance, standoff, late, v, a) == pytest.approx(expected, abs=1e-3)
+
+
+@settings(max_examples=100, deadline=None)
+@given(st.floats(0.001, 5.0), st.floats(0.05, 2.0), st.floats(0.2, 9.0), st.floats(0.0, 1.0))
+def test_travelled_ends_at_the_distance_at_rest(d: float, v: float, a: float, part: float) -> None:
+    total = trapezoid_time(d, v, a)
+    way, speed = travelled(d, v, a, 0.0, total)
+    assert way == pytest.approx(d) and speed == pytest.approx(0.0, abs=1e-9)
+    half, speed = travelled(d, v, a, 0.0, part * total)
+    assert -1e-12 <= half <= d + 1e-9 and speed <= v + 1e-12
+
+
+def test_waiting_takes_no_time_but_its_dwell() -> None:
+    limits = Limits(np.ones(2), np.ones(2))
+    assert mode_time(Mode.still(2), np.array([3.0, 4.0]), limits) == 0.0

@@ -1,0 +1,309 @@
+"""PNML: read ∘ write is the identity; what is broken is diagnosed; exporters are found."""
+
+from __future__ import annotations
+
+import random
+import re
+from dataclasses import replace
+from pathlib import Path
+from xml.etree import ElementTree
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import factory.export
+from factory.errors import InputError
+from factory.export import exporters
+from factory.export.dot import write_dot
+from factory.export.pnml import read_pnml, write_pnml
+from factory.factory import Factory
+from factory.nets.gears import GearNet
+from factory.nets.general import analyse
+from factory.nets.marked import MarkedNet, marked
+from factory.nets.petri import Transition
+from tests.net_values import (
+    crossed_twice,
+    doubled_token,
+    lost_token,
+    missing_producer,
+    net_from,
+    random_marked_net,
+    unclosed_gear,
+)
+from tests.pag_values import factories, factory_of, paper
+
+NS = "http://www.pnml.org/version-2009/grammar/pnml"
+
+
+@given(factories())
+def test_read_after_write_is_the_identity(factory: Factory) -> None:
+    text = write_pnml(factory.net)
+    net = read_pnml(text, "net.pnml")
+    assert net == factory.net
+    assert isinstance(net, GearNet)
+    assert write_pnml(net) == text
+    assert [p.position for p in net.threaded.places] == [
+        p.position for p in factory.net.threaded.places
+    ]
+
+
+@given(st.integers(0, 10**9))
+def test_any_marked_net_survives(seed: int) -> None:
+    net = random_marked_net(random.Random(seed))
+    assert read_pnml(write_pnml(net)) == net
+
+
+def test_it_is_pnml_of_2009() -> None:
+    root = ElementTree.fromstring(write_pnml(factory_of(paper()).net))
+    assert root.tag == f"{{{NS}}}pnml"
+    net = root.find(f"{{{NS}}}net")
+    assert net is not None
+    assert net.get("type") == "http://www.pnml.org/version-2009/grammar/ptnet"
+    page = net.find(f"{{{NS}}}page")
+    assert page is not None
+    counts = [len(page.findall(f"{{{NS}}}{name}")) for name in ("place", "transition", "arc")]
+    assert counts == [19, 14, 38]
+    ids = [e.get("id") for e in root.iter() if e.get("id")]
+    assert len(ids) == len(set(ids))
+
+
+def test_names_are_escaped() -> None:
+    net = net_from([("a", "b", 1), ("b", "a", 0)])
+    named = replace(net.net, transitions=(Transition('<&">'), Transition("ä\x01")))
+    found = read_pnml(write_pnml(replace(net, net=named)))
+    assert isinstance(found, MarkedNet)
+    assert [t.name for t in found.net.transitions] == ['<&">', "ä?"]
+
+
+def test_equal_names_give_way_to_ids() -> None:
+    text = minimal('<place id="x"><name><text>n</text></name></place>').replace('id="n"', 'id="m"')
+    more = '<place id="n"/><place id="y"><name><text>n</text></name></place></page>'
+    found = read_pnml(text.replace("</page>", more))
+    assert isinstance(found, MarkedNet)
+    assert [p.name for p in found.net.places] == ["p", "x", "n", "y"]
+
+
+@given(factories(20), st.randoms(use_true_random=False), st.integers(0, 4))
+def test_broken_nets_are_read_and_judged_alike(
+    factory: Factory, rng: random.Random, which: int
+) -> None:
+    net = factory.net
+    robot = rng.randrange(len(net.gears))
+    broken = (
+        lost_token(net, robot),
+        doubled_token(net, robot),
+        missing_producer(net, rng.randrange(len(net.threaded.places))),
+        crossed_twice(net, robot, 0) or lost_token(net, robot),
+        unclosed_gear(net, robot, 0, net.gears[robot].transitions[0]),
+    )[which]
+    before, after = analyse(broken), analyse(read_pnml(write_pnml(broken)))
+    assert before.as_json() == after.as_json()
+    assert not after.holds
+    assert any(w.robots for w in after.witness)
+    assert any(w.lines for w in after.witness)
+
+
+def edited(old: str, new: str) -> str:
+    """The paper's net with one place of its text changed."""
+    text = write_pnml(factory_of(paper()).net)
+    assert re.search(old, text)
+    return re.sub(old, new, text, count=1)
+
+
+def test_a_net_with_an_arc_cut_names_robots_labels_and_lines() -> None:
+    verdict = analyse(read_pnml(edited('<arc id="a5"[^>]*/>\n', ""), "cut.pnml"))
+    first = verdict.witness[0]
+    assert verdict.gear_net is False
+    assert first.kind == "missing consumer"
+    assert (first.robots, first.labels) == (("r3",), ("sub2",))
+    assert first.lines == ("test.pag:4",)
+
+
+def test_a_net_with_a_place_cut() -> None:
+    text = edited(r'<place id="p8">.*\n.*\n', "")
+    text = re.sub(r'<arc [^>]*"p8"[^>]*/>\n', "", text)
+    verdict = analyse(read_pnml(text))
+    assert verdict.gear_net is False
+    assert "r1" in {robot for w in verdict.witness for robot in w.robots}
+
+
+def test_foreign_lines_are_those_of_the_file() -> None:
+    text = re.sub(r"<toolspecific(?s:.*?)</toolspecific>", "", write_pnml(factory_of(paper()).net))
+    text = text.replace("<initialMarking><text>1</text></initialMarking>", "", 1)
+    verdict = analyse(read_pnml(text, "other.pnml"))
+    assert (verdict.gear_net, verdict.live, verdict.legal) == (True, False, False)
+    assert all(line.startswith("other.pnml:") for w in verdict.witness for line in w.lines)
+
+
+def minimal(content: str = "", kind: str = "http://www.pnml.org/version-2009/grammar/ptnet") -> str:
+    """A net with one transition and what else is given."""
+    return (
+        f'<pnml xmlns="{NS}">\n<net id="n" type="{kind}">\n<page id="g">\n'
+        f'<place id="p"/>\n<transition id="t"/>\n{content}\n</page></net></pnml>'
+    )
+
+
+LAUGHS = '<!DOCTYPE x [<!ENTITY a "ha"><!ENTITY b "&a;&a;&a;">]><pnml>&b;</pnml>'
+
+
+@pytest.mark.parametrize(
+    ("text", "code", "line", "message"),
+    [
+        ("", "Syntax", 1, "not well-formed"),
+        ("pnml", "Syntax", 1, "not well-formed"),
+        ("<pnml>\n<net>", "Syntax", 2, "not well-formed"),
+        ("\ud800", "Syntax", 1, "not well-formed"),
+        (LAUGHS, "Syntax", 1, "document type"),
+        ('<!DOCTYPE pnml SYSTEM "x.dtd"><pnml/>', "Syntax", 1, "document type"),
+        ("<html/>", "BadNet", 1, "<html>"),
+        ("<pnml/>", "BadNet", 1, "0 nets"),
+        (
+            "<pnml><net id='a' type='ptnet'/>\n<net id='b' type='ptnet'/></pnml>",
+            "BadNet",
+            2,
+            "2 nets",
+        ),
+        ('<pnml>\n<net id="n" type="x/ptnet"/></pnml>', "BadNet", 2, "no page"),
+        (minimal(kind="http://x/symmetricnet"), "BadNet", 2, "symmetricnet"),
+        (minimal(kind=""), "BadNet", 2, "without a type"),
+        (minimal('<arc id="a" source="p" target="q"/>'), "BadNet", 6, "unknown node 'q'"),
+        (minimal('<arc id="a" source="p"/>'), "BadNet", 6, "nothing"),
+        (minimal('<arc id="p" source="p" target="t"/>'), "BadNet", 6, "used twice"),
+        (minimal("<place/>"), "BadNet", 6, "without id"),
+        (minimal('<arc id="a" source="p" target="p"/>'), "BadNet", 6, "from place 'p' to place"),
+        (
+            minimal(
+                '<arc id="a" source="p" target="t"><inscription><text>2</text></inscription></arc>'
+            ),
+            "BadNet",
+            6,
+            "weight '2'",
+        ),
+        (
+            minimal('<arc id="a" source="p" target="t"><type value="inhibitor"/></arc>'),
+            "BadNet",
+            6,
+            "type 'inhibitor'",
+        ),
+        (
+            minimal('<arc id="a" source="p" target="t"/>\n<arc id="b" source="p" target="t"/>'),
+            "BadNet",
+            7,
+            "second arc",
+        ),
+        (
+            minimal('<place id="q">\n<initialMarking><text>two</text></initialMarking></place>'),
+            "BadNet",
+            7,
+            "initial marking is 'two'",
+        ),
+        (minimal('<referencePlace id="r" ref="x"/>'), "BadNet", 6, "refers to unknown 'x'"),
+        (minimal('<referencePlace id="r" ref="r"/>'), "BadNet", 6, "stands for itself"),
+        (minimal('<referencePlace id="r" ref="t"/>'), "BadNet", 6, "refers to a transition"),
+        (minimal().replace("</net>", '<place id="z"/></net>'), "BadNet", 7, "outside every page"),
+        (minimal() + "\x00", "Syntax", 7, "not well-formed"),
+    ],
+)
+def test_what_is_broken_is_diagnosed(text: str, code: str, line: int, message: str) -> None:
+    with pytest.raises(InputError) as caught:
+        read_pnml(text, "bad.pnml")
+    first = caught.value.diagnostics[0]
+    assert (first.code, first.position and first.position.line) == (code, line)
+    assert first.position is not None
+    assert str(first.position).startswith("bad.pnml:")
+    assert message in first.message
+    assert first.hint
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ('<gear robot="r2"', '<gear robot="r1"', "names of their own"),
+        ('size="3"', 'size="many"', "size of a mode"),
+        ('<move from="p0 0"', '<move from="p0 1"', "not a bijection"),
+    ],
+)
+def test_notes_that_contradict_the_net_are_refused(old: str, new: str, message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        read_pnml(edited(old, new))
+
+
+def test_several_faults_are_reported_at_once() -> None:
+    arcs = '<arc id="a" source="x" target="t"/>\n<arc id="b" source="p" target="y"/>'
+    with pytest.raises(InputError) as caught:
+        read_pnml(minimal(arcs))
+    assert [d.position and d.position.line for d in caught.value.diagnostics] == [6, 7]
+
+
+def test_pages_and_references_are_followed() -> None:
+    inner = (
+        '<page id="h"><referencePlace id="r" ref="p"/><transition id="u"/>'
+        '<place id="q"><initialMarking><text>1</text></initialMarking></place>'
+        '<arc id="a" source="u" target="r"/><arc id="b" source="q" target="u"/></page>'
+        '<arc id="c" source="p" target="t"/><arc id="d" source="t" target="q"/>'
+    )
+    found = read_pnml(minimal(inner))
+    assert isinstance(found, MarkedNet)
+    assert analyse(found).holds
+
+
+def test_very_deep_documents_are_no_trouble() -> None:
+    deep = "<page id='x'>" + "<a>" * 20_000 + "</a>" * 20_000 + "</page>"
+    assert read_pnml(minimal(deep))
+
+
+@given(st.integers(0, 10**9))
+@settings(max_examples=300)
+def test_garbled_documents_give_diagnostics_only(seed: int) -> None:
+    rng = random.Random(seed)
+    text = write_pnml(factory_of(paper()).net)
+    for _ in range(rng.randint(1, 4)):
+        at, size = rng.randrange(len(text)), rng.choice((1, 2, 30))
+        lines = text.split("\n")
+        if rng.random() < 0.4:
+            del lines[rng.randrange(len(lines))]
+            text = "\n".join(lines)
+        else:
+            text = text[:at] + rng.choice(("", "<", '"', "p0", "99", "&x;")) + text[at + size :]
+    try:
+        net = read_pnml(text, "garbled.pnml")
+    except InputError as error:
+        placed = [d.position is not None for d in error.diagnostics]
+    else:
+        verdict = analyse(net, limit=2_000)
+        placed = [verdict.holds or bool(verdict.witness)]
+    assert placed
+    assert all(placed)
+
+
+def test_exporters_are_found_by_directory() -> None:
+    found = exporters()
+    assert list(found) == sorted(found)
+    assert {"pnml", "dot"} <= set(found)
+    folder = Path(factory.export.__file__ or "").parent
+    defining = [
+        p for p in folder.glob("*.py") if re.search(r"^FORMAT = ", p.read_text("utf-8"), re.M)
+    ]
+    assert len(found) == len(defining)
+    made = factory_of(paper())
+    for export in found.values():
+        assert export(made) == export(made.net) == export(made)
+
+
+def test_dot_shows_robots_tokens_and_arcs() -> None:
+    text = write_dot(factory_of(paper()).net)
+    assert text.count("subgraph cluster_") == 6
+    assert text.count("●") == 6
+    assert text.count("->") == 38
+    assert 'label="r3:nopart\\nwait\\n●"' in text
+
+
+def test_dot_escapes() -> None:
+    net = net_from([("a", "b", 7)])
+    named = replace(net.net, transitions=(Transition('say "hi"\\'), Transition("x\ny")))
+    text = write_dot(replace(net, net=named))
+    assert r'xlabel="say \"hi\"\\"' in text
+    assert r'xlabel="x\ny"' in text
+    assert "● 7" in text
+    assert marked(net) is net

@@ -1,0 +1,138 @@
+"""Records replayed, markings named, and the ways that lead to them."""
+
+from __future__ import annotations
+
+import random
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from factory.errors import InputError
+from factory.factory import Factory
+from factory.nets.gears import GearNet
+from factory.nets.history import firings, legal_marking
+from factory.nets.marked import marked, play
+from factory.nets.replay import replay
+from tests.net_values import fair_run, legal_markings, random_legal_marking
+from tests.pag_values import factories, factory_of, paper
+
+
+def names(net: GearNet, events: list[int]) -> list[str]:
+    """The names of transitions."""
+    return [net.threaded.transitions[e].name for e in events]
+
+
+@given(factories(), st.randoms(use_true_random=False), st.booleans())
+def test_runs_refine_their_net(factory: Factory, rng: random.Random, elsewhere: bool) -> None:
+    net = factory.net
+    start = random_legal_marking(net, rng) if elsewhere else net.initial_marking
+    record = fair_run(net, start, 60, rng)
+    found = replay(net, names(net, record), start)
+    marking = start
+    for event in record:
+        marking = net.threaded.net.follower(marking, (event,))
+    assert (found.refines, found.index, found.reason) == (True, None, "")
+    assert found.marking == marking
+    assert found.events == len(record)
+
+
+@given(factories(), st.randoms(use_true_random=False), st.integers(0, 2))
+def test_a_record_that_was_changed_does_not(factory: Factory, rng: random.Random, how: int) -> None:
+    net = factory.net
+    record = names(net, fair_run(net, net.initial_marking, 40, rng))
+    at = rng.randrange(len(record))
+    bad = [*record[:at], record[at], *record[at:]]
+    if how == 1:
+        bad[at] = "nonsense"
+    if how == 2:
+        first = record.index(record[at])
+        bad = record[:first] + record[first + 1 :] + [record[at]] * 3
+    found = replay(net, bad)
+    assert not found.refines
+    assert found.index is not None
+    assert found.events == found.index
+    assert found.reason
+
+
+def test_the_reasons() -> None:
+    net = factory_of(paper()).net
+    assert "sub1_s is not enabled: r5:part1 is not marked" in replay(net, ["sub1_s"]).reason
+    assert "no transition 'sub9_s'" in replay(net, ["sub9_s"]).reason
+    twice = replay(net, ["part1_s"], net.initial_marking | {0})
+    assert (twice.index, twice.refines) == (-1, False)
+    assert "twice" in twice.reason
+    assert "leaves out r1" in replay(net, [], frozenset()).reason
+    assert "not there" in replay(net, [], frozenset({99})).reason
+
+
+def test_a_contact_is_a_fault() -> None:
+    net = factory_of(paper()).net
+    found = replay(net, ["part1_s", "part1_e", "part1_s"])
+    assert (found.index, found.refines) == (2, False)
+    assert "r5:nopart is not marked" in found.reason
+
+
+def test_named_markings() -> None:
+    net = factory_of(paper()).net
+    place = net.threaded.net.place_index
+    assert legal_marking(net, "") == net.initial_marking
+    found = legal_marking(net, " sub1 ,r1:sub3")
+    assert found == frozenset(place[n] for n in ("sub1", "r1:sub3", "r2:nopart", "r4:nopart"))
+    assert legal_marking(net, "dropoff, r3:sub1") == frozenset(
+        place[n] for n in ("dropoff", "r2:nopart", "r3:sub1", "r4:nopart", "r5:nopart", "r6:nopart")
+    )
+
+
+@pytest.mark.parametrize(
+    ("text", "column", "message", "hint"),
+    [
+        ("sub9", 1, "no place 'sub9'", "did you mean 'sub"),
+        ("sub1, r3:sub4", 7, "no place 'r3:sub4'", "did you mean 'r3:sub"),
+        ("sub1,  r3:sub2", 8, "r3 is marked twice: at sub1 and at r3:sub2", "r5, r6, r3"),
+        ("r5:nopart, sub1", 12, "r5 is marked twice", "sub1 needs all its robots"),
+        ("r5:nopart,r5:part1", 11, "r5 is marked twice", "one place for each robot"),
+    ],
+)
+def test_markings_that_are_not_legal(text: str, column: int, message: str, hint: str) -> None:
+    with pytest.raises(InputError) as caught:
+        legal_marking(factory_of(paper()).net, text)
+    found = caught.value.diagnostics[0]
+    assert found.code == "BadMarking"
+    assert found.position is not None
+    assert found.position.column == column
+    assert message in found.message
+    assert hint in found.hint
+
+
+def test_an_operation_that_lacks_robots() -> None:
+    from dataclasses import replace
+
+    factory = factory_of(paper())
+    net = factory.net
+    at = factory.by_label["sub1"].place
+    odd = replace(net, initial=(*net.initial[:4], at, net.initial[5]))
+    with pytest.raises(InputError, match=r"r5 is at sub1, which also needs r6, r3"):
+        legal_marking(odd, "")
+
+
+def test_every_legal_marking_of_the_paper_can_be_reached() -> None:
+    net = factory_of(paper()).net
+    for marking in legal_markings(net):
+        record = names(net, list(play(marked(net), firings(net, marking))))
+        assert replay(net, record).marking == marking
+
+
+@given(factories(), st.randoms(use_true_random=False))
+def test_names_describe_every_marking(factory: Factory, rng: random.Random) -> None:
+    net = factory.net
+    marking = random_legal_marking(net, rng)
+    text = ", ".join(net.threaded.places[p].name for p in sorted(marking))
+    assert legal_marking(net, text) == marking
+
+
+def test_firings_need_a_legal_marking() -> None:
+    net = factory_of(paper()).net
+    with pytest.raises(ValueError, match="gear of r1 exactly once"):
+        firings(net, frozenset())
+    assert set(firings(net, net.initial_marking).values()) == {0}

@@ -1,0 +1,324 @@
+"""The proof, against brute force and against planted faults."""
+
+from __future__ import annotations
+
+import random
+from dataclasses import replace
+
+import pytest
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+
+from factory.factory import Factory
+from factory.nets.explore import explore
+from factory.nets.gears import Gear, GearNet
+from factory.nets.general import analyse
+from factory.nets.marked import MarkedNet, marked
+from factory.nets.verdict import Verdict, Witness
+from factory.nets.verify import verify
+from tests.net_values import (
+    crossed_twice,
+    doubled_token,
+    explored,
+    lost_token,
+    missing_producer,
+    net_from,
+    random_marked_net,
+    unclosed_gear,
+)
+from tests.pag_values import SHAPES, factories, factory_of, paper, random_pag
+
+
+def bare(net: GearNet | MarkedNet) -> MarkedNet:
+    """The net without any word about gears."""
+    return replace(marked(net), gears=(), slots=())
+
+
+def witness(verdict: Verdict, kind: str) -> Witness:
+    """The first witness of a kind."""
+    kinds = [w.kind for w in verdict.witness]
+    assert kind in kinds, verdict.witness
+    return verdict.witness[kinds.index(kind)]
+
+
+@pytest.mark.parametrize("shape", SHAPES)
+def test_ten_thousand_labels(shape: str) -> None:
+    assert verify(factory_of(random_pag(2_500, 1, shape)).net).holds
+
+
+def test_a_chain_without_recursion() -> None:
+    factory = factory_of(random_pag(10_000, 3, "chain"))
+    assert verify(factory.net).holds
+    found = analyse(bare(factory.net))
+    assert found.holds
+    assert len(found.gears) == len(factory.robots)
+
+
+@given(factories())
+def test_the_gears_of_a_bare_net_are_found(factory: Factory) -> None:
+    found = analyse(bare(factory.net))
+    assert found.holds
+    wanted = {frozenset(gear.places) for gear in factory.net.gears}
+    assert {frozenset(gear.places) for gear in found.gears} == wanted
+
+
+@given(factories(9))
+@settings(max_examples=25)
+def test_agrees_with_brute_force(factory: Factory) -> None:
+    truth = explored(marked(factory.net), 2_000)
+    assume(truth is not None)
+    assert truth is not None
+    assert (truth.live, truth.safe, truth.reversible) == (True, True, True)
+    found = explore(marked(factory.net))
+    assert found.markings == truth.markings
+    assert found.complete
+    assert (found.deadlock, found.unsafe, found.starved, found.one_way) == (None,) * 4
+
+
+@given(st.integers(0, 10**9))
+@settings(max_examples=400)
+def test_broken_marked_graphs_agree_with_brute_force(seed: int) -> None:
+    net = random_marked_net(random.Random(seed))
+    truth = explored(net, 1_500)
+    verdict = analyse(net)
+    assert verdict.method == "structure"
+    if truth is None:
+        assert verdict.safe is False
+        return
+    assert (verdict.live, verdict.safe, verdict.reversible) == (
+        truth.live,
+        truth.safe,
+        truth.reversible,
+    )
+
+
+@given(factories(7), st.randoms(use_true_random=False), st.integers(0, 3))
+@settings(max_examples=60)
+def test_broken_factories_agree_with_brute_force(
+    factory: Factory, rng: random.Random, which: int
+) -> None:
+    net = factory.net
+    robot = rng.randrange(len(net.gears))
+    broken = (
+        lost_token(net, robot),
+        doubled_token(net, robot),
+        missing_producer(net, rng.randrange(len(net.threaded.places))),
+        crossed_twice(net, robot, 0) or lost_token(net, robot),
+    )[which]
+    truth = explored(broken, 1_500, 3)
+    verdict = verify(broken)
+    assert not verdict.holds
+    if truth is None:
+        return
+    assert (verdict.live, verdict.safe, verdict.reversible) == (
+        truth.live,
+        truth.safe,
+        truth.reversible,
+    )
+
+
+@given(factories(), st.randoms(use_true_random=False))
+def test_a_lost_token_is_named(factory: Factory, rng: random.Random) -> None:
+    robot = rng.randrange(len(factory.robots))
+    verdict = verify(lost_token(factory.net, robot))
+    assert (verdict.gear_net, verdict.live, verdict.safe, verdict.legal) == (
+        True,
+        False,
+        True,
+        False,
+    )
+    found = witness(verdict, "lost token")
+    assert found.robots == (factory.robots[robot].name,)
+    assert found.labels
+    assert all(line.startswith("test.pag:") for line in found.lines)
+    assert found.lines
+    assert factory.robots[robot].name in witness(verdict, "token-free circuit").robots
+
+
+@given(factories(), st.randoms(use_true_random=False))
+def test_a_doubled_token_is_named(factory: Factory, rng: random.Random) -> None:
+    robot = rng.randrange(len(factory.robots))
+    verdict = verify(doubled_token(factory.net, robot))
+    assert (verdict.gear_net, verdict.safe, verdict.legal) == (True, False, False)
+    assert witness(verdict, "doubled token").robots == (factory.robots[robot].name,)
+    assert witness(verdict, "two tokens").lines
+
+
+@given(factories(), st.randoms(use_true_random=False))
+def test_an_unclosed_gear_is_named(factory: Factory, rng: random.Random) -> None:
+    net = factory.net
+    robot = rng.randrange(len(net.gears))
+    step = rng.randrange(len(net.gears[robot].places))
+    after = net.threaded.places[net.gears[robot].places[step]].right[0]
+    event = (after + 1 + rng.randrange(len(net.threaded.transitions) - 1)) % len(
+        net.threaded.transitions
+    )
+    verdict = verify(unclosed_gear(net, robot, step, event))
+    assert verdict.gear_net is False
+    found = witness(verdict, "unclosed gear")
+    assert factory.robots[robot].name in {r for w in verdict.witness for r in w.robots}
+    assert found.lines
+    assert "should be [" in found.reason
+
+
+@given(factories(), st.randoms(use_true_random=False))
+def test_a_missing_producer_is_named(factory: Factory, rng: random.Random) -> None:
+    net = factory.net
+    place = rng.randrange(len(net.threaded.places))
+    verdict = verify(missing_producer(net, place))
+    assert (verdict.gear_net, verdict.live) == (False, False)
+    found = witness(verdict, "missing producer")
+    assert found.places == (net.threaded.places[place].name,)
+    assert set(found.robots) <= {net.gears[g].robot for g in net.slots[place]}
+    assert found.lines
+
+
+@given(factories(), st.randoms(use_true_random=False))
+def test_gears_that_cross_twice_are_named(factory: Factory, rng: random.Random) -> None:
+    net = factory.net
+    pairs = [(a, b) for a, b in _meeting(net) if crossed_twice(net, a, b)]
+    assume(pairs)
+    one, other = rng.choice(pairs)
+    broken = crossed_twice(net, one, other)
+    assert broken is not None
+    verdict = verify(broken)
+    assert verdict.gear_net is False
+    found = witness(verdict, "two gears cross twice")
+    assert set(found.robots) == {net.gears[one].robot, net.gears[other].robot}
+    assert len(found.places) == 2
+    assert found.lines
+    assert analyse(bare(broken)).gear_net is False
+
+
+def _meeting(net: GearNet) -> list[tuple[int, int]]:
+    shared = (own for own in net.slots if len(own) > 1)
+    return [(a, b) for own in shared for a in own for b in own if a != b]
+
+
+def test_a_ring_of_three_gears() -> None:
+    places = [("a0", "a1", 0), ("b0", "b1", 0), ("c0", "c1", 0)]
+    places += [("a1", "b0", 1), ("b1", "a0", 1), ("b1", "c0", 1), ("c1", "b0", 1)]
+    places += [("c1", "a0", 1), ("a1", "c0", 1)]
+    net = net_from(places)
+    events = net.net.transition_index
+    gears = tuple(
+        Gear(robot, "dot", ps, tuple(events[e] for e in names.split()))
+        for robot, ps, names in (
+            ("r1", (0, 3, 1, 4), "a0 a1 b0 b1"),
+            ("r2", (1, 5, 2, 6), "b0 b1 c0 c1"),
+            ("r3", (2, 7, 0, 8), "c0 c1 a0 a1"),
+        )
+    )
+    verdict = verify(replace(net, gears=gears))
+    found = witness(verdict, "two gears cross twice")
+    assert set(found.robots) == {"r1", "r2", "r3"}
+    assert set(found.places) == {"p0", "p1", "p2"}
+    assert "form a ring" in found.reason
+
+
+def test_gears_apart() -> None:
+    net = net_from([("a", "b", 1), ("b", "a", 0), ("c", "d", 1), ("d", "c", 0)])
+    gears = (Gear("r1", "dot", (0, 1), (0, 1)), Gear("r2", "dot", (2, 3), (2, 3)))
+    verdict = verify(replace(net, gears=gears))
+    assert witness(verdict, "gears apart").robots == ("r2",)
+    assert (verdict.live, verdict.safe, verdict.reversible) == (True, True, True)
+    assert analyse(net).gear_net is False
+
+
+def test_a_gear_of_one_place() -> None:
+    net = net_from([("a", "a", 1)])
+    for verdict in (verify(replace(net, gears=(Gear("r1", "", (0,), (0,)),))), analyse(net)):
+        assert (verdict.gear_net, verdict.live, verdict.reversible) == (False, False, True)
+        assert witness(verdict, "1-gear").reason
+
+
+def test_a_place_in_no_gear() -> None:
+    subject = marked(factory_of(paper()).net)
+    net = replace(subject, gears=subject.gears[:-1])
+    verdict = verify(net)
+    assert verdict.gear_net is False
+    assert witness(verdict, "place in no gear").labels
+
+
+def test_gears_that_share_a_transition_only() -> None:
+    net = net_from([("a", "b", 1), ("b", "a", 0), ("a", "c", 1), ("c", "a", 0)])
+    gears = (Gear("r1", "", (0, 1), (0, 1)), Gear("r2", "", (2, 3), (0, 2)))
+    assert witness(verify(replace(net, gears=gears)), "no shared place").transitions == ("a",)
+    assert witness(analyse(net), "no shared place").transitions == ("a",)
+
+
+def test_initial_places_of_a_gear_net() -> None:
+    net = factory_of(paper()).net
+    for initial in (net.initial[1:], net.initial[:1] + net.initial, (net.initial[1],) * 6):
+        verdict = verify(replace(net, initial=initial))
+        assert verdict.legal is False
+        assert verdict.gear_net
+
+
+def test_a_robot_in_another_robots_slot() -> None:
+    net = factory_of(paper()).net
+    slots = list(net.slots)
+    slots[0] = slots[0][::-1]
+    verdict = verify(replace(net, slots=tuple(slots)))
+    assert verdict.gear_net is False
+    assert "belongs to another robot" in witness(verdict, "slots").reason
+    slots[0] = (0, 1)
+    assert "acts on 3 robots" in witness(verify(replace(net, slots=tuple(slots))), "slots").reason
+
+
+def test_the_verdict_as_json() -> None:
+    verdict = verify(lost_token(factory_of(paper()).net, 4))
+    document = verdict.as_json()
+    assert document["live"] is False
+    first = verdict.witness[0].as_json()
+    assert first["robots"] == ["r5"]
+    assert first["lines"] == ["test.pag:6", "test.pag:5"]
+    assert set(first) >= {"property", "reason", "labels", "places", "transitions"}
+
+
+def test_a_net_with_choice_is_explored() -> None:
+    net = net_from([("b c", "a", 1), ("a", "b c", 0)])
+    verdict = analyse(net)
+    assert verdict.method == "exploration"
+    assert (verdict.gear_net, verdict.live, verdict.safe) == (False, True, True)
+    assert (verdict.reversible, verdict.legal) == (True, None)
+    assert "has choice" in witness(verdict, "choice").reason
+
+
+def test_a_deadlock_is_shown_by_a_firing_sequence() -> None:
+    net = net_from([("b", "a c", 1), ("a", "b", 0)])
+    verdict = analyse(net)
+    assert (verdict.live, verdict.safe, verdict.reversible) == (False, True, False)
+    assert witness(verdict, "deadlock").transitions == ("c",)
+    assert witness(verdict, "no way back").transitions == ("c",)
+
+
+def test_a_livelock_starves_a_transition() -> None:
+    net = net_from([("b", "a c", 1), ("a", "b", 0), ("c e", "d", 0), ("d", "e", 0)])
+    verdict = analyse(net)
+    assert (verdict.live, verdict.reversible) == (False, False)
+    assert "never fire again" in witness(verdict, "dead transition").reason
+
+
+def test_an_unbounded_net_with_choice_is_unsafe_and_otherwise_undecided() -> None:
+    net = net_from([("a b", "a b", 1), ("c", "c d", 1), ("", "c", 0), ("d", "", 0)])
+    net = net_from([("", "x", 3), ("a", "b c", 0), ("b c x", "a", 1), ("a", "", 0)])
+    verdict = analyse(net, limit=50)
+    assert verdict.safe is False
+    assert verdict.live is None
+    assert witness(verdict, "undecided").reason.startswith("undecided: ")
+
+
+def test_exploring_stops_at_its_limit() -> None:
+    rows = [
+        row for i in range(9) for row in ((f"a{i} c{i}", f"b{i}", 1), (f"b{i}", f"a{i} c{i}", 0))
+    ]
+    verdict = analyse(net_from(rows), limit=100)
+    assert (verdict.live, verdict.safe, verdict.reversible) == (None, None, None)
+    assert not verdict.holds
+
+
+def test_a_net_of_nothing() -> None:
+    assert analyse(net_from([])).gear_net is False
+    with pytest.raises(ValueError, match="one number of tokens"):
+        replace(net_from([("a", "b", 1)]), tokens=(-1,))
