@@ -9,10 +9,10 @@ from pathlib import Path
 from typing import Any
 
 from factory.console import say, table
-from factory.errors import Diagnostic, InputError
 from factory.factory import Factory
 from factory.nets.gears import Gear, GearNet
 from factory.nets.marked import MarkedNet, marked
+from factory.nets.petri import Place
 from factory.nets.verdict import Verdict
 
 SHOWN = 24
@@ -49,14 +49,13 @@ class Checked:
             "tokens": sum(subject.tokens),
             "largest_mode": max((p.size for p in places), default=0),
             **self.verdict.as_json(),
-            "gears": [gear_json(gear, self.net) for gear in self.verdict.gears],
+            "gears": [gear_json(gear, places) for gear in self.verdict.gears],
             "part_pool": self.pool,
         }
 
 
-def gear_json(gear: Gear, net: GearNet | MarkedNet) -> dict[str, Any]:
+def gear_json(gear: Gear, places: Sequence[Place]) -> dict[str, Any]:
     """One robot's gear as `check --json` lists it."""
-    places = marked(net).net.places
     return {
         "robot": gear.robot,
         "type": gear.type,
@@ -90,9 +89,6 @@ def check_net(file: Path) -> Checked:
     from factory.nets.general import analyse
 
     net = read_pnml(read_text(file), str(file))
-    if isinstance(net, tuple):
-        message = "the net cannot be analysed"
-        raise InputError(Diagnostic("BadNet", message, None, "give a place/transition net"))
     verdict = analyse(net)
     return Checked(file.stem, 0, net, verdict, None, {})
 

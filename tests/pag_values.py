@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import random
 from functools import cache
+from pathlib import Path
 
 from hypothesis import strategies as st
 
@@ -65,8 +66,6 @@ TEMPLATES = {t.name: t for t in (_DOT, _MATE, _INSERT, _WELD, _CLAMP, _DROPOFF)}
 @cache
 def catalogue() -> Catalogue:
     """Robots of types dot and tool, from no file."""
-    from pathlib import Path
-
     return Catalogue({name: RobotType(name, Path(f"{name}.xml")) for name in ("dot", "tool")})
 
 

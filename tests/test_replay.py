@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import random
+from dataclasses import replace
 
 import pytest
 from hypothesis import given
@@ -106,8 +107,6 @@ def test_markings_that_are_not_legal(text: str, column: int, message: str, hint:
 
 
 def test_an_operation_that_lacks_robots() -> None:
-    from dataclasses import replace
-
     factory = factory_of(paper())
     net = factory.net
     at = factory.by_label["sub1"].place

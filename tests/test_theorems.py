@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import random
 from collections import Counter
+from dataclasses import replace
 
 import pytest
 from hypothesis import given, settings
@@ -119,8 +120,6 @@ def test_gluing_along_two_places_is_no_gear_net() -> None:
     again = subject.net.place_index["1.part1"]
     first = subject.net.place_index["0.part1"]
     places = list(subject.net.places)
-    from dataclasses import replace
-
     moved = {places[again].left[0]: places[first].left[0]}
     moved[places[again].right[0]] = places[first].right[0]
     for i, place in enumerate(places):

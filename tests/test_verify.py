@@ -301,7 +301,6 @@ def test_a_livelock_starves_a_transition() -> None:
 
 
 def test_an_unbounded_net_with_choice_is_unsafe_and_otherwise_undecided() -> None:
-    net = net_from([("a b", "a b", 1), ("c", "c d", 1), ("", "c", 0), ("d", "", 0)])
     net = net_from([("", "x", 3), ("a", "b c", 0), ("b c x", "a", 1), ("a", "", 0)])
     verdict = analyse(net, limit=50)
     assert verdict.safe is False

@@ -35,7 +35,7 @@ def operation_mode(layout: Layout, operation: Operation, eps: float) -> Mode:
     if operation.before[carrier] != NOPART:
         for slot, label in enumerate(operation.before):
             if slot != carrier and label != NOPART:
-                gate[slot], standoff[slot] = carrier, _standoff(layout, operation, slot)
+                gate[slot], standoff[slot] = carrier, layout.standoff(operation, slot)
     r = np.array([path.r for path in paths])
     stations = [
         path.length - layout.stations[operation.index] - path.reach if slot == carrier else np.nan
@@ -54,24 +54,6 @@ def operation_mode(layout: Layout, operation: Operation, eps: float) -> Mode:
     )
     template = operation.template
     return mode_of(_inside(template) if template.before[carrier] != NOPART else template, setting)
-
-
-def _standoff(layout: Layout, operation: Operation, slot: int) -> float:
-    """How far short of the meeting point a payload is clear of the carrier's on its way there [m]."""
-    guest = layout.guidepaths[operation.robots[slot]]
-    host = layout.guidepaths[operation.carrier]
-    ahead = _extent(layout, operation.before[slot], guest.heading)
-    aside = _extent(layout, operation.label, (-guest.heading[0], -guest.heading[1]))
-    lane = CARRIAGE / 2 + abs(host.offset)
-    wanted = ahead + max(aside, lane) + layout.clearance
-    return min(max(wanted, 0.0), guest.travel)
-
-
-def _extent(layout: Layout, label: str, direction: tuple[float, float]) -> float:
-    """How far a payload reaches from the product's middle in one of the four directions [m]."""
-    xlo, xhi, ylo, yhi = layout.payloads[label]
-    x, y = round(direction[0]), round(direction[1])
-    return {(1, 0): xhi, (-1, 0): -xlo, (0, 1): yhi, (0, -1): -ylo}[x, y]
 
 
 @lru_cache(maxsize=256)

@@ -20,8 +20,15 @@ PAYLOAD = 0.1
 MAST = 0.02
 """Width of a mast; arms and fingers are narrower."""
 
+ARM_WIDTH = 0.016
+
 POST = 0.03
 """Width of a feeder's post."""
+
+BOOM = 0.016
+"""Width of the boom from which a feeder holds its part; `BOOM_HEIGHT` its height."""
+
+BOOM_HEIGHT = 0.014
 
 TOOL_TRAVEL = 0.12
 """How far a tool comes from its home to its station."""

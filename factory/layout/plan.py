@@ -11,12 +11,21 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from types import MappingProxyType
+from typing import TYPE_CHECKING
 
-from factory.factory import Factory
+from factory.factory import Factory, Operation
 from factory.geometry import Product
+from factory.layout.dimensions import BOOM, PAYLOAD, POST, Clearance
+from factory.pag import NOPART
+
+if TYPE_CHECKING:
+    from factory.layout.clearance import Certificate
 
 Box = tuple[float, float, float, float]
 """(xlo, xhi, ylo, yhi) [m]."""
+
+Extent = tuple[float, float, float, float]
+"""(ulo, uhi, tlo, thi): a box in a robot's frame, about the product's middle [m]."""
 
 Point2 = tuple[float, float]
 
@@ -65,6 +74,31 @@ class Guidepath:
             self.a[1] - self.heading[1] * x + self.side[1] * self.offset,
         )
 
+    def world(self, extent: Extent, middle: Point2) -> Box:
+        """A box given in the robot's frame (u, t), as it lies in the world about `middle`."""
+        ulo, uhi, tlo, thi = extent
+        u, t = self.heading, self.side
+        x = sorted((u[0] * ulo + t[0] * tlo, u[0] * uhi + t[0] * thi))
+        y = sorted((u[1] * ulo + t[1] * tlo, u[1] * uhi + t[1] * thi))
+        return middle[0] + x[0], middle[0] + x[1], middle[1] + y[0], middle[1] + y[1]
+
+    def frame(self, box: Box) -> Extent:
+        """A box about the product's middle, in the world's directions, in the robot's frame (u, t)."""
+        u, t = self.heading, self.side
+        along = sorted((box[0] * u[0] + box[2] * u[1], box[1] * u[0] + box[3] * u[1]))
+        across = sorted((box[0] * t[0] + box[2] * t[1], box[1] * t[0] + box[3] * t[1]))
+        return along[0], along[1], across[0], across[1]
+
+
+@dataclass(frozen=True, slots=True)
+class Feeder:
+    """Where a part is presented: the boxes of its post and of the boom above the part, in the world,
+    and the height of the boom's lower edge [m]."""
+
+    post: Box
+    boom: Box
+    height: float
+
 
 @dataclass(frozen=True)
 class Layout:
@@ -83,6 +117,7 @@ class Layout:
     payloads: Mapping[str, Box] = field(repr=False)
     outfeed: Box = (0.0, 0.0, 0.0, 0.0)
     floor: Box = (0.0, 0.0, 0.0, 0.0)
+    certificate: Certificate | None = field(default=None, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "payloads", MappingProxyType(dict(self.payloads)))
@@ -120,6 +155,36 @@ class Layout:
             return self.guidepaths[robot].length
         before = self.factory.operations[gear[step - 1]]
         return self.goal(before.index, before.robots.index(robot))
+
+    def feeder(self, label: str) -> Feeder:
+        """The feeder of a part, behind the rear stop of the robot that it serves."""
+        operation = self.factory.by_label[label]
+        path = self.guidepaths[operation.carrier]
+        middle = path.middle(self.goal(operation.index, operation.template.carrier - 1))
+        rear = path.frame(self.payloads[label])[0]
+        back = -Clearance(self.clearance).post(path.reach, rear)
+        across, half = path.offset, POST / 2
+        solid = self.product.solids[label]
+        return Feeder(
+            path.world((back - half, back + half, across - half, across + half), middle),
+            path.world((back, path.nest, across - BOOM / 2, across + BOOM / 2), middle),
+            PAYLOAD + float(solid.high[2] - self.product.low[2]) + self.clearance,
+        )
+
+    def standoff(self, operation: Operation, slot: int) -> float:
+        """How far short of the meeting point the robot in `slot` waits until the carrier stands [m].
+
+        Where the carrier brings a pile too, both would meet diagonally; from here on the payload is
+        clear of the pile wherever that is on its way.
+        """
+        carrier = operation.template.carrier - 1
+        pile, label = operation.before[carrier], operation.before[slot]
+        if slot == carrier or NOPART in (pile, label):
+            return 0.0
+        path = self.guidepaths[operation.robots[slot]]
+        ahead = path.frame(self.payloads[label])[1]
+        towards = -path.frame(self.payloads[pile])[0]
+        return max(0.0, ahead + towards + self.clearance)
 
     @cached_property
     def product_length(self) -> float:

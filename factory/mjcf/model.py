@@ -22,7 +22,13 @@ from factory.layout.plan import Layout
 from factory.mjcf import names
 from factory.mjcf.elements import add, number, numbers
 from factory.mjcf.parts import add_meshes, add_parts, feeder_middle, parked_at, place_in
-from factory.mjcf.robots import Drive, heading_quaternion, instantiate, load_robot_model
+from factory.mjcf.robots import (
+    Drive,
+    add_paints,
+    heading_quaternion,
+    instantiate,
+    load_robot_model,
+)
 from factory.mjcf.scene import add_assets, add_follower, add_scene, add_visuals
 from factory.robots import Catalogue
 from factory.settings import Settings
@@ -107,6 +113,7 @@ def build_model(
     defaults = _defaults(root)
     asset = add(root, "asset")
     add_assets(asset)
+    add_paints(asset)
     files = add_meshes(asset, product)
     world = add(root, "worldbody")
     add_scene(world, layout, settings.outfeed)
@@ -201,12 +208,27 @@ def _robots(
         parts = factory.contents[carried] if carried else ()
         low = min((float(product.solids[p].low[2]) for p in parts), default=float(product.low[2]))
         body, actuators = instantiate(
-            models[robot.type], robot.name, path, drive, low - float(product.low[2])
+            models[robot.type],
+            robot.name,
+            path,
+            drive,
+            low - float(product.low[2]),
+            _role(factory, robot.index),
         )
         if robot.index == 0:
             add_follower(body, layout)
         world.append(body)
         actuator.extend(actuators)
+
+
+def _role(factory: Factory, robot: int) -> str:
+    """What a robot does, for its paint."""
+    if robot == 0:
+        return "output"
+    if not _delivered(factory, robot):
+        return "tool"
+    first = factory.operations[factory.robots[robot].operations[0]]
+    return "carrier" if first.inputs else "fed"
 
 
 def _delivered(factory: Factory, robot: int) -> str:

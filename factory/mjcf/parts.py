@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-import struct
 from collections.abc import Mapping
 from xml.etree.ElementTree import Element
 
-import numpy as np
-
-from factory.geometry import Array, Mesh, Product, Solid
+from factory.geometry import Mesh, Product, Solid
 from factory.layout.dimensions import PAYLOAD
 from factory.layout.plan import Layout, Point2
 from factory.mjcf.elements import add, exact, numbers
+from factory.mjcf.mesh_files import mesh_file
 from factory.mjcf.names import copy, part
 
 PARKED = -0.6
@@ -85,9 +83,9 @@ def add_meshes(asset: Element, product: Product) -> dict[str, bytes]:
     """The meshes as assets, and the content of their files by name."""
     files: dict[str, bytes] = {}
     for mesh in used_meshes(product):
-        file = f"{mesh.name}.stl"
-        add(asset, "mesh", name=f"mesh/{mesh.name}", file=file)
-        files[file] = stl(mesh)
+        file, content = mesh_file(mesh)
+        add(asset, "mesh", name=f"mesh/{mesh.name}", file=file, inertia="convex")
+        files[file] = content
     return files
 
 
@@ -95,19 +93,6 @@ def used_meshes(product: Product) -> list[Mesh]:
     """Each mesh once, in the order in which the parts use them."""
     found = {s.mesh.name: s.mesh for s in product.solids.values() if s.mesh is not None}
     return list(found.values())
-
-
-def stl(mesh: Mesh) -> bytes:
-    """A mesh as a binary STL file."""
-    corners: Array = mesh.vertices[mesh.faces]
-    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    length = np.linalg.norm(normal, axis=1, keepdims=True)
-    normal = np.divide(normal, length, out=np.zeros_like(normal), where=length > 0)
-    record = np.zeros(
-        len(corners), dtype=[("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("spare", "<u2")]
-    )
-    record["normal"], record["corners"] = normal, corners
-    return b"\0" * 80 + struct.pack("<I", len(corners)) + record.tobytes()
 
 
 __all__ = ["add_meshes", "add_parts", "copy", "feeder_middle", "parked_at", "place_in"]

@@ -11,7 +11,7 @@ from xml.etree.ElementTree import Element
 from factory.errors import Diagnostic, InputError, Position
 from factory.layout.dimensions import FINGER_TOP, PAYLOAD
 from factory.layout.plan import Guidepath
-from factory.mjcf.elements import number, numbers
+from factory.mjcf.elements import add, number, numbers
 from factory.mjcf.names import carriage
 from factory.robots import RobotType
 
@@ -69,17 +69,35 @@ def _prefixed(element: Element, prefix: str, names: bool) -> Element:
     return copy
 
 
+ROLES = {
+    "output": "0.07 0.45 0.40 1",
+    "carrier": "0.13 0.31 0.58 1",
+    "fed": "0.52 0.65 0.80 1",
+    "tool": "0.90 0.45 0.09 1",
+}
+"""The paint of robots by what they do: bring the product out, carry sub-assemblies, fetch parts, work."""
+
+
+def add_paints(asset: Element) -> None:
+    """A material for each role."""
+    for role, rgba in ROLES.items():
+        add(asset, "material", name=f"role/{role}", rgba=rgba, specular=0.35, shininess=0.45)
+
+
 def instantiate(
-    model: RobotModel, robot: str, path: Guidepath, drive: Drive, lift: float
+    model: RobotModel, robot: str, path: Guidepath, drive: Drive, lift: float, role: str = ""
 ) -> tuple[Element, list[Element]]:
     """The body of one robot at its B end and its actuators.
 
     `lift`: how far above z0 the payload's own lowest point is; the finger's pin reaches up to it [m].
+    `role`: one of ROLES; geometry of the material `paint` takes its colour.
     """
     body = _prefixed(model.body, model.name, names=False)
     for node in body.iter():
         if "name" in node.attrib:
             node.set("name", f"{robot}/{node.get('name')}")
+        if role and node.get("material") == f"{model.name}/paint":
+            node.set("material", f"role/{role}")
     body.set("name", carriage(robot))
     x, y = path.carriage(path.length)
     body.set("pos", numbers((x, y, 0)))

@@ -23,14 +23,17 @@ from factory.mjcf.robots import heading_quaternion
 VIEW = 32.0
 """Vertical field of view of the cameras [degrees]: narrow, for a calm perspective."""
 
-SHED = (0.22, 0.25, 0.30, 1.0)
+SHED = (0.87, 0.88, 0.89, 1.0)
+
+KEY, FILL = (0.40, 0.48, -0.78), (-0.65, 0.30, -0.70)
+"""Directions of the two lights; the first casts the shadows."""
 
 
 def add_visuals(root: Element, layout: Layout) -> None:
     """Sky, haze and the quality of light."""
     visual = add(root, "visual")
-    add(visual, "headlight", ambient="0.32 0.32 0.32", diffuse="0.22 0.22 0.22", specular="0 0 0")
-    add(visual, "quality", shadowsize=4096, offsamples=4)
+    add(visual, "headlight", ambient="0.38 0.38 0.39", diffuse="0.20 0.20 0.20", specular="0 0 0")
+    add(visual, "quality", shadowsize=2048, offsamples=4)
     add(visual, "map", znear=0.02, zfar=60, shadowclip=1.0)
     add(visual, "global", offwidth=1920, offheight=1080, fovy=VIEW)
     x, y = _centre(layout)
@@ -41,16 +44,15 @@ def add_visuals(root: Element, layout: Layout) -> None:
 def add_assets(asset: Element) -> None:
     """The materials of the hall."""
     add(asset, "texture", name="sky", type="skybox", builtin="gradient",
-        rgb1="0.93 0.95 0.97", rgb2="0.72 0.78 0.85", width=64, height=384)
-    add(asset, "texture", name="floor", type="2d", builtin="checker", mark="edge",
-        rgb1="0.80 0.81 0.82", rgb2="0.78 0.79 0.80", markrgb="0.72 0.73 0.74",
-        width=256, height=256)
-    add(asset, "material", name="floor", texture="floor", texuniform="true", texrepeat="2 2",
-        reflectance=0.04, specular=0.1, shininess=0.1)
-    add(asset, "material", name="rail", rgba="0.42 0.45 0.49 1", specular=0.5, shininess=0.5)
-    add(asset, "material", name="post", rgba="0.93 0.72 0.16 1", specular=0.3, shininess=0.3)
-    add(asset, "material", name="belt", rgba="0.13 0.14 0.16 1", specular=0.1, shininess=0.1)
-    add(asset, "material", name="frame", rgba="0.62 0.65 0.69 1", specular=0.5, shininess=0.6)
+        rgb1="0.93 0.95 0.97", rgb2="0.80 0.84 0.88", width=64, height=384)
+    add(asset, "texture", name="floor", type="2d", builtin="flat", mark="edge",
+        rgb1="0.93 0.935 0.94", markrgb="0.84 0.85 0.86", width=256, height=256)
+    add(asset, "material", name="floor", texture="floor", texuniform="true", texrepeat="4 4",
+        specular=0, shininess=0)
+    add(asset, "material", name="rail", rgba="0.55 0.58 0.62 1", specular=0.2, shininess=0.4)
+    add(asset, "material", name="post", rgba="0.80 0.82 0.84 1", specular=0.1, shininess=0.3)
+    add(asset, "material", name="belt", rgba="0.24 0.26 0.29 1", specular=0, shininess=0)
+    add(asset, "material", name="frame", rgba="0.70 0.73 0.76 1", specular=0.2, shininess=0.4)
 
 
 def add_scene(world: Element, layout: Layout, outfeed_speed: float) -> None:
@@ -82,15 +84,14 @@ def _floor_and_light(world: Element, layout: Layout) -> None:
     x, y = _centre(layout)
     radius = _radius(layout)
     add(world, "geom", name="floor", type="plane", size=(radius * 20, radius * 20, 0.1),
-        material="floor", contype=1, conaffinity=1)
-    key = (0.42, 0.30, -0.86)
-    add(world, "light", name="key", type="directional", castshadow=True, dir=key,
-        pos=(x - key[0] * 3 * radius, y - key[1] * 3 * radius, -key[2] * 3 * radius),
-        diffuse="0.62 0.60 0.56", specular="0.25 0.25 0.25")
-    fill = (-0.55, -0.35, -0.75)
-    add(world, "light", name="fill", type="directional", castshadow=False, dir=fill,
-        pos=(x - fill[0] * 3 * radius, y - fill[1] * 3 * radius, -fill[2] * 3 * radius),
-        diffuse="0.18 0.19 0.22", specular="0 0 0")
+        material="floor", contype=1, conaffinity=1, castshadow=False)
+    for name, ray, shadow, diffuse, specular in (
+        ("key", KEY, True, "0.50 0.49 0.47", "0.12 0.12 0.12"),
+        ("fill", FILL, False, "0.14 0.145 0.16", "0 0 0"),
+    ):
+        add(world, "light", name=name, type="directional", castshadow=shadow, dir=ray,
+            pos=(x - ray[0] * 3 * radius, y - ray[1] * 3 * radius, -ray[2] * 3 * radius),
+            diffuse=diffuse, specular=specular)
 
 
 def _cameras(world: Element, layout: Layout) -> None:
@@ -151,8 +152,11 @@ def _feeder(world: Element, layout: Layout, label: str) -> None:
     add(body, "geom", name=f"{feeder(label)}/boom", class_="station", type="box",
         pos=((back + ahead) / 2, across, top + beam / 2),
         size=((ahead - back) / 2, 0.008, beam / 2), material="post")
+    add(body, "geom", name=f"{feeder(label)}/cap", class_="shown", type="box",
+        pos=(back, across, top + beam), size=(POST / 2 + 0.001, POST / 2 + 0.001, 0.002),
+        rgba=solid.rgba)
     add(body, "geom", name=f"{feeder(label)}/head", class_="shown", type="cylinder",
-        pos=(ahead, across, top + beam / 2), size=(0.016, beam / 2 + 0.003), rgba=solid.rgba)
+        pos=(ahead, across, top + beam / 2), size=(0.012, beam / 2 + 0.002), rgba=solid.rgba)
 
 
 def _handedness(u: tuple[float, float], t: tuple[float, float]) -> int:
@@ -171,22 +175,23 @@ def _outfeed(world: Element, layout: Layout, speed: float) -> None:
         friction="0.8 0.005 0.0001", solref="0.004 1", solimp="0.99 0.9999 0.0001 0.5 2", surfacevel=(speed, 0, 0, 0, 0, 0))
     tall = float(layout.product.high[2] - layout.product.low[2])
     length = layout.product_length + 0.1
-    shed = half[0] - length / 2
+    shed, wall = half[0] - length / 2, top + tall / 2 + 0.005
     for side in (-1, 1):
         add(body, "geom", name=f"outfeed/side{side}", class_="shown", type="box",
-            pos=(0, side * (half[1] + 0.006), top - 0.012), size=(half[0], 0.006, 0.016),
+            pos=(0, side * (half[1] + 0.006), top - 0.008), size=(half[0], 0.0055, 0.012),
             material="frame")
         for end in (-1, 1):
             add(body, "geom", name=f"outfeed/leg{side}{end}", class_="shown", type="box",
-                pos=(end * (half[0] - 0.03), side * (half[1] + 0.006), (top - 0.02) / 2),
-                size=(0.008, 0.006, (top - 0.02) / 2), material="frame")
+                pos=(end * (half[0] - 0.03), side * (half[1] - 0.008), (top - thick) / 2),
+                size=(0.006, 0.006, (top - thick) / 2), material="frame")
         add(body, "geom", name=f"outfeed/wall{side}", class_="shown", type="box",
-            pos=(shed, side * (half[1] + 0.004), top + tall / 2),
-            size=(length / 2, 0.004, tall / 2 + 0.03), rgba=SHED)
+            pos=(shed, side * (half[1] + 0.0165), wall),
+            size=(length / 2, 0.004, tall / 2 + 0.025), rgba=SHED)
     add(body, "geom", name="outfeed/roof", class_="shown", type="box",
-        pos=(shed, 0, top + tall + 0.032), size=(length / 2, half[1] + 0.008, 0.004), rgba=SHED)
+        pos=(shed + 0.002, 0, top + tall + 0.0335), size=(length / 2 + 0.008, half[1] + 0.024, 0.004),
+        rgba=SHED)
     add(body, "geom", name="outfeed/back", class_="shown", type="box",
-        pos=(half[0], 0, top + tall / 2), size=(0.004, half[1] + 0.008, tall / 2 + 0.03), rgba=SHED)
+        pos=(half[0] + 0.0045, 0, wall), size=(0.004, half[1] + 0.0205, tall / 2 + 0.025), rgba=SHED)
 
 
 __all__ = ["add_assets", "add_follower", "add_scene", "add_visuals", "carriage", "look_distance"]

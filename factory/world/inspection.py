@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import mujoco
 import numpy as np
 
+from factory.engine import mujoco
 from factory.mjcf.model import Model
 from factory.trace import PhysicsFigures
 from factory.world.stock import Switched

@@ -9,12 +9,12 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from time import perf_counter
 
-import mujoco
 import numpy as np
 
 from factory.control.governor import follow
 from factory.control.mode import Array, Index
 from factory.control.navigation import Bundle
+from factory.engine import mujoco
 from factory.errors import Diagnostic, InputError
 from factory.factory import Operation
 from factory.mjcf import names

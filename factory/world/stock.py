@@ -7,10 +7,10 @@ from collections.abc import Mapping
 
 from dataclasses import dataclass
 
-import mujoco
 import numpy as np
 
 
+from factory.engine import mujoco
 from factory.factory import Operation
 from factory.mjcf import names
 from factory.mjcf.model import BITS, Model

@@ -1,0 +1,114 @@
+"""The clearance certificate of a layout, as a value: what was looked at, what is shared, what is wrong."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from factory.errors import Diagnostic, Position
+from factory.layout.plan import Point2
+from factory.layout.sweeps import ALWAYS, KINDS, LAYERS, Region
+
+MILLI = 1000.0
+
+
+@dataclass(frozen=True, slots=True)
+class Fault:
+    """Something that breaks the certificate: the robots, the labels they carry, `lacking`: by how much
+    [m], the layer ("" for the guidepaths themselves), and where the user's file asks for them."""
+
+    message: str
+    robots: tuple[str, ...]
+    labels: tuple[str, ...] = ()
+    lacking: float = 0.0
+    layer: str = ""
+    positions: tuple[Position | None, ...] = ()
+
+    def diagnostic(self) -> Diagnostic:
+        """The fault as an error (Layout) at the first robot's line."""
+        places = [str(place) for place in self.positions[1:] if place is not None]
+        hint = f"the other robot comes from {', '.join(places)}" if places else ""
+        first = self.positions[0] if self.positions else None
+        return Diagnostic("Layout", self.message, first, hint)
+
+    def as_json(self) -> dict[str, object]:
+        """The fault as the certificate's document lists it."""
+        return {
+            "message": self.message,
+            "robots": list(self.robots),
+            "labels": list(self.labels),
+            "lacking_mm": round(self.lacking * MILLI, 3),
+            "layer": self.layer,
+            "positions": [None if p is None else str(p) for p in self.positions],
+        }
+
+
+@dataclass(frozen=True, slots=True)
+class Shared:
+    """Two robots whose regions meet, and why they do not: `operations` are the modes in which they are
+    there, and `point` the junction. One operation: both are in that very mode, which joins their
+    payloads. Two: the modes have a robot in common, which can be in one of them only."""
+
+    robots: tuple[str, str]
+    operations: tuple[str, ...]
+    point: Point2
+
+    def as_json(self) -> dict[str, object]:
+        """The pair as the certificate's document lists it."""
+        return {
+            "robots": list(self.robots),
+            "operations": list(self.operations),
+            "point": [round(v, 6) for v in self.point],
+        }
+
+
+@dataclass(frozen=True, slots=True)
+class Certificate:
+    """That no two robots which are not coupled by a mode can touch, nor their payloads.
+
+    Uncoupled regions of different robots in one layer are at least `clearance` [m] apart in plan;
+    `layers` gives each layer's z range and `gaps` the vertical distance to the one below [m]; where a
+    coupled region is nearer to another robot's, `shared` names the junction. It holds if there is no
+    fault; at most `clearance.MOST` faults are listed.
+    """
+
+    clearance: float
+    layers: tuple[tuple[str, float, float], ...]
+    gaps: tuple[tuple[str, float], ...]
+    robots: tuple[str, ...] = field(repr=False)
+    operations: tuple[str, ...] = field(repr=False)
+    regions: tuple[Region, ...] = field(repr=False)
+    shared: tuple[Shared, ...] = field(repr=False)
+    faults: tuple[Fault, ...] = ()
+    pairs: int = 0
+
+    @property
+    def holds(self) -> bool:
+        """Whether the layout is clear."""
+        return not self.faults
+
+    def as_json(self) -> dict[str, object]:
+        """The certificate as a document that another program can check."""
+        return {
+            "schema": 1,
+            "holds": self.holds,
+            "clearance_m": self.clearance,
+            "layers": [
+                {"layer": name, "z_low_m": round(low, 6), "z_high_m": round(high, 6)}
+                for name, low, high in self.layers
+            ],
+            "vertical_gaps_m": {name: round(gap, 6) for name, gap in self.gaps},
+            "regions": [self._region(region) for region in self.regions],
+            "shared": [shared.as_json() for shared in self.shared],
+            "faults": [fault.as_json() for fault in self.faults],
+        }
+
+    def _region(self, region: Region) -> dict[str, object]:
+        return {
+            "robot": self.robots[region.robot],
+            "layer": LAYERS[region.layer],
+            "of": KINDS[region.kind],
+            "label": region.label or None,
+            "box": [round(v, 6) for v in region.box],
+            "z": [round(v, 6) for v in region.z],
+            "operation": None if region.mode == ALWAYS else self.operations[region.mode],
+        }

@@ -1,0 +1,281 @@
+"""Certify a layout: no two robots that are not coupled by a mode can touch, nor their payloads.
+
+Guarantees nothing about how the layout was made, and uses nothing of it: regions are read from the
+guidepaths and the parts' real geometry. Two regions in one layer have to be a clearance apart unless they
+are never taken at once. They are not where a payload is *coupled*, on the way that it goes in the mode of
+operation X alone, and the other region is that of a payload of another robot of X, which is then in that
+very mode; nor where both are coupled, in modes that have a robot in common. A coupled pair in one mode is
+looked at again: where the carrier brings a pile as well, the other waits at its standoff. Near linear.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+
+from factory.factory import Operation
+from factory.layout.certificate import Certificate, Fault, Shared
+from factory.layout.crossings import embedding_faults
+from factory.layout.dimensions import (
+    ARM_LOW,
+    ARM_TOP,
+    BELT_GAP,
+    CARRIAGE_TOP,
+    FINGER_LOW,
+    FINGER_TOP,
+    PAYLOAD,
+)
+from factory.layout.plan import Box, Layout
+from factory.layout.sweeps import (
+    ALWAYS,
+    BOOM_KIND,
+    KINDS,
+    LAYERS,
+    OUTFEED_KIND,
+    PAYLOAD_KIND,
+    POST_KIND,
+    Pile,
+    Region,
+    boxes,
+    goals,
+    piles,
+    regions,
+    sweep,
+)
+from factory.pag import NOPART
+
+Index = NDArray[np.intp]
+
+TOLERANCE = 1e-6
+"""Distances are compared to this [m]: a thousandth of what a layout is rounded to."""
+
+MOST = 100
+"""So many faults are listed; there is no use in more."""
+
+CHUNK = 512
+"""Regions looked up at a time, so that a heap of them all in one place takes no more memory."""
+
+
+def certify(layout: Layout) -> Certificate:
+    """The clearance certificate of a layout. Never raises; see `Certificate.holds`."""
+    factory = layout.factory
+    found = piles(factory, layout.product)
+    swept = regions(layout, found)
+    search = _Search(layout, swept)
+    faults = [*embedding_faults(layout), *search.faults(), *_standoffs(layout, found)]
+    top = max(region.z[1] for region in swept)
+    return Certificate(
+        layout.clearance,
+        tuple(
+            (name, low, high)
+            for name, low, high in zip(
+                LAYERS,
+                (0.0, CARRIAGE_TOP, PAYLOAD),
+                (CARRIAGE_TOP, ARM_TOP, top),
+                strict=True,
+            )
+        ),
+        (
+            ("carriages to arms", ARM_LOW - CARRIAGE_TOP),
+            ("masts and arms to fingers", FINGER_LOW - ARM_TOP),
+            ("masts and arms to payloads", PAYLOAD - ARM_TOP),
+            ("fingers to payloads", PAYLOAD - FINGER_TOP),
+            ("outfeed to payloads", BELT_GAP),
+        ),
+        tuple(robot.name for robot in factory.robots),
+        tuple(operation.label for operation in factory.operations),
+        tuple(swept),
+        tuple(search.shared.values()),
+        tuple(faults[:MOST]),
+        search.pairs,
+    )
+
+
+def separation(one: Box, other: Box) -> float:
+    """The distance of two boxes [m]; negative by how deep they overlap."""
+    x = max(other[0] - one[1], one[0] - other[1])
+    y = max(other[2] - one[3], one[2] - other[3])
+    if max(x, y) <= 0:
+        return float(max(x, y))
+    return float(np.hypot(max(x, 0.0), max(y, 0.0)))
+
+
+class _Search:
+    """Finds the pairs of regions that are too near, and why some of them may be.
+
+    `pairs` counts those looked at, to tell how the work grows.
+    """
+
+    def __init__(self, layout: Layout, swept: list[Region]) -> None:
+        self.layout, self.swept = layout, swept
+        self.shared: dict[tuple[int, int, int, int], Shared] = {}
+        self.pairs = 0
+        self._members = [frozenset(o.robots) for o in layout.factory.operations]
+
+    def faults(self) -> Iterator[Fault]:
+        """Every pair that is too near with no reason."""
+        count = 0
+        for layer in range(len(LAYERS)):
+            here = [region for region in self.swept if region.layer == layer]
+            for one, other in self._near(here):
+                if not self._settled(one, other):
+                    yield self._fault(one, other)
+                    count += 1
+                if count >= MOST:
+                    return
+
+    def _near(self, here: list[Region]) -> Iterator[tuple[Region, Region]]:
+        """Pairs in one layer that are less than a clearance apart in plan: of different robots, or of a
+        station and its own robot."""
+        corners = boxes(here)
+        cells = shapely.box(corners[:, 0], corners[:, 2], corners[:, 1], corners[:, 3])
+        tree = shapely.STRtree(cells)
+        robot = np.array([region.robot for region in here])
+        kind = np.array([region.kind for region in here])
+        least = max(self.layout.clearance - TOLERANCE, 0.0)
+        for start in range(0, len(here), CHUNK):
+            first, second = tree.query(cells[start : start + CHUNK], "dwithin", least)
+            first = first + start
+            self.pairs += len(first)
+            still = (kind[first] >= POST_KIND) != (kind[second] >= POST_KIND)
+            kept = (first < second) & ((robot[first] != robot[second]) | still)
+            order = np.lexsort((second[kept], first[kept]))
+            for i, j in zip(first[kept][order].tolist(), second[kept][order].tolist(), strict=True):
+                yield here[i], here[j]
+
+    def _settled(self, one: Region, other: Region) -> bool:
+        """Whether two regions that are near in plan are never taken at once, or are apart in height."""
+        kinds = {one.kind, other.kind}
+        if one.robot == other.robot and OUTFEED_KIND in kinds:
+            return True
+        if BOOM_KIND in kinds and kinds <= {BOOM_KIND, PAYLOAD_KIND}:
+            gap = max(one.z[0] - other.z[1], other.z[0] - one.z[1])
+            return gap >= self.layout.clearance - TOLERANCE
+        if kinds != {PAYLOAD_KIND}:
+            return False
+        return self._joined(one, other) or self._joined(other, one) or self._in_turn(one, other)
+
+    def _joined(self, one: Region, other: Region) -> bool:
+        """Whether one is coupled in a mode of the other's robot."""
+        if one.mode == ALWAYS or other.robot not in self._members[one.mode]:
+            return False
+        self._share(one, other, one.mode, one.mode)
+        return True
+
+    def _in_turn(self, one: Region, other: Region) -> bool:
+        """Whether both are coupled, in modes that have a robot in common."""
+        if ALWAYS in (one.mode, other.mode):
+            return False
+        if self._members[one.mode].isdisjoint(self._members[other.mode]):
+            return False
+        self._share(one, other, one.mode, other.mode)
+        return True
+
+    def _share(self, one: Region, other: Region, first: int, second: int) -> None:
+        pair = sorted(((one.robot, first), (other.robot, second)))
+        (i, first), (j, second) = pair
+        if (i, j, first, second) in self.shared:
+            return
+        robots, operations = self.layout.factory.robots, self.layout.factory.operations
+        labels = dict.fromkeys(operations[number].label for number in (first, second))
+        self.shared[i, j, first, second] = Shared(
+            (robots[i].name, robots[j].name), tuple(labels), self._point(operations[first])
+        )
+
+    def _point(self, operation: Operation) -> tuple[float, float]:
+        path = self.layout.guidepaths[operation.carrier]
+        x, y = path.middle(self.layout.goal(operation.index, operation.template.carrier - 1))
+        return round(x, 6), round(y, 6)
+
+    def _fault(self, one: Region, other: Region) -> Fault:
+        c = self.layout.clearance
+        gap = separation(one.box, other.box)
+        names = [self._words(region) for region in (one, other)]
+        found = f"are {gap * 1000:.1f} mm apart" if gap > 0 else f"overlap by {-gap * 1000:.1f} mm"
+        message = (
+            f"{names[0]} and {names[1]} {found} in the layer of {LAYERS[one.layer]};"
+            f" {c * 1000:g} mm are needed"
+        )
+        return _fault(self.layout, message, (one, other), c - gap)
+
+    def _words(self, region: Region) -> str:
+        name = self.layout.factory.robots[region.robot].name
+        if region.kind == OUTFEED_KIND:
+            return "the outfeed"
+        if region.kind >= POST_KIND:
+            return f"the {KINDS[region.kind]} of '{region.label}''s feeder"
+        label = f" '{region.label}'" if region.label else ""
+        return f"{name}'s {KINDS[region.kind]}{label}"
+
+
+def _fault(layout: Layout, message: str, found: tuple[Region, ...], lacking: float) -> Fault:
+    robots = [layout.factory.robots[region.robot] for region in found]
+    return Fault(
+        message,
+        tuple(robot.name for robot in robots),
+        tuple(dict.fromkeys(region.label for region in found if region.label)),
+        lacking,
+        LAYERS[found[0].layer],
+        tuple(robot.position for robot in robots),
+    )
+
+
+def _standoffs(layout: Layout, found: Mapping[str, Pile]) -> Iterator[Fault]:
+    """Where a carrier brings a pile itself: what is brought to it is clear of the pile's way as long as
+    it waits at its standoff, and waits no farther away than where it comes from."""
+    for operation in layout.factory.operations[:-1]:
+        carrier = operation.template.carrier - 1
+        if operation.before[carrier] == NOPART or len(operation.robots) == 1:
+            continue
+        pile = _way(layout, found, operation, carrier)
+        for slot, label in enumerate(operation.before):
+            if slot == carrier or label == NOPART:
+                continue
+            robot = operation.robots[slot]
+            stops = goals(layout, robot)
+            room = stops[-2] - stops[-1] - layout.standoff(operation, slot)
+            if room < -TOLERANCE:
+                name = layout.factory.robots[robot].name
+                message = (
+                    f"{name} waits {-room * 1000:.1f} mm before its guidepath's last station for"
+                    f" '{operation.label}': it could never start"
+                )
+                yield _fault(layout, message, (Region(robot, 2, 0, pile.box, pile.z, label),), -room)
+            yield from _met(layout, pile, _way(layout, found, operation, slot))
+
+
+def _way(layout: Layout, found: Mapping[str, Pile], operation: Operation, slot: int) -> Region:
+    """What a robot's payload sweeps in a mode before its gate opens."""
+    robot, label = operation.robots[slot], operation.before[slot]
+    stops, gear = goals(layout, robot), layout.factory.robots[robot].operations
+    step = gear.index(operation.index)
+    end = stops[step] + layout.standoff(operation, slot)
+    box = sweep(layout.guidepaths[robot], found[label].box, max(stops[step - 1], end), end)
+    return Region(robot, 2, PAYLOAD_KIND, box, found[label].z, label, operation.index)
+
+
+def _met(layout: Layout, pile: Region, guest: Region) -> Iterator[Fault]:
+    gap = separation(pile.box, guest.box)
+    if gap < layout.clearance - TOLERANCE:
+        robots = layout.factory.robots
+        label = layout.factory.operations[pile.mode].label
+        message = (
+            f"{robots[guest.robot].name}'s '{guest.label}' waits {gap * 1000:.1f} mm from the way of"
+            f" {robots[pile.robot].name}'s '{pile.label}' in '{label}';"
+            f" {layout.clearance * 1000:g} mm are needed"
+        )
+        yield _fault(layout, message, (guest, pile), layout.clearance - gap)
+
+
+@dataclass(frozen=True, slots=True)
+class Tightness:
+    """How much shorter each guidepath could be before the certificate breaks [m], by robot."""
+
+    slack: tuple[float, ...]
+
+
+__all__ = ["Certificate", "certify", "separation"]

@@ -1,0 +1,126 @@
+"""That f embeds the quotient workspace W: guidepaths come together at their junctions, cross nowhere.
+
+What a carriage's centre follows is the segment f([A + 2r, B]): 2r before A it stands, and what is joined
+there is what it holds out. So no two segments have a point in common, and at a junction the product's
+middles are one point. All of it is in whole millimetres, and every comparison is between integers.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+
+from factory.layout.certificate import Fault
+from factory.layout.plan import Layout, Point2
+from factory.pag import NOPART
+
+Grid = tuple[int, int]
+"""A point of the floor in whole millimetres."""
+
+
+def embedding_faults(layout: Layout) -> Iterator[Fault]:
+    """What keeps f from being an embedding: ends off the grid of millimetres, junctions that ~ asks for
+    but f does not make, and crossings that it makes but ~ does not ask for. Near linear."""
+    carriers = delivered_to(layout)
+    for robot in range(len(layout.guidepaths)):
+        yield from _off_grid(layout, robot)
+        yield from _junction(layout, robot, carriers[robot])
+    yield from _crossings(layout)
+
+
+def delivered_to(layout: Layout) -> list[int]:
+    """For each robot the carrier it delivers to, -1 for the output robot."""
+    operations = layout.factory.operations
+    found = [operations[robot.operations[-1]].carrier for robot in layout.factory.robots]
+    return [-1 if carrier == robot else carrier for robot, carrier in enumerate(found)]
+
+
+def _grid(point: Point2) -> Grid:
+    return round(point[0] * 1000), round(point[1] * 1000)
+
+
+def _fault(layout: Layout, message: str, *robots: int, lacking: float = 0.0) -> Fault:
+    chosen = [layout.factory.robots[robot] for robot in robots]
+    names, places = tuple(r.name for r in chosen), tuple(r.position for r in chosen)
+    return Fault(message, names, (), lacking, "", places)
+
+
+def _off_grid(layout: Layout, robot: int) -> Iterator[Fault]:
+    name, path = layout.factory.robots[robot].name, layout.guidepaths[robot]
+    ends = *path.a, *path.carriage(path.reach), *path.carriage(path.length)
+    if not all(abs(v * 1000 - round(v * 1000)) < 1e-3 for v in ends):
+        message = f"{name}: its guidepath from {ends[2:4]} to {ends[4:]} is not in whole millimetres"
+        yield _fault(layout, message, robot)
+    elif not (path.travel > 0 and path.reach > 0):
+        message = f"{name}: its guidepath has no length (it receives and delivers at {path.a})"
+        yield _fault(layout, message, robot)
+
+
+def _junction(layout: Layout, robot: int, carrier: int) -> Iterator[Fault]:
+    """A of a robot is the station of its operation on its carrier's path, and they meet at right angles."""
+    path, factory = layout.guidepaths[robot], layout.factory
+    name = factory.robots[robot].name
+    u, t = path.heading, path.side
+    if _turn(u, t) == 0 or sorted(map(abs, u)) != [0.0, 1.0] or sorted(map(abs, t)) != [0.0, 1.0]:
+        yield _fault(layout, f"{name}: heading {u} and side {t} are no axes at right angles", robot)
+        return
+    if carrier < 0:
+        return
+    on, number = layout.guidepaths[carrier], factory.robots[robot].operations[-1]
+    operation, other = factory.operations[number], factory.robots[carrier].name
+    if t != on.heading:
+        message = f"{name}: its side {t} is not {other}'s heading {on.heading}: it is mirrored"
+        yield _fault(layout, message, robot, carrier)
+    wanted = on.middle(on.length - layout.stations[number])
+    off = _distance(path.a, wanted)
+    if off > 1e-6:
+        message = (
+            f"{name} ends {off * 1000:.1f} mm away from the junction of '{operation.label}'"
+            f" on {other}'s guidepath"
+        )
+        yield _fault(layout, message, robot, carrier, lacking=off)
+        return
+    slot = operation.robots.index(robot)
+    mine = path.middle(layout.goal(number, slot))
+    theirs = on.middle(layout.goal(number, operation.template.carrier - 1))
+    off = _distance(mine, theirs)
+    if operation.before[slot] != NOPART and off > 1e-6:
+        message = (
+            f"{name} brings '{operation.before[slot]}' to {off * 1000:.1f} mm from its place in"
+            f" '{operation.label}': the goals of {operation.template.name} do not meet"
+        )
+        yield _fault(layout, message, robot, carrier, lacking=off)
+
+
+def _turn(u: Point2, t: Point2) -> float:
+    return u[0] * t[1] - u[1] * t[0]
+
+
+def _distance(p: Point2, q: Point2) -> float:
+    return float(np.hypot(p[0] - q[0], p[1] - q[1]))
+
+
+def _crossings(layout: Layout) -> Iterator[Fault]:
+    """Segments along the axes meet where their bounding boxes do."""
+    ends = [(_grid(g.carriage(g.reach)), _grid(g.carriage(g.length))) for g in layout.guidepaths]
+    points = np.array(ends, np.int64).reshape(-1, 2, 2)
+    low, high = points.min(axis=1), points.max(axis=1)
+    for i, j in zip(*(found.tolist() for found in touching(low, high)), strict=True):
+        x, y = (int(v) / 1000 for v in np.maximum(low[i], low[j]))
+        names = [layout.factory.robots[robot].name for robot in (i, j)]
+        message = f"the guidepaths of {names[0]} and {names[1]} cross at ({x:g}, {y:g})"
+        yield _fault(layout, message, i, j)
+
+
+def touching(
+    low: NDArray[np.int64], high: NDArray[np.int64]
+) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """The pairs i < j of closed boxes with corners low, high (n, 2) that have a point in common."""
+    cells = shapely.box(low[:, 0], low[:, 1], high[:, 0], high[:, 1])
+    first, second = shapely.STRtree(cells).query(cells)
+    kept = first < second
+    order = np.lexsort((second[kept], first[kept]))
+    return first[kept][order], second[kept][order]

@@ -1,0 +1,119 @@
+"""Where the camera stands: as near as it can with everything that is to be seen still in the picture.
+
+A view is fitted, not set: for a direction of sight and an aspect ratio the nearest position from which a set
+of points lies inside the frame has a closed form. So the factory fills a picture of any shape.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import cos, radians, sin, tan
+from typing import Literal, get_args
+
+import numpy as np
+from numpy.typing import NDArray
+
+from factory.errors import Diagnostic, InputError, did_you_mean
+
+Array = NDArray[np.float64]
+
+Camera = Literal["overview", "top", "product"]
+"""`overview`: the whole factory, aslant; `top`: from above; `product`: follows the product that is furthest
+on its way."""
+
+CAMERAS: tuple[Camera, ...] = get_args(Camera)
+
+FIELD = 24.0
+"""Angle of view across the shorter side of the picture [degrees]: narrow, for a calm perspective."""
+
+
+@dataclass(frozen=True, slots=True)
+class Frame:
+    """What of a picture may be used: `aspect` = width / height, and the margins as fractions of height."""
+
+    aspect: float
+    below: float = 0.03
+    above: float = 0.03
+    beside: float = 0.03
+
+
+@dataclass(frozen=True, slots=True)
+class View:
+    """A camera: its `position` (3,), its `axes` (3, 3) right, up and ahead, the tangents of half its angles of
+    view, the `distance` to the middle of what it looks at, and half the depth of that [m]."""
+
+    position: Array
+    axes: Array
+    wide: float
+    tall: float
+    distance: float
+    depth: float
+
+
+def camera_named(name: str) -> Camera:
+    """Raises InputError (BadValue) for a name that no camera has."""
+    for camera in CAMERAS:
+        if camera == name:
+            return camera
+    hint = did_you_mean(name, CAMERAS, "cameras")
+    raise InputError(Diagnostic("BadValue", f"there is no camera '{name}'", None, hint))
+
+
+def towards(azimuth: float, elevation: float) -> Array:
+    """Axes (3, 3), rows right, up and ahead, of a camera that stands at an azimuth and an elevation
+    [degrees] from what it looks at."""
+    a, e = radians(azimuth), radians(elevation)
+    right = (-sin(a), cos(a), 0.0)
+    up = (-sin(e) * cos(a), -sin(e) * sin(a), cos(e))
+    ahead = (-cos(e) * cos(a), -cos(e) * sin(a), -sin(e))
+    return np.array([right, up, ahead])
+
+
+def fit(points: Array, axes: Array, frame: Frame) -> View:
+    """The nearest view along `axes` that has all points (n, 3) in the frame."""
+    tall = tan(radians(FIELD / 2)) / min(1.0, frame.aspect)
+    side = tall * (frame.aspect - 2 * frame.beside)
+    low, high = tall * (1 - 2 * frame.below), tall * (1 - 2 * frame.above)
+    r, u, f = axes @ points.T
+    across, upright = _Wedge(r, f, side, side), _Wedge(u, f, low, high)
+    c = min(across.nearest, upright.nearest)
+    position = axes.T @ np.array([across.middle(c), upright.middle(c), c])
+    middle = float(f.min() + f.max()) / 2
+    return View(
+        position, axes, tall * frame.aspect, tall, middle - c, float(f.max() - f.min()) / 2
+    )
+
+
+class _Wedge:
+    """The positions (a, c) from which all points (r, f) are seen between two rays of tangents `low` and
+    `high`: -(f - c) low <= r - a <= (f - c) high, a wedge that opens backwards from its tip."""
+
+    def __init__(self, r: Array, f: Array, low: float, high: float) -> None:
+        self.low, self.high = low, high
+        self.left, self.right = float((r - f * high).max()), float((r + f * low).min())
+
+    @property
+    def nearest(self) -> float:
+        """c of the tip."""
+        return (self.right - self.left) / (self.low + self.high)
+
+    def middle(self, c: float) -> float:
+        """a half way between the wedge's sides at c."""
+        return (self.left + c * self.high + self.right - c * self.low) / 2
+
+
+def overview(points: Array, frame: Frame) -> View:
+    """From the south, aslant, or from where the factory fills the picture better by a tenth."""
+    best: View | None = None
+    for azimuth in (-62.0, -118.0, -28.0, -152.0):
+        view = fit(points, towards(azimuth, 40.0), frame)
+        if best is None or view.distance < 0.9 * best.distance:
+            best = view
+    assert best is not None
+    return best
+
+
+def from_above(points: Array, frame: Frame) -> View:
+    """Straight down, north up, or turned by a quarter where that fills the picture better."""
+    upright, turned = (fit(points, towards(a, 90.0), frame) for a in (-90.0, 180.0))
+    return turned if turned.distance < 0.9 * upright.distance else upright
