@@ -35,7 +35,8 @@ def refuse_unproved(factory: Factory) -> Verdict:
     verdict = verify(factory.net)
     if not verdict.holds:
         raise RunError(
-            Diagnostic("NotProved", str(witness), None, "see factory check") for witness in verdict.witness
+            Diagnostic("NotProved", str(witness), None, "see factory check")
+            for witness in verdict.witness
         )
     return verdict
 
@@ -93,7 +94,8 @@ def _write_folder(source: Source, layout: Layout, output: Path) -> list[Path]:
     texts = {
         f"{stem}.svg": write_svg(layout),
         f"{stem}.programs.txt": "\n\n".join(programs) + "\n",
-        f"{stem}.proof.json": json.dumps(certificate(factory.net, verdict), ensure_ascii=False) + "\n",
+        f"{stem}.proof.json": json.dumps(certificate(factory.net, verdict), ensure_ascii=False)
+        + "\n",
         f"{stem}.clearance.json": json.dumps(certify(layout).as_json(), ensure_ascii=False) + "\n",
         **{f"{stem}.{name}": write(factory) for name, write in exporters().items()},
     }

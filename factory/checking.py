@@ -99,7 +99,11 @@ def describe(checked: Checked, verbose: bool) -> None:
     gears = document["gears"]
     shown = gears if verbose else gears[:SHOWN]
     rows = (
-        (g["robot"], g["type"], " · ".join(f"{p['mode']} {p['label']}".strip() for p in g["places"]))
+        (
+            g["robot"],
+            g["type"],
+            " · ".join(f"{p['mode']} {p['label']}".strip() for p in g["places"]),
+        )
         for g in shown
     )
     table("", ("robot", "type", "gear"), rows)

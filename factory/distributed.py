@@ -259,7 +259,9 @@ class DistributedSupervisor:
         if found is None:
             robots = list(operation.robots)
             limits = Limits(self.limits.speed[robots], self.limits.acceleration[robots])
-            found = self.bundles[operation.index] = Bundle.of([self.modes[operation.index]], [limits])
+            found = self.bundles[operation.index] = Bundle.of(
+                [self.modes[operation.index]], [limits]
+            )
         return found
 
     # --- the record ----------------------------------------------------------------------------
@@ -285,5 +287,3 @@ class DistributedSupervisor:
         self.record.events.append(Event(self.world.time, name))
         self.last_event = self.world.time
         self.active.operations = tuple(self.record.under_way)
-
-

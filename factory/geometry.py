@@ -211,7 +211,9 @@ class _Reader:
         except Exception as error:  # trimesh's readers raise anything on a broken file
             position = _value_position(node, "mesh")
             hint = "export it again as .obj, .stl, .ply or .glb with triangles"
-            self.errors.append(Diagnostic("BadMesh", f"cannot read '{path}': {error}", position, hint))
+            self.errors.append(
+                Diagnostic("BadMesh", f"cannot read '{path}': {error}", position, hint)
+            )
             return None
 
 

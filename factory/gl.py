@@ -77,7 +77,9 @@ def _probed(variables: tuple[tuple[str, str | None], ...]) -> Diagnostic | None:
     reason = _reason()
     if not reason:
         return None
-    message = f"rendering needs OpenGL through MUJOCO_GL={named}, which does not work here: {reason}"
+    message = (
+        f"rendering needs OpenGL through MUJOCO_GL={named}, which does not work here: {reason}"
+    )
     return Diagnostic("NoGL", message, None, _way_out(named, dict(variables)))
 
 

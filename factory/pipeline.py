@@ -36,7 +36,9 @@ def all_templates(folders: Sequence[Path] = ()) -> Mapping[str, Template]:
     for folder in folders:
         if not Path(folder).is_dir():
             message = f"the templates folder '{folder}' is no directory"
-            raise InputError(Diagnostic("BadTemplate", message, None, "--templates takes a directory"))
+            raise InputError(
+                Diagnostic("BadTemplate", message, None, "--templates takes a directory")
+            )
     return load_templates([*map(Path, folders), templates_folder()])
 
 

@@ -19,7 +19,9 @@ TOUCH = 1.0
 """Two robots of width r touch when their centres are no more than this apart [r]."""
 
 
-def check_prepared(robots: Sequence[Robot], operations: Sequence[Operation]) -> Iterator[Diagnostic]:
+def check_prepared(
+    robots: Sequence[Robot], operations: Sequence[Operation]
+) -> Iterator[Diagnostic]:
     """Every violation of NotPrepared, templates first."""
     used = dict.fromkeys(o.template for o in operations)
     faults = [fault for template in used for fault in _unreachable(template)]
@@ -38,7 +40,9 @@ def _unreachable(template: Template) -> Iterator[Diagnostic]:
         if goal.robot != number:
             yield _fault(template, f"the goal {goal} is no point of robot {number}", goal)
         elif goal.multiple * {"A": -1, "B": 1, "S": 0}[goal.end] > 0:
-            yield _fault(template, f"the goal {goal} lies off the guidepath of robot {number}", goal)
+            yield _fault(
+                template, f"the goal {goal} lies off the guidepath of robot {number}", goal
+            )
     if isinstance(template.law.eps, float) and template.law.eps <= 0:
         yield _fault(template, "a goal ball of radius 0 is never reached", goals[0])
     for one, other in touching(template, goals):
@@ -50,7 +54,9 @@ def _unreachable(template: Template) -> Iterator[Diagnostic]:
         )
 
 
-def _unprepared(operation: Operation, left: Mapping[tuple[int, int], Point]) -> Iterator[Diagnostic]:
+def _unprepared(
+    operation: Operation, left: Mapping[tuple[int, int], Point]
+) -> Iterator[Diagnostic]:
     """Robots that touch where their last operations have left them."""
     starts = [left[operation.index, robot] for robot in operation.robots]
     for one, other in touching(operation.template, starts):

@@ -95,5 +95,7 @@ def _check_ancestry(path: Path, robot: RobotType, types: Mapping[str, RobotType]
         seen.add(current.name)
 
 
-def _trouble(path: Path, message: str, hint: str = "see the shipped mjcf/catalogue.toml") -> Diagnostic:
+def _trouble(
+    path: Path, message: str, hint: str = "see the shipped mjcf/catalogue.toml"
+) -> Diagnostic:
     return Diagnostic("BadTemplate", message, Position(str(path), 1, 1), hint)

@@ -98,19 +98,27 @@ def render_file(
 def summarise(record: Run, factory: Factory, verbose: bool) -> None:
     """A run in a few lines for people."""
     cycle = f"{record.cycle_time_s:.3f} s" if record.cycle_time_s is not None else "not yet steady"
-    say(f"{record.products} of {record.units} products in {record.sim_time_s:.2f} s "
-        f"({record.realtime_factor:.1f} times real time, {record.world})")
-    say(f"cycle time {cycle}, predicted {record.predicted_cycle_time_s:.3f} s; "
-        f"bottleneck {record.bottleneck}")
-    say(f"{len(record.events)} transitions fired, "
-        f"the record {'refines' if record.refines_net else 'DOES NOT REFINE'} the net")
+    say(
+        f"{record.products} of {record.units} products in {record.sim_time_s:.2f} s "
+        f"({record.realtime_factor:.1f} times real time, {record.world})"
+    )
+    say(
+        f"cycle time {cycle}, predicted {record.predicted_cycle_time_s:.3f} s; "
+        f"bottleneck {record.bottleneck}"
+    )
+    say(
+        f"{len(record.events)} transitions fired, "
+        f"the record {'refines' if record.refines_net else 'DOES NOT REFINE'} the net"
+    )
     physics = record.physics
     if physics is not None:
         error = physics.product_error_max_mm
-        say(f"{physics.handoffs} hand-offs, gap at most {physics.handoff_gap_max_mm:.3f} mm; "
+        say(
+            f"{physics.handoffs} hand-offs, gap at most {physics.handoff_gap_max_mm:.3f} mm; "
             f"product error {'none measured' if error is None else f'{error:.3f} mm'}; "
             f"{physics.unintended_contacts} unintended contacts, "
-            f"{physics.engine_warnings} engine warnings")
+            f"{physics.engine_warnings} engine warnings"
+        )
         for pair in physics.contacts[:8]:
             say(f"  touched: {pair}")
     busy = sorted(zip(factory.robots, record.utilisation, strict=True), key=lambda p: -p[1])

@@ -42,7 +42,11 @@ class Settings:
         for name, value in given.items():
             if not 0 < value < float("inf"):
                 message = f"{name} = {value:g} must be positive and finite"
-                raise InputError(Diagnostic("BadValue", message, None, f"for example {name} = {getattr(self, name)}"))
+                raise InputError(
+                    Diagnostic(
+                        "BadValue", message, None, f"for example {name} = {getattr(self, name)}"
+                    )
+                )
         return replace(self, **given)  # type: ignore[arg-type]
 
 
@@ -63,7 +67,14 @@ def load_settings(path: Path) -> Settings:
             hint = did_you_mean(key, known, "keys")
             raise InputError(_trouble(path, "UnknownParameter", f"unknown key '{key}'", hint))
         if isinstance(value, bool) or not isinstance(value, int | float):
-            raise InputError(_trouble(path, "BadValue", f"{key} must be a number", f"{key} = {getattr(Settings(), key)}"))
+            raise InputError(
+                _trouble(
+                    path,
+                    "BadValue",
+                    f"{key} must be a number",
+                    f"{key} = {getattr(Settings(), key)}",
+                )
+            )
     if "substeps" in table:
         table["substeps"] = int(table["substeps"])
     return Settings().with_options(table)

@@ -95,7 +95,13 @@ class Simulation:
             message = "a distributed run starts where every robot waits with no part"
             raise InputError(Diagnostic("BadMarking", message, None, "leave out --from"))
         return DistributedSupervisor(
-            factory, self.modes, self.limits, self.world, settings.timestep, settings.substeps, self.seed
+            factory,
+            self.modes,
+            self.limits,
+            self.world,
+            settings.timestep,
+            settings.substeps,
+            self.seed,
         )
 
     def under_way(self) -> dict[str, int]:
@@ -106,9 +112,7 @@ class Simulation:
 
     def run(self, observers: Sequence[Observer] = (), max_time: float | None = None) -> Run:
         """Tick until `units` products have been dropped off, the run stalls or `max_time` [s] passes."""
-        delays = operation_delays(
-            self.layout, self.modes, self.limits, self.settings, self.kind
-        )
+        delays = operation_delays(self.layout, self.modes, self.limits, self.settings, self.kind)
         patience = PATIENCE * max(delays)
         begin, watched, trouble = perf_counter(), 0.0, None
         supervisor, world, goal = self.supervisor, self.world, self.before + self.units
@@ -162,7 +166,9 @@ class Simulation:
         )
         places = [factory.operations[n] for n in numbers[:3]]
         robots = ", ".join(
-            f"{factory.robots[r].name} in {o.template.name}({o.label})" for o in places for r in o.robots
+            f"{factory.robots[r].name} in {o.template.name}({o.label})"
+            for o in places
+            for r in o.robots
         )
         waits = "nothing fired for" if code == "Stalled" else "not finished after"
         message = f"{waits} {seconds:.2f} s of simulated time; {robots or 'no robot can start'}"

@@ -31,7 +31,9 @@ class World(Protocol):
         """Whether the world is in the domain of an operation's mode as far as parts go: a feeder has a
         part to give, the outfeed is free."""
 
-    def apply(self, started: Sequence[tuple[Operation, int]], ended: Sequence[tuple[Operation, int]]) -> None:
+    def apply(
+        self, started: Sequence[tuple[Operation, int]], ended: Sequence[tuple[Operation, int]]
+    ) -> None:
         """Operations that start or end now, each with the number of the unit it works on."""
 
     def step(self, bundle: Bundle | None, robots: Index) -> None:
@@ -71,7 +73,13 @@ class Supervisor:
         start: Marking | None = None,
         counts: dict[int, int] | None = None,
     ) -> None:
-        self.factory, self.modes, self.limits, self.world, self.tick = factory, modes, limits, world, tick
+        self.factory, self.modes, self.limits, self.world, self.tick = (
+            factory,
+            modes,
+            limits,
+            world,
+            tick,
+        )
         self.net = factory.net.threaded
         marking = factory.net.initial_marking if start is None else start
         self.threads = dict(factory.net.marking_of(marking).threads)

@@ -88,4 +88,6 @@ def corner_normals(mesh: Mesh) -> Array:
     length = np.linalg.norm(total, axis=1, keepdims=True)
     own = np.repeat(normal, 3, axis=0)
     own[np.linalg.norm(own, axis=1) == 0] = (0.0, 0.0, 1.0)
-    return np.asarray(np.where(length > 0, total / np.maximum(length, 1e-300), own)).reshape(-1, 3, 3)
+    return np.asarray(np.where(length > 0, total / np.maximum(length, 1e-300), own)).reshape(
+        -1, 3, 3
+    )

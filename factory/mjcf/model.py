@@ -125,9 +125,7 @@ def build_model(
     ElementTree.indent(root)
     xml = ElementTree.tostring(root, encoding="unicode") + "\n"
     joints = len(factory.robots) + sum(copies.values())
-    return Model(
-        layout, settings, copies, masses, drives, xml, files, joints, len(equality)
-    )
+    return Model(layout, settings, copies, masses, drives, xml, files, joints, len(equality))
 
 
 def product_name(factory: Factory) -> str:
@@ -159,7 +157,9 @@ def _drive(factory: Factory, robot: int, masses: Mapping[str, float], settings: 
     )
     mass = CARRIAGE_MASS + load
     kp, kv = mass * STIFFNESS**2, 2 * mass * STIFFNESS
-    return Drive(round(kp, 3), round(kv, 3), round(settings.force * mass * settings.acceleration + 5, 3))
+    return Drive(
+        round(kp, 3), round(kv, 3), round(settings.force * mass * settings.acceleration + 5, 3)
+    )
 
 
 def _options(root: Element, settings: Settings, bodies: int) -> None:
@@ -179,8 +179,15 @@ def _defaults(root: Element) -> Element:
     default = add(root, "default")
     add(default, "equality", solref="0.004 1", solimp="0.99 0.999 0.001 0.5 2")
     part = add(default, "default", class_="part")
-    add(part, "geom", contype=2, conaffinity=number(2 ** (BITS + 1) - 1 - 2), condim=3,
-        friction="0.6 0.005 0.0001", group=0)
+    add(
+        part,
+        "geom",
+        contype=2,
+        conaffinity=number(2 ** (BITS + 1) - 1 - 2),
+        condim=3,
+        friction="0.6 0.005 0.0001",
+        group=0,
+    )
     station = add(default, "default", class_="station")
     add(station, "geom", contype=1, conaffinity=1, group=0)
     shown = add(default, "default", class_="shown")
@@ -246,7 +253,13 @@ def _welds(equality: Element, layout: Layout, copies: Mapping[str, int]) -> None
         label = _delivered(factory, robot.index)
         for part in factory.contents[label] if label else ():
             pose = (*grip_position(layout, robot.index, part), w, 0, 0, -z)
-            _weld(equality, names.grip(robot.name, part), names.carriage(robot.name), names.part(part, 1), pose)
+            _weld(
+                equality,
+                names.grip(robot.name, part),
+                names.carriage(robot.name),
+                names.part(part, 1),
+                pose,
+            )
     for operation in factory.leaves:
         part = operation.label
         path = layout.guidepaths[operation.carrier]
@@ -282,7 +295,9 @@ def grip_position(layout: Layout, robot: int, part: str) -> tuple[float, float, 
     return _turned((x, y, z), path.heading)
 
 
-def _turned(v: tuple[float, float, float], heading: tuple[float, float]) -> tuple[float, float, float]:
+def _turned(
+    v: tuple[float, float, float], heading: tuple[float, float]
+) -> tuple[float, float, float]:
     """A vector of the world in a frame whose x is the heading."""
     u, w = heading
     return (v[0] * u + v[1] * w, -v[0] * w + v[1] * u, v[2])

@@ -43,12 +43,39 @@ def add_visuals(root: Element, layout: Layout) -> None:
 
 def add_assets(asset: Element) -> None:
     """The materials of the hall."""
-    add(asset, "texture", name="sky", type="skybox", builtin="gradient",
-        rgb1="0.93 0.95 0.97", rgb2="0.80 0.84 0.88", width=64, height=384)
-    add(asset, "texture", name="floor", type="2d", builtin="flat", mark="edge",
-        rgb1="0.93 0.935 0.94", markrgb="0.84 0.85 0.86", width=256, height=256)
-    add(asset, "material", name="floor", texture="floor", texuniform="true", texrepeat="4 4",
-        specular=0, shininess=0)
+    add(
+        asset,
+        "texture",
+        name="sky",
+        type="skybox",
+        builtin="gradient",
+        rgb1="0.93 0.95 0.97",
+        rgb2="0.80 0.84 0.88",
+        width=64,
+        height=384,
+    )
+    add(
+        asset,
+        "texture",
+        name="floor",
+        type="2d",
+        builtin="flat",
+        mark="edge",
+        rgb1="0.93 0.935 0.94",
+        markrgb="0.84 0.85 0.86",
+        width=256,
+        height=256,
+    )
+    add(
+        asset,
+        "material",
+        name="floor",
+        texture="floor",
+        texuniform="true",
+        texrepeat="4 4",
+        specular=0,
+        shininess=0,
+    )
     add(asset, "material", name="rail", rgba="0.55 0.58 0.62 1", specular=0.2, shininess=0.4)
     add(asset, "material", name="post", rgba="0.80 0.82 0.84 1", specular=0.1, shininess=0.3)
     add(asset, "material", name="belt", rgba="0.24 0.26 0.29 1", specular=0, shininess=0)
@@ -63,8 +90,17 @@ def add_scene(world: Element, layout: Layout, outfeed_speed: float) -> None:
         a, b = path.carriage(path.reach), path.carriage(path.length)
         middle = ((a[0] + b[0]) / 2, (a[1] + b[1]) / 2, 0.004)
         half = path.travel / 2 + CARRIAGE / 2
-        add(world, "geom", name=f"{robot.name}/rail", class_="shown", type="box",
-            pos=middle, quat=heading_quaternion(path), size=(half, 0.010, 0.004), material="rail")
+        add(
+            world,
+            "geom",
+            name=f"{robot.name}/rail",
+            class_="shown",
+            type="box",
+            pos=middle,
+            quat=heading_quaternion(path),
+            size=(half, 0.010, 0.004),
+            material="rail",
+        )
     for operation in layout.factory.leaves:
         _feeder(world, layout, operation.label)
     _outfeed(world, layout, outfeed_speed)
@@ -83,30 +119,63 @@ def _radius(layout: Layout) -> float:
 def _floor_and_light(world: Element, layout: Layout) -> None:
     x, y = _centre(layout)
     radius = _radius(layout)
-    add(world, "geom", name="floor", type="plane", size=(radius * 20, radius * 20, 0.1),
-        material="floor", contype=1, conaffinity=1, castshadow=False)
+    add(
+        world,
+        "geom",
+        name="floor",
+        type="plane",
+        size=(radius * 20, radius * 20, 0.1),
+        material="floor",
+        contype=1,
+        conaffinity=1,
+        castshadow=False,
+    )
     for name, ray, shadow, diffuse, specular in (
         ("key", KEY, True, "0.50 0.49 0.47", "0.12 0.12 0.12"),
         ("fill", FILL, False, "0.14 0.145 0.16", "0 0 0"),
     ):
-        add(world, "light", name=name, type="directional", castshadow=shadow, dir=ray,
+        add(
+            world,
+            "light",
+            name=name,
+            type="directional",
+            castshadow=shadow,
+            dir=ray,
             pos=(x - ray[0] * 3 * radius, y - ray[1] * 3 * radius, -ray[2] * 3 * radius),
-            diffuse=diffuse, specular=specular)
+            diffuse=diffuse,
+            specular=specular,
+        )
 
 
 def _cameras(world: Element, layout: Layout) -> None:
     x, y = _centre(layout)
     distance = look_distance(layout, 16 / 9)
     up, around = radians(42), radians(-62)
-    offset = (distance * cos(up) * cos(around), distance * cos(up) * sin(around), distance * sin(up))
+    offset = (
+        distance * cos(up) * cos(around),
+        distance * cos(up) * sin(around),
+        distance * sin(up),
+    )
     right = (-sin(around), cos(around), 0.0)
     above = (-sin(up) * cos(around), -sin(up) * sin(around), cos(up))
-    add(world, "camera", name="overview", pos=(x + offset[0], y + offset[1], 0.05 + offset[2]),
-        xyaxes=numbers((*right, *above)), fovy=VIEW)
+    add(
+        world,
+        "camera",
+        name="overview",
+        pos=(x + offset[0], y + offset[1], 0.05 + offset[2]),
+        xyaxes=numbers((*right, *above)),
+        fovy=VIEW,
+    )
     xlo, xhi, ylo, yhi = layout.floor
     tall = max(yhi - ylo, (xhi - xlo) * 9 / 16) * 1.12 + 0.2
-    add(world, "camera", name="top", pos=(x, y, tall / 2 / tan(radians(VIEW / 2))),
-        xyaxes="1 0 0 0 1 0", fovy=VIEW)
+    add(
+        world,
+        "camera",
+        name="top",
+        pos=(x, y, tall / 2 / tan(radians(VIEW / 2))),
+        xyaxes="1 0 0 0 1 0",
+        fovy=VIEW,
+    )
 
 
 def look_distance(layout: Layout, aspect: float) -> float:
@@ -126,8 +195,11 @@ def add_follower(body: Element, layout: Layout) -> None:
     distance = 2.2 * size + 0.15
     up, around = radians(32), radians(-125)
     nest = layout.guidepaths[0].reach
-    pos = (nest + distance * cos(up) * cos(around), distance * cos(up) * sin(around),
-           PAYLOAD + 0.3 * size + distance * sin(up))
+    pos = (
+        nest + distance * cos(up) * cos(around),
+        distance * cos(up) * sin(around),
+        PAYLOAD + 0.3 * size + distance * sin(up),
+    )
     right = (-sin(around), cos(around), 0.0)
     above = (-sin(up) * cos(around), -sin(up) * sin(around), cos(up))
     add(body, "camera", name="product", pos=pos, xyaxes=numbers((*right, *above)), fovy=VIEW)
@@ -145,18 +217,47 @@ def _feeder(world: Element, layout: Layout, label: str) -> None:
     back = -Clearance(layout.clearance).post(path.reach, rear)
     top = PAYLOAD + float(solid.high[2] - product.low[2]) + layout.clearance
     beam = 0.014
-    add(body, "geom", name=f"{feeder(label)}/post", class_="station", type="box",
-        pos=(back, across, (top + beam) / 2), size=(POST / 2, POST / 2, (top + beam) / 2),
-        material="post")
+    add(
+        body,
+        "geom",
+        name=f"{feeder(label)}/post",
+        class_="station",
+        type="box",
+        pos=(back, across, (top + beam) / 2),
+        size=(POST / 2, POST / 2, (top + beam) / 2),
+        material="post",
+    )
     ahead = path.nest
-    add(body, "geom", name=f"{feeder(label)}/boom", class_="station", type="box",
+    add(
+        body,
+        "geom",
+        name=f"{feeder(label)}/boom",
+        class_="station",
+        type="box",
         pos=((back + ahead) / 2, across, top + beam / 2),
-        size=((ahead - back) / 2, 0.008, beam / 2), material="post")
-    add(body, "geom", name=f"{feeder(label)}/cap", class_="shown", type="box",
-        pos=(back, across, top + beam), size=(POST / 2 + 0.001, POST / 2 + 0.001, 0.002),
-        rgba=solid.rgba)
-    add(body, "geom", name=f"{feeder(label)}/head", class_="shown", type="cylinder",
-        pos=(ahead, across, top + beam / 2), size=(0.012, beam / 2 + 0.002), rgba=solid.rgba)
+        size=((ahead - back) / 2, 0.008, beam / 2),
+        material="post",
+    )
+    add(
+        body,
+        "geom",
+        name=f"{feeder(label)}/cap",
+        class_="shown",
+        type="box",
+        pos=(back, across, top + beam),
+        size=(POST / 2 + 0.001, POST / 2 + 0.001, 0.002),
+        rgba=solid.rgba,
+    )
+    add(
+        body,
+        "geom",
+        name=f"{feeder(label)}/head",
+        class_="shown",
+        type="cylinder",
+        pos=(ahead, across, top + beam / 2),
+        size=(0.012, beam / 2 + 0.002),
+        rgba=solid.rgba,
+    )
 
 
 def _handedness(u: tuple[float, float], t: tuple[float, float]) -> int:
@@ -170,28 +271,76 @@ def _outfeed(world: Element, layout: Layout, speed: float) -> None:
     top, thick = PAYLOAD - BELT_GAP, (PAYLOAD - BELT_GAP - FINGER_TOP) * 0.8
     middle, half = ((xlo + xhi) / 2, (ylo + yhi) / 2), ((xhi - xlo) / 2, (yhi - ylo) / 2)
     body = add(world, "body", name="outfeed", pos=(middle[0], middle[1], 0.0))
-    add(body, "geom", name="outfeed/belt", class_="station", type="box", priority=1,
-        pos=(0, 0, top - thick / 2), size=(half[0], half[1], thick / 2), material="belt",
-        friction="0.8 0.005 0.0001", solref="0.004 1", solimp="0.99 0.9999 0.0001 0.5 2", surfacevel=(speed, 0, 0, 0, 0, 0))
+    add(
+        body,
+        "geom",
+        name="outfeed/belt",
+        class_="station",
+        type="box",
+        priority=1,
+        pos=(0, 0, top - thick / 2),
+        size=(half[0], half[1], thick / 2),
+        material="belt",
+        friction="0.8 0.005 0.0001",
+        solref="0.004 1",
+        solimp="0.99 0.9999 0.0001 0.5 2",
+        surfacevel=(speed, 0, 0, 0, 0, 0),
+    )
     tall = float(layout.product.high[2] - layout.product.low[2])
     length = layout.product_length + 0.1
     shed, wall = half[0] - length / 2, top + tall / 2 + 0.005
     for side in (-1, 1):
-        add(body, "geom", name=f"outfeed/side{side}", class_="shown", type="box",
-            pos=(0, side * (half[1] + 0.006), top - 0.008), size=(half[0], 0.0055, 0.012),
-            material="frame")
+        add(
+            body,
+            "geom",
+            name=f"outfeed/side{side}",
+            class_="shown",
+            type="box",
+            pos=(0, side * (half[1] + 0.006), top - 0.008),
+            size=(half[0], 0.0055, 0.012),
+            material="frame",
+        )
         for end in (-1, 1):
-            add(body, "geom", name=f"outfeed/leg{side}{end}", class_="shown", type="box",
+            add(
+                body,
+                "geom",
+                name=f"outfeed/leg{side}{end}",
+                class_="shown",
+                type="box",
                 pos=(end * (half[0] - 0.03), side * (half[1] - 0.008), (top - thick) / 2),
-                size=(0.006, 0.006, (top - thick) / 2), material="frame")
-        add(body, "geom", name=f"outfeed/wall{side}", class_="shown", type="box",
+                size=(0.006, 0.006, (top - thick) / 2),
+                material="frame",
+            )
+        add(
+            body,
+            "geom",
+            name=f"outfeed/wall{side}",
+            class_="shown",
+            type="box",
             pos=(shed, side * (half[1] + 0.0165), wall),
-            size=(length / 2, 0.004, tall / 2 + 0.025), rgba=SHED)
-    add(body, "geom", name="outfeed/roof", class_="shown", type="box",
-        pos=(shed + 0.002, 0, top + tall + 0.0335), size=(length / 2 + 0.008, half[1] + 0.024, 0.004),
-        rgba=SHED)
-    add(body, "geom", name="outfeed/back", class_="shown", type="box",
-        pos=(half[0] + 0.0045, 0, wall), size=(0.004, half[1] + 0.0205, tall / 2 + 0.025), rgba=SHED)
+            size=(length / 2, 0.004, tall / 2 + 0.025),
+            rgba=SHED,
+        )
+    add(
+        body,
+        "geom",
+        name="outfeed/roof",
+        class_="shown",
+        type="box",
+        pos=(shed + 0.002, 0, top + tall + 0.0335),
+        size=(length / 2 + 0.008, half[1] + 0.024, 0.004),
+        rgba=SHED,
+    )
+    add(
+        body,
+        "geom",
+        name="outfeed/back",
+        class_="shown",
+        type="box",
+        pos=(half[0] + 0.0045, 0, wall),
+        size=(0.004, half[1] + 0.0205, tall / 2 + 0.025),
+        rgba=SHED,
+    )
 
 
 __all__ = ["add_assets", "add_follower", "add_scene", "add_visuals", "carriage", "look_distance"]

@@ -64,7 +64,10 @@ class Inspection:
         """The largest displacement [m] of any vertex of any part from its place in the product, after
         a rigid fit on the first part."""
         turn = self.d.xmat[bodies].reshape(-1, 3, 3)
-        here = np.einsum("nij,nj->ni", turn[self._owner], self._local) + self.d.xpos[bodies][self._owner]
+        here = (
+            np.einsum("nij,nj->ni", turn[self._owner], self._local)
+            + self.d.xpos[bodies][self._owner]
+        )
         fitted = (here - self.d.xpos[bodies[0]]) @ turn[0]
         return float(np.linalg.norm(fitted - self._nominal, axis=1).max())
 
@@ -84,8 +87,3 @@ class Inspection:
             int(sum(w.number for w in self.d.warning)),
             tuple(pairs),
         )
-
-
-
-
-

@@ -153,7 +153,9 @@ class MujocoWorld:
 def load(model: Model) -> mujoco.MjModel:
     """The engine's model of what `write_model` writes."""
     xml = model.xml
-    files: Mapping[str, bytes] = {f"meshes/{name}": content for name, content in model.files.items()}
+    files: Mapping[str, bytes] = {
+        f"meshes/{name}": content for name, content in model.files.items()
+    }
     try:
         return mujoco.MjModel.from_xml_string(xml, dict(files))
     except ValueError as error:

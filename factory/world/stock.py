@@ -255,7 +255,9 @@ class Stock:
         for leaf in factory.leaves:
             for unit in range(self.released, counts.get(leaf.end, 0)):
                 holder = operation = leaf
-                while operation.index != factory.dropoff.index and counts.get(operation.end, 0) > unit:
+                while (
+                    operation.index != factory.dropoff.index and counts.get(operation.end, 0) > unit
+                ):
                     holder = operation
                     operation = factory.operations[factory.parents[operation.index]]
                 if holder is leaf:
@@ -286,5 +288,3 @@ class Stock:
 
     def _hold(self, label: str, copy: int) -> int:
         return int(self.m.equality(names.hold(label, copy + 1)).id)
-
-

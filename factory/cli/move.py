@@ -1,0 +1,112 @@
+"""The commands `run` and `render`."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Any
+
+import click
+
+from factory.cli.options import (
+    FLOOR,
+    MOTION,
+    OUTPUT,
+    PICTURE,
+    RUN,
+    SOURCE,
+    pair,
+    plan,
+    settings_of,
+    writable,
+)
+from factory.console import emit, say, warn
+
+
+@click.command()
+@SOURCE
+@RUN
+@click.option("--video", type=click.Path(path_type=Path), help="Film the run (.mp4).")
+@click.option("--log", type=click.Path(path_type=Path), help="Keep every tick in a file.")
+@click.option(
+    "--distributed", is_flag=True, help="Each robot runs its own program (paper, section 6)."
+)
+@PICTURE
+@FLOOR
+@MOTION
+@OUTPUT
+def run(
+    file: Path,
+    folders: tuple[Path, ...],
+    video: Path | None,
+    log: Path | None,
+    floor: str | None,
+    as_json: bool,
+    quiet: bool,
+    verbose: bool,
+    **options: Any,
+) -> int:
+    """Run FILE.pag until its products are dropped off."""
+    from factory.running import run_file
+
+    for path in (video, log):
+        writable(path)
+    settings = settings_of(file, options)
+    source, factory, layout = plan(file, folders, settings, floor)
+    warn(layout.product.warnings, quiet)
+    size = pair(options["size"], "--size", "1280x720", int)
+    record = run_file(source, layout, settings, video, log, size, quiet or as_json, options)
+    if as_json:
+        document = record.as_json()
+        document.pop("schema")
+        trouble = [record.trouble.as_json()] if record.trouble else []
+        emit({**document, **({"errors": trouble} if trouble else {})})
+    elif not quiet:
+        from factory.running import summarise
+
+        summarise(record, factory, verbose)
+    if record.trouble is not None:
+        print(record.trouble, file=sys.stderr)
+    return 1 if record.trouble is not None or not record.refines_net else 0
+
+
+@click.command()
+@SOURCE
+@click.option(
+    "-o",
+    "--output",
+    type=click.Path(path_type=Path),
+    required=True,
+    help="OUT.mp4, or OUT.png for a still.",
+)
+@click.option("--at", default="end", help="Time of a still [s], or `end`.")
+@RUN
+@PICTURE
+@FLOOR
+@MOTION
+@OUTPUT
+def render(
+    file: Path,
+    folders: tuple[Path, ...],
+    output: Path,
+    at: str,
+    floor: str | None,
+    as_json: bool,
+    quiet: bool,
+    verbose: bool,
+    **options: Any,
+) -> int:
+    """Film FILE.pag, or a LOG that `run --log` has kept, headless through EGL."""
+    from factory.running import render_file
+
+    writable(output)
+    size = pair(options["size"], "--size", "1280x720", int)
+    document = render_file(file, folders, output, at, floor, size, quiet or as_json, options)
+    if as_json:
+        emit(document)
+    elif not quiet:
+        say(
+            f"{output}: {document['frames']} frames of {document['width']}x{document['height']}, "
+            f"{document['seconds']:.1f} s"
+        )
+    return 0

@@ -1,0 +1,111 @@
+"""The commands that need no geometry: check, programs, export."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from factory.cli.options import OUTPUT, SOURCE, writable
+from factory.console import emit, say
+from factory.errors import Diagnostic, InputError, did_you_mean
+
+
+@click.command()
+@SOURCE
+@click.option("--certificate", type=click.Path(path_type=Path), help="Write the proof here.")
+@click.option("--wip", type=click.IntRange(1), help="Copies of each part let in at once.")
+@OUTPUT
+def check(
+    file: Path,
+    folders: tuple[Path, ...],
+    certificate: Path | None,
+    wip: int | None,
+    as_json: bool,
+    quiet: bool,
+    verbose: bool,
+) -> int:
+    """Parse, compile and prove FILE.pag (or a net in FILE.pnml)."""
+    from factory.checking import check_file, describe
+
+    writable(certificate)
+    checked = check_file(file, folders, wip)
+    if certificate is not None:
+        from factory.files import write_text
+
+        write_text(certificate, checked.certificate())
+    if as_json:
+        emit(checked.as_json())
+    elif not quiet:
+        describe(checked, verbose)
+    return 0 if checked.verdict.holds else 1
+
+
+@click.command()
+@SOURCE
+@click.option("--robot", help="Only this robot, as r3.")
+@OUTPUT
+def programs(
+    file: Path,
+    folders: tuple[Path, ...],
+    robot: str | None,
+    as_json: bool,
+    quiet: bool,
+    verbose: bool,
+) -> int:
+    """Print each robot's program, in the paper's form."""
+    from factory.pipeline import read
+    from factory.programs import program_of, write_program
+
+    factory = read(file, folders).compile()
+    names = [r.name for r in factory.robots]
+    if robot is not None and robot not in names:
+        hint = did_you_mean(robot, names, "robots")
+        raise InputError(Diagnostic("Usage", f"there is no robot '{robot}'", None, hint))
+    chosen = [r for r in factory.robots if robot in (None, r.name)]
+    texts = {r.name: write_program(program_of(factory, r.index)) for r in chosen}
+    if as_json:
+        emit({"programs": texts})
+    else:
+        say("\n\n".join(texts.values()))
+    return 0
+
+
+@click.command()
+@SOURCE
+@click.option("--format", "form", required=True, help="pnml or dot.")
+@click.option("-o", "--output", type=click.Path(path_type=Path), help="A file; stdout without.")
+@OUTPUT
+def export(
+    file: Path,
+    folders: tuple[Path, ...],
+    form: str,
+    output: Path | None,
+    as_json: bool,
+    quiet: bool,
+    verbose: bool,
+) -> int:
+    """Write the net of FILE.pag for other tools."""
+    from factory.export import exporters
+    from factory.files import write_text
+    from factory.pipeline import read
+
+    known = exporters()
+    if form not in known:
+        hint = did_you_mean(form, list(known), "formats")
+        raise InputError(Diagnostic("Usage", f"unknown format '{form}'", None, hint))
+    writable(output)
+    text = known[form](read(file, folders).compile())
+    if output is not None:
+        write_text(output, text)
+    if as_json:
+        emit(
+            {
+                "format": form,
+                "output": str(output) if output else None,
+                **({} if output else {"text": text}),
+            }
+        )
+    elif output is None:
+        say(text.rstrip("\n"))
+    return 0

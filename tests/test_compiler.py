@@ -1,0 +1,181 @@
+"""Compile and CompileNode: the paper's example to the letter, numbering, and what is refused."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+from hypothesis import given
+
+from factory.compiler import compile_pag, expand
+from factory.errors import InputError
+from factory.lang import read_pag, read_template
+from factory.pag import PAG
+from factory.pipeline import all_templates
+from factory.robots import Catalogue, RobotType, load_catalogue
+from tests.strategies import pags
+
+PAPER = """6 parts; root = sub3; sub3 = mate ( sub2, part3 ); sub2 = weld ( sub1 );
+sub1 = mate ( part1, part2 ); part1 = atomic(); part2 = atomic(); part3 = atomic()"""
+
+GEARS = [
+    "r1: wait nopart · mate sub3 · wait sub3 · dropoff",
+    "r2: wait nopart · atomic part3 · wait part3 · mate sub3",
+    "r3: wait nopart · mate sub1 · hold sub1 · weld sub2 · wait sub2 · mate sub3",
+    "r4: wait nopart · weld sub2",
+    "r5: wait nopart · atomic part1 · wait part1 · mate sub1",
+    "r6: wait nopart · atomic part2 · wait part2 · mate sub1",
+]
+
+TEMPLATES = all_templates()
+
+
+def compiled(text: str, *templates: str, catalogue: Catalogue | None = None):
+    table = dict(TEMPLATES) | {t.name: t for t in map(read_template, templates)}
+    return compile_pag(read_pag(text, table), table, catalogue or load_catalogue())
+
+
+def codes(error: pytest.ExceptionInfo[InputError]) -> list[str]:
+    return [d.code for d in error.value.diagnostics]
+
+
+def gears(plan) -> list[str]:
+    places = plan.net.threaded.places
+    return [
+        f"{g.robot}: " + " · ".join(f"{places[p].mode} {places[p].label}".strip() for p in g.places)
+        for g in plan.net.gears
+    ]
+
+
+def test_the_papers_example_has_the_gears_of_the_paper() -> None:
+    plan = compiled(PAPER)
+    assert gears(plan) == GEARS
+    operations = {o.label: [r + 1 for r in o.robots] for o in plan.operations}
+    assert operations["sub1"] == [5, 6, 3]
+    assert operations["sub2"] == [3, 4]
+    assert operations["sub3"] == [3, 2, 1]
+
+
+def test_further_inputs_become_piles() -> None:
+    pag = read_pag(
+        "root = s; s = mate(a, b, c, d); a = atomic(); b = atomic(); c = atomic(); d = atomic()",
+        TEMPLATES,
+    )
+    nodes = expand(pag, TEMPLATES)
+    assert nodes["s/2"].inputs == ("a", "b")
+    assert nodes["s/3"].inputs == ("s/2", "c")
+    assert nodes["s"].inputs == ("s/3", "d")
+    assert nodes["s"].template.name == "insert"
+    assert nodes["s"].size == 7
+
+
+def test_a_part_alone_is_a_product() -> None:
+    plan = compiled("root = p; p = atomic()")
+    assert gears(plan) == ["r1: wait nopart · atomic p · wait p · dropoff"]
+
+
+def test_numbering_gives_small_inputs_first_and_tools_last() -> None:
+    plan = compiled(
+        "root = s; s = mate(t, u); t = mate(a, b); u = atomic(); a = weld(c); b = atomic();"
+        "c = atomic()"
+    )
+    made = {o.label: o.carrier + 1 for o in plan.operations}
+    assert (made["s"], made["u"], made["t"]) == (1, 2, 3)
+    assert (made["b"], made["a"]) == (4, 5)
+    assert [r + 1 for r in plan.by_label["a"].robots] == [5, 6]
+
+
+@given(pags(max_labels=40))
+def test_counts_are_those_of_the_specification(pag: PAG) -> None:
+    plan = compile_pag(pag, TEMPLATES, load_catalogue())
+    n = len(plan.operations) - 1
+    robots = 1 + sum(len(o.robots) - 1 for o in plan.operations[:-1])
+    assert len(plan.robots) == robots
+    assert len(plan.net.threaded.transitions) == 2 * n + 2
+    assert len(plan.net.threaded.places) == 2 * n + robots + 1
+    assert len(plan.net.initial_marking) == robots
+
+
+CRANE = """crane = (R, j, ~, <a; b>, F) where R = < gantry >; j = 1; ~ = {}; <a; b> = < nopart; LAB1 >;
+F = navigation on W to ( B1 ) within eps; parameters = geometry"""
+HOIST = """hoist = (R, j, ~, <a; b>, F) where R = < lift, dot >; j = 1; ~ = { S1 = A2 };
+<a; b> = < LAB1, LAB2; LAB3, nopart >; F = navigation on W to ( S1 + 2r, A2 + 2r ) within eps"""
+
+
+def catalogue() -> Catalogue:
+    types = dict(load_catalogue().types)
+    types["gantry"] = replace(types["tool"], name="gantry")
+    types["lift"] = RobotType("lift", types["dot"].mjcf, "dot")
+    return Catalogue(types)
+
+
+def test_a_carrier_of_another_type_does_not_fit_its_role() -> None:
+    with pytest.raises(InputError) as error:
+        compiled(
+            "root = s; s = mate(a, b); a = crane(); b = atomic()", CRANE, catalogue=catalogue()
+        )
+    assert codes(error) == ["TypeMismatch"]
+    assert "'a'" in str(error.value) and "gantry" in str(error.value)
+
+
+def test_the_output_type_must_fit_too() -> None:
+    with pytest.raises(InputError) as error:
+        compiled("root = a; a = crane()", CRANE, catalogue=catalogue())
+    assert codes(error) == ["TypeMismatch"]
+
+
+def test_an_unknown_type_is_named_with_a_suggestion() -> None:
+    with pytest.raises(InputError) as error:
+        compiled(
+            "root = s; s = big(a); a = atomic()",
+            HOIST.replace("hoist", "big")
+            .replace("dot }", "dott")
+            .replace("lift, dot >", "dot, dott >")
+            .replace("LAB1, LAB2; LAB3, nopart", "LAB1, nopart; LAB2, nopart"),
+        )
+    assert codes(error) == ["TypeMismatch"]
+    assert "did you mean 'dot'" in str(error.value)
+
+
+def test_a_type_that_extends_another_takes_its_roles() -> None:
+    text = "root = s; s = mate(h, c); h = hoist(a, b); a = atomic(); b = atomic(); c = atomic()"
+    plan = compiled(text, HOIST, catalogue=catalogue())
+    assert plan.robots[plan.by_label["h"].carrier].type == "lift"
+    assert plan.robots[plan.by_label["a"].carrier].type == "lift"
+    assert plan.robots[plan.by_label["b"].carrier].type == "dot"
+
+
+MATE = """mate = (R, j, ~, <a; b>, F) where R = < dot, dot, dot >; j = 3; ~ = { A1 = A2 = B3 };
+<a; b> = < LAB1, LAB2, nopart; nopart, nopart, LAB3 >;
+F = navigation on W to ( %s ) within %s; further = insert"""
+TWO = "root = s; s = mate(a, b); a = atomic(); b = atomic()"
+
+
+def test_the_mate_of_the_paper_is_accepted_as_written() -> None:
+    assert gears(compiled(TWO, MATE % ("A1 + 2r, A2 + 2r, B3", "eps")))
+
+
+@pytest.mark.parametrize(
+    ("goals", "eps", "words"),
+    [
+        ("A1, A2, B3", "eps", "touching"),
+        ("A1 + 0.3r, A2 + 0.3r, B3", "eps", "touching"),
+        ("A1 - 2r, A2 + 2r, B3", "eps", "off the guidepath"),
+        ("A1 + 2r, A2 + 2r, B3 + r", "eps", "off the guidepath"),
+        ("A2 + 2r, A1 + 2r, B3", "eps", "no point of robot 1"),
+    ],
+)
+def test_a_mode_that_cannot_reach_its_goal_is_refused(goals: str, eps: str, words: str) -> None:
+    with pytest.raises(InputError) as error:
+        compiled(TWO, MATE % (goals, eps))
+    assert set(codes(error)) == {"NotPrepared"}
+    assert words in str(error.value)
+
+
+def test_robots_left_touching_are_outside_the_next_domain() -> None:
+    part = """near = (R, j, ~, <a; b>, F) where R = < dot >; j = 1; ~ = {}; <a; b> = < nopart; LAB1 >;
+    F = navigation on W to ( A1 ) within eps; parameters = geometry"""
+    with pytest.raises(InputError) as error:
+        compiled("root = s; s = mate(a, b); a = near(); b = near()", part)
+    assert codes(error) == ["NotPrepared"]
+    assert "'s'" in str(error.value)
