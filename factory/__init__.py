@@ -99,14 +99,16 @@ def run(
     seed: int = 0,
     jitter: float = 0.0,
     settings: Settings | None = None,
+    max_time: float | None = None,
     **options: Any,
 ) -> Run:
     """Run the net over a world until `units` products are dropped off.
 
-    `seed` and `jitter` draw each robot's speed and gain within ± jitter. Raises RunError for a run
-    that stalls, InputError where the engine refuses a mesh.
+    `seed` and `jitter` draw each robot's speed and gain within ± jitter; `max_time` [s] of simulated
+    time; further options are those of `factory.simulation.Simulation`. Raises RunError for a run that
+    stalls or takes longer, InputError where the engine refuses a mesh.
     """
     from factory.simulation import Simulation, require
 
     simulation = Simulation(layout, world, units, seed, jitter, settings, **options)
-    return require(simulation.run())
+    return require(simulation.run(max_time=max_time))

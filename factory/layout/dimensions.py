@@ -22,6 +22,9 @@ MAST = 0.02
 
 ARM_WIDTH = 0.016
 
+STUB = 0.03
+"""The shortest arm, from the middle of the mast."""
+
 POST = 0.03
 """Width of a feeder's post."""
 
@@ -45,8 +48,13 @@ class Clearance:
 
     @property
     def rim(self) -> float:
-        """How far an arm's end stays behind the line of another robot's carriage."""
-        return CARRIAGE / 2 + self.c
+        """How far an arm's end stays behind the line of another robot's mast, and of a post."""
+        return max(MAST, POST) / 2 + self.c
+
+    def reach(self, arm: float, lane: float = 0.0) -> float:
+        """How far the carriage stays behind: of the arm's end, and of the other robot's carriage whose
+        line is `lane` nearer than the product's middle."""
+        return max(arm + STUB, CARRIAGE + self.c + lane)
 
     def post(self, reach: float, rear: float) -> float:
         """How far behind the product's middle the centre of a feeder's post stands: behind the

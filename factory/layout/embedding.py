@@ -39,8 +39,8 @@ def lay_out(
     outfeed = _outfeed(guidepaths[0], shapes[0].last, c)
     tree = stretched.subtrees[0]
     b = guidepaths[0].middle(guidepaths[0].length)
-    xlo, xhi = b[0] + tree.back, outfeed[1]
-    ylo, yhi = min(b[1] + tree.low, outfeed[2]), max(b[1] + tree.high, outfeed[3])
+    xlo, xhi = b[0] + min(tree.back), outfeed[1]
+    ylo, yhi = min(b[1] + min(tree.low), outfeed[2]), max(b[1] + max(tree.high), outfeed[3])
     layout = Layout(
         factory,
         product,
@@ -96,7 +96,7 @@ def _symmetric(
             for number in _carried(factory, robot)
         }
         last = list(piles.values())[-1] if piles else (0.0, 0.0, 0.0, 0.0)
-        return Shape(piles, last, 0.0, c.rim, tools[robot])
+        return Shape(piles, last, 0.0, c.rim, c.reach(c.rim), 0.0, tools[robot])
 
     return shape
 
@@ -142,18 +142,30 @@ def exact_shapes(
         numbers = _carried(factory, robot)
         piles = {n: project(payloads[factory.operations[n].label], u, t) for n in numbers}
         last = list(piles.values())[-1] if piles else (0.0, 0.0, 0.0, 0.0)
-        offset = _millimetres((last[2] + last[3]) / 2)
-        arm = c.rim
-        if carrier >= 0:
-            arm = max(arm, c.rim + sides[robot] * shapes[carrier].offset)
-            if tools[robot]:
-                operation = factory.operations[factory.robots[robot].operations[0]]
-                pile = shapes[carrier].piles[operation.index]
-                offset = _millimetres((pile[0] + pile[1]) / 2)
-        else:
-            arm = max(arm, c.c - last[0])
-        shapes.append(Shape(piles, last, offset, up(arm), tools[robot]))
+        held = _worked_on(factory, robot, carrier, sides, shapes) if tools[robot] else last
+        lane = sides[robot] * shapes[carrier].offset if carrier >= 0 else 0.0
+        arm = up(max(c.rim, c.rim + lane, c.c - last[0] if carrier < 0 else 0.0))
+        shapes.append(
+            Shape(
+                piles,
+                last,
+                _millimetres((held[2] + held[3]) / 2),
+                arm,
+                up(c.reach(arm, lane)),
+                _millimetres((held[0] + held[1]) / 2),
+                tools[robot],
+            )
+        )
     return shapes
+
+
+def _worked_on(
+    factory: Factory, robot: int, carrier: int, sides: Sides, shapes: list[Shape]
+) -> Extent:
+    """The pile that a tool works on, in the tool's frame: its heading is against the carrier's side."""
+    pile = shapes[carrier].piles[factory.robots[robot].operations[0]]
+    along = sorted((-sides[robot] * pile[2], -sides[robot] * pile[3]))
+    return along[0], along[1], pile[0], pile[1]
 
 
 def project(box: Box, u: Point2, t: Point2) -> Extent:
@@ -185,31 +197,19 @@ def _embed(
             station = stretched.stations[factory.robots[robot].operations[-1]]
             a = on.middle(on.length - station)
         shape = shapes[robot]
-        nest = _nest(factory, robot, sides, shapes, carrier)
         paths.append(
             Guidepath(
                 u,
                 t,
                 (_millimetres(a[0]), _millimetres(a[1])),
                 stretched.travel[robot],
-                shape.reach(c),
+                shape.reach,
                 shape.offset,
                 shape.arm,
-                nest,
+                shape.nest,
             )
         )
     return tuple(paths)
-
-
-def _nest(
-    factory: Factory, robot: int, sides: Sides, shapes: list[Shape], carrier: int
-) -> float:
-    """The middle of the last payload along u; for a tool, of what it works on."""
-    shape = shapes[robot]
-    if not shape.tool:
-        return _millimetres((shape.last[0] + shape.last[1]) / 2)
-    pile = shapes[carrier].piles[factory.robots[robot].operations[0]]
-    return _millimetres(-sides[robot] * (pile[2] + pile[3]) / 2)
 
 
 def _outfeed(path: Guidepath, last: Extent, c: Clearance) -> Box:

@@ -2,11 +2,12 @@
 
 The guidepaths form a tree. A robot's path starts where it receives (B) and runs straight to where it
 delivers (A); the paths of the robots that bring it something end on it, from its left or right. A subtree
-takes a box beside its carrier's path; boxes on one side follow one another; a path is as long as it takes
-to keep its own subtree clear of the path it ends on. Bottom-up, linear in the number of robots.
+takes a box in each layer beside its carrier's path; boxes on one side follow one another; a path is as
+long as it takes to keep its own subtree clear of the path it ends on, layer by layer. Bottom-up, linear in
+the number of robots.
 
 Frames: a robot's heading is u, its side t is the heading of the robot it delivers to. So a subtree's extent
-in t is its extent along the path it ends on.
+in t is its extent along the path it ends on. Every box has half a clearance around it.
 """
 
 from __future__ import annotations
@@ -17,11 +18,20 @@ from math import ceil
 
 from factory.errors import Diagnostic, InputError
 from factory.factory import Factory, Operation
-from factory.layout.dimensions import CARRIAGE, POST, TOOL_TRAVEL, Clearance
+from factory.layout.dimensions import (
+    CARRIAGE,
+    MAST,
+    POST,
+    TOOL_TRAVEL,
+    Clearance,
+)
+from factory.layout.plan import Extent
 from factory.pag import NOPART
 
-Extent = tuple[float, float, float, float]
-"""(ulo, uhi, tlo, thi): a box in a robot's frame, about the product's middle [m]."""
+CARRIAGES, ARMS, PAYLOADS = LAYERS = range(3)
+"""The layers, from the floor up. What stands on the floor is in all of them."""
+
+NOTHING = float("-inf")
 
 Sides = dict[int, int]
 """For each robot but the first: +1 where it stands on the side t of its carrier's path, else -1."""
@@ -30,36 +40,35 @@ Sides = dict[int, int]
 @dataclass(frozen=True, slots=True)
 class Shape:
     """What the layout must know of a robot: the box of each pile it carries, by operation, and of the
-    last one, how far its carriage line is to the side, and how far behind its arm ends."""
+    last one, how far its carriage line is to the side, how far behind the middle its arm ends and its
+    carriage is (`reach`, 2r), and how far ahead its finger goes (`nest`) [m]."""
 
     piles: Mapping[int, Extent]
     last: Extent
     offset: float
     arm: float
+    reach: float
+    nest: float
     tool: bool
 
-    def reach(self, c: Clearance) -> float:
-        """2r: the carriage stands this far behind the product's middle."""
-        return self.arm + CARRIAGE / 2 + c.c
 
-
-@dataclass(slots=True)
 class Subtree:
     """A robot with all that brings it something, in its own frame, origin at its B station.
 
-    `front`: the farthest extent ahead; `back`: behind; `low`, `high`: to the side; `travel` [m].
+    By layer: `front`, the farthest extent ahead; `back`, behind; `low`, `high`, to the side; `travel` [m].
     """
 
-    front: float
-    back: float
-    low: float
-    high: float
-    travel: float = 0.0
+    __slots__ = ("back", "front", "high", "low", "travel")
 
-    def include(self, ulo: float, uhi: float, tlo: float, thi: float) -> None:
-        """Grow to contain a box."""
-        self.back, self.front = min(self.back, ulo), max(self.front, uhi)
-        self.low, self.high = min(self.low, tlo), max(self.high, thi)
+    def __init__(self) -> None:
+        self.front, self.back = [NOTHING] * 3, [-NOTHING] * 3
+        self.low, self.high = [-NOTHING] * 3, [NOTHING] * 3
+        self.travel = 0.0
+
+    def include(self, layer: int, ulo: float, uhi: float, tlo: float, thi: float) -> None:
+        """Grow to contain a box in one layer."""
+        self.back[layer], self.front[layer] = min(self.back[layer], ulo), max(self.front[layer], uhi)
+        self.low[layer], self.high[layer] = min(self.low[layer], tlo), max(self.high[layer], thi)
 
 
 @dataclass(frozen=True)
@@ -95,7 +104,8 @@ def stretch(
         subtrees[robot.index] = builder.finish()
     for robot in factory.robots:
         travel[robot.index] = subtrees[robot.index].travel
-    travel[0] = up(subtrees[0].front - min(0.0, shape(0).last[0]) + clearance.c)
+    last = shape(0).last
+    travel[0] = up(max(subtrees[0].front) - min(0.0, last[0]) + clearance.c)
     return Stretched(travel, stations, chosen, subtrees)
 
 
@@ -117,38 +127,50 @@ class _Builder:
     ) -> None:
         self.shape, self.subtrees, self.sides, self.choose = shape, subtrees, sides, choose
         self.c, self.half = clearance, clearance.c / 2
-        self.lane = CARRIAGE / 2 + self.half
-        self.strip = {
-            +1: max(shape.last[3] + self.half, shape.offset + self.lane),
-            -1: max(-shape.last[2] + self.half, -shape.offset + self.lane),
-        }
-        self.frontier = {+1: float("-inf"), -1: float("-inf")}
+        self.strip = {side: self._strip(side) for side in (-1, +1)}
+        self.frontier = {side: [NOTHING] * 3 for side in (-1, +1)}
+        self.boom = NOTHING
         self.station = 0.0
         self.count = 0
-        behind = -shape.reach(clearance) - CARRIAGE / 2 - self.half
-        self.tree = Subtree(-shape.arm + self.half, behind, -self.strip[-1], self.strip[+1])
+        self.tree = Subtree()
+        for layer, half in ((CARRIAGES, CARRIAGE / 2), (ARMS, MAST / 2)):
+            behind = -shape.reach - half - self.half
+            self._include(layer, behind, -shape.arm + self.half)
+
+    def _strip(self, side: int) -> list[float]:
+        """How far to a side the robot's own path takes the floor, by layer."""
+        lane, payload = side * self.shape.offset, self.shape.last[3] * (side > 0)
+        payload -= self.shape.last[2] * (side < 0)
+        widths = [lane + CARRIAGE / 2, lane + MAST / 2, NOTHING if self.shape.tool else payload]
+        return [width + self.half for width in widths]
+
+    def _include(self, layer: int, ulo: float, uhi: float) -> None:
+        """Something on the robot's own path."""
+        if self.strip[1][layer] > NOTHING:
+            self.tree.include(layer, ulo, uhi, -self.strip[-1][layer], self.strip[+1][layer])
 
     def add(self, operation: Operation) -> float:
-        """Places one operation; its distance from B [m]."""
+        """Places one operation; the distance of its station from B [m]."""
         guests = [r for r in operation.robots if r != operation.carrier]
         _check_guests(operation, guests)
         if self.count == 0:
             self._choose_mates(guests)
             if not guests:
-                self._feeder(operation.index)
+                self._feeder(self.shape.piles[operation.index])
         elif self.choose:
             self._choose_sides(guests)
+        pile = self.shape.piles[operation.index]
         if self.count:
-            self.station = up(max([self.station, *(self._earliest(g) for g in guests)]))
+            wanted = [self.station, *(self._earliest(guest) for guest in guests)]
+            if len(operation.inputs) > 1:
+                wanted.append(self.boom + self.c.c - pile[0])
+            self.station = up(max(wanted))
         for guest in guests:
             self._attach(guest)
-        pile = self.shape.piles[operation.index]
-        at = self.station
-        self.tree.include(
-            at + pile[0] - self.half, at + pile[1] + self.half, -self.strip[-1], self.strip[+1]
-        )
+        at = self.station + _ahead(operation, self.shape.reach)
+        self._include(PAYLOADS, at + pile[0] - self.half, at + pile[1] + self.half)
         self.count += 1
-        return at
+        return self.station
 
     def finish(self) -> Subtree:
         """The subtree, ready to be attached; a tool comes a fixed way."""
@@ -156,13 +178,28 @@ class _Builder:
             self.tree.travel = TOOL_TRAVEL
         return self.tree
 
-    def _feeder(self, operation: int) -> None:
-        """A post behind the carriage's rear stop and behind the part."""
-        post = self.c.post(self.shape.reach(self.c), self.shape.piles[operation][0]) + POST / 2
-        self.tree.include(-post - self.half, 0.0, -self.strip[-1], self.strip[+1])
+    def _feeder(self, part: Extent) -> None:
+        """A post behind the carriage's rear stop and behind the part, and a boom over the part, which
+        what is put on the part later has to be clear of."""
+        post = -self.c.post(self.shape.reach, part[0])
+        room = POST / 2 + self.half
+        for side in (-1, +1):
+            lane = side * self.shape.offset + room
+            self.strip[side] = [max(lane, width) for width in self.strip[side]]
+        for layer in LAYERS:
+            self._include(layer, post - room, post + room)
+        self.boom = max(self.shape.nest, post + POST / 2)
+        self._include(PAYLOADS, post, self.boom + self.half)
+        for side in (-1, +1):
+            self.frontier[side][PAYLOADS] = self.boom + self.half
 
     def _earliest(self, guest: int) -> float:
-        return self.frontier[self.sides[guest]] - self.subtrees[guest].low
+        return self._free(guest, self.sides[guest])
+
+    def _free(self, guest: int, side: int) -> float:
+        """The least station for a guest on one side."""
+        low, frontier = self.subtrees[guest].low, self.frontier[side]
+        return max(frontier[layer] - low[layer] for layer in LAYERS)
 
     def _choose_mates(self, guests: list[int]) -> None:
         """Of two that meet here, the longer goes away from where this robot delivers."""
@@ -176,26 +213,35 @@ class _Builder:
             if other is not None:
                 self.sides[guest] = -self.sides[other]
                 continue
-            low = self.subtrees[guest].low
-            left, right = self.frontier[-1] - low, self.frontier[+1] - low
-            self.sides[guest] = -1 if max(left, self.station) <= max(right, self.station) else +1
+            left, right = (max(self._free(guest, side), self.station) for side in (-1, +1))
+            self.sides[guest] = -1 if left <= right else +1
 
     def _outward(self, guest: int, side: int) -> float:
-        tree = self.subtrees[guest]
-        return self._travel(guest, side) - tree.back
+        return self._travel(guest, side) - min(self.subtrees[guest].back)
 
     def _travel(self, guest: int, side: int) -> float:
         """How far a guest must come so that, at its B end, its subtree is clear of this path."""
-        tree = self.subtrees[guest]
-        return up(max(tree.travel, tree.front + self.strip[side], self.c.c))
+        tree, strip = self.subtrees[guest], self.strip[side]
+        clear = max(tree.front[layer] + strip[layer] for layer in LAYERS)
+        return up(max(tree.travel, clear, self.c.c))
 
     def _attach(self, guest: int) -> None:
         side, tree = self.sides[guest], self.subtrees[guest]
         tree.travel = self._travel(guest, side)
-        self.frontier[side] = self.station + tree.high
-        far = tree.travel - tree.back
-        low, high = (-far, 0.0) if side < 0 else (0.0, far)
-        self.tree.include(self.station + tree.low, self.station + tree.high, low, high)
+        for layer in LAYERS:
+            ulo, uhi = self.station + tree.low[layer], self.station + tree.high[layer]
+            if ulo > uhi:
+                continue
+            self.frontier[side][layer] = max(self.frontier[side][layer], uhi)
+            far = tree.travel - tree.back[layer]
+            self.tree.include(layer, ulo, uhi, *((-far, 0.0) if side < 0 else (0.0, far)))
+
+
+def _ahead(operation: Operation, reach: float) -> float:
+    """How far ahead of its station a carrier has its goal [m]; 0 where it meets what is brought."""
+    point = operation.template.law.goals[operation.template.carrier - 1]
+    exact = {"B": 0.0, "S": 2.0}.get(point.end, point.multiple)
+    return (exact - point.multiple) * reach / 2
 
 
 def _check_guests(operation: Operation, guests: list[int]) -> None:

@@ -1,0 +1,241 @@
+"""Runs in both worlds: the figures that must be seen, and planted faults that must be caught."""
+
+from __future__ import annotations
+
+import random
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import factory
+from factory.layout.plan import Layout
+from factory.nets.history import firings, legal_marking
+from factory.nets.replay import replay
+from factory.pipeline import all_templates
+from factory.programs import program_of, write_program
+from factory.simulation import Simulation
+from tests.test_compiler import PAPER, compiled
+
+UNARY = "root = c; c = glue(b, dwell = 0.1); b = weld(a, dwell = 0.2); a = press(p, dwell = 0.1); p = atomic()"
+KARY = """root = s; s = mate(a, b, c, t, dd); t = mate(e, f); dd = inspect(d, dwell = 0.2);
+a = atomic(); b = atomic(); c = atomic(); d = atomic(); e = atomic(); f = atomic()"""
+CHAIN = """root = s4; s4 = mate(s3, e); s3 = mate(d, s2); s2 = mate(s1, c); s1 = mate(a, b);
+a = atomic(); b = atomic(); c = atomic(); d = atomic(); e = atomic()"""
+OVERLAP = """root = s; s = mate(u, v);  u = mate(a, b); v = mate(c, d);
+a = atomic(box = (0.2, 0.02, 0.05)); b = atomic(box = (0.02, 0.2, 0.06), pos = (0, 0.13, 0));
+c = atomic(cylinder = (0.03, 0.06), pos = (0.2, 0.1, 0)); d = atomic(sphere = 0.04, pos = (-0.1, 0.1, 0.01))"""
+LONE = "root = p; p = atomic()"
+
+PRODUCTS = {"paper": PAPER, "unary": UNARY, "kary": KARY, "chain": CHAIN, "overlap": OVERLAP, "lone": LONE}
+
+
+def laid_out(text: str) -> Layout:
+    return factory.lay_out(compiled(text))
+
+
+@pytest.fixture(scope="module")
+def paper() -> Layout:
+    return laid_out(PAPER)
+
+
+def assert_good(run: factory.trace.Run) -> None:
+    """The figures that every MuJoCo run must reach."""
+    assert run.trouble is None
+    assert run.refines_net
+    physics = run.physics
+    assert physics is not None
+    assert physics.handoff_gap_max_mm <= 1.0
+    assert physics.product_error_max_mm is not None
+    assert physics.product_error_max_mm <= 0.1
+    assert physics.unintended_contacts == 0, physics.contacts
+    assert physics.engine_warnings == 0
+
+
+@pytest.mark.parametrize("name", PRODUCTS)
+def test_every_shape_of_product_is_made_in_mujoco(name: str) -> None:
+    run = factory.run(laid_out(PRODUCTS[name]), units=3)
+    assert run.products == 3
+    assert_good(run)
+
+
+@pytest.mark.parametrize("seed", range(20))
+@pytest.mark.parametrize("world", ["mujoco", "ideal"])
+def test_the_papers_example_under_jitter(paper: Layout, world: str, seed: int) -> None:
+    run = factory.run(paper, world=world, units=3, jitter=0.3, seed=seed)
+    assert run.products == 3
+    assert run.refines_net
+    if world == "mujoco":
+        assert_good(run)
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_distributed_runs_refine_the_net(paper: Layout, seed: int) -> None:
+    run = factory.run(paper, units=3, jitter=0.3, seed=seed, distributed=True)
+    assert run.products == 3
+    assert_good(run)
+
+
+@pytest.mark.parametrize("name", ["unary", "kary", "chain"])
+def test_distributed_runs_of_other_shapes(name: str) -> None:
+    for seed in range(3):
+        run = factory.run(laid_out(PRODUCTS[name]), units=2, seed=seed, distributed=True)
+        assert run.products == 2
+        assert_good(run)
+
+
+def test_a_hundred_units_of_the_papers_example(paper: Layout) -> None:
+    run = factory.run(paper, units=100)
+    assert run.products == 100
+    assert_good(run)
+    assert run.cycle_time_s == pytest.approx(run.predicted_cycle_time_s, rel=0.02)
+
+
+@pytest.mark.parametrize("name", ["paper", "unary", "kary", "chain"])
+def test_the_ideal_world_has_the_predicted_cycle_time(name: str) -> None:
+    run = factory.run(laid_out(PRODUCTS[name]), world="ideal", units=12)
+    assert run.cycle_time_s == pytest.approx(run.predicted_cycle_time_s, rel=0.02)
+
+
+def random_marking(layout: Layout, seed: int) -> frozenset[int]:
+    """A legal marking: play the token game at random for a while."""
+    net, draw = layout.factory.net, random.Random(seed)
+    marking = net.initial_marking
+    for _ in range(draw.randrange(1, 60)):
+        event = draw.choice(net.threaded.net.enabled(marking))
+        marking = net.threaded.net.follower(marking, [event])
+    return marking
+
+
+@pytest.mark.parametrize("world", ["mujoco", "ideal"])
+@pytest.mark.parametrize("seed", range(6))
+def test_a_run_can_start_from_any_legal_marking(paper: Layout, world: str, seed: int) -> None:
+    """Theorem 5.2: dropoff runs again and again, whatever the marking."""
+    start = random_marking(paper, seed)
+    run = factory.run(paper, world=world, units=2, start=start)
+    assert run.products == 2
+    assert run.refines_net
+    if world == "mujoco":
+        assert_good(run)
+
+
+def test_a_marking_is_given_by_names(paper: Layout) -> None:
+    start = legal_marking(paper.factory.net, "sub1, r1:sub3")
+    assert firings(paper.factory.net, start)[paper.factory.by_label["sub3"].end] == 1
+    assert_good(factory.run(paper, units=1, start=start))
+
+
+def test_wip_bounds_what_is_inside(paper: Layout) -> None:
+    run = factory.run(paper, units=5, wip=1)
+    assert_good(run)
+    inside, most = 0, 0
+    for event in run.events:
+        inside += (event.transition == "part1_s") - (event.transition == "dropoff_e")
+        most = max(most, inside)
+    assert most == 1
+    free = factory.run(paper, units=5)
+    assert free.cycle_time_s < run.cycle_time_s
+
+
+def test_the_pool_is_what_the_net_says(paper: Layout) -> None:
+    model = Simulation(paper, units=50).model
+    assert model is not None
+    assert dict(model.copies) == {"part1": 4, "part2": 4, "part3": 3}
+    assert dict(Simulation(paper, units=2).model.copies) == {"part1": 2, "part2": 2, "part3": 2}
+
+
+def test_runs_repeat_bit_for_bit(paper: Layout) -> None:
+    one = factory.run(paper, units=3, jitter=0.3, seed=5)
+    other = factory.run(paper, units=3, jitter=0.3, seed=5)
+    assert one.events == other.events
+    assert one.physics == other.physics
+    assert factory.run(paper, units=3, jitter=0.3, seed=6).events != one.events
+
+
+def test_the_replay_catches_a_swapped_event(paper: Layout) -> None:
+    events = [e.transition for e in factory.run(paper, world="ideal", units=2).events]
+    assert replay(paper.factory.net, events).refines
+    cut = events.index("sub1_e")
+    swapped = [*events[:cut], events[cut + 1], events[cut], *events[cut + 2 :]]
+    dropped = [*events[:cut], *events[cut + 1 :]]
+    assert not replay(paper.factory.net, dropped).refines
+    assert replay(paper.factory.net, dropped).index is not None
+    assert replay(paper.factory.net, swapped).refines in (True, False)
+
+
+def test_a_time_limit_names_robot_mode_and_line(paper: Layout) -> None:
+    with pytest.raises(factory.RunError) as error:
+        factory.run(paper, units=50, max_time=1.5)
+    text = str(error.value)
+    assert "Timeout" in text
+    assert "r3 in weld(sub2)" in text
+    assert "sub2 = weld ( sub1 )" in text
+
+
+def test_a_stuck_robot_is_a_stall(paper: Layout) -> None:
+    """Planted fault: robot r5's drive does nothing."""
+    simulation = Simulation(paper, units=1)
+    simulation.world.m.actuator_biasprm[4, 1:3] = 0.0
+    simulation.world.m.actuator_gaintype[4] = 0
+    simulation.world.m.actuator_gainprm[4] = 0.0
+    run = simulation.run()
+    assert run.trouble is not None
+    assert run.trouble.code == "Stalled"
+    assert "r5 in" in run.trouble.message
+    assert run.trouble.position is not None
+
+
+def test_a_payload_larger_than_the_layout_knew_is_a_contact() -> None:
+    """Planted fault: the parts are wider than those the clearance was certified for."""
+    text = OVERLAP.replace("mate(u, v)", "mate(u, v, w, x)") + (
+        "; w = atomic(box = (0.05, 0.05, 0.06), pos = (0, -0.1, 0));"
+        "x = atomic(box = (0.05, 0.05, 0.06), pos = (0.1, -0.1, 0))"
+    )
+    layout = laid_out(text)
+    assert_good(factory.run(layout, units=2))
+    wide = laid_out(text.replace("box = (0.05, 0.05", "box = (0.12, 0.12"))
+    solids = {**layout.product.solids, **{k: wide.product.solids[k] for k in ("w", "x")}}
+    broken = replace(layout, product=replace(layout.product, solids=solids))
+    run = Simulation(broken, units=3).run(max_time=60)
+    assert run.physics is not None
+    assert run.physics.unintended_contacts > 0
+
+
+def test_a_shifted_weld_shows_in_the_gap(paper: Layout) -> None:
+    """Planted fault: one nominal frame is 2 mm off."""
+    simulation = Simulation(paper, units=1)
+    simulation.world.m.eq_data[simulation.world.m.equality("grip/r3/part1").id, 3] += 0.002
+    run = simulation.run()
+    assert run.physics is not None
+    assert run.physics.handoff_gap_max_mm > 1.0
+
+
+def test_each_robot_has_its_own_speed(paper: Layout) -> None:
+    limits = Simulation(paper, world="ideal", jitter=0.3, seed=1).limits
+    assert len(set(limits.speed)) == len(limits.speed)
+    assert np.all((limits.speed >= 0.35) & (limits.speed <= 0.65))
+
+
+def test_programs_read_as_in_the_paper(paper: Layout) -> None:
+    text = write_program(program_of(paper.factory, 2))
+    assert "  If state_3 = sub1\n    Run ẋ_3 = hold Until state_4 = nopart" in text
+    assert "Run ẋ_3 = π_3 ∘ mate(x_5, x_6, x_3) Until state_3 = sub1" in text
+    assert "Run ẋ_3 = π_1 ∘ mate(x_3, x_2, x_1) Until state_3 = nopart" in text
+    assert "Run ẋ_3 = wait Until state_1 = nopart ∧ state_2 = part3" in text
+
+
+def test_templates_of_the_user_run_without_a_change_of_code(tmp_path) -> None:
+    (tmp_path / "rivet.op").write_text(
+        """rivet = (R, j, ~, <a; b>, F) where R = < dot, tool >; j = 1; ~ = { S1 = A2 };
+        <a; b> = < LAB1, nopart; LAB2, nopart >;
+        F = navigation on W to ( S1 + 2r, A2 + 2r ) within eps for dwell;
+        parameters = ( dwell = 0.8 );"""
+    )
+    (tmp_path / "p.pag").write_text(
+        "root = c; c = rivet ( b, dwell = 0.3 ); b = mate ( x, y );"
+        "x = atomic ( box = (0.1, 0.04, 0.02) ); y = atomic ( sphere = 0.02, pos = (0, 0, 0.05) )"
+    )
+    assert "rivet" in all_templates([tmp_path])
+    pag = factory.load_pag(tmp_path / "p.pag", [tmp_path])
+    plan = factory.compile(pag, [tmp_path])
+    assert_good(factory.run(factory.lay_out(plan), units=2))
