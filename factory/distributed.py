@@ -103,6 +103,72 @@ class DistributedSupervisor:
         self.factory, self.modes, self.limits = factory, modes, limits
         self.world, self.timestep, self.ticks = world, timestep, ticks
         self.random = np.random.default_rng([seed, 7])
+        self.net = factory.net.threaded
+        self.marked = bytearray(p in factory.net.initial_marking for p in range(len(self.net.places)))
+        self.link = Link(world)
+        self.programs = [program_of(factory, r.index) for r in factory.robots]
+        self.cells = [Cell(p.steps[0].label) for p in self.programs]
+        periods = self.random.integers(*RATES, size=len(self.programs))
+        x = world.sense()[0]
+        self.processes = [
+            Process(p, int(n), int(self.random.integers(n)), reference=float(x[p.robot]))
+            for p, n in zip(self.programs, periods, strict=True)
+        ]
+        self.place_in_gear = {
+            (robot.index, number): position
+            for robot in factory.robots
+            for position, number in enumerate(robot.operations)
+        }
+        self.bundles: dict[int, Bundle] = {}
+        self.record = Record()
+        self.busy = [0.0] * len(factory.robots)
+        self.last_event = world.time
+        self.active = _Active()
+        self.ready: set[int] = set()
+        self.count = 0
+
+    @property
+    def events(self) -> list[Event]:
+        """The record so far."""
+        return self.record.events
+
+    def marking(self) -> tuple[str, ...]:
+        """The names of the places that the record marks."""
+        return tuple(p.name for p, m in zip(self.net.places, self.marked, strict=True) if m)
+
+    def step(self) -> Step:
+        """The step it is at."""
+        return self.program.steps[self.position]
+
+
+@dataclass(slots=True)
+class Record:
+    """The record of a distributed run, in the terms of the net: X_s when the first robot enters an
+    operation, X_e when its carrier ends it."""
+
+    events: list[Event] = field(default_factory=list)
+    started: set[tuple[int, int]] = field(default_factory=set)
+    under_way: dict[int, float] = field(default_factory=dict)
+
+
+class DistributedSupervisor:
+    """No supervisor at all: it only lets the robots' processes tick, each at its own rate and phase."""
+
+    def __init__(
+        self,
+        factory: Factory,
+        modes: Sequence[Mode],
+        limits: Limits,
+        world: Any,
+        timestep: float,
+        ticks: int,
+        seed: int = 0,
+    ) -> None:
+        self.factory, self.modes, self.limits = factory, modes, limits
+        self.world, self.timestep, self.ticks = world, timestep, ticks
+        self.random = np.random.default_rng([seed, 7])
+        self.net = factory.net.threaded
+        self.marked = bytearray(p in factory.net.initial_marking for p in range(len(self.net.places)))
         self.link = Link(world)
         self.programs = [program_of(factory, r.index) for r in factory.robots]
         self.cells = [Cell(p.steps[0].label) for p in self.programs]
@@ -283,7 +349,11 @@ class DistributedSupervisor:
         self.world.apply([], [(operation, unit)])
 
     def _log(self, event: int) -> None:
-        name = self.factory.net.threaded.transitions[event].name
+        name = self.net.transitions[event].name
+        for place in self.net.net.preset[event]:
+            self.marked[place] = 0
+        for place in self.net.net.postset[event]:
+            self.marked[place] = 1
         self.record.events.append(Event(self.world.time, name))
         self.last_event = self.world.time
         self.active.operations = tuple(self.record.under_way)

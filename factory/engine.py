@@ -1,9 +1,9 @@
-"""The engine, `mujoco`, imported so that it loads whatever MUJOCO_GL says and whether or not there is GL.
+"""The engine, `mujoco`, imported so that it loads whatever MUJOCO_GL says and whether or not there
+is GL.
 
-MuJoCo binds a window system as soon as it is imported, and fails where MUJOCO_GL names none or its library
-is missing. Nothing but rendering needs one, so a failed import is done again without. Every module
-that needs the engine takes it from here: `from factory.engine import mujoco`.
-"""
+MuJoCo binds a window system as soon as it is imported, and fails where MUJOCO_GL names none or its
+library is missing. Nothing but rendering needs one, so a failed import is done again without. Every
+module that needs the engine takes it from here: `from factory.engine import mujoco`."""
 
 from __future__ import annotations
 

@@ -1,8 +1,8 @@
-"""OpenGL for pictures without a screen: chosen, tried out in another process, and explained where missing.
+"""OpenGL for pictures without a screen: chosen, tried out in another process, and explained where
+missing.
 
-Only rendering needs it. A GL that does not work shows as four different errors, or ends the process, so
-it is tried in a subprocess first.
-"""
+Only rendering needs it. A GL that does not work shows as four different errors, or ends the
+process, so it is tried in a subprocess first."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ import os
 import subprocess
 import sys
 from functools import cache
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -42,15 +43,10 @@ def prepare() -> str:
 
 
 def context(width: int, height: int) -> Any:
-    """A current GL context without a window. Call `probe` first; raises anything where GL is broken."""
-    named = prepare()
-    made: Any
-    if named == "egl":
-        from mujoco.egl import GLContext as made
-    elif named == "osmesa":
-        from mujoco.osmesa import GLContext as made
-    else:
-        from mujoco.glfw import GLContext as made
+    """A current GL context without a window. Call `probe` first; raises anything where GL is
+    broken."""
+    module = {"egl": "mujoco.egl", "osmesa": "mujoco.osmesa"}.get(prepare(), "mujoco.glfw")
+    made: Any = import_module(module).GLContext
     found = made(width, height)
     found.make_current()
     return found
@@ -151,3 +147,10 @@ def trial() -> None:
         raise RuntimeError("the picture stays empty")
     drawing.free()
     held.free()
+
+
+def import_mujoco() -> Any:
+    """The engine, whatever MUJOCO_GL says. Raises MissingError where it cannot be loaded."""
+    from factory.engine import mujoco
+
+    return mujoco

@@ -1,23 +1,25 @@
-"""The log of a run, `run --log OUT`: its whole state after every tick, in one file that is only appended to.
+"""The log of a run, `run --log OUT`: its whole state after every tick, in one file that is only
+appended to.
 
     factory-log 1\\n          magic
-    <I length>{...}          header, JSON: versions, command line, world, seed, jitter, units, settings, the names of
-                             robots, places and transitions, the PAG's name, text and SHA-256, nq, nv
+    <I length>{...}          header, JSON: versions, command line, world, seed, jitter, units,
+                             settings, names of robots, places and transitions, the PAG's name,
+                             text and SHA-256, nq, nv
     blocks                   see log_blocks: a letter, length, CRC-32, compressed arrays
 
     M  the model, once: `xml`, and `mesh/NAME` for each mesh file, bytes (mujoco only)
     T  ticks, about a simulated second of them:
-       time (n,) [s], delivered (n,)          products that have left since the run began
-       qpos (n, nq), qvel (n, nv)             of the engine; arc lengths and speeds of the robots in the ideal world
-       marking_at, marking_count, marking     rows at which the marking changes, how many places, which
-       active_at, active_count, active        the same for the active constraints: number, and both bodies each joins
-       contact_at, contact_count, contact, contact_dist   rows with contacts, pairs of geoms, their distances [m]
-       fired_at, fired, fired_t               row, number and time [s] of each transition that fired before it
-    E  the end, empty: the run ended, or was stopped, with the file closed properly
+       time (n,) [s], delivered (n,)      products that have left since the run began
+       qpos (n, nq), qvel (n, nv)         the engine's; in the ideal world arc lengths and speeds
+       marking_at, _count, marking        rows where the marking changes, how many places, which
+       active_at, _count, active          the same for the active constraints: number, two bodies
+       contact_at, _count, contact        rows with contacts, how many, pairs of geoms
+       contact_dist                       their distances [m]
+       fired_at, fired, fired_t           row, number and time [s] of the transitions fired
+    E  the end, empty: the file was closed properly
 
-Every block stands for itself. What was written is flushed with each, so a file that ends in the middle of
-one lacks at most the last second.
-"""
+Every block stands for itself. What was written is flushed with each, so a file that ends in the
+middle of one lacks at most the last second."""
 
 from __future__ import annotations
 
@@ -40,8 +42,8 @@ from factory.errors import Diagnostic, InputError
 from factory.log_blocks import LENGTH, Arrays, block, blocks, pack_rows, unpack_rows
 
 if TYPE_CHECKING:
+    from factory.pipeline import Source
     from factory.simulation import Simulation
-    from factory.supervisor import Supervisor
 
 Index = NDArray[np.int32]
 
@@ -51,11 +53,16 @@ MAGIC = b"factory-log 1\n"
 class LogWriter:
     """An observer that writes a log; close it, or use it as a context manager.
 
-    Raises InputError (BadLog) where the file cannot be written.
-    """
+    `source`: the PAG with its templates, if there is more to it than the factory knows; `command`:
+    the command line, this process's unless given. Raises InputError (BadLog) where the file cannot
+    be written."""
 
     def __init__(
-        self, path: Path | str, simulation: Simulation, command: Sequence[str] | None = None
+        self,
+        path: Path | str,
+        simulation: Simulation,
+        source: Source | None = None,
+        command: Sequence[str] | None = None,
     ) -> None:
         self.path, self.world = Path(path), simulation.world
         self.physical = simulation.model is not None
@@ -66,13 +73,15 @@ class LogWriter:
         nq, nv = (s.shape[0] for s in self._state())
         self.qpos, self.qvel = np.empty((self.ticks, nq)), np.empty((self.ticks, nv))
         self.seen = 0
+        self.row = 0
+        self.marked = self.aimed = b""
         self._start()
         try:
             self.path.parent.mkdir(parents=True, exist_ok=True)
             self.file = self.path.open("wb")
         except OSError as error:
             raise InputError(_bad(self.path, f"cannot be written: {error.strerror}")) from error
-        header = json.dumps(_header(simulation, command, nq, nv)).encode()
+        header = json.dumps(_header(simulation, source, command, nq, nv)).encode()
         self.file.write(MAGIC + LENGTH.pack(len(header)) + header)
         if simulation.model is not None:
             files = {f"mesh/{name}": content for name, content in simulation.model.files.items()}
@@ -84,14 +93,17 @@ class LogWriter:
         return self
 
     def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
     ) -> None:
         self.close()
 
-    def __call__(self, world: Any, supervisor: Supervisor) -> None:
+    def __call__(self, world: Any, supervisor: Any) -> None:
         self.observe(world, supervisor)
 
-    def observe(self, world: Any, supervisor: Supervisor) -> None:
+    def observe(self, world: Any, supervisor: Any) -> None:
         """Record the state after a tick."""
         row = self.row
         self.qpos[row], self.qvel[row] = self._state()
@@ -179,11 +191,12 @@ def _ragged(name: str, rows: Sequence[tuple[int, Any]], shape: tuple[int, ...]) 
 
 
 def _header(
-    simulation: Simulation, command: Sequence[str] | None, nq: int, nv: int
+    simulation: Simulation, source: Source | None, command: Sequence[str] | None, nq: int, nv: int
 ) -> dict[str, Any]:
     factory = simulation.layout.factory
     net = simulation.supervisor.net
-    file = Path(factory.pag.file)
+    pag = source.pag if source else factory.pag
+    file = Path(pag.file)
     text = file.read_text("utf-8", errors="replace") if file.is_file() else ""
     return {
         "versions": {"python": platform.python_version(), **_versions()},
@@ -194,7 +207,11 @@ def _header(
         "units": simulation.units,
         "settings": asdict(simulation.settings),
         "product": file.stem or "factory",
-        "pag": {"file": str(file), "text": text, "sha256": hashlib.sha256(text.encode()).hexdigest()},
+        "pag": {
+            "file": str(file),
+            "text": text,
+            "sha256": hashlib.sha256(text.encode()).hexdigest(),
+        },
         "robots": [robot.name for robot in factory.robots],
         "places": [place.name for place in net.places],
         "transitions": [transition.name for transition in net.transitions],
@@ -205,7 +222,7 @@ def _header(
 
 def _versions() -> dict[str, str]:
     found = {}
-    for name in ("factory", "mujoco", "numpy"):
+    for name in ("klavins-factory", "mujoco", "numpy"):
         try:
             found[name] = version(name)
         except PackageNotFoundError:
@@ -229,10 +246,9 @@ class Ragged:
 class Log:
     """A log, read: locked arrays over n ticks, the first before the run began.
 
-    `marking[i]`: numbers of the marked places; `active[i]` (k, 3): active constraints, and the two bodies each
-    joins; `contacts[i]` (k, 2) geoms, `distances[i]` (k,) [m]; `fired` and `fired_t`: transitions by number and
-    time [s]. `complete`: whether the file was closed properly.
-    """
+    `marking[i]`: numbers of the marked places; `active[i]` (k, 3): active constraints, and the two
+    bodies each joins; `contacts[i]` (k, 2) geoms, `distances[i]` (k,) [m]; `fired` and `fired_t`:
+    transitions by number and time [s]. `complete`: whether the file was closed properly."""
 
     header: Mapping[str, Any] = field(repr=False)
     xml: str = field(repr=False)
@@ -260,7 +276,8 @@ class Log:
 
 
 def read_log(path: Path | str) -> Log:
-    """The log in a file; what a cut-off file still has. Raises InputError (BadLog) for anything else."""
+    """The log in a file; what a cut-off file still has. Raises InputError (BadLog) for anything
+    else."""
     path = Path(path)
     try:
         data = path.read_bytes()
@@ -336,7 +353,9 @@ def _spans(
 ) -> tuple[NDArray[Any], NDArray[Any], NDArray[Any]]:
     """Rows of the whole log at which something is recorded, and where its values start and end."""
     base = np.cumsum([0, *counts])
-    at = np.concatenate([np.zeros(0, int), *(a[f"{name}_at"] + b for a, b in zip(ticks, base, strict=False))])
+    at = np.concatenate(
+        [np.zeros(0, int), *(a[f"{name}_at"] + b for a, b in zip(ticks, base, strict=False))]
+    )
     ends = np.cumsum(np.concatenate([np.zeros(0, int), *(a[f"{name}_count"] for a in ticks)]))
     return at, np.concatenate([[0], ends])[: len(ends)], ends
 
@@ -364,4 +383,6 @@ def _single(name: str, values: str, ticks: Sequence[Arrays], counts: Sequence[in
 
 
 def _bad(path: Path, words: str) -> Diagnostic:
-    return Diagnostic("BadLog", f"'{path}' {words}", None, "`factory run FILE.pag --log OUT` writes one")
+    return Diagnostic(
+        "BadLog", f"'{path}' {words}", None, "`factory run FILE.pag --log OUT` writes one"
+    )

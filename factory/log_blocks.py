@@ -1,8 +1,8 @@
 """The blocks of a log file: named arrays packed, compressed, and checked when they are read.
 
-A block is one letter, the length of its content and its CRC-32 (`<cII`), then the content, zlib. Unpacked, that
-is the length (`<I`) of a JSON directory [[name, dtype, shape], ...], the directory, and the arrays' bytes in a row.
-"""
+A block is one letter, the length of its content and its CRC-32 (`<cII`), then the content, zlib.
+Unpacked, that is the length (`<I`) of a JSON directory [[name, dtype, shape], ...], the directory,
+and the arrays' bytes in a row."""
 
 from __future__ import annotations
 
@@ -30,7 +30,9 @@ def block(kind: bytes, arrays: Mapping[str, NDArray[Any]], level: int = 1) -> by
     plain = {name: np.ascontiguousarray(a) for name, a in arrays.items()}
     entries = [[name, a.dtype.newbyteorder("<").str, list(a.shape)] for name, a in plain.items()]
     directory = json.dumps(entries).encode()
-    body = b"".join([LENGTH.pack(len(directory)), directory, *(a.tobytes() for a in plain.values())])
+    body = b"".join(
+        [LENGTH.pack(len(directory)), directory, *(a.tobytes() for a in plain.values())]
+    )
     content = zlib.compress(body, level)
     return HEAD.pack(kind, len(content), zlib.crc32(content)) + content
 
@@ -66,8 +68,8 @@ def unpacked(content: memoryview) -> Arrays:
 
 
 def pack_rows(name: str, rows: NDArray[np.float64]) -> Arrays:
-    """Rows (n, k) of which most columns stand still: the first row, the columns that change, and of these
-    each value's bits against those of the row before, byte by byte."""
+    """Rows (n, k) of which most columns stand still: the first row, the columns that change, and of
+    these each value's bits against those of the row before, byte by byte."""
     bits = rows.view(np.int64)
     change = bits[1:] ^ bits[:-1]
     moving = np.flatnonzero(change.any(axis=0)).astype(np.int32)

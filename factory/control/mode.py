@@ -18,6 +18,9 @@ Truth = NDArray[np.bool_]
 REACH = 1.5
 """An obstacle of Δ acts on robots up to this many times the touching distance apart."""
 
+ROUNDING = 1e-9
+"""Lengths [m] closer than this are the same."""
+
 SOFTNESS = 100.0
 """Distance to the goal [eps] beyond which gamma grows linearly, no longer as a square."""
 
@@ -206,7 +209,8 @@ def _check_robots(mode: Mode) -> None:
     if not mode.size or not mode.eps > 0 or not mode.dwell >= 0:
         raise ValueError(f"{mode.size} robots, eps {mode.eps}, dwell {mode.dwell}")
     last = mode.goals + mode.standoff
-    outside = ~((mode.lower <= mode.goals) & (mode.standoff >= 0) & (last <= mode.upper))
+    within = (mode.lower - ROUNDING <= mode.goals) & (last <= mode.upper + ROUNDING)
+    outside = ~(within & (mode.standoff >= 0))
     if outside.any():
         i = int(np.argmax(outside))
         raise ValueError(

@@ -1,9 +1,9 @@
-"""Mesh files: what the engine reads and draws. Shape and mass are settled elsewhere; this is about looks.
+"""Mesh files: what the engine reads and draws. Shape and mass are settled elsewhere; this is about
+looks.
 
-A closed mesh is written as STL. One that is open, or wound to and fro, as most CAD exports are, would be
-drawn with holes: it is written as OBJ with every triangle seen from both sides, and with normals that are
-smooth over rounded surfaces and sharp at edges.
-"""
+A closed mesh is written as STL. One that is open, or wound to and fro, as most CAD exports are,
+would be drawn with holes: it is written as OBJ with every triangle seen from both sides, and with
+normals that are smooth over rounded surfaces and sharp at edges."""
 
 from __future__ import annotations
 
@@ -66,8 +66,8 @@ def face_normals(mesh: Mesh) -> Array:
 
 
 def corner_normals(mesh: Mesh) -> Array:
-    """The normal at each corner of each triangle (m, 3, 3): the mean over the triangles at that vertex that
-    meet it at less than CREASE, whichever way round they are wound."""
+    """The normal at each corner of each triangle (m, 3, 3): the mean over the triangles at that
+    vertex that meet it at less than CREASE, whichever way round they are wound."""
     from scipy.sparse import csr_matrix
 
     normal, count = face_normals(mesh), len(mesh.faces)

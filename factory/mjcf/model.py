@@ -177,7 +177,7 @@ def _options(root: Element, settings: Settings, bodies: int) -> None:
 
 def _defaults(root: Element) -> Element:
     default = add(root, "default")
-    add(default, "equality", solref="0.004 1", solimp="0.99 0.999 0.001 0.5 2")
+    add(default, "equality", solref="0.004 1", solimp="0.999 0.9999 0.001 0.5 2")
     part = add(default, "default", class_="part")
     add(
         part,

@@ -1,0 +1,20 @@
+"""Pictures without a screen: films and stills of a run, or of its log."""
+
+from factory.render.camera import CAMERAS, Camera, camera_named
+from factory.render.film import FPS, SIZE, Film, Still, render_log, still
+from factory.render.video import FILMS, STILLS, check_output
+
+__all__ = [
+    "CAMERAS",
+    "FILMS",
+    "FPS",
+    "SIZE",
+    "STILLS",
+    "Camera",
+    "Film",
+    "Still",
+    "camera_named",
+    "check_output",
+    "render_log",
+    "still",
+]

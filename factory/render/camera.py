@@ -1,8 +1,9 @@
-"""Where the camera stands: as near as it can with everything that is to be seen still in the picture.
+"""Where the camera stands: as near as it can with everything that is to be seen still in the
+picture.
 
-A view is fitted, not set: for a direction of sight and an aspect ratio the nearest position from which a set
-of points lies inside the frame has a closed form. So the factory fills a picture of any shape.
-"""
+A view is fitted, not set: for a direction of sight and an aspect ratio the nearest position from
+which a set of points lies inside the frame has a closed form. So the factory fills a picture of any
+shape."""
 
 from __future__ import annotations
 
@@ -18,18 +19,20 @@ from factory.errors import Diagnostic, InputError, did_you_mean
 Array = NDArray[np.float64]
 
 Camera = Literal["overview", "top", "product"]
-"""`overview`: the whole factory, aslant; `top`: from above; `product`: follows the product that is furthest
-on its way."""
+"""`overview`: the whole factory, aslant; `top`: from above; `product`: follows the product that is
+furthest on its way."""
 
 CAMERAS: tuple[Camera, ...] = get_args(Camera)
 
 FIELD = 24.0
-"""Angle of view across the shorter side of the picture [degrees]: narrow, for a calm perspective."""
+"""Angle of view across the shorter side of the picture [degrees]: narrow, for a calm
+perspective."""
 
 
 @dataclass(frozen=True, slots=True)
 class Frame:
-    """What of a picture may be used: `aspect` = width / height, and the margins as fractions of height."""
+    """What of a picture may be used: `aspect` = width / height, and the margins as fractions of
+    height."""
 
     aspect: float
     below: float = 0.03
@@ -39,8 +42,9 @@ class Frame:
 
 @dataclass(frozen=True, slots=True)
 class View:
-    """A camera: its `position` (3,), its `axes` (3, 3) right, up and ahead, the tangents of half its angles of
-    view, the `distance` to the middle of what it looks at, and half the depth of that [m]."""
+    """A camera: its `position` (3,), its `axes` (3, 3) right, up and ahead, the tangents of half
+    its angles of view, the `distance` to the middle of what it looks at, and half the depth of that
+    [m]."""
 
     position: Array
     axes: Array
@@ -79,14 +83,12 @@ def fit(points: Array, axes: Array, frame: Frame) -> View:
     c = min(across.nearest, upright.nearest)
     position = axes.T @ np.array([across.middle(c), upright.middle(c), c])
     middle = float(f.min() + f.max()) / 2
-    return View(
-        position, axes, tall * frame.aspect, tall, middle - c, float(f.max() - f.min()) / 2
-    )
+    return View(position, axes, tall * frame.aspect, tall, middle - c, float(f.max() - f.min()) / 2)
 
 
 class _Wedge:
-    """The positions (a, c) from which all points (r, f) are seen between two rays of tangents `low` and
-    `high`: -(f - c) low <= r - a <= (f - c) high, a wedge that opens backwards from its tip."""
+    """The positions (a, c) from which all points (r, f) are seen between two rays of tangents `low`
+    and `high`: -(f - c) low <= r - a <= (f - c) high, a wedge that opens backwards from its tip."""
 
     def __init__(self, r: Array, f: Array, low: float, high: float) -> None:
         self.low, self.high = low, high

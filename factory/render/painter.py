@@ -26,12 +26,13 @@ LAG = 0.25
 
 
 class Painter:
-    """Draws one model from one camera; it has a model and data of its own, so a run is not disturbed.
+    """Draws one model from one camera; it has a model and data of its own, so a run is not
+    disturbed.
 
-    `caption`: height of the strip below that is kept free, as a fraction of the picture's. `samples`: above 1
-    a picture is the mean of so many, each with the key light and the pixels' grid moved a little: soft
-    shadows and smooth edges, for stills. Raises MissingError where there is no GL.
-    """
+    `caption`: height of the strip below that is kept free, as a fraction of the picture's.
+    `samples`: above 1 a picture is the mean of so many, each with the key light and the pixels'
+    grid moved a little: soft shadows and smooth edges, for stills. Raises MissingError where there
+    is no GL."""
 
     def __init__(
         self,
@@ -71,7 +72,10 @@ class Painter:
         return self
 
     def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
     ) -> None:
         self.close()
 
@@ -84,8 +88,8 @@ class Painter:
             self.held = None
 
     def paint(self, shown: Snapshot, elapsed: float = 0.0) -> Pixels:
-        """One picture (height, width, 3). `elapsed` [s] since the last one: a camera that follows glides;
-        with 0 it is where it wants to be."""
+        """One picture (height, width, 3). `elapsed` [s] since the last one: a camera that follows
+        glides; with 0 it is where it wants to be."""
         view = self._pose(shown, elapsed)
         if self.samples == 1:
             self._draw(view, self.shadows)
@@ -118,7 +122,7 @@ class Painter:
         else:
             self._glide(wanted, elapsed)
         box = self.followed.box
-        about = box.mean(axis=0) + 1.25 * (box - box.mean(axis=0))
+        about = box.mean(axis=0) + 1.45 * (box - box.mean(axis=0))
         return fit(self.middle + about, towards(-122.0, 32.0), self.frame)
 
     def _glide(self, wanted: NDArray[np.float64], elapsed: float) -> None:
@@ -158,7 +162,8 @@ class Painter:
             camera.frustum_top = near * (dy + view.tall)
 
     def _light(self, view: View, sample: tuple[int, int] | None) -> None:
-        """The headlight shines from the camera, the key light over what is seen; a still moves it."""
+        """The headlight shines from the camera, the key light over what is seen; a still moves
+        it."""
         middle = view.position + view.distance * view.axes[2]
         self.drawing.shadowClip = 1.25 * view.distance * max(view.wide, view.tall) + view.depth
         for light in self.scene.lights[: self.scene.nlight]:

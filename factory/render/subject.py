@@ -1,4 +1,5 @@
-"""What the cameras look at, read from a model alone: the factory's extent, and the product on its way."""
+"""What the cameras look at, read from a model alone: the factory's extent, and the product on its
+way."""
 
 from __future__ import annotations
 
@@ -17,8 +18,8 @@ SIGNS = np.array(list(product((-1.0, 1.0), repeat=3)))
 
 @dataclass(frozen=True, slots=True)
 class Snapshot:
-    """The state of a model that a picture shows: `qpos`, and the constraints that are active, by number, with
-    the bodies they are aimed at."""
+    """The state of a model that a picture shows: `qpos`, and the constraints that are active, by
+    number, with the bodies they are aimed at."""
 
     qpos: Array
     active: NDArray[np.int32]
@@ -33,7 +34,8 @@ class Snapshot:
 
 
 def extent(m: mujoco.MjModel, d: mujoco.MjData) -> Array:
-    """Points (n, 3) round everything that stands in a factory and its robots at both ends of their rails."""
+    """Points (n, 3) round everything that stands in a factory and its robots at both ends of their
+    rails."""
     robots = {m.body(j.bodyid[0]).name: j for j in map(m.joint, range(m.njnt)) if j.type[0] == 2}
     found = []
     for g in range(m.ngeom):
@@ -71,14 +73,16 @@ def _travel(m: mujoco.MjModel, d: mujoco.MjData, carriage: str, joint: int) -> A
 class Followed:
     """The product that is furthest on its way: where the finished product's box will be about it.
 
-    It is known by one of its parts, that which the most robots carry. Parts never turn, so the place of one
-    part tells that of the product.
-    """
+    It is known by one of its parts, that which the most robots carry. Parts never turn, so the
+    place of one part tells that of the product."""
 
     def __init__(self, m: mujoco.MjModel) -> None:
         self.kinds = [m.equality(e).name for e in range(m.neq)]
         grips = [name.split("/", 2)[1:] for name in self.kinds if name.startswith("grip/")]
-        carried, rank = _counts([label for _, label in grips]), _counts([robot for robot, _ in grips])
+        carried, rank = (
+            _counts([label for _, label in grips]),
+            _counts([robot for robot, _ in grips]),
+        )
         self.label = max(carried, key=lambda label: carried[label]) if carried else ""
         self.rank = {e: self._rank(name, rank) for e, name in enumerate(self.kinds)}
         bodies = {m.body(b).name: b for b in range(m.nbody)}
@@ -87,8 +91,8 @@ class Followed:
         self.box = self._box(m, bodies)
 
     def _rank(self, name: str, rank: dict[str, int]) -> float:
-        """How far a part is that this constraint holds: parked, at its feeder, with a robot that carries
-        n parts."""
+        """How far a part is that this constraint holds: parked, at its feeder, with a robot that
+        carries n parts."""
         kind, _, rest = name.partition("/")
         if kind == "grip":
             return float(rank[rest.partition("/")[0]])
@@ -118,7 +122,8 @@ class Followed:
         return np.asarray((low + high) / 2 + SIGNS * (high - low) / 2)
 
     def place(self, d: mujoco.MjData, shown: Snapshot) -> Array | None:
-        """The origin (3,) of the followed part in the product furthest on its way; None if there is none."""
+        """The origin (3,) of the followed part in the product furthest on its way; None if there is
+        none."""
         rank = dict.fromkeys(self.copies, np.inf)
         for e, body in zip(shown.active.tolist(), shown.body2.tolist(), strict=True):
             if body in rank:

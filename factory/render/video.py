@@ -1,0 +1,144 @@
+"""Video files that are playable whatever ends the writing.
+
+Frames go to a hidden Matroska file beside the target, flushed every second, so what a killed
+process leaves can still be played. Closed, it takes its name, rewrapped as MP4 where that is asked
+for: nothing half-written is ever seen under the name itself."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from math import isfinite
+from pathlib import Path
+from types import TracebackType
+from typing import Any
+
+from factory.errors import Diagnostic, InputError, MissingError
+from factory.render.painter import Pixels
+
+FILMS, STILLS = (".mp4", ".mkv"), (".png",)
+
+LARGEST, SMALLEST = 7680, 16
+
+
+def check_output(
+    path: Path | str, size: tuple[int, int], fps: float = 30.0, still: bool | None = False
+) -> bool:
+    """Whether a still is asked for, once ending, size and rate are known to be possible.
+
+    `still`: True or False where only stills or films will do, None for either. Raises InputError
+    (BadValue)."""
+    ending = Path(path).suffix.lower()
+    valid = STILLS if still else FILMS if still is False else FILMS + STILLS
+    if ending not in valid:
+        found = f"'{ending}'" if ending else "no ending"
+        raise _bad(f"'{Path(path).name}' has {found}", f"valid endings: {', '.join(valid)}")
+    width, height = size
+    if not all(SMALLEST <= n <= LARGEST for n in size):
+        raise _bad(
+            f"the size {width}x{height} is out of range", f"{SMALLEST} to {LARGEST} either way"
+        )
+    if ending in FILMS:
+        if width % 2 or height % 2:
+            near = f"{width + width % 2}x{height + height % 2}"
+            raise _bad(f"the size {width}x{height} is odd", f"H.264 needs even sizes: {near}")
+        if not (isfinite(fps) and 0 < fps <= 240):
+            raise _bad(f"{fps:g} frames per second are out of range", "for example 30; at most 240")
+    return ending in STILLS
+
+
+def _bad(message: str, hint: str) -> InputError:
+    return InputError(Diagnostic("BadValue", message, None, hint))
+
+
+class VideoFile:
+    """An H.264 video (yuv420p) of exact size and rate. Raises InputError where it cannot be
+    written."""
+
+    def __init__(self, path: Path, size: tuple[int, int], fps: float) -> None:
+        check_output(path, size, fps)
+        self.path, self.frames = path, 0
+        self.partial = path.with_name(f".{path.name}.part")
+        av = _av()
+        rate = Fraction(fps).limit_denominator(1001)
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            options = {"cluster_time_limit": "500", "flush_packets": "1"}
+            self.container = av.open(str(self.partial), "w", format="matroska", options=options)
+        except OSError as error:
+            raise _bad(
+                f"'{path}' cannot be written: {error.strerror}", "choose another file"
+            ) from error
+        self.stream: Any = self.container.add_stream("libx264", rate=rate)
+        self.stream.width, self.stream.height = size
+        self.stream.pix_fmt = "yuv420p"
+        coder = self.stream.codec_context
+        coder.time_base = 1 / rate
+        coder.gop_size = max(1, round(fps))
+        coder.color_range, coder.colorspace = 1, 1
+        coder.color_primaries, coder.color_trc = 1, 1
+        coder.options = {"crf": "19", "preset": "fast", "rc-lookahead": "8", "bf": "2"}
+
+    def __enter__(self) -> VideoFile:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()
+
+    def write(self, pixels: Pixels) -> None:
+        """Add a frame (height, width, 3)."""
+        frame = _av().VideoFrame.from_ndarray(pixels, format="rgb24")
+        frame = frame.reformat(format="yuv420p", dst_colorspace="ITU709", dst_color_range="MPEG")
+        frame.pts, frame.time_base = self.frames, self.stream.codec_context.time_base
+        self.container.mux(self.stream.encode(frame))
+        self.frames += 1
+
+    def close(self) -> None:
+        """Finish the file and give it its name; without a single frame there is none."""
+        if self.container is None:
+            return
+        container, self.container = self.container, None
+        try:
+            if self.frames:
+                container.mux(self.stream.encode(None))
+        finally:
+            container.close()
+        if not self.frames:
+            self.partial.unlink(missing_ok=True)
+        elif self.path.suffix.lower() == ".mkv":
+            self.partial.replace(self.path)
+        else:
+            _rewrap(self.partial, self.path)
+
+
+def _rewrap(source: Path, target: Path) -> None:
+    """The same video as MP4, its index first, as browsers like it."""
+    av = _av()
+    partial = target.with_name(f".{target.name}.mp4.part")
+    try:
+        with (
+            av.open(str(source)) as old,
+            av.open(str(partial), "w", format="mp4", options={"movflags": "faststart"}) as new,
+        ):
+            stream = new.add_stream_from_template(old.streams.video[0])
+            for packet in old.demux(video=0):
+                if packet.dts is not None:
+                    packet.stream = stream
+                    new.mux(packet)
+        partial.replace(target)
+        source.unlink()
+    finally:
+        partial.unlink(missing_ok=True)
+
+
+def _av() -> Any:
+    try:
+        import av
+    except ImportError as error:
+        message = f"films need PyAV: {error}"
+        raise MissingError(Diagnostic("NoVideo", message, None, "pip install av")) from error
+    return av
