@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 from factory.errors import Diagnostic, Position
 from factory.layout.plan import Point2
-from factory.layout.sweeps import ALWAYS, KINDS, LAYERS, Region
+from factory.layout.sweeps import ALWAYS, KINDS, NAMES, Region
 
 MILLI = 1000.0
 
@@ -105,7 +105,7 @@ class Certificate:
     def _region(self, region: Region) -> dict[str, object]:
         return {
             "robot": self.robots[region.robot],
-            "layer": LAYERS[region.layer],
+            "layer": NAMES[region.layer],
             "of": KINDS[region.kind],
             "label": region.label or None,
             "box": [round(v, 6) for v in region.box],

@@ -32,12 +32,12 @@ from factory.layout.dimensions import (
 from factory.layout.plan import Box, Layout
 from factory.layout.sweeps import (
     ALWAYS,
-    BOOM_KIND,
+    BOOM,
     KINDS,
-    LAYERS,
-    OUTFEED_KIND,
-    PAYLOAD_KIND,
-    POST_KIND,
+    NAMES,
+    OUTFEED,
+    PAYLOAD_BODY,
+    STATIONS,
     Pile,
     Region,
     boxes,
@@ -73,7 +73,7 @@ def certify(layout: Layout) -> Certificate:
         tuple(
             (name, low, high)
             for name, low, high in zip(
-                LAYERS,
+                NAMES,
                 (0.0, CARRIAGE_TOP, PAYLOAD),
                 (CARRIAGE_TOP, ARM_TOP, top),
                 strict=True,
@@ -119,7 +119,7 @@ class _Search:
     def faults(self) -> Iterator[Fault]:
         """Every pair that is too near with no reason."""
         count = 0
-        for layer in range(len(LAYERS)):
+        for layer in range(len(NAMES)):
             here = [region for region in self.swept if region.layer == layer]
             for one, other in self._near(here):
                 if not self._settled(one, other):
@@ -141,7 +141,7 @@ class _Search:
             first, second = tree.query(cells[start : start + CHUNK], "dwithin", least)
             first = first + start
             self.pairs += len(first)
-            still = (kind[first] >= POST_KIND) != (kind[second] >= POST_KIND)
+            still = np.isin(kind[first], STATIONS) != np.isin(kind[second], STATIONS)
             kept = (first < second) & ((robot[first] != robot[second]) | still)
             order = np.lexsort((second[kept], first[kept]))
             for i, j in zip(first[kept][order].tolist(), second[kept][order].tolist(), strict=True):
@@ -150,12 +150,12 @@ class _Search:
     def _settled(self, one: Region, other: Region) -> bool:
         """Whether two regions that are near in plan are never taken at once, or are apart in height."""
         kinds = {one.kind, other.kind}
-        if one.robot == other.robot and OUTFEED_KIND in kinds:
+        if one.robot == other.robot and OUTFEED in kinds:
             return True
-        if BOOM_KIND in kinds and kinds <= {BOOM_KIND, PAYLOAD_KIND}:
+        if BOOM in kinds and kinds <= {BOOM, PAYLOAD_BODY}:
             gap = max(one.z[0] - other.z[1], other.z[0] - one.z[1])
             return gap >= self.layout.clearance - TOLERANCE
-        if kinds != {PAYLOAD_KIND}:
+        if kinds != {PAYLOAD_BODY}:
             return False
         return self._joined(one, other) or self._joined(other, one) or self._in_turn(one, other)
 
@@ -197,16 +197,16 @@ class _Search:
         names = [self._words(region) for region in (one, other)]
         found = f"are {gap * 1000:.1f} mm apart" if gap > 0 else f"overlap by {-gap * 1000:.1f} mm"
         message = (
-            f"{names[0]} and {names[1]} {found} in the layer of {LAYERS[one.layer]};"
+            f"{names[0]} and {names[1]} {found} in the layer of {NAMES[one.layer]};"
             f" {c * 1000:g} mm are needed"
         )
         return _fault(self.layout, message, (one, other), c - gap)
 
     def _words(self, region: Region) -> str:
         name = self.layout.factory.robots[region.robot].name
-        if region.kind == OUTFEED_KIND:
+        if region.kind == OUTFEED:
             return "the outfeed"
-        if region.kind >= POST_KIND:
+        if region.kind in STATIONS:
             return f"the {KINDS[region.kind]} of '{region.label}''s feeder"
         label = f" '{region.label}'" if region.label else ""
         return f"{name}'s {KINDS[region.kind]}{label}"
@@ -219,7 +219,7 @@ def _fault(layout: Layout, message: str, found: tuple[Region, ...], lacking: flo
         tuple(robot.name for robot in robots),
         tuple(dict.fromkeys(region.label for region in found if region.label)),
         lacking,
-        LAYERS[found[0].layer],
+        NAMES[found[0].layer],
         tuple(robot.position for robot in robots),
     )
 
@@ -255,7 +255,7 @@ def _way(layout: Layout, found: Mapping[str, Pile], operation: Operation, slot: 
     step = gear.index(operation.index)
     end = stops[step] + layout.standoff(operation, slot)
     box = sweep(layout.guidepaths[robot], found[label].box, max(stops[step - 1], end), end)
-    return Region(robot, 2, PAYLOAD_KIND, box, found[label].z, label, operation.index)
+    return Region(robot, 2, PAYLOAD_BODY, box, found[label].z, label, operation.index)
 
 
 def _met(layout: Layout, pile: Region, guest: Region) -> Iterator[Fault]:

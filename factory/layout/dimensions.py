@@ -8,6 +8,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+CARRIAGES, ARMS, PAYLOADS = LAYERS = range(3)
+"""The layers in which things can meet, from the floor up. What stands on the floor is in all of them."""
+
 CARRIAGE = 0.06
 """Width and length W of a carriage."""
 

@@ -1,20 +1,30 @@
 """Lay out a factory: choose sides with symmetric payloads, then stretch with the real ones.
 
-Guarantees what `factory.layout.clearance` proves: no two robots that are not coupled by a mode can touch,
-nor their payloads. All lengths are whole millimetres, so that a written model loses nothing.
+Guarantees what `factory.layout.clearance` proves, and carries the proof: no two robots that are not coupled
+by a mode can touch, nor their payloads. All lengths are whole millimetres, so that a written model loses
+nothing.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from math import ceil
+from dataclasses import dataclass, replace
+from math import ceil, floor
 
 from factory.errors import Diagnostic, RunError
 from factory.factory import Factory
 from factory.geometry import Product
-from factory.layout.dimensions import CARRIAGE, Clearance
-from factory.layout.plan import Box, Guidepath, Layout, Point2
-from factory.layout.stretching import Extent, Shape, Sides, Stretched, is_tool, stretch, up
+from factory.layout.clearance import certify
+from factory.layout.dimensions import Clearance
+from factory.layout.plan import Box, Extent, Guidepath, Layout, Point2
+from factory.layout.shapes import (
+    carriers,
+    exact_shapes,
+    payload_boxes,
+    project,
+    symmetric_shapes,
+)
+from factory.layout.stretching import Shape, Sides, Stretched, stretch, up
+from factory.layout.sweeps import ALWAYS, KINDS, OUTFEED, STATIONS, Region, hull, piles, regions
 
 SHED = 0.1
 """Length of the open part of the outfeed beyond the product, and of what its end has to spare [m]."""
@@ -26,87 +36,22 @@ def lay_out(
     clearance: float = 0.02,
     floor: Point2 | None = None,
 ) -> Layout:
-    """The layout of a factory. Raises RunError (Layout) where it does not fit a floor of the given width
-    and depth, saying by how much and where."""
-    c = Clearance(clearance)
-    payloads = payload_boxes(factory, product)
-    tools = [is_tool(factory, robot.index) for robot in factory.robots]
-    sides = stretch(factory, _symmetric(factory, payloads, tools, c), c).sides
-    axes = headings(factory, sides)
-    shapes = exact_shapes(factory, payloads, axes, sides, tools, c)
-    stretched = stretch(factory, shapes.__getitem__, c, sides)
-    guidepaths = _embed(factory, axes, shapes, stretched, sides, c)
-    outfeed = _outfeed(guidepaths[0], shapes[0].last, c)
-    tree = stretched.subtrees[0]
-    b = guidepaths[0].middle(guidepaths[0].length)
-    xlo, xhi = b[0] + min(tree.back), outfeed[1]
-    ylo, yhi = min(b[1] + min(tree.low), outfeed[2]), max(b[1] + max(tree.high), outfeed[3])
-    layout = Layout(
-        factory,
-        product,
-        clearance,
-        guidepaths,
-        tuple(stretched.stations),
-        payloads,
-        outfeed,
-        (xlo, xhi, ylo, yhi),
-    )
+    """The layout of a factory with its clearance certificate. Raises RunError (Layout) where it does not
+    fit a floor of the given width and depth, saying by how much and where, or where an operation's
+    template asks for what cannot be kept clear."""
+    draft = _draft(factory, product, Clearance(clearance))
+    layout = draft.layout()
+    draft.stretched.travel[0] = round(draft.stretched.travel[0] - _spare(layout), 3)
+    layout = draft.layout()
+    certificate = certify(layout)
+    if not certificate.holds:
+        raise RunError(fault.diagnostic() for fault in certificate.faults)
+    half, box = clearance / 2, hull([region.box for region in certificate.regions])
+    bounds = (box[0] - half, box[1] + half, box[2] - half, box[3] + half)
+    layout = replace(layout, floor=bounds, certificate=certificate)
     if floor is not None:
-        _check_floor(layout, floor)
+        _check_floor(layout, certificate.regions, floor)
     return layout
-
-
-def payload_boxes(factory: Factory, product: Product) -> dict[str, Box]:
-    """The plan of every sub-assembly about the product's middle, from its parts' real geometry."""
-    x, y, _ = product.middle
-    boxes: dict[str, Box] = {}
-    for operation in reversed(factory.operations[:-1]):
-        if operation.inputs:
-            parts = [boxes[label] for label in operation.inputs]
-            boxes[operation.label] = (
-                min(b[0] for b in parts),
-                max(b[1] for b in parts),
-                min(b[2] for b in parts),
-                max(b[3] for b in parts),
-            )
-        else:
-            solid = product.solids[operation.label]
-            low, high = solid.low, solid.high
-            boxes[operation.label] = (
-                float(low[0] - x),
-                float(high[0] - x),
-                float(low[1] - y),
-                float(high[1] - y),
-            )
-    return boxes
-
-
-def _symmetric(
-    factory: Factory, payloads: Mapping[str, Box], tools: list[bool], c: Clearance
-) -> Callable[[int], Shape]:
-    """Shapes whose extents are the same in every direction, to choose the sides by."""
-
-    def shape(robot: int) -> Shape:
-        def square(label: str) -> Extent:
-            half = max(abs(edge) for edge in payloads[label])
-            return (-half, half, -half, half)
-
-        piles = {
-            number: square(factory.operations[number].label)
-            for number in _carried(factory, robot)
-        }
-        last = list(piles.values())[-1] if piles else (0.0, 0.0, 0.0, 0.0)
-        return Shape(piles, last, 0.0, c.rim, c.reach(c.rim), 0.0, tools[robot])
-
-    return shape
-
-
-def _carried(factory: Factory, robot: int) -> list[int]:
-    return [
-        number
-        for number in factory.robots[robot].operations
-        if factory.operations[number].carrier == robot and number != factory.dropoff.index
-    ]
 
 
 def headings(factory: Factory, sides: Sides) -> list[tuple[Point2, Point2]]:
@@ -119,97 +64,55 @@ def headings(factory: Factory, sides: Sides) -> list[tuple[Point2, Point2]]:
     return axes
 
 
-def carriers(factory: Factory) -> list[int]:
-    """For each robot the carrier it delivers to; -1 for the output robot."""
-    return [
-        -1 if robot.index == 0 else factory.operations[robot.operations[-1]].carrier
-        for robot in factory.robots
-    ]
+@dataclass(frozen=True, slots=True)
+class _Draft:
+    """All that is needed to place the robots of a factory on a floor."""
 
+    factory: Factory
+    product: Product
+    clearance: Clearance
+    payloads: dict[str, Box]
+    axes: list[tuple[Point2, Point2]]
+    shapes: list[Shape]
+    stretched: Stretched
 
-def exact_shapes(
-    factory: Factory,
-    payloads: Mapping[str, Box],
-    axes: list[tuple[Point2, Point2]],
-    sides: Sides,
-    tools: list[bool],
-    c: Clearance,
-) -> list[Shape]:
-    """Shapes from the payloads as they lie in the world: parts never turn."""
-    shapes: list[Shape] = []
-    for robot, carrier in enumerate(carriers(factory)):
-        u, t = axes[robot]
-        numbers = _carried(factory, robot)
-        piles = {n: project(payloads[factory.operations[n].label], u, t) for n in numbers}
-        last = list(piles.values())[-1] if piles else (0.0, 0.0, 0.0, 0.0)
-        held = _worked_on(factory, robot, carrier, sides, shapes) if tools[robot] else last
-        lane = sides[robot] * shapes[carrier].offset if carrier >= 0 else 0.0
-        arm = up(max(c.rim, c.rim + lane, c.c - last[0] if carrier < 0 else 0.0))
-        shapes.append(
-            Shape(
-                piles,
-                last,
-                _millimetres((held[2] + held[3]) / 2),
-                arm,
-                up(c.reach(arm, lane)),
-                _millimetres((held[0] + held[1]) / 2),
-                tools[robot],
-            )
+    def layout(self) -> Layout:
+        """The layout that its lengths give; the floor it takes is not known yet."""
+        guidepaths = self._guidepaths()
+        return Layout(
+            self.factory,
+            self.product,
+            self.clearance.c,
+            guidepaths,
+            tuple(self.stretched.stations),
+            self.payloads,
+            _outfeed(guidepaths[0], self.shapes[0].last, self.clearance),
         )
-    return shapes
 
-
-def _worked_on(
-    factory: Factory, robot: int, carrier: int, sides: Sides, shapes: list[Shape]
-) -> Extent:
-    """The pile that a tool works on, in the tool's frame: its heading is against the carrier's side."""
-    pile = shapes[carrier].piles[factory.robots[robot].operations[0]]
-    along = sorted((-sides[robot] * pile[2], -sides[robot] * pile[3]))
-    return along[0], along[1], pile[0], pile[1]
-
-
-def project(box: Box, u: Point2, t: Point2) -> Extent:
-    """A box of the world in the frame (u, t), both along world axes."""
-    along = sorted((box[0] * u[0] + box[2] * u[1], box[1] * u[0] + box[3] * u[1]))
-    across = sorted((box[0] * t[0] + box[2] * t[1], box[1] * t[0] + box[3] * t[1]))
-    return along[0], along[1], across[0], across[1]
-
-
-def _millimetres(length: float) -> float:
-    return round(length, 3)
-
-
-def _embed(
-    factory: Factory,
-    axes: list[tuple[Point2, Point2]],
-    shapes: list[Shape],
-    stretched: Stretched,
-    sides: Sides,
-    c: Clearance,
-) -> tuple[Guidepath, ...]:
-    """Places every robot, carriers first: its A is a station of its carrier."""
-    paths: list[Guidepath] = []
-    for robot, carrier in enumerate(carriers(factory)):
-        u, t = axes[robot]
-        a = (0.0, 0.0)
-        if carrier >= 0:
-            on = paths[carrier]
-            station = stretched.stations[factory.robots[robot].operations[-1]]
-            a = on.middle(on.length - station)
-        shape = shapes[robot]
-        paths.append(
-            Guidepath(
-                u,
-                t,
-                (_millimetres(a[0]), _millimetres(a[1])),
-                stretched.travel[robot],
-                shape.reach,
-                shape.offset,
-                shape.arm,
-                shape.nest,
+    def _guidepaths(self) -> tuple[Guidepath, ...]:
+        """Places every robot, carriers first: its A is a station of its carrier."""
+        paths: list[Guidepath] = []
+        for robot, carrier in enumerate(carriers(self.factory)):
+            (u, t), shape, a = self.axes[robot], self.shapes[robot], (0.0, 0.0)
+            if carrier >= 0:
+                number = self.factory.robots[robot].operations[-1]
+                on = paths[carrier]
+                a = on.middle(on.length - self.stretched.stations[number])
+            a = (round(a[0], 3), round(a[1], 3))
+            travel = self.stretched.travel[robot]
+            paths.append(
+                Guidepath(u, t, a, travel, shape.reach, shape.offset, shape.arm, shape.nest)
             )
-        )
-    return tuple(paths)
+        return tuple(paths)
+
+
+def _draft(factory: Factory, product: Product, c: Clearance) -> _Draft:
+    payloads = payload_boxes(factory, product)
+    sides = stretch(factory, symmetric_shapes(factory, payloads, c), c).sides
+    axes = headings(factory, sides)
+    shapes = exact_shapes(factory, payloads, axes, sides, c)
+    stretched = stretch(factory, shapes.__getitem__, c, sides)
+    return _Draft(factory, product, c, payloads, axes, shapes, stretched)
 
 
 def _outfeed(path: Guidepath, last: Extent, c: Clearance) -> Box:
@@ -219,21 +122,61 @@ def _outfeed(path: Guidepath, last: Extent, c: Clearance) -> Box:
     return path.a[0] + u[0], path.a[0] + u[1], path.a[1] + last[2] - c.c, path.a[1] + last[3] + c.c
 
 
-def _check_floor(layout: Layout, floor: Point2) -> None:
+def _spare(layout: Layout) -> float:
+    """How much shorter the output robot's path can be: the outfeed has to be clear of what is beside its
+    own course, of the product in the making, and of no more [whole mm]."""
+    start, _, low, high = layout.outfeed
+    c = layout.clearance
+    ahead = [
+        region.box[1]
+        for region in regions(layout, piles(layout.factory, layout.product))
+        if region.kind != OUTFEED
+        and (region.robot != 0 or region.mode == ALWAYS)
+        and region.box[2] < high + c
+        and region.box[3] > low - c
+        and not _runs_under(region)
+    ]
+    spare = start - c - max(ahead)
+    return min(floor(spare * 1000 + 1e-6) / 1000, layout.guidepaths[0].travel - up(c))
+
+
+def _runs_under(region: Region) -> bool:
+    """Whether a region is that of the output robot itself, which comes as far as A."""
+    return region.robot == 0 and KINDS[region.kind] in ("carriage", "mast", "arm")
+
+
+def _check_floor(layout: Layout, found: tuple[Region, ...], wanted: Point2) -> None:
     xlo, xhi, ylo, yhi = layout.floor
     size = (xhi - xlo, yhi - ylo)
-    if size[0] <= floor[0] and size[1] <= floor[1]:
+    if size[0] <= wanted[0] and size[1] <= wanted[1]:
         return
-    excess = ", ".join(
-        f"{size[i] - floor[i]:.3f} m too {word}"
+    excess = "; ".join(
+        f"{size[i] - wanted[i]:.3f} m too {word}, from {_at_edge(layout, found, 2 * i, min)}"
+        f" to {_at_edge(layout, found, 2 * i + 1, max)}"
         for i, word in ((0, "wide (along the output robot's path)"), (1, "deep (across it)"))
-        if size[i] > floor[i]
+        if size[i] > wanted[i]
     )
     message = f"the factory takes {size[0]:.3f} x {size[1]:.3f} m of floor: {excess}"
     longest = max(range(len(layout.guidepaths)), key=lambda i: layout.guidepaths[i].length)
     robot = layout.factory.robots[longest]
+    fits = "x".join(f"{ceil(length * 100 - 1e-6) / 100:g}" for length in size)
     hint = (
-        f"the longest guidepath is that of {robot.name} ({layout.guidepaths[longest].length:.3f} m);"
-        f" it fits --floor {ceil(size[0] * 100) / 100:g}x{ceil(size[1] * 100) / 100:g}"
+        f"it fits --floor {fits}; the longest guidepath is that of {robot.name}"
+        f" ({layout.guidepaths[longest].length:.3f} m)"
     )
     raise RunError(Diagnostic("Layout", message, robot.position, hint))
+
+
+def _at_edge(layout: Layout, found: tuple[Region, ...], edge: int, choose: object) -> str:
+    """What reaches the farthest at one edge of the floor, in words."""
+    extreme = min if choose is min else max
+    region = extreme(found, key=lambda r: r.box[edge])
+    if region.kind == OUTFEED:
+        return "the outfeed"
+    name = layout.factory.robots[region.robot].name
+    if region.kind in STATIONS:
+        return f"the feeder of '{region.label}' ({name})"
+    return f"{name}'s {KINDS[region.kind]}"
+
+
+__all__ = ["headings", "lay_out", "project"]

@@ -161,13 +161,14 @@ class Layout:
         operation = self.factory.by_label[label]
         path = self.guidepaths[operation.carrier]
         middle = path.middle(self.goal(operation.index, operation.template.carrier - 1))
-        rear = path.frame(self.payloads[label])[0]
+        rear, front, _, _ = path.frame(self.payloads[label])
         back = -Clearance(self.clearance).post(path.reach, rear)
+        ahead = round((rear + front) / 2, 3)
         across, half = path.offset, POST / 2
         solid = self.product.solids[label]
         return Feeder(
             path.world((back - half, back + half, across - half, across + half), middle),
-            path.world((back, path.nest, across - BOOM / 2, across + BOOM / 2), middle),
+            path.world((back, ahead, across - BOOM / 2, across + BOOM / 2), middle),
             PAYLOAD + float(solid.high[2] - self.product.low[2]) + self.clearance,
         )
 

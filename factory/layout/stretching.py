@@ -19,17 +19,18 @@ from math import ceil
 from factory.errors import Diagnostic, InputError
 from factory.factory import Factory, Operation
 from factory.layout.dimensions import (
+    ARMS,
     CARRIAGE,
+    CARRIAGES,
+    LAYERS,
     MAST,
+    PAYLOADS,
     POST,
     TOOL_TRAVEL,
     Clearance,
 )
 from factory.layout.plan import Extent
 from factory.pag import NOPART
-
-CARRIAGES, ARMS, PAYLOADS = LAYERS = range(3)
-"""The layers, from the floor up. What stands on the floor is in all of them."""
 
 NOTHING = float("-inf")
 
@@ -188,7 +189,7 @@ class _Builder:
             self.strip[side] = [max(lane, width) for width in self.strip[side]]
         for layer in LAYERS:
             self._include(layer, post - room, post + room)
-        self.boom = max(self.shape.nest, post + POST / 2)
+        self.boom = round((part[0] + part[1]) / 2, 3)
         self._include(PAYLOADS, post, self.boom + self.half)
         for side in (-1, +1):
             self.frontier[side][PAYLOADS] = self.boom + self.half

@@ -20,24 +20,27 @@ from factory.layout.dimensions import (
     ARM_LOW,
     ARM_TOP,
     ARM_WIDTH,
+    ARMS,
     BOOM_HEIGHT,
     CARRIAGE,
     CARRIAGE_TOP,
+    CARRIAGES,
+    LAYERS,
     MAST,
     PAYLOAD,
+    PAYLOADS,
 )
 from factory.layout.plan import Box, Extent, Guidepath, Layout
 from factory.pag import NOPART
 
-CARRIAGES, ARMS, PAYLOADS = range(3)
-"""The layers."""
-
-LAYERS = ("carriages", "masts and arms", "payloads")
+NAMES = ("carriages", "masts and arms", "payloads")
+"""The layers' names."""
 
 KINDS = ("carriage", "mast", "arm", "payload", "post", "boom", "outfeed")
-"""What a region is swept by; from `post` on, things that stand still."""
+"""What a region is swept by; STATIONS are those that stand still."""
 
-CARRIAGE_KIND, MAST_KIND, ARM_KIND, PAYLOAD_KIND, POST_KIND, BOOM_KIND, OUTFEED_KIND = range(7)
+CARRIAGE_BODY, MAST_BODY, ARM_BODY, PAYLOAD_BODY, POST_BODY, BOOM, OUTFEED = range(len(KINDS))
+STATIONS = (POST_BODY, BOOM, OUTFEED)
 
 ALWAYS = -1
 """The mode of a region that is uncoupled."""
@@ -115,7 +118,7 @@ def regions(layout: Layout, found: Mapping[str, Pile]) -> list[Region]:
     for leaf in layout.factory.leaves:
         result.extend(_feeder(layout, leaf.label, leaf.carrier))
     top = max(pile.z[1] for pile in found.values())
-    result.extend(_upright(0, OUTFEED_KIND, layout.outfeed, top, ""))
+    result.extend(_upright(0, OUTFEED, layout.outfeed, top, ""))
     return result
 
 
@@ -135,9 +138,9 @@ def _bodies(layout: Layout, robot: int) -> Iterator[Region]:
     start, end = min(path.reach, *stops), max(path.length, *stops)
     mast, width = (CARRIAGE_TOP, ARM_TOP), MAST / 2
     for kind, layer, half, ahead, side, z in (
-        (CARRIAGE_KIND, CARRIAGES, CARRIAGE / 2, CARRIAGE / 2, CARRIAGE / 2, (0.0, CARRIAGE_TOP)),
-        (MAST_KIND, ARMS, width, width, width, mast),
-        (ARM_KIND, ARMS, 0.0, path.reach - path.arm, ARM_WIDTH / 2, (ARM_LOW, ARM_TOP)),
+        (CARRIAGE_BODY, CARRIAGES, CARRIAGE / 2, CARRIAGE / 2, CARRIAGE / 2, (0.0, CARRIAGE_TOP)),
+        (MAST_BODY, ARMS, width, width, width, mast),
+        (ARM_BODY, ARMS, 0.0, path.reach - path.arm, ARM_WIDTH / 2, (ARM_LOW, ARM_TOP)),
     ):
         foot: Extent = (-half, max(ahead, 0.0), -side, side)
         (x0, y0), (x1, y1) = path.carriage(start), path.carriage(end)
@@ -159,22 +162,22 @@ def _payloads(layout: Layout, robot: int, found: Mapping[str, Pile]) -> Iterator
         onward = operations[gear[step]]
         leaves = onward.after[onward.robots.index(robot)] == NOPART
         stand = sweep(path, pile.box, at, at if leaves else stops[step])
-        yield Region(robot, PAYLOADS, PAYLOAD_KIND, stand, pile.z, label)
+        yield Region(robot, PAYLOADS, PAYLOAD_BODY, stand, pile.z, label)
         if leaves:
             way = sweep(path, pile.box, at, stops[step])
-            yield Region(robot, PAYLOADS, PAYLOAD_KIND, way, pile.z, label, onward.index)
+            yield Region(robot, PAYLOADS, PAYLOAD_BODY, way, pile.z, label, onward.index)
 
 
 def _feeder(layout: Layout, label: str, robot: int) -> Iterator[Region]:
     feeder = layout.feeder(label)
     height = feeder.height, feeder.height + BOOM_HEIGHT
-    yield from _upright(robot, POST_KIND, feeder.post, height[1], label)
-    yield Region(robot, PAYLOADS, BOOM_KIND, feeder.boom, height, label)
+    yield from _upright(robot, POST_BODY, feeder.post, height[1], label)
+    yield Region(robot, PAYLOADS, BOOM, feeder.boom, height, label)
 
 
 def _upright(robot: int, kind: int, box: Box, top: float, label: str) -> Iterator[Region]:
     """Something that stands in all layers."""
-    for layer in (CARRIAGES, ARMS, PAYLOADS):
+    for layer in LAYERS:
         yield Region(robot, layer, kind, box, (0.0, top), label)
 
 

@@ -1,0 +1,109 @@
+"""The shapes that stretching works with: piles in the frame of the robot that carries them, arms, lanes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+
+from factory.factory import Factory
+from factory.geometry import Product
+from factory.layout.dimensions import Clearance
+from factory.layout.plan import Box, Extent, Point2
+from factory.layout.stretching import Shape, Sides, is_tool, up
+from factory.layout.sweeps import hull
+
+NOWHERE: Extent = (0.0, 0.0, 0.0, 0.0)
+
+
+def payload_boxes(factory: Factory, product: Product) -> dict[str, Box]:
+    """The plan of every sub-assembly about the product's middle, from its parts' real geometry."""
+    x, y, _ = (float(v) for v in product.middle)
+    found: dict[str, Box] = {}
+    for operation in reversed(factory.operations[:-1]):
+        if operation.inputs:
+            found[operation.label] = hull([found[label] for label in operation.inputs])
+            continue
+        (xlo, ylo, _), (xhi, yhi, _) = (
+            map(float, corner)
+            for corner in (
+                product.solids[operation.label].low,
+                product.solids[operation.label].high,
+            )
+        )
+        found[operation.label] = (xlo - x, xhi - x, ylo - y, yhi - y)
+    return found
+
+
+def symmetric_shapes(
+    factory: Factory, payloads: Mapping[str, Box], c: Clearance
+) -> Callable[[int], Shape]:
+    """Shapes whose extents are the same in every direction, to choose the sides by."""
+
+    def square(label: str) -> Extent:
+        half = max(abs(edge) for edge in payloads[label])
+        return (-half, half, -half, half)
+
+    def shape(robot: int) -> Shape:
+        piles = {n: square(factory.operations[n].label) for n in carried(factory, robot)}
+        tool = is_tool(factory, robot)
+        return Shape(piles, _last(piles), 0.0, c.rim, c.reach(c.rim), 0.0, tool)
+
+    return shape
+
+
+def exact_shapes(
+    factory: Factory,
+    payloads: Mapping[str, Box],
+    axes: list[tuple[Point2, Point2]],
+    sides: Sides,
+    c: Clearance,
+) -> list[Shape]:
+    """Shapes from the payloads as they lie in the world: parts never turn. Carriers come first, since
+    a robot's arm ends beside its carrier's line."""
+    shapes: list[Shape] = []
+    for robot, carrier in enumerate(carriers(factory)):
+        u, t = axes[robot]
+        numbers = carried(factory, robot)
+        piles = {n: project(payloads[factory.operations[n].label], u, t) for n in numbers}
+        last, tool = _last(piles), is_tool(factory, robot)
+        held = _worked_on(factory, robot, shapes[carrier], sides[robot]) if tool else last
+        lane = sides[robot] * shapes[carrier].offset if carrier >= 0 else 0.0
+        belt = c.c - last[0] if carrier < 0 else 0.0
+        arm = up(max(c.rim, c.rim + lane, belt))
+        offset, nest = round((held[2] + held[3]) / 2, 3), round((held[0] + held[1]) / 2, 3)
+        shapes.append(Shape(piles, last, offset, arm, up(c.reach(arm, lane)), nest, tool))
+    return shapes
+
+
+def carried(factory: Factory, robot: int) -> list[int]:
+    """The operations of a robot after which it carries something, in its gear's order."""
+    return [
+        number
+        for number in factory.robots[robot].operations
+        if factory.operations[number].carrier == robot and number != factory.dropoff.index
+    ]
+
+
+def carriers(factory: Factory) -> list[int]:
+    """For each robot the carrier it delivers to; -1 for the output robot."""
+    return [
+        -1 if robot.index == 0 else factory.operations[robot.operations[-1]].carrier
+        for robot in factory.robots
+    ]
+
+
+def project(box: Box, u: Point2, t: Point2) -> Extent:
+    """A box of the world in the frame (u, t), both along world axes."""
+    along = sorted((box[0] * u[0] + box[2] * u[1], box[1] * u[0] + box[3] * u[1]))
+    across = sorted((box[0] * t[0] + box[2] * t[1], box[1] * t[0] + box[3] * t[1]))
+    return along[0], along[1], across[0], across[1]
+
+
+def _last(piles: Mapping[int, Extent]) -> Extent:
+    return next(reversed(piles.values())) if piles else NOWHERE
+
+
+def _worked_on(factory: Factory, robot: int, carrier: Shape, side: int) -> Extent:
+    """The pile that a tool works on, in the tool's frame: its heading is against the carrier's side."""
+    pile = carrier.piles[factory.robots[robot].operations[0]]
+    along = sorted((-side * pile[2], -side * pile[3]))
+    return along[0], along[1], pile[0], pile[1]
