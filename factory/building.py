@@ -7,11 +7,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from factory.errors import Diagnostic, InputError, RunError
+from factory.errors import Diagnostic, RunError
 from factory.factory import Factory
-from factory.files import write_text
+from factory.files import write_all
+from factory.layout.certificate import Certificate
 from factory.layout.plan import Layout
-from factory.mjcf.model import Model, write_model
+from factory.mjcf.model import Model, model_files
 from factory.nets.verdict import Verdict
 from factory.pipeline import Source
 from factory.settings import Settings
@@ -57,18 +58,18 @@ def build_all(
 
     certificate = certify(layout)
     if not certificate.holds:
-        raise RunError(
-            Diagnostic("Layout", str(fault), None, "give --clearance less, or report this layout")
-            for fault in certificate.faults
-        )
+        raise RunError(fault.diagnostic() for fault in certificate.faults)
     model = physical_model(layout, units, settings, source.catalogue, wip)
     load(model)
-    files: list[Path] = []
+    files: dict[Path, bytes] = {}
     if output is not None:
-        files += _write_folder(source, layout, output)
         mjcf = mjcf or output / f"{_stem(source)}.xml"
     if mjcf is not None:
-        files = [*write_model(model, mjcf), *files]
+        files |= model_files(model, mjcf)
+    if output is not None:
+        texts = _documents(layout, certificate)
+        files |= {output / f"{_stem(source)}.{end}": t.encode() for end, t in texts.items()}
+    write_all(files)
     return Built(model, mjcf, tuple(files), certificate.as_json())
 
 
@@ -76,30 +77,24 @@ def _stem(source: Source) -> str:
     return Path(source.pag.file).stem or "factory"
 
 
-def _write_folder(source: Source, layout: Layout, output: Path) -> list[Path]:
-    """Everything about the factory but the model, in a folder made for it."""
+def _documents(layout: Layout, clear: Certificate) -> dict[str, str]:
+    """Everything about the factory but the model, as texts by the endings of their files."""
     from factory.export import exporters
-    from factory.layout.clearance import certify
     from factory.layout.drawing import write_svg
     from factory.nets.certificate import certificate
     from factory.nets.verify import verify
     from factory.programs import program_of, write_program
 
-    if output.exists() and not output.is_dir():
-        message = f"'{output}' is a file, not a folder"
-        raise InputError(Diagnostic("File", message, None, "-o takes the name of a folder"))
-    factory, stem = layout.factory, _stem(source)
-    verdict = verify(factory.net)
+    factory = layout.factory
     programs = (write_program(program_of(factory, r.index)) for r in factory.robots)
-    texts = {
-        f"{stem}.svg": write_svg(layout),
-        f"{stem}.programs.txt": "\n\n".join(programs) + "\n",
-        f"{stem}.proof.json": json.dumps(certificate(factory.net, verdict), ensure_ascii=False)
-        + "\n",
-        f"{stem}.clearance.json": json.dumps(certify(layout).as_json(), ensure_ascii=False) + "\n",
-        **{f"{stem}.{name}": write(factory) for name, write in exporters().items()},
+    return {
+        "svg": write_svg(layout),
+        "programs.txt": "\n\n".join(programs) + "\n",
+        "proof.json": _json(certificate(factory.net, verify(factory.net))),
+        "clearance.json": _json(clear.as_json()),
+        **{name: write(factory) for name, write in exporters().items()},
     }
-    output.mkdir(parents=True, exist_ok=True)
-    for name, text in texts.items():
-        write_text(output / name, text)
-    return [output / name for name in texts]
+
+
+def _json(document: object) -> str:
+    return json.dumps(document, ensure_ascii=False) + "\n"

@@ -8,6 +8,8 @@ from __future__ import annotations
 import json
 import sys
 from collections.abc import Iterable, Mapping
+from dataclasses import replace
+from math import isfinite
 from typing import Any
 
 from factory.errors import Diagnostic, FactoryError
@@ -16,8 +18,21 @@ SCHEMA = 1
 
 
 def emit(document: Mapping[str, Any]) -> None:
-    """One JSON document on stdout."""
-    print(json.dumps({"schema": SCHEMA, **document}, ensure_ascii=False, allow_nan=False))
+    """One JSON document on stdout, in ASCII whatever the locale; null for what is not finite."""
+    document = {"schema": SCHEMA, **document}
+    try:
+        text = json.dumps(document, allow_nan=False)
+    except ValueError:
+        text = json.dumps(_finite(document), allow_nan=False)
+    print(text)
+
+
+def _finite(value: Any) -> Any:
+    if isinstance(value, float):
+        return value if isfinite(value) else None
+    if isinstance(value, dict):
+        return {key: _finite(item) for key, item in value.items()}
+    return [_finite(item) for item in value] if isinstance(value, list | tuple) else value
 
 
 def say(text: str = "") -> None:
@@ -26,11 +41,11 @@ def say(text: str = "") -> None:
 
 
 def warn(diagnostics: Iterable[Diagnostic], quiet: bool = False) -> None:
-    """Warnings, on stderr."""
+    """Warnings, on stderr: `file:line:col: CODE warning: message`."""
     if quiet:
         return
     for diagnostic in diagnostics:
-        print(f"warning: {diagnostic}", file=sys.stderr)
+        print(replace(diagnostic, message=f"warning: {diagnostic.message}"), file=sys.stderr)
 
 
 def fail(error: FactoryError, as_json: bool) -> int:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import platform
+import sys
 from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, version
 
@@ -36,11 +37,13 @@ class Finding:
 
 def examine() -> list[Finding]:
     """Python, packages, assets, the engine and headless rendering."""
-    return [_python(), *map(_package, PACKAGES), _assets(), _engine(), _rendering()]
+    engine = _engine()
+    rendering = _rendering() if engine.ok else Finding("rendering", False, "no engine", engine.mend)
+    return [_python(), *map(_package, PACKAGES), _assets(), engine, rendering]
 
 
 def _python() -> Finding:
-    good = platform.python_version_tuple() >= ("3", "11")
+    good = sys.version_info >= (3, 11)
     return Finding("python", good, platform.python_version(), "install Python 3.11 or newer")
 
 
@@ -52,13 +55,13 @@ def _package(name: str) -> Finding:
 
 
 def _assets() -> Finding:
-    from factory.pipeline import all_templates
-    from factory.robots import load_catalogue
-
     try:
+        from factory.pipeline import all_templates
+        from factory.robots import load_catalogue
+
         found = f"{len(all_templates())} operations, {len(load_catalogue().types)} robot types"
         return Finding("assets", True, found)
-    except FactoryError as error:
+    except (FactoryError, ImportError) as error:
         return Finding("assets", False, str(error), "install factory again")
 
 
@@ -70,6 +73,8 @@ def _engine() -> Finding:
         model = mujoco.MjModel.from_xml_string("<mujoco><worldbody/></mujoco>")
         mujoco.mj_step(model, mujoco.MjData(model))
         return Finding("engine", True, f"MuJoCo {mujoco.mj_versionString()} steps")
+    except FactoryError as error:
+        return Finding("engine", False, error.diagnostics[0].message, error.diagnostics[0].hint)
     except Exception as error:  # whatever a broken installation raises
         return Finding("engine", False, str(error), "pip install --force-reinstall mujoco")
 

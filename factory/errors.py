@@ -37,13 +37,12 @@ class Diagnostic:
     def __str__(self) -> str:
         """`file:line:col: CODE message`, then the source line with a caret, then the hint."""
         where = f"{self.position}: " if self.position else ""
-        lines = [f"{where}{self.code} {self.message}"]
+        lines = [_one_line(f"{where}{self.code} {self.message}")]
         if self.position and self.position.text:
             start, caret = _window(self.position.text, self.position.column - 1)
-            shown = "".join(c if c.isprintable() else " " for c in start).rstrip()
-            lines += [f"    {shown}", f"    {' ' * caret}^"]
+            lines += [f"    {_one_line(start).rstrip()}", f"    {' ' * caret}^"]
         if self.hint:
-            lines.append(f"    {self.hint}")
+            lines.append(f"    {_one_line(self.hint)}")
         return "\n".join(lines)
 
     def as_json(self) -> dict[str, object]:
@@ -57,6 +56,11 @@ class Diagnostic:
             "message": self.message,
             "hint": self.hint,
         }
+
+
+def _one_line(text: str) -> str:
+    """A text with a space for every line end, tab and unprintable character."""
+    return "".join(c if c.isprintable() else " " for c in text)
 
 
 def _window(source: str, caret: int, width: int = 100) -> tuple[str, int]:

@@ -8,9 +8,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-import numpy as np
-
 from factory.control.mode import Limits, Mode
+from factory.control.plan import operation_starts
 from factory.control.profile import World, mode_time
 from factory.layout.plan import Layout
 from factory.nets.timing import CycleTime, cycle_time
@@ -22,16 +21,11 @@ def operation_delays(
 ) -> list[float]:
     """The time [s] from X_s to X_e of every operation, and the tick until what follows can fire."""
     factory = layout.factory
-    left: dict[tuple[int, int], float] = {}
-    for robot in factory.robots:
-        for step, number in enumerate(robot.operations):
-            before = factory.operations[robot.operations[step - 1]]
-            left[number, robot.index] = layout.goal(before.index, before.robots.index(robot.index))
     settle = settings.settle if world == "mujoco" else 0.0
     delays = []
-    for operation, mode in zip(factory.operations, modes, strict=True):
+    starts = operation_starts(layout)
+    for operation, mode, start in zip(factory.operations, modes, starts, strict=True):
         robots = list(operation.robots)
-        start = np.array([left[operation.index, robot] for robot in robots])
         chosen = Limits(limits.speed[robots], limits.acceleration[robots])
         delays.append(mode_time(mode, start, chosen, world) + settle + settings.tick)
     return delays

@@ -10,6 +10,7 @@ from typing import Any
 from factory.console import say, table
 from factory.errors import Diagnostic, InputError
 from factory.factory import Factory
+from factory.interruption import Interruption
 from factory.layout.plan import Layout
 from factory.nets.history import legal_marking
 from factory.pipeline import Source
@@ -34,7 +35,7 @@ def simulation(
         options.get("jitter", 0.0),
         settings,
         source.catalogue,
-        legal_marking(net, start) if start else None,
+        None if start is None else legal_marking(net, start),
         options.get("wip"),
         bool(options.get("distributed")),
     )
@@ -61,13 +62,14 @@ def run_file(
             message = "the ideal world has no bodies to film"
             raise InputError(Diagnostic("Usage", message, None, "leave out --world ideal"))
         from factory.gl import probe
-        from factory.render import check_output
+        from factory.render import camera_named, check_output
 
-        check_output(video, size or (1280, 720))
+        check_output(video, size or (1280, 720), options["fps"])
+        camera_named(options["camera"])
         probe()
     made = simulation(source, layout, settings, options)
     with ExitStack() as stack:
-        observers: list[Observer] = []
+        observers: list[Observer] = [stack.enter_context(Interruption()).observe]
         if log is not None:
             from factory.log import LogWriter
 

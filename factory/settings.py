@@ -2,12 +2,26 @@
 
 from __future__ import annotations
 
+import re
 import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
 
 from factory.errors import Diagnostic, InputError, Position, did_you_mean
+
+RANGES = {
+    "speed": (1e-3, 100.0),
+    "acceleration": (1e-3, 1e4),
+    "eps": (1e-6, 0.02),
+    "timestep": (1e-5, 0.02),
+    "substeps": (1, 100),
+    "clearance": (1e-4, 10.0),
+    "force": (1e-3, 1e6),
+    "settle": (1e-6, 10.0),
+    "outfeed": (1e-3, 10.0),
+}
+"""Least and greatest value of each setting: beyond lie nothing but overflows and endless runs."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,7 +39,7 @@ class Settings:
     substeps: int = 5
     clearance: float = 0.02
     force: float = 3.0
-    settle: float = 0.015
+    settle: float = 0.0
     outfeed: float = 0.3
 
     @property
@@ -36,49 +50,79 @@ class Settings:
     def with_options(self, options: Mapping[str, float | int | None]) -> Settings:
         """These settings with every option that is not None put in place.
 
-        Raises InputError (BadValue) for a number that is not positive and finite.
+        Raises InputError (BadValue) with every number that is not within its range.
         """
         given = {name: value for name, value in options.items() if value is not None}
-        for name, value in given.items():
-            if not 0 < value < float("inf"):
-                message = f"{name} = {value:g} must be positive and finite"
-                raise InputError(
-                    Diagnostic(
-                        "BadValue", message, None, f"for example {name} = {getattr(self, name)}"
-                    )
-                )
+        faults = [_out_of_range(name, value) for name, value in given.items()]
+        if any(faults):
+            raise InputError(fault for fault in faults if fault)
         return replace(self, **given)  # type: ignore[arg-type]
 
 
 def load_settings(path: Path) -> Settings:
     """The settings of a `factory.toml`; the defaults where there is no such file.
 
-    Raises InputError for broken TOML, an unknown key or a value that is no positive number.
+    Raises InputError with every fault of the file: broken TOML, an unknown key, or a value that is no
+    number within its range.
     """
     if not path.is_file():
         return Settings()
     try:
-        table = tomllib.loads(path.read_text("utf-8"))
+        text = path.read_bytes().decode("utf-8-sig")
+        table = tomllib.loads(text)
     except (OSError, ValueError) as error:
-        raise InputError(_trouble(path, "Syntax", str(error), "see https://toml.io")) from error
-    known = [f.name for f in fields(Settings)]
+        raise InputError(_broken(path, error)) from error
+    faults = []
     for key, value in table.items():
-        if key not in known:
-            hint = did_you_mean(key, known, "keys")
-            raise InputError(_trouble(path, "UnknownParameter", f"unknown key '{key}'", hint))
-        if isinstance(value, bool) or not isinstance(value, int | float):
-            raise InputError(
-                _trouble(
-                    path,
-                    "BadValue",
-                    f"{key} must be a number",
-                    f"{key} = {getattr(Settings(), key)}",
-                )
-            )
-    if "substeps" in table:
-        table["substeps"] = int(table["substeps"])
-    return Settings().with_options(table)
+        fault = _fault(key, value)
+        if fault is not None:
+            faults.append(replace(fault, position=_place(path, text, key)))
+    if faults:
+        raise InputError(faults)
+    return Settings().with_options({k: v if k == "substeps" else float(v) for k, v in table.items()})
 
 
-def _trouble(path: Path, code: str, message: str, hint: str) -> Diagnostic:
-    return Diagnostic(code, message, Position(str(path), 1, 1), hint)
+def _fault(key: str, value: object) -> Diagnostic | None:
+    """What is wrong with a key of `factory.toml`."""
+    if key not in RANGES:
+        hint = did_you_mean(key, [f.name for f in fields(Settings)], "keys")
+        return Diagnostic("UnknownParameter", f"unknown key '{key}'", None, hint)
+    kind = "whole number" if key == "substeps" else "number"
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        return Diagnostic("BadValue", f"{key} must be a {kind}", None, _example(key))
+    if key == "substeps" and not isinstance(value, int):
+        return Diagnostic("BadValue", f"{key} must be a {kind}", None, _example(key))
+    return _out_of_range(key, value)
+
+
+def _out_of_range(name: str, value: float) -> Diagnostic | None:
+    low, high = RANGES[name]
+    if low <= value <= high:
+        return None
+    shown = f"{value:g}" if isinstance(value, float) else f"{value}"[:20]
+    message = f"{name} = {shown} is not between {low:g} and {high:g}"
+    return Diagnostic("BadValue", message, None, _example(name))
+
+
+def _example(name: str) -> str:
+    return f"for example {name} = {getattr(Settings(), name)}"
+
+
+def _place(path: Path, text: str, key: str) -> Position:
+    """Where a key stands in a file: its first mention at the start of a line, or in a header."""
+    for number, line in enumerate(text.splitlines(), 1):
+        if found := re.match(rf"""\s*\[*\s*["']?({re.escape(key)})\b""", line):
+            return Position(str(path), number, found.start(1) + 1, line)
+    return Position(str(path), 1, 1)
+
+
+def _broken(path: Path, error: Exception) -> Diagnostic:
+    """What tomllib says, at the place it speaks of."""
+    words = getattr(error, "strerror", None) or str(error)
+    found = re.search(r" \(at line (\d+), column (\d+)\)", words)
+    if found is None:
+        return Diagnostic("Syntax", words, Position(str(path), 1, 1), "see https://toml.io")
+    line, column = int(found[1]), int(found[2])
+    text = path.read_text("utf-8-sig").splitlines()[line - 1]
+    at = Position(str(path), line, column, text)
+    return Diagnostic("Syntax", words.replace(found[0], ""), at, "see https://toml.io")

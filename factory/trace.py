@@ -92,7 +92,7 @@ class Run:
             "jitter": self.jitter,
             "sim_time_s": round(self.sim_time_s, 6),
             "wall_time_s": self.wall_time_s,
-            "physics_time_s": self.physics_time_s,
+            "physics_time_s": self.physics_time_s if physics else None,
             "supervisor_time_s": self.supervisor_time_s,
             "realtime_factor": self.realtime_factor,
             "cycle_time_s": self.cycle_time_s,

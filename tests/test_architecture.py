@@ -25,7 +25,7 @@ ROOMS = [
     {"supervisor", "distributed", "world"},
     {"simulation"},
     {"log", "render", "progress"},
-    {"console", "checking", "building", "running", "doctor"},
+    {"console", "interruption", "checking", "building", "running", "doctor"},
     {"cli", "__main__"},
 ]
 """In the order in which the data walks; rooms of one set may use each other."""

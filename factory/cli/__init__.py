@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import os
+import signal
 import sys
 from collections.abc import Sequence
+from contextlib import suppress
 from typing import Any
 
 import click
@@ -14,7 +16,7 @@ from factory.cli.make import build
 from factory.cli.move import render, run
 from factory.cli.prove import check, export, programs
 from factory.cli.tell import doctor, templates
-from factory.console import fail
+from factory.console import emit, fail, say
 from factory.errors import Diagnostic, FactoryError, InputError, MissingError, did_you_mean
 
 CONTEXT = {"help_option_names": ["-h", "--help"], "max_content_width": 100}
@@ -23,61 +25,86 @@ CONTEXT = {"help_option_names": ["-h", "--help"], "max_content_width": 100}
 def main(arguments: Sequence[str] | None = None) -> None:
     """The entry point: runs a command and exits with its status, never with a traceback."""
     words = list(sys.argv[1:] if arguments is None else arguments)
+    for stream in (sys.stdout, sys.stderr):
+        with suppress(AttributeError):
+            stream.reconfigure(errors="replace")  # type: ignore[union-attr]
+    with suppress(ValueError):
+        signal.signal(signal.SIGTERM, signal.default_int_handler)
     status = run_command(words)
     try:
         sys.stdout.flush()
-    except BrokenPipeError:
+    except OSError as error:
         os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
+        if not isinstance(error, BrokenPipeError):
+            status = fail(_unwritten(error), False)
     sys.exit(status)
 
 
 def run_command(words: list[str]) -> int:
     """The exit status of a command line: 0 ok, 1 a check or run failed, 2 bad input, 3 something is
     missing on the machine, 130 interrupted."""
-    as_json = "--json" in words
     try:
         result = cli.main(words, prog_name="factory", standalone_mode=False)
         return result if isinstance(result, int) else 0
     except click.exceptions.Exit as done:
         return done.exit_code
-    except click.ClickException as error:
-        return fail(InputError(_usage(error)), as_json)
-    except FactoryError as error:
-        return fail(error, as_json)
-    except (KeyboardInterrupt, click.Abort):
-        return fail(_Interrupted(Diagnostic("Interrupted", "stopped by the user")), as_json)
     except BrokenPipeError:
         return 0
-    except ImportError as error:
-        return fail(_missing_package(error), as_json)
-    except OSError as error:
-        message = f"{error.filename or 'the system'}: {error.strerror or error}"
-        hint = "check the path, its permissions and the space on the disk"
-        return fail(InputError(Diagnostic("File", message, None, hint)), as_json)
-    except RecursionError:
-        message = "the input is nested too deeply"
-        return fail(InputError(Diagnostic("Syntax", message, None, "flatten it")), as_json)
+    except (Exception, KeyboardInterrupt) as error:
+        return fail(_refusal(error), "--json" in words)
 
 
 class _Interrupted(FactoryError):
     exit_status = 130
 
 
+def _refusal(error: BaseException) -> FactoryError:
+    """Whatever went wrong, as an error for the user."""
+    if isinstance(error, FactoryError):
+        return error
+    if isinstance(error, KeyboardInterrupt | click.Abort):
+        return _Interrupted(Diagnostic("Interrupted", "stopped by the user"))
+    if isinstance(error, click.ClickException):
+        return InputError(_usage(error))
+    if isinstance(error, ImportError) and not (error.name or "").startswith("factory"):
+        return _missing_package(error)
+    if isinstance(error, OSError):
+        return _unwritten(error)
+    if isinstance(error, MemoryError):
+        message = f"there is not enough memory: {error or 'no more to be had'}"
+        return MissingError(Diagnostic("Missing", message, None, "take a smaller product"))
+    if isinstance(error, RecursionError):
+        message = "the input is nested too deeply"
+        return InputError(Diagnostic("Syntax", message, None, "flatten it"))
+    if os.environ.get("FACTORY_TRACEBACK"):
+        raise error
+    message = f"{type(error).__name__}: {error}"
+    hint = "a fault of factory: please report it, with what FACTORY_TRACEBACK=1 prints"
+    return InputError(Diagnostic("Internal", message, None, hint))
+
+
 def _usage(error: click.ClickException) -> Diagnostic:
     """A usage error of click as a diagnostic."""
-    hint = "see factory --help"
     context = getattr(error, "ctx", None)
-    if context is not None:
-        hint = f"see {context.command_path} --help"
-    if isinstance(error, click.exceptions.NoSuchOption) and error.possibilities:
-        hint = f"did you mean '{sorted(error.possibilities)[0]}'?"
-    return Diagnostic("Usage", error.format_message().replace("\n", " "), None, hint)
+    hint = f"see {context.command_path if context else 'factory'} --help"
+    message = error.format_message()
+    if isinstance(error, click.exceptions.NoSuchOption):
+        message = f"there is no option '{error.option_name}'"
+        if error.possibilities:
+            hint = did_you_mean(error.option_name, sorted(error.possibilities), "options")
+    return Diagnostic("Usage", message, None, hint)
 
 
 def _missing_package(error: ImportError) -> MissingError:
     name = (error.name or "").partition(".")[0] or "a package"
     message = f"the Python package '{name}' cannot be imported: {error}"
     return MissingError(Diagnostic("Missing", message, None, f"pip install {name}"))
+
+
+def _unwritten(error: OSError) -> InputError:
+    message = f"{error.filename or 'the system'}: {error.strerror or error}"
+    hint = "check the path, its permissions and the space on the disk"
+    return InputError(Diagnostic("BadFile", message, None, hint))
 
 
 class _Commands(click.Group):
@@ -88,13 +115,25 @@ class _Commands(click.Group):
             return super().resolve_command(ctx, args)
         except click.UsageError as error:
             hint = did_you_mean(args[0], list(self.commands), "commands")
-            raise InputError(Diagnostic("Usage", error.format_message(), None, hint)) from error
+            message = f"there is no command '{args[0]}'"
+            raise InputError(Diagnostic("Usage", message, None, hint)) from error
 
 
-@click.group(cls=_Commands, context_settings=CONTEXT)
-@click.version_option(__version__, prog_name="factory")
-def cli() -> None:
+@click.group(cls=_Commands, context_settings=CONTEXT, invoke_without_command=True)
+@click.option("--version", is_flag=True, help="Show the version and exit.")
+@click.option("--json", "as_json", is_flag=True, hidden=True)
+@click.pass_context
+def cli(ctx: click.Context, version: bool, as_json: bool) -> None:
     """Compile a product assembly graph (PAG) into a factory, prove it live, run it in MuJoCo."""
+    if version:
+        emit({"version": __version__}) if as_json else say(f"factory {__version__}")
+        ctx.exit()
+    if ctx.invoked_subcommand is None:
+        if not as_json:
+            click.echo(ctx.get_help() + "\n", err=True)
+        raise click.UsageError("there is no command", ctx)
+    if as_json:
+        raise click.UsageError("--json comes after the command", ctx)
 
 
 for _command in (check, build, run, render, programs, export, templates, doctor):

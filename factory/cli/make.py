@@ -8,7 +8,7 @@ from typing import Any
 
 import click
 
-from factory.cli.options import FLOOR, MOTION, OUTPUT, SOURCE, plan, settings_of, writable
+from factory.cli.options import FLOOR, MOTION, OUTPUT, SOURCE, plan, settings_of, writable, writable_folder
 from factory.console import emit, say, warn
 
 
@@ -42,7 +42,8 @@ def build(
     from factory.building import build_all, refuse_unproved
 
     begin = perf_counter()
-    writable(mjcf)
+    writable(file, mjcf)
+    writable_folder(output)
     settings = settings_of(file, options)
     source, factory, layout = plan(file, folders, settings, floor)
     refuse_unproved(factory)

@@ -49,8 +49,7 @@ def run(
     """Run FILE.pag until its products are dropped off."""
     from factory.running import run_file
 
-    for path in (video, log):
-        writable(path)
+    writable(file, video, log)
     settings = settings_of(file, options)
     source, factory, layout = plan(file, folders, settings, floor)
     warn(layout.product.warnings, quiet)
@@ -99,7 +98,7 @@ def render(
     """Film FILE.pag, or a LOG that `run --log` has kept, headless through EGL."""
     from factory.running import render_file
 
-    writable(output)
+    writable(file, output)
     size = pair(options["size"], "--size", "1280x720", int)
     document = render_file(file, folders, output, at, floor, size, quiet or as_json, options)
     if as_json:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Sequence
+from math import isfinite
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -37,6 +39,16 @@ SOURCE = options(
         help="A folder of further operations, searched first (repeatable).",
     ),
 )
+class Number(click.FloatRange):
+    """A finite number; click's own ranges let nan pass."""
+
+    def convert(self, value: Any, param: Any, ctx: Any) -> Any:
+        number = super().convert(value, param, ctx)
+        if not isfinite(number):
+            self.fail(f"{value} is not a finite number.", param, ctx)
+        return number
+
+
 MOTION = options(
     click.option("--speed", type=float, help="Speed of a robot [m/s]."),
     click.option("--acceleration", type=float, help="Acceleration of a robot [m/s²]."),
@@ -54,7 +66,7 @@ RUN = options(
     click.option("--seed", type=click.IntRange(0), default=0),
     click.option(
         "--jitter",
-        type=click.FloatRange(0, 0.9),
+        type=Number(0, 0.9),
         default=0.0,
         help="Draw each robot's speed and gain within ± this share.",
     ),
@@ -62,7 +74,7 @@ RUN = options(
     click.option(
         "--from", "start", help="Start from a legal marking: place names, comma-separated."
     ),
-    click.option("--max-time", type=float, help="Stop after this simulated time [s]."),
+    click.option("--max-time", type=Number(0, min_open=True), help="Stop after this simulated time [s]."),
 )
 PICTURE = options(
     click.option("--size", default="1280x720", help="Of the picture, as 1280x720."),
@@ -78,7 +90,7 @@ def settings_of(file: Path, options: dict[str, Any]) -> Any:
     names = ("speed", "acceleration", "force", "timestep", "substeps", "clearance")
     beside = file.parent / "factory.toml"
     settings = load_settings(beside if beside.is_file() else Path("factory.toml"))
-    return settings.withoptions({name: options.get(name) for name in names})
+    return settings.with_options({name: options.get(name) for name in names})
 
 
 def pair(text: str | None, option: str, example: str, number: type) -> tuple[Any, Any] | None:
@@ -87,7 +99,7 @@ def pair(text: str | None, option: str, example: str, number: type) -> tuple[Any
         return None
     try:
         width, depth = (number(word) for word in text.lower().split("x"))
-        if not (0 < width < float("inf") and 0 < depth < float("inf")):
+        if "_" in text or not (0 < width < float("inf") and 0 < depth < float("inf")):
             raise ValueError
     except ValueError:
         message = f"{option} takes two positive numbers, not '{text}'"
@@ -112,14 +124,48 @@ def plan(
     return source, factory, lay_out(factory, product, settings.clearance, room)
 
 
-def writable(path: Path | None) -> None:
-    """An output file must be writable: its folder there, itself no folder."""
+def writable(file: Path | None, *outputs: Path | None) -> None:
+    """Output files must be such that they can be written: their folder there and writable, themselves
+    no folder, all different, and none the input. Raises InputError (BadFile) with every fault."""
+    taken = {} if file is None else {file.resolve(): "the input"}
+    faults = []
+    for path in outputs:
+        if path is None:
+            continue
+        trouble = _unwritable(path)
+        if trouble is None and path.resolve() in taken:
+            trouble = f"'{path}' is {taken[path.resolve()]}", "give another name"
+        if trouble is not None:
+            faults.append(Diagnostic("BadFile", trouble[0], None, trouble[1]))
+        elif path.exists() and not path.is_file():
+            continue
+        taken[path.resolve()] = "given twice"
+    if faults:
+        raise InputError(faults)
+
+
+def _unwritable(path: Path) -> tuple[str, str] | None:
+    """What is wrong with an output file, and what would mend it."""
+    folder = path.parent
+    if path.is_dir():
+        return f"'{path}' is a folder", "give the name of a file"
+    if not folder.exists():
+        return f"the folder '{folder}' does not exist", f"mkdir -p {folder}"
+    if not folder.is_dir():
+        return f"'{folder}' is not a folder", "choose another place"
+    if not os.access(path if path.exists() else folder, os.W_OK):
+        return f"'{path}' may not be written", "choose another place, or change its permissions"
+    return None
+
+
+def writable_folder(path: Path | None) -> None:
+    """A folder to be written into, or made. Raises InputError (BadFile)."""
     if path is None:
         return
-    if path.is_dir():
-        raise InputError(
-            Diagnostic("File", f"'{path}' is a folder", None, "give the name of a file")
-        )
-    if not path.parent.is_dir():
-        message = f"the folder '{path.parent}' does not exist"
-        raise InputError(Diagnostic("File", message, None, f"mkdir -p {path.parent}"))
+    there = next(f for f in (path, *path.absolute().parents) if f.exists())
+    if not there.is_dir():
+        message, hint = f"'{there}' is a file, not a folder", "-o takes the name of a folder"
+        raise InputError(Diagnostic("BadFile", message, None, hint))
+    if not os.access(there, os.W_OK | os.X_OK):
+        message, hint = f"'{there}' may not be written", "choose another place"
+        raise InputError(Diagnostic("BadFile", message, None, hint))

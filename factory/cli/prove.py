@@ -28,7 +28,7 @@ def check(
     """Parse, compile and prove FILE.pag (or a net in FILE.pnml)."""
     from factory.checking import check_file, describe
 
-    writable(certificate)
+    writable(file, certificate)
     checked = check_file(file, folders, wip)
     if certificate is not None:
         from factory.files import write_text
@@ -90,11 +90,11 @@ def export(
     from factory.files import write_text
     from factory.pipeline import read
 
+    writable(file, output)
     known = exporters()
     if form not in known:
         hint = did_you_mean(form, list(known), "formats")
         raise InputError(Diagnostic("Usage", f"unknown format '{form}'", None, hint))
-    writable(output)
     text = known[form](read(file, folders).compile())
     if output is not None:
         write_text(output, text)

@@ -11,7 +11,9 @@ from functools import lru_cache
 import numpy as np
 
 from factory.control.laws import Setting, mode_of
-from factory.control.mode import Limits, Mode
+from factory.control.mode import Array, Limits, Mode
+from factory.control.navigation import Bundle
+from factory.errors import Diagnostic, InputError
 from factory.factory import Operation
 from factory.layout.dimensions import CARRIAGE
 from factory.layout.plan import Layout
@@ -22,8 +24,53 @@ from factory.template import Point, Template
 
 
 def operation_modes(layout: Layout, eps: float) -> tuple[Mode, ...]:
-    """F_p, D_p and G_p of every operation, in arc length. Raises InputError (NotPrepared)."""
-    return tuple(operation_mode(layout, operation, eps) for operation in layout.factory.operations)
+    """F_p, D_p and G_p of every operation, in arc length.
+
+    Raises InputError (NotPrepared) where the operations before leave the robots outside the domain of
+    a mode, or where one may hold another up for ever.
+    """
+    operations = layout.factory.operations
+    modes = tuple(operation_mode(layout, operation, eps) for operation in operations)
+    starts = operation_starts(layout)
+    count = len(layout.guidepaths)
+    limits = Limits(np.ones(count), np.ones(count))
+    bundle = Bundle.of(modes, [_chosen(limits, operation) for operation in operations])
+    inside = bundle.in_domain(np.concatenate(starts))
+    faults = [
+        _unprepared(operation, within)
+        for operation, mode, start, within in zip(operations, modes, starts, inside, strict=True)
+        if not within or (mode.trapped and not mode.clear_from(start))
+    ]
+    if faults:
+        raise InputError(faults)
+    return modes
+
+
+def operation_starts(layout: Layout) -> list[Array]:
+    """For each operation where its robots are when it starts (k,): where the ones before left them."""
+    factory = layout.factory
+    left: dict[tuple[int, int], float] = {}
+    for robot in factory.robots:
+        for step, number in enumerate(robot.operations):
+            before = factory.operations[robot.operations[step - 1]]
+            left[number, robot.index] = layout.goal(before.index, before.robots.index(robot.index))
+    return [np.array([left[o.index, robot] for robot in o.robots]) for o in factory.operations]
+
+
+def _chosen(limits: Limits, operation: Operation) -> Limits:
+    robots = list(operation.robots)
+    return Limits(limits.speed[robots], limits.acceleration[robots])
+
+
+def _unprepared(operation: Operation, inside: bool) -> Diagnostic:
+    what = (
+        "its robots may hold each other up for ever"
+        if inside
+        else "the operations before leave its robots outside its domain"
+    )
+    message = f"{operation.template.name}: '{operation.label}' cannot reach its goal; {what}"
+    position = operation.template.position or operation.position
+    return Diagnostic("NotPrepared", message, position, "let ~ join A ends to a B end or a station")
 
 
 def operation_mode(layout: Layout, operation: Operation, eps: float) -> Mode:
@@ -83,4 +130,4 @@ def robot_limits(
     return Limits(speed, np.full(count, settings.acceleration)), draw[1]
 
 
-__all__ = ["is_tool", "operation_mode", "operation_modes", "robot_limits"]
+__all__ = ["is_tool", "operation_mode", "operation_modes", "operation_starts", "robot_limits"]

@@ -11,7 +11,6 @@ looked at again: where the carrier brings a pile as well, the other waits at its
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
 
 import numpy as np
 import shapely
@@ -28,6 +27,7 @@ from factory.layout.dimensions import (
     FINGER_LOW,
     FINGER_TOP,
     PAYLOAD,
+    PAYLOADS,
 )
 from factory.layout.plan import Box, Layout
 from factory.layout.sweeps import (
@@ -151,13 +151,17 @@ class _Search:
         """Whether two regions that are near in plan are never taken at once, or are apart in height."""
         kinds = {one.kind, other.kind}
         if one.robot == other.robot and OUTFEED in kinds:
-            return True
+            return self._serves(one) and self._serves(other)
         if BOOM in kinds and kinds <= {BOOM, PAYLOAD_BODY}:
             gap = max(one.z[0] - other.z[1], other.z[0] - one.z[1])
             return gap >= self.layout.clearance - TOLERANCE
         if kinds != {PAYLOAD_BODY}:
             return False
         return self._joined(one, other) or self._joined(other, one) or self._in_turn(one, other)
+
+    def _serves(self, region: Region) -> bool:
+        """Whether the outfeed takes a region in: itself, the robot under it, the product let go."""
+        return region.kind != PAYLOAD_BODY or region.mode == self.layout.factory.dropoff.index
 
     def _joined(self, one: Region, other: Region) -> bool:
         """Whether one is coupled in a mode of the other's robot."""
@@ -227,35 +231,52 @@ def _fault(layout: Layout, message: str, found: tuple[Region, ...], lacking: flo
 def _standoffs(layout: Layout, found: Mapping[str, Pile]) -> Iterator[Fault]:
     """Where a carrier brings a pile itself: what is brought to it is clear of the pile's way as long as
     it waits at its standoff, and waits no farther away than where it comes from."""
+    legs = _legs(layout)
     for operation in layout.factory.operations[:-1]:
         carrier = operation.template.carrier - 1
-        if operation.before[carrier] == NOPART or len(operation.robots) == 1:
+        if operation.before[carrier] == NOPART or len(operation.inputs) == 1:
             continue
-        pile = _way(layout, found, operation, carrier)
+        pile = _way(layout, found, operation, carrier, legs)
         for slot, label in enumerate(operation.before):
             if slot == carrier or label == NOPART:
                 continue
-            robot = operation.robots[slot]
-            stops = goals(layout, robot)
-            room = stops[-2] - stops[-1] - layout.standoff(operation, slot)
+            guest = _way(layout, found, operation, slot, legs)
+            start, end = legs[operation.index, guest.robot]
+            room = start - end - layout.standoff(operation, slot)
             if room < -TOLERANCE:
-                name = layout.factory.robots[robot].name
+                name = layout.factory.robots[guest.robot].name
                 message = (
-                    f"{name} waits {-room * 1000:.1f} mm before its guidepath's last station for"
-                    f" '{operation.label}': it could never start"
+                    f"{name} waits for '{operation.label}' {-room * 1000:.1f} mm behind the last"
+                    " station of its guidepath: it could never start"
                 )
-                yield _fault(layout, message, (Region(robot, 2, 0, pile.box, pile.z, label),), -room)
-            yield from _met(layout, pile, _way(layout, found, operation, slot))
+                yield _fault(layout, message, (guest,), -room)
+            yield from _met(layout, pile, guest)
 
 
-def _way(layout: Layout, found: Mapping[str, Pile], operation: Operation, slot: int) -> Region:
+def _legs(layout: Layout) -> dict[tuple[int, int], tuple[float, float]]:
+    """From where to where (arc lengths) each robot goes in each of its operations."""
+    found: dict[tuple[int, int], tuple[float, float]] = {}
+    for robot in layout.factory.robots:
+        stops = goals(layout, robot.index)
+        for step, number in enumerate(robot.operations):
+            found[number, robot.index] = stops[step - 1], stops[step]
+    return found
+
+
+def _way(
+    layout: Layout,
+    found: Mapping[str, Pile],
+    operation: Operation,
+    slot: int,
+    legs: Mapping[tuple[int, int], tuple[float, float]],
+) -> Region:
     """What a robot's payload sweeps in a mode before its gate opens."""
-    robot, label = operation.robots[slot], operation.before[slot]
-    stops, gear = goals(layout, robot), layout.factory.robots[robot].operations
-    step = gear.index(operation.index)
-    end = stops[step] + layout.standoff(operation, slot)
-    box = sweep(layout.guidepaths[robot], found[label].box, max(stops[step - 1], end), end)
-    return Region(robot, 2, PAYLOAD_BODY, box, found[label].z, label, operation.index)
+    robot, pile = operation.robots[slot], found[operation.before[slot]]
+    start, end = legs[operation.index, robot]
+    end += layout.standoff(operation, slot)
+    box = sweep(layout.guidepaths[robot], pile.box, max(start, end), end)
+    label = operation.before[slot]
+    return Region(robot, PAYLOADS, PAYLOAD_BODY, box, pile.z, label, operation.index)
 
 
 def _met(layout: Layout, pile: Region, guest: Region) -> Iterator[Fault]:
@@ -269,13 +290,6 @@ def _met(layout: Layout, pile: Region, guest: Region) -> Iterator[Fault]:
             f" {layout.clearance * 1000:g} mm are needed"
         )
         yield _fault(layout, message, (guest, pile), layout.clearance - gap)
-
-
-@dataclass(frozen=True, slots=True)
-class Tightness:
-    """How much shorter each guidepath could be before the certificate breaks [m], by robot."""
-
-    slack: tuple[float, ...]
 
 
 __all__ = ["Certificate", "certify", "separation"]

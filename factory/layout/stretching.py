@@ -12,8 +12,10 @@ in t is its extent along the path it ends on. Every box has half a clearance aro
 
 from __future__ import annotations
 
+from bisect import bisect_left
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import accumulate
 from math import ceil
 
 from factory.errors import Diagnostic, InputError
@@ -128,11 +130,13 @@ class _Builder:
     ) -> None:
         self.shape, self.subtrees, self.sides, self.choose = shape, subtrees, sides, choose
         self.c, self.half = clearance, clearance.c / 2
+        self.post = {-1: NOTHING, +1: NOTHING}
         self.strip = {side: self._strip(side) for side in (-1, +1)}
         self.frontier = {side: [NOTHING] * 3 for side in (-1, +1)}
         self.boom = NOTHING
         self.station = 0.0
-        self.count = 0
+        self.piles: list[tuple[float, Extent]] = []
+        self.guests: list[tuple[int, float]] = []
         self.tree = Subtree()
         for layer, half in ((CARRIAGES, CARRIAGE / 2), (ARMS, MAST / 2)):
             behind = -shape.reach - half - self.half
@@ -140,10 +144,14 @@ class _Builder:
 
     def _strip(self, side: int) -> list[float]:
         """How far to a side the robot's own path takes the floor, by layer."""
-        lane, payload = side * self.shape.offset, self.shape.last[3] * (side > 0)
-        payload -= self.shape.last[2] * (side < 0)
-        widths = [lane + CARRIAGE / 2, lane + MAST / 2, NOTHING if self.shape.tool else payload]
-        return [width + self.half for width in widths]
+        lane = side * self.shape.offset + self.half
+        payload = NOTHING if self.shape.tool else self._payload_strip(side, self.shape.last)
+        return [lane + CARRIAGE / 2, lane + MAST / 2, payload]
+
+    def _payload_strip(self, side: int, pile: Extent) -> float:
+        """How far to a side a pile reaches, and its feeder's post if there is one."""
+        width = pile[3] if side > 0 else -pile[2]
+        return max(width, self.post[side]) + self.half
 
     def _include(self, layer: int, ulo: float, uhi: float) -> None:
         """Something on the robot's own path."""
@@ -154,27 +162,31 @@ class _Builder:
         """Places one operation; the distance of its station from B [m]."""
         guests = [r for r in operation.robots if r != operation.carrier]
         _check_guests(operation, guests)
-        if self.count == 0:
+        if not self.piles:
             self._choose_mates(guests)
             if not guests:
                 self._feeder(self.shape.piles[operation.index])
         elif self.choose:
             self._choose_sides(guests)
         pile = self.shape.piles[operation.index]
-        if self.count:
+        if self.piles:
             wanted = [self.station, *(self._earliest(guest) for guest in guests)]
             if len(operation.inputs) > 1:
                 wanted.append(self.boom + self.c.c - pile[0])
             self.station = up(max(wanted))
         for guest in guests:
-            self._attach(guest)
+            self._take_up(guest)
         at = self.station + _ahead(operation, self.shape.reach)
         self._include(PAYLOADS, at + pile[0] - self.half, at + pile[1] + self.half)
-        self.count += 1
+        self.piles.append((at, pile))
         return self.station
 
     def finish(self) -> Subtree:
         """The subtree, ready to be attached; a tool comes a fixed way."""
+        starts = [at + pile[0] - self.half for at, pile in self.piles]
+        starts = list(accumulate(reversed(starts), min))[::-1]
+        for guest, station in self.guests:
+            self._attach(guest, station, starts)
         if self.shape.tool:
             self.tree.travel = TOOL_TRAVEL
         return self.tree
@@ -185,8 +197,8 @@ class _Builder:
         post = -self.c.post(self.shape.reach, part[0])
         room = POST / 2 + self.half
         for side in (-1, +1):
-            lane = side * self.shape.offset + room
-            self.strip[side] = [max(lane, width) for width in self.strip[side]]
+            self.post[side] = side * self.shape.offset + POST / 2
+            self.strip[side] = [max(self.post[side] + self.half, w) for w in self._strip(side)]
         for layer in LAYERS:
             self._include(layer, post - room, post + room)
         self.boom = round((part[0] + part[1]) / 2, 3)
@@ -218,24 +230,36 @@ class _Builder:
             self.sides[guest] = -1 if left <= right else +1
 
     def _outward(self, guest: int, side: int) -> float:
-        return self._travel(guest, side) - min(self.subtrees[guest].back)
+        return self._travel(guest, self.strip[side]) - min(self.subtrees[guest].back)
 
-    def _travel(self, guest: int, side: int) -> float:
+    def _travel(self, guest: int, strip: Sequence[float]) -> float:
         """How far a guest must come so that, at its B end, its subtree is clear of this path."""
-        tree, strip = self.subtrees[guest], self.strip[side]
+        tree = self.subtrees[guest]
         clear = max(tree.front[layer] + strip[layer] for layer in LAYERS)
         return up(max(tree.travel, clear, self.c.c))
 
-    def _attach(self, guest: int) -> None:
-        side, tree = self.sides[guest], self.subtrees[guest]
-        tree.travel = self._travel(guest, side)
+    def _take_up(self, guest: int) -> None:
+        """The floor along this path that a guest's subtree needs, beginning at its station."""
+        frontier, tree = self.frontier[self.sides[guest]], self.subtrees[guest]
+        self.guests.append((guest, self.station))
         for layer in LAYERS:
-            ulo, uhi = self.station + tree.low[layer], self.station + tree.high[layer]
-            if ulo > uhi:
+            frontier[layer] = max(frontier[layer], self.station + tree.high[layer])
+
+    def _attach(self, guest: int, station: float, starts: Sequence[float]) -> None:
+        """Fixes a guest's travel. Only the piles that come so far back are beside its subtree: the last
+        of them is the widest, and `starts` are the least starts of each pile and those after it."""
+        side, tree = self.sides[guest], self.subtrees[guest]
+        strip = list(self.strip[side])
+        beside = bisect_left(starts, station + tree.high[PAYLOADS])
+        if not self.shape.tool:
+            strip[PAYLOADS] = self._payload_strip(side, self.piles[max(beside, 1) - 1][1])
+        tree.travel = self._travel(guest, strip)
+        for layer in LAYERS:
+            if tree.low[layer] > tree.high[layer]:
                 continue
-            self.frontier[side][layer] = max(self.frontier[side][layer], uhi)
             far = tree.travel - tree.back[layer]
-            self.tree.include(layer, ulo, uhi, *((-far, 0.0) if side < 0 else (0.0, far)))
+            across = (-far, 0.0) if side < 0 else (0.0, far)
+            self.tree.include(layer, station + tree.low[layer], station + tree.high[layer], *across)
 
 
 def _ahead(operation: Operation, reach: float) -> float:

@@ -14,9 +14,9 @@ from pathlib import Path
 from types import MappingProxyType
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
+from xml.sax.saxutils import quoteattr
 
 from factory.factory import Factory
-from factory.files import write_bytes
 from factory.layout.dimensions import PAYLOAD
 from factory.layout.plan import Layout
 from factory.mjcf import names
@@ -122,6 +122,7 @@ def build_model(
     add_parts(world, layout, copies)
     _welds(equality, layout, copies)
     root.extend([equality, actuator])
+    _home(add(root, "keyframe"), layout, actuator)
     ElementTree.indent(root)
     xml = ElementTree.tostring(root, encoding="unicode") + "\n"
     joints = len(factory.robots) + sum(copies.values())
@@ -130,22 +131,16 @@ def build_model(
 
 def product_name(factory: Factory) -> str:
     """The name of the model: that of the PAG file, without folder and ending."""
-    return Path(factory.pag.file).stem or "factory"
+    name = "".join(c if c.isprintable() else "?" for c in Path(factory.pag.file).stem)
+    return name or "factory"
 
 
-def write_model(model: Model, path: Path) -> list[Path]:
-    """Writes the XML and, beside it, its mesh folder `NAME_meshes`; both or nothing. Gives the files."""
+def model_files(model: Model, path: Path) -> dict[Path, bytes]:
+    """The XML at `path` and, beside it, its mesh folder `NAME_meshes`: what to write where."""
     folder = path.with_name(f"{path.stem}_meshes")
-    xml = model.xml.replace('meshdir="meshes"', f'meshdir="{folder.name}"', 1)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    if model.files:
-        folder.mkdir(exist_ok=True)
-    written = []
-    for name, content in model.files.items():
-        written.append(folder / name)
-        write_bytes(folder / name, content)
-    write_bytes(path, xml.encode())
-    return [path, *written]
+    xml = model.xml.replace('meshdir="meshes"', f"meshdir={quoteattr(folder.name)}", 1)
+    meshes = {folder / name: content for name, content in model.files.items()}
+    return {path: xml.encode(errors="surrogateescape"), **meshes}
 
 
 def _drive(factory: Factory, robot: int, masses: Mapping[str, float], settings: Settings) -> Drive:
@@ -226,6 +221,19 @@ def _robots(
             add_follower(body, layout)
         world.append(body)
         actuator.extend(actuators)
+
+
+def _home(keyframe: Element, layout: Layout, actuator: Element) -> None:
+    """The keyframe `home`: setpoints at which every robot stays at the end B of its guidepath."""
+    ends = {
+        names.drive(robot.name): path.length
+        for robot, path in zip(layout.factory.robots, layout.guidepaths, strict=True)
+    }
+    setpoints: list[float] = []
+    for element in actuator:
+        inputs = len((element.get("input") or "pos").split())
+        setpoints += [ends.get(element.get("name") or "", 0.0), *[0.0] * (inputs - 1)]
+    add(keyframe, "key", name="home", ctrl=tuple(setpoints))
 
 
 def _role(factory: Factory, robot: int) -> str:
@@ -314,4 +322,4 @@ def _weld(
     add(equality, "weld", name=name, body1=body1, body2=body2, relpose=numbers(pose), active=active)
 
 
-__all__ = ["PAYLOAD", "Model", "build_model", "feeder_middle", "part_copies", "write_model"]
+__all__ = ["PAYLOAD", "Model", "build_model", "feeder_middle", "model_files", "part_copies"]

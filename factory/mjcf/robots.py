@@ -140,7 +140,7 @@ def _stretch(body: Element, path: Guidepath, lift: float) -> None:
         elif kind.startswith("finger"):
             _span(geom, rim - 0.01, nest)
         elif kind.startswith("pin"):
-            top = PAYLOAD + lift - 1e-4
+            top = PAYLOAD + lift - 1e-3
             radius = (geom.get("size") or "0.006").split()[0]
             geom.set("size", f"{radius} {number(max(top - FINGER_TOP, 1e-3) / 2)}")
             geom.set("pos", numbers((nest, 0, (top + FINGER_TOP) / 2)))

@@ -213,7 +213,7 @@ def _feeder(world: Element, layout: Layout, label: str) -> None:
     x, y = feeder_middle(layout, label)
     body = add(world, "body", name=feeder(label), pos=(x, y, 0.0), quat=heading_quaternion(path))
     across = path.offset * _handedness(path.heading, path.side)
-    rear = project(layout.payloads[label], path.heading, path.side)[0]
+    rear, front, _, _ = project(layout.payloads[label], path.heading, path.side)
     back = -Clearance(layout.clearance).post(path.reach, rear)
     top = PAYLOAD + float(solid.high[2] - product.low[2]) + layout.clearance
     beam = 0.014
@@ -227,7 +227,7 @@ def _feeder(world: Element, layout: Layout, label: str) -> None:
         size=(POST / 2, POST / 2, (top + beam) / 2),
         material="post",
     )
-    ahead = path.nest
+    ahead = round((rear + front) / 2, 3)
     add(
         body,
         "geom",

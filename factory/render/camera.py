@@ -53,6 +53,15 @@ class View:
     distance: float
     depth: float
 
+    @property
+    def range(self) -> tuple[float, float]:
+        """From where to where something is drawn [m]: tightly, or shadows get speckles. The far end is
+        where the floor meets the upper edge of the picture."""
+        up, ahead = self.axes[1][2], self.axes[2][2]
+        far = float(self.position[2]) / max(-ahead - self.tall * up, 0.06)
+        near = max(0.1 * self.distance, 0.7 * (self.distance - self.depth))
+        return near, max(1.05 * far, self.distance + self.depth)
+
 
 def camera_named(name: str) -> Camera:
     """Raises InputError (BadValue) for a name that no camera has."""

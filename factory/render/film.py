@@ -16,7 +16,7 @@ from factory.log import Log
 from factory.render.camera import Camera, camera_named
 from factory.render.caption import Caption, Words
 from factory.render.painter import Painter, Pixels
-from factory.render.subject import Snapshot
+from factory.render.subject import Snapshot, held
 from factory.render.video import VideoFile, check_output
 
 if TYPE_CHECKING:
@@ -63,6 +63,11 @@ class Take:
     size: Size
     camera: Camera
     caption: bool
+
+    @property
+    def best(self) -> bool:
+        """Whether a still at the end is better taken while the finished product can be seen."""
+        return self.camera == "product"
 
 
 class Camerawork:
@@ -162,7 +167,10 @@ class Film(_Observer):
 
 
 class Still(_Observer):
-    """A still (PNG) of a run at a time [s], or at its end; written when it is closed."""
+    """A still (PNG) of a run at a time [s], or at its end; written when it is closed.
+
+    For the camera `product` the end is when the output robot last holds a product.
+    """
 
     def __init__(
         self,
@@ -175,15 +183,18 @@ class Still(_Observer):
     ) -> None:
         check_output(path, size, still=True)
         super().__init__(simulation, size, camera, caption)
-        self.path, self.at = Path(path), at
+        self.path, self.at, self.held = Path(path), at, False
 
     def __enter__(self) -> Still:
         return self
 
     def observe(self, world: Any, supervisor: Any) -> None:
         """Keep the state if it may be the one."""
-        if self.at == "end" or self.last.time < self.at:
-            self.last = self._moment()
+        if self.at != "end" and self.last.time >= self.at:
+            return
+        now = self._moment()
+        if self.at != "end" or not self.take.best or held(world.m, now.shown) or not self.held:
+            self.last, self.held = now, self.held or held(world.m, now.shown)
 
     def close(self) -> None:
         """Take the picture."""
@@ -257,8 +268,7 @@ def render_log(
         caption,
     )
     if is_still:
-        row = len(log) - 1 if at == "end" else int(np.searchsorted(log.time, at - 1e-9))
-        _save(take, moment_of(log, min(row, len(log) - 1)), Path(path))
+        _save(take, moment_of(log, _row(log, take, at)), Path(path))
         return 1
     reel = Reel(take, Path(path), fps)
     try:
@@ -267,6 +277,15 @@ def render_log(
     finally:
         reel.close()
     return reel.frames
+
+
+def _row(log: Log, take: Take, at: When) -> int:
+    """The row of a log that a still at that time shows."""
+    last = len(log) - 1
+    if at != "end":
+        return min(int(np.searchsorted(log.time, at - 1e-9)), last)
+    rows = range(last, -1, -1) if take.best else ()
+    return next((row for row in rows if held(take.m, moment_of(log, row).shown)), last)
 
 
 def moment_of(log: Log, row: int) -> Moment:

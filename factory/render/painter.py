@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from factory import gl
 from factory.engine import mujoco
-from factory.render.camera import Camera, Frame, View, fit, from_above, overview, towards
+from factory.render.camera import Array, Camera, Frame, View, fit, from_above, overview, towards
 from factory.render.subject import Followed, Snapshot, extent
 
 Pixels = NDArray[np.uint8]
@@ -22,7 +22,7 @@ SOFT = 0.11
 """Radius of the sun as a still sees it [rad]: the softness of shadows."""
 
 LAG = 0.25
-"""Time in which the camera comes up with the product it follows [s]."""
+"""Time in which the camera goes from one product to the next [s]."""
 
 
 class Painter:
@@ -56,8 +56,9 @@ class Painter:
         self.frame = Frame(self.width / self.height, below=0.03 + caption)
         self.points = extent(m, self.d)
         self.followed = Followed(m) if camera == "product" else None
-        self.middle: NDArray[np.float64] | None = None
-        self.glide = np.zeros(3)
+        self.wanted: Array | None = None
+        self.body = -1
+        self.away, self.glide = np.zeros(3), np.zeros(3)
         self.shadows = int((m.jnt_type == mujoco.mjtJoint.mjJNT_SLIDE).sum()) <= MANY
         self.held = gl.context(*size)
         self.scene = mujoco.MjvScene(m, maxgeom=m.ngeom + 100)
@@ -114,23 +115,35 @@ class Painter:
 
     def _following(self, shown: Snapshot, elapsed: float) -> View:
         assert self.followed is not None
-        wanted = self.followed.place(self.d, shown)
-        if wanted is None:
-            wanted = self.middle if self.middle is not None else self.points.mean(axis=0)
-        if self.middle is None or elapsed <= 0.0:
-            self.middle, self.glide = wanted, np.zeros(3)
+        wanted, body = self._wanted(shown)
+        if elapsed <= 0.0 or self.wanted is None:
+            self.away, self.glide = np.zeros(3), np.zeros(3)
         else:
-            self._glide(wanted, elapsed)
+            if body != self.body:
+                self.away = self.away + self.wanted - wanted
+            self._glide(elapsed)
+        self.wanted, self.body = wanted, body
         box = self.followed.box
         about = box.mean(axis=0) + 1.45 * (box - box.mean(axis=0))
-        return fit(self.middle + about, towards(-122.0, 32.0), self.frame)
+        return fit(wanted + self.away + about, towards(-122.0, 44.0), self.frame)
 
-    def _glide(self, wanted: NDArray[np.float64], elapsed: float) -> None:
-        """One step of a critically damped spring, exact for any step."""
-        assert self.middle is not None
-        decay, away = np.exp(-elapsed / LAG), self.middle - wanted
-        push = (self.glide + away / LAG) * elapsed
-        self.middle = wanted + (away + push) * decay
+    def _wanted(self, shown: Snapshot) -> tuple[Array, int]:
+        """Where the camera should look, and the body it follows there. A product that nobody holds
+        any more is let go: the camera stays until it is gone."""
+        assert self.followed is not None
+        found = self.followed.furthest(self.d, shown)
+        if found is None:
+            return (self.points.mean(axis=0) if self.wanted is None else self.wanted), self.body
+        body, rank = found
+        if rank == np.inf and body == self.body and self.wanted is not None:
+            return self.wanted, body
+        return np.array(self.d.xpos[body]), body
+
+    def _glide(self, elapsed: float) -> None:
+        """The way still to go after a change of body, one step of a critically damped spring
+        later."""
+        decay, push = np.exp(-elapsed / LAG), (self.glide + self.away / LAG) * elapsed
+        self.away = (self.away + push) * decay
         self.glide = (self.glide - push / LAG) * decay
 
     # --- drawing -----------------------------------------------------------------------------------
@@ -147,10 +160,9 @@ class Painter:
         mujoco.mjr_render(self.rectangle, scene, self.drawing)
         mujoco.mjr_readPixels(self.pixels, None, self.rectangle, self.drawing)
 
-    def _aim(self, view: View, shift: NDArray[np.float64]) -> None:
+    def _aim(self, view: View, shift: Array) -> None:
         """Set the scene's cameras to a view, moved by a fraction of a pixel."""
-        near = max(0.2 * view.distance, view.distance - view.depth - 0.5 * view.distance)
-        far = view.distance + view.depth + 4 * view.distance
+        near, far = view.range
         dx = shift[0] * 2 * view.wide / self.width
         dy = shift[1] * 2 * view.tall / self.height
         for camera in self.scene.camera:
@@ -172,10 +184,10 @@ class Painter:
             elif light.castshadow:
                 if sample is not None:
                     light.dir = _moved(np.asarray(light.dir, float), sample)
-                light.pos = middle - view.distance * np.asarray(light.dir, float)
+                light.pos = middle - sum(view.range) / 2 * np.asarray(light.dir, float)
 
 
-def _moved(direction: NDArray[np.float64], sample: tuple[int, int]) -> NDArray[np.float64]:
+def _moved(direction: Array, sample: tuple[int, int]) -> Array:
     """A direction moved inside a disc of radius SOFT, the samples evenly spread over it."""
     n, count = sample
     radius, angle = SOFT * ((n + 0.5) / count) ** 0.5, n * 2.399963
@@ -186,7 +198,7 @@ def _moved(direction: NDArray[np.float64], sample: tuple[int, int]) -> NDArray[n
     return np.asarray(moved / np.linalg.norm(moved))
 
 
-def _halton(n: int) -> NDArray[np.float64]:
+def _halton(n: int) -> Array:
     """The n-th point of an even sequence in the unit square."""
     return np.array([_radical(n, 2), _radical(n, 3)])
 

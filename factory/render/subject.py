@@ -121,17 +121,21 @@ class Followed:
         low, high = every.min(axis=0), every.max(axis=0)
         return np.asarray((low + high) / 2 + SIGNS * (high - low) / 2)
 
-    def place(self, d: mujoco.MjData, shown: Snapshot) -> Array | None:
-        """The origin (3,) of the followed part in the product furthest on its way; None if there is
-        none."""
+    def furthest(self, d: mujoco.MjData, shown: Snapshot) -> tuple[int, float] | None:
+        """The body of the followed part in the product furthest on its way, and how far it is:
+        infinitely where no robot holds it any more. None if no copy is in the factory."""
         rank = dict.fromkeys(self.copies, np.inf)
         for e, body in zip(shown.active.tolist(), shown.body2.tolist(), strict=True):
             if body in rank:
                 rank[body] = min(rank[body], self.rank[e])
         seen = [b for b in self.copies if rank[b] >= 0 and d.xpos[b, 2] > 0]
-        if not seen:
-            return None
-        return np.array(d.xpos[max(seen, key=lambda b: rank[b])])
+        return max(((b, rank[b]) for b in seen), key=lambda pair: pair[1], default=None)
+
+
+def held(m: mujoco.MjModel, shown: Snapshot) -> bool:
+    """Whether the output robot, the first, holds a product."""
+    grip = names.grip("r1", "")
+    return any(m.equality(e).name.startswith(grip) for e in shown.active.tolist())
 
 
 def _counts(words: list[str]) -> dict[str, int]:

@@ -59,7 +59,7 @@ class VideoFile:
         self.path, self.frames = path, 0
         self.partial = path.with_name(f".{path.name}.part")
         av = _av()
-        rate = Fraction(fps).limit_denominator(1001)
+        self.rate = rate = Fraction(fps).limit_denominator(1001)
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
             options = {"cluster_time_limit": "500", "flush_packets": "1"}
@@ -76,7 +76,7 @@ class VideoFile:
         coder.gop_size = max(1, round(fps))
         coder.color_range, coder.colorspace = 1, 1
         coder.color_primaries, coder.color_trc = 1, 1
-        coder.options = {"crf": "19", "preset": "fast", "rc-lookahead": "8", "bf": "2"}
+        coder.options = {"crf": "19", "preset": "fast", "rc-lookahead": "8", "bf": "0"}
 
     def __enter__(self) -> VideoFile:
         return self
@@ -112,11 +112,12 @@ class VideoFile:
         elif self.path.suffix.lower() == ".mkv":
             self.partial.replace(self.path)
         else:
-            _rewrap(self.partial, self.path)
+            _rewrap(self.partial, self.path, self.rate)
 
 
-def _rewrap(source: Path, target: Path) -> None:
-    """The same video as MP4, its index first, as browsers like it."""
+def _rewrap(source: Path, target: Path, rate: Fraction) -> None:
+    """The same video as MP4, its index first, as browsers like it. Matroska's times are whole
+    milliseconds; without B-frames packet n is frame n, and its time n / rate."""
     av = _av()
     partial = target.with_name(f".{target.name}.mp4.part")
     try:
@@ -125,10 +126,12 @@ def _rewrap(source: Path, target: Path) -> None:
             av.open(str(partial), "w", format="mp4", options={"movflags": "faststart"}) as new,
         ):
             stream = new.add_stream_from_template(old.streams.video[0])
-            for packet in old.demux(video=0):
-                if packet.dts is not None:
-                    packet.stream = stream
-                    new.mux(packet)
+            packets = (packet for packet in old.demux(video=0) if packet.size)
+            for number, packet in enumerate(packets):
+                packet.stream, packet.time_base = stream, 1 / rate
+                packet.pts = packet.dts = number
+                packet.duration = 1
+                new.mux(packet)
         partial.replace(target)
         source.unlink()
     finally:

@@ -151,7 +151,7 @@ class MujocoWorld:
 
 
 def load(model: Model) -> mujoco.MjModel:
-    """The engine's model of what `write_model` writes."""
+    """The engine's model of what `model_files` gives."""
     xml = model.xml
     files: Mapping[str, bytes] = {
         f"meshes/{name}": content for name, content in model.files.items()
