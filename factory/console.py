@@ -69,5 +69,7 @@ def table(title: str, columns: tuple[str, ...], rows: Iterable[tuple[str, ...]])
         made.add_column(column, overflow="fold")
     for row in rows:
         made.add_row(*(Text(cell) for cell in row))
-    width = None if sys.stdout.isatty() else 160
-    Console(width=width, highlight=False).print(made)
+    console = Console(width=None if sys.stdout.isatty() else 160, highlight=False)
+    with console.capture() as printed:
+        console.print(made)
+    print(printed.get(), end="")

@@ -39,8 +39,10 @@ def write_all(contents: Mapping[Path, bytes]) -> None:
             partial.write_bytes(content)
         for target, partial in partials.items():
             partial.replace(target)
-    except BaseException:
+    except BaseException as error:
         _remove(partials.values(), made)
+        if isinstance(error, OSError) and error.filename is None:
+            error.filename = str(path)
         raise
 
 

@@ -1,8 +1,8 @@
 """The geometry of a product: a solid for each part, in the frame of the finished product.
 
-Shapes written in the PAG are taken as they are; meshes are read with trimesh; parts with no geometry
-get a box in a cubic lattice of at most 0.2 m. A mesh that the engine cannot use falls back to its convex
-hull or its box, with a warning that names it.
+Shapes written in the PAG are taken as they are; meshes are read with trimesh; parts with no
+geometry get a box in a cubic lattice of at most 0.2 m. A mesh that the engine cannot use falls back
+to its convex hull or its box, with a warning that names it.
 """
 
 from __future__ import annotations
@@ -14,12 +14,10 @@ from pathlib import Path
 from types import MappingProxyType
 
 import numpy as np
-from numpy.typing import NDArray
 
 from factory.errors import Diagnostic, InputError, Position
+from factory.meshes import LEAST_MASS, Array, Measured, Mesh, measured, sound, usable
 from factory.pag import PAG, Assembly
-
-Array = NDArray[np.float64]
 
 DENSITY = 1000.0
 """Density of a part that states neither mass nor density [kg/m³]."""
@@ -33,26 +31,29 @@ CELL = 0.06
 LONGEST, SHORTEST = 5.0, 0.005
 """A product outside these lengths [m] gets a warning."""
 
-MOST_FACES = 150_000
-"""A mesh of more faces is replaced by its convex hull."""
-
-
-@dataclass(frozen=True, slots=True)
-class Mesh:
-    """A triangle mesh in metres, in its own frame: vertices (n, 3), faces (m, 3)."""
-
-    name: str
-    vertices: Array = field(repr=False)
-    faces: NDArray[np.int64] = field(repr=False)
+PALETTE = (
+    (0.035, 0.58, 0.88),
+    (0.560, 0.55, 0.66),
+    (0.110, 0.42, 0.95),
+    (0.420, 0.36, 0.68),
+    (0.960, 0.42, 0.72),
+    (0.600, 0.30, 0.86),
+    (0.075, 0.62, 0.62),
+    (0.760, 0.26, 0.58),
+    (0.240, 0.42, 0.74),
+    (0.500, 0.50, 0.56),
+)
+"""Hue, saturation and value of parts with no colour of their own; later rounds turn the hue."""
 
 
 @dataclass(frozen=True, slots=True)
 class Solid:
     """A part as a solid. Arrays are in the frame of the finished product unless said otherwise.
 
-    `kind` is box, cylinder, sphere or mesh; `size` its half lengths as MJCF writes them [m]; `position`
-    (3,) and `quaternion` (4,) place it; `mass` [kg], `centre` (3,) of mass, `inertia` (3, 3) about it
-    [kg m²]; `low`, `high` (3,) its bounding box; `corners` (n, 3) the vertices of its hull.
+    `kind` is box, cylinder, sphere or mesh; `size` its half lengths as MJCF writes them [m];
+    `position` (3,) and `quaternion` (4,) place it; `mass` [kg], `centre` (3,) of mass, `inertia`
+    (3, 3) about it [kg m²]; `low`, `high` (3,) its bounding box; `corners` (n, 3) the vertices of
+    its hull.
     """
 
     label: str
@@ -72,7 +73,8 @@ class Solid:
 
 @dataclass(frozen=True)
 class Product:
-    """The solids of a product's parts by label, its bounding box and what there is to warn about."""
+    """The solids of a product's parts by label, its bounding box and what there is to warn
+    about."""
 
     solids: Mapping[str, Solid]
     low: Array
@@ -147,18 +149,6 @@ def _box_in_lattice(node: Assembly, number: int, cells: tuple[int, float], lift:
     return _primitive(node, "box", half, place, np.array([1.0, 0, 0, 0]), number)
 
 
-@dataclass(frozen=True, slots=True)
-class _Measured:
-    """A mesh, what was wrong with it, and its mass properties for unit density."""
-
-    mesh: Mesh
-    trouble: str
-    volume: float
-    centre: Array
-    inertia: Array
-    hull: Array
-
-
 class _Reader:
     """Reads shapes, collecting errors and warnings; a mesh file is read once."""
 
@@ -166,7 +156,7 @@ class _Reader:
         self.folder = folder
         self.errors: list[Diagnostic] = []
         self.warnings: list[Diagnostic] = []
-        self._meshes: dict[tuple[str, float], _Measured | None] = {}
+        self._meshes: dict[tuple[str, float], Measured | None] = {}
 
     def solid(self, node: Assembly, number: int) -> Solid | None:
         place = np.array(node.parameter("pos", (0.0, 0.0, 0.0)), float)
@@ -197,7 +187,7 @@ class _Reader:
             self.warnings.append(Diagnostic("BadMesh", f"{path} {found.trouble}", position, hint))
         return _from_mesh(node, found, place, quaternion, number)
 
-    def _read(self, node: Assembly, path: str, scale: float) -> _Measured | None:
+    def _read(self, node: Assembly, path: str, scale: float) -> Measured | None:
         import trimesh
 
         try:
@@ -207,7 +197,7 @@ class _Reader:
             if len(faces) == 0 or not np.isfinite(vertices).all():
                 raise ValueError("it has no triangles, or vertices that are not finite")
             mesh, trouble = usable(f"m{len(self._meshes)}", vertices, faces)
-            return _Measured(mesh, trouble, *_mass_properties(mesh))
+            return measured(mesh, trouble)
         except Exception as error:  # trimesh's readers raise anything on a broken file
             position = _value_position(node, "mesh")
             hint = "export it again as .obj, .stl, .ply or .glb with triangles"
@@ -215,25 +205,6 @@ class _Reader:
                 Diagnostic("BadMesh", f"cannot read '{path}': {error}", position, hint)
             )
             return None
-
-
-def usable(name: str, vertices: Array, faces: NDArray[np.int64]) -> tuple[Mesh, str]:
-    """A mesh that the engine accepts, and what was wrong with the one given ("" if nothing)."""
-    import trimesh
-
-    low, high = vertices.min(axis=0), vertices.max(axis=0)
-    extent = high - low
-    if extent.min() < 1e-3 * extent.max() or extent.min() < 1e-5:
-        thin = np.maximum(extent, max(1e-4, 2e-3 * float(extent.max())))
-        box = trimesh.creation.box(thin)
-        box.apply_translation((low + high) / 2)
-        return Mesh(name, box.vertices, box.faces), "is flat; its box is used instead"
-    if len(faces) > MOST_FACES:
-        hull = trimesh.Trimesh(vertices, faces, process=False).convex_hull
-        return Mesh(name, hull.vertices, hull.faces), (
-            f"has {len(faces)} triangles; its convex hull is used instead"
-        )
-    return Mesh(name, vertices, faces), ""
 
 
 def _value_position(node: Assembly, name: str) -> Position | None:
@@ -263,7 +234,7 @@ def _primitive(
     turn = rotation(quaternion)
     corners = _corners(kind, size) @ turn.T + place
     reach = np.abs(turn) @ size if kind == "box" else _round_reach(kind, size, turn)
-    inertia = turn @ np.diag(mass * diagonal) @ turn.T
+    inertia = sound(turn @ np.diag(mass * diagonal) @ turn.T)
     return Solid(
         node.label,
         kind,
@@ -287,7 +258,7 @@ def _corners(kind: str, size: Array) -> Array:
         return np.concatenate([np.eye(3), -np.eye(3)]) * size[0]
     half = np.array([size[0], size[0], size[1]]) if kind == "cylinder" else size
     signs = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], float)
-    return signs * half
+    return np.asarray(signs * half)
 
 
 def _round_reach(kind: str, size: Array, turn: Array) -> Array:
@@ -299,7 +270,7 @@ def _round_reach(kind: str, size: Array, turn: Array) -> Array:
 
 
 def _from_mesh(
-    node: Assembly, found: _Measured, place: Array, quaternion: Array, number: int
+    node: Assembly, found: Measured, place: Array, quaternion: Array, number: int
 ) -> Solid:
     turn = rotation(quaternion)
     mass = _mass(node, found.volume)
@@ -312,7 +283,7 @@ def _from_mesh(
         quaternion,
         mass,
         turn @ found.centre + place,
-        turn @ (found.inertia * mass / found.volume) @ turn.T,
+        sound(turn @ (found.inertia * mass / found.volume) @ turn.T),
         corners.min(axis=0),
         corners.max(axis=0),
         colour(node, number),
@@ -321,36 +292,11 @@ def _from_mesh(
     )
 
 
-def _mass_properties(mesh: Mesh) -> tuple[float, Array, Array, Array]:
-    """Volume, centre of mass, inertia for unit density, vertices of the hull. An open mesh, or one
-    that is inside out somewhere, has those of its convex hull."""
-    import trimesh
-
-    body = trimesh.Trimesh(mesh.vertices, mesh.faces, process=False)
-    hull = body.convex_hull
-    for solid in (body, hull, hull.bounding_box):
-        if not solid.is_watertight or not solid.volume > 0:
-            continue
-        properties = solid.mass_properties
-        inertia = np.asarray(properties.inertia) / float(properties.density)
-        if is_inertia(inertia):
-            break
-    centre = np.asarray(properties.center_mass)
-    return float(properties.volume), centre, inertia, np.asarray(hull.vertices)
-
-
-def is_inertia(matrix: Array) -> bool:
-    """Whether a symmetric matrix (3, 3) can be the inertia of a body: principal moments positive, and
-    none larger than the sum of the others."""
-    low, middle, high = np.linalg.eigvalsh(matrix)
-    return bool(low > 1e-6 * high and high <= (low + middle) * (1 + 1e-6))
-
-
 def _mass(node: Assembly, volume: float) -> float:
     mass = node.parameter("mass")
-    if mass is not None:
-        return float(mass)  # type: ignore[arg-type]
-    return float(node.parameter("density", DENSITY)) * volume  # type: ignore[arg-type]
+    if mass is None:
+        mass = float(node.parameter("density", DENSITY)) * volume  # type: ignore[arg-type]
+    return max(float(mass), LEAST_MASS)  # type: ignore[arg-type]
 
 
 def colour(node: Assembly, number: int) -> tuple[float, ...]:
@@ -358,8 +304,10 @@ def colour(node: Assembly, number: int) -> tuple[float, ...]:
     given = node.parameter("rgba")
     if isinstance(given, tuple):
         return given
-    hue = (0.07 + 0.381966 * number) % 1.0
-    return (*(round(c, 3) for c in colorsys.hsv_to_rgb(hue, 0.62, 0.92)), 1.0)
+    round_, index = divmod(number, len(PALETTE))
+    hue, saturation, value = PALETTE[index]
+    red, green, blue = colorsys.hsv_to_rgb((hue + 0.045 * round_) % 1.0, saturation, value)
+    return (round(red, 3), round(green, 3), round(blue, 3), 1.0)
 
 
 def rotation(quaternion: Array) -> Array:
@@ -381,3 +329,6 @@ def _size_warnings(pag: PAG, low: Array, high: Array) -> list[Diagnostic]:
     hint = "is a mesh in millimetres? then write scale = 0.001"
     message = f"the product is {longest:g} m long"
     return [Diagnostic("Size", message, pag[pag.root].position, hint)]
+
+
+__all__ = ["Array", "Mesh", "Product", "Solid", "colour", "product_geometry", "rotation"]

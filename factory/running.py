@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import sys
+from collections.abc import Callable
 from contextlib import ExitStack
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 from factory.console import say, table
 from factory.errors import Diagnostic, InputError
@@ -73,7 +74,7 @@ def run_file(
         if log is not None:
             from factory.log import LogWriter
 
-            observers.append(stack.enter_context(LogWriter(log, made, source)).observe)
+            observers.append(stack.enter_context(LogWriter(log, made, source, sys.argv)).observe)
         if video is not None:
             from factory.render import Film
 
@@ -85,16 +86,74 @@ def run_file(
 
 def render_file(
     file: Path,
-    folders: Sequence[Path],
     output: Path,
     at: str,
-    floor: str | None,
-    size: Size | None,
+    size: Size,
     quiet: bool,
     options: dict[str, Any],
+    prepare: Callable[[], Simulation],
 ) -> dict[str, Any]:
-    """A film or still of a PAG that is run for it, or of a log."""
-    raise NotImplementedError
+    """A film, or a still (.png), of a log or of the simulation that `prepare` makes of a PAG; the
+    keys of `render`.
+
+    Raises InputError for what cannot be filmed, MissingError where there is no GL; nothing is
+    written then. A run that stalls is filmed as far as it goes.
+    """
+    from factory.gl import probe
+    from factory.log import is_log, read_log
+    from factory.progress import Progress
+    from factory.render import Film, Still, camera_named, check_output, render_log
+
+    moment = _moment(at)
+    is_still = check_output(output, size, options["fps"], still=None)
+    camera = options["camera"]
+    camera_named(camera)
+    probe()
+    if is_log(file):
+        log = read_log(file)
+        frames = render_log(log, output, size, options["fps"], camera, moment)
+        return _picture(output, frames, size, options["fps"], is_still)
+    made = prepare()
+    with ExitStack() as stack:
+        picture: Any = (
+            Still(made, output, size, camera, moment)
+            if is_still
+            else Film(made, output, size, options["fps"], camera)
+        )
+        observers = [
+            stack.enter_context(Interruption()).observe,
+            stack.enter_context(picture).observe,
+            stack.enter_context(Progress(made.units, quiet)).observe,
+        ]
+        enough = moment if is_still and moment != "end" else options.get("max_time")
+        made.run(observers, enough)
+    return _picture(output, 1 if is_still else picture.frames, size, options["fps"], is_still)
+
+
+def _moment(at: str) -> float | Literal["end"]:
+    """The time of a still [s], or the end."""
+    if at == "end":
+        return "end"
+    try:
+        seconds = float(at)
+        if not 0 <= seconds < float("inf"):
+            raise ValueError
+    except ValueError:
+        message = f"--at takes seconds or `end`, not '{at}'"
+        raise InputError(Diagnostic("BadValue", message, None, "for example --at 2.5")) from None
+    return seconds
+
+
+def _picture(output: Path, frames: int, size: Size, fps: int, is_still: bool) -> dict[str, Any]:
+    """The keys of `render --json`."""
+    return {
+        "output": str(output),
+        "frames": frames,
+        "width": size[0],
+        "height": size[1],
+        "fps": fps,
+        "seconds": 0.0 if is_still else round(frames / fps, 6),
+    }
 
 
 def summarise(record: Run, factory: Factory, verbose: bool) -> None:

@@ -79,7 +79,9 @@ def load_settings(path: Path) -> Settings:
             faults.append(replace(fault, position=_place(path, text, key)))
     if faults:
         raise InputError(faults)
-    return Settings().with_options({k: v if k == "substeps" else float(v) for k, v in table.items()})
+    return Settings().with_options(
+        {k: v if k == "substeps" else float(v) for k, v in table.items()}
+    )
 
 
 def _fault(key: str, value: object) -> Diagnostic | None:

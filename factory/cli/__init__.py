@@ -18,6 +18,7 @@ from factory.cli.prove import check, export, programs
 from factory.cli.tell import doctor, templates
 from factory.console import emit, fail, say
 from factory.errors import Diagnostic, FactoryError, InputError, MissingError, did_you_mean
+from factory.interruption import stop_on_signals
 
 CONTEXT = {"help_option_names": ["-h", "--help"], "max_content_width": 100}
 
@@ -25,11 +26,8 @@ CONTEXT = {"help_option_names": ["-h", "--help"], "max_content_width": 100}
 def main(arguments: Sequence[str] | None = None) -> None:
     """The entry point: runs a command and exits with its status, never with a traceback."""
     words = list(sys.argv[1:] if arguments is None else arguments)
-    for stream in (sys.stdout, sys.stderr):
-        with suppress(AttributeError):
-            stream.reconfigure(errors="replace")  # type: ignore[union-attr]
-    with suppress(ValueError):
-        signal.signal(signal.SIGTERM, signal.default_int_handler)
+    _open_streams()
+    stop_on_signals(signal.default_int_handler)
     status = run_command(words)
     try:
         sys.stdout.flush()
@@ -40,6 +38,15 @@ def main(arguments: Sequence[str] | None = None) -> None:
     sys.exit(status)
 
 
+def _open_streams() -> None:
+    """A stream that is closed swallows what is printed; one whose encoding lacks a sign shows `?`."""
+    for name in ("stdout", "stderr"):
+        if getattr(sys, name) is None:
+            setattr(sys, name, open(os.devnull, "w", encoding="utf-8"))
+        with suppress(AttributeError):
+            getattr(sys, name).reconfigure(errors="replace")
+
+
 def run_command(words: list[str]) -> int:
     """The exit status of a command line: 0 ok, 1 a check or run failed, 2 bad input, 3 something is
     missing on the machine, 130 interrupted."""
@@ -48,7 +55,7 @@ def run_command(words: list[str]) -> int:
         return result if isinstance(result, int) else 0
     except click.exceptions.Exit as done:
         return done.exit_code
-    except BrokenPipeError:
+    except (BrokenPipeError, SystemExit):  # click exits where nobody reads its stdout any more
         return 0
     except (Exception, KeyboardInterrupt) as error:
         return fail(_refusal(error), "--json" in words)
@@ -102,7 +109,8 @@ def _missing_package(error: ImportError) -> MissingError:
 
 
 def _unwritten(error: OSError) -> InputError:
-    message = f"{error.filename or 'the system'}: {error.strerror or error}"
+    where = f"{error.filename}: " if error.filename else ""
+    message = f"{where}{error.strerror or error}"
     hint = "check the path, its permissions and the space on the disk"
     return InputError(Diagnostic("BadFile", message, None, hint))
 

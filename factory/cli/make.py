@@ -8,7 +8,16 @@ from typing import Any
 
 import click
 
-from factory.cli.options import FLOOR, MOTION, OUTPUT, SOURCE, plan, settings_of, writable, writable_folder
+from factory.cli.options import (
+    FLOOR,
+    MOTION,
+    OUTPUT,
+    SOURCE,
+    plan,
+    settings_of,
+    writable,
+    writable_folder,
+)
 from factory.console import emit, say, warn
 
 

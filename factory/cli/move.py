@@ -96,11 +96,18 @@ def render(
     **options: Any,
 ) -> int:
     """Film FILE.pag, or a LOG that `run --log` has kept, headless through EGL."""
-    from factory.running import render_file
+    from factory.running import render_file, simulation
 
     writable(file, output)
-    size = pair(options["size"], "--size", "1280x720", int)
-    document = render_file(file, folders, output, at, floor, size, quiet or as_json, options)
+    size = pair(options["size"], "--size", "1280x720", int) or (1280, 720)
+
+    def prepare() -> Any:
+        settings = settings_of(file, options)
+        source, _, layout = plan(file, folders, settings, floor)
+        warn(layout.product.warnings, quiet)
+        return simulation(source, layout, settings, options)
+
+    document = render_file(file, output, at, size, quiet or as_json, options, prepare)
     if as_json:
         emit(document)
     elif not quiet:

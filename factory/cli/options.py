@@ -39,6 +39,8 @@ SOURCE = options(
         help="A folder of further operations, searched first (repeatable).",
     ),
 )
+
+
 class Number(click.FloatRange):
     """A finite number; click's own ranges let nan pass."""
 
@@ -74,7 +76,9 @@ RUN = options(
     click.option(
         "--from", "start", help="Start from a legal marking: place names, comma-separated."
     ),
-    click.option("--max-time", type=Number(0, min_open=True), help="Stop after this simulated time [s]."),
+    click.option(
+        "--max-time", type=Number(0, min_open=True), help="Stop after this simulated time [s]."
+    ),
 )
 PICTURE = options(
     click.option("--size", default="1280x720", help="Of the picture, as 1280x720."),

@@ -1,4 +1,5 @@
-"""The clearance certificate of a layout, as a value: what was looked at, what is shared, what is wrong."""
+"""The clearance certificate of a layout, as a value: what was looked at, what is shared, what is
+wrong."""
 
 from __future__ import annotations
 
@@ -13,8 +14,9 @@ MILLI = 1000.0
 
 @dataclass(frozen=True, slots=True)
 class Fault:
-    """Something that breaks the certificate: the robots, the labels they carry, `lacking`: by how much
-    [m], the layer ("" for the guidepaths themselves), and where the user's file asks for them."""
+    """Something that breaks the certificate: the robots, the labels they carry, `lacking`: by
+    how much [m], the layer ("" for the guidepaths themselves), and where the user's file asks
+    for them."""
 
     message: str
     robots: tuple[str, ...]
@@ -44,9 +46,10 @@ class Fault:
 
 @dataclass(frozen=True, slots=True)
 class Shared:
-    """Two robots whose regions meet, and why they do not: `operations` are the modes in which they are
-    there, and `point` the junction. One operation: both are in that very mode, which joins their
-    payloads. Two: the modes have a robot in common, which can be in one of them only."""
+    """Two robots whose regions meet, and why they do not: `operations` are the modes in which
+    they are there, and `point` the junction. One operation: both are in that very mode, which
+    joins their payloads. Two: the modes have a robot in common, which can be in one of them
+    only."""
 
     robots: tuple[str, str]
     operations: tuple[str, ...]
@@ -66,9 +69,9 @@ class Certificate:
     """That no two robots which are not coupled by a mode can touch, nor their payloads.
 
     Uncoupled regions of different robots in one layer are at least `clearance` [m] apart in plan;
-    `layers` gives each layer's z range and `gaps` the vertical distance to the one below [m]; where a
-    coupled region is nearer to another robot's, `shared` names the junction. It holds if there is no
-    fault; at most `clearance.MOST` faults are listed.
+    `layers` gives each layer's z range and `gaps` the vertical distance to the one below [m]; where
+    a coupled region is nearer to another robot's, `shared` names the junction. It holds if there is
+    no fault; at most `clearance.MOST` faults are listed.
     """
 
     clearance: float

@@ -1,11 +1,12 @@
 """Certify a layout: no two robots that are not coupled by a mode can touch, nor their payloads.
 
 Guarantees nothing about how the layout was made, and uses nothing of it: regions are read from the
-guidepaths and the parts' real geometry. Two regions in one layer have to be a clearance apart unless they
-are never taken at once. They are not where a payload is *coupled*, on the way that it goes in the mode of
-operation X alone, and the other region is that of a payload of another robot of X, which is then in that
-very mode; nor where both are coupled, in modes that have a robot in common. A coupled pair in one mode is
-looked at again: where the carrier brings a pile as well, the other waits at its standoff. Near linear.
+guidepaths and the parts' real geometry. Two regions in one layer have to be a clearance apart
+unless they are never taken at once. They are not where a payload is *coupled*, on the way that it
+goes in the mode of operation X alone, and the other region is that of a payload of another robot of
+X, which is then in that very mode; nor where both are coupled, in modes that have a robot in
+common. A coupled pair in one mode is looked at again: where the carrier brings a pile as well, the
+other waits at its standoff. Near linear.
 """
 
 from __future__ import annotations
@@ -129,8 +130,8 @@ class _Search:
                     return
 
     def _near(self, here: list[Region]) -> Iterator[tuple[Region, Region]]:
-        """Pairs in one layer that are less than a clearance apart in plan: of different robots, or of a
-        station and its own robot."""
+        """Pairs in one layer that are less than a clearance apart in plan: of different robots,
+        or of a station and its own robot."""
         corners = boxes(here)
         cells = shapely.box(corners[:, 0], corners[:, 2], corners[:, 1], corners[:, 3])
         tree = shapely.STRtree(cells)
@@ -148,7 +149,8 @@ class _Search:
                 yield here[i], here[j]
 
     def _settled(self, one: Region, other: Region) -> bool:
-        """Whether two regions that are near in plan are never taken at once, or are apart in height."""
+        """Whether two regions that are near in plan are never taken at once, or are apart in
+        height."""
         kinds = {one.kind, other.kind}
         if one.robot == other.robot and OUTFEED in kinds:
             return self._serves(one) and self._serves(other)
@@ -229,8 +231,8 @@ def _fault(layout: Layout, message: str, found: tuple[Region, ...], lacking: flo
 
 
 def _standoffs(layout: Layout, found: Mapping[str, Pile]) -> Iterator[Fault]:
-    """Where a carrier brings a pile itself: what is brought to it is clear of the pile's way as long as
-    it waits at its standoff, and waits no farther away than where it comes from."""
+    """Where a carrier brings a pile itself: what is brought to it is clear of the pile's way as
+    long as it waits at its standoff, and waits no farther away than where it comes from."""
     legs = _legs(layout)
     for operation in layout.factory.operations[:-1]:
         carrier = operation.template.carrier - 1
@@ -281,15 +283,15 @@ def _way(
 
 def _met(layout: Layout, pile: Region, guest: Region) -> Iterator[Fault]:
     gap = separation(pile.box, guest.box)
-    if gap < layout.clearance - TOLERANCE:
-        robots = layout.factory.robots
-        label = layout.factory.operations[pile.mode].label
-        message = (
-            f"{robots[guest.robot].name}'s '{guest.label}' waits {gap * 1000:.1f} mm from the way of"
-            f" {robots[pile.robot].name}'s '{pile.label}' in '{label}';"
-            f" {layout.clearance * 1000:g} mm are needed"
-        )
-        yield _fault(layout, message, (guest, pile), layout.clearance - gap)
+    if gap >= layout.clearance - TOLERANCE:
+        return
+    waits, comes = (layout.factory.robots[region.robot].name for region in (guest, pile))
+    label = layout.factory.operations[pile.mode].label
+    message = (
+        f"{waits}'s '{guest.label}' waits {gap * 1000:.1f} mm from the way of {comes}'s"
+        f" '{pile.label}' in '{label}'; {layout.clearance * 1000:g} mm are needed"
+    )
+    yield _fault(layout, message, (guest, pile), layout.clearance - gap)
 
 
 __all__ = ["Certificate", "certify", "separation"]

@@ -1,8 +1,10 @@
-"""That f embeds the quotient workspace W: guidepaths come together at their junctions, cross nowhere.
+"""That f embeds the quotient workspace W: guidepaths come together at their junctions, cross
+nowhere.
 
-What a carriage's centre follows is the segment f([A + 2r, B]): 2r before A it stands, and what is joined
-there is what it holds out. So no two segments have a point in common, and at a junction the product's
-middles are one point. All of it is in whole millimetres, and every comparison is between integers.
+What a carriage's centre follows is the segment f([A + 2r, B]): 2r before A it stands, and what is
+joined there is what it holds out. So no two segments have a point in common, and at a junction the
+product's middles are one point. All of it is in whole millimetres, and every comparison is between
+integers.
 """
 
 from __future__ import annotations
@@ -22,8 +24,9 @@ Grid = tuple[int, int]
 
 
 def embedding_faults(layout: Layout) -> Iterator[Fault]:
-    """What keeps f from being an embedding: ends off the grid of millimetres, junctions that ~ asks for
-    but f does not make, and crossings that it makes but ~ does not ask for. Near linear."""
+    """What keeps f from being an embedding: ends off the grid of millimetres, junctions that ~
+    asks for but f does not make, and crossings that it makes but ~ does not ask for. Near
+    linear."""
     carriers = delivered_to(layout)
     for robot in range(len(layout.guidepaths)):
         yield from _off_grid(layout, robot)
@@ -52,7 +55,7 @@ def _off_grid(layout: Layout, robot: int) -> Iterator[Fault]:
     name, path = layout.factory.robots[robot].name, layout.guidepaths[robot]
     ends = *path.a, *path.carriage(path.reach), *path.carriage(path.length)
     if not all(abs(v * 1000 - round(v * 1000)) < 1e-3 for v in ends):
-        message = f"{name}: its guidepath from {ends[2:4]} to {ends[4:]} is not in whole millimetres"
+        message = f"{name}: its guidepath, {ends[2:4]} to {ends[4:]}, is not in whole millimetres"
         yield _fault(layout, message, robot)
     elif not (path.travel > 0 and path.reach > 0):
         message = f"{name}: its guidepath has no length (it receives and delivers at {path.a})"
@@ -60,7 +63,8 @@ def _off_grid(layout: Layout, robot: int) -> Iterator[Fault]:
 
 
 def _junction(layout: Layout, robot: int, carrier: int) -> Iterator[Fault]:
-    """A of a robot is the station of its operation on its carrier's path, and they meet at right angles."""
+    """A of a robot is the station of its operation on its carrier's path, and they meet at right
+    angles."""
     path, factory = layout.guidepaths[robot], layout.factory
     name = factory.robots[robot].name
     u, t = path.heading, path.side

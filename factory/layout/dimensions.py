@@ -1,7 +1,8 @@
 """The sizes of robots and the heights of the two layers of a factory [m]; see docs/design.md.
 
-Robots live below the plane z0 = PAYLOAD, payloads above it, so a robot passes under any payload. From the
-floor up: carriages; arms, above any carriage, met by masts only; fingers, above any mast; payloads.
+Robots live below the plane z0 = PAYLOAD, payloads above it, so a robot passes under any payload.
+From the floor up: carriages; arms, above any carriage, met by masts only; fingers, above any mast;
+payloads.
 """
 
 from __future__ import annotations
@@ -9,7 +10,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 CARRIAGES, ARMS, PAYLOADS = LAYERS = range(3)
-"""The layers in which things can meet, from the floor up. What stands on the floor is in all of them."""
+"""The layers in which things can meet, from the floor up. What stands on the floor is in all of
+them."""
 
 CARRIAGE = 0.06
 """Width and length W of a carriage."""
@@ -40,7 +42,8 @@ TOOL_TRAVEL = 0.12
 """How far a tool comes from its home to its station."""
 
 BELT_GAP = 3e-4
-"""The outfeed lies this much below z0, so that the output robot brings its product without touching."""
+"""The outfeed lies this much below z0, so that the output robot brings its product without
+touching."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,8 +58,8 @@ class Clearance:
         return max(MAST, POST) / 2 + self.c
 
     def reach(self, arm: float, lane: float = 0.0) -> float:
-        """How far the carriage stays behind: of the arm's end, and of the other robot's carriage whose
-        line is `lane` nearer than the product's middle."""
+        """How far the carriage stays behind: of the arm's end, and of the other robot's carriage
+        whose line is `lane` nearer than the product's middle."""
         return max(arm + STUB, CARRIAGE + self.c + lane)
 
     def post(self, reach: float, rear: float) -> float:

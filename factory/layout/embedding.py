@@ -1,8 +1,8 @@
 """Lay out a factory: choose sides with symmetric payloads, then stretch with the real ones.
 
-Guarantees what `factory.layout.clearance` proves, and carries the proof: no two robots that are not coupled
-by a mode can touch, nor their payloads. All lengths are whole millimetres, so that a written model loses
-nothing.
+Guarantees what `factory.layout.clearance` proves, and carries the proof: no two robots that are not
+coupled by a mode can touch, nor their payloads. All lengths are whole millimetres, so that a
+written model loses nothing.
 """
 
 from __future__ import annotations
@@ -27,7 +27,8 @@ from factory.layout.stretching import Shape, Sides, Stretched, stretch, up
 from factory.layout.sweeps import ALWAYS, KINDS, OUTFEED, STATIONS, Region, hull, piles, regions
 
 SHED = 0.1
-"""Length of the open part of the outfeed beyond the product, and of what its end has to spare [m]."""
+"""Length of the open part of the outfeed beyond the product, and of what its end has to spare
+[m]."""
 
 
 def lay_out(
@@ -36,9 +37,9 @@ def lay_out(
     clearance: float = 0.02,
     floor: Point2 | None = None,
 ) -> Layout:
-    """The layout of a factory with its clearance certificate. Raises RunError (Layout) where it does not
-    fit a floor of the given width and depth, saying by how much and where, or where an operation's
-    template asks for what cannot be kept clear."""
+    """The layout of a factory with its clearance certificate. Raises RunError (Layout) where it
+    does not fit a floor of the given width and depth, saying by how much and where, or where an
+    operation's template asks for what cannot be kept clear."""
     draft = _draft(factory, product, Clearance(clearance))
     layout = draft.layout()
     draft.stretched.travel[0] = round(draft.stretched.travel[0] - _spare(layout), 3)
@@ -116,15 +117,15 @@ def _draft(factory: Factory, product: Product, c: Clearance) -> _Draft:
 
 
 def _outfeed(path: Guidepath, last: Extent, c: Clearance) -> Box:
-    """The conveyor: under the product at A and ahead, twice the product's length and some."""
-    length = last[1] - last[0]
-    u = (last[0] - c.c / 2, last[1] + length + 3 * SHED)
-    return path.a[0] + u[0], path.a[0] + u[1], path.a[1] + last[2] - c.c, path.a[1] + last[3] + c.c
+    """The conveyor: under the product at A and ahead, twice the product's length and some. It is
+    no wider than the product, so that what keeps clear of the one keeps clear of the other."""
+    ahead = 2 * last[1] - last[0] + 3 * SHED
+    return path.world((last[0] - c.c / 2, ahead, last[2], last[3]), path.a)
 
 
 def _spare(layout: Layout) -> float:
-    """How much shorter the output robot's path can be: the outfeed has to be clear of what is beside its
-    own course, of the product in the making, and of no more [whole mm]."""
+    """How much shorter the output robot's path can be: the outfeed has to be clear of what is
+    beside its own course, of the product in the making, and of no more [whole mm]."""
     start, _, low, high = layout.outfeed
     c = layout.clearance
     ahead = [

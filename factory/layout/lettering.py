@@ -1,50 +1,24 @@
-"""Lettering: text on a drawing, put where it hides nothing that was drawn or lettered before."""
+"""Lettering: labels put where they hide least of what was drawn or lettered before."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, field
-from xml.sax.saxutils import escape
 
 from factory.layout.plan import Box, Point2
+from factory.layout.svg import label, shortened
 
-WIDTH = 0.58
+WIDTH = 0.6
 """Mean width of a letter, in font sizes."""
 
-LONGEST = 20
-"""A label of more letters is cut; its whole text is shown as a tooltip."""
-
-
-def number(value: float) -> str:
-    """A coordinate [mm] to a tenth, the same for all zeros."""
-    text = f"{value:.1f}"
-    return text[:-2].replace("-0", "0") if text.endswith(".0") and len(text) < 5 else text
-
-
-def clean(text: str) -> str:
-    """A text as XML may contain it."""
-    return escape("".join(c if c.isprintable() else " " for c in text))
-
-
-def shortened(label: str) -> str:
-    """A label as it is drawn."""
-    return label if len(label) <= LONGEST else f"{label[: LONGEST - 1]}…"
-
-
-def text(at: Point2, words: str, size: float, style: str = "", anchor: str = "middle") -> str:
-    """A text whose middle line is at a point of the page [mm]."""
-    shown = shortened(words) if style != "h" else words
-    title = "" if shown == words else f"<title>{clean(words)}</title>"
-    marked = f' class="{style}"' if style else ""
-    return (
-        f'<text x="{number(at[0])}" y="{number(at[1] + 0.35 * size)}" font-size="{number(size)}"'
-        f' text-anchor="{anchor}"{marked}>{clean(shown)}{title}</text>'
-    )
+DIRECTIONS = ((1, -1), (-1, -1), (1, 1), (-1, 1), (0, -1), (0, 1), (1, 0), (-1, 0))
+"""Where a label may be about its point, the best first."""
 
 
 @dataclass(slots=True)
 class Lettering:
-    """Finds room for labels; boxes are on the page, y down [mm]. A grid keeps it near linear."""
+    """Finds room for labels; boxes are on the page, y down [mm]. A grid of cells keeps it near
+    linear."""
 
     cell: float = 150.0
     taken: dict[tuple[int, int], list[Box]] = field(default_factory=dict)
@@ -54,16 +28,16 @@ class Lettering:
         for key in self._cells(box):
             self.taken.setdefault(key, []).append(box)
 
-    def place(self, at: Point2, words: str, size: float, off: float, style: str = "") -> str:
+    def place(self, at: Point2, words: str, size: float, off: float, style: str) -> str:
         """A label about `off` away from a point, where it covers least of what is there already."""
         half = len(shortened(words)) * size * WIDTH / 2, size / 2
-        best = min(
-            ((self._hidden(box := _about(middle, half)), n, middle, box)
-             for n, middle in enumerate(_around(at, half, off))),
-            key=lambda found: found[:2],
-        )  # fmt: skip
-        self.block(best[3])
-        return text(best[2], words, size, style)
+        found = [
+            (self._hidden(_about(middle, half)), number, middle)
+            for number, middle in enumerate(_around(at, half, off))
+        ]
+        middle = min(found)[2]
+        self.block(_about(middle, half))
+        return label(middle, words, size, style)
 
     def _hidden(self, box: Box) -> float:
         """How much of a box is taken [mm²]."""
@@ -85,9 +59,8 @@ def _about(middle: Point2, half: Point2) -> Box:
     return x - half[0], x + half[0], y - half[1], y + half[1]
 
 
-def _around(at: Point2, half: Point2, off: float) -> Iterable[Point2]:
-    """Places about a point, the best first."""
+def _around(at: Point2, half: Point2, off: float) -> Iterator[Point2]:
     for reach in (1.0, 1.8, 2.8):
         x, y = half[0] + off * reach, half[1] + off * reach
-        for i, j in ((1, -1), (-1, -1), (1, 1), (-1, 1), (0, -1), (0, 1), (1, 0), (-1, 0)):
+        for i, j in DIRECTIONS:
             yield at[0] + i * x, at[1] + j * y

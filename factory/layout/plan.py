@@ -1,8 +1,8 @@
 """A layout: the embedding f of the quotient workspace W in the plane (paper, section 5.1).
 
-Every part is carried in its place in the finished product, relative to the product's middle. Where that
-middle is in the world is the robot's *station*: at a mate the middles of all robots coincide, so the parts
-are assembled when they meet. A guidepath is the straight line of that point.
+Every part is carried in its place in the finished product, relative to the product's middle. Where
+that middle is in the world is the robot's *station*: at a mate the middles of all robots coincide,
+so the parts are assembled when they meet. A guidepath is the straight line of that point.
 """
 
 from __future__ import annotations
@@ -34,13 +34,15 @@ Point2 = tuple[float, float]
 class Guidepath:
     """The guidepath of one robot and how the robot is stretched to its payload.
 
-    `heading` u, a unit vector towards A, and `side` t, to the left or right of it; `a`: the product's
-    middle when the robot delivers (x, y); `travel`: how far before that it receives (the station
-    at its B end); `reach` = 2r: how far the carriage stays behind the product's middle; `offset`: how far
-    the carriage's line is to the side t; `arm`: how far behind the middle the arm ends; `nest`: where
-    ahead of the middle the payload's own middle is, reached by the finger. All lengths in [m].
+    `heading` u, a unit vector towards A, and `side` t, to the left or right of it; `a`: the
+    product's middle when the robot delivers (x, y); `travel`: how far before that it receives (the
+    station at its B end); `reach` = 2r: how far the carriage stays behind the product's middle;
+    `offset`: how far the carriage's line is to the side t; `arm`: how far behind the middle the arm
+    ends; `nest`: where ahead of the middle the payload's own middle is, reached by the finger. All
+    lengths in [m].
 
-    Arc length x of the carriage runs from A = 0; delivering at x = reach, receiving at B = reach + travel.
+    Arc length x of the carriage runs from A = 0; delivering at x = reach, receiving at B = reach +
+    travel.
     """
 
     heading: Point2
@@ -83,7 +85,8 @@ class Guidepath:
         return middle[0] + x[0], middle[0] + x[1], middle[1] + y[0], middle[1] + y[1]
 
     def frame(self, box: Box) -> Extent:
-        """A box about the product's middle, in the world's directions, in the robot's frame (u, t)."""
+        """A box about the product's middle, in the world's directions, in the robot's frame (u,
+        t)."""
         u, t = self.heading, self.side
         along = sorted((box[0] * u[0] + box[2] * u[1], box[1] * u[0] + box[3] * u[1]))
         across = sorted((box[0] * t[0] + box[2] * t[1], box[1] * t[0] + box[3] * t[1]))
@@ -92,8 +95,8 @@ class Guidepath:
 
 @dataclass(frozen=True, slots=True)
 class Feeder:
-    """Where a part is presented: the boxes of its post and of the boom above the part, in the world,
-    and the height of the boom's lower edge [m]."""
+    """Where a part is presented: the boxes of its post and of the boom above the part, in the
+    world, and the height of the boom's lower edge [m]."""
 
     post: Box
     boom: Box
@@ -102,11 +105,11 @@ class Feeder:
 
 @dataclass(frozen=True)
 class Layout:
-    """A factory laid out: a guidepath for each robot, and for each operation the arc length at which
-    each of its robots has its goal.
+    """A factory laid out: a guidepath for each robot, and for each operation the arc length at
+    which each of its robots has its goal.
 
-    `stations[i]`: distance [m] of operation i from its carrier's B end; `payloads[label]`: the box of a
-    sub-assembly about the product's middle; `outfeed`: the box of the conveyor in the world.
+    `stations[i]`: distance [m] of operation i from its carrier's B end; `payloads[label]`: the box
+    of a sub-assembly about the product's middle; `outfeed`: the box of the conveyor in the world.
     """
 
     factory: Factory
@@ -173,7 +176,8 @@ class Layout:
         )
 
     def standoff(self, operation: Operation, slot: int) -> float:
-        """How far short of the meeting point the robot in `slot` waits until the carrier stands [m].
+        """How far short of the meeting point the robot in `slot` waits until the carrier stands
+        [m].
 
         Where the carrier brings a pile too, both would meet diagonally; from here on the payload is
         clear of the pile wherever that is on its way.

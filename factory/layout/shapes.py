@@ -1,4 +1,5 @@
-"""The shapes that stretching works with: piles in the frame of the robot that carries them, arms, lanes."""
+"""The shapes that stretching works with: piles in the frame of the robot that carries them,
+arms, lanes."""
 
 from __future__ import annotations
 
@@ -57,8 +58,8 @@ def exact_shapes(
     sides: Sides,
     c: Clearance,
 ) -> list[Shape]:
-    """Shapes from the payloads as they lie in the world: parts never turn. Carriers come first, since
-    a robot's arm ends beside its carrier's line."""
+    """Shapes from the payloads as they lie in the world: parts never turn. Carriers come first,
+    since a robot's arm ends beside its carrier's line."""
     shapes: list[Shape] = []
     for robot, carrier in enumerate(carriers(factory)):
         u, t = axes[robot]
@@ -99,11 +100,12 @@ def project(box: Box, u: Point2, t: Point2) -> Extent:
 
 
 def _last(piles: Mapping[int, Extent]) -> Extent:
-    return next(reversed(piles.values())) if piles else NOWHERE
+    return list(piles.values())[-1] if piles else NOWHERE
 
 
 def _worked_on(factory: Factory, robot: int, carrier: Shape, side: int) -> Extent:
-    """The pile that a tool works on, in the tool's frame: its heading is against the carrier's side."""
+    """The pile that a tool works on, in the tool's frame: its heading is against the carrier's
+    side."""
     pile = carrier.piles[factory.robots[robot].operations[0]]
     along = sorted((-side * pile[2], -side * pile[3]))
     return along[0], along[1], pile[0], pile[1]

@@ -1,13 +1,15 @@
-"""Stretching: choose free lengths and directions of the guidepaths so that nothing meets that should not.
+"""Stretching: choose free lengths and directions of the guidepaths so that nothing meets that
+should not.
 
-The guidepaths form a tree. A robot's path starts where it receives (B) and runs straight to where it
-delivers (A); the paths of the robots that bring it something end on it, from its left or right. A subtree
-takes a box in each layer beside its carrier's path; boxes on one side follow one another; a path is as
-long as it takes to keep its own subtree clear of the path it ends on, layer by layer. Bottom-up, linear in
-the number of robots.
+The guidepaths form a tree. A robot's path starts where it receives (B) and runs straight to where
+it delivers (A); the paths of the robots that bring it something end on it, from its left or right.
+A subtree takes a box in each layer beside its carrier's path; boxes on one side follow one another;
+a path is as long as it takes to keep its own subtree clear of the path it ends on, layer by layer.
+Bottom-up, linear in the number of robots.
 
-Frames: a robot's heading is u, its side t is the heading of the robot it delivers to. So a subtree's extent
-in t is its extent along the path it ends on. Every box has half a clearance around it.
+Frames: a robot's heading is u, its side t is the heading of the robot it delivers to. So a
+subtree's extent in t is its extent along the path it ends on. Every box has half a clearance around
+it.
 """
 
 from __future__ import annotations
@@ -42,9 +44,9 @@ Sides = dict[int, int]
 
 @dataclass(frozen=True, slots=True)
 class Shape:
-    """What the layout must know of a robot: the box of each pile it carries, by operation, and of the
-    last one, how far its carriage line is to the side, how far behind the middle its arm ends and its
-    carriage is (`reach`, 2r), and how far ahead its finger goes (`nest`) [m]."""
+    """What the layout must know of a robot: the box of each pile it carries, by operation, and
+    of the last one, how far its carriage line is to the side, how far behind the middle its arm
+    ends and its carriage is (`reach`, 2r), and how far ahead its finger goes (`nest`) [m]."""
 
     piles: Mapping[int, Extent]
     last: Extent
@@ -58,7 +60,8 @@ class Shape:
 class Subtree:
     """A robot with all that brings it something, in its own frame, origin at its B station.
 
-    By layer: `front`, the farthest extent ahead; `back`, behind; `low`, `high`, to the side; `travel` [m].
+    By layer: `front`, the farthest extent ahead; `back`, behind; `low`, `high`, to the side;
+    `travel` [m].
     """
 
     __slots__ = ("back", "front", "high", "low", "travel")
@@ -70,8 +73,10 @@ class Subtree:
 
     def include(self, layer: int, ulo: float, uhi: float, tlo: float, thi: float) -> None:
         """Grow to contain a box in one layer."""
-        self.back[layer], self.front[layer] = min(self.back[layer], ulo), max(self.front[layer], uhi)
-        self.low[layer], self.high[layer] = min(self.low[layer], tlo), max(self.high[layer], thi)
+        self.back[layer] = min(self.back[layer], ulo)
+        self.front[layer] = max(self.front[layer], uhi)
+        self.low[layer] = min(self.low[layer], tlo)
+        self.high[layer] = max(self.high[layer], thi)
 
 
 @dataclass(frozen=True)
@@ -91,8 +96,9 @@ def stretch(
     clearance: Clearance,
     sides: Sides | None = None,
 ) -> Stretched:
-    """Lengths and stations for given sides; chooses the sides where none are given: the longer of two
-    inputs away from where the robot delivers, a later input on the side where its station comes sooner.
+    """Lengths and stations for given sides; chooses the sides where none are given: the longer of
+    two inputs away from where the robot delivers, a later input on the side where its station comes
+    sooner.
     """
     travel = [0.0] * len(factory.robots)
     stations = [0.0] * len(factory.operations)
@@ -192,8 +198,8 @@ class _Builder:
         return self.tree
 
     def _feeder(self, part: Extent) -> None:
-        """A post behind the carriage's rear stop and behind the part, and a boom over the part, which
-        what is put on the part later has to be clear of."""
+        """A post behind the carriage's rear stop and behind the part, and a boom over the part,
+        which what is put on the part later has to be clear of."""
         post = -self.c.post(self.shape.reach, part[0])
         room = POST / 2 + self.half
         for side in (-1, +1):
@@ -246,8 +252,9 @@ class _Builder:
             frontier[layer] = max(frontier[layer], self.station + tree.high[layer])
 
     def _attach(self, guest: int, station: float, starts: Sequence[float]) -> None:
-        """Fixes a guest's travel. Only the piles that come so far back are beside its subtree: the last
-        of them is the widest, and `starts` are the least starts of each pile and those after it."""
+        """Fixes a guest's travel. Only the piles that come so far back are beside its subtree:
+        the last of them is the widest, and `starts` are the least starts of each pile and those
+        after it."""
         side, tree = self.sides[guest], self.subtrees[guest]
         strip = list(self.strip[side])
         beside = bisect_left(starts, station + tree.high[PAYLOADS])
@@ -272,17 +279,17 @@ def _ahead(operation: Operation, reach: float) -> float:
 def _check_guests(operation: Operation, guests: list[int]) -> None:
     """Two guidepaths can end at one point of a third, one from each side; a third cannot."""
     goals = operation.template.law.goals
-    wrong = [
-        g for g in guests if goals[operation.robots.index(g)].end != "A"
-    ]
+    wrong = [g for g in guests if goals[operation.robots.index(g)].end != "A"]
     if len(guests) <= 2 and not wrong:
         return
     message = (
-        f"'{operation.label}': {len(guests)} guidepaths would end at one point of the carrier's path"
-        if not wrong
-        else f"'{operation.label}': a robot that is not the carrier must have its goal at its A end"
+        f"'{operation.label}': {len(guests)} guidepaths would end at one point of the carrier's"
     )
+    if wrong:
+        message = f"'{operation.label}': a robot that is not the carrier has its goal away from A"
     hint = "give further inputs to another template (further = insert), two at a point at most"
+    if wrong:
+        hint = "write its goal as A + 2r: its guidepath ends where it meets the carrier"
     position = operation.template.position or operation.position
     raise InputError(Diagnostic("Layout", message, position, hint))
 

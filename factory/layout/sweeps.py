@@ -1,9 +1,11 @@
-"""What can be where: the regions that robots, payloads and stations sweep, read from a layout alone.
+"""What can be where: the regions that robots, payloads and stations sweep, read from a layout
+alone.
 
-A region is a rectangle in one layer, with the mode in which its robot is there. Everything below z0 may be
-anywhere on its guidepath in any mode. A payload is swept from goal to goal of its robot's gear: *uncoupled*
-up to the last goal before it is delivered, *coupled* on its last way, which it goes in the mode of one
-operation only, that of the carrier it delivers to. Stations stand where they are in every mode.
+A region is a rectangle in one layer, with the mode in which its robot is there. Everything below z0
+may be anywhere on its guidepath in any mode. A payload is swept from goal to goal of its robot's
+gear: *uncoupled* up to the last goal before it is delivered, *coupled* on its last way, which it
+goes in the mode of one operation only, that of the carrier it delivers to. Stations stand where
+they are in every mode.
 """
 
 from __future__ import annotations
@@ -48,9 +50,9 @@ ALWAYS = -1
 
 @dataclass(frozen=True, slots=True)
 class Region:
-    """A rectangle in one layer: which robot is there (a station counts to the robot it serves), with
-    what, carrying which label, from z low to z high [m], and in the mode of which operation, ALWAYS
-    for an uncoupled region."""
+    """A rectangle in one layer: which robot is there (a station counts to the robot it serves),
+    with what, carrying which label, from z low to z high [m], and in the mode of which
+    operation, ALWAYS for an uncoupled region."""
 
     robot: int
     layer: int

@@ -32,7 +32,7 @@ KEY, FILL = (0.40, 0.48, -0.78), (-0.65, 0.30, -0.70)
 def add_visuals(root: Element, layout: Layout) -> None:
     """Sky, haze and the quality of light."""
     visual = add(root, "visual")
-    add(visual, "headlight", ambient="0.38 0.38 0.39", diffuse="0.20 0.20 0.20", specular="0 0 0")
+    add(visual, "headlight", ambient="0.38 0.38 0.39", diffuse="0.16 0.16 0.16", specular="0 0 0")
     add(visual, "quality", shadowsize=2048, offsamples=4)
     add(visual, "map", znear=0.02, zfar=60, shadowclip=1.0)
     add(visual, "global", offwidth=1920, offheight=1080, fovy=VIEW)

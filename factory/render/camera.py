@@ -55,12 +55,13 @@ class View:
 
     @property
     def range(self) -> tuple[float, float]:
-        """From where to where something is drawn [m]: tightly, or shadows get speckles. The far end is
-        where the floor meets the upper edge of the picture."""
+        """From where to where something is drawn [m]: tightly, or shadows get speckles. Twice as
+        far as the floor at the upper edge of the picture, since the sky is drawn nearer than the
+        far end."""
         up, ahead = self.axes[1][2], self.axes[2][2]
         far = float(self.position[2]) / max(-ahead - self.tall * up, 0.06)
         near = max(0.1 * self.distance, 0.7 * (self.distance - self.depth))
-        return near, max(1.05 * far, self.distance + self.depth)
+        return near, 2 * max(far, self.distance + self.depth)
 
 
 def camera_named(name: str) -> Camera:
@@ -114,10 +115,14 @@ class _Wedge:
 
 
 def overview(points: Array, frame: Frame) -> View:
-    """From the south, aslant, or from where the factory fills the picture better by a tenth."""
+    """From the south, aslant, or from where the factory fills the picture better by a tenth; an
+    upright picture may see a long factory lengthwise, and from higher up."""
     best: View | None = None
-    for azimuth in (-62.0, -118.0, -28.0, -152.0):
-        view = fit(points, towards(azimuth, 40.0), frame)
+    azimuths = (
+        (-62.0, -118.0, -28.0, -152.0) if frame.aspect >= 1 else (-62.0, -118.0, -8.0, -172.0)
+    )
+    for azimuth in azimuths:
+        view = fit(points, towards(azimuth, 40.0 if frame.aspect >= 1 else 52.0), frame)
         if best is None or view.distance < 0.9 * best.distance:
             best = view
     assert best is not None

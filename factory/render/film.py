@@ -1,94 +1,18 @@
-"""Films and stills of a run as it goes on, or of its log: the same pictures either way."""
+"""Films and stills of a run as it goes on: observers of the run, which they don't disturb."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
 from pathlib import Path
 from types import TracebackType
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
-from factory.engine import mujoco
-from factory.errors import Diagnostic, InputError
-from factory.files import write_bytes
-from factory.log import Log
-from factory.render.camera import Camera, camera_named
-from factory.render.caption import Caption, Words
-from factory.render.painter import Painter, Pixels
+from factory.render.camera import camera_named
+from factory.render.camerawork import FPS, SIZE, Moment, Reel, Size, Take, When, pictureless, save
 from factory.render.subject import Snapshot, held
-from factory.render.video import VideoFile, check_output
+from factory.render.video import check_output
 
 if TYPE_CHECKING:
     from factory.simulation import Simulation
-
-Size = tuple[int, int]
-
-When = float | Literal["end"]
-
-SIZE, FPS = (1280, 720), 30.0
-
-SAMPLES = 32
-"""Pictures that a still is the mean of."""
-
-JUMP = 0.03
-"""A coordinate that changes by more in one tick was set anew; no frame shows it on the way [m]."""
-
-
-@dataclass(frozen=True, slots=True)
-class Moment:
-    """A state with its time [s] and the products delivered by then."""
-
-    time: float
-    made: int
-    shown: Snapshot
-
-    def towards(self, later: Moment, time: float) -> Moment:
-        """The state between this and a later one."""
-        share = (time - self.time) / (later.time - self.time) if later.time > self.time else 1.0
-        change = later.shown.qpos - self.shown.qpos
-        qpos = self.shown.qpos + np.where(np.abs(change) > JUMP, 1.0, share) * change
-        whole = later if share >= 0.5 else self
-        return Moment(time, whole.made, replace(whole.shown, qpos=qpos))
-
-
-@dataclass(frozen=True, slots=True)
-class Take:
-    """What a picture is of and how it is taken: the model, the product's name and the units asked
-    for, size, camera, and whether there is a caption."""
-
-    m: mujoco.MjModel
-    product: str
-    units: int
-    size: Size
-    camera: Camera
-    caption: bool
-
-    @property
-    def best(self) -> bool:
-        """Whether a still at the end is better taken while the finished product can be seen."""
-        return self.camera == "product"
-
-
-class Camerawork:
-    """Takes captioned pictures of moments."""
-
-    def __init__(self, take: Take, samples: int = 1) -> None:
-        self.take = take
-        self.caption = Caption(take.size)
-        share = self.caption.share if take.caption else 0.0
-        self.painter = Painter(take.m, take.size, take.camera, share, samples)
-
-    def picture(self, moment: Moment, elapsed: float = 0.0) -> Pixels:
-        """One picture; `elapsed` [s] since the last."""
-        pixels = self.painter.paint(moment.shown, elapsed)
-        if not self.take.caption:
-            return pixels
-        words = Words(self.take.product, moment.made, self.take.units, moment.time)
-        return self.caption.draw(pixels, words)
-
-    def close(self) -> None:
-        self.painter.close()
 
 
 class _Observer:
@@ -96,7 +20,7 @@ class _Observer:
 
     def __init__(self, simulation: Simulation, size: Size, camera: str, caption: bool) -> None:
         if simulation.model is None:
-            raise _pictureless()
+            raise pictureless()
         from factory.mjcf.model import product_name
 
         self.simulation = simulation
@@ -198,7 +122,7 @@ class Still(_Observer):
 
     def close(self) -> None:
         """Take the picture."""
-        _save(self.take, self.last, self.path)
+        save(self.take, self.last, self.path)
 
 
 def still(
@@ -210,128 +134,3 @@ def still(
 ) -> None:
     """A still of the state a simulation is in now."""
     Still(simulation, path, size, camera, "end", caption).close()
-
-
-class Reel:
-    """Frames of a growing row of moments, at even times, into a video file."""
-
-    def __init__(self, take: Take, path: Path, fps: float) -> None:
-        self.work = Camerawork(take)
-        try:
-            self.file = VideoFile(path, take.size, fps)
-        except BaseException:
-            self.work.close()
-            raise
-        self.fps, self.last = fps, None  # type: float, Moment | None
-
-    @property
-    def frames(self) -> int:
-        """Frames written."""
-        return self.file.frames
-
-    def until(self, now: Moment) -> None:
-        """Write the frames whose time has come."""
-        while self.frames / self.fps <= now.time + 1e-9:
-            due = self.frames / self.fps
-            moment = self.last.towards(now, due) if self.last is not None else now
-            self.file.write(self.work.picture(moment, 1 / self.fps if self.frames else 0.0))
-        self.last = now
-
-    def close(self) -> None:
-        """Finish the file and give the GL back."""
-        try:
-            self.file.close()
-        finally:
-            self.work.close()
-
-
-def render_log(
-    log: Log,
-    path: Path | str,
-    size: Size = SIZE,
-    fps: float = FPS,
-    camera: str = "overview",
-    at: When = "end",
-    caption: bool = True,
-) -> int:
-    """A film, or for .png a still, from a log alone; gives the number of frames.
-
-    Nothing is simulated again. Raises InputError for a log of the ideal world or one without a
-    tick."""
-    is_still = check_output(path, size, fps, still=None)
-    take = Take(
-        _model(log),
-        str(log.header["product"]),
-        int(log.header["units"]),
-        size,
-        camera_named(camera),
-        caption,
-    )
-    if is_still:
-        _save(take, moment_of(log, _row(log, take, at)), Path(path))
-        return 1
-    reel = Reel(take, Path(path), fps)
-    try:
-        for row in range(len(log)):
-            reel.until(moment_of(log, row))
-    finally:
-        reel.close()
-    return reel.frames
-
-
-def _row(log: Log, take: Take, at: When) -> int:
-    """The row of a log that a still at that time shows."""
-    last = len(log) - 1
-    if at != "end":
-        return min(int(np.searchsorted(log.time, at - 1e-9)), last)
-    rows = range(last, -1, -1) if take.best else ()
-    return next((row for row in rows if held(take.m, moment_of(log, row).shown)), last)
-
-
-def moment_of(log: Log, row: int) -> Moment:
-    """The state in a row of a log."""
-    active = log.active[row]
-    shown = Snapshot(log.qpos[row], active[:, 0], active[:, 1], active[:, 2])
-    return Moment(float(log.time[row]), int(log.delivered[row]), shown)
-
-
-def _model(log: Log) -> mujoco.MjModel:
-    """The engine's model of a log."""
-    if not log.xml:
-        raise _pictureless()
-    if not len(log):
-        raise InputError(Diagnostic("BadLog", "the log has no tick", None, "run for longer"))
-    files = {f"meshes/{name}": content for name, content in log.files.items()}
-    try:
-        m = mujoco.MjModel.from_xml_string(log.xml, files)
-    except ValueError as error:
-        raise InputError(Diagnostic("BadLog", f"the log's model is broken: {error}")) from error
-    if m.nq != log.qpos.shape[1]:
-        raise InputError(Diagnostic("BadLog", "the log's states are not those of its model"))
-    return m
-
-
-def _save(take: Take, moment: Moment, path: Path) -> None:
-    """A picture of a moment as PNG."""
-    from io import BytesIO
-
-    from PIL import Image
-
-    work = Camerawork(take, SAMPLES)
-    try:
-        pixels = work.picture(moment)
-    finally:
-        work.close()
-    content = BytesIO()
-    Image.fromarray(pixels).save(content, "png", optimize=True)
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        write_bytes(path, content.getvalue())
-    except OSError as error:
-        message = f"'{path}' cannot be written: {error.strerror}"
-        raise InputError(Diagnostic("BadValue", message, None, "choose another file")) from error
-
-
-def _pictureless() -> InputError:
-    message = "the ideal world has no bodies to picture"
-    return InputError(Diagnostic("BadValue", message, None, "leave out --world ideal"))

@@ -146,13 +146,14 @@ class Painter:
         self.away = (self.away + push) * decay
         self.glide = (self.glide - push / LAG) * decay
 
-    # --- drawing -----------------------------------------------------------------------------------
+    # --- drawing ----------------------------------------------------------------------------------
 
     def _draw(self, view: View, shadows: bool, sample: tuple[int, int] | None = None) -> None:
         scene, everything = self.scene, mujoco.mjtCatBit.mjCAT_ALL.value
         mujoco.mjv_updateScene(self.m, self.d, self.options, None, self.free, everything, scene)
         scene.flags[mujoco.mjtRndFlag.mjRND_SHADOW] = shadows
         scene.flags[mujoco.mjtRndFlag.mjRND_REFLECTION] = False
+        scene.flags[mujoco.mjtRndFlag.mjRND_HAZE] = False
         shift = _halton(sample[0] + 1) - 0.5 if sample else np.zeros(2)
         self._aim(view, shift)
         self._light(view, sample)

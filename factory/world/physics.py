@@ -99,6 +99,7 @@ class MujocoWorld:
 
     def step(self, bundle: Bundle | None, robots: Index) -> None:
         """One tick of the engine, the drives following a reference that obeys F_p under the limits."""
+        self._halt(robots)
         if bundle is not None:
             x, v = self.reference[robots], self.speed[robots]
             x1, v1, a = follow(bundle, x, v, self.settings.tick)
@@ -110,6 +111,17 @@ class MujocoWorld:
             self.move(robots, x1, still, still)
             self.d.ctrl[self.control[robots] + 1] = v1
         self.settle()
+
+    def _halt(self, active: Index) -> None:
+        """Robots whose operation has ended stop where their reference is. They may hand over at a low
+        speed: left as a setpoint it would carry them out of the goal, and of the next domain."""
+        moving = self.speed != 0.0
+        moving[active] = False
+        if moving.any():
+            robots = np.flatnonzero(moving)
+            self.speed[robots] = 0.0
+            still = np.zeros(len(robots))
+            self.move(robots, self.reference[robots], still, still)
 
     def move(self, robots: Index, x: Array, v: Array, a: Array) -> None:
         """From now on the references of `robots` run from x [m] at speed v under acceleration a."""

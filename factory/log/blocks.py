@@ -10,12 +10,17 @@ import json
 import struct
 import zlib
 from collections.abc import Iterator, Mapping
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from factory.errors import Diagnostic
+
 Arrays = dict[str, NDArray[Any]]
+
+MAGIC = b"factory-log 1\n"
 
 HEAD = struct.Struct("<cII")
 LENGTH = struct.Struct("<I")
@@ -87,3 +92,10 @@ def unpack_rows(name: str, arrays: Arrays, count: int) -> NDArray[np.float64]:
     change = np.ascontiguousarray(planes.T).view(np.int64).reshape(len(moving), count - 1).T
     bits[1:, moving] = bits[0, moving] ^ np.bitwise_xor.accumulate(change, axis=0)
     return bits.view(np.float64)
+
+
+def bad_log(path: Path, words: str) -> Diagnostic:
+    """What is wrong with a file that should be a log."""
+    return Diagnostic(
+        "BadLog", f"'{path}' {words}", None, "`factory run FILE.pag --log OUT` writes one"
+    )

@@ -1,0 +1,121 @@
+"""Meshes that the engine can use, and their mass properties."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+MOST_FACES = 150_000
+"""A mesh of more faces is replaced by its convex hull."""
+
+LEAST_BOX = 1e-12
+"""A mesh in a smaller box [m³] has no volume for the engine."""
+
+LEAST_MASS, LEAST_INERTIA = 1e-9, 1e-12
+"""Bodies have at least this mass [kg] and principal moments [kg m²], or the engine refuses them."""
+
+
+@dataclass(frozen=True, slots=True)
+class Mesh:
+    """A triangle mesh in metres, in its own frame: vertices (n, 3), faces (m, 3)."""
+
+    name: str
+    vertices: Array = field(repr=False)
+    faces: NDArray[np.int64] = field(repr=False)
+
+
+@dataclass(frozen=True, slots=True)
+class Measured:
+    """A mesh, what was wrong with it, and its mass properties for unit density."""
+
+    mesh: Mesh
+    trouble: str
+    volume: float
+    centre: Array
+    inertia: Array
+    hull: Array
+
+
+def usable(name: str, vertices: Array, faces: NDArray[np.int64]) -> tuple[Mesh, str]:
+    """A mesh that the engine accepts, and what was wrong with the one given ("" if nothing)."""
+    for axes in (np.eye(3), _principal_axes(vertices)):
+        low, high = (vertices @ axes.T).min(axis=0), (vertices @ axes.T).max(axis=0)
+        if _is_flat(high - low):
+            return _box_mesh(name, low, high, axes), "is flat; its box is used instead"
+    low, high = vertices.min(axis=0), vertices.max(axis=0)
+    if float(np.prod(high - low)) < LEAST_BOX:
+        return _box_mesh(name, low, high, np.eye(3)), "is tiny; its box is used instead"
+    if len(faces) > MOST_FACES:
+        return _hull_mesh(name, vertices), (
+            f"has {len(faces)} triangles; its convex hull is used instead"
+        )
+    return Mesh(name, vertices, faces), ""
+
+
+def _principal_axes(vertices: Array) -> Array:
+    """The axes (3, 3) of a mesh's own frame, as rows: a flat one has no extent along the first."""
+    spread = vertices - vertices.mean(axis=0)
+    axes = np.linalg.eigh(spread.T @ spread)[1].T
+    return np.asarray(axes if np.linalg.det(axes) > 0 else -axes)
+
+
+def _is_flat(extent: Array) -> bool:
+    return bool(extent.min() < 1e-3 * extent.max() or extent.min() < 1e-5)
+
+
+def _box_mesh(name: str, low: Array, high: Array, axes: Array) -> Mesh:
+    """The box low, high (3,) along `axes` as a mesh, thick enough for the engine."""
+    import trimesh
+
+    extent = high - low
+    box = trimesh.creation.box(np.maximum(extent, max(1e-4, 2e-3 * float(extent.max()))))
+    return Mesh(name, (np.asarray(box.vertices) + (low + high) / 2) @ axes, np.asarray(box.faces))
+
+
+def _hull_mesh(name: str, vertices: Array) -> Mesh:
+    """The convex hull, of the vertices moved to a grid if it has too many faces itself."""
+    import trimesh
+
+    step = float(np.ptp(vertices, axis=0).max()) / 250
+    for points in (vertices, np.unique(np.round(vertices / step), axis=0) * step):
+        hull = trimesh.convex.convex_hull(points)
+        if len(hull.faces) <= MOST_FACES:
+            break
+    return Mesh(name, np.asarray(hull.vertices), np.asarray(hull.faces))
+
+
+def measured(mesh: Mesh, trouble: str = "") -> Measured:
+    """Volume, centre of mass, inertia for unit density, vertices of the hull. An open mesh, or one
+    that is inside out somewhere, has those of its convex hull."""
+    import trimesh
+
+    body = trimesh.Trimesh(mesh.vertices, mesh.faces, process=False)
+    hull = body.convex_hull
+    for solid in (body, hull, hull.bounding_box):
+        if not solid.is_watertight or not solid.volume > 0:
+            continue
+        properties = solid.mass_properties
+        inertia = np.asarray(properties.inertia) / float(properties.density)
+        if is_inertia(inertia):
+            break
+    centre = np.asarray(properties.center_mass)
+    volume, corners = float(properties.volume), np.asarray(hull.vertices)
+    return Measured(mesh, trouble, volume, centre, inertia, corners)
+
+
+def is_inertia(matrix: Array) -> bool:
+    """Whether a symmetric matrix (3, 3) can be the inertia of a body: principal moments
+    positive, and none larger than the sum of the others."""
+    low, middle, high = np.linalg.eigvalsh(matrix)
+    return bool(low > 1e-6 * high and high <= (low + middle) * (1 + 1e-6))
+
+
+def sound(inertia: Array) -> Array:
+    """An inertia (3, 3) with moments that the engine accepts: too small ones are made larger, all by
+    the same, so that it remains one of a body."""
+    lacking = LEAST_INERTIA - float(np.linalg.eigvalsh(inertia)[0])
+    return inertia + np.eye(3) * max(0.0, lacking)

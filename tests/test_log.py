@@ -1,0 +1,209 @@
+"""Logs: what is written is read back to the bit, from whole files and from cut-off ones; what is no
+log is refused, never a traceback."""
+
+from __future__ import annotations
+
+import random
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra import numpy as arrays
+
+import factory
+from factory.engine import mujoco
+from factory.errors import InputError
+from factory.log import MAGIC, Log, LogWriter, is_log, read_log
+from factory.log.blocks import HEAD, LENGTH, pack_rows, unpack_rows
+from factory.simulation import Simulation
+
+PAPER = Path(__file__).parent.parent / "examples" / "paper.pag"
+
+
+@pytest.fixture(scope="module")
+def layout():
+    return factory.lay_out(factory.compile(factory.load_pag(PAPER)))
+
+
+class Witness:
+    """Keeps what a log should say, by other means."""
+
+    def __init__(self, simulation: Simulation) -> None:
+        self.rows: list[tuple] = []
+        self.observe(simulation.world, simulation.supervisor)
+
+    def observe(self, world, supervisor) -> None:
+        d, m = world.d, world.m
+        on = [e for e in range(m.neq) if d.eq_active[e]]
+        active = [(e, int(m.eq_obj1id[e]), int(m.eq_obj2id[e])) for e in on]
+        pairs = [tuple(c.geom.tolist()) for c in d.contact]
+        marking = [p for p, marked in enumerate(supervisor.marked) if marked]
+        self.rows.append((world.time, d.qpos.copy(), d.qvel.copy(), marking, active, pairs))
+
+
+@pytest.fixture(scope="module")
+def recorded(layout, tmp_path_factory: pytest.TempPathFactory):
+    path = tmp_path_factory.mktemp("log") / "run.log"
+    simulation = Simulation(layout, "mujoco", 2, seed=3, jitter=0.2)
+    witness = Witness(simulation)
+    with LogWriter(path, simulation, command=["factory", "run"]) as writer:
+        run = simulation.run([writer.observe, witness.observe])
+    return path, run, witness, simulation
+
+
+def test_a_log_says_what_happened_to_the_bit(recorded) -> None:
+    path, run, witness, _ = recorded
+    log = read_log(path)
+    assert log.complete and is_log(path)
+    assert len(log) == len(witness.rows) == round(run.sim_time_s / 0.01) + 1
+    for row, (time, qpos, qvel, marking, active, pairs) in enumerate(witness.rows):
+        assert log.time[row] == time
+        assert (log.qpos[row] == qpos).all() and (log.qvel[row] == qvel).all()
+        assert log.marking[row].tolist() == marking
+        assert [tuple(a) for a in log.active[row].tolist()] == active
+        assert [tuple(c) for c in log.contacts[row].tolist()] == pairs
+        assert len(log.distances[row]) == len(pairs)
+    assert log.events == tuple((e.t, e.transition) for e in run.events)
+    assert log.delivered[-1] == run.products == 2
+    assert any(len(row[-1]) for row in witness.rows), (
+        "no contact was logged: the test shows nothing"
+    )
+
+
+def test_the_header_has_all_that_made_the_run(recorded) -> None:
+    path, _, _, simulation = recorded
+    header = read_log(path).header
+    assert header["seed"] == 3 and header["jitter"] == 0.2 and header["units"] == 2
+    assert header["world"] == "mujoco" and header["command"] == ["factory", "run"]
+    assert header["pag"]["text"] == PAPER.read_text("utf-8") and len(header["pag"]["sha256"]) == 64
+    assert header["versions"]["mujoco"] == mujoco.__version__
+    assert header["settings"]["timestep"] == simulation.settings.timestep
+    assert header["places"] == [p.name for p in simulation.supervisor.net.places]
+
+
+def test_the_model_in_a_log_is_the_engines(recorded) -> None:
+    path, _, _, simulation = recorded
+    log = read_log(path)
+    assert log.xml == simulation.model.xml and dict(log.files) == dict(simulation.model.files)
+
+
+def test_what_is_read_is_locked(recorded) -> None:
+    log = read_log(recorded[0])
+    for values in (log.time, log.qpos, log.qvel, log.fired, log.marking.values, log.active.values):
+        with pytest.raises(ValueError):
+            values[...] = 0
+
+
+def block_ends(data: bytes) -> list[int]:
+    """Where the header and each block end."""
+    at = len(MAGIC)
+    at += LENGTH.size + LENGTH.unpack_from(data, at)[0]
+    ends = [at]
+    while at < len(data):
+        at += HEAD.size + HEAD.unpack_from(data, at)[1]
+        ends.append(at)
+    return ends
+
+
+def test_a_file_cut_off_anywhere_gives_its_beginning(recorded, tmp_path: Path) -> None:
+    path = recorded[0]
+    data, whole = path.read_bytes(), read_log(path)
+    ends = block_ends(data)
+    assert len(ends) > 6 and ends[-1] == len(data)
+    cut = tmp_path / "cut.log"
+    seen = []
+    for end in ends:
+        for at in {end - 1, end, end + 1, end + HEAD.size, end + 40}:
+            if not ends[0] <= at < len(data):
+                continue
+            cut.write_bytes(data[:at])
+            log = read_log(cut)
+            seen.append(len(log))
+            assert not log.complete
+            assert (log.qpos == whole.qpos[: len(log)]).all()
+            assert log.events == whole.events[: len(log.events)]
+            if len(log):
+                last = len(log) - 1
+                assert (log.active[last] == whole.active[last]).all()
+    assert 0 in seen and max(seen) == len(whole)
+
+
+def test_a_damaged_block_ends_the_log(recorded, tmp_path: Path) -> None:
+    data = bytearray(recorded[0].read_bytes())
+    third = block_ends(bytes(data))[3]
+    data[third + HEAD.size + 5] ^= 0x40
+    broken = tmp_path / "broken.log"
+    broken.write_bytes(data)
+    assert 0 < len(read_log(broken)) < len(read_log(recorded[0]))
+
+
+def test_no_bytes_give_a_traceback(recorded, tmp_path: Path) -> None:
+    data, chance = recorded[0].read_bytes(), random.Random(7)
+    path = tmp_path / "fuzz"
+    inputs = [b"", MAGIC, MAGIC + b"\xff" * 4, MAGIC + LENGTH.pack(2) + b"{}"]
+    inputs += [
+        MAGIC + LENGTH.pack(len(j)) + j for j in (b"[]", b"7", b'{"nq":-1,"nv":2}', b'{"nq":{}}')
+    ]
+    inputs += [chance.randbytes(chance.randrange(200)) for _ in range(200)]
+    inputs += [MAGIC + chance.randbytes(chance.randrange(200)) for _ in range(200)]
+    for _ in range(200):
+        copy = bytearray(data[: chance.randrange(len(data))])
+        for _ in range(chance.randrange(1, 4)):
+            if copy:
+                copy[chance.randrange(min(len(copy), 4000))] = chance.randrange(256)
+        inputs.append(bytes(copy))
+    refused = 0
+    for content in inputs:
+        path.write_bytes(content)
+        try:
+            assert isinstance(read_log(path), Log)
+        except InputError as error:
+            refused += 1
+            assert error.diagnostics[0].code == "BadLog" and error.diagnostics[0].hint
+    assert refused > 300
+
+
+def test_a_folder_or_nothing_is_no_log(tmp_path: Path) -> None:
+    for path in (tmp_path, tmp_path / "nothing", PAPER):
+        with pytest.raises(InputError, match="BadLog"):
+            read_log(path)
+        assert not is_log(path)
+
+
+def test_a_log_that_cannot_be_written_is_refused(layout, tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="BadLog"):
+        LogWriter(tmp_path, Simulation(layout, "ideal", 1))
+
+
+def test_an_interrupted_run_leaves_a_closed_log(layout, tmp_path: Path) -> None:
+    simulation = Simulation(layout, "mujoco", 1)
+
+    def interrupt(world, supervisor) -> None:
+        if world.time > 1.234:
+            raise KeyboardInterrupt
+
+    path = tmp_path / "cut"
+    with pytest.raises(KeyboardInterrupt), LogWriter(path, simulation) as writer:
+        simulation.run([writer.observe, interrupt])
+    log = read_log(path)
+    assert log.complete and log.time[-1] == pytest.approx(1.24)
+
+
+def test_the_ideal_world_logs_arc_lengths(layout, tmp_path: Path) -> None:
+    simulation = Simulation(layout, "ideal", 2)
+    with LogWriter(tmp_path / "ideal", simulation) as writer:
+        run = simulation.run([writer.observe])
+    log = read_log(tmp_path / "ideal")
+    assert log.qpos.shape == (len(log), 6) and (log.qpos[-1] == simulation.world.x).all()
+    assert log.xml == "" and not log.files
+    assert all(len(log.active[row]) == len(log.contacts[row]) == 0 for row in range(len(log)))
+    assert len(log.events) == len(run.events) and len(log.marking[0]) == 6
+
+
+@given(arrays.arrays(np.float64, st.tuples(st.integers(1, 9), st.integers(0, 6))))
+def test_rows_are_packed_without_loss(rows: np.ndarray) -> None:
+    packed = pack_rows("x", rows)
+    found = unpack_rows("x", packed, len(rows))
+    assert (found.view(np.int64) == rows.view(np.int64)).all()

@@ -1,0 +1,371 @@
+"""Pictures: exact sizes and counts, every part to be seen, the same from a run and from its log,
+and nothing lost when the work is broken off. Without EGL only what needs none is tested."""
+
+from __future__ import annotations
+
+import colorsys
+import os
+import signal
+import subprocess
+import sys
+import time
+from itertools import pairwise
+from pathlib import Path
+
+import imageio.v3 as iio
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra import numpy as arrays
+
+import factory
+from factory import gl
+from factory.errors import InputError, MissingError
+from factory.geometry import Mesh
+from factory.log import LogWriter, read_log
+from factory.mjcf.mesh_files import corner_normals, face_normals, mesh_file
+from factory.render import Film, Still, camera_named, check_output, render_log, still
+from factory.render.camera import Frame, fit, from_above, overview, towards
+from factory.render.video import VideoFile
+from factory.simulation import Simulation
+
+ROOT = Path(__file__).parent.parent
+PAPER = ROOT / "examples" / "paper.pag"
+SIZE, FPS = (160, 96), 10.0
+
+
+def why_no_gl() -> str:
+    try:
+        gl.probe()
+    except MissingError as error:
+        return str(error)
+    return ""
+
+
+WHY = why_no_gl()
+needs_gl = pytest.mark.skipif(bool(WHY), reason=f"no headless OpenGL here: {WHY}")
+
+
+@pytest.fixture(scope="module")
+def layout():
+    return factory.lay_out(factory.compile(factory.load_pag(PAPER)))
+
+
+@pytest.fixture(scope="module")
+def taken(layout, tmp_path_factory: pytest.TempPathFactory):
+    """A run filmed, logged, and with a still of its finished product."""
+    folder = tmp_path_factory.mktemp("taken")
+    simulation = Simulation(layout, "mujoco", 1)
+    with (
+        LogWriter(folder / "run.log", simulation) as log,
+        Film(simulation, folder / "run.mp4", SIZE, FPS) as film,
+        Still(simulation, folder / "end.png", (240, 136), "product") as end,
+    ):
+        run = simulation.run([log.observe, film.observe, end.observe])
+    return folder, run, film, simulation
+
+
+def film_of(path: Path) -> np.ndarray:
+    return iio.imread(path, plugin="pyav")
+
+
+# --- films ------------------------------------------------------------------------------------
+
+
+@needs_gl
+def test_size_rate_and_frames_are_exact(taken) -> None:
+    folder, run, film, _ = taken
+    frames = film_of(folder / "run.mp4")
+    wanted = int(run.sim_time_s * FPS + 1e-6) + 1
+    assert film.frames == wanted and frames.shape == (wanted, SIZE[1], SIZE[0], 3)
+    about = iio.immeta(folder / "run.mp4", plugin="pyav")
+    assert about["fps"] == pytest.approx(FPS) and about["codec"] == "h264"
+    assert about["video_format"] == "yuv420p"
+    assert sorted(p.name for p in folder.iterdir() if p.name.startswith(".")) == []
+
+
+@needs_gl
+def test_the_picture_is_not_blank_and_changes(taken) -> None:
+    frames = film_of(taken[0] / "run.mp4").astype(int)
+    assert all(frame.std() > 10 for frame in frames)
+    factory_only = frames[:, : int(0.8 * SIZE[1])]
+    changed = [np.abs(a - b).max() for a, b in pairwise(factory_only)]
+    assert np.mean(np.array(changed) > 30) > 0.6
+
+
+@needs_gl
+def test_filming_does_not_disturb_the_run(taken, layout) -> None:
+    again = Simulation(layout, "mujoco", 1).run()
+    assert again.events == taken[1].events and again.physics == taken[1].physics
+
+
+@needs_gl
+def test_a_log_gives_the_same_pictures_as_its_run(taken, tmp_path: Path) -> None:
+    folder = taken[0]
+    log = read_log(folder / "run.log")
+    count = render_log(log, tmp_path / "log.mp4", SIZE, FPS)
+    one, other = film_of(folder / "run.mp4"), film_of(tmp_path / "log.mp4")
+    assert count == len(one) == len(other)
+    assert np.abs(one.astype(int) - other).max() <= 2
+    assert render_log(log, tmp_path / "log.png", (240, 136), camera="product") == 1
+    pictures = [iio.imread(p).astype(int) for p in (folder / "end.png", tmp_path / "log.png")]
+    assert np.abs(pictures[0] - pictures[1]).max() <= 2
+    assert render_log(log, tmp_path / "then.png", SIZE, at=1.0) == 1
+    assert iio.imread(tmp_path / "then.png").shape == (SIZE[1], SIZE[0], 3)
+
+
+@needs_gl
+@pytest.mark.parametrize("error", [KeyboardInterrupt, RuntimeError])
+def test_an_interruption_leaves_a_film_of_what_was(layout, tmp_path: Path, error) -> None:
+    simulation = Simulation(layout, "mujoco", 1)
+
+    def interrupt(world, supervisor) -> None:
+        if world.time >= 1.0:
+            raise error
+
+    path = tmp_path / "cut.mp4"
+    with pytest.raises(error), Film(simulation, path, SIZE, FPS) as film:
+        simulation.run([film.observe, interrupt])
+    assert len(film_of(path)) == film.frames == 11
+    assert [p.name for p in tmp_path.iterdir()] == ["cut.mp4"]
+
+
+def test_nothing_is_left_of_a_film_without_frames(tmp_path: Path) -> None:
+    with VideoFile(tmp_path / "none.mp4", SIZE, FPS):
+        pass
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_killed_process_leaves_all_but_the_last_second(tmp_path: Path) -> None:
+    code = (
+        "import sys, time, numpy as np; from pathlib import Path;"
+        "from factory.render.video import VideoFile;"
+        f"v = VideoFile(Path({str(tmp_path / 'k.mp4')!r}), (64, 48), 10);"
+        "noise = np.random.default_rng(0).integers(0, 255, (60, 48, 64, 3), np.uint8);"
+        "[v.write(frame) for frame in noise];"
+        "print('written', flush=True); time.sleep(60)"
+    )
+    child = subprocess.Popen(
+        [sys.executable, "-c", code], stdout=subprocess.PIPE, text=True, cwd=ROOT
+    )
+    assert child.stdout is not None and child.stdout.readline() == "written\n"
+    os.kill(child.pid, signal.SIGKILL)
+    child.wait()
+    child.stdout.close()
+    (left,) = tmp_path.iterdir()
+    assert left.name == ".k.mp4.part"
+    assert len(iio.imread(left.read_bytes(), plugin="pyav", extension=".mkv")) >= 50
+
+
+@pytest.mark.parametrize("ending", [".mp4", ".mkv"])
+@pytest.mark.parametrize(("fps", "count"), [(30, 1), (25, 7), (29.97, 40)])
+def test_every_frame_is_in_the_file_in_order(
+    tmp_path: Path, ending: str, fps: float, count: int
+) -> None:
+    path = tmp_path / f"grey{ending}"
+    with VideoFile(path, (130, 62), fps) as video:
+        for k in range(count):
+            video.write(np.full((62, 130, 3), 40 + 4 * k, np.uint8))
+    frames = film_of(path)
+    assert frames.shape == (count, 62, 130, 3)
+    assert np.allclose(frames.mean(axis=(1, 2, 3)), 40 + 4 * np.arange(count), atol=3)
+
+
+# --- what is to be seen -----------------------------------------------------------------------
+
+
+def missing_parts(layout, picture: np.ndarray) -> list[str]:
+    """The parts whose hue has next to no pixel in the middle of the picture."""
+    tall, wide = picture.shape[0] // 5, picture.shape[1] // 4
+    picture = picture[tall:-tall, wide:-wide]
+    red, green, blue = (picture[..., k].astype(float) for k in range(3))
+    found = []
+    for label, solid in layout.product.solids.items():
+        hue = colorsys.rgb_to_hsv(*solid.rgba[:3])[0]
+        pure = np.array(colorsys.hsv_to_rgb(hue, 1.0, 1.0)) - 1 / 3
+        colour = np.stack([red, green, blue], axis=-1)
+        tint = colour - colour.mean(axis=-1, keepdims=True)
+        strength = np.linalg.norm(tint, axis=-1)
+        pure = pure - pure.mean()
+        like = (tint @ pure) > 0.97 * strength * np.linalg.norm(pure)
+        if int((like & (strength > 40)).sum()) < 150:
+            found.append(label)
+    return found
+
+
+@needs_gl
+def test_every_part_is_in_the_picture_of_the_product(taken, layout) -> None:
+    assert missing_parts(layout, iio.imread(taken[0] / "end.png")) == []
+
+
+@needs_gl
+def test_an_invisible_part_would_be_noticed(taken, layout, tmp_path: Path) -> None:
+    simulation = Simulation(layout, "mujoco", 1)
+    m = simulation.world.m
+    for g in range(m.ngeom):
+        if m.geom(g).name.startswith("part/part2#"):
+            m.geom_rgba[g, 3] = 0.0
+    with Still(simulation, tmp_path / "end.png", (240, 136), "product", caption=False) as end:
+        simulation.run([end.observe])
+    assert missing_parts(layout, iio.imread(tmp_path / "end.png")) == ["part2"]
+
+
+@needs_gl
+@pytest.mark.parametrize("size", [(320, 120), (192, 192), (120, 320)])
+@pytest.mark.parametrize("camera", ["overview", "top"])
+def test_the_factory_fills_pictures_of_any_shape(layout, tmp_path: Path, size, camera) -> None:
+    simulation = Simulation(layout, "mujoco", 1)
+    still(simulation, tmp_path / "a.png", size, camera, caption=False)
+    picture = iio.imread(tmp_path / "a.png").astype(int)
+    floor = np.median(picture.reshape(-1, 3), axis=0)
+    rows, columns = np.nonzero(np.abs(picture - floor).sum(axis=-1) > 90)
+    tall, wide = np.ptp(rows) / size[1], np.ptp(columns) / size[0]
+    assert max(tall, wide) > 0.85
+
+
+@given(
+    arrays.arrays(np.float64, (12, 3), elements=st.floats(-5, 5)),
+    st.floats(0.3, 3),
+    st.floats(-180, 180),
+    st.floats(5, 90),
+)
+def test_a_fitted_view_has_all_points_in_the_frame_and_one_at_its_edge(
+    points, aspect, azimuth, elevation
+) -> None:
+    points = points + np.eye(12, 3)
+    frame = Frame(aspect, below=0.1)
+    view = fit(points, towards(azimuth, elevation), frame)
+    right, up, ahead = view.axes @ (points - view.position).T
+    assert (ahead > 0).all()
+    x, y = right / ahead / view.tall, up / ahead / view.tall
+    side = aspect - 2 * frame.beside
+    edges = [
+        side - x.max(),
+        x.min() + side,
+        1 - 2 * frame.above - y.max(),
+        y.min() + 1 - 2 * frame.below,
+    ]
+    assert min(edges) > -1e-6
+    assert max(abs(edges[0]), abs(edges[1])) < 1e-6 or max(abs(edges[2]), abs(edges[3])) < 1e-6
+
+
+@pytest.mark.parametrize("look", [overview, from_above])
+def test_a_long_factory_is_not_looked_at_from_further_than_a_short_side_asks(look) -> None:
+    long = np.array([(x, y, z) for x in (-3, 3) for y in (-0.5, 0.5) for z in (0, 0.2)], float)
+    upright = look(long, Frame(9 / 16))
+    turned = look(long[:, [1, 0, 2]], Frame(9 / 16))
+    assert upright.distance < 1.5 * turned.distance
+
+
+# --- meshes -----------------------------------------------------------------------------------
+
+
+def test_an_open_mesh_is_seen_from_both_sides() -> None:
+    corners = np.array([(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)], float)
+    sheet = Mesh("m", corners, np.array([(0, 1, 2), (0, 1, 3)]))
+    name, content = mesh_file(sheet)
+    assert name == "m.obj" and content.count(b"\nf ") == 4
+    whole = Mesh("m", corners, np.array([(0, 2, 1), (0, 1, 3), (1, 2, 3), (0, 3, 2)]))
+    assert mesh_file(whole)[0] == "m.stl"
+
+
+def test_normals_are_sharp_at_edges_and_smooth_on_round_surfaces() -> None:
+    trimesh = pytest.importorskip("trimesh")
+    box = trimesh.creation.box((1, 1, 1))
+    cube = Mesh("m", box.vertices, box.faces)
+    assert np.allclose(corner_normals(cube), face_normals(cube)[:, None])
+    ball = trimesh.creation.icosphere(3)
+    flipped = ball.faces.copy()
+    flipped[::2] = flipped[::2, ::-1]
+    normals = corner_normals(Mesh("m", ball.vertices, flipped))
+    outward = ball.vertices[flipped] / np.linalg.norm(
+        ball.vertices[flipped], axis=-1, keepdims=True
+    )
+    assert np.abs(np.abs((normals * outward).sum(axis=-1)) - 1).max() < 0.01
+
+
+# --- what is refused --------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("path", "size", "fps", "words"),
+    [
+        ("a.gif", (64, 64), 30, "valid endings: .mp4, .mkv"),
+        ("a", (64, 64), 30, "no ending"),
+        ("a.mp4", (65, 64), 30, "66x64"),
+        ("a.mp4", (64, 0), 30, "out of range"),
+        ("a.mp4", (64, 99999), 30, "out of range"),
+        ("a.mp4", (64, 64), 0, "frames per second"),
+        ("a.mp4", (64, 64), float("nan"), "frames per second"),
+    ],
+)
+def test_impossible_films_are_refused(path, size, fps, words) -> None:
+    with pytest.raises(InputError, match="BadValue") as caught:
+        check_output(path, size, fps)
+    assert words in str(caught.value)
+
+
+def test_a_still_may_have_an_odd_size() -> None:
+    assert check_output("a.png", (65, 33), still=True) and check_output(
+        "a.png", (65, 33), still=None
+    )
+    assert not check_output("A.MP4", (64, 32), still=None)
+    with pytest.raises(InputError, match=r"valid endings: \.png$"):
+        check_output("a.mp4", (64, 32), still=True)
+
+
+def test_an_unknown_camera_is_refused_with_the_nearest() -> None:
+    with pytest.raises(InputError, match="did you mean 'overview'"):
+        camera_named("overvue")
+
+
+def test_the_ideal_world_has_no_picture(layout, tmp_path: Path) -> None:
+    simulation = Simulation(layout, "ideal", 1)
+    with pytest.raises(InputError, match="ideal world"):
+        Film(simulation, tmp_path / "a.mp4")
+    with LogWriter(tmp_path / "log", simulation) as log:
+        simulation.run([log.observe])
+    with pytest.raises(InputError, match="ideal world"):
+        render_log(read_log(tmp_path / "log"), tmp_path / "a.mp4")
+    assert not (tmp_path / "a.mp4").exists()
+
+
+# --- where GL is missing ----------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("variable", "value", "hint"),
+    [
+        ("MUJOCO_GL", "bogus", "set MUJOCO_GL=egl"),
+        ("MUJOCO_GL", "disabled", "set MUJOCO_GL=egl"),
+        ("__EGL_VENDOR_LIBRARY_DIRS", "/nowhere", gl.APT),
+        ("PYOPENGL_PLATFORM", "glx", gl.APT),
+    ],
+)
+def test_missing_gl_is_explained_with_what_mends_it(monkeypatch, variable, value, hint) -> None:
+    monkeypatch.setenv("MUJOCO_GL", "egl")
+    monkeypatch.setenv(variable, value)
+    with pytest.raises(MissingError, match="NoGL") as caught:
+        gl.probe()
+    found = caught.value.diagnostics[0]
+    assert hint in found.hint and "\n" not in found.message and len(found.message) < 250
+    assert caught.value.exit_status == 3
+    begin = time.perf_counter()
+    with pytest.raises(MissingError):
+        gl.probe()
+    assert time.perf_counter() - begin < 0.05
+
+
+@pytest.mark.parametrize("backend", ["bogus", "egl", "osmesa", "glfw"])
+def test_a_run_needs_no_gl_whatever_mujoco_gl_says(backend: str) -> None:
+    code = (
+        "import factory;"
+        f"layout = factory.lay_out(factory.compile(factory.load_pag({str(PAPER)!r})));"
+        "print(factory.run(layout).products)"
+    )
+    variables = {**os.environ, "MUJOCO_GL": backend, "__EGL_VENDOR_LIBRARY_DIRS": "/nowhere"}
+    done = subprocess.run(
+        [sys.executable, "-c", code], env=variables, cwd=ROOT, capture_output=True, text=True
+    )
+    assert (done.returncode, done.stdout.strip()) == (0, "1"), done.stderr
