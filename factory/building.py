@@ -70,7 +70,7 @@ def build_all(
         texts = _documents(layout, certificate)
         files |= {output / f"{_stem(source)}.{end}": t.encode() for end, t in texts.items()}
     write_all(files)
-    return Built(model, mjcf, tuple(files), certificate.as_json())
+    return Built(model, mjcf, tuple(files), certificate.summary())
 
 
 def _stem(source: Source) -> str:

@@ -67,8 +67,8 @@ def gear_json(gear: Gear, places: Sequence[Place]) -> dict[str, Any]:
 
 
 def check_file(file: Path, folders: Sequence[Path], wip: int | None = None) -> Checked:
-    """Check a PAG, or a net in PNML by its ending. Raises InputError."""
-    if file.suffix.lower() == ".pnml":
+    """Check a PAG, or a net in PNML. Raises InputError."""
+    if is_net(file):
         return check_net(file)
     from factory.nets.pool import part_pool
     from factory.nets.verify import verify
@@ -80,6 +80,19 @@ def check_file(file: Path, folders: Sequence[Path], wip: int | None = None) -> C
     verdict = verify(factory.net, sources)
     pool = dict(part_pool(factory, wip))
     return Checked(source.pag.root, len(source.pag), factory.net, verdict, factory, pool)
+
+
+def is_net(file: Path) -> bool:
+    """Whether a file is meant as PNML: by its ending, or because it begins as XML does."""
+    if file.suffix.lower() == ".pnml":
+        return True
+    try:
+        if not file.is_file():
+            return False
+        with file.open("rb") as stream:
+            return stream.read(100).lstrip(b"\xef\xbb\xbf \t\r\n").startswith(b"<")
+    except OSError:
+        return False
 
 
 def check_net(file: Path) -> Checked:

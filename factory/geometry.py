@@ -255,7 +255,7 @@ def _primitive(
 def _corners(kind: str, size: Array) -> Array:
     """Points on the surface whose displacement tells that of the whole."""
     if kind == "sphere":
-        return np.concatenate([np.eye(3), -np.eye(3)]) * size[0]
+        return np.asarray(np.concatenate([np.eye(3), -np.eye(3)]) * size[0])
     half = np.array([size[0], size[0], size[1]]) if kind == "cylinder" else size
     signs = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], float)
     return np.asarray(signs * half)

@@ -115,7 +115,7 @@ def is_inertia(matrix: Array) -> bool:
 
 
 def sound(inertia: Array) -> Array:
-    """An inertia (3, 3) with moments that the engine accepts: too small ones are made larger, all by
-    the same, so that it remains one of a body."""
+    """An inertia (3, 3) with moments that the engine accepts: too small ones are made larger, all
+    by the same, so that it remains one of a body."""
     lacking = LEAST_INERTIA - float(np.linalg.eigvalsh(inertia)[0])
     return inertia + np.eye(3) * max(0.0, lacking)

@@ -10,6 +10,7 @@ from hypothesis import HealthCheck, settings
 
 from factory.lang import load_templates
 from factory.template import Template
+from tests.command_line import Terminal
 
 TESTS = Path(__file__).parent
 ROOT = TESTS.parent
@@ -48,3 +49,9 @@ def golden(request: pytest.FixtureRequest) -> Callable[[str, str], None]:
 def templates() -> Mapping[str, Template]:
     """The shipped templates."""
     return load_templates([ROOT / "templates"])
+
+
+@pytest.fixture
+def run(capsys: pytest.CaptureFixture[str]) -> Terminal:
+    """`run("check", file, "--json")` runs a command of the command line in this process."""
+    return Terminal(capsys)

@@ -17,7 +17,7 @@ ROOMS = [
     {"lang"},
     {"nets"},
     {"factory"},
-    {"prepared", "compiler", "programs", "pipeline", "geometry", "export"},
+    {"prepared", "compiler", "programs", "pipeline", "geometry", "meshes", "export"},
     {"layout"},
     {"control", "prediction"},
     {"mjcf"},

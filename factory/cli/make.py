@@ -12,6 +12,7 @@ from factory.cli.options import (
     FLOOR,
     MOTION,
     OUTPUT,
+    PATH,
     SOURCE,
     plan,
     settings_of,
@@ -23,10 +24,8 @@ from factory.console import emit, say, warn
 
 @click.command()
 @SOURCE
-@click.option("--mjcf", type=click.Path(path_type=Path), help="Write the model as one XML here.")
-@click.option(
-    "-o", "--output", type=click.Path(path_type=Path), help="Write everything in a folder."
-)
+@click.option("--mjcf", type=PATH, help="Write the model as one XML here.")
+@click.option("-o", "--output", type=PATH, help="Write everything in a folder.")
 @click.option(
     "--units", type=click.IntRange(1), help="Size the pool of parts for so many products."
 )

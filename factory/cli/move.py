@@ -12,6 +12,7 @@ from factory.cli.options import (
     FLOOR,
     MOTION,
     OUTPUT,
+    PATH,
     PICTURE,
     RUN,
     SOURCE,
@@ -26,8 +27,8 @@ from factory.console import emit, say, warn
 @click.command()
 @SOURCE
 @RUN
-@click.option("--video", type=click.Path(path_type=Path), help="Film the run (.mp4).")
-@click.option("--log", type=click.Path(path_type=Path), help="Keep every tick in a file.")
+@click.option("--video", type=PATH, help="Film the run (.mp4).")
+@click.option("--log", type=PATH, help="Keep every tick in a file.")
 @click.option(
     "--distributed", is_flag=True, help="Each robot runs its own program (paper, section 6)."
 )
@@ -74,7 +75,7 @@ def run(
 @click.option(
     "-o",
     "--output",
-    type=click.Path(path_type=Path),
+    type=PATH,
     required=True,
     help="OUT.mp4, or OUT.png for a still.",
 )

@@ -15,6 +15,10 @@ from factory.errors import Diagnostic, InputError
 F = TypeVar("F", bound=Callable[..., Any])
 
 
+PATH = click.Path(path_type=Path, readable=False)
+"""A path as it is given; what is wrong with it the stage that opens it says, as a diagnostic."""
+
+
 def options(*decorators: Callable[[F], F]) -> Callable[[F], F]:
     def decorate(function: F) -> F:
         for decorator in reversed(decorators):
@@ -30,12 +34,12 @@ OUTPUT = options(
     click.option("-v", "--verbose", is_flag=True, help="Say more."),
 )
 SOURCE = options(
-    click.argument("file", type=click.Path(path_type=Path)),
+    click.argument("file", type=PATH),
     click.option(
         "--templates",
         "folders",
         multiple=True,
-        type=click.Path(path_type=Path),
+        type=PATH,
         help="A folder of further operations, searched first (repeatable).",
     ),
 )

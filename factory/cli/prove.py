@@ -6,14 +6,14 @@ from pathlib import Path
 
 import click
 
-from factory.cli.options import OUTPUT, SOURCE, writable
+from factory.cli.options import OUTPUT, PATH, SOURCE, writable
 from factory.console import emit, say
 from factory.errors import Diagnostic, InputError, did_you_mean
 
 
 @click.command()
 @SOURCE
-@click.option("--certificate", type=click.Path(path_type=Path), help="Write the proof here.")
+@click.option("--certificate", type=PATH, help="Write the proof here.")
 @click.option("--wip", type=click.IntRange(1), help="Copies of each part let in at once.")
 @OUTPUT
 def check(
@@ -74,7 +74,7 @@ def programs(
 @click.command()
 @SOURCE
 @click.option("--format", "form", required=True, help="pnml or dot.")
-@click.option("-o", "--output", type=click.Path(path_type=Path), help="A file; stdout without.")
+@click.option("-o", "--output", type=PATH, help="A file; stdout without.")
 @OUTPUT
 def export(
     file: Path,

@@ -6,12 +6,12 @@ from pathlib import Path
 
 import click
 
-from factory.cli.options import OUTPUT
+from factory.cli.options import OUTPUT, PATH
 from factory.console import emit, say, table
 
 
 @click.command()
-@click.option("--templates", "folders", multiple=True, type=click.Path(path_type=Path))
+@click.option("--templates", "folders", multiple=True, type=PATH)
 @OUTPUT
 def templates(folders: tuple[Path, ...], as_json: bool, quiet: bool, verbose: bool) -> int:
     """List the operations and robot types there are."""

@@ -105,6 +105,16 @@ class Certificate:
             "faults": [fault.as_json() for fault in self.faults],
         }
 
+    def summary(self) -> dict[str, object]:
+        """Its figures alone: whether it holds, the clearance [m], how many regions were compared and
+        how many pairs of robots share a junction."""
+        return {
+            "holds": self.holds,
+            "clearance_m": self.clearance,
+            "regions": len(self.regions),
+            "shared": len(self.shared),
+        }
+
     def _region(self, region: Region) -> dict[str, object]:
         return {
             "robot": self.robots[region.robot],

@@ -12,6 +12,7 @@ other waits at its standoff. Near linear.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from itertools import islice
 
 import numpy as np
 import shapely
@@ -19,7 +20,7 @@ from numpy.typing import NDArray
 
 from factory.factory import Operation
 from factory.layout.certificate import Certificate, Fault, Shared
-from factory.layout.crossings import embedding_faults
+from factory.layout.crossings import CHUNK, embedding_faults
 from factory.layout.dimensions import (
     ARM_LOW,
     ARM_TOP,
@@ -57,9 +58,6 @@ TOLERANCE = 1e-6
 MOST = 100
 """So many faults are listed; there is no use in more."""
 
-CHUNK = 512
-"""Regions looked up at a time, so that a heap of them all in one place takes no more memory."""
-
 
 def certify(layout: Layout) -> Certificate:
     """The clearance certificate of a layout. Never raises; see `Certificate.holds`."""
@@ -67,7 +65,11 @@ def certify(layout: Layout) -> Certificate:
     found = piles(factory, layout.product)
     swept = regions(layout, found)
     search = _Search(layout, swept)
-    faults = [*embedding_faults(layout), *search.faults(), *_standoffs(layout, found)]
+    faults = [
+        *islice(embedding_faults(layout), MOST),
+        *islice(search.faults(), MOST),
+        *islice(_standoffs(layout, found), MOST),
+    ]
     top = max(region.z[1] for region in swept)
     return Certificate(
         layout.clearance,
@@ -119,15 +121,11 @@ class _Search:
 
     def faults(self) -> Iterator[Fault]:
         """Every pair that is too near with no reason."""
-        count = 0
         for layer in range(len(NAMES)):
             here = [region for region in self.swept if region.layer == layer]
             for one, other in self._near(here):
                 if not self._settled(one, other):
                     yield self._fault(one, other)
-                    count += 1
-                if count >= MOST:
-                    return
 
     def _near(self, here: list[Region]) -> Iterator[tuple[Region, Region]]:
         """Pairs in one layer that are less than a clearance apart in plan: of different robots,

@@ -19,6 +19,9 @@ from factory.layout.certificate import Fault
 from factory.layout.plan import Layout, Point2
 from factory.pag import NOPART
 
+CHUNK = 512
+"""Boxes looked up at a time, so that a heap of them all in one place takes no more memory."""
+
 Grid = tuple[int, int]
 """A point of the floor in whole millimetres."""
 
@@ -112,19 +115,20 @@ def _crossings(layout: Layout) -> Iterator[Fault]:
     ends = [(_grid(g.carriage(g.reach)), _grid(g.carriage(g.length))) for g in layout.guidepaths]
     points = np.array(ends, np.int64).reshape(-1, 2, 2)
     low, high = points.min(axis=1), points.max(axis=1)
-    for i, j in zip(*(found.tolist() for found in touching(low, high)), strict=True):
+    for i, j in touching(low, high):
         x, y = (int(v) / 1000 for v in np.maximum(low[i], low[j]))
         names = [layout.factory.robots[robot].name for robot in (i, j)]
         message = f"the guidepaths of {names[0]} and {names[1]} cross at ({x:g}, {y:g})"
         yield _fault(layout, message, i, j)
 
 
-def touching(
-    low: NDArray[np.int64], high: NDArray[np.int64]
-) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+def touching(low: NDArray[np.int64], high: NDArray[np.int64]) -> Iterator[tuple[int, int]]:
     """The pairs i < j of closed boxes with corners low, high (n, 2) that have a point in common."""
     cells = shapely.box(low[:, 0], low[:, 1], high[:, 0], high[:, 1])
-    first, second = shapely.STRtree(cells).query(cells)
-    kept = first < second
-    order = np.lexsort((second[kept], first[kept]))
-    return first[kept][order], second[kept][order]
+    tree = shapely.STRtree(cells)
+    for start in range(0, len(cells), CHUNK):
+        first, second = tree.query(cells[start : start + CHUNK])
+        kept = first + start < second
+        order = np.lexsort((second[kept], first[kept]))
+        for i, j in zip(first[kept][order], second[kept][order], strict=True):
+            yield int(i) + start, int(j)

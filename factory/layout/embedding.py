@@ -152,8 +152,8 @@ def _check_floor(layout: Layout, found: tuple[Region, ...], wanted: Point2) -> N
     if size[0] <= wanted[0] and size[1] <= wanted[1]:
         return
     excess = "; ".join(
-        f"{size[i] - wanted[i]:.3f} m too {word}, from {_at_edge(layout, found, 2 * i, min)}"
-        f" to {_at_edge(layout, found, 2 * i + 1, max)}"
+        f"{size[i] - wanted[i]:.3f} m too {word}, from {_at_edge(layout, found, 2 * i)}"
+        f" to {_at_edge(layout, found, 2 * i + 1)}"
         for i, word in ((0, "wide (along the output robot's path)"), (1, "deep (across it)"))
         if size[i] > wanted[i]
     )
@@ -168,10 +168,10 @@ def _check_floor(layout: Layout, found: tuple[Region, ...], wanted: Point2) -> N
     raise RunError(Diagnostic("Layout", message, robot.position, hint))
 
 
-def _at_edge(layout: Layout, found: tuple[Region, ...], edge: int, choose: object) -> str:
+def _at_edge(layout: Layout, found: tuple[Region, ...], edge: int) -> str:
     """What reaches the farthest at one edge of the floor, in words."""
-    extreme = min if choose is min else max
-    region = extreme(found, key=lambda r: r.box[edge])
+    outwards = 1 if edge % 2 else -1
+    region = max(found, key=lambda r: outwards * r.box[edge])
     if region.kind == OUTFEED:
         return "the outfeed"
     name = layout.factory.robots[region.robot].name

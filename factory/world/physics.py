@@ -26,6 +26,10 @@ AWAKE = -0.0
 """Written over a speed of zero it wakes a sleeping body and changes nothing else."""
 
 
+DOZE = int(mujoco.mjMINAWAKE) // 2
+"""Steps of the engine between looks at who sleeps: it takes twice as many of a slow body to doze off."""
+
+
 class MujocoWorld:
     """A compiled model with its data, and the parts' whereabouts.
 
@@ -51,6 +55,7 @@ class MujocoWorld:
         actuator = [self.m.actuator(names.drive(r.name)).id for r in factory.robots]
         self.qpos = self.m.jnt_qposadr[joint]
         self.dof = self.m.jnt_dofadr[joint]
+        self.tree = self.m.body_treeid[self.m.jnt_bodyid[joint]]
         self.control = self.m.actuator_ctrladr[actuator]
         self.m.actuator_biasprm[actuator, 1:3] *= np.asarray(gains)[:, None]
         self.reference = np.array(start, float)
@@ -138,17 +143,25 @@ class MujocoWorld:
         moving = np.flatnonzero(self._moving)
         ctrl, dof = self.control[moving], self.dof[moving]
         begun, x, v, a = self._plan[moving].T
-        for _ in range(substeps):
+        for step in range(substeps):
             if len(moving):
                 tau = d.time - begun
                 d.ctrl[ctrl] = x + tau * (v + 0.5 * tau * a)
                 d.ctrl[ctrl + 1] = v + a * tau
-                d.qvel[dof[d.qvel[dof] == 0.0]] = AWAKE
+                if step % DOZE == 0:
+                    self._rouse(dof, self.tree[moving])
             begin = perf_counter()
             mujoco.mj_step(m, d)
             self.physics_time += perf_counter() - begin
             if d.ncon:
                 self.inspection.contacts()
+
+    def _rouse(self, dof: Index, tree: Index) -> None:
+        """Wake robots that sleep, and keep those awake that creep: the engine puts to sleep what has been
+        slow for a while, and a robot under way never comes to its goal then."""
+        speed, asleep = self.d.qvel[dof], self.d.tree_asleep[tree]
+        self.d.qvel[dof[speed == 0.0]] = AWAKE
+        self.d.tree_asleep[tree[asleep < 0]] = -1 - mujoco.mjMINAWAKE
 
     def settle(self) -> None:
         """After a tick: look at welds and the outfeed."""

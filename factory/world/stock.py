@@ -4,11 +4,9 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Mapping
-
 from dataclasses import dataclass
 
 import numpy as np
-
 
 from factory.engine import mujoco
 from factory.factory import Operation
@@ -222,10 +220,14 @@ class Stock:
             self._wake(int(joined))
 
     def _wake(self, body: int) -> None:
+        """Wake a body that sleeps, and let one that is about to, being slow, wait as long again."""
         dofs = slice(self.m.body_dofadr[body], self.m.body_dofadr[body] + self.m.body_dofnum[body])
         if self.m.body_dofnum[body]:
             speeds = self.d.qvel[dofs]
             speeds[speeds == 0.0] = -0.0
+            tree = self.m.body_treeid[body]
+            if self.d.tree_asleep[tree] < 0:
+                self.d.tree_asleep[tree] = -1 - mujoco.mjMINAWAKE
 
     def _place(self, body: int, at: tuple[float, float, float]) -> None:
         joint = self.m.body_jntadr[body]

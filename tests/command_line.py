@@ -1,0 +1,82 @@
+"""The command line for tests: in this process, which is quick, or in one of its own."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from factory.cli import run_command
+
+ROOT = Path(__file__).resolve().parent.parent
+PAPER = ROOT / "examples" / "paper.pag"
+
+
+@dataclass(frozen=True)
+class Done:
+    """What a command left: its status, and what it wrote."""
+
+    status: int
+    out: str
+    err: str
+
+    @property
+    def json(self) -> dict[str, Any]:
+        """The one document on stdout, in which no number is out of range."""
+        assert self.out.count("\n") == 1, self.out
+        document = json.loads(self.out, parse_constant=_refuse)
+        assert document["schema"] == 1
+        return dict(document)
+
+    @property
+    def codes(self) -> list[str]:
+        """The codes of its errors."""
+        return [error["code"] for error in self.json["errors"]]
+
+
+def _refuse(constant: str) -> float:
+    raise AssertionError(f"{constant} is not JSON")
+
+
+class Terminal:
+    """Runs commands in this process."""
+
+    def __init__(self, capsys: pytest.CaptureFixture[str]) -> None:
+        self.capsys = capsys
+
+    def __call__(self, *words: object) -> Done:
+        self.capsys.readouterr()
+        status = run_command([str(word) for word in words])
+        out, err = self.capsys.readouterr()
+        assert "Traceback" not in err
+        assert "Internal" not in err, err
+        return Done(status, out, err)
+
+
+def spawn(*words: object, cwd: Path | None = None, **variables: str) -> Done:
+    """Runs a command in a process of its own, with environment variables added."""
+    done = subprocess.run(
+        [sys.executable, "-m", "factory", *(str(word) for word in words)],
+        env={**os.environ, "PYTHONPATH": str(ROOT), **variables},
+        cwd=cwd,
+        capture_output=True,
+        text=True,
+        timeout=120,
+    )
+    assert "Traceback" not in done.stderr, done.stderr
+    return Done(done.returncode, done.stdout, done.stderr)
+
+
+def files_in(folder: Path) -> dict[str, bytes]:
+    """Every file below a folder, by its name, with its content."""
+    return {
+        path.relative_to(folder).as_posix(): path.read_bytes()
+        for path in sorted(folder.rglob("*"))
+        if path.is_file()
+    }

@@ -1,0 +1,164 @@
+"""Laid-out factories for tests: random trees with random geometry, and layouts changed on
+purpose."""
+
+from __future__ import annotations
+
+import random
+from collections import defaultdict
+from dataclasses import replace
+from functools import cache
+
+from pag_values import SHAPES, factory_of, paper, random_pag
+
+from factory.geometry import Product, Solid, product_geometry
+from factory.layout.crossings import delivered_to
+from factory.layout.embedding import lay_out
+from factory.layout.plan import Layout
+from factory.layout.stretching import is_tool
+from factory.pag import PAG, Assembly, Parameter, Value
+
+STYLES = ("plain", "small", "medium", "large", "far", "mixed")
+"""How large parts are, and how far from the middle of the product."""
+
+SPREAD = {"small": 0.03, "medium": 0.15, "large": 0.4, "far": 0.6}
+
+
+def shaped(pag: PAG, seed: int, style: str, base: bool = False) -> PAG:
+    """The PAG with a random shape for every part; some mates of two become insertions.
+
+    `base`: the first part is a heavy plate under all others, so that the product stands by itself.
+    """
+    rng = random.Random(f"{seed} {style}")
+    nodes = []
+    for node in pag.nodes:
+        changed = node
+        if not node.inputs:
+            changed = replace(node, parameters=tuple(_geometry(rng, style)))
+            if base and style != "plain":
+                wide, base = 2 * SPREAD.get(style, 0.6) + 0.05, False
+                plate = (("box", (wide, wide, 0.01)), ("pos", (0.0, 0.0, -0.25)), ("mass", 3.0))
+                changed = replace(node, parameters=tuple(Parameter(k, v) for k, v in plate))
+        elif node.operation == "mate" and len(node.inputs) == 2 and rng.random() < 0.15:
+            changed = replace(node, operation="insert")
+        nodes.append(changed)
+    return replace(pag, nodes=tuple(nodes))
+
+
+def _geometry(rng: random.Random, style: str) -> list[Parameter]:
+    """Boxes, plates, rods, balls and cylinders, turned or not, off the product's middle."""
+    chosen = rng.choice(tuple(SPREAD)) if style == "mixed" else style
+    if chosen == "plain":
+        return []
+    wide = SPREAD[chosen]
+    given: dict[str, Value] = dict([_shape(rng, min(wide, 0.25))])
+    given["pos"] = (rng.uniform(-wide, wide), rng.uniform(-wide, wide), rng.uniform(0.0, 0.15))
+    given["mass"] = rng.uniform(0.05, 0.5)
+    if rng.random() < 0.4:
+        given["quat"] = tuple(rng.uniform(-1, 1) for _ in range(4))
+    return [Parameter(name, value) for name, value in given.items()]
+
+
+def _shape(rng: random.Random, longest: float) -> tuple[str, Value]:
+    def length(most: float = longest) -> float:
+        return 0.005 * float((most / 0.005) ** rng.random())
+
+    kind = rng.choice(("box", "plate", "rod", "cylinder", "sphere"))
+    if kind == "plate":
+        return "box", (length(), length(), 0.005)
+    if kind == "rod":
+        sides = [0.008, 0.008, 0.008]
+        sides[rng.randrange(3)] = 2 * length()
+        return "box", tuple(sides)
+    if kind == "cylinder":
+        return kind, (length() / 2, length())
+    return (kind, length() / 2) if kind == "sphere" else (kind, (length(), length(), length(0.1)))
+
+
+def random_layout(
+    size: int, seed: int, shape: str = "any", style: str = "medium", base: bool = False
+) -> Layout:
+    """A layout of a random factory, always the same for the same arguments."""
+    factory = factory_of(shaped(random_pag(size, seed, shape), seed, style, base))
+    return lay_out(factory, product_geometry(factory.pag))
+
+
+def many_layouts(size: int, seeds: range) -> list[Layout]:
+    """Layouts of all shapes of trees and styles of parts in turn."""
+    return [
+        random_layout(size, seed, SHAPES[seed % len(SHAPES)], STYLES[seed // 2 % len(STYLES)])
+        for seed in seeds
+    ]
+
+
+@cache
+def paper_layout() -> Layout:
+    """The layout of the paper's example."""
+    factory = factory_of(paper())
+    return lay_out(factory, product_geometry(factory.pag))
+
+
+def table_pag(root: str, *rows: tuple[str, str, str, dict[str, Value]]) -> PAG:
+    """A PAG from rows (label, operation, inputs apart by spaces, parameters)."""
+    return PAG(
+        root,
+        tuple(
+            Assembly(
+                label, op, tuple(inputs.split()), tuple(Parameter(k, v) for k, v in given.items())
+            )
+            for label, op, inputs, given in rows
+        ),
+    )
+
+
+def row_of_inserts(parts: int = 5) -> Layout:
+    """A carrier that takes its parts one after the other: stations in a row."""
+    boxes: list[tuple[str, str, str, dict[str, Value]]] = [
+        (f"p{n}", "atomic", "", {"box": (0.04, 0.04, 0.04), "pos": (0.0, 0.0, 0.05 * n)})
+        for n in range(parts)
+    ]
+    whole = ("x", "mate", " ".join(f"p{n}" for n in range(parts)), {})
+    factory = factory_of(table_pag("x", whole, *boxes))
+    return lay_out(factory, product_geometry(factory.pag))
+
+
+def shortened(layout: Layout, robot: int, length: float) -> Layout:
+    """A guidepath shortened at its B end, with everything that delivers to it moved along."""
+    below = defaultdict(list)
+    for guest, carrier in enumerate(delivered_to(layout)):
+        below[carrier].append(guest)
+    paths = list(layout.guidepaths)
+    u = paths[robot].heading
+    paths[robot] = replace(paths[robot], travel=round(paths[robot].travel - length, 3))
+    moved = list(below[robot])
+    while moved:
+        guest = moved.pop()
+        x, y = paths[guest].a
+        a = (round(x + u[0] * length, 3), round(y + u[1] * length, 3))
+        paths[guest] = replace(paths[guest], a=a)
+        moved += below[guest]
+    return replace(layout, guidepaths=tuple(paths), certificate=None)
+
+
+def with_path(layout: Layout, robot: int, **changes: object) -> Layout:
+    """A layout with one guidepath changed and nothing else."""
+    paths = list(layout.guidepaths)
+    paths[robot] = replace(paths[robot], **changes)  # type: ignore[arg-type]
+    return replace(layout, guidepaths=tuple(paths), certificate=None)
+
+
+def grown(layout: Layout, label: str, by: float) -> Layout:
+    """A part that is larger in plan, on every side, than the layout knows."""
+
+    def larger(solid: Solid) -> Solid:
+        step = solid.low * 0 + (by, by, 0.0)
+        return replace(solid, low=solid.low - step, high=solid.high + step)
+
+    product = layout.product
+    solids = {k: larger(s) if k == label else s for k, s in product.solids.items()}
+    changed = Product(solids, product.low, product.high)
+    return replace(layout, product=changed, certificate=None)
+
+
+def robots_with_payload(layout: Layout) -> list[int]:
+    """The robots that are no tools."""
+    return [r.index for r in layout.factory.robots if not is_tool(layout.factory, r.index)]

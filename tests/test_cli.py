@@ -1,0 +1,403 @@
+"""The command line seen from outside: documents, statuses, diagnostics."""
+
+from __future__ import annotations
+
+import json
+import re
+import tomllib
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from factory.nets.certificate_check import check_certificate
+from tests.command_line import PAPER, ROOT, Terminal, files_in, spawn
+
+NUMBER = (int, float)
+MAYBE = (int, float, type(None))
+FLAG = (bool,)
+
+CHECK: dict[str, Any] = {
+    "product": str,
+    **dict.fromkeys(("labels", "robots", "places", "transitions", "tokens", "largest_mode"), int),
+    **dict.fromkeys(("gear_net", "live", "safe", "reversible", "legal"), bool),
+    "gears": list,
+    "part_pool": dict,
+    "witness": list,
+}
+BUILD: dict[str, Any] = {
+    "mjcf": (str, type(None)),
+    **dict.fromkeys(("robots", "parts", "joints", "welds"), int),
+    **dict.fromkeys(("guidepath_length_m", "area_m2", "compile_s"), NUMBER),
+}
+RUN: dict[str, Any] = {
+    "world": str,
+    **dict.fromkeys(("units", "robots", "transitions_fired", "handoffs"), int),
+    **dict.fromkeys(("unintended_contacts", "engine_warnings"), int),
+    **dict.fromkeys(("sim_time_s", "wall_time_s", "physics_time_s"), NUMBER),
+    **dict.fromkeys(("supervisor_time_s", "realtime_factor", "predicted_cycle_time_s"), NUMBER),
+    **dict.fromkeys(("handoff_gap_max_mm", "weld_residual_max_mm"), NUMBER),
+    "product_error_max_mm": NUMBER,
+    "cycle_time_s": MAYBE,
+    "refines_net": bool,
+    "events": list,
+}
+OF_PHYSICS = [
+    "physics_time_s",
+    "handoffs",
+    "handoff_gap_max_mm",
+    "weld_residual_max_mm",
+    "product_error_max_mm",
+    "unintended_contacts",
+    "engine_warnings",
+]
+
+
+def assert_keys(document: dict[str, Any], expected: dict[str, Any]) -> None:
+    for key, kinds in expected.items():
+        assert key in document
+        assert isinstance(document[key], kinds), f"{key} = {document[key]!r}"
+        if kinds is int:
+            assert not isinstance(document[key], bool)
+
+
+# --- the documents --------------------------------------------------------------------------------
+
+
+def test_check_of_the_papers_example(run: Terminal) -> None:
+    document = run("check", PAPER, "--json").json
+    assert_keys(document, CHECK)
+    assert document["product"] == "sub3"
+    assert [document[k] for k in ("labels", "robots", "places", "transitions", "tokens")] == [
+        *(6, 6, 19, 14, 6)
+    ]
+    assert document["largest_mode"] == 3
+    assert document["part_pool"] == {"part1": 3, "part2": 3, "part3": 2}
+    assert document["witness"] == []
+    r3 = document["gears"][2]
+    assert (r3["robot"], r3["type"]) == ("r3", "dot")
+    assert [f"{p['mode']} {p['label']}" for p in r3["places"]] == [
+        *("wait nopart", "mate sub1", "hold sub1", "weld sub2", "wait sub2", "mate sub3")
+    ]
+    assert all(set(p) >= {"name", "mode", "label"} for g in document["gears"] for p in g["places"])
+
+
+def test_labels_are_those_the_user_wrote(run: Terminal, tmp_path: Path) -> None:
+    file = tmp_path / "k.pag"
+    file.write_text("5 parts; root = s; s = mate(a, b, c, d);" + "".join(
+        f"{x} = atomic();" for x in "abcd"
+    ))
+    document = run("check", file, "--json").json
+    assert document["labels"] == 5
+    operations, roles = 7, 4 + 3 + 2 + 2
+    robots = 1 + roles - operations
+    assert document["robots"] == robots
+    assert document["transitions"] == 2 * operations + 2
+    assert document["places"] == 2 * operations + robots + 1
+
+
+def test_build_of_the_papers_example(run: Terminal, tmp_path: Path) -> None:
+    file = tmp_path / "paper.xml"
+    document = run("build", PAPER, "--mjcf", file, "--json").json
+    assert_keys(document, BUILD)
+    assert document["mjcf"] == str(file)
+    assert document["robots"] == 6
+    assert file.is_file()
+
+
+def test_build_writes_a_folder(run: Terminal, tmp_path: Path) -> None:
+    done = run("build", PAPER, "-o", tmp_path / "new" / "folder")
+    assert done.status == 0
+    written = files_in(tmp_path)
+    assert "new/folder/paper.xml" in written
+    assert {Path(name).suffix for name in written} >= {".xml", ".svg", ".pnml", ".dot", ".json"}
+    assert all(name in done.out for name in written)
+    proof = json.loads(written["new/folder/paper.proof.json"])
+    assert check_certificate(proof) == []
+
+
+def test_run_in_mujoco(run: Terminal) -> None:
+    done = run("run", PAPER, "--units", 2, "--json")
+    document = done.json
+    assert done.status == 0
+    assert_keys(document, RUN)
+    assert document["world"] == "mujoco"
+    assert document["products"] == document["units"] == 2
+    assert document["refines_net"]
+    assert document["cycle_time_s"] is None
+    assert len(document["events"]) == document["transitions_fired"] == 28
+    assert document["handoffs"] == 2 * 11
+    for event in document["events"]:
+        assert set(event) >= {"t", "transition"}
+    times = [event["t"] for event in document["events"]]
+    assert times == sorted(times)
+    assert document["events"][-1]["transition"] == "dropoff_e"
+    spent = document["physics_time_s"] + document["supervisor_time_s"]
+    assert spent == pytest.approx(document["wall_time_s"])
+    factor = document["sim_time_s"] / document["wall_time_s"]
+    assert document["realtime_factor"] == pytest.approx(factor)
+
+
+def test_keys_of_physics_are_null_in_the_ideal_world(run: Terminal) -> None:
+    document = run("run", PAPER, "--world", "ideal", "--units", 6, "--json").json
+    assert_keys(document, {k: v for k, v in RUN.items() if k not in OF_PHYSICS})
+    assert all(document[key] is None for key in OF_PHYSICS)
+    assert document["cycle_time_s"] == pytest.approx(document["predicted_cycle_time_s"], rel=0.02)
+
+
+def test_programs_export_templates_doctor(run: Terminal, tmp_path: Path) -> None:
+    programs = run("programs", PAPER, "--json").json["programs"]
+    assert list(programs) == [f"r{n}" for n in range(1, 7)]
+    one = run("programs", PAPER, "--robot", "r3")
+    assert one.status == 0
+    assert "π_3 ∘ mate(x_5, x_6, x_3)" in one.out
+    assert "r4" not in one.out
+    for form, word in (("pnml", "<pnml"), ("dot", "digraph")):
+        assert word in run("export", PAPER, "--format", form).out
+        assert word in run("export", PAPER, "--format", form, "--json").json["text"]
+        file = tmp_path / f"paper.{form}"
+        assert run("export", PAPER, "--format", form, "-o", file).out == ""
+        assert word in file.read_text("utf-8")
+    shown = run("templates", "--json").json
+    assert {t["name"] for t in shown["templates"]} >= {
+        *("atomic", "mate", "insert", "weld", "dropoff", "inspect", "press", "glue")
+    }
+    assert {r["name"] for r in shown["robots"]} >= {"dot"}
+    assert "mate" in run("templates").out
+    found = run("doctor", "--json")
+    assert found.status in (0, 3)
+    assert {c["name"] for c in found.json["checks"]} >= {"python", "mujoco", "engine", "rendering"}
+    assert all(c["ok"] or c["mend"] for c in found.json["checks"])
+
+
+def test_version_and_help(run: Terminal) -> None:
+    version = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["version"]
+    assert run("--version").out.strip() == f"factory {version}"
+    assert run("--version", "--json").json["version"] == version
+    text = run("--help").out
+    for command in ("check", "build", "run", "render", "programs", "export", "templates", "doctor"):
+        assert command in text
+        done = run(command, "--help")
+        assert done.status == 0
+        assert "--json" in done.out
+        assert run(command, "-h").out == done.out
+
+
+def test_people_get_a_summary(run: Terminal) -> None:
+    out = run("run", PAPER, "--units", 4).out
+    for word in ("4 of 4 products", "cycle time", "bottleneck r3", "Utilisation", "refines"):
+        assert word in out
+    assert "live: yes" in run("check", PAPER).out
+    assert run("check", PAPER, "-q").out == ""
+    assert run("run", PAPER, "-q").out == ""
+    assert run("build", PAPER, "-q").out == ""
+    assert len(run("templates", "-v").out) > len(run("templates").out)
+
+
+# --- diagnostics ----------------------------------------------------------------------------------
+
+BROKEN = """root = s;
+s = mate(a, b);
+a = atomic ( mass = -1, box = (1, 2) );
+b = atomik ();
+"""
+
+
+@pytest.fixture
+def broken(tmp_path: Path) -> Path:
+    file = tmp_path / "broken.pag"
+    file.write_text(BROKEN)
+    return file
+
+
+@pytest.mark.parametrize("columns", ["20", "80", "1000"])
+def test_diagnostics_are_lines_that_are_never_wrapped(broken: Path, columns: str) -> None:
+    done = spawn("check", broken, COLUMNS=columns)
+    assert done.status == 2
+    assert done.out == ""
+    lines = done.err.splitlines()
+    heads = [line for line in lines if re.match(r"\S.*:\d+:\d+: \w+ \S", line)]
+    assert [re.sub(r"^.*?(\d+:\d+: \w+).*", r"\1", head) for head in heads] == [
+        *("3:21: BadValue", "3:31: BadValue", "4:5: UnknownOperation")
+    ]
+    for head in heads:
+        at = lines.index(head)
+        line, column = (int(n) for n in head.removeprefix(f"{broken}:").split(":")[:2])
+        assert lines[at + 1].strip() == BROKEN.splitlines()[line - 1].strip()
+        caret = lines[at + 2].index("^")
+        assert lines[at + 1][caret] == BROKEN.splitlines()[line - 1][column - 1]
+        assert lines[at + 3].strip()
+    assert "did you mean 'atomic'?" in done.err
+
+
+def test_errors_are_a_document_too(run: Terminal, broken: Path) -> None:
+    done = run("check", broken, "--json")
+    assert done.status == 2
+    assert done.codes == ["BadValue", "BadValue", "UnknownOperation"]
+    for error in done.json["errors"]:
+        assert error["file"] == str(broken)
+        assert error["message"]
+        assert isinstance(error["line"], int)
+        assert isinstance(error["col"], int)
+
+
+def test_unprintable_signs_cannot_break_a_line(run: Terminal, tmp_path: Path) -> None:
+    file = tmp_path / "new\nline.pag"
+    file.write_bytes(b"root = \x1b[31m\x07;\tx")
+    err = run("check", file).err
+    assert "\x1b" not in err
+    assert "new line.pag:1:" in err.splitlines()[0]
+
+
+def test_warnings_have_the_form_of_diagnostics(run: Terminal, tmp_path: Path) -> None:
+    file = tmp_path / "big.pag"
+    file.write_text("root = p; p = atomic ( box = (9, 1, 1) );")
+    done = run("build", file)
+    assert done.status == 0
+    assert re.match(rf"{re.escape(str(file))}:\d+:\d+: \w+ warning: ", done.err)
+    assert run("build", file, "-q").err == ""
+    assert run("build", file, "--json").json["warnings"]
+
+
+@pytest.mark.parametrize(
+    ("words", "hint"),
+    [
+        ([], "--help"),
+        (["--json", "check", PAPER], "--help"),
+        (["chek", PAPER], "did you mean 'check'?"),
+        (["run", PAPER, "--unitz", "2"], "did you mean '--units'?"),
+        (["run"], "factory run --help"),
+        (["run", PAPER, "--units"], "--help"),
+        (["check", PAPER, PAPER], "--help"),
+        (["export", PAPER, "--format", "pnlm"], "did you mean 'pnml'?"),
+        (["programs", PAPER, "--robot", "r77"], "robots: r1, r2"),
+        (["check", PAPER.parent / "papers.pag"], "did you mean"),
+        (["run", PAPER, "--world", "real"], "--help"),
+        (["build", PAPER, "--templates", "nowhere"], "directory"),
+    ],
+)
+def test_usage_errors(run: Terminal, words: list[object], hint: str) -> None:
+    done = run(*words)
+    assert done.status == 2
+    assert hint in done.err
+    document = done if "--json" in words else run(*words, "--json")
+    assert document.status == 2
+    assert len(document.codes) == 1
+    assert "--json" in words or done.out == ""
+
+
+# --- proofs ---------------------------------------------------------------------------------------
+
+
+def test_certificates_check(run: Terminal, tmp_path: Path) -> None:
+    file = tmp_path / "proof.json"
+    assert run("check", PAPER, "--certificate", file).status == 0
+    proof = json.loads(file.read_text("utf-8"))
+    assert check_certificate(proof) == []
+    assert run("check", PAPER, "--certificate", file, "--wip", 1, "--json").json["part_pool"] == {
+        **dict.fromkeys(("part1", "part2", "part3"), 1)
+    }
+
+
+@pytest.mark.parametrize("ending", ["pnml", "xml"])
+def test_a_net_that_fails_has_a_witness(run: Terminal, tmp_path: Path, ending: str) -> None:
+    file = tmp_path / f"net.{ending}"
+    text = run("export", PAPER, "--format", "pnml").out
+    file.write_text(text)
+    good = run("check", file, "--json")
+    assert good.status == 0
+    assert good.json["live"] is True
+    bad = re.sub(r"<initialMarking>\s*<text>1</text>\s*</initialMarking>", "", text)
+    assert bad != text
+    file.write_text(bad)
+    done = run("check", file, "--json")
+    assert done.status == 1
+    assert_keys(done.json, {k: v for k, v in CHECK.items() if v is not bool})
+    assert done.json["live"] is False
+    assert done.json["witness"]
+    assert all(w["property"] and w["reason"] for w in done.json["witness"])
+    assert "NO" in run("check", file).out
+
+
+# --- factory.toml and templates -------------------------------------------------------------------
+
+
+@pytest.fixture
+def product(tmp_path: Path) -> Path:
+    file = tmp_path / "p.pag"
+    file.write_text(PAPER.read_text())
+    return file
+
+
+def test_a_file_of_settings_and_options_that_beat_it(run: Terminal, product: Path) -> None:
+    def seconds(*words: object) -> float:
+        found = run("run", product, "--world", "ideal", "--json", *words).json["sim_time_s"]
+        assert isinstance(found, float)
+        return found
+
+    plain = seconds()
+    settings = product.with_name("factory.toml")
+    settings.write_text("speed = 0.05 # slow\nacceleration = 1")
+    slow = seconds()
+    assert slow > 2 * plain
+    assert seconds("--speed", 0.5, "--acceleration", 2) == plain
+    settings.write_text("\ufeffspeed = 0.5\r\n")
+    assert seconds() == plain
+
+
+@pytest.mark.parametrize(
+    ("text", "where", "code", "hint"),
+    [
+        ("speed = 1\nsped = 2", "2:1", "UnknownParameter", "did you mean 'speed'?"),
+        ("[motion]\nspeed = 1", "1:2", "UnknownParameter", "keys"),
+        ("clearance = 'much'", "1:1", "BadValue", "clearance = 0.02"),
+        ("  timestep = -1", "1:3", "BadValue", "timestep = 0.002"),
+        ("substeps = 2.5", "1:1", "BadValue", "substeps = 5"),
+        ("speed = true", "1:1", "BadValue", "speed = 0.5"),
+        ("speed = nan", "1:1", "BadValue", "speed = 0.5"),
+        ("speed = 9" + "9" * 500, "1:1", "BadValue", "speed = 0.5"),
+        ("force = 1\nspeed = = 2", "2:9", "Syntax", "toml.io"),
+        ("speed = [", "1:", "Syntax", "toml.io"),
+    ],
+)
+def test_faults_of_the_settings_are_shown_in_place(
+    run: Terminal, product: Path, text: str, where: str, code: str, hint: str
+) -> None:
+    settings = product.with_name("factory.toml")
+    settings.write_text(text)
+    done = run("run", product)
+    assert done.status == 2
+    assert f"{settings}:{where}" in done.err
+    assert code in done.err
+    assert hint in done.err
+
+
+def test_all_faults_of_the_settings_at_once(run: Terminal, product: Path) -> None:
+    product.with_name("factory.toml").write_text("sped = 1\nforce = -1\nclearance = ''")
+    assert run("build", product, "--json").codes == ["UnknownParameter", "BadValue", "BadValue"]
+    product.with_name("factory.toml").write_bytes(b"\xff\xfe")
+    assert run("build", product, "--json").codes == ["Syntax"]
+
+
+OWN = """{name} = (R, j, ~, <a; b>, F) where R = < dot, tool >; j = 1; ~ = {{ S1 = A2 }};
+<a; b> = < LAB1, nopart; LAB2, nopart >;
+F = navigation on W to ( S1 + 2r, A2 + 2r ) within eps for dwell; parameters = ( dwell = {dwell} );
+"""
+
+
+def test_folders_of_templates_are_searched_in_order(run: Terminal, tmp_path: Path) -> None:
+    for folder, dwell in (("one", 1.5), ("two", 2.5)):
+        (tmp_path / folder).mkdir()
+        for name in ("rivet", "weld"):
+            (tmp_path / folder / f"{name}.op").write_text(OWN.format(name=name, dwell=dwell))
+    (tmp_path / "two" / "bolt.op").write_text(OWN.format(name="bolt", dwell=3.5))
+    words = ["--templates", tmp_path / "one", "--templates", tmp_path / "two"]
+    shown = {t["name"]: t for t in run("templates", *words, "--json").json["templates"]}
+    dwells = [shown[n]["parameters"]["dwell"] for n in ("rivet", "weld", "bolt", "glue")]
+    assert dwells == [1.5, 1.5, 3.5, 2.0]
+    file = tmp_path / "p.pag"
+    file.write_text("root = d; d = bolt(c); c = rivet(b); b = weld(a); a = atomic()")
+    assert run("run", file, *words, "--json").json["sim_time_s"] > 1.5 + 1.5 + 3.5
+    assert run("check", file).status == 2
+    for command in (["check"], ["build"], ["programs"], ["export", "--format", "dot"]):
+        assert run(command[0], file, *command[1:], *words).status == 0

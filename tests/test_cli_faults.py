@@ -1,0 +1,384 @@
+"""The command line under ill treatment: no traceback for any input, no half of a file, and a status that
+says whose fault it was."""
+
+from __future__ import annotations
+
+import json
+import os
+import random
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from factory.log import read_log
+from tests.command_line import PAPER, ROOT, Terminal, files_in, spawn
+
+BROKEN = sorted((ROOT / "tests" / "broken").glob("*.pag"))
+TEMPLATES = sorted((ROOT / "tests" / "broken").glob("*.op"))
+
+
+def commands(folder: Path) -> list[list[object]]:
+    """Every command that takes a PAG, with everything that it can write."""
+    return [
+        ["check", "--certificate", folder / "proof.json"],
+        ["build", "--mjcf", folder / "model.xml", "-o", folder / "all"],
+        ["run", "--log", folder / "run.log", "--video", folder / "run.mp4"],
+        ["render", "-o", folder / "film.mp4"],
+        ["programs"],
+        ["export", "--format", "dot", "-o", folder / "net.dot"],
+    ]
+
+
+@pytest.fixture
+def out(tmp_path: Path) -> Path:
+    """A folder for what is written, that stays empty when something is wrong."""
+    folder = tmp_path / "out"
+    folder.mkdir()
+    return folder
+
+
+# --- broken files ---------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("file", BROKEN, ids=lambda p: p.stem)
+def test_broken_files_write_nothing(run: Terminal, out: Path, file: Path) -> None:
+    """By every command: the same errors, the same status, and nothing is written. A mesh that cannot be
+    read is none of the concern of `programs` and `export`."""
+    needed = [c for c in commands(out) if c[0] in ("build", "run", "render")]
+    shape = run("check", file).status == 0
+    for command, *options in needed if shape else commands(out):
+        done = run(command, file, *options, "--json")
+        assert done.status == 2
+        errors = done.json["errors"]
+        assert errors
+        assert all(e["file"] and e["line"] >= 1 and e["col"] >= 1 for e in errors), command
+        assert files_in(out) == {}
+
+
+@pytest.mark.parametrize("file", TEMPLATES, ids=lambda p: p.stem)
+def test_broken_templates_write_nothing(run: Terminal, out: Path, file: Path) -> None:
+    folder = out.parent / "templates"
+    folder.mkdir()
+    (folder / file.name).write_bytes(file.read_bytes())
+    for command, *options in [*commands(out), ["templates"]]:
+        source = [] if command == "templates" else [PAPER]
+        done = run(command, *source, *options, "--templates", folder, "--json")
+        assert done.status == 2
+        assert done.codes
+    assert files_in(out) == {}
+
+
+def garbage() -> dict[str, bytes]:
+    """Files that nobody would write."""
+    draw = random.Random(7)
+    mangled = bytearray(PAPER.read_bytes())
+    for _ in range(20):
+        mangled[draw.randrange(len(mangled))] = draw.choice(b"(){}=;,<>\"\\\x00 /")
+    return {
+        "random.pag": draw.randbytes(4000),
+        "zero.pag": bytes(500),
+        "mangled.pag": bytes(mangled),
+        "utf16.pag": PAPER.read_text().encode("utf-16"),
+        "open.pag": b"root = s; s = mate(" + b"(" * 20_000,
+        "nested.pag": b"root = s; s = " + b"mate(" * 20_000,
+        "signs.pag": b"root = s; s = a" * 1000,
+        "quotes.pag": b'root = s; s = atomic(mesh = "' + b"x" * 70_000,
+        "unclosed.pnml": b"<pnml><net><place id='p'/>",
+        "random.pnml": draw.randbytes(4000),
+        "empty.pnml": b"",
+        "bomb.pnml": b'<!DOCTYPE l [<!ENTITY a "aa"><!ENTITY b "&a;&a;">]><pnml>&b;</pnml>',
+        "deep.pnml": b"<a>" * 5_000 + b"</a>" * 5_000,
+        "other.pnml": b"<html><body/></html>",
+    }
+
+
+@pytest.mark.parametrize("name", garbage())
+def test_garbage(run: Terminal, out: Path, name: str) -> None:
+    file = out.parent / name
+    file.write_bytes(garbage()[name])
+    for command, *options in commands(out):
+        done = run(command, file, *options, "--json")
+        assert done.status == 2, done
+        assert done.codes
+    assert files_in(out) == {}
+
+
+def test_what_is_no_file(run: Terminal, out: Path) -> None:
+    for file in (out, out / "missing.pag", "", "/dev/null", "x" * 300, "a\udcff.pag", PAPER / "x"):
+        for command, *options in commands(out):
+            assert run(command, file, *options, "--json").status == 2
+    assert files_in(out) == {}
+
+
+# --- options --------------------------------------------------------------------------------------
+
+ODD = ["-1", "0", "nan", "inf", "-inf", "1e300", "1e-300", "", "abc", "9" * 400, "0x10", "--", "٣"]
+
+OF_MOTION = ["--speed", "--acceleration", "--force", "--timestep", "--substeps", "--clearance"]
+
+
+@pytest.mark.parametrize("option", [*OF_MOTION, "--floor", "--units", "--wip"])
+def test_odd_numbers_for_build(run: Terminal, out: Path, option: str) -> None:
+    for value in ODD:
+        done = run("build", PAPER, option, value, "--mjcf", out / "m.xml", "--json")
+        assert done.status in (0, 2), value
+        (out / "m.xml").unlink() if done.status == 0 else None
+        assert files_in(out) == {}
+
+
+@pytest.mark.parametrize(
+    "option",
+    ["--units", "--seed", "--jitter", "--wip", "--from", "--max-time", "--world", "--size", "--fps"],
+)
+def test_odd_numbers_for_run(run: Terminal, out: Path, option: str) -> None:
+    limit = [] if option == "--max-time" else ["--max-time", "9"]
+    for value in ODD:
+        words = [option, value, "--world", "ideal"] if option != "--world" else [option, value]
+        done = run("run", PAPER, *words, *limit, "--log", out / "run.log", "--json")
+        assert done.status in (0, 1, 2), value
+        if done.status == 2:
+            assert files_in(out) == {}
+        (out / "run.log").unlink(missing_ok=True)
+
+
+@pytest.mark.parametrize("value", ["0x0", "-1x2", "4", "4x", "x", "4x3x2", "nanx1", "infx2", "4,3"])
+def test_odd_pairs(run: Terminal, out: Path, value: str) -> None:
+    for words in (["build", PAPER, "--floor"], ["run", PAPER, "--size"]):
+        done = run(*words, value, "--json")
+        assert (done.status, done.codes) == (2, ["BadValue"])
+
+
+@pytest.mark.parametrize("size", ["1x1", "321x181", "100000x100000", "320x181"])
+def test_sizes_that_no_film_has(run: Terminal, out: Path, size: str) -> None:
+    for words in (["run", PAPER, "--video"], ["render", PAPER, "-o"]):
+        assert run(*words, out / "film.mp4", "--size", size, "--json").status == 2
+    assert files_in(out) == {}
+
+
+@pytest.mark.parametrize(
+    "words",
+    [["--camera", "nowhere"], ["--world", "ideal"], ["--fps", "0"], ["--fps", "1000"]],
+    ids=" ".join,
+)
+def test_films_that_cannot_be_taken(run: Terminal, out: Path, words: list[str]) -> None:
+    done = run("run", PAPER, "--video", out / "f.mp4", "--log", out / "l", *words, "--json")
+    assert done.status == 2
+    assert files_in(out) == {}
+
+
+# --- outputs --------------------------------------------------------------------------------------
+
+OUTPUTS = [
+    ["build", "--mjcf"],
+    ["build", "-o"],
+    ["check", "--certificate"],
+    ["run", "--log"],
+    ["run", "--video"],
+    ["export", "--format", "pnml", "-o"],
+    ["render", "-o"],
+]
+
+
+@pytest.mark.parametrize("words", OUTPUTS, ids=" ".join)
+def test_places_where_nothing_can_be_written(run: Terminal, out: Path, words: list[str]) -> None:
+    command, *options = words
+    end = ".mp4" if "--video" in words or command == "render" else ".xml"
+    file = out.parent / f"file{end}"
+    file.write_text("mine")
+    places: list[object] = [file / f"below{end}", f"/proc/x{end}"]
+    if words != ["build", "-o"]:
+        places += [out, out / "missing" / f"x{end}", ""]
+    for place in places:
+        assert run(command, PAPER, *options, place, "--json").status == 2, place
+    assert files_in(out) == {}
+    assert file.read_text() == "mine"
+
+
+@pytest.mark.parametrize("words", OUTPUTS, ids=" ".join)
+def test_the_input_is_never_overwritten(run: Terminal, out: Path, words: list[str]) -> None:
+    file = out / "p.pag"
+    file.write_bytes(PAPER.read_bytes())
+    command, *options = words
+    assert run(command, file, *options, out / ".." / "out" / "p.pag", "--json").status == 2
+    assert files_in(out) == {"p.pag": PAPER.read_bytes()}
+
+
+def test_one_file_cannot_be_two(run: Terminal, out: Path) -> None:
+    name = out / "both.mp4"
+    assert run("run", PAPER, "--log", name, "--video", name, "--json").codes == ["BadFile"]
+    assert files_in(out) == {}
+
+
+def test_a_folder_that_may_not_be_written(run: Terminal, out: Path) -> None:
+    out.chmod(0o500)
+    try:
+        if os.access(out, os.W_OK):
+            pytest.skip("this user may write everywhere (root)")
+        for command, *options in commands(out):
+            if options and command != "programs":
+                assert run(command, PAPER, *options, "--json").status == 2
+    finally:
+        out.chmod(0o700)
+
+
+def test_a_file_that_may_not_be_read(run: Terminal, out: Path) -> None:
+    file = out / "secret.pag"
+    file.write_bytes(PAPER.read_bytes())
+    file.chmod(0)
+    if os.access(file, os.R_OK):
+        pytest.skip("this user may read everything (root)")
+    assert run("check", file, "--json").codes == ["BadFile"]
+
+
+def test_devices_are_written_in_place(run: Terminal, out: Path) -> None:
+    assert run("export", PAPER, "--format", "dot", "-o", "/dev/null").status == 0
+    assert run("export", PAPER, "--format", "dot", "-o", "/dev/full").status == 2
+    assert Path("/dev/null").is_char_device()
+    pipe = out / "pipe"
+    os.mkfifo(pipe)
+    words = [sys.executable, "-m", "factory", "export", PAPER, "--format", "dot", "-o", pipe]
+    with subprocess.Popen(words, cwd=ROOT):
+        assert pipe.read_text().startswith("digraph")
+
+
+def test_a_link_leads_to_the_file(run: Terminal, out: Path) -> None:
+    (out / "real").mkdir()
+    (out / "link.dot").symlink_to(out / "real" / "net.dot")
+    assert run("export", PAPER, "--format", "dot", "-o", out / "link.dot").status == 0
+    assert (out / "link.dot").is_symlink()
+    assert (out / "real" / "net.dot").read_text().startswith("digraph")
+
+
+def test_a_build_is_written_whole_or_not_at_all(run: Terminal, out: Path) -> None:
+    """The mesh folder's name is taken by a file."""
+    (out / "part.obj").write_bytes((ROOT / "tests/broken/bricks/3001.obj").read_bytes())
+    (out / "p.pag").write_text('root = p; p = atomic(mesh = "part.obj")')
+    (out / "p_meshes").write_text("mine")
+    before = files_in(out)
+    assert run("build", out / "p.pag", "--mjcf", out / "p.xml", "--json").codes == ["BadFile"]
+    assert run("build", out / "p.pag", "-o", out, "--json").codes == ["BadFile"]
+    assert files_in(out) == before
+
+
+def test_streams_that_are_closed_or_full() -> None:
+    factory = f"{sys.executable} -m factory"
+    for command, status in (
+        (f"{factory} check {PAPER} > /dev/full", 2),
+        (f"{factory} check {PAPER} >&-", 0),
+        (f"{factory} check missing.pag --json 2>&- | {sys.executable} -m json.tool", 0),
+        (f"{factory} templates | true", 0),
+        (f"PYTHONIOENCODING=ascii {factory} programs {PAPER}", 0),
+    ):
+        done = subprocess.run(command, shell=True, cwd=ROOT, capture_output=True, text=True)
+        assert done.returncode == status, command
+        assert "Traceback" not in done.stderr
+        assert "Exception" not in done.stderr
+
+
+# --- a run that fails, or is stopped --------------------------------------------------------------
+
+
+def test_a_run_that_fails_says_where(run: Terminal, out: Path) -> None:
+    log = out / "run.log"
+    done = run("run", PAPER, "--units", 50, "--max-time", 1.5, "--log", log, "--json")
+    assert done.status == 1
+    assert done.codes == ["Timeout"]
+    assert done.json["errors"][0]["line"] == 4
+    assert f"{PAPER}:4:1: Timeout" in done.err
+    assert done.json["products"] == 0
+    assert read_log(log).complete
+
+
+def test_a_factory_that_does_not_fit(run: Terminal, out: Path) -> None:
+    done = run("build", PAPER, "--floor", "0.1x0.1", "-o", out / "all", "--json")
+    assert done.status == 1
+    assert done.codes == ["Layout"]
+    assert list(out.iterdir()) == []
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM], ids=lambda n: n.name)
+def test_a_run_that_is_stopped_closes_its_files(out: Path, number: signal.Signals) -> None:
+    log = out / "run.log"
+    words = ["run", PAPER, "--units", "1000000", "--log", log, "--json"]
+    with subprocess.Popen(
+        [sys.executable, "-m", "factory", *map(str, words)],
+        cwd=ROOT,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    ) as process:
+        deadline = time.monotonic() + 60
+        while not (log.exists() and log.stat().st_size > 20_000):
+            assert time.monotonic() < deadline
+            time.sleep(0.02)
+        process.send_signal(number)
+        answer, errors = process.communicate(timeout=60)
+    assert process.returncode == 130
+    assert json.loads(answer)["errors"][0]["code"] == "Interrupted"
+    assert "Traceback" not in errors
+    assert [path.name for path in out.iterdir()] == ["run.log"]
+    kept = read_log(log)
+    assert kept.complete
+    assert len(kept) > 10
+
+
+# --- what a machine may lack ----------------------------------------------------------------------
+
+WITHOUT_GL = {
+    "bogus": {"MUJOCO_GL": "bogus"},
+    "a screen": {"MUJOCO_GL": "glfw", "DISPLAY": "", "WAYLAND_DISPLAY": ""},
+    "osmesa": {"MUJOCO_GL": "osmesa"},
+    "EGL drivers": {"__EGL_VENDOR_LIBRARY_FILENAMES": "/nowhere", "LIBGL_DRIVERS_PATH": "/nowhere"},
+}
+
+EACH = """
+import sys
+from factory.cli import run_command
+for words in (["check"], ["build", "--mjcf", sys.argv[2]], ["programs"],
+              ["export", "--format", "pnml"], ["run"]):
+    assert run_command([words[0], sys.argv[1], *words[1:], "-q"]) == 0, words
+"""
+
+
+@pytest.mark.parametrize("lacking", WITHOUT_GL)
+def test_only_pictures_need_gl(out: Path, lacking: str) -> None:
+    environment = {**os.environ, **WITHOUT_GL[lacking]}
+    words = [sys.executable, "-c", EACH, PAPER, out / "m.xml"]
+    done = subprocess.run(words, cwd=ROOT, env=environment, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+
+
+def test_films_without_gl_say_what_to_install(out: Path) -> None:
+    for words in (["run", "--video"], ["render", "-o"]):
+        done = spawn(words[0], PAPER, words[1], out / "f.mp4", "--json", MUJOCO_GL="bogus")
+        assert done.status == 3
+        assert "MUJOCO_GL=egl" in done.json["errors"][0]["hint"]
+    assert files_in(out) == {}
+
+
+@pytest.fixture
+def bare(tmp_path: Path) -> str:
+    """A PYTHONPATH on which importing mujoco fails."""
+    (tmp_path / "bare" / "mujoco").mkdir(parents=True)
+    text = 'raise ModuleNotFoundError("No module named \'mujoco\'", name="mujoco")'
+    (tmp_path / "bare" / "mujoco" / "__init__.py").write_text(text)
+    return f"{tmp_path / 'bare'}:{ROOT}"
+
+
+def test_without_the_engine(bare: str, out: Path) -> None:
+    for words in (["check"], ["programs"], ["export", "--format", "dot"]):
+        assert spawn(words[0], PAPER, *words[1:], "-q", PYTHONPATH=bare).status == 0
+    assert spawn("run", PAPER, "--world", "ideal", "-q", PYTHONPATH=bare).status == 0
+    for words in (["run", "--log", out / "l"], ["build", "-o", out / "all"]):
+        done = spawn(words[0], PAPER, *words[1:], "--json", PYTHONPATH=bare)
+        assert done.status == 3
+        assert "mujoco" in done.json["errors"][0]["message"]
+        assert done.json["errors"][0]["hint"] == "pip install mujoco"
+    done = spawn("doctor", "--json", PYTHONPATH=bare)
+    assert done.status == 3
+    assert {c["name"] for c in done.json["checks"] if not c["ok"]} == {"engine", "rendering"}
+    assert list(out.iterdir()) == []
