@@ -12,8 +12,8 @@ The main job is four calls:
 >>> run.products, run.refines_net
 (3, True)
 
-With `world="mujoco"`, the default, the same net runs over rigid-body physics. `factory.verify(plan)` proves
-that the net is a gear net, live, safe and reversible.
+With `world="mujoco"`, the default, the same net runs over rigid-body physics.
+`factory.verify(plan)` proves that the net is a gear net, live, safe and reversible.
 """
 
 from __future__ import annotations
@@ -53,8 +53,8 @@ __all__ = [
 def load_pag(path: str | PathLike[str], templates: Sequence[Path] = ()) -> PAG:
     """The product assembly graph in a file.
 
-    `templates`: folders with further operations, searched before the shipped ones. Raises InputError
-    with every error of the file.
+    `templates`: folders with further operations, searched before the shipped ones. Raises
+    InputError with every error of the file.
     """
     from factory.pipeline import read
 
@@ -104,9 +104,9 @@ def run(
 ) -> Run:
     """Run the net over a world until `units` products are dropped off.
 
-    `seed` and `jitter` draw each robot's speed and gain within ± jitter; `max_time` [s] of simulated
-    time; further options are those of `factory.simulation.Simulation`. Raises RunError for a run that
-    stalls or takes longer, InputError where the engine refuses a mesh.
+    `seed` and `jitter` draw each robot's speed and gain within ± jitter; `max_time` [s] of
+    simulated time; further options are those of `factory.simulation.Simulation`. Raises RunError
+    for a run that stalls or takes longer, InputError where the engine refuses a mesh.
     """
     from factory.simulation import Simulation, require
 

@@ -51,8 +51,8 @@ def build_all(
     units: int | None,
     wip: int | None,
 ) -> Built:
-    """Build the model and write what is asked for. Raises RunError where the layout is not certified,
-    InputError where the engine refuses the model; nothing is written then."""
+    """Build the model and write what is asked for. Raises RunError where the layout is not
+    certified, InputError where the engine refuses the model; nothing is written then."""
     from factory.layout.clearance import certify
     from factory.world.physics import load
 

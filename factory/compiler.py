@@ -1,7 +1,8 @@
 """Compile and CompileNode (paper, section 5): from a PAG to a factory F = (R, ~, N).
 
-Guarantees: the net is composed of one gear per robot and is a gear net (Theorem 5.1); `factory.nets.
-verify` proves it again, independently. What would break that is refused here. Linear in the PAG.
+Guarantees: the net is composed of one gear per robot and is a gear net (Theorem 5.1);
+`factory.nets. verify` proves it again, independently. What would break that is refused here. Linear
+in the PAG.
 """
 
 from __future__ import annotations
@@ -60,8 +61,8 @@ def compile_pag(pag: PAG, templates: Mapping[str, Template], catalogue: Catalogu
     """The factory that makes the product `pag`.
 
     Raises InputError with every TypeMismatch and NotPrepared found. Robots and operations are
-    numbered as in the specification of the net: the output robot is r1; an operation numbers all its
-    new robots at once, the input with fewest operation instances first, tools last.
+    numbered as in the specification of the net: the output robot is r1; an operation numbers all
+    its new robots at once, the input with fewest operation instances first, tools last.
     """
     nodes = expand(pag, templates)
     draft = _Draft([], [], [], [], [], [])
@@ -135,8 +136,8 @@ def _compile_nodes(
         draft.parents.append(parent)
         for robot in robots:
             draft.visits[robot].append(index)
-        inputs = sorted((r, l) for r, l in zip(robots, before, strict=True) if l != NOPART)
-        stack.extend((l, robot, index) for robot, l in reversed(inputs))
+        inputs = sorted((r, x) for r, x in zip(robots, before, strict=True) if x != NOPART)
+        stack.extend((x, robot, index) for robot, x in reversed(inputs))
 
 
 def _brought(node: Node) -> list[str]:

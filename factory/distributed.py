@@ -1,10 +1,11 @@
 """The paper's own way of running (section 6): every robot executes its program by itself.
 
-Robots share a cell each, for the label they carry, and the continuous state of the mode they are in; nothing
-else. Each has its own control rate and phase. Reads of labels alone would race: a tool's label never changes,
-and a slow robot may see a label of the next unit. So a cell counts, beside its label, the operations its
-robot has finished, and a condition asks for a count; the carrier alone ends an operation, and goes on when
-all others have followed. That is the least that makes the record refine the net; see docs/design.md.
+Robots share a cell each, for the label they carry, and the continuous state of the mode they are
+in; nothing else. Each has its own control rate and phase. Reads of labels alone would race: a
+tool's label never changes, and a slow robot may see a label of the next unit. So a cell counts,
+beside its label, the operations its robot has finished, and a condition asks for a count; the
+carrier alone ends an operation, and goes on when all others have followed. That is the least that
+makes the record refine the net; see docs/design.md.
 """
 
 from __future__ import annotations
@@ -31,14 +32,16 @@ REST = 0.01
 
 @dataclass(slots=True)
 class Cell:
-    """What a robot shows to all others: the label it carries and how many operations it has finished."""
+    """What a robot shows to all others: the label it carries and how many operations it has
+    finished."""
 
     label: str
     turn: int = 0
 
 
 class Link:
-    """The continuous state that the robots of one mode share; reading any other robot is an error."""
+    """The continuous state that the robots of one mode share; reading any other robot is an
+    error."""
 
     def __init__(self, world: Any) -> None:
         self.world = world
@@ -59,7 +62,8 @@ class _Active:
 
 @dataclass(slots=True)
 class Process:
-    """One robot executing its program: the step it is at and its phase in it, `wait`, `run` or `leave`."""
+    """One robot executing its program: the step it is at and its phase in it, `wait`, `run` or
+    `leave`."""
 
     program: Program
     period: int
@@ -88,7 +92,8 @@ class Record:
 
 
 class DistributedSupervisor:
-    """No supervisor at all: it only lets the robots' processes tick, each at its own rate and phase."""
+    """No supervisor at all: it only lets the robots' processes tick, each at its own rate and
+    phase."""
 
     def __init__(
         self,
@@ -104,7 +109,9 @@ class DistributedSupervisor:
         self.world, self.timestep, self.ticks = world, timestep, ticks
         self.random = np.random.default_rng([seed, 7])
         self.net = factory.net.threaded
-        self.marked = bytearray(p in factory.net.initial_marking for p in range(len(self.net.places)))
+        self.marked = bytearray(
+            p in factory.net.initial_marking for p in range(len(self.net.places))
+        )
         self.link = Link(world)
         self.programs = [program_of(factory, r.index) for r in factory.robots]
         self.cells = [Cell(p.steps[0].label) for p in self.programs]

@@ -83,8 +83,8 @@ class Robot:
 class Factory:
     """F = (R, ~, N) with the operations it is made of; the last operation is dropoff.
 
-    ~ is the union of the templates' identifications over `operations`. `parents[i]` is the operation
-    that takes the result of operation i (dropoff has none, -1).
+    ~ is the union of the templates' identifications over `operations`. `parents[i]` is the
+    operation that takes the result of operation i (dropoff has none, -1).
     """
 
     pag: PAG

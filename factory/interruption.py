@@ -1,4 +1,5 @@
-"""An interruption (Ctrl-C, a signal to end) that waits for the end of a tick, so that files are closed whole."""
+"""An interruption (Ctrl-C, a signal to end) that waits for the end of a tick, so that files are
+closed whole."""
 
 from __future__ import annotations
 
@@ -7,12 +8,14 @@ from collections.abc import Callable, Mapping
 from types import FrameType, TracebackType
 from typing import Any
 
-SIGNALS = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)]
+SIGNALS = [
+    getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)
+]
 
 
 def stop_on_signals(handler: Callable[[int, FrameType | None], Any]) -> Mapping[int, Any]:
-    """Let `handler` take the signals that end a program, save those that the caller has it ignore; gives
-    the handlers there were. Outside the main thread it does nothing."""
+    """Let `handler` take the signals that end a program, save those that the caller has it ignore;
+    gives the handlers there were. Outside the main thread it does nothing."""
     try:
         before = {n: signal.getsignal(n) for n in SIGNALS}
         heard = {n: old for n, old in before.items() if old is not signal.SIG_IGN}

@@ -1,7 +1,8 @@
 """Predict a run before it: the delay of each operation, and the cycle time they give.
 
-A robot starts an operation where the one before has left it. In either world a transition costs a tick,
-since those enabled in one tick fire as one set; in MuJoCo the drives settle within eps besides.
+A robot starts an operation where the one before has left it. In either world a transition costs a
+tick, since those enabled in one tick fire as one set; in MuJoCo the drives settle within eps
+besides.
 """
 
 from __future__ import annotations
@@ -34,5 +35,6 @@ def operation_delays(
 def predict(
     layout: Layout, modes: Sequence[Mode], limits: Limits, settings: Settings, world: World
 ) -> CycleTime:
-    """The cycle time of the compiled net (the greatest sum of delays along a gear) and its bottleneck."""
+    """The cycle time of the compiled net (the greatest sum of delays along a gear) and its
+    bottleneck."""
     return cycle_time(layout.factory, operation_delays(layout, modes, limits, settings, world))

@@ -1,9 +1,9 @@
 """The condition NotPrepared: every mode can reach its goal, and every goal set, redistributed, lies
 in the domain of the next mode (paper, Definition 3.4 and section 4.3).
 
-Points are compared symbolically, end by end in multiples of r, because stretching changes B - A alone.
-A domain is W - Δ, where Δ are the configurations in which two robots touch: robots at distances d_i and
-d_j from a point where their guidepaths meet, with d_i + d_j <= 1 in units of r.
+Points are compared symbolically, end by end in multiples of r, because stretching changes B - A
+alone. A domain is W - Δ, where Δ are the configurations in which two robots touch: robots at
+distances d_i and d_j from a point where their guidepaths meet, with d_i + d_j <= 1 in units of r.
 """
 
 from __future__ import annotations

@@ -1,7 +1,8 @@
-"""The robots' programs, read off their gears (paper, section 6): a loop over what the robot carries.
+"""The robots' programs, read off their gears (paper, section 6): a loop over what the robot
+carries.
 
-A step waits until the other robots of its operation show what they must bring, then runs its component of
-the operation's field until the labels have changed.
+A step waits until the other robots of its operation show what they must bring, then runs its
+component of the operation's field until the labels have changed.
 """
 
 from __future__ import annotations

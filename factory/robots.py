@@ -1,4 +1,5 @@
-"""Robot types (paper, section 4.2): an MJCF file and an entry in a catalogue, `mjcf/catalogue.toml`."""
+"""Robot types (paper, section 4.2): an MJCF file and an entry in a catalogue,
+`mjcf/catalogue.toml`."""
 
 from __future__ import annotations
 

@@ -26,10 +26,10 @@ RANGES = {
 
 @dataclass(frozen=True, slots=True)
 class Settings:
-    """Speed [m/s] and acceleration [m/s²] of a robot; `eps`, radius of a goal ball [m]; `timestep` of the
-    engine [s] and `substeps` of it in one tick of the supervisor; least `clearance` [m]; `force`: the
-    actuators' limit as a multiple of what the payload needs; `settle`: time to come to rest within
-    eps [s], used only to predict; `outfeed` speed [m/s].
+    """Speed [m/s] and acceleration [m/s²] of a robot; `eps`, radius of a goal ball [m]; `timestep`
+    of the engine [s] and `substeps` of it in one tick of the supervisor; least `clearance` [m];
+    `force`: the actuators' limit as a multiple of what the payload needs; `settle`: time to come to
+    rest within eps [s], used only to predict; `outfeed` speed [m/s].
     """
 
     speed: float = 0.5
@@ -62,8 +62,8 @@ class Settings:
 def load_settings(path: Path) -> Settings:
     """The settings of a `factory.toml`; the defaults where there is no such file.
 
-    Raises InputError with every fault of the file: broken TOML, an unknown key, or a value that is no
-    number within its range.
+    Raises InputError with every fault of the file: broken TOML, an unknown key, or a value that is
+    no number within its range.
     """
     if not path.is_file():
         return Settings()

@@ -27,7 +27,8 @@ if TYPE_CHECKING:
     from factory.mjcf.model import Model
 
 Observer = Callable[[Any, Supervisor], None]
-"""Called after every tick with the world and the supervisor: to render, to log, to show progress."""
+"""Called after every tick with the world and the supervisor: to render, to log, to show
+progress."""
 
 PATIENCE = 10.0
 """A run has stalled when nothing fires for this many times the longest predicted delay."""
@@ -36,8 +37,8 @@ PATIENCE = 10.0
 class Simulation:
     """One run, ready to go: `run()` does it; `model` is what the engine is given (mujoco only).
 
-    Raises InputError where the engine refuses the model, and RunError (Stalled, Timeout) from `run` only
-    where `strict`; otherwise the Run carries the trouble.
+    Raises InputError where the engine refuses the model, and RunError (Stalled, Timeout) from `run`
+    only where `strict`; otherwise the Run carries the trouble.
     """
 
     def __init__(
@@ -111,7 +112,8 @@ class Simulation:
         return {o.label: counts.get(o.end, 0) - gone for o in factory.leaves}
 
     def run(self, observers: Sequence[Observer] = (), max_time: float | None = None) -> Run:
-        """Tick until `units` products have been dropped off, the run stalls or `max_time` [s] passes."""
+        """Tick until `units` products have been dropped off, the run stalls or `max_time` [s]
+        passes."""
         delays = operation_delays(self.layout, self.modes, self.limits, self.settings, self.kind)
         patience = PATIENCE * max(delays)
         begin, watched, trouble = perf_counter(), 0.0, None
@@ -159,7 +161,8 @@ class Simulation:
         )
 
     def _stalled(self, seconds: float, code: str = "Stalled") -> Diagnostic:
-        """Names the robots that are in an operation, or else those that wait for one that cannot start."""
+        """Names the robots that are in an operation, or else those that wait for one that cannot
+        start."""
         factory, supervisor = self.layout.factory, self.supervisor
         numbers = supervisor.active.operations or tuple(
             event // 2 for event in sorted(supervisor.ready)

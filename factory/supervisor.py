@@ -1,7 +1,8 @@
 """The supervisor fires the net over any world (Definitions 3.3 and 3.4).
 
-It knows nothing of physics: a `World` senses positions, moves robots along the field of the active modes,
-and hands parts over when a transition fires. Python runs only for what fires; a waiting robot costs nothing.
+It knows nothing of physics: a `World` senses positions, moves robots along the field of the active
+modes, and hands parts over when a transition fires. Python runs only for what fires; a waiting
+robot costs nothing.
 """
 
 from __future__ import annotations
@@ -28,8 +29,8 @@ class World(Protocol):
         """Positions x (R,) [m] and speeds (R,) [m/s] of all robots, in arc length."""
 
     def prepared(self, operation: Operation, unit: int) -> bool:
-        """Whether the world is in the domain of an operation's mode as far as parts go: a feeder has a
-        part to give, the outfeed is free."""
+        """Whether the world is in the domain of an operation's mode as far as parts go: a feeder
+        has a part to give, the outfeed is free."""
 
     def apply(
         self, started: Sequence[tuple[Operation, int]], ended: Sequence[tuple[Operation, int]]
@@ -111,8 +112,8 @@ class Supervisor:
         return tuple(p.name for p, m in zip(self.net.places, self.marked, strict=True) if m)
 
     def _startable(self) -> list[int]:
-        """Operations X with X_s enabled: waits marked (their goals are everything), the robots in the
-        domain of X's mode, and the world prepared."""
+        """Operations X with X_s enabled: waits marked (their goals are everything), the robots in
+        the domain of X's mode, and the world prepared."""
         found = []
         positions: Array | None = None
         for event in sorted(self.ready):
@@ -130,7 +131,8 @@ class Supervisor:
         return found
 
     def _finished(self) -> list[int]:
-        """Operations X with X_e enabled: robots in the goal ball, at rest, and the clock run out."""
+        """Operations X with X_e enabled: robots in the goal ball, at rest, and the clock run
+        out."""
         active = self.active
         if active.bundle is None:
             return []

@@ -1,6 +1,7 @@
 """`make bench`: times and sizes as whole processes, written to docs/benchmarks.md.
 
-Each figure is the median of several runs of a fresh process; memory is the process's largest resident set.
+Each figure is the median of several runs of a fresh process; memory is the process's largest
+resident set.
 """
 
 from __future__ import annotations
@@ -54,12 +55,19 @@ def measured(command: Sequence[str]) -> tuple[float, float, str]:
 def median(command: Sequence[str], runs: int) -> tuple[float, float, str]:
     """Medians of wall time and memory over some runs, and the last run's stdout."""
     found = [measured(command) for _ in range(runs)]
-    return statistics.median(f[0] for f in found), statistics.median(f[1] for f in found), found[-1][2]
+    return (
+        statistics.median(f[0] for f in found),
+        statistics.median(f[1] for f in found),
+        found[-1][2],
+    )
 
 
 def scaling(folder: Path) -> list[str]:
     """Check and layout of random PAGs of growing size."""
-    lines = ["| labels | check [s] | memory [MB] | layout [s] | certificate [s] | memory [MB] |", "|---|---|---|---|---|---|"]
+    lines = [
+        "| labels | check [s] | memory [MB] | layout [s] | certificate [s] | memory [MB] |",
+        "|---|---|---|---|---|---|",
+    ]
     for labels, runs in ((100, 5), (1_000, 5), (10_000, 3), (100_000, 1)):
         path = folder / f"random{labels}.pag"
         path.write_text(random_pag_text(labels, 1))
@@ -78,11 +86,16 @@ def scaling(folder: Path) -> list[str]:
 
 def runs() -> list[str]:
     """What runs of real products measure."""
-    wanted = [(ROOT / "examples" / f"{n}.pag", u) for n, u in
-              (("paper", 20), ("lamp", 10), ("stool", 10), ("shelf", 10), ("balanced", 10))]
+    wanted = [
+        (ROOT / "examples" / f"{n}.pag", u)
+        for n, u in (("paper", 20), ("lamp", 10), ("stool", 10), ("shelf", 10), ("balanced", 10))
+    ]
     wanted += [(p, 1 if p.stat().st_size > 12_000 else 2) for p in sorted(PRODUCTS.glob("*.pag"))]
-    lines = ["| product | robots | units | cycle [s] | predicted [s] | times real time | supervisor share | gap [mm] | product error [mm] | contacts |",
-             "|---|---|---|---|---|---|---|---|---|---|"]
+    heads = (
+        "product, robots, units, cycle [s], predicted [s], times real time, supervisor share,"
+        " gap [mm], product error [mm], contacts"
+    ).split(",")
+    lines = [f"| {' | '.join(h.strip() for h in heads)} |", "|---" * len(heads) + "|"]
     for path, units in wanted:
         _, _, text = measured([*FACTORY, "run", str(path), "--units", str(units), "--json", "-q"])
         run = json.loads(text)
@@ -99,7 +112,9 @@ def runs() -> list[str]:
 
 def machine() -> str:
     """What it was measured on."""
-    packages = ", ".join(f"{name} {version(name)}" for name in ("mujoco", "numpy", "lark", "shapely"))
+    packages = ", ".join(
+        f"{name} {version(name)}" for name in ("mujoco", "numpy", "lark", "shapely")
+    )
     return f"Python {platform.python_version()}, {packages}; {os.cpu_count()} cores, {platform.machine()}."
 
 

@@ -84,9 +84,9 @@ def test_check_of_the_papers_example(run: Terminal) -> None:
 
 def test_labels_are_those_the_user_wrote(run: Terminal, tmp_path: Path) -> None:
     file = tmp_path / "k.pag"
-    file.write_text("5 parts; root = s; s = mate(a, b, c, d);" + "".join(
-        f"{x} = atomic();" for x in "abcd"
-    ))
+    file.write_text(
+        "5 parts; root = s; s = mate(a, b, c, d);" + "".join(f"{x} = atomic();" for x in "abcd")
+    )
     document = run("check", file, "--json").json
     assert document["labels"] == 5
     operations, roles = 7, 4 + 3 + 2 + 2

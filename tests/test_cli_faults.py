@@ -1,5 +1,5 @@
-"""The command line under ill treatment: no traceback for any input, no half of a file, and a status that
-says whose fault it was."""
+"""The command line under ill treatment: no traceback for any input, no half of a file, and a status
+that says whose fault it was."""
 
 from __future__ import annotations
 
@@ -46,8 +46,8 @@ def out(tmp_path: Path) -> Path:
 
 @pytest.mark.parametrize("file", BROKEN, ids=lambda p: p.stem)
 def test_broken_files_write_nothing(run: Terminal, out: Path, file: Path) -> None:
-    """By every command: the same errors, the same status, and nothing is written. A mesh that cannot be
-    read is none of the concern of `programs` and `export`."""
+    """By every command: the same errors, the same status, and nothing is written. A mesh that
+    cannot be read is none of the concern of `programs` and `export`."""
     needed = [c for c in commands(out) if c[0] in ("build", "run", "render")]
     shape = run("check", file).status == 0
     for command, *options in needed if shape else commands(out):
@@ -77,7 +77,7 @@ def garbage() -> dict[str, bytes]:
     draw = random.Random(7)
     mangled = bytearray(PAPER.read_bytes())
     for _ in range(20):
-        mangled[draw.randrange(len(mangled))] = draw.choice(b"(){}=;,<>\"\\\x00 /")
+        mangled[draw.randrange(len(mangled))] = draw.choice(b'(){}=;,<>"\\\x00 /')
     return {
         "random.pag": draw.randbytes(4000),
         "zero.pag": bytes(500),
@@ -132,7 +132,17 @@ def test_odd_numbers_for_build(run: Terminal, out: Path, option: str) -> None:
 
 @pytest.mark.parametrize(
     "option",
-    ["--units", "--seed", "--jitter", "--wip", "--from", "--max-time", "--world", "--size", "--fps"],
+    [
+        "--units",
+        "--seed",
+        "--jitter",
+        "--wip",
+        "--from",
+        "--max-time",
+        "--world",
+        "--size",
+        "--fps",
+    ],
 )
 def test_odd_numbers_for_run(run: Terminal, out: Path, option: str) -> None:
     limit = [] if option == "--max-time" else ["--max-time", "9"]

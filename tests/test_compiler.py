@@ -96,7 +96,8 @@ def test_counts_are_those_of_the_specification(pag: PAG) -> None:
     assert len(plan.net.initial_marking) == robots
 
 
-CRANE = """crane = (R, j, ~, <a; b>, F) where R = < gantry >; j = 1; ~ = {}; <a; b> = < nopart; LAB1 >;
+CRANE = """crane = (R, j, ~, <a; b>, F) where R = < gantry >; j = 1; ~ = {};
+<a; b> = < nopart; LAB1 >;
 F = navigation on W to ( B1 ) within eps; parameters = geometry"""
 HOIST = """hoist = (R, j, ~, <a; b>, F) where R = < lift, dot >; j = 1; ~ = { S1 = A2 };
 <a; b> = < LAB1, LAB2; LAB3, nopart >; F = navigation on W to ( S1 + 2r, A2 + 2r ) within eps"""
@@ -173,7 +174,8 @@ def test_a_mode_that_cannot_reach_its_goal_is_refused(goals: str, eps: str, word
 
 
 def test_robots_left_touching_are_outside_the_next_domain() -> None:
-    part = """near = (R, j, ~, <a; b>, F) where R = < dot >; j = 1; ~ = {}; <a; b> = < nopart; LAB1 >;
+    part = """near = (R, j, ~, <a; b>, F) where R = < dot >; j = 1; ~ = {};
+    <a; b> = < nopart; LAB1 >;
     F = navigation on W to ( A1 ) within eps; parameters = geometry"""
     with pytest.raises(InputError) as error:
         compiled("root = s; s = mate(a, b); a = near(); b = near()", part)

@@ -17,17 +17,26 @@ from factory.programs import program_of, write_program
 from factory.simulation import Simulation
 from tests.test_compiler import PAPER, compiled
 
-UNARY = "root = c; c = glue(b, dwell = 0.1); b = weld(a, dwell = 0.2); a = press(p, dwell = 0.1); p = atomic()"
+UNARY = """root = c; c = glue(b, dwell = 0.1); b = weld(a, dwell = 0.2);
+a = press(p, dwell = 0.1); p = atomic()"""
 KARY = """root = s; s = mate(a, b, c, t, dd); t = mate(e, f); dd = inspect(d, dwell = 0.2);
 a = atomic(); b = atomic(); c = atomic(); d = atomic(); e = atomic(); f = atomic()"""
 CHAIN = """root = s4; s4 = mate(s3, e); s3 = mate(d, s2); s2 = mate(s1, c); s1 = mate(a, b);
 a = atomic(); b = atomic(); c = atomic(); d = atomic(); e = atomic()"""
 OVERLAP = """root = s; s = mate(u, v);  u = mate(a, b); v = mate(c, d);
 a = atomic(box = (0.2, 0.02, 0.05)); b = atomic(box = (0.02, 0.2, 0.06), pos = (0, 0.13, 0));
-c = atomic(cylinder = (0.03, 0.06), pos = (0.2, 0.1, 0)); d = atomic(sphere = 0.04, pos = (-0.1, 0.1, 0.01))"""
+c = atomic(cylinder = (0.03, 0.06), pos = (0.2, 0.1, 0));
+d = atomic(sphere = 0.04, pos = (-0.1, 0.1, 0.01))"""
 LONE = "root = p; p = atomic()"
 
-PRODUCTS = {"paper": PAPER, "unary": UNARY, "kary": KARY, "chain": CHAIN, "overlap": OVERLAP, "lone": LONE}
+PRODUCTS = {
+    "paper": PAPER,
+    "unary": UNARY,
+    "kary": KARY,
+    "chain": CHAIN,
+    "overlap": OVERLAP,
+    "lone": LONE,
+}
 
 
 def laid_out(text: str) -> Layout:

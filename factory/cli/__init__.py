@@ -39,7 +39,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 
 def _open_streams() -> None:
-    """A stream that is closed swallows what is printed; one whose encoding lacks a sign shows `?`."""
+    """A stream that is closed swallows what is printed; one whose encoding lacks a sign shows
+    `?`."""
     for name in ("stdout", "stderr"):
         if getattr(sys, name) is None:
             setattr(sys, name, open(os.devnull, "w", encoding="utf-8"))

@@ -133,8 +133,9 @@ def plan(
 
 
 def writable(file: Path | None, *outputs: Path | None) -> None:
-    """Output files must be such that they can be written: their folder there and writable, themselves
-    no folder, all different, and none the input. Raises InputError (BadFile) with every fault."""
+    """Output files must be such that they can be written: their folder there and writable,
+    themselves no folder, all different, and none the input. Raises InputError (BadFile) with every
+    fault."""
     taken = {} if file is None else {file.resolve(): "the input"}
     faults = []
     for path in outputs:

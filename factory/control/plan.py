@@ -26,8 +26,8 @@ from factory.template import Point, Template
 def operation_modes(layout: Layout, eps: float) -> tuple[Mode, ...]:
     """F_p, D_p and G_p of every operation, in arc length.
 
-    Raises InputError (NotPrepared) where the operations before leave the robots outside the domain of
-    a mode, or where one may hold another up for ever.
+    Raises InputError (NotPrepared) where the operations before leave the robots outside the domain
+    of a mode, or where one may hold another up for ever.
     """
     operations = layout.factory.operations
     modes = tuple(operation_mode(layout, operation, eps) for operation in operations)
@@ -47,7 +47,8 @@ def operation_modes(layout: Layout, eps: float) -> tuple[Mode, ...]:
 
 
 def operation_starts(layout: Layout) -> list[Array]:
-    """For each operation where its robots are when it starts (k,): where the ones before left them."""
+    """For each operation where its robots are when it starts (k,): where the ones before left
+    them."""
     factory = layout.factory
     left: dict[tuple[int, int], float] = {}
     for robot in factory.robots:
@@ -74,8 +75,8 @@ def _unprepared(operation: Operation, inside: bool) -> Diagnostic:
 
 
 def operation_mode(layout: Layout, operation: Operation, eps: float) -> Mode:
-    """The mode of one operation. A robot that brings something to a carrier that brings something too
-    keeps its distance until the carrier stands: they would meet diagonally."""
+    """The mode of one operation. A robot that brings something to a carrier that brings something
+    too keeps its distance until the carrier stands: they would meet diagonally."""
     paths = [layout.guidepaths[robot] for robot in operation.robots]
     carrier = operation.template.carrier - 1
     gate, standoff = np.full(len(paths), -1), np.zeros(len(paths))
@@ -122,8 +123,8 @@ def _inside(template: Template) -> Template:
 def robot_limits(
     layout: Layout, settings: Settings, seed: int = 0, jitter: float = 0.0
 ) -> tuple[Limits, np.ndarray]:
-    """Each robot's speed and acceleration, and the factor (R,) on its controller's gain, drawn within
-    ± jitter by the seed."""
+    """Each robot's speed and acceleration, and the factor (R,) on its controller's gain, drawn
+    within ± jitter by the seed."""
     count = len(layout.guidepaths)
     draw = np.random.default_rng(seed).uniform(1 - jitter, 1 + jitter, size=(2, count))
     speed = settings.speed * draw[0]

@@ -106,8 +106,8 @@ class Certificate:
         }
 
     def summary(self) -> dict[str, object]:
-        """Its figures alone: whether it holds, the clearance [m], how many regions were compared and
-        how many pairs of robots share a junction."""
+        """Its figures alone: whether it holds, the clearance [m], how many regions were compared
+        and how many pairs of robots share a junction."""
         return {
             "holds": self.holds,
             "clearance_m": self.clearance,

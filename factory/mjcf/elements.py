@@ -1,4 +1,5 @@
-"""Small helpers to write MJCF elements: every number in full precision, attributes in a fixed order."""
+"""Small helpers to write MJCF elements: every number in full precision, attributes in a fixed
+order."""
 
 from __future__ import annotations
 
@@ -25,7 +26,8 @@ def exact(values: Iterable[Number]) -> str:
 
 
 def add(parent: Element, tag: str, **attributes: object) -> Element:
-    """A child element. Tuples are written as numbers; None is left out; a trailing `_` is dropped."""
+    """A child element. Tuples are written as numbers; None is left out; a trailing `_` is
+    dropped."""
     child = SubElement(parent, tag)
     for name, value in attributes.items():
         if value is None:

@@ -1,7 +1,8 @@
 """The only writer of MJCF: a layout as one XML with its mesh files, that stock MuJoCo loads.
 
-Guarantees: every weld that a run can switch is there, with its nominal frame compiled from nest and product
-pose; robots come before parts; nothing depends on hashing, so the same factory gives the same bytes.
+Guarantees: every weld that a run can switch is there, with its nominal frame compiled from nest and
+product pose; robots come before parts; nothing depends on hashing, so the same factory gives the
+same bytes.
 """
 
 from __future__ import annotations
@@ -99,7 +100,8 @@ def part_copies(
 def build_model(
     layout: Layout, catalogue: Catalogue, copies: Mapping[str, int], settings: Settings
 ) -> Model:
-    """The model of a laid-out factory. Raises InputError where the MJCF of a robot type is unusable."""
+    """The model of a laid-out factory. Raises InputError where the MJCF of a robot type is
+    unusable."""
     factory, product = layout.factory, layout.product
     masses = {
         label: sum(product.solids[part].mass for part in parts)
@@ -144,7 +146,8 @@ def model_files(model: Model, path: Path) -> dict[Path, bytes]:
 
 
 def _drive(factory: Factory, robot: int, masses: Mapping[str, float], settings: Settings) -> Drive:
-    """Gains for the heaviest load a robot carries, critically damped; force for its acceleration."""
+    """Gains for the heaviest load a robot carries, critically damped; force for its
+    acceleration."""
     operations = factory.operations
     load = max(
         masses.get(operations[o].after[operations[o].robots.index(robot)], 0.0)

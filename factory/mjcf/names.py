@@ -44,7 +44,8 @@ def feeder(label: str) -> str:
 
 
 def hold(label: str, number: int) -> str:
-    """The weld that joins a copy to the product's first part once nobody carries it, `hold/part2#1`."""
+    """The weld that joins a copy to the product's first part once nobody carries it,
+    `hold/part2#1`."""
     return f"hold/{copy(label, number)}"
 
 

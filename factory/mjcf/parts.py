@@ -1,4 +1,5 @@
-"""Parts as MJCF: free bodies with explicit mass and inertia, whose origin is their centre of mass."""
+"""Parts as MJCF: free bodies with explicit mass and inertia, whose origin is their centre of
+mass."""
 
 from __future__ import annotations
 
@@ -17,7 +18,8 @@ PARKED = -0.6
 
 
 def place_in(product: Product, label: str, middle: Point2) -> tuple[float, float, float]:
-    """Where a part's centre of mass is when the product's middle is there, z0 under its lowest point."""
+    """Where a part's centre of mass is when the product's middle is there, z0 under its lowest
+    point."""
     centre = product.solids[label].centre
     x, y, _ = product.middle
     return (

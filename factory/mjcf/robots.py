@@ -18,8 +18,8 @@ from factory.robots import RobotType
 
 @dataclass(frozen=True, slots=True)
 class RobotModel:
-    """The MJCF file of a robot type, taken apart: body, actuators, and the shared defaults and assets,
-    whose names are prefixed by the type's."""
+    """The MJCF file of a robot type, taken apart: body, actuators, and the shared defaults and
+    assets, whose names are prefixed by the type's."""
 
     name: str
     body: Element = field(repr=False)
@@ -38,7 +38,8 @@ class Drive:
 
 
 def load_robot_model(robot: RobotType) -> RobotModel:
-    """Reads the file of a type. Raises InputError (BadTemplate) where it is no MJCF of one robot."""
+    """Reads the file of a type. Raises InputError (BadTemplate) where it is no MJCF of one
+    robot."""
     path = Path(robot.mjcf)
     try:
         root = ElementTree.parse(path).getroot()
@@ -77,7 +78,8 @@ ROLES = {
     "fed": "0.52 0.65 0.80 1",
     "tool": "0.90 0.45 0.09 1",
 }
-"""The paint of robots by what they do: bring the product out, carry sub-assemblies, fetch parts, work."""
+"""The paint of robots by what they do: bring the product out, carry sub-assemblies, fetch parts,
+work."""
 
 
 def add_paints(asset: Element) -> None:
@@ -91,8 +93,8 @@ def instantiate(
 ) -> tuple[Element, list[Element]]:
     """The body of one robot at its B end and its actuators.
 
-    `lift`: how far above z0 the payload's own lowest point is; the finger's pin reaches up to it [m].
-    `role`: one of ROLES; geometry of the material `paint` takes its colour.
+    `lift`: how far above z0 the payload's own lowest point is; the finger's pin reaches up to it
+    [m]. `role`: one of ROLES; geometry of the material `paint` takes its colour.
     """
     body = _prefixed(model.body, model.name, names=False)
     for node in body.iter():

@@ -1,4 +1,5 @@
-"""The scene: floor, light, cameras, guidepaths, feeders and the outfeed. Nothing here moves by itself."""
+"""The scene: floor, light, cameras, guidepaths, feeders and the outfeed. Nothing here moves by
+itself."""
 
 from __future__ import annotations
 

@@ -44,7 +44,8 @@ class Place:
 
 @dataclass(frozen=True)
 class PetriNet:
-    """A Petri net (T, P) (Definition 3.1). It may have choice: nothing here assumes a marked graph."""
+    """A Petri net (T, P) (Definition 3.1). It may have choice: nothing here assumes a marked
+    graph."""
 
     transitions: tuple[Transition, ...]
     places: tuple[Place, ...]

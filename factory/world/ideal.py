@@ -1,5 +1,5 @@
-"""The ideal world: the paper's DotFactory (section 6). Robots obey ẋ = F_p(x) exactly, parts move with the
-robots that carry them, transfers are instantaneous."""
+"""The ideal world: the paper's DotFactory (section 6). Robots obey ẋ = F_p(x) exactly, parts move
+with the robots that carry them, transfers are instantaneous."""
 
 from __future__ import annotations
 
@@ -13,7 +13,8 @@ from factory.factory import Operation
 
 
 class IdealWorld:
-    """A DotFactory. Asserts that no configuration in Δ occurs: no two robots coupled by a mode touch."""
+    """A DotFactory. Asserts that no configuration in Δ occurs: no two robots coupled by a mode
+    touch."""
 
     def __init__(
         self,

@@ -1,4 +1,5 @@
-"""What is measured in the engine while a factory runs: gaps, residuals, contacts, finished products."""
+"""What is measured in the engine while a factory runs: gaps, residuals, contacts, finished
+products."""
 
 from __future__ import annotations
 
@@ -61,8 +62,8 @@ class Inspection:
         return (pairs == self.belt).any(axis=1) & free
 
     def measure(self, bodies: np.ndarray) -> float:
-        """The largest displacement [m] of any vertex of any part from its place in the product, after
-        a rigid fit on the first part."""
+        """The largest displacement [m] of any vertex of any part from its place in the product,
+        after a rigid fit on the first part."""
         turn = self.d.xmat[bodies].reshape(-1, 3, 3)
         here = (
             np.einsum("nij,nj->ni", turn[self._owner], self._local)

@@ -1,7 +1,8 @@
 """The MuJoCo world: slide joints, actuators with force limits, parts as free bodies, welds.
 
-At a transition the actuators' setpoints follow another mode's reference and the welds of the parts concerned
-are switched; nothing is teleported, except a finished product's bodies returning out of sight.
+At a transition the actuators' setpoints follow another mode's reference and the welds of the parts
+concerned are switched; nothing is teleported, except a finished product's bodies returning out of
+sight.
 """
 
 from __future__ import annotations
@@ -27,14 +28,15 @@ AWAKE = -0.0
 
 
 DOZE = int(mujoco.mjMINAWAKE) // 2
-"""Steps of the engine between looks at who sleeps: it takes twice as many of a slow body to doze off."""
+"""Steps of the engine between looks at who sleeps: it takes twice as many of a slow body to doze
+off."""
 
 
 class MujocoWorld:
     """A compiled model with its data, and the parts' whereabouts.
 
-    `gains` (R,): factor on each robot's controller gain. Raises InputError (BadMesh) where the engine
-    refuses the model, with the engine's own words.
+    `gains` (R,): factor on each robot's controller gain. Raises InputError (BadMesh) where the
+    engine refuses the model, with the engine's own words.
     """
 
     def __init__(
@@ -103,7 +105,8 @@ class MujocoWorld:
                 self.mass[robot] = CARRIAGE_MASS + self.model.masses.get(operation.after[slot], 0.0)
 
     def step(self, bundle: Bundle | None, robots: Index) -> None:
-        """One tick of the engine, the drives following a reference that obeys F_p under the limits."""
+        """One tick of the engine, the drives following a reference that obeys F_p under the
+        limits."""
         self._halt(robots)
         if bundle is not None:
             x, v = self.reference[robots], self.speed[robots]
@@ -118,8 +121,9 @@ class MujocoWorld:
         self.settle()
 
     def _halt(self, active: Index) -> None:
-        """Robots whose operation has ended stop where their reference is. They may hand over at a low
-        speed: left as a setpoint it would carry them out of the goal, and of the next domain."""
+        """Robots whose operation has ended stop where their reference is. They may hand over at a
+        low speed: left as a setpoint it would carry them out of the goal, and of the next
+        domain."""
         moving = self.speed != 0.0
         moving[active] = False
         if moving.any():
@@ -157,8 +161,8 @@ class MujocoWorld:
                 self.inspection.contacts()
 
     def _rouse(self, dof: Index, tree: Index) -> None:
-        """Wake robots that sleep, and keep those awake that creep: the engine puts to sleep what has been
-        slow for a while, and a robot under way never comes to its goal then."""
+        """Wake robots that sleep, and keep those awake that creep: the engine puts to sleep what
+        has been slow for a while, and a robot under way never comes to its goal then."""
         speed, asleep = self.d.qvel[dof], self.d.tree_asleep[tree]
         self.d.qvel[dof[speed == 0.0]] = AWAKE
         self.d.tree_asleep[tree[asleep < 0]] = -1 - mujoco.mjMINAWAKE

@@ -18,7 +18,8 @@ from factory.pag import NOPART
 
 @dataclass(frozen=True, slots=True)
 class Switched:
-    """Grips switched by one operation: how many, and the largest gap between the joined frames [m]."""
+    """Grips switched by one operation: how many, and the largest gap between the joined frames
+    [m]."""
 
     count: int
     gap: float
@@ -27,8 +28,9 @@ class Switched:
 class Stock:
     """Copies of parts, fed in the order of units: the n-th part of each label is for unit n.
 
-    A weld is aimed at the copy it holds by writing its body at run time; its nominal frame is the same for
-    all copies. Copies of one unit never collide with each other, those of different units do.
+    A weld is aimed at the copy it holds by writing its body at run time; its nominal frame is the
+    same for all copies. Copies of one unit never collide with each other, those of different units
+    do.
     """
 
     def __init__(
@@ -76,8 +78,9 @@ class Stock:
         return allowed and self.shown.get(label) == unit
 
     def feed_next(self, label: str) -> None:
-        """Put the next copy into its empty feeder, if there is one to spare and a unit that needs it,
-        and the robot has delivered the part it took last: until then it may still stand there."""
+        """Put the next copy into its empty feeder, if there is one to spare and a unit that needs
+        it, and the robot has delivered the part it took last: until then it may still stand
+        there."""
         unit = self.next_unit[label]
         if label in self.taken or label in self.shown or unit >= self.units or not self.free[label]:
             return
@@ -201,7 +204,8 @@ class Stock:
         return found
 
     def _gap(self, joins: list[tuple[int, str]], unit: int) -> float:
-        """The largest distance between the frames that the grips (robot, part) would join now [m]."""
+        """The largest distance between the frames that the grips (robot, part) would join now
+        [m]."""
         if not joins:
             return 0.0
         grips = [self.grip[join] for join in joins]
@@ -242,7 +246,8 @@ class Stock:
         self._switch(self._park(label, copy), True)
 
     def _mask(self, body: int, unit: int | None) -> None:
-        """Contact masks: the parts of a unit share a bit and ignore it; spare copies touch nothing."""
+        """Contact masks: the parts of a unit share a bit and ignore it; spare copies touch
+        nothing."""
         start = self.m.body_geomadr[body]
         geoms = slice(start, start + self.m.body_geomnum[body])
         own = 0 if unit is None else 1 << (1 + unit % BITS)

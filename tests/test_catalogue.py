@@ -1,0 +1,138 @@
+"""What is found by directory, each tried once: templates, robot types, exporters, examples."""
+
+from __future__ import annotations
+
+import tomllib
+from pathlib import Path
+from xml.etree import ElementTree
+
+import mujoco
+import pytest
+
+import factory
+from factory.export import exporters
+from factory.lang import read_template, write_template
+from factory.mjcf.robots import load_robot_model
+from factory.pipeline import all_templates
+from factory.robots import load_catalogue
+from factory.template import Template
+from tests.command_line import ROOT, Terminal
+from tests.test_simulation import assert_good
+
+TEMPLATES = sorted((ROOT / "templates").glob("*.op"))
+ROBOTS = list(tomllib.loads((ROOT / "mjcf" / "catalogue.toml").read_text("utf-8")))
+EXAMPLES = sorted((ROOT / "examples").glob("*.pag"))
+
+SMALL = 12
+"""Most labels of an example that is run here."""
+
+
+# --- templates ------------------------------------------------------------------------------------
+
+
+def smallest_product(template: Template) -> str:
+    """A PAG that needs the template: parts, one operation, and a weld to take its product on."""
+    if template.geometry:
+        return "root = p; p = atomic ( box = (0.05, 0.04, 0.03) )"
+    parts = [f"p{n}" for n in range(len(template.inputs))]
+    made = [f"{p} = atomic ()" for p in parts]
+    if template.name == "dropoff":
+        return "root = p0; " + "; ".join(made)
+    if template.name == "insert":
+        return "root = s; s = mate ( p0, p1, p2 ); p2 = atomic (); " + "; ".join(made)
+    operation = f"s = {template.name} ( {', '.join(parts)} )"
+    return f"root = t; t = weld ( s, dwell = 0.1 ); {operation}; " + "; ".join(made)
+
+
+@pytest.mark.parametrize("file", TEMPLATES, ids=lambda p: p.stem)
+def test_templates_read_and_write_back(file: Path) -> None:
+    template = read_template(file.read_text("utf-8"), str(file))
+    assert template.name == file.stem
+    assert read_template(write_template(template)) == template
+    assert all_templates()[file.stem] == template
+
+
+@pytest.mark.parametrize("world", ["ideal", "mujoco"])
+@pytest.mark.parametrize("file", TEMPLATES, ids=lambda p: p.stem)
+def test_templates_run(file: Path, world: str, tmp_path: Path) -> None:
+    product = tmp_path / "p.pag"
+    product.write_text(smallest_product(all_templates()[file.stem]))
+    plan = factory.compile(factory.load_pag(product))
+    assert file.stem in {operation.template.name for operation in plan.operations}
+    assert factory.verify(plan).holds
+    run = factory.run(factory.lay_out(plan), world=world, units=1)
+    assert run.products == 1
+    assert run.refines_net
+    if world == "mujoco":
+        assert_good(run)
+
+
+# --- robot types ----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", ROBOTS)
+def test_robot_types_load(name: str) -> None:
+    """Alone in stock MuJoCo, with the joint and the actuator that every type has."""
+    robot = load_catalogue()[name]
+    assert robot.summary
+    m = mujoco.MjModel.from_xml_path(str(robot.mjcf))
+    assert m.joint("slide").type == mujoco.mjtJoint.mjJNT_SLIDE
+    assert m.actuator("drive").trnid[0] == m.joint("slide").id
+    assert m.actuator_forcelimited[m.actuator("drive").id]
+    assert m.site("nest").id >= 0
+    model = load_robot_model(robot)
+    assert model.name == name
+    assert ElementTree.parse(robot.mjcf).getroot().get("model") == name
+
+
+@pytest.mark.parametrize("name", ROBOTS)
+def test_robot_types_are_what_they_extend(name: str) -> None:
+    catalogue = load_catalogue()
+    assert catalogue.fits(name, name)
+    ancestor = catalogue[name].extends
+    if ancestor:
+        assert catalogue.fits(name, ancestor)
+        assert not catalogue.fits(ancestor, name)
+
+
+def test_every_file_of_the_folder_is_in_the_catalogue() -> None:
+    listed = {robot.mjcf.name for robot in load_catalogue().types.values()}
+    assert {path.name for path in (ROOT / "mjcf").glob("*.xml")} == listed
+
+
+def test_templates_ask_for_robots_that_exist() -> None:
+    wanted = {robot for template in all_templates().values() for robot in template.robots}
+    assert wanted <= set(ROBOTS)
+
+
+# --- exporters ------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("form", exporters())
+def test_exporters_run(run: Terminal, form: str) -> None:
+    one, other = (run("export", EXAMPLES[0], "--format", form).out for _ in range(2))
+    assert one.strip()
+    assert one == other
+
+
+# --- examples -------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("file", EXAMPLES, ids=lambda p: p.stem)
+def test_examples_check(run: Terminal, file: Path) -> None:
+    done = run("check", file, "--json")
+    assert done.status == 0
+    document = done.json
+    n, robots = document["transitions"] // 2 - 1, document["robots"]
+    assert document["places"] == 2 * n + robots + 1
+    assert document["tokens"] == robots
+
+
+@pytest.mark.parametrize("file", EXAMPLES, ids=lambda p: p.stem)
+def test_examples_run(file: Path) -> None:
+    plan = factory.compile(factory.load_pag(file))
+    if len(plan.pag) > SMALL:
+        pytest.skip(f"{len(plan.pag)} labels: too large for here")
+    run = factory.run(factory.lay_out(plan), units=1)
+    assert run.products == 1
+    assert_good(run)

@@ -1,0 +1,70 @@
+"""Real products that nobody here designed: LEGO sets with brick meshes, from the folder beside the
+project. Skipped where that is missing."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import mujoco
+import pytest
+
+from tests.command_line import Terminal, files_in
+
+FOLDER = Path(__file__).parents[2] / "shared" / "products" / "ldraw"
+
+SMALL = ["30023-1-Lighthouse", "889-1-RadarTruck", "6966-1-JediStarfighter-Mini"]
+LARGE = ["4494-1-Imperial_Shuttle-Mini", "5935-1-IslandHopper"]
+
+pytestmark = pytest.mark.skipif(
+    not FOLDER.is_dir(), reason="the LDraw products are not beside this checkout"
+)
+
+
+def product(name: str) -> Path:
+    return FOLDER / f"{name}.pag"
+
+
+def assert_well_made(run: Terminal, name: str, units: int) -> None:
+    done = run("run", product(name), "--units", units, "--json")
+    assert done.status == 0, done.err
+    document = done.json
+    assert document["products"] == units
+    assert document["refines_net"]
+    assert document["product_error_max_mm"] <= 0.2
+    assert document["handoff_gap_max_mm"] <= 1.0
+    assert document["unintended_contacts"] == 0, document["contacts"]
+    assert document["engine_warnings"] == 0
+    events = [event["transition"] for event in document["events"]]
+    assert events.count("dropoff_e") == units
+
+
+@pytest.mark.parametrize("name", SMALL + LARGE)
+def test_products_are_proved(run: Terminal, name: str) -> None:
+    document = run("check", product(name), "--json").json
+    n, robots = document["transitions"] // 2 - 1, document["robots"]
+    assert document["places"] == 2 * n + robots + 1
+    assert all(document[k] for k in ("gear_net", "live", "safe", "reversible", "legal"))
+
+
+@pytest.mark.parametrize("name", SMALL)
+def test_small_products_are_made(run: Terminal, name: str) -> None:
+    assert_well_made(run, name, 2)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", LARGE)
+def test_large_products_are_made(run: Terminal, name: str) -> None:
+    assert_well_made(run, name, 1)
+
+
+@pytest.mark.parametrize("name", LARGE)
+def test_large_products_are_built(run: Terminal, tmp_path: Path, name: str) -> None:
+    done = run("build", product(name), "--mjcf", tmp_path / "m.xml", "--units", 1, "--json")
+    assert done.status == 0, done.err
+    assert done.json["clearance"]["holds"]
+    (tmp_path / "elsewhere").mkdir()
+    for path in tmp_path.glob("m*"):
+        path.rename(tmp_path / "elsewhere" / path.name)
+    m = mujoco.MjModel.from_xml_path(str(tmp_path / "elsewhere" / "m.xml"))
+    assert (m.njnt, m.neq) == (done.json["joints"], done.json["welds"])
+    assert len(files_in(tmp_path)) == 1 + m.nmesh
