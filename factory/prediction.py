@@ -11,9 +11,10 @@ from collections.abc import Sequence
 
 from factory.control.mode import Limits, Mode
 from factory.control.plan import operation_starts
-from factory.control.profile import World, mode_time
+from factory.control.profile import World, mode_time, trapezoid_time
 from factory.layout.plan import Layout
-from factory.nets.timing import CycleTime, cycle_time
+from factory.nets.pool import with_wip
+from factory.nets.timing import CycleTime, cycle_time, marked_graph_cycle_time
 from factory.settings import Settings
 
 
@@ -33,8 +34,22 @@ def operation_delays(
 
 
 def predict(
-    layout: Layout, modes: Sequence[Mode], limits: Limits, settings: Settings, world: World
+    layout: Layout,
+    modes: Sequence[Mode],
+    limits: Limits,
+    settings: Settings,
+    world: World,
+    wip: int | None = None,
 ) -> CycleTime:
     """The cycle time of the compiled net (the greatest sum of delays along a gear) and its
-    bottleneck."""
-    return cycle_time(layout.factory, operation_delays(layout, modes, limits, settings, world))
+    bottleneck. Two things may allow no less and be it: in MuJoCo the outfeed, whose tray must be
+    back before the next dropoff, and the bound `wip` on what is inside."""
+    delays = operation_delays(layout, modes, limits, settings, world)
+    found = [cycle_time(layout.factory, delays)]
+    if world == "mujoco":
+        way = trapezoid_time(layout.outfeed_way, settings.outfeed, settings.outfeed_acceleration)
+        found.append(CycleTime(delays[-1] + 2 * (float(way) + settings.tick), "outfeed"))
+    if wip is not None:
+        bound = marked_graph_cycle_time(with_wip(layout.factory, wip), delays).seconds
+        found.append(CycleTime(bound * (1 - 1e-9), f"wip {wip}"))
+    return max(found, key=lambda time: time.seconds)

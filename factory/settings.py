@@ -40,7 +40,12 @@ class Settings:
     clearance: float = 0.02
     force: float = 3.0
     settle: float = 0.0
-    outfeed: float = 0.3
+    outfeed: float = 1.0
+
+    @property
+    def outfeed_acceleration(self) -> float:
+        """Of the outfeed's tray: twice that of a robot [m/s²]."""
+        return 2 * self.acceleration
 
     @property
     def tick(self) -> float:

@@ -55,7 +55,7 @@ class Simulation:
         distributed: bool = False,
     ) -> None:
         self.layout, self.kind, self.units = layout, world, units
-        self.seed, self.jitter = seed, jitter
+        self.seed, self.jitter, self.wip = seed, jitter, wip
         self.settings = settings or Settings()
         factory = layout.factory
         self.modes = operation_modes(layout, self.settings.eps)
@@ -134,7 +134,9 @@ class Simulation:
     def _record(self, wall: float, trouble: Diagnostic | None) -> Run:
         supervisor, world, factory = self.supervisor, self.world, self.layout.factory
         physics = getattr(world, "physics_time", 0.0)
-        predicted = predict(self.layout, self.modes, self.limits, self.settings, self.kind)
+        predicted = predict(
+            self.layout, self.modes, self.limits, self.settings, self.kind, self.wip
+        )
         verdict = replay(factory.net, [e.transition for e in supervisor.events], self.start)
         figures: PhysicsFigures | None = None
         if self.model is not None:

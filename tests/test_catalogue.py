@@ -23,7 +23,7 @@ TEMPLATES = sorted((ROOT / "templates").glob("*.op"))
 ROBOTS = list(tomllib.loads((ROOT / "mjcf" / "catalogue.toml").read_text("utf-8")))
 EXAMPLES = sorted((ROOT / "examples").glob("*.pag"))
 
-SMALL = 12
+SMALL = 40
 """Most labels of an example that is run here."""
 
 

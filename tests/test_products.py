@@ -51,8 +51,7 @@ def test_small_products_are_made(run: Terminal, name: str) -> None:
     assert_well_made(run, name, 2)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("name", LARGE)
+@pytest.mark.parametrize("name", [LARGE[0], pytest.param(LARGE[1], marks=pytest.mark.slow)])
 def test_large_products_are_made(run: Terminal, name: str) -> None:
     assert_well_made(run, name, 1)
 

@@ -146,6 +146,13 @@ def test_wip_bounds_what_is_inside(paper: Layout) -> None:
     assert free.cycle_time_s < run.cycle_time_s
 
 
+@pytest.mark.parametrize("name", ["paper", "kary", "chain"])
+@pytest.mark.parametrize("wip", [1, 2])
+def test_the_cycle_time_under_wip_is_predicted(name: str, wip: int) -> None:
+    run = factory.run(laid_out(PRODUCTS[name]), world="ideal", units=12, wip=wip)
+    assert run.cycle_time_s == pytest.approx(run.predicted_cycle_time_s, rel=0.02)
+
+
 def test_the_pool_is_what_the_net_says(paper: Layout) -> None:
     model = Simulation(paper, units=50).model
     assert model is not None

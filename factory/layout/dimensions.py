@@ -41,6 +41,9 @@ BOOM_HEIGHT = 0.014
 TOOL_TRAVEL = 0.12
 """How far a tool comes from its home to its station."""
 
+TRAY = 0.0025
+"""Thickness of the tray on which a product leaves."""
+
 BELT_GAP = 3e-4
 """The outfeed lies this much below z0, so that the output robot brings its product without
 touching."""

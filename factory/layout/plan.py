@@ -191,6 +191,11 @@ class Layout:
         towards = -path.frame(self.payloads[pile])[0]
         return max(0.0, ahead + towards + self.clearance)
 
+    @property
+    def outfeed_way(self) -> float:
+        """How far the outfeed takes a product until it is out of sight [m]."""
+        return self.product_length + 0.12
+
     @cached_property
     def product_length(self) -> float:
         """Length of the finished product along the output robot's heading [m]."""

@@ -22,6 +22,7 @@ from factory.layout.dimensions import PAYLOAD
 from factory.layout.plan import Layout
 from factory.mjcf import names
 from factory.mjcf.elements import add, number, numbers
+from factory.mjcf.outfeed import TRAY_MASS, add_tray
 from factory.mjcf.parts import add_meshes, add_parts, feeder_middle, parked_at, place_in
 from factory.mjcf.robots import (
     Drive,
@@ -71,11 +72,6 @@ class Model:
         return self.layout.factory
 
     @cached_property
-    def base(self) -> str:
-        """The part that a finished product's other parts are welded to."""
-        return heaviest(self.layout)
-
-    @cached_property
     def bodies(self) -> int:
         """How many bodies of parts there are."""
         return sum(self.copies.values())
@@ -118,16 +114,18 @@ def build_model(
     add_paints(asset)
     files = add_meshes(asset, product)
     world = add(root, "worldbody")
-    add_scene(world, layout, settings.outfeed)
+    add_scene(world, layout)
     equality, actuator = Element("equality"), Element("actuator")
     _robots(layout, catalogue, drives, defaults, asset, world, actuator)
+    load = masses[factory.pag.root] + TRAY_MASS
+    add_tray(world, actuator, layout, drive_for(load, settings.outfeed_acceleration, settings))
     add_parts(world, layout, copies)
     _welds(equality, layout, copies)
     root.extend([equality, actuator])
     _home(add(root, "keyframe"), layout, actuator)
     ElementTree.indent(root)
     xml = ElementTree.tostring(root, encoding="unicode") + "\n"
-    joints = len(factory.robots) + sum(copies.values())
+    joints = len(factory.robots) + 1 + sum(copies.values())
     return Model(layout, settings, copies, masses, drives, xml, files, joints, len(equality))
 
 
@@ -146,18 +144,19 @@ def model_files(model: Model, path: Path) -> dict[Path, bytes]:
 
 
 def _drive(factory: Factory, robot: int, masses: Mapping[str, float], settings: Settings) -> Drive:
-    """Gains for the heaviest load a robot carries, critically damped; force for its
-    acceleration."""
+    """The drive for the heaviest load a robot carries."""
     operations = factory.operations
     load = max(
         masses.get(operations[o].after[operations[o].robots.index(robot)], 0.0)
         for o in factory.robots[robot].operations
     )
-    mass = CARRIAGE_MASS + load
+    return drive_for(CARRIAGE_MASS + load, settings.acceleration, settings)
+
+
+def drive_for(mass: float, acceleration: float, settings: Settings) -> Drive:
+    """Critically damped gains for a mass [kg], and the force that its acceleration [m/s²] takes."""
     kp, kv = mass * STIFFNESS**2, 2 * mass * STIFFNESS
-    return Drive(
-        round(kp, 3), round(kv, 3), round(settings.force * mass * settings.acceleration + 5, 3)
-    )
+    return Drive(round(kp, 3), round(kv, 3), round(settings.force * mass * acceleration + 5, 3))
 
 
 def _options(root: Element, settings: Settings, bodies: int) -> None:
@@ -281,20 +280,9 @@ def _welds(equality: Element, layout: Layout, copies: Mapping[str, int]) -> None
         for n in range(1, copies[part] + 1):
             at = (*parked_at(layout, part, n), 1, 0, 0, 0)
             _weld(equality, names.park(part, n), "world", names.part(part, n), at, n > 1)
-    first = heaviest(layout)
-    base = product.solids[first].centre
-    for part in (p for p in factory.contents[factory.pag.root] if p != first):
-        offset = tuple(float(v) for v in product.solids[part].centre - base)
-        for n in range(1, copies[part] + 1):
-            body1, body2 = names.part(first, 1), names.part(part, n)
-            _weld(equality, names.hold(part, n), body1, body2, (*offset, 1, 0, 0, 0))
-
-
-def heaviest(layout: Layout) -> str:
-    """The part that the others are held to on the outfeed: a weld is as stiff as the lighter of the
-    bodies it joins is heavy."""
-    solids = layout.product.solids
-    return max(layout.factory.contents[layout.factory.pag.root], key=lambda part: solids[part].mass)
+    for part in factory.contents[factory.pag.root]:
+        pose = (*place_in(product, part, (0.0, 0.0)), 1, 0, 0, 0)
+        _weld(equality, names.hold(part), names.OUTFEED_TRAY, names.part(part, 1), pose)
 
 
 def grip_position(layout: Layout, robot: int, part: str) -> tuple[float, float, float]:

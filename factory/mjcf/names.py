@@ -43,10 +43,20 @@ def feeder(label: str) -> str:
     return f"feeder/{label}"
 
 
-def hold(label: str, number: int) -> str:
-    """The weld that joins a copy to the product's first part once nobody carries it,
-    `hold/part2#1`."""
-    return f"hold/{copy(label, number)}"
+def hold(label: str) -> str:
+    """The weld by which the outfeed's tray holds a part of a finished product, `hold/part2`; it is
+    aimed at the copy it holds."""
+    return f"hold/{label}"
+
+
+OUTFEED_TRAY = "outfeed/tray"
+"""The body that takes a finished product away; also the name of its geom."""
+
+OUTFEED_SLIDE = "outfeed/slide"
+"""Its joint."""
+
+OUTFEED_DRIVE = "outfeed/drive"
+"""Its actuator."""
 
 
 def park(label: str, number: int) -> str:

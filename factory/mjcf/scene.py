@@ -7,9 +7,7 @@ from math import cos, radians, sin, tan
 from xml.etree.ElementTree import Element
 
 from factory.layout.dimensions import (
-    BELT_GAP,
     CARRIAGE,
-    FINGER_TOP,
     PAYLOAD,
     POST,
     Clearance,
@@ -18,13 +16,13 @@ from factory.layout.embedding import project
 from factory.layout.plan import Layout
 from factory.mjcf.elements import add, numbers
 from factory.mjcf.names import carriage, feeder
+from factory.mjcf.outfeed import add_outfeed
 from factory.mjcf.parts import feeder_middle
 from factory.mjcf.robots import heading_quaternion
 
 VIEW = 32.0
 """Vertical field of view of the cameras [degrees]: narrow, for a calm perspective."""
 
-SHED = (0.87, 0.88, 0.89, 1.0)
 
 KEY, FILL = (0.40, 0.48, -0.78), (-0.65, 0.30, -0.70)
 """Directions of the two lights; the first casts the shadows."""
@@ -79,11 +77,12 @@ def add_assets(asset: Element) -> None:
     )
     add(asset, "material", name="rail", rgba="0.55 0.58 0.62 1", specular=0.2, shininess=0.4)
     add(asset, "material", name="post", rgba="0.80 0.82 0.84 1", specular=0.1, shininess=0.3)
+    add(asset, "material", name="tray", rgba="0.45 0.48 0.52 1", specular=0.2, shininess=0.3)
     add(asset, "material", name="belt", rgba="0.24 0.26 0.29 1", specular=0, shininess=0)
     add(asset, "material", name="frame", rgba="0.70 0.73 0.76 1", specular=0.2, shininess=0.4)
 
 
-def add_scene(world: Element, layout: Layout, outfeed_speed: float) -> None:
+def add_scene(world: Element, layout: Layout) -> None:
     """Everything that stands still."""
     _floor_and_light(world, layout)
     _cameras(world, layout)
@@ -104,7 +103,7 @@ def add_scene(world: Element, layout: Layout, outfeed_speed: float) -> None:
         )
     for operation in layout.factory.leaves:
         _feeder(world, layout, operation.label)
-    _outfeed(world, layout, outfeed_speed)
+    add_outfeed(world, layout)
 
 
 def _centre(layout: Layout) -> tuple[float, float]:
@@ -264,84 +263,6 @@ def _feeder(world: Element, layout: Layout, label: str) -> None:
 def _handedness(u: tuple[float, float], t: tuple[float, float]) -> int:
     """+1 where the side t is to the left of the heading u, else -1."""
     return 1 if u[0] * t[1] - u[1] * t[0] > 0 else -1
-
-
-def _outfeed(world: Element, layout: Layout, speed: float) -> None:
-    """A conveyor under the product at the output robot's A end, into a shed."""
-    xlo, xhi, ylo, yhi = layout.outfeed
-    top, thick = PAYLOAD - BELT_GAP, (PAYLOAD - BELT_GAP - FINGER_TOP) * 0.8
-    middle, half = ((xlo + xhi) / 2, (ylo + yhi) / 2), ((xhi - xlo) / 2, (yhi - ylo) / 2)
-    body = add(world, "body", name="outfeed", pos=(middle[0], middle[1], 0.0))
-    add(
-        body,
-        "geom",
-        name="outfeed/belt",
-        class_="station",
-        type="box",
-        priority=1,
-        pos=(0, 0, top - thick / 2),
-        size=(half[0], half[1], thick / 2),
-        material="belt",
-        friction="0.8 0.005 0.0001",
-        solref="0.004 1",
-        solimp="0.99 0.9999 0.0001 0.5 2",
-        surfacevel=(speed, 0, 0, 0, 0, 0),
-    )
-    tall = float(layout.product.high[2] - layout.product.low[2])
-    length = layout.product_length + 0.1
-    shed, wall = half[0] - length / 2, top + tall / 2 + 0.005
-    for side in (-1, 1):
-        add(
-            body,
-            "geom",
-            name=f"outfeed/side{side}",
-            class_="shown",
-            type="box",
-            pos=(0, side * (half[1] + 0.006), top - 0.008),
-            size=(half[0], 0.0055, 0.012),
-            material="frame",
-        )
-        for end in (-1, 1):
-            add(
-                body,
-                "geom",
-                name=f"outfeed/leg{side}{end}",
-                class_="shown",
-                type="box",
-                pos=(end * (half[0] - 0.03), side * (half[1] - 0.008), (top - thick) / 2),
-                size=(0.006, 0.006, (top - thick) / 2),
-                material="frame",
-            )
-        add(
-            body,
-            "geom",
-            name=f"outfeed/wall{side}",
-            class_="shown",
-            type="box",
-            pos=(shed, side * (half[1] + 0.0165), wall),
-            size=(length / 2, 0.004, tall / 2 + 0.025),
-            rgba=SHED,
-        )
-    add(
-        body,
-        "geom",
-        name="outfeed/roof",
-        class_="shown",
-        type="box",
-        pos=(shed + 0.002, 0, top + tall + 0.0335),
-        size=(length / 2 + 0.008, half[1] + 0.024, 0.004),
-        rgba=SHED,
-    )
-    add(
-        body,
-        "geom",
-        name="outfeed/back",
-        class_="shown",
-        type="box",
-        pos=(half[0] + 0.0045, 0, wall),
-        size=(0.004, half[1] + 0.0205, tall / 2 + 0.025),
-        rgba=SHED,
-    )
 
 
 __all__ = ["add_assets", "add_follower", "add_scene", "add_visuals", "carriage", "look_distance"]

@@ -10,15 +10,12 @@ from factory.mjcf.model import Model
 from factory.trace import PhysicsFigures
 from factory.world.stock import Switched
 
-BELT = "outfeed/belt"
-
 
 class Inspection:
     """Keeps the worst figures of a run. Contacts are looked at after every step of the engine."""
 
     def __init__(self, m: mujoco.MjModel, d: mujoco.MjData, model: Model) -> None:
         self.m, self.d, self.model = m, d, model
-        self.belt = m.geom(BELT).id
         self.handoffs = 0
         self.gap = self.residual = 0.0
         self.error: float | None = None
@@ -46,20 +43,14 @@ class Inspection:
             self._touching = frozenset()
 
     def contacts(self) -> None:
-        """Count the onsets of contacts that nothing intends: all but the product's on the belt."""
+        """Count the onsets of contacts. Nothing intends any: parts that belong together ignore each
+        other by their masks, and all else is meant to stay apart."""
         pairs = self.d.contact.geom[: self.d.ncon]
         touching = self.d.contact.dist[: self.d.ncon] < 0
-        unintended = touching & ~self._on_belt(pairs)
-        now = frozenset((int(a), int(b)) for a, b in pairs[unintended])
+        now = frozenset((int(a), int(b)) for a, b in pairs[touching])
         for a, b in sorted(now - self._touching):
             self.unintended.append((self.m.geom(a).name, self.m.geom(b).name))
         self._touching = now
-
-    def _on_belt(self, pairs: np.ndarray) -> np.ndarray:
-        """Parts may touch the belt."""
-        other = np.where(pairs[:, 0] == self.belt, pairs[:, 1], pairs[:, 0])
-        free = self.m.body_dofnum[self.m.geom_bodyid[other]] == 6
-        return (pairs == self.belt).any(axis=1) & free
 
     def measure(self, bodies: np.ndarray) -> float:
         """The largest displacement [m] of any vertex of any part from its place in the product,

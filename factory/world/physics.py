@@ -12,16 +12,21 @@ from time import perf_counter
 
 import numpy as np
 
-from factory.control.governor import follow
-from factory.control.mode import Array, Index
+from factory.control.governor import follow, govern
+from factory.control.mode import ROUNDING, Array, Index
 from factory.control.navigation import Bundle
+from factory.control.profile import landing_speed
 from factory.engine import mujoco
 from factory.errors import Diagnostic, InputError
 from factory.factory import Operation
 from factory.mjcf import names
 from factory.mjcf.model import BITS, CARRIAGE_MASS, Model
+from factory.mjcf.outfeed import TRAY_MASS
 from factory.world.inspection import Inspection
 from factory.world.stock import Stock
+
+NEAR = 1e-3
+"""The tray is somewhere when it is within this [m]."""
 
 AWAKE = -0.0
 """Written over a speed of zero it wakes a sleeping body and changes nothing else."""
@@ -53,18 +58,23 @@ class MujocoWorld:
         self.m = load(model)
         self.d = mujoco.MjData(self.m)
         factory = model.factory
-        joint = [self.m.joint(names.slide(r.name)).id for r in factory.robots]
-        actuator = [self.m.actuator(names.drive(r.name)).id for r in factory.robots]
+        slides = [*(names.slide(r.name) for r in factory.robots), names.OUTFEED_SLIDE]
+        drives = [*(names.drive(r.name) for r in factory.robots), names.OUTFEED_DRIVE]
+        joint = [self.m.joint(name).id for name in slides]
+        actuator = [self.m.actuator(name).id for name in drives]
+        self.tray = len(factory.robots)
         self.qpos = self.m.jnt_qposadr[joint]
         self.dof = self.m.jnt_dofadr[joint]
         self.tree = self.m.body_treeid[self.m.jnt_bodyid[joint]]
         self.control = self.m.actuator_ctrladr[actuator]
-        self.m.actuator_biasprm[actuator, 1:3] *= np.asarray(gains)[:, None]
+        self.m.actuator_biasprm[actuator[: self.tray], 1:3] *= np.asarray(gains)[:, None]
+        start = np.append(start, 0.0)
         self.reference = np.array(start, float)
         self.speed = np.zeros_like(self.reference)
         self._plan = np.zeros((len(start), 4))
         self._moving = np.zeros(len(start), bool)
         self.mass = np.full(len(start), CARRIAGE_MASS)
+        self.mass[self.tray] = TRAY_MASS
         self.d.qpos[self.qpos] = start
         self.d.ctrl[self.control] = start
         self.stock = Stock(self.m, self.d, model, units, counts or {}, wip)
@@ -84,12 +94,13 @@ class MujocoWorld:
 
     def sense(self) -> tuple[Array, Array]:
         """Measured positions and speeds of all carriages."""
-        return self.d.qpos[self.qpos], self.d.qvel[self.dof]
+        robots = slice(self.tray)
+        return self.d.qpos[self.qpos[robots]], self.d.qvel[self.dof[robots]]
 
     def prepared(self, operation: Operation, unit: int) -> bool:
         """A feeder presents the part of that unit; the outfeed has room for a product."""
         if operation.index == self.model.factory.dropoff.index:
-            return self.stock.outfeed_is_free()
+            return self.stock.on_tray is None and self._tray_is_at(0.0)
         return bool(operation.inputs) or self.stock.presents(operation.label, unit)
 
     def apply(
@@ -125,7 +136,7 @@ class MujocoWorld:
         low speed: left as a setpoint it would carry them out of the goal, and of the next
         domain."""
         moving = self.speed != 0.0
-        moving[active] = False
+        moving[active] = moving[self.tray] = False
         if moving.any():
             robots = np.flatnonzero(moving)
             self.speed[robots] = 0.0
@@ -168,11 +179,38 @@ class MujocoWorld:
         self.d.tree_asleep[tree[asleep < 0]] = -1 - mujoco.mjMINAWAKE
 
     def settle(self) -> None:
-        """After a tick: look at welds and the outfeed."""
+        """After a tick: look at welds, and move the outfeed's tray."""
         self.inspection.tick()
-        for unit in self.stock.clear_outfeed():
+        unit, way = self.stock.on_tray, self.model.layout.outfeed_way
+        if unit is not None and self._tray_is_at(way):
             self.inspection.measured(self.stock.bodies_of(unit))
-            self.stock.recycle(unit)
+            self.stock.recycle()
+            unit = None
+        load = 0.0 if unit is None else self.model.masses[self.model.factory.pag.root]
+        self.mass[self.tray] = TRAY_MASS + load
+        self._send_tray(0.0 if unit is None else way)
+
+    def _tray_is_at(self, place: float) -> bool:
+        """Whether the outfeed's tray rests at a place of its way [m]."""
+        x, v = self.d.qpos[self.qpos[self.tray]], self.d.qvel[self.dof[self.tray]]
+        return bool(abs(x - place) < NEAR and abs(v) < NEAR / self.settings.tick)
+
+    def _send_tray(self, place: float) -> None:
+        """One tick of the tray's way to a place, as fast as its limits allow."""
+        tray = np.array([self.tray])
+        x, v, dt = self.reference[tray], self.speed[tray], self.settings.tick
+        if x[0] == place and v[0] == 0.0:
+            return
+        limit = np.array([self.settings.outfeed_acceleration])
+        left = place - (x + v * (dt / 2))
+        wanted = np.minimum(landing_speed(np.abs(left), limit, dt), self.settings.outfeed)
+        x1, v1, a = govern(x, v, np.copysign(wanted, left), limit, dt)
+        if abs(x1[0] - place) < ROUNDING and abs(v1[0]) < ROUNDING:
+            x1, v1 = np.array([place]), np.zeros(1)
+            self.move(tray, x1, v1, v1)
+        else:
+            self.move(tray, x, v, a)
+        self.reference[tray], self.speed[tray] = x1, v1
 
     def delivered(self) -> int:
         """Products that have left the outfeed, since the beginning of time."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -45,7 +45,7 @@ class Stock:
         self.m, self.d, self.model, self.wip = m, d, model, wip
         factory = model.factory
         self.parts = factory.contents[factory.pag.root]
-        self.first = model.base
+        self.first = self.parts[0]
         self.body = {
             label: np.array([m.body(names.part(label, n + 1)).id for n in range(count)])
             for label, count in model.copies.items()
@@ -62,9 +62,9 @@ class Stock:
         self.units = self.released + units
         self.next_unit = {o.label: counts.get(o.end, 0) for o in factory.leaves}
         self.feeds_robot = {o.carrier: o.label for o in factory.leaves}
-        self.on_outfeed: deque[int] = deque()
+        self.hold = {label: m.equality(names.hold(label)).id for label in self.parts}
+        self.on_tray: int | None = None
         self.left: list[float] = []
-        self.exit_at = self._exit()
         self._hide_spares()
         self._hand_out(counts)
         for label in self.parts:
@@ -99,7 +99,7 @@ class Stock:
 
     def hand_over(self, operation: Operation, unit: int) -> Switched:
         """Switch the grips that an operation's end asks for; a feeder's too, and at dropoff all of
-        the output robot's against the star that holds the product together."""
+        the output robot's against those of the outfeed's tray."""
         if not operation.inputs:
             switched = self._take(operation, unit)
         elif operation.index == self.model.factory.dropoff.index:
@@ -117,7 +117,7 @@ class Stock:
         label = operation.label
         del self.shown[label]
         self.taken.add(label)
-        gap = self._gap([(operation.carrier, label)], unit)
+        gap = self._gap([self.grip[operation.carrier, label]], [label], unit)
         self._switch(self.feed[label], False)
         self._switch(self.grip[operation.carrier, label], True, self.body_of(label, unit))
         return Switched(1, gap)
@@ -130,23 +130,21 @@ class Stock:
             if robot != carrier and label in contents
             for part in contents[label]
         ]
-        gap = self._gap([(carrier, part) for _, part in moved], unit)
+        parts = [part for _, part in moved]
+        gap = self._gap([self.grip[carrier, part] for part in parts], parts, unit)
         for robot, part in moved:
             self._switch(self.grip[robot, part], False)
             self._switch(self.grip[carrier, part], True, self.body_of(part, unit))
         return Switched(len(moved), gap)
 
     def _release(self, operation: Operation, unit: int) -> Switched:
-        base = self.body_of(self.first, unit)
+        gap = self._gap([self.hold[part] for part in self.parts], self.parts, unit)
         for part in self.parts:
             self._switch(self.grip[operation.carrier, part], False)
-            if part != self.first:
-                hold = self._hold(part, self.copy_of[part, unit])
-                self.m.eq_obj1id[hold] = base
-                self._switch(hold, True)
-        self.on_outfeed.append(unit)
+            self._switch(self.hold[part], True, self.body_of(part, unit))
+        self.on_tray = unit
         self.released += 1
-        return Switched(len(self.parts), 0.0)
+        return Switched(len(self.parts), gap)
 
     def body_of(self, label: str, unit: int) -> int:
         """The body of the part `label` in a unit."""
@@ -158,39 +156,17 @@ class Stock:
 
     # --- the outfeed ---------------------------------------------------------------------------
 
-    def outfeed_is_free(self) -> bool:
-        """Whether the last product has moved on by its own length."""
-        if not self.on_outfeed:
-            return True
-        length = self.model.layout.product_length + self.model.settings.clearance
-        return self._way_gone(self.on_outfeed[-1]) > length
-
-    def clear_outfeed(self) -> list[int]:
-        """The units that have left the factory now."""
-        gone = []
-        while self.on_outfeed and self._way_gone(self.on_outfeed[0]) > self.exit_at:
-            gone.append(self.on_outfeed.popleft())
-            self.left.append(float(self.d.time))
-        return gone
-
-    def recycle(self, unit: int) -> None:
-        """Return the bodies of a unit that has left to their feeders, out of sight."""
+    def recycle(self) -> None:
+        """Return the bodies of the product on the tray to their feeders, out of sight."""
+        unit, self.on_tray = self.on_tray, None
+        assert unit is not None
+        self.left.append(float(self.d.time))
         for part in self.parts:
             copy = self.copy_of.pop((part, unit))
-            if part != self.first:
-                self._switch(self._hold(part, copy), False)
+            self._switch(self.hold[part], False)
             self._put_away(part, copy)
             self.free[part].append(copy)
             self.feed_next(part)
-
-    def _way_gone(self, unit: int) -> float:
-        """How far a product on the outfeed has moved on [m]."""
-        start = place_in(self.model.layout.product, self.first, self.model.layout.guidepaths[0].a)
-        return float(self.d.xpos[self.body_of(self.first, unit)][0]) - start[0]
-
-    def _exit(self) -> float:
-        """The way after which a product is inside the shed [m]."""
-        return self.model.layout.product_length + 0.12
 
     # --- welds and bodies ----------------------------------------------------------------------
 
@@ -203,16 +179,14 @@ class Stock:
                 found[robot.index, part] = self.m.equality(names.grip(robot.name, part)).id
         return found
 
-    def _gap(self, joins: list[tuple[int, str]], unit: int) -> float:
-        """The largest distance between the frames that the grips (robot, part) would join now
-        [m]."""
-        if not joins:
+    def _gap(self, welds: list[int], parts: Sequence[str], unit: int) -> float:
+        """The largest distance between the frames that welds would join to these parts now [m]."""
+        if not welds:
             return 0.0
-        grips = [self.grip[join] for join in joins]
-        bodies = [self.body_of(part, unit) for _, part in joins]
-        holder = self.m.eq_obj1id[grips]
+        bodies = [self.body_of(part, unit) for part in parts]
+        holder = self.m.eq_obj1id[welds]
         turn = self.d.xmat[holder].reshape(-1, 3, 3)
-        wanted = self.d.xpos[holder] + np.einsum("nij,nj->ni", turn, self.m.eq_data[grips, 3:6])
+        wanted = self.d.xpos[holder] + np.einsum("nij,nj->ni", turn, self.m.eq_data[welds, 3:6])
         return float(np.linalg.norm(self.d.xpos[bodies] - wanted, axis=1).max())
 
     def _switch(self, weld: int, on: bool, body: int | None = None) -> None:
@@ -287,11 +261,9 @@ class Stock:
     def _hide_spares(self) -> None:
         for label, bodies in self.body.items():
             self._switch(self.feed[label], False)
+            self._switch(self.hold[label], False)
             for copy in range(len(bodies)):
                 self._put_away(label, copy)
 
     def _park(self, label: str, copy: int) -> int:
         return int(self.m.equality(names.park(label, copy + 1)).id)
-
-    def _hold(self, label: str, copy: int) -> int:
-        return int(self.m.equality(names.hold(label, copy + 1)).id)

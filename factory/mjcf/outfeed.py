@@ -1,0 +1,123 @@
+"""The outfeed: a track under the output robot's A end, and a tray on it that takes a product away.
+
+The tray holds a finished product as robots do, by a star of welds to a body that is heavy beside
+any part. A product need not stand by itself, nor can it tip on the way out.
+"""
+
+from __future__ import annotations
+
+from xml.etree.ElementTree import Element
+
+from factory.layout.dimensions import BELT_GAP, FINGER_TOP, PAYLOAD, TRAY
+from factory.layout.plan import Layout
+from factory.mjcf import names
+from factory.mjcf.elements import add
+from factory.mjcf.robots import Drive
+
+TRAY_MASS = 4.0
+"""Mass of the empty tray [kg]."""
+
+SHED = (0.87, 0.88, 0.89, 1.0)
+
+
+def add_tray(world: Element, actuator: Element, layout: Layout, drive: Drive) -> None:
+    """The tray under the place where the output robot delivers, its joint and its drive."""
+    x, y = layout.guidepaths[0].a
+    xlo, xhi, ylo, yhi = layout.payloads[layout.factory.pag.root]
+    body = add(world, "body", name=names.OUTFEED_TRAY, pos=(x, y, 0), sleep="allowed")
+    add(body, "joint", name=names.OUTFEED_SLIDE, type="slide", axis="1 0 0", frictionloss=0.2)
+    add(
+        body,
+        "geom",
+        name=names.OUTFEED_TRAY,
+        class_="shown",
+        type="box",
+        mass=TRAY_MASS,
+        pos=((xlo + xhi) / 2, (ylo + yhi) / 2, PAYLOAD - BELT_GAP - TRAY / 2),
+        size=((xhi - xlo) / 2, (yhi - ylo) / 2, TRAY / 2 - 1e-4),
+        material="tray",
+    )
+    add(
+        actuator,
+        "pid",
+        name=names.OUTFEED_DRIVE,
+        joint=names.OUTFEED_SLIDE,
+        kp=drive.kp,
+        kv=drive.kv,
+        input="pos vel ff",
+        forcerange=(-drive.force, drive.force),
+    )
+
+
+def add_outfeed(world: Element, layout: Layout) -> None:
+    """A table with a track at the output robot's A end, into a shed."""
+    xlo, xhi, ylo, yhi = layout.outfeed
+    top = PAYLOAD - BELT_GAP - TRAY
+    thick = (top - FINGER_TOP) * 0.8
+    middle, half = ((xlo + xhi) / 2, (ylo + yhi) / 2), ((xhi - xlo) / 2, (yhi - ylo) / 2)
+    body = add(world, "body", name="outfeed", pos=(middle[0], middle[1], 0.0))
+    add(
+        body,
+        "geom",
+        name="outfeed/belt",
+        class_="station",
+        type="box",
+        pos=(0, 0, top - thick / 2),
+        size=(half[0], half[1], thick / 2),
+        material="belt",
+    )
+    tall = float(layout.product.high[2] - layout.product.low[2])
+    length = layout.product_length + 0.1
+    shed, wall = half[0] - length / 2, top + tall / 2 + 0.005
+    for side in (-1, 1):
+        add(
+            body,
+            "geom",
+            name=f"outfeed/side{side}",
+            class_="shown",
+            type="box",
+            pos=(0, side * (half[1] + 0.006), top - 0.008),
+            size=(half[0], 0.0055, 0.012),
+            material="frame",
+        )
+        for end in (-1, 1):
+            add(
+                body,
+                "geom",
+                name=f"outfeed/leg{side}{end}",
+                class_="shown",
+                type="box",
+                pos=(end * (half[0] - 0.03), side * (half[1] - 0.008), (top - thick) / 2),
+                size=(0.006, 0.006, (top - thick) / 2),
+                material="frame",
+            )
+        add(
+            body,
+            "geom",
+            name=f"outfeed/wall{side}",
+            class_="shown",
+            type="box",
+            pos=(shed, side * (half[1] + 0.0165), wall),
+            size=(length / 2, 0.004, tall / 2 + 0.025),
+            rgba=SHED,
+        )
+    add(
+        body,
+        "geom",
+        name="outfeed/roof",
+        class_="shown",
+        type="box",
+        pos=(shed + 0.002, 0, top + tall + 0.0335),
+        size=(length / 2 + 0.008, half[1] + 0.024, 0.004),
+        rgba=SHED,
+    )
+    add(
+        body,
+        "geom",
+        name="outfeed/back",
+        class_="shown",
+        type="box",
+        pos=(half[0] + 0.0045, 0, wall),
+        size=(0.004, half[1] + 0.0205, tall / 2 + 0.025),
+        rgba=SHED,
+    )
