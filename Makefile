@@ -1,6 +1,6 @@
 # factory: make demo, make test. Each sets up what it needs.
 PY := .venv/bin/python
-FACTORY := .venv/bin/factory
+FACTORY := $(PY) -m factory
 
 .PHONY: help demo test test-all bench lint golden wheel setup clean
 
@@ -33,15 +33,15 @@ bench: setup
 
 lint:
 	@tools/setup dev
-	.venv/bin/ruff check factory tests
-	.venv/bin/ruff format --check factory tests
-	.venv/bin/mypy
+	$(PY) -m ruff check factory tests
+	$(PY) -m ruff format --check factory tests
+	$(PY) -m mypy
 
 golden: setup
 	$(PY) -m pytest -q -n 2 -m "not slow" --update-golden
 
 wheel: setup
-	.venv/bin/pip wheel --quiet --no-deps --wheel-dir dist .
+	$(PY) -m pip wheel --quiet --no-deps --wheel-dir dist .
 
 clean:
 	rm -rf .venv build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis

@@ -50,6 +50,7 @@ def predict(
         way = trapezoid_time(layout.outfeed_way, settings.outfeed, settings.outfeed_acceleration)
         found.append(CycleTime(delays[-1] + 2 * (float(way) + settings.tick), "outfeed"))
     if wip is not None:
-        bound = marked_graph_cycle_time(with_wip(layout.factory, wip), delays).seconds
+        most = min(wip, len(layout.factory.robots))  # no more are inside without a bound
+        bound = marked_graph_cycle_time(with_wip(layout.factory, most), delays).seconds
         found.append(CycleTime(bound * (1 - 1e-9), f"wip {wip}"))
     return max(found, key=lambda time: time.seconds)

@@ -47,6 +47,10 @@ class Witness:
 def recorded(layout, tmp_path_factory: pytest.TempPathFactory):
     path = tmp_path_factory.mktemp("log") / "run.log"
     simulation = Simulation(layout, "mujoco", 2, seed=3, jitter=0.2)
+    m = simulation.world.m
+    part = m.geom("part/part3#1").id
+    reach = 0.03  # the engine lists contacts from this far on, so that there are some to log
+    m.geom_margin[part] = m.geom_gap[part] = m.body_margin[m.geom_bodyid[part]] = reach
     witness = Witness(simulation)
     with LogWriter(path, simulation, command=["factory", "run"]) as writer:
         run = simulation.run([writer.observe, witness.observe])

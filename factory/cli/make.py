@@ -27,9 +27,9 @@ from factory.console import emit, say, warn
 @click.option("--mjcf", type=PATH, help="Write the model as one XML here.")
 @click.option("-o", "--output", type=PATH, help="Write everything in a folder.")
 @click.option(
-    "--units", type=click.IntRange(1), help="Size the pool of parts for so many products."
+    "--units", type=click.IntRange(1, 10**9), help="Size the pool of parts for so many products."
 )
-@click.option("--wip", type=click.IntRange(1), help="Copies of each part let in at once.")
+@click.option("--wip", type=click.IntRange(1, 10**9), help="Copies of each part let in at once.")
 @FLOOR
 @MOTION
 @OUTPUT

@@ -68,7 +68,7 @@ FLOOR = options(
 )
 RUN = options(
     click.option("--world", type=click.Choice(["mujoco", "ideal"]), default="mujoco"),
-    click.option("--units", type=click.IntRange(1), default=1, help="Products to make."),
+    click.option("--units", type=click.IntRange(1, 10**9), default=1, help="Products to make."),
     click.option("--seed", type=click.IntRange(0), default=0),
     click.option(
         "--jitter",
@@ -76,7 +76,7 @@ RUN = options(
         default=0.0,
         help="Draw each robot's speed and gain within ± this share.",
     ),
-    click.option("--wip", type=click.IntRange(1), help="Copies of each part let in at once."),
+    click.option("--wip", type=click.IntRange(1, 10**9), help="Copies of each part let in at once."),
     click.option(
         "--from", "start", help="Start from a legal marking: place names, comma-separated."
     ),

@@ -14,7 +14,7 @@ from factory.errors import Diagnostic, InputError, did_you_mean
 @click.command()
 @SOURCE
 @click.option("--certificate", type=PATH, help="Write the proof here.")
-@click.option("--wip", type=click.IntRange(1), help="Copies of each part let in at once.")
+@click.option("--wip", type=click.IntRange(1, 10**9), help="Copies of each part let in at once.")
 @OUTPUT
 def check(
     file: Path,

@@ -101,9 +101,9 @@ class Followed:
     def _box(self, m: mujoco.MjModel, bodies: dict[str, int]) -> Array:
         """The corners (8, 3) of the finished product's box, about the followed part's origin."""
         offset = {
-            names.label_of(f"part/{name.partition('/')[2]}"): m.eq_data[e, 3:6]
+            name.partition("/")[2]: m.eq_data[e, 3:6]
             for e, name in enumerate(self.kinds)
-            if name.startswith("hold/") and name.endswith("#1")
+            if name.startswith("hold/")
         }
         shift = offset.get(self.label, np.zeros(3))
         points = []
