@@ -8,6 +8,7 @@ module that needs the engine takes it from here: `from factory.engine import muj
 from __future__ import annotations
 
 import os
+import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 
@@ -37,5 +38,13 @@ except Exception:  # a wrong MUJOCO_GL is a RuntimeError, a missing library anyt
     except ImportError as error:
         message = f"the engine cannot be loaded: {error}"
         raise MissingError(Diagnostic("Engine", message, None, "pip install mujoco")) from error
+
+
+def _warn(words: str) -> None:
+    """Warnings go to stderr; the engine's own way is stdout, and a file in the current folder."""
+    print(f"engine: {words}", file=sys.stderr)
+
+
+mujoco.set_mju_user_warning(_warn)
 
 __all__ = ["environment", "mujoco"]

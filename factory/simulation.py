@@ -26,7 +26,7 @@ from factory.world.ideal import IdealWorld
 if TYPE_CHECKING:
     from factory.mjcf.model import Model
 
-Observer = Callable[[Any, Supervisor], None]
+Observer = Callable[[Any, Any], None]
 """Called after every tick with the world and the supervisor: to render, to log, to show
 progress."""
 

@@ -96,7 +96,7 @@ def test_builds_are_the_same_in_every_process(
 ) -> None:
     source = Path(shapes[0].factory.pag.file)
     digests = set()
-    for seed in ("0", "1", "4242"):
+    for seed in ("1", "4242"):
         out = tmp_path / seed
         subprocess.run(
             [sys.executable, "-W", "ignore", "-c", DIGEST, source, out],

@@ -46,7 +46,9 @@ def test_the_wheel_runs_by_itself(wheel: Path, tmp_path: Path) -> None:
     call(sys.executable, "-m", "venv", tmp_path / "venv", cwd=tmp_path)
     python = tmp_path / "venv" / "bin" / "python"
     call(python, "-m", "pip", "install", "--quiet", "--no-deps", wheel, cwd=tmp_path)
-    site = Path(call(python, "-c", "import site; print(site.getsitepackages()[0])", cwd=tmp_path).strip())
+    site = Path(
+        call(python, "-c", "import site; print(site.getsitepackages()[0])", cwd=tmp_path).strip()
+    )
     (site / "zz_dependencies.pth").write_text(sysconfig.get_paths()["purelib"])
     (tmp_path / "p.pag").write_bytes(PAPER.read_bytes())
     factory = tmp_path / "venv" / "bin" / "factory"

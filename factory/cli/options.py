@@ -76,7 +76,9 @@ RUN = options(
         default=0.0,
         help="Draw each robot's speed and gain within ± this share.",
     ),
-    click.option("--wip", type=click.IntRange(1, 10**9), help="Copies of each part let in at once."),
+    click.option(
+        "--wip", type=click.IntRange(1, 10**9), help="Copies of each part let in at once."
+    ),
     click.option(
         "--from", "start", help="Start from a legal marking: place names, comma-separated."
     ),

@@ -3,7 +3,7 @@ itself."""
 
 from __future__ import annotations
 
-from math import cos, radians, sin, tan
+from math import cos, hypot, radians, sin, tan
 from xml.etree.ElementTree import Element
 
 from factory.layout.dimensions import (
@@ -113,7 +113,7 @@ def _centre(layout: Layout) -> tuple[float, float]:
 
 def _radius(layout: Layout) -> float:
     xlo, xhi, ylo, yhi = layout.floor
-    return 0.5 * ((xhi - xlo) ** 2 + (yhi - ylo) ** 2) ** 0.5
+    return hypot(xhi - xlo, yhi - ylo) / 2
 
 
 def _floor_and_light(world: Element, layout: Layout) -> None:

@@ -65,7 +65,7 @@ class VideoFile:
         self.rate = rate = Fraction(fps).limit_denominator(1001)
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
-            options = {"cluster_time_limit": "500", "flush_packets": "1"}
+            options = {"cluster_time_limit": "250", "flush_packets": "1"}
             self.container: Any = av.open(
                 str(self.partial), "w", format="matroska", options=options
             )
@@ -81,7 +81,9 @@ class VideoFile:
         codec.gop_size = max(1, round(fps))
         codec.color_range, codec.colorspace = 1, 1
         codec.color_primaries, codec.color_trc = 1, 1
-        codec.options = {"crf": "19", "preset": "fast", "rc-lookahead": "8", "bf": "0"}
+        ahead = min(8, int(fps / 8))
+        codec.thread_type = "SLICE"
+        codec.options = {"crf": "19", "preset": "fast", "rc-lookahead": str(ahead), "bf": "0"}
 
     def __enter__(self) -> VideoFile:
         return self
