@@ -19,7 +19,7 @@ setup:
 demo: setup
 	$(FACTORY) check examples/paper.pag
 	$(FACTORY) run examples/paper.pag --units 3 --video renders/paper.mp4
-	$(FACTORY) render examples/paper.pag -o renders/paper.png --units 1 --at 5
+	$(FACTORY) render examples/paper.pag -o renders/paper.png --units 3 --at 4.9
 	@echo "see renders/paper.mp4 and renders/paper.png"
 
 test: setup

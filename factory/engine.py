@@ -10,7 +10,7 @@ from __future__ import annotations
 import os
 import sys
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 
 from factory.errors import Diagnostic, MissingError
 
@@ -42,7 +42,8 @@ except Exception:  # a wrong MUJOCO_GL is a RuntimeError, a missing library anyt
 
 def _warn(words: str) -> None:
     """Warnings go to stderr; the engine's own way is stdout, and a file in the current folder."""
-    print(f"engine: {words}", file=sys.stderr)
+    with suppress(BaseException):  # an exception in here would end the process
+        print(f"engine: {words}", file=sys.stderr)
 
 
 mujoco.set_mju_user_warning(_warn)
