@@ -28,6 +28,10 @@ LATTICE = 0.2
 CELL = 0.06
 """Largest cell of that lattice [m]."""
 
+SMALLEST, FURTHEST, HEAVIEST = 5e-9, 1e5, 1e12
+"""A part of a smaller half length, or beyond this distance [m] or mass [kg], is refused: nothing
+can be computed with it."""
+
 LONGEST, SHORTEST = 5.0, 0.005
 """A product outside these lengths [m] gets a warning."""
 
@@ -95,8 +99,10 @@ class Product:
         return float(sum(solid.mass for solid in self.solids.values()))
 
 
+@np.errstate(all="ignore")
 def product_geometry(pag: PAG) -> Product:
-    """The solids of all parts. Raises InputError (BadMesh) where a mesh cannot be read."""
+    """The solids of all parts. Raises InputError where a mesh cannot be read (BadMesh), or a part is
+    too large, too far away or too heavy for any engine (BadValue)."""
     reader = _Reader(Path(pag.folder))
     leaves = [node for node in pag.postorder() if not node.inputs]
     plain = [node for node in leaves if not _has_shape(node)]
@@ -111,12 +117,27 @@ def product_geometry(pag: PAG) -> Product:
     lift = 0.0 if base == -np.inf else float(base)
     for number, node in enumerate(plain):
         solids[node.label] = _box_in_lattice(node, number, cells, lift)
-    if reader.errors:
-        raise InputError(reader.errors)
+    faults = [_beyond(node, solids[node.label]) for node in leaves if node.label in solids]
+    if reader.errors or any(faults):
+        raise InputError([*reader.errors, *(fault for fault in faults if fault)])
     low = np.min([s.low for s in solids.values()], axis=0)
     high = np.max([s.high for s in solids.values()], axis=0)
     warnings = (*reader.warnings, *_size_warnings(pag, low, high))
     return Product(solids, low, high, warnings)
+
+
+def _beyond(node: Assembly, solid: Solid) -> Diagnostic | None:
+    """What is wrong with a part whose numbers, each fine in itself, lead too far."""
+    reach = float(np.max(np.abs([solid.low, solid.high])))
+    if not reach <= FURTHEST:
+        message = f"'{node.label}' reaches further than {FURTHEST:g} m from the origin"
+        hint = "lengths are in metres: check pos, scale and the shape"
+        return Diagnostic("BadValue", message, node.position, hint)
+    if not (0 < solid.mass <= HEAVIEST and np.isfinite(solid.inertia).all()):
+        message = f"'{node.label}' weighs {solid.mass:g} kg"
+        hint = f"more than 0 and at most {HEAVIEST:g} kg: check mass, density and shape"
+        return Diagnostic("BadValue", message, node.position, hint)
+    return None
 
 
 def _has_shape(node: Assembly) -> bool:
@@ -161,11 +182,18 @@ class _Reader:
     def solid(self, node: Assembly, number: int) -> Solid | None:
         place = np.array(node.parameter("pos", (0.0, 0.0, 0.0)), float)
         quaternion = np.array(node.parameter("quat", (1.0, 0.0, 0.0, 0.0)), float)
+        quaternion /= np.abs(quaternion).max()
         quaternion /= np.linalg.norm(quaternion)
         for kind in ("box", "cylinder", "sphere"):
             given = node.parameter(kind)
             if given is not None:
                 size = _half(kind, np.atleast_1d(np.array(given, float)))
+                if not SMALLEST <= size.min() <= size.max() <= FURTHEST:
+                    position = _value_position(node, kind)
+                    message = f"the {kind} of '{node.label}' is out of range"
+                    hint = f"from {2 * SMALLEST:g} to {FURTHEST:g} m; lengths are in metres"
+                    self.errors.append(Diagnostic("BadValue", message, position, hint))
+                    return None
                 return _primitive(node, kind, size, place, quaternion, number)
         return self._mesh_solid(node, place, quaternion, number)
 

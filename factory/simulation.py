@@ -33,6 +33,10 @@ progress."""
 PATIENCE = 10.0
 """A run has stalled when nothing fires for this many times the longest predicted delay."""
 
+LOOK = "look at these robots in `factory render`, or give --max-time more"
+
+SMALLER = "take smaller speeds, a smaller --timestep, or check that the parts are in metres"
+
 
 class Simulation:
     """One run, ready to go: `run()` does it; `model` is what the engine is given (mujoco only).
@@ -125,10 +129,14 @@ class Simulation:
                 for observe in observers:
                     observe(world, supervisor)
                 watched += perf_counter() - pause
-            if world.time - supervisor.last_event > patience:
-                trouble = self._stalled(patience)
+            if self.model is not None and (reason := world.unstable()):
+                trouble = self._trouble("Unstable", reason, SMALLER)
+            elif world.time - supervisor.last_event > patience:
+                what = f"nothing fired for {patience:.2f} s of simulated time"
+                trouble = self._trouble("Stalled", what, LOOK)
             elif max_time is not None and world.time >= max_time:
-                trouble = self._stalled(max_time, "Timeout")
+                what = f"not finished after {max_time:.2f} s of simulated time"
+                trouble = self._trouble("Timeout", what, LOOK)
         return self._record(perf_counter() - begin - watched, trouble)
 
     def _record(self, wall: float, trouble: Diagnostic | None) -> Run:
@@ -162,7 +170,7 @@ class Simulation:
             trouble,
         )
 
-    def _stalled(self, seconds: float, code: str = "Stalled") -> Diagnostic:
+    def _trouble(self, code: str, what: str, hint: str) -> Diagnostic:
         """Names the robots that are in an operation, or else those that wait for one that cannot
         start."""
         factory, supervisor = self.layout.factory, self.supervisor
@@ -175,11 +183,8 @@ class Simulation:
             for o in places
             for r in o.robots
         )
-        waits = "nothing fired for" if code == "Stalled" else "not finished after"
-        message = f"{waits} {seconds:.2f} s of simulated time; {robots or 'no robot can start'}"
-        position = places[0].position if places else None
-        hint = "look at these robots in `factory render`, or give --max-time more"
-        return Diagnostic(code, message, position, hint)
+        message = f"{what}; {robots or 'no robot can start'}"
+        return Diagnostic(code, message, places[0].position if places else None, hint)
 
 
 def physical_model(

@@ -238,7 +238,7 @@ def test_guidepaths_that_cross_or_leave_the_grid() -> None:
     x, y = layout.guidepaths[5].a
     broken(with_path(layout, 5, a=(x + 0.0004, y)), "r6", "not in whole millimetres")
     broken(with_path(layout, 5, travel=0.0), "r6", "has no length")
-    broken(with_path(layout, 5, a=(x + 0.4, y)), "the guidepaths of r5 and r6 cross at")
+    broken(with_path(layout, 5, a=(x - 0.2, y)), "the guidepaths of r5 and r6 cross at")
     across = with_path(layout, 3, travel=-0.4)
     broken(across, "the guidepaths of r3 and r4 cross at")
 

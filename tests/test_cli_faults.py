@@ -305,6 +305,35 @@ def test_a_run_that_fails_says_where(run: Terminal, out: Path) -> None:
     assert read_log(log).complete
 
 
+@pytest.mark.parametrize(
+    ("geometry", "status"),
+    [
+        ("box = (3e3, 3e3, 3e3)", {0, 1}),
+        ("sphere = 1e-7", {0}),
+        ("sphere = 0.02, mass = 1e11", {0, 1}),
+        ("sphere = 0.02, mass = 1e-30", {0}),
+        ("sphere = 0.02, quat = (1e-200, 0, 0, 1e-200)", {0}),
+        ("sphere = 0.02, quat = (1e300, 1e300, 0, 0)", {0}),
+        ("box = (1e200, 1, 1)", {2}),
+        ("sphere = 1e120", {2}),
+        ("sphere = 1, pos = (1e300, 0, 0)", {2}),
+        ("sphere = 1, density = 1e300", {2}),
+        ("sphere = 1e-150, density = 1e-300", {2}),
+    ],
+)
+def test_absurd_products_come_to_an_end(
+    run: Terminal, out: Path, geometry: str, status: set[int]
+) -> None:
+    file = out / "p.pag"
+    file.write_text(f"root = s; s = mate(a, b); a = atomic({geometry}); b = atomic()")
+    done = run("run", file, "--max-time", 30, "--json")
+    assert done.status in status
+    if done.status == 2:
+        assert done.codes == ["BadValue"]
+        assert done.json["errors"][0]["col"] in (27, 38)
+    assert "RuntimeWarning" not in done.err
+
+
 def test_a_factory_that_does_not_fit(run: Terminal, out: Path) -> None:
     done = run("build", PAPER, "--floor", "0.1x0.1", "-o", out / "all", "--json")
     assert done.status == 1

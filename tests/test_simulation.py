@@ -14,6 +14,7 @@ from factory.nets.history import firings, legal_marking
 from factory.nets.replay import replay
 from factory.pipeline import all_templates
 from factory.programs import program_of, write_program
+from factory.settings import Settings
 from factory.simulation import Simulation
 from tests.test_compiler import PAPER, compiled
 
@@ -199,6 +200,36 @@ def test_a_stuck_robot_is_a_stall(paper: Layout) -> None:
     assert run.trouble.code == "Stalled"
     assert "r5 in" in run.trouble.message
     assert run.trouble.position is not None
+
+
+def test_an_unstable_engine_ends_the_run(paper: Layout) -> None:
+    """Planted fault: a speed that is no number. The engine would begin anew, and again."""
+    simulation = Simulation(paper, units=1)
+    simulation.world.d.qvel[simulation.world.dof[2]] = float("nan")
+    run = simulation.run()
+    assert run.trouble is not None
+    assert run.trouble.code == "Unstable"
+    assert "r5 in" in run.trouble.message
+
+
+def test_short_steps_and_slow_starts_do_not_send_robots_to_sleep(paper: Layout) -> None:
+    """The engine puts to sleep what is slow for ten steps, in the middle of a trajectory too."""
+    for settings in (
+        Settings(timestep=1e-4, substeps=20, acceleration=0.2),
+        Settings(acceleration=0.002, speed=0.05),
+    ):
+        run = factory.run(paper, units=1, settings=settings)
+        assert run.products == 1
+        assert_good(run)
+
+
+def test_robots_stop_where_their_operation_ends(paper: Layout) -> None:
+    """They may hand over at up to 10 mm/s; kept as a setpoint it would drag them out of the goal."""
+    simulation = Simulation(paper, units=2, settings=Settings(timestep=1e-4))
+    run = simulation.run()
+    assert_good(run)
+    speeds = simulation.world.control[: simulation.world.tray] + 1
+    assert np.all(simulation.world.d.ctrl[speeds] == 0.0)
 
 
 def test_a_payload_larger_than_the_layout_knew_is_a_contact() -> None:

@@ -23,6 +23,7 @@ from factory.layout.shapes import (
     project,
     symmetric_shapes,
 )
+from factory.layout.sides import uncrossed
 from factory.layout.stretching import Shape, Sides, Stretched, stretch, up
 from factory.layout.sweeps import ALWAYS, KINDS, OUTFEED, STATIONS, Region, hull, piles, regions
 
@@ -109,7 +110,8 @@ class _Draft:
 
 def _draft(factory: Factory, product: Product, c: Clearance) -> _Draft:
     payloads = payload_boxes(factory, product)
-    sides = stretch(factory, symmetric_shapes(factory, payloads, c), c).sides
+    compact = stretch(factory, symmetric_shapes(factory, payloads, c), c).sides
+    sides = uncrossed(factory, product, payloads, compact)
     axes = headings(factory, sides)
     shapes = exact_shapes(factory, payloads, axes, sides, c)
     stretched = stretch(factory, shapes.__getitem__, c, sides)

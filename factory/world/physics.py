@@ -28,6 +28,12 @@ from factory.world.stock import Stock
 NEAR = 1e-3
 """The tray is somewhere when it is within this [m]."""
 
+GIVEN_UP = tuple(
+    int(getattr(mujoco.mjtWarning, f"mjWARN_{name}"))
+    for name in ("BADQPOS", "BADQVEL", "BADQACC", "BADCTRL")
+)
+"""Warnings after which the engine has begun anew, or let go of the drives."""
+
 AWAKE = -0.0
 """Written over a speed of zero it wakes a sleeping body and changes nothing else."""
 
@@ -211,6 +217,14 @@ class MujocoWorld:
         else:
             self.move(tray, x, v, a)
         self.reference[tray], self.speed[tray] = x1, v1
+
+    def unstable(self) -> str:
+        """What made the engine give up, "" while it has not."""
+        for kind in GIVEN_UP:
+            if self.d.warning[kind].number:
+                name = mujoco.mjtWarning(kind).name.removeprefix("mjWARN_BAD").lower()
+                return f"the simulation became unstable ({name} is nan or huge)"
+        return ""
 
     def delivered(self) -> int:
         """Products that have left the outfeed, since the beginning of time."""

@@ -1,0 +1,57 @@
+"""Inputs of a mate come from the side on which they lie: they never pass through each other."""
+
+from __future__ import annotations
+
+import mujoco
+import numpy as np
+import pytest
+
+import factory.layout.embedding as embedding
+from factory.geometry import product_geometry
+from factory.layout.plan import Layout
+from factory.simulation import Simulation
+from tests.test_compiler import PAPER, compiled
+
+BALANCED = """root = r; r = mate(s, t); s = mate(a, b); t = mate(c, d);
+a = atomic(); b = atomic(); c = atomic(); d = atomic()"""
+STACKED = """root = r; r = mate(a, b); a = atomic(box = (0.05, 0.05, 0.05));
+b = atomic(box = (0.05, 0.05, 0.05), pos = (0.02, 0.02, 0.06))"""
+
+
+def laid_out(text: str) -> Layout:
+    plan = compiled(text)
+    return embedding.lay_out(plan, product_geometry(plan.pag))
+
+
+def deepest(layout: Layout) -> float:
+    """How deep any two parts of one product are in each other at any tick of its making [m]."""
+    simulation = Simulation(layout, units=1)
+    m, d = simulation.world.m, simulation.world.d
+    parts = [m.geom(f"part/{o.label}#1").id for o in layout.factory.leaves]
+    line, worst = np.zeros(6), [0.0]
+
+    def observe(world, supervisor) -> None:
+        for i, one in enumerate(parts):
+            for other in parts[:i]:
+                worst.append(-mujoco.mj_geomDistance(m, d, one, other, 0.01, line))
+
+    assert simulation.run([observe]).products == 1
+    return max(worst)
+
+
+@pytest.mark.parametrize("text", [PAPER, BALANCED, STACKED], ids=["paper", "balanced", "stacked"])
+def test_parts_of_a_product_do_not_pass_through_each_other(text: str) -> None:
+    assert deepest(laid_out(text)) < 1e-4
+
+
+def test_inputs_from_the_wrong_sides_are_seen(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Planted fault: the sides that are shortest, whatever lies where."""
+    right = laid_out(BALANCED)
+
+    def swapped(factory, product, payloads, sides):
+        found = embedding_uncrossed(factory, product, payloads, sides)
+        return {robot: -side for robot, side in found.items()}
+
+    embedding_uncrossed = embedding.uncrossed
+    monkeypatch.setattr(embedding, "uncrossed", swapped)
+    assert deepest(laid_out(BALANCED)) > 0.01 > deepest(right)
