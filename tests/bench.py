@@ -102,9 +102,10 @@ def runs() -> list[str]:
         cycle = "–" if run["cycle_time_s"] is None else f"{run['cycle_time_s']:.3f}"
         share = run["supervisor_time_s"] / run["wall_time_s"]
         lines.append(
-            f"| {path.stem} | {run['robots']} | {units} | {cycle} | {run['predicted_cycle_time_s']:.3f} "
-            f"| {run['realtime_factor']:.1f} | {100 * share:.0f} % | {run['handoff_gap_max_mm']:.3f} "
-            f"| {run['product_error_max_mm']:.4f} | {run['unintended_contacts']} |"
+            f"| {path.stem} | {run['robots']} | {units} | {cycle}"
+            f" | {run['predicted_cycle_time_s']:.3f} | {run['realtime_factor']:.1f}"
+            f" | {100 * share:.0f} % | {run['handoff_gap_max_mm']:.3f}"
+            f" | {run['product_error_max_mm']:.4f} | {run['unintended_contacts']} |"
         )
         print(lines[-1], flush=True)
     return lines
@@ -115,7 +116,8 @@ def machine() -> str:
     packages = ", ".join(
         f"{name} {version(name)}" for name in ("mujoco", "numpy", "lark", "shapely")
     )
-    return f"Python {platform.python_version()}, {packages}; {os.cpu_count()} cores, {platform.machine()}."
+    cores = f"{os.cpu_count()} cores, {platform.machine()}"
+    return f"Python {platform.python_version()}, {packages}; {cores}."
 
 
 def main() -> None:
@@ -131,9 +133,10 @@ def main() -> None:
         [
             "# Benchmarks",
             "Written by `make bench`. " + machine(),
-            "Random PAGs are mixed trees of mates, welds and parts without geometry. Check is the whole process, "
-            "interpreter start included: parse, compile, verify, print. Layout includes the payloads' extents. Runs "
-            "are in MuJoCo at 2 ms, contact between different units on, one body per part, jitter 0.",
+            "Random PAGs are mixed trees of mates, welds and parts without geometry. Check is the"
+            " whole process, interpreter start included: parse, compile, verify, print. Layout"
+            " includes the payloads' extents and the certificate that `lay_out` asks for. Runs are"
+            " in MuJoCo at 2 ms, contact between different units on, one body per part, jitter 0.",
             *parts,
         ]
     )

@@ -55,3 +55,11 @@ def templates() -> Mapping[str, Template]:
 def run(capsys: pytest.CaptureFixture[str]) -> Terminal:
     """`run("check", file, "--json")` runs a command of the command line in this process."""
     return Terminal(capsys)
+
+
+@pytest.fixture
+def out(tmp_path: Path) -> Path:
+    """A folder for what is written, that stays empty when something is wrong."""
+    folder = tmp_path / "out"
+    folder.mkdir()
+    return folder

@@ -1,0 +1,171 @@
+"""The command line when a run comes to no good end, when it is stopped, and on machines that lack
+something."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from factory.log import read_log
+from tests.command_line import PAPER, ROOT, Terminal, files_in, spawn
+
+# --- a run that fails, or is stopped --------------------------------------------------------------
+
+
+def test_a_run_that_fails_says_where(run: Terminal, out: Path) -> None:
+    log = out / "run.log"
+    done = run("run", PAPER, "--units", 50, "--max-time", 1.5, "--log", log, "--json")
+    assert done.status == 1
+    assert done.codes == ["Timeout"]
+    assert done.json["errors"][0]["line"] == 4
+    assert f"{PAPER}:4:1: Timeout" in done.err
+    assert done.json["products"] == 0
+    assert read_log(log).complete
+
+
+@pytest.mark.parametrize(
+    ("geometry", "status"),
+    [
+        ("box = (9e2, 9e2, 9e2)", {0, 1}),
+        ("sphere = 1e-7", {0}),
+        ("sphere = 0.02, mass = 1e11", {0, 1}),
+        ("sphere = 0.02, mass = 1e-30", {0}),
+        ("sphere = 0.02, quat = (1e-200, 0, 0, 1e-200)", {0}),
+        ("sphere = 0.02, quat = (1e300, 1e300, 0, 0)", {0}),
+        ("box = (1e200, 1, 1)", {2}),
+        ("sphere = 1e120", {2}),
+        ("sphere = 1, pos = (1e300, 0, 0)", {2}),
+        ("sphere = 1, density = 1e300", {2}),
+        ("sphere = 1e-150, density = 1e-300", {2}),
+    ],
+)
+def test_absurd_products_come_to_an_end(
+    run: Terminal, out: Path, geometry: str, status: set[int]
+) -> None:
+    file = out / "p.pag"
+    file.write_text(f"root = s; s = mate(a, b); a = atomic({geometry}); b = atomic()")
+    done = run("run", file, "--max-time", 30, "--json")
+    assert done.status in status
+    if done.status == 2:
+        assert done.codes == ["BadValue"]
+        assert done.json["errors"][0]["col"] in (27, 44, 47)
+    assert "RuntimeWarning" not in done.err
+
+
+def test_a_factory_that_does_not_fit(run: Terminal, out: Path) -> None:
+    done = run("build", PAPER, "--floor", "0.1x0.1", "-o", out / "all", "--json")
+    assert done.status == 1
+    assert done.codes == ["Layout"]
+    assert list(out.iterdir()) == []
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM], ids=lambda n: n.name)
+def test_a_run_that_is_stopped_closes_its_files(out: Path, number: signal.Signals) -> None:
+    log = out / "run.log"
+    words = ["run", PAPER, "--units", "1000000", "--log", log, "--json"]
+    with subprocess.Popen(
+        [sys.executable, "-m", "factory", *map(str, words)],
+        cwd=ROOT,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    ) as process:
+        deadline = time.monotonic() + 60
+        while not (log.exists() and log.stat().st_size > 20_000):
+            assert time.monotonic() < deadline
+            time.sleep(0.02)
+        process.send_signal(number)
+        answer, errors = process.communicate(timeout=60)
+    assert process.returncode == 130
+    assert json.loads(answer)["errors"][0]["code"] == "Interrupted"
+    assert "Traceback" not in errors
+    assert [path.name for path in out.iterdir()] == ["run.log"]
+    kept = read_log(log)
+    assert kept.complete
+    assert len(kept) > 10
+
+
+# --- what a machine may lack ----------------------------------------------------------------------
+
+WITHOUT_GL = {
+    "bogus": {"MUJOCO_GL": "bogus"},
+    "a screen": {"MUJOCO_GL": "glfw", "DISPLAY": "", "WAYLAND_DISPLAY": ""},
+    "osmesa": {"MUJOCO_GL": "osmesa"},
+    "EGL drivers": {"__EGL_VENDOR_LIBRARY_FILENAMES": "/nowhere", "LIBGL_DRIVERS_PATH": "/nowhere"},
+}
+
+EACH = """
+import sys
+from factory.cli import run_command
+for words in (["check"], ["build", "--mjcf", sys.argv[2]], ["programs"],
+              ["export", "--format", "pnml"], ["run"]):
+    assert run_command([words[0], sys.argv[1], *words[1:], "-q"]) == 0, words
+"""
+
+
+@pytest.mark.parametrize("lacking", WITHOUT_GL)
+def test_only_pictures_need_gl(out: Path, lacking: str) -> None:
+    environment = {**os.environ, **WITHOUT_GL[lacking]}
+    words = [sys.executable, "-c", EACH, PAPER, out / "m.xml"]
+    done = subprocess.run(words, cwd=ROOT, env=environment, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+
+
+def test_films_without_gl_say_what_to_install(out: Path) -> None:
+    for words in (["run", "--video"], ["render", "-o"]):
+        done = spawn(words[0], PAPER, words[1], out / "f.mp4", "--json", MUJOCO_GL="bogus")
+        assert done.status == 3
+        assert "MUJOCO_GL=egl" in done.json["errors"][0]["hint"]
+    assert files_in(out) == {}
+
+
+@pytest.fixture
+def bare(tmp_path: Path) -> str:
+    """A PYTHONPATH on which importing mujoco fails."""
+    (tmp_path / "bare" / "mujoco").mkdir(parents=True)
+    text = 'raise ModuleNotFoundError("No module named \'mujoco\'", name="mujoco")'
+    (tmp_path / "bare" / "mujoco" / "__init__.py").write_text(text)
+    return f"{tmp_path / 'bare'}:{ROOT}"
+
+
+def test_without_the_engine(bare: str, out: Path) -> None:
+    for words in (["check"], ["programs"], ["export", "--format", "dot"]):
+        assert spawn(words[0], PAPER, *words[1:], "-q", PYTHONPATH=bare).status == 0
+    assert spawn("run", PAPER, "--world", "ideal", "-q", PYTHONPATH=bare).status == 0
+    for words in (["run", "--log", out / "l"], ["build", "-o", out / "all"]):
+        done = spawn(words[0], PAPER, *words[1:], "--json", PYTHONPATH=bare)
+        assert done.status == 3
+        assert "mujoco" in done.json["errors"][0]["message"]
+        assert done.json["errors"][0]["hint"] == "pip install mujoco"
+    done = spawn("doctor", "--json", PYTHONPATH=bare)
+    assert done.status == 3
+    assert {c["name"] for c in done.json["checks"] if not c["ok"]} == {"engine", "rendering"}
+    assert list(out.iterdir()) == []
+
+
+def test_the_engine_warns_on_stderr(out: Path) -> None:
+    """Not on stdout, where a document may be, and not in a file in the current folder."""
+    code = (
+        "from factory.engine import mujoco\n"
+        "m = mujoco.MjModel.from_xml_string('<mujoco><worldbody><body><freejoint/>"
+        '<geom size=".1"/></body></worldbody></mujoco>\')\n'
+        "d = mujoco.MjData(m); d.qvel[0] = float('nan'); mujoco.mj_step(m, d)\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code],
+        cwd=out,
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+        capture_output=True,
+        text=True,
+    )
+    assert done.returncode == 0, done.stderr
+    assert done.stdout == ""
+    assert done.stderr.startswith("engine: ")
+    assert files_in(out) == {}
