@@ -101,8 +101,8 @@ class Product:
 
 @np.errstate(all="ignore")
 def product_geometry(pag: PAG) -> Product:
-    """The solids of all parts. Raises InputError where a mesh cannot be read (BadMesh), or a part is
-    too large, too far away or too heavy for any engine (BadValue)."""
+    """The solids of all parts. Raises InputError where a mesh cannot be read (BadMesh), or a part
+    is too large, too far away or too heavy for any engine (BadValue)."""
     reader = _Reader(Path(pag.folder))
     leaves = [node for node in pag.postorder() if not node.inputs]
     plain = [node for node in leaves if not _has_shape(node)]
@@ -229,8 +229,9 @@ class _Reader:
         except Exception as error:  # trimesh's readers raise anything on a broken file
             position = _value_position(node, "mesh")
             hint = "export it again as .obj, .stl, .ply or .glb with triangles"
+            why = "its content is no mesh" if isinstance(error, ImportError) else str(error)
             self.errors.append(
-                Diagnostic("BadMesh", f"cannot read '{path}': {error}", position, hint)
+                Diagnostic("BadMesh", f"cannot read '{path}': {why}", position, hint)
             )
             return None
 

@@ -92,10 +92,10 @@ def runs() -> list[str]:
     ]
     wanted += [(p, 1 if p.stat().st_size > 12_000 else 2) for p in sorted(PRODUCTS.glob("*.pag"))]
     heads = (
-        "product, robots, units, cycle [s], predicted [s], times real time, supervisor share,"
-        " gap [mm], product error [mm], contacts"
-    ).split(",")
-    lines = [f"| {' | '.join(h.strip() for h in heads)} |", "|---" * len(heads) + "|"]
+        *("product", "robots", "units", "cycle [s]", "predicted [s]", "times real time"),
+        *("supervisor share", "gap [mm]", "product error [mm]", "contacts"),
+    )
+    lines = [f"| {' | '.join(heads)} |", "|---" * len(heads) + "|"]
     for path, units in wanted:
         _, _, text = measured([*FACTORY, "run", str(path), "--units", str(units), "--json", "-q"])
         run = json.loads(text)

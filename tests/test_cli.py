@@ -43,13 +43,8 @@ RUN: dict[str, Any] = {
     "events": list,
 }
 OF_PHYSICS = [
-    "physics_time_s",
-    "handoffs",
-    "handoff_gap_max_mm",
-    "weld_residual_max_mm",
-    "product_error_max_mm",
-    "unintended_contacts",
-    "engine_warnings",
+    *("physics_time_s", "handoffs", "handoff_gap_max_mm", "weld_residual_max_mm"),
+    *("product_error_max_mm", "unintended_contacts", "engine_warnings"),
 ]
 
 
@@ -401,3 +396,17 @@ def test_folders_of_templates_are_searched_in_order(run: Terminal, tmp_path: Pat
     assert run("check", file).status == 2
     for command in (["check"], ["build"], ["programs"], ["export", "--format", "dot"]):
         assert run(command[0], file, *command[1:], *words).status == 0
+
+
+def test_a_witness_reads_as_a_sentence(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    from factory.cli import run_command
+
+    net = tmp_path / "net.pnml"
+    assert run_command(["export", str(PAPER), "--format", "pnml", "-o", str(net)]) == 0
+    text = net.read_text("utf-8")
+    start, end = text.index("<initialMarking>"), text.index("</initialMarking>")
+    net.write_text(text[:start] + text[end + len("</initialMarking>") :], "utf-8")
+    assert run_command(["check", str(net)]) == 1
+    said = capsys.readouterr().out
+    assert "not legal: the gear of r1 carries no token" in said
+    assert "paper.pag:3" in said and "Witness(" not in said

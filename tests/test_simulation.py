@@ -224,7 +224,7 @@ def test_short_steps_and_slow_starts_do_not_send_robots_to_sleep(paper: Layout) 
 
 
 def test_robots_stop_where_their_operation_ends(paper: Layout) -> None:
-    """They may hand over at up to 10 mm/s; kept as a setpoint it would drag them out of the goal."""
+    """They may hand over at up to 10 mm/s, which as a setpoint would drag them out of the goal."""
     simulation = Simulation(paper, units=2, settings=Settings(timestep=1e-4))
     run = simulation.run()
     assert_good(run)

@@ -48,6 +48,11 @@ class Witness:
         """The source lines, as `file:line`."""
         return tuple(dict.fromkeys(f"{at.file}:{at.line}" for at in self.sources))
 
+    def __str__(self) -> str:
+        """What it is a witness against, why, and the source lines concerned."""
+        where = f" ({', '.join(self.lines)})" if self.lines else ""
+        return f"not {self.property.replace('_', ' ')}: {self.reason}{where}"
+
     def as_json(self) -> dict[str, object]:
         """The witness as the `--json` document lists it."""
         return {
