@@ -50,13 +50,16 @@ def build_all(
     output: Path | None,
     units: int | None,
     wip: int | None,
+    verdict: Verdict,
 ) -> Built:
-    """Build the model and write what is asked for. Raises RunError where the layout is not
-    certified, InputError where the engine refuses the model; nothing is written then."""
+    """Build the model and write what is asked for, with the proof of the net's `verdict`.
+
+    Raises RunError where the layout is not certified, InputError where the engine refuses the
+    model; nothing is written then."""
     from factory.layout.clearance import certify
     from factory.world.physics import load
 
-    certificate = certify(layout)
+    certificate = layout.certificate or certify(layout)
     if not certificate.holds:
         raise RunError(fault.diagnostic() for fault in certificate.faults)
     model = physical_model(layout, units, settings, source.catalogue, wip)
@@ -67,7 +70,7 @@ def build_all(
     if mjcf is not None:
         files |= model_files(model, mjcf)
     if output is not None:
-        texts = _documents(layout, certificate)
+        texts = _documents(layout, certificate, verdict)
         files |= {output / f"{_stem(source)}.{end}": t.encode() for end, t in texts.items()}
     write_all(files)
     return Built(model, mjcf, tuple(files), certificate.summary())
@@ -77,12 +80,11 @@ def _stem(source: Source) -> str:
     return Path(source.pag.file).stem or "factory"
 
 
-def _documents(layout: Layout, clear: Certificate) -> dict[str, str]:
+def _documents(layout: Layout, clear: Certificate, verdict: Verdict) -> dict[str, str]:
     """Everything about the factory but the model, as texts by the endings of their files."""
     from factory.export import exporters
     from factory.layout.drawing import write_svg
     from factory.nets.certificate import certificate
-    from factory.nets.verify import verify
     from factory.programs import program_of, write_program
 
     factory = layout.factory
@@ -90,7 +92,7 @@ def _documents(layout: Layout, clear: Certificate) -> dict[str, str]:
     return {
         "svg": write_svg(layout),
         "programs.txt": "\n\n".join(programs) + "\n",
-        "proof.json": _json(certificate(factory.net, verify(factory.net))),
+        "proof.json": _json(certificate(factory.net, verdict)),
         "clearance.json": _json(clear.as_json()),
         **{name: write(factory) for name, write in exporters().items()},
     }

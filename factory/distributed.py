@@ -21,13 +21,11 @@ from factory.control.mode import Array, Limits, Mode
 from factory.control.navigation import Bundle
 from factory.factory import Factory, Operation
 from factory.programs import Program, Step, program_of
+from factory.supervisor import REST
 from factory.trace import Event
 
 RATES = (3, 11)
 """Control periods are drawn from these, in timesteps of the engine."""
-
-REST = 0.01
-"""Robots hand over only when slower than this [m/s]."""
 
 
 @dataclass(slots=True)
@@ -259,8 +257,7 @@ class DistributedSupervisor:
     def _bundle(self, operation: Operation) -> Bundle:
         found = self.bundles.get(operation.index)
         if found is None:
-            robots = list(operation.robots)
-            limits = Limits(self.limits.speed[robots], self.limits.acceleration[robots])
+            limits = self.limits.of(operation.robots)
             found = self.bundles[operation.index] = Bundle.of(
                 [self.modes[operation.index]], [limits]
             )

@@ -108,6 +108,12 @@ class Factory:
         """The output robot's last operation."""
         return self.operations[-1]
 
+    def delivered(self, robot: int) -> str:
+        """The label a robot (index) carries to its A end, "" for a tool."""
+        operation = self.operations[self.robots[robot].operations[-1]]
+        label = operation.before[operation.robots.index(robot)]
+        return "" if label == NOPART else label
+
     @cached_property
     def contents(self) -> Mapping[str, tuple[str, ...]]:
         """For each label that is carried: the labels of its parts. Quadratic in a chain; only for

@@ -27,24 +27,21 @@ def operation_delays(
     delays = []
     starts = operation_starts(layout)
     for operation, mode, start in zip(factory.operations, modes, starts, strict=True):
-        robots = list(operation.robots)
-        chosen = Limits(limits.speed[robots], limits.acceleration[robots])
-        delays.append(mode_time(mode, start, chosen, world) + settle + settings.tick)
+        time = mode_time(mode, start, limits.of(operation.robots), world)
+        delays.append(time + settle + settings.tick)
     return delays
 
 
 def predict(
     layout: Layout,
-    modes: Sequence[Mode],
-    limits: Limits,
+    delays: Sequence[float],
     settings: Settings,
     world: World,
     wip: int | None = None,
 ) -> CycleTime:
-    """The cycle time of the compiled net (the greatest sum of delays along a gear) and its
-    bottleneck. Two things may allow no less and be it: in MuJoCo the outfeed, whose tray must be
-    back before the next dropoff, and the bound `wip` on what is inside."""
-    delays = operation_delays(layout, modes, limits, settings, world)
+    """The cycle time of the compiled net (the greatest sum of the operations' `delays` along a
+    gear) and its bottleneck. Two things may allow no less and be it: in MuJoCo the outfeed, whose
+    tray must be back before the next dropoff, and the bound `wip` on what is inside."""
     found = [cycle_time(layout.factory, delays)]
     if world == "mujoco":
         way = trapezoid_time(layout.outfeed_way, settings.outfeed, settings.outfeed_acceleration)

@@ -41,8 +41,8 @@ SMALLER = "take smaller speeds, a smaller --timestep, or check that the parts ar
 class Simulation:
     """One run, ready to go: `run()` does it; `model` is what the engine is given (mujoco only).
 
-    Raises InputError where the engine refuses the model, and RunError (Stalled, Timeout) from `run`
-    only where `strict`; otherwise the Run carries the trouble.
+    Raises InputError where the engine refuses the model, or a mode starts outside its domain. A
+    run that stalls or takes too long is a Run with its trouble; `require` makes that an error.
     """
 
     def __init__(
@@ -64,6 +64,7 @@ class Simulation:
         factory = layout.factory
         self.modes = operation_modes(layout, self.settings.eps)
         self.limits, gains = robot_limits(layout, self.settings, seed, jitter)
+        self.delays = operation_delays(layout, self.modes, self.limits, self.settings, world)
         self.start = factory.net.initial_marking if start is None else start
         self.counts = firings(factory.net, self.start)
         positions = start_positions(layout, self.start)
@@ -118,8 +119,7 @@ class Simulation:
     def run(self, observers: Sequence[Observer] = (), max_time: float | None = None) -> Run:
         """Tick until `units` products have been dropped off, the run stalls or `max_time` [s]
         passes."""
-        delays = operation_delays(self.layout, self.modes, self.limits, self.settings, self.kind)
-        patience = PATIENCE * max(delays)
+        patience = PATIENCE * max(self.delays)
         begin, watched, trouble = perf_counter(), 0.0, None
         supervisor, world, goal = self.supervisor, self.world, self.before + self.units
         while world.delivered() < goal and trouble is None:
@@ -142,9 +142,7 @@ class Simulation:
     def _record(self, wall: float, trouble: Diagnostic | None) -> Run:
         supervisor, world, factory = self.supervisor, self.world, self.layout.factory
         physics = getattr(world, "physics_time", 0.0)
-        predicted = predict(
-            self.layout, self.modes, self.limits, self.settings, self.kind, self.wip
-        )
+        predicted = predict(self.layout, self.delays, self.settings, self.kind, self.wip)
         verdict = replay(factory.net, [e.transition for e in supervisor.events], self.start)
         figures: PhysicsFigures | None = None
         if self.model is not None:

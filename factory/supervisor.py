@@ -19,6 +19,9 @@ from factory.factory import Factory, Operation
 from factory.nets.petri import Marking
 from factory.trace import Event
 
+REST = 0.01
+"""Robots hand over only when slower than this [m/s]."""
+
 
 class World(Protocol):
     """Where a factory runs: the ideal one or MuJoCo."""
@@ -60,9 +63,6 @@ class Supervisor:
     `threads` is f_m: the robot in each slot of a marked place; every firing moves robots by the
     redistribution functions and asserts that the marking stays legal.
     """
-
-    REST = 0.01
-    """Robots hand over only when slower than this [m/s]."""
 
     def __init__(
         self,
@@ -125,7 +125,7 @@ class Supervisor:
             if positions is None:
                 positions = self.world.sense()[0]
             robots = list(operation.robots)
-            mode = Bundle.of([self.modes[operation.index]], [self._limits(operation)])
+            mode = Bundle.of([self.modes[operation.index]], [self.limits.of(operation.robots)])
             if mode.in_domain(positions[robots])[0]:
                 found.append(operation.index)
         return found
@@ -142,7 +142,7 @@ class Supervisor:
         done = active.bundle.finished(x, active.clocks)
         if not done.any():
             return []
-        still = np.logical_and.reduceat(np.abs(v) < self.REST, active.bundle.starts)
+        still = np.logical_and.reduceat(np.abs(v) < REST, active.bundle.starts)
         return [o for o, ends in zip(active.operations, done & still, strict=True) if ends]
 
     def _fire(self, started: list[int], ended: list[int]) -> None:
@@ -211,7 +211,7 @@ class Supervisor:
         clocks = dict(zip(self.active.operations, self.active.clocks, strict=True))
         chosen = [self.factory.operations[o] for o in numbers]
         bundle = (
-            Bundle.of([self.modes[o] for o in numbers], [self._limits(o) for o in chosen])
+            Bundle.of([self.modes[o] for o in numbers], [self.limits.of(o.robots) for o in chosen])
             if numbers
             else None
         )
@@ -219,7 +219,3 @@ class Supervisor:
         self.active = _Active(
             numbers, bundle, robots, np.array([clocks.get(o, 0.0) for o in numbers])
         )
-
-    def _limits(self, operation: Operation) -> Limits:
-        robots = list(operation.robots)
-        return Limits(self.limits.speed[robots], self.limits.acceleration[robots])

@@ -54,10 +54,10 @@ def build(
     writable_folder(output)
     settings = settings_of(file, options)
     source, factory, layout = plan(file, folders, settings, floor)
-    refuse_unproved(factory)
+    verdict = refuse_unproved(factory)
     spent = perf_counter() - begin
     warn(layout.product.warnings, quiet)
-    built = build_all(source, layout, settings, mjcf, output, units, wip)
+    built = build_all(source, layout, settings, mjcf, output, units, wip, verdict)
     document = {
         "product": source.pag.root,
         "mjcf": str(built.mjcf) if built.mjcf else None,

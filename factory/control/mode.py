@@ -6,6 +6,7 @@ A robot's position is the arc length [m] of its carriage on its own guidepath [A
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -61,6 +62,11 @@ class Limits:
                 raise ValueError(f"{name} limits {values} are not all positive and finite")
         if self.speed.shape != self.acceleration.shape:
             raise ValueError(f"{self.speed.size} speeds for {self.acceleration.size} accelerations")
+
+    def of(self, robots: Sequence[int]) -> Limits:
+        """Those of some of the robots, in that order."""
+        chosen = list(robots)
+        return Limits(self.speed[chosen], self.acceleration[chosen])
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -17,7 +17,6 @@ from factory.errors import Diagnostic, InputError
 from factory.factory import Operation
 from factory.layout.dimensions import CARRIAGE
 from factory.layout.plan import Layout
-from factory.layout.stretching import is_tool
 from factory.pag import NOPART
 from factory.settings import Settings
 from factory.template import Point, Template
@@ -34,7 +33,7 @@ def operation_modes(layout: Layout, eps: float) -> tuple[Mode, ...]:
     starts = operation_starts(layout)
     count = len(layout.guidepaths)
     limits = Limits(np.ones(count), np.ones(count))
-    bundle = Bundle.of(modes, [_chosen(limits, operation) for operation in operations])
+    bundle = Bundle.of(modes, [limits.of(operation.robots) for operation in operations])
     inside = bundle.in_domain(np.concatenate(starts))
     faults = [
         _unprepared(operation, within)
@@ -56,11 +55,6 @@ def operation_starts(layout: Layout) -> list[Array]:
             before = factory.operations[robot.operations[step - 1]]
             left[number, robot.index] = layout.goal(before.index, before.robots.index(robot.index))
     return [np.array([left[o.index, robot] for robot in o.robots]) for o in factory.operations]
-
-
-def _chosen(limits: Limits, operation: Operation) -> Limits:
-    robots = list(operation.robots)
-    return Limits(limits.speed[robots], limits.acceleration[robots])
 
 
 def _unprepared(operation: Operation, inside: bool) -> Diagnostic:
@@ -129,6 +123,3 @@ def robot_limits(
     draw = np.random.default_rng(seed).uniform(1 - jitter, 1 + jitter, size=(2, count))
     speed = settings.speed * draw[0]
     return Limits(speed, np.full(count, settings.acceleration)), draw[1]
-
-
-__all__ = ["is_tool", "operation_mode", "operation_modes", "operation_starts", "robot_limits"]

@@ -18,12 +18,11 @@ from xml.etree.ElementTree import Element
 from xml.sax.saxutils import quoteattr
 
 from factory.factory import Factory
-from factory.layout.dimensions import PAYLOAD
 from factory.layout.plan import Layout
 from factory.mjcf import names
 from factory.mjcf.elements import add, number, numbers
 from factory.mjcf.outfeed import TRAY_MASS, add_tray
-from factory.mjcf.parts import add_meshes, add_parts, feeder_middle, parked_at, place_in
+from factory.mjcf.parts import add_meshes, add_parts, parked_at, place_in
 from factory.mjcf.robots import (
     Drive,
     add_paints,
@@ -208,7 +207,7 @@ def _robots(
             model = models[robot.type] = load_robot_model(catalogue[robot.type])
             defaults.append(model.defaults)
             asset.extend(model.assets)
-        carried = _delivered(factory, robot.index)
+        carried = factory.delivered(robot.index)
         parts = factory.contents[carried] if carried else ()
         low = min((float(product.solids[p].low[2]) for p in parts), default=float(product.low[2]))
         body, actuators = instantiate(
@@ -242,17 +241,10 @@ def _role(factory: Factory, robot: int) -> str:
     """What a robot does, for its paint."""
     if robot == 0:
         return "output"
-    if not _delivered(factory, robot):
+    if not factory.delivered(robot):
         return "tool"
     first = factory.operations[factory.robots[robot].operations[0]]
     return "carrier" if first.inputs else "fed"
-
-
-def _delivered(factory: Factory, robot: int) -> str:
-    """The label a robot carries to its A end, "" for a tool."""
-    operation = factory.operations[factory.robots[robot].operations[-1]]
-    label = operation.before[operation.robots.index(robot)]
-    return label if label in factory.contents else ""
 
 
 def _welds(equality: Element, layout: Layout, copies: Mapping[str, int]) -> None:
@@ -260,7 +252,7 @@ def _welds(equality: Element, layout: Layout, copies: Mapping[str, int]) -> None
     factory, product = layout.factory, layout.product
     for robot, path in zip(factory.robots, layout.guidepaths, strict=True):
         w, _, _, z = heading_quaternion(path)
-        label = _delivered(factory, robot.index)
+        label = factory.delivered(robot.index)
         for part in factory.contents[label] if label else ():
             pose = (*grip_position(layout, robot.index, part), w, 0, 0, -z)
             _weld(
@@ -311,6 +303,3 @@ def _weld(
     active: bool = False,
 ) -> None:
     add(equality, "weld", name=name, body1=body1, body2=body2, relpose=numbers(pose), active=active)
-
-
-__all__ = ["PAYLOAD", "Model", "build_model", "feeder_middle", "model_files", "part_copies"]

@@ -11,7 +11,7 @@ from factory.layout.dimensions import PAYLOAD
 from factory.layout.plan import Layout, Point2
 from factory.mjcf.elements import add, exact, numbers
 from factory.mjcf.mesh_files import mesh_file
-from factory.mjcf.names import copy, part
+from factory.mjcf.names import part
 
 PARKED = -0.6
 """Height at which the first spare copy of a part is kept, under the floor [m]."""
@@ -95,6 +95,3 @@ def used_meshes(product: Product) -> list[Mesh]:
     """Each mesh once, in the order in which the parts use them."""
     found = {s.mesh.name: s.mesh for s in product.solids.values() if s.mesh is not None}
     return list(found.values())
-
-
-__all__ = ["add_meshes", "add_parts", "copy", "feeder_middle", "parked_at", "place_in"]

@@ -15,7 +15,7 @@ from factory.layout.dimensions import (
 from factory.layout.embedding import project
 from factory.layout.plan import Layout
 from factory.mjcf.elements import add, numbers
-from factory.mjcf.names import carriage, feeder
+from factory.mjcf.names import feeder
 from factory.mjcf.outfeed import add_outfeed
 from factory.mjcf.parts import feeder_middle
 from factory.mjcf.robots import heading_quaternion
@@ -263,6 +263,3 @@ def _feeder(world: Element, layout: Layout, label: str) -> None:
 def _handedness(u: tuple[float, float], t: tuple[float, float]) -> int:
     """+1 where the side t is to the left of the heading u, else -1."""
     return 1 if u[0] * t[1] - u[1] * t[0] > 0 else -1
-
-
-__all__ = ["add_assets", "add_follower", "add_scene", "add_visuals", "carriage", "look_distance"]

@@ -20,7 +20,7 @@ from factory.engine import mujoco
 from factory.errors import Diagnostic, InputError
 from factory.factory import Operation
 from factory.mjcf import names
-from factory.mjcf.model import BITS, CARRIAGE_MASS, Model
+from factory.mjcf.model import CARRIAGE_MASS, Model
 from factory.mjcf.outfeed import TRAY_MASS
 from factory.world.inspection import Inspection
 from factory.world.stock import Stock
@@ -251,6 +251,3 @@ def _explained(model: Model, words: str) -> Diagnostic:
             position = model.factory.pag[solid.label].position
             return Diagnostic("BadMesh", words.strip(), position, "repair the mesh of this part")
     return Diagnostic("Engine", words.strip(), None, "please report this as a bug of factory")
-
-
-__all__ = ["BITS", "MujocoWorld", "load"]

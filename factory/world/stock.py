@@ -173,8 +173,7 @@ class Stock:
     def _grips(self) -> dict[tuple[int, str], int]:
         found: dict[tuple[int, str], int] = {}
         for robot in self.model.factory.robots:
-            operation = self.model.factory.operations[robot.operations[-1]]
-            label = operation.before[operation.robots.index(robot.index)]
+            label = self.model.factory.delivered(robot.index)
             for part in self.model.factory.contents.get(label, ()):
                 found[robot.index, part] = self.m.equality(names.grip(robot.name, part)).id
         return found
