@@ -5,8 +5,10 @@ from __future__ import annotations
 
 import signal
 from collections.abc import Callable, Mapping
-from types import FrameType, TracebackType
-from typing import Any
+from types import FrameType
+from typing import Any, Self
+
+from factory.closing import Closing
 
 SIGNALS = [
     getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)
@@ -26,7 +28,7 @@ def stop_on_signals(handler: Callable[[int, FrameType | None], Any]) -> Mapping[
     return heard
 
 
-class Interruption:
+class Interruption(Closing):
     """While it lasts, the first signal is only noted, and raised as KeyboardInterrupt by `observe`;
     the second is raised at once."""
 
@@ -34,16 +36,12 @@ class Interruption:
         self.noted = False
         self._before: Mapping[int, Any] = {}
 
-    def __enter__(self) -> Interruption:
+    def __enter__(self) -> Self:
         self._before = stop_on_signals(self._note)
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def close(self) -> None:
+        """Give the signals back to who had them."""
         for number, handler in self._before.items():
             signal.signal(number, handler)
 

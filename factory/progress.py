@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import sys
 from time import perf_counter
-from types import TracebackType
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Self
+
+from factory.closing import Closing
 
 if TYPE_CHECKING:
     from rich.progress import Progress as Bar
@@ -14,7 +15,7 @@ PERIOD = 0.1
 """The bar is redrawn so often [s]."""
 
 
-class Progress:
+class Progress(Closing):
     """An observer and context manager; silent where `quiet`, or where stderr is no terminal."""
 
     def __init__(self, units: int, quiet: bool = False) -> None:
@@ -24,7 +25,7 @@ class Progress:
         self.next = 0.0
         self.before: int | None = None
 
-    def __enter__(self) -> Progress:
+    def __enter__(self) -> Self:
         if self.shown:
             self.bar = self._bar()
             self.task = self.bar.add_task("", total=self.units, time="0.0 s", speed="")
@@ -32,12 +33,8 @@ class Progress:
             self.begin = perf_counter()
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def close(self) -> None:
+        """Take the bar away."""
         if self.bar is not None:
             self.bar.stop()
             self.bar = None

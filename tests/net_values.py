@@ -265,3 +265,16 @@ def _threaded(net: PetriNet, gears: list[Gear], slots: list[tuple[int, ...]]) ->
             event = gear.transitions[(i + 1) % len(gear.places)]
             moves[event].append(((place, slots[place].index(number)), (q, slots[q].index(number))))
     return ThreadedNet(net, tuple(tuple(sorted(m)) for m in moves))
+
+
+def planted(net: GearNet, rng: random.Random, which: int) -> GearNet | MarkedNet:
+    """The net with one fault of a kind: a lost or doubled token, a missing producer, two gears that
+    cross twice (a lost token where they cannot), an unclosed gear."""
+    robot = rng.randrange(len(net.gears))
+    return (
+        lost_token(net, robot),
+        doubled_token(net, robot),
+        missing_producer(net, rng.randrange(len(net.threaded.places))),
+        crossed_twice(net, robot, 0) or lost_token(net, robot),
+        unclosed_gear(net, robot, 0, net.gears[robot].transitions[0]),
+    )[which]

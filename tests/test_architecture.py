@@ -12,7 +12,7 @@ import pytest
 PACKAGE = Path(__file__).resolve().parent.parent / "factory"
 
 ROOMS = [
-    {"errors", "assets", "files", "engine", "gl"},
+    {"errors", "assets", "closing", "files", "engine", "gl"},
     {"pag", "template", "robots", "settings"},
     {"lang"},
     {"nets"},

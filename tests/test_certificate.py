@@ -22,13 +22,9 @@ from factory.nets.gears import GearNet
 from factory.nets.general import analyse
 from factory.nets.marked import MarkedNet, marked
 from tests.net_values import (
-    crossed_twice,
-    doubled_token,
-    lost_token,
-    missing_producer,
     net_from,
+    planted,
     random_marked_net,
-    unclosed_gear,
 )
 from tests.pag_values import factories, factory_of, paper, random_pag
 
@@ -61,14 +57,7 @@ def test_certificates_of_broken_factories_pass(
     factory: Factory, rng: random.Random, which: int
 ) -> None:
     net = factory.net
-    robot = rng.randrange(len(net.gears))
-    broken = (
-        lost_token(net, robot),
-        doubled_token(net, robot),
-        missing_producer(net, rng.randrange(len(net.threaded.places))),
-        crossed_twice(net, robot, 0) or lost_token(net, robot),
-        unclosed_gear(net, robot, 0, net.gears[robot].transitions[0]),
-    )[which]
+    broken = planted(net, rng, which)
     document = certified(broken)
     assert check_certificate(document) == []
     assert any(document[claim]["holds"] is False for claim in _CLAIMS)

@@ -23,13 +23,9 @@ from factory.nets.general import analyse
 from factory.nets.marked import MarkedNet, marked
 from factory.nets.petri import Transition
 from tests.net_values import (
-    crossed_twice,
-    doubled_token,
-    lost_token,
-    missing_producer,
     net_from,
+    planted,
     random_marked_net,
-    unclosed_gear,
 )
 from tests.pag_values import factories, factory_of, paper
 
@@ -89,14 +85,7 @@ def test_broken_nets_are_read_and_judged_alike(
     factory: Factory, rng: random.Random, which: int
 ) -> None:
     net = factory.net
-    robot = rng.randrange(len(net.gears))
-    broken = (
-        lost_token(net, robot),
-        doubled_token(net, robot),
-        missing_producer(net, rng.randrange(len(net.threaded.places))),
-        crossed_twice(net, robot, 0) or lost_token(net, robot),
-        unclosed_gear(net, robot, 0, net.gears[robot].transitions[0]),
-    )[which]
+    broken = planted(net, rng, which)
     before, after = analyse(broken), analyse(read_pnml(write_pnml(broken)))
     assert before.as_json() == after.as_json()
     assert not after.holds

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import factory
+from factory.distributed import Link
 from factory.layout.plan import Layout
 from factory.nets.history import firings, legal_marking
 from factory.nets.replay import replay
@@ -169,15 +170,48 @@ def test_runs_repeat_bit_for_bit(paper: Layout) -> None:
     assert factory.run(paper, units=3, jitter=0.3, seed=6).events != one.events
 
 
-def test_the_replay_catches_a_swapped_event(paper: Layout) -> None:
+def test_the_replay_catches_a_record_out_of_order(paper: Layout) -> None:
     events = [e.transition for e in factory.run(paper, world="ideal", units=2).events]
     assert replay(paper.factory.net, events).refines
-    cut = events.index("sub1_e")
-    swapped = [*events[:cut], events[cut + 1], events[cut], *events[cut + 2 :]]
+    cut, after = events.index("sub1_e"), events.index("sub2_s")
     dropped = [*events[:cut], *events[cut + 1 :]]
     assert not replay(paper.factory.net, dropped).refines
     assert replay(paper.factory.net, dropped).index is not None
-    assert replay(paper.factory.net, swapped).refines in (True, False)
+    early = [*events[:cut], "sub2_s", *events[cut:after], *events[after + 1 :]]
+    assert replay(paper.factory.net, early).index == cut
+
+
+def test_robots_that_touch_are_seen_in_the_ideal_world(paper: Layout) -> None:
+    """Planted fault: r5 and r6 stand at their meeting point."""
+    simulation = Simulation(paper, world="ideal", units=1)
+    while paper.factory.by_label["sub1"].index not in simulation.supervisor.active.operations:
+        simulation.supervisor.step()
+    simulation.world.x[[4, 5]] = 0.0
+    with pytest.raises(AssertionError, match="two robots touch"):
+        simulation.supervisor.step()
+
+
+def test_a_robot_reads_only_its_own_mode(paper: Layout) -> None:
+    """Planted fault: r1 asks for the state of a mode it is not in."""
+    link = Link(Simulation(paper, world="ideal", units=1).world)
+    assert len(link.read(paper.factory.by_label["sub1"], 2)[0]) == 3
+    with pytest.raises(AssertionError, match="not in the mode of sub1"):
+        link.read(paper.factory.by_label["sub1"], 0)
+
+
+def test_an_event_that_is_not_enabled_cannot_fire(paper: Layout) -> None:
+    """Planted fault: the supervisor is made to end an operation that has not begun."""
+    supervisor = Simulation(paper, world="ideal", units=1).supervisor
+    with pytest.raises(AssertionError, match="sub3_e fires but is not enabled"):
+        supervisor._redistribute(paper.factory.by_label["sub3"].end)
+
+
+def test_the_outfeed_may_be_the_bottleneck() -> None:
+    layout = laid_out(LONE)
+    slow = factory.run(layout, units=8, settings=factory.Settings(outfeed=0.1))
+    assert slow.bottleneck == "outfeed"
+    assert slow.cycle_time_s == pytest.approx(slow.predicted_cycle_time_s, rel=0.02)
+    assert_good(slow)
 
 
 def test_a_time_limit_names_robot_mode_and_line(paper: Layout) -> None:

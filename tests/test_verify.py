@@ -23,6 +23,7 @@ from tests.net_values import (
     lost_token,
     missing_producer,
     net_from,
+    planted,
     random_marked_net,
     unclosed_gear,
 )
@@ -98,13 +99,7 @@ def test_broken_factories_agree_with_brute_force(
     factory: Factory, rng: random.Random, which: int
 ) -> None:
     net = factory.net
-    robot = rng.randrange(len(net.gears))
-    broken = (
-        lost_token(net, robot),
-        doubled_token(net, robot),
-        missing_producer(net, rng.randrange(len(net.threaded.places))),
-        crossed_twice(net, robot, 0) or lost_token(net, robot),
-    )[which]
+    broken = planted(net, rng, which)
     truth = explored(broken, 1_500, 3)
     verdict = verify(broken)
     assert not verdict.holds

@@ -10,11 +10,11 @@ from collections.abc import Sequence
 from dataclasses import asdict
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from types import TracebackType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from factory.closing import Closing
 from factory.errors import InputError
 from factory.log.blocks import LENGTH, MAGIC, Arrays, bad_log, block, pack_rows
 
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from factory.simulation import Simulation
 
 
-class LogWriter:
+class LogWriter(Closing):
     """An observer that writes a log; close it, or use it as a context manager.
 
     `source`: the PAG with its templates, if there is more to it than the factory knows; `command`:
@@ -61,17 +61,6 @@ class LogWriter:
             packed = {"xml": simulation.model.xml.encode(), **files}
             self.file.write(block(b"M", {k: np.frombuffer(v, "u1") for k, v in packed.items()}, 6))
         self.observe(simulation.world, simulation.supervisor)
-
-    def __enter__(self) -> LogWriter:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self.close()
 
     def __call__(self, world: Any, supervisor: Any) -> None:
         self.observe(world, supervisor)

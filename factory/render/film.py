@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from pathlib import Path
-from types import TracebackType
 from typing import TYPE_CHECKING, Any
 
+from factory.closing import Closing
 from factory.render.camera import camera_named
 from factory.render.camerawork import FPS, SIZE, Moment, Reel, Size, Take, When, pictureless, save
 from factory.render.subject import Snapshot, held
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from factory.simulation import Simulation
 
 
-class _Observer:
+class _Observer(Closing):
     """What films and stills of a run have in common: an observer, and a context manager."""
 
     def __init__(self, simulation: Simulation, size: Size, camera: str, caption: bool) -> None:
@@ -34,17 +34,6 @@ class _Observer:
 
     def observe(self, world: Any, supervisor: Any) -> None:
         raise NotImplementedError
-
-    def close(self) -> None:
-        raise NotImplementedError
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self.close()
 
     def _moment(self) -> Moment:
         world = self.simulation.world
@@ -72,9 +61,6 @@ class Film(_Observer):
         super().__init__(simulation, size, camera, caption)
         self.reel = Reel(self.take, Path(path), fps)
         self.reel.until(self.last)
-
-    def __enter__(self) -> Film:
-        return self
 
     @property
     def frames(self) -> int:
@@ -108,9 +94,6 @@ class Still(_Observer):
         check_output(path, size, still=True)
         super().__init__(simulation, size, camera, caption)
         self.path, self.at, self.held = Path(path), at, False
-
-    def __enter__(self) -> Still:
-        return self
 
     def observe(self, world: Any, supervisor: Any) -> None:
         """Keep the state if it may be the one."""

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from copy import copy
-from types import TracebackType
 
 import numpy as np
 from numpy.typing import NDArray
 
 from factory import gl
+from factory.closing import Closing
 from factory.engine import mujoco
 from factory.render.camera import Array, Camera, Frame, View, fit, from_above, overview, towards
 from factory.render.subject import Followed, Snapshot, extent
@@ -25,7 +25,7 @@ LAG = 0.25
 """Time in which the camera goes from one product to the next [s]."""
 
 
-class Painter:
+class Painter(Closing):
     """Draws one model from one camera; it has a model and data of its own, so a run is not
     disturbed.
 
@@ -68,17 +68,6 @@ class Painter:
         mujoco.mjv_defaultFreeCamera(m, self.free)
         self.rectangle = mujoco.MjrRect(0, 0, *size)
         self.pixels = np.empty((self.height, self.width, 3), np.uint8)
-
-    def __enter__(self) -> Painter:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self.close()
 
     def close(self) -> None:
         """Gives the GL context back."""

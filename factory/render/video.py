@@ -10,9 +10,9 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from fractions import Fraction
 from math import isfinite
 from pathlib import Path
-from types import TracebackType
 from typing import Any
 
+from factory.closing import Closing
 from factory.errors import Diagnostic, InputError, MissingError
 from factory.render.painter import Pixels
 
@@ -51,7 +51,7 @@ def _bad(message: str, hint: str) -> InputError:
     return InputError(Diagnostic("BadValue", message, None, hint))
 
 
-class VideoFile:
+class VideoFile(Closing):
     """An H.264 video (yuv420p) of exact size and rate. Raises InputError where it cannot be
     written."""
 
@@ -84,17 +84,6 @@ class VideoFile:
         ahead = min(8, int(fps / 8))
         codec.thread_type = "SLICE"
         codec.options = {"crf": "19", "preset": "fast", "rc-lookahead": str(ahead), "bf": "0"}
-
-    def __enter__(self) -> VideoFile:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self.close()
 
     def write(self, pixels: Pixels) -> None:
         """Add a frame (height, width, 3). It is encoded on a thread of its own while the next is
