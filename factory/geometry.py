@@ -57,7 +57,8 @@ class Solid:
     `kind` is box, cylinder, sphere or mesh; `size` its half lengths as MJCF writes them [m];
     `position` (3,) and `quaternion` (4,) place it; `mass` [kg], `centre` (3,) of mass, `inertia`
     (3, 3) about it [kg m²]; `low`, `high` (3,) its bounding box; `corners` (n, 3) the vertices of
-    its hull.
+    its hull; `pieces` the vertices (n, 3) of the convex bodies it is made of, as the engine
+    collides them: one, its hull, for most.
     """
 
     label: str
@@ -73,6 +74,7 @@ class Solid:
     rgba: tuple[float, ...]
     mesh: Mesh | None = None
     corners: Array = field(default_factory=lambda: np.zeros((0, 3)), repr=False)
+    pieces: tuple[Array, ...] = field(default=(), repr=False)
 
 
 @dataclass(frozen=True)
