@@ -11,6 +11,9 @@ Kind = Literal["slide", "lower", "blocked"]
 Pair = tuple[str, str]
 """Labels of two parts, in alphabetical order."""
 
+MARGIN = 0.02
+"""What is to be lowered comes at least this far above everything of the others [m]."""
+
 
 @dataclass(frozen=True, slots=True)
 class Approach:

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
+from factory.approaching import approaches_json, clashes_json, describe_approaches
 from factory.console import say, table
 from factory.factory import Factory
 from factory.nets.gears import Gear, GearNet
@@ -15,13 +16,18 @@ from factory.nets.marked import MarkedNet, marked
 from factory.nets.petri import Place
 from factory.nets.verdict import Verdict
 
+if TYPE_CHECKING:
+    from factory.geometry import Product
+    from factory.mating import Matings
+
 SHOWN = 24
 """Robots in the table for people; `--json` and `-v` list all."""
 
 
 @dataclass(frozen=True)
 class Checked:
-    """A net with its verdict; `factory` is None where the net was read from PNML."""
+    """A net with its verdict; `factory` is None where the net was read from PNML. `matings` and
+    `product`: how its inputs come together, None where no part has a shape of its own."""
 
     name: str
     labels: int
@@ -29,6 +35,8 @@ class Checked:
     verdict: Verdict
     factory: Factory | None
     pool: dict[str, int]
+    matings: Matings | None = None
+    product: Product | None = None
 
     def certificate(self) -> str:
         """The proof as a document that another program can check."""
@@ -51,7 +59,17 @@ class Checked:
             **self.verdict.as_json(),
             "gears": [gear_json(gear, places) for gear in self.verdict.gears],
             "part_pool": self.pool,
+            "approaches": approaches_json(self.matings),
+            "clashes": clashes_json(self.matings),
         }
+
+    def pictures(self, folder: Path) -> dict[Path, bytes]:
+        """The files that `check --clashes` writes, one for each blocked operation."""
+        if self.matings is None or self.product is None:
+            return {}
+        from factory.clashes import pictures
+
+        return pictures(folder, self.matings, self.product)
 
 
 def gear_json(gear: Gear, places: Sequence[Place]) -> dict[str, Any]:
@@ -70,6 +88,7 @@ def check_file(file: Path, folders: Sequence[Path], wip: int | None = None) -> C
     """Check a PAG, or a net in PNML. Raises InputError."""
     if is_net(file):
         return check_net(file)
+    from factory.mating import matings, shaped
     from factory.nets.pool import part_pool
     from factory.nets.verify import verify
     from factory.pipeline import read
@@ -79,7 +98,12 @@ def check_file(file: Path, folders: Sequence[Path], wip: int | None = None) -> C
     sources = {r.name: r.position for r in factory.robots if r.position}
     verdict = verify(factory.net, sources)
     pool = dict(part_pool(factory, wip))
-    return Checked(source.pag.root, len(source.pag), factory.net, verdict, factory, pool)
+    checked = Checked(source.pag.root, len(source.pag), factory.net, verdict, factory, pool)
+    if not shaped(source.pag):
+        return checked
+    product = source.product
+    judged = matings(source.pag, source.templates, product)
+    return replace(checked, matings=judged, product=product)
 
 
 def is_net(file: Path) -> bool:
@@ -136,3 +160,5 @@ def describe(checked: Checked, verbose: bool) -> None:
         most = sorted(checked.pool.items(), key=lambda item: -item[1])[:8]
         listed = ", ".join(f"{label} {count}" for label, count in most)
         say(f"copies inside at once: {listed}{', ...' if len(checked.pool) > 8 else ''}")
+    if checked.matings is not None:
+        describe_approaches(checked.matings, None if verbose else SHOWN)

@@ -9,7 +9,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from types import MappingProxyType
 
+from factory.approach import Approach
 from factory.errors import Diagnostic, InputError, Position, did_you_mean
 from factory.factory import Factory, Operation, Robot
 from factory.nets.gears import Gear, GearNet
@@ -18,9 +20,12 @@ from factory.nets.threaded import Redistribution, ThreadedNet
 from factory.pag import NOPART, PAG, Assembly
 from factory.prepared import check_prepared
 from factory.robots import Catalogue
-from factory.template import Template
+from factory.template import Template, variable_number
 
 DROPOFF = "dropoff"
+
+LIFT = "lift"
+"""The type of a robot that lowers what it brings."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,8 +62,16 @@ class _Draft:
         return len(self.types) - 1
 
 
-def compile_pag(pag: PAG, templates: Mapping[str, Template], catalogue: Catalogue) -> Factory:
+def compile_pag(
+    pag: PAG,
+    templates: Mapping[str, Template],
+    catalogue: Catalogue,
+    approaches: Mapping[str, Approach] = MappingProxyType({}),
+) -> Factory:
     """The factory that makes the product `pag`.
+
+    `approaches`: how the inputs of operations (by label, see `expand`) can come together; where one
+    is to be lowered, a lift brings it.
 
     Raises InputError with every TypeMismatch and NotPrepared found. Robots and operations are
     numbered as in the specification of the net: the output robot is r1; an operation numbers all
@@ -68,7 +81,7 @@ def compile_pag(pag: PAG, templates: Mapping[str, Template], catalogue: Catalogu
     draft = _Draft([], [], [], [], [], [])
     output = templates[DROPOFF]
     carrier = draft.allocate(output.robots[0], pag[pag.root].position)
-    _compile_nodes(nodes, pag.root, carrier, draft, catalogue)
+    _compile_nodes(nodes, pag.root, carrier, draft, catalogue, approaches)
     _add_dropoff(output, pag, carrier, draft)
     if not draft.troubles:
         robots = _robots(draft)
@@ -117,7 +130,12 @@ def _dwell(template: Template, assembly: Assembly) -> float:
 
 
 def _compile_nodes(
-    nodes: Mapping[str, Node], root: str, output: int, draft: _Draft, catalogue: Catalogue
+    nodes: Mapping[str, Node],
+    root: str,
+    output: int,
+    draft: _Draft,
+    catalogue: Catalogue,
+    approaches: Mapping[str, Approach],
 ) -> None:
     """CompileNode(P, carrier) for every node in preorder, with a stack in place of recursion."""
     stack: list[tuple[str, int, int]] = [(root, output, -1)]
@@ -127,11 +145,23 @@ def _compile_nodes(
         index = len(draft.operations)
         brought = _brought(node)
         _claim_carrier(node, carrier, draft, catalogue)
-        robots = _allocate(node, carrier, brought, nodes, draft, catalogue)
+        approach = approaches.get(label)
+        lowered = approach.lowered if approach else ""
+        robots = _allocate(node, carrier, brought, nodes, draft, catalogue, lowered)
         before = tuple(brought)
         after = tuple(NOPART if b == NOPART else label for b in node.template.after)
         draft.operations.append(
-            Operation(index, label, node.template, robots, before, after, node.dwell, node.position)
+            Operation(
+                index,
+                label,
+                node.template,
+                robots,
+                before,
+                after,
+                node.dwell,
+                node.position,
+                approach,
+            )
         )
         draft.parents.append(parent)
         for robot in robots:
@@ -142,14 +172,9 @@ def _compile_nodes(
 
 def _brought(node: Node) -> list[str]:
     """a, with the template's label variables replaced by the labels of the inputs."""
-    variables = sorted(node.template.inputs, key=_number)
+    variables = sorted(node.template.inputs, key=variable_number)
     actual = dict(zip(variables, node.inputs, strict=True))
     return [actual.get(variable, NOPART) for variable in node.template.before]
-
-
-def _number(variable: str) -> tuple[int, str]:
-    digits = "".join(c for c in variable if c.isdigit())
-    return int(digits or 0), variable
 
 
 def _claim_carrier(node: Node, carrier: int, draft: _Draft, catalogue: Catalogue) -> None:
@@ -174,8 +199,10 @@ def _allocate(
     nodes: Mapping[str, Node],
     draft: _Draft,
     catalogue: Catalogue,
+    lowered: str,
 ) -> tuple[int, ...]:
-    """r_1, ..., r_k: the carrier and the new robots, numbered smallest input first, tools last."""
+    """r_1, ..., r_k: the carrier and the new robots, numbered smallest input first, tools last. The
+    one that brings `lowered` is a lift."""
     template = node.template
     robots = {template.carrier - 1: carrier}
     new = [i for i in range(len(template.robots)) if i != template.carrier - 1]
@@ -192,8 +219,22 @@ def _allocate(
             draft.troubles.append(
                 Diagnostic("TypeMismatch", message, template.position or node.position, hint)
             )
-        robots[i] = draft.allocate(template.robots[i], node.position)
+        wanted = template.robots[i]
+        if lowered and brought[i] == lowered:
+            wanted = _lift(wanted, node, draft, catalogue)
+        robots[i] = draft.allocate(wanted, node.position)
     return tuple(robots[i] for i in range(len(template.robots)))
+
+
+def _lift(wanted: str, node: Node, draft: _Draft, catalogue: Catalogue) -> str:
+    """The type of a robot that takes the role of a `wanted` and can lower what it brings."""
+    met = catalogue.meet(LIFT, wanted) if LIFT in catalogue.types else None
+    if met is not None and catalogue.fits(met, LIFT):
+        return met
+    message = f"what '{node.label}' takes must be lowered, and a '{wanted}' has no lift"
+    hint = "let the template ask for a 'dot', or the type extend 'lift'"
+    draft.troubles.append(Diagnostic("TypeMismatch", message, node.position, hint))
+    return wanted
 
 
 def _add_dropoff(output: Template, pag: PAG, carrier: int, draft: _Draft) -> None:

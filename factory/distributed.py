@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from factory.control.governor import govern
-from factory.control.mode import Array, Limits, Mode
+from factory.control.mode import Array, Index, Limits, Mode
 from factory.control.navigation import Bundle
 from factory.factory import Factory, Operation
 from factory.programs import Program, Step, program_of
@@ -41,16 +41,16 @@ class Link:
     """The continuous state that the robots of one mode share; reading any other robot is an
     error."""
 
-    def __init__(self, world: Any) -> None:
-        self.world = world
+    def __init__(self, world: Any, axes: Sequence[tuple[int, ...]]) -> None:
+        self.world, self.axes = world, axes
 
     def read(self, operation: Operation, robot: int) -> tuple[Array, Array]:
-        """Positions and speeds of the robots of an operation, for one of them."""
+        """Positions and speeds of an operation's axes, for one of its robots."""
         if robot not in operation.robots:
             raise AssertionError(f"robot {robot} is not in the mode of {operation.label}")
         x, v = self.world.sense()
-        robots = list(operation.robots)
-        return x[robots], v[robots]
+        axes = list(self.axes[operation.index])
+        return x[axes], v[axes]
 
 
 @dataclass(slots=True)
@@ -61,16 +61,17 @@ class _Active:
 @dataclass(slots=True)
 class Process:
     """One robot executing its program: the step it is at and its phase in it, `wait`, `run` or
-    `leave`."""
+    `leave`; the `reference` and `speed` of each of its `axes`, its lift's after its carriage's."""
 
     program: Program
     period: int
     phase: int
+    axes: Index
+    reference: Array
+    speed: Array
     position: int = 0
     stage: str = "wait"
     clock: float = 0.0
-    speed: float = 0.0
-    reference: float = 0.0
     turns: int = 0
 
     @property
@@ -110,15 +111,19 @@ class DistributedSupervisor:
         self.marked = bytearray(
             p in factory.net.initial_marking for p in range(len(self.net.places))
         )
-        self.link = Link(world)
+        self.link = Link(world, factory.axes)
         self.programs = [program_of(factory, r.index) for r in factory.robots]
         self.cells = [Cell(p.steps[0].label) for p in self.programs]
         periods = self.random.integers(*RATES, size=len(self.programs))
         x = world.sense()[0]
-        self.processes = [
-            Process(p, int(n), int(self.random.integers(n)), reference=float(x[p.robot]))
-            for p, n in zip(self.programs, periods, strict=True)
-        ]
+        lifts = {robot: len(self.programs) + n for n, robot in enumerate(factory.strokes)}
+        self.processes = []
+        for p, n in zip(self.programs, periods, strict=True):
+            axes = np.array([p.robot, *([lifts[p.robot]] if p.robot in lifts else [])])
+            phase = int(self.random.integers(n))
+            self.processes.append(
+                Process(p, int(n), phase, axes, np.array(x[axes]), np.zeros(len(axes)))
+            )
         self.place_in_gear = {
             (robot.index, number): position
             for robot in factory.robots
@@ -196,24 +201,21 @@ class DistributedSupervisor:
         self._move(process, step, operation, me)
 
     def _move(self, process: Process, step: Step, operation: Operation, me: int) -> None:
-        """ẋ_i = π_i ∘ F_p, governed by the robot's own limits at its own rate."""
+        """ẋ_i = π_i ∘ F_p, governed by the robot's own limits at its own rate; its lift's too."""
         dt = process.period * self.timestep
         x = self.link.read(operation, me)[0].copy()
-        x[step.slot] = process.reference + process.speed * dt / 2
-        wanted = self._bundle(operation).field(x, dt)[step.slot : step.slot + 1]
-        at, speed = np.array([process.reference]), np.array([process.speed])
-        limit = self.limits.acceleration[me : me + 1]
-        x1, v1, a = govern(at, speed, wanted, limit, dt)
-        self.world.move(np.array([me]), at, speed, a)
-        process.reference, process.speed = float(x1[0]), float(v1[0])
+        slots, mine = np.nonzero(np.equal.outer(self.factory.axes[operation.index], process.axes))
+        axes, at, speed = process.axes[mine], process.reference[mine], process.speed[mine]
+        x[slots] = at + speed * dt / 2
+        wanted = self._bundle(operation).field(x, dt)[slots]
+        x1, v1, a = govern(at, speed, wanted, self.limits.acceleration[axes], dt)
+        self.world.move(axes, at, speed, a)
+        process.reference[mine], process.speed[mine] = x1, v1
 
     def _stop(self, process: Process) -> None:
         """Stand where the reference is."""
-        process.speed = 0.0
-        zero = np.zeros(1)
-        self.world.move(
-            np.array([process.program.robot]), np.array([process.reference]), zero, zero
-        )
+        process.speed[:] = 0.0
+        self.world.move(process.axes, process.reference.copy(), process.speed, process.speed)
 
     def _at_goal(self, process: Process, step: Step) -> bool:
         """The carrier judges the goal of the whole mode, and keeps its clock."""
@@ -257,7 +259,7 @@ class DistributedSupervisor:
     def _bundle(self, operation: Operation) -> Bundle:
         found = self.bundles.get(operation.index)
         if found is None:
-            limits = self.limits.of(operation.robots)
+            limits = self.limits.of(self.factory.axes[operation.index])
             found = self.bundles[operation.index] = Bundle.of(
                 [self.modes[operation.index]], [limits]
             )
@@ -270,6 +272,7 @@ class DistributedSupervisor:
             return
         self.record.started.add((operation.index, unit))
         self.record.under_way[operation.index] = self.world.time
+        self.world.apply([(operation, unit)], [])
         self._log(operation.start)
 
     def _ended(self, operation: Operation, unit: int) -> None:

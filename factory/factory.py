@@ -11,10 +11,11 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from types import MappingProxyType
 
+from factory.approach import Approach
 from factory.errors import Position
 from factory.nets.gears import GearNet
 from factory.pag import NOPART, PAG
-from factory.template import Template
+from factory.template import Template, variable_number
 
 
 @dataclass(frozen=True, slots=True)
@@ -22,7 +23,8 @@ class Operation:
     """A template instantiated: O(r_1, ..., r_k) (section 4.3).
 
     `robots` are indices into `Factory.robots`, in the template's order; `before` and `after` the
-    labels each carries when it starts and ends (NOPART for none); `dwell` [s].
+    labels each carries when it starts and ends (NOPART for none); `dwell` [s]; `approach`: how its
+    inputs come together, None where that is free.
     """
 
     index: int
@@ -33,6 +35,7 @@ class Operation:
     after: tuple[str, ...]
     dwell: float = 0.0
     position: Position | None = field(default=None, compare=False)
+    approach: Approach | None = field(default=None, repr=False)
 
     @property
     def name(self) -> str:
@@ -48,6 +51,19 @@ class Operation:
     def inputs(self) -> tuple[str, ...]:
         """The labels brought, in the order of the robots."""
         return tuple(label for label in self.before if label != NOPART)
+
+    @property
+    def lowered(self) -> int:
+        """The slot of the robot that lowers what it brings, -1 for none."""
+        if self.approach is None or not self.approach.lowered:
+            return -1
+        return self.before.index(self.approach.lowered)
+
+    @property
+    def last(self) -> int:
+        """The slot of the robot that brings the last input, -1 for none."""
+        variables = sorted(self.template.inputs, key=variable_number)
+        return self.template.before.index(variables[-1]) if variables else -1
 
     @property
     def start(self) -> int:
@@ -107,6 +123,29 @@ class Factory:
     def dropoff(self) -> Operation:
         """The output robot's last operation."""
         return self.operations[-1]
+
+    @cached_property
+    def strokes(self) -> Mapping[int, float]:
+        """How far [m] each robot (index) with a lift lowers what it delivers, robot by robot."""
+        found = {
+            o.robots[o.lowered]: o.approach.stroke
+            for o in self.operations
+            if o.approach is not None and o.lowered >= 0
+        }
+        return MappingProxyType(dict(sorted(found.items())))
+
+    @cached_property
+    def axes(self) -> tuple[tuple[int, ...], ...]:
+        """For each operation the axes that its mode moves: the carriages of its robots, which have
+        their robots' numbers, and the lifts that are raised or lowered in it, numbered from R on in
+        the order of `strokes`. A lift is up but for the operation that it delivers to."""
+        lift = {robot: len(self.robots) + n for n, robot in enumerate(self.strokes)}
+        found = [list(operation.robots) for operation in self.operations]
+        for robot, axis in lift.items():
+            gear = self.robots[robot].operations
+            for number in dict.fromkeys((gear[0], gear[-1])):
+                found[number].append(axis)
+        return tuple(map(tuple, found))
 
     def delivered(self, robot: int) -> str:
         """The label a robot (index) carries to its A end, "" for a tool."""

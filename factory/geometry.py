@@ -15,9 +15,11 @@ from types import MappingProxyType
 
 import numpy as np
 
+from factory.decomposition import in_pieces
 from factory.errors import Diagnostic, InputError, Position
-from factory.meshes import LEAST_MASS, Array, Measured, Mesh, measured, sound, usable
+from factory.meshes import LEAST_MASS, Array, Indices, Measured, Mesh, measured, sound, usable
 from factory.pag import PAG, Assembly
+from factory.pieces import box_piece, cylinder_piece, sphere_piece
 
 DENSITY = 1000.0
 """Density of a part that states neither mass nor density [kg/m³]."""
@@ -58,7 +60,7 @@ class Solid:
     `position` (3,) and `quaternion` (4,) place it; `mass` [kg], `centre` (3,) of mass, `inertia`
     (3, 3) about it [kg m²]; `low`, `high` (3,) its bounding box; `corners` (n, 3) the vertices of
     its hull; `pieces` the vertices (n, 3) of the convex bodies it is made of, as the engine
-    collides them: one, its hull, for most.
+    collides them (`factory.pieces` states how exactly): one for most.
     """
 
     label: str
@@ -227,6 +229,8 @@ class _Reader:
             if len(faces) == 0 or not np.isfinite(vertices).all():
                 raise ValueError("it has no triangles, or vertices that are not finite")
             mesh, trouble = usable(f"m{len(self._meshes)}", vertices, faces)
+            if not trouble:
+                mesh = in_pieces(mesh, lambda: self._as_written(path, scale))
             return measured(mesh, trouble)
         except Exception as error:  # trimesh's readers raise anything on a broken file
             position = _value_position(node, "mesh")
@@ -236,6 +240,13 @@ class _Reader:
                 Diagnostic("BadMesh", f"cannot read '{path}': {why}", position, hint)
             )
             return None
+
+    def _as_written(self, path: str, scale: float) -> tuple[Array, Indices]:
+        """Vertices and faces of a mesh file whose vertices in the same place stay apart."""
+        import trimesh
+
+        loaded = trimesh.load(self.folder / path, force="mesh", process=False)
+        return np.asarray(loaded.vertices, float) * scale, np.asarray(loaded.faces, np.int64)
 
 
 def _value_position(node: Assembly, name: str) -> Position | None:
@@ -280,6 +291,7 @@ def _primitive(
         colour(node, number),
         None,
         corners,
+        (_piece(kind, size) @ turn.T + place,),
     )
 
 
@@ -287,9 +299,16 @@ def _corners(kind: str, size: Array) -> Array:
     """Points on the surface whose displacement tells that of the whole."""
     if kind == "sphere":
         return np.asarray(np.concatenate([np.eye(3), -np.eye(3)]) * size[0])
-    half = np.array([size[0], size[0], size[1]]) if kind == "cylinder" else size
-    signs = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], float)
-    return np.asarray(signs * half)
+    return box_piece(np.array([size[0], size[0], size[1]]) if kind == "cylinder" else size)
+
+
+def _piece(kind: str, size: Array) -> Array:
+    """The convex body (n, 3) of a primitive, in its own frame."""
+    if kind == "box":
+        return box_piece(size)
+    if kind == "cylinder":
+        return cylinder_piece(float(size[0]), float(size[1]))
+    return sphere_piece(float(size[0]))
 
 
 def _round_reach(kind: str, size: Array, turn: Array) -> Array:
@@ -320,6 +339,7 @@ def _from_mesh(
         colour(node, number),
         found.mesh,
         corners,
+        tuple(piece @ turn.T + place for piece in found.mesh.pieces) or (corners,),
     )
 
 

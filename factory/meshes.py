@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
+Indices = NDArray[np.int64]
 
 MOST_FACES = 150_000
 """A mesh of more faces is replaced by its convex hull."""
@@ -21,11 +22,13 @@ LEAST_MASS, LEAST_INERTIA = 1e-9, 1e-12
 
 @dataclass(frozen=True, slots=True)
 class Mesh:
-    """A triangle mesh in metres, in its own frame: vertices (n, 3), faces (m, 3)."""
+    """A triangle mesh in metres, in its own frame: vertices (n, 3), faces (m, 3). `pieces` are the
+    vertices (k, 3) of the convex bodies that collide in its place; none where its hull does."""
 
     name: str
     vertices: Array = field(repr=False)
-    faces: NDArray[np.int64] = field(repr=False)
+    faces: Indices = field(repr=False)
+    pieces: tuple[Array, ...] = field(default=(), repr=False)
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,7 +43,7 @@ class Measured:
     hull: Array
 
 
-def usable(name: str, vertices: Array, faces: NDArray[np.int64]) -> tuple[Mesh, str]:
+def usable(name: str, vertices: Array, faces: Indices) -> tuple[Mesh, str]:
     """A mesh that the engine accepts, and what was wrong with the one given ("" if nothing)."""
     for axes in (np.eye(3), _principal_axes(vertices)):
         low, high = (vertices @ axes.T).min(axis=0), (vertices @ axes.T).max(axis=0)

@@ -4,21 +4,25 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from os import PathLike
 from pathlib import Path
 
+from factory.approach import Approach
 from factory.assets import templates_folder
 from factory.compiler import compile_pag
 from factory.errors import Diagnostic, InputError
 from factory.factory import Factory
+from factory.geometry import Product, product_geometry
 from factory.lang.pag_reader import load_pag
 from factory.lang.template_reader import load_templates
+from factory.mating import Matings, matings, shaped
 from factory.pag import PAG
 from factory.robots import Catalogue, load_catalogue
 from factory.template import Template
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Source:
     """A PAG with the templates and robot types it is to be compiled with."""
 
@@ -26,9 +30,25 @@ class Source:
     templates: Mapping[str, Template]
     catalogue: Catalogue
 
+    @cached_property
+    def product(self) -> Product:
+        """The solids of its parts. Raises InputError where a mesh cannot be read."""
+        return product_geometry(self.pag)
+
+    @cached_property
+    def approaches(self) -> Mapping[str, Approach]:
+        """How the inputs of its operations can come together; empty for a product none of whose
+        parts has a shape of its own: its default boxes can always slide."""
+        return self.matings.approaches if self.matings else {}
+
+    @cached_property
+    def matings(self) -> Matings | None:
+        """What was found of how its inputs come together; None for a product of default boxes."""
+        return matings(self.pag, self.templates, self.product) if shaped(self.pag) else None
+
     def compile(self) -> Factory:
         """Compile(P)."""
-        return compile_pag(self.pag, self.templates, self.catalogue)
+        return compile_pag(self.pag, self.templates, self.catalogue, self.approaches)
 
 
 def all_templates(folders: Sequence[Path] = ()) -> Mapping[str, Template]:

@@ -27,7 +27,7 @@ def operation_delays(
     delays = []
     starts = operation_starts(layout)
     for operation, mode, start in zip(factory.operations, modes, starts, strict=True):
-        time = mode_time(mode, start, limits.of(operation.robots), world)
+        time = mode_time(mode, start, limits.of(factory.axes[operation.index]), world)
         delays.append(time + settle + settings.tick)
     return delays
 

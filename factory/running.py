@@ -5,8 +5,9 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable
 from contextlib import ExitStack
+from dataclasses import replace
 from pathlib import Path
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 from factory.console import say, table
 from factory.errors import Diagnostic, InputError
@@ -18,6 +19,9 @@ from factory.pipeline import Source
 from factory.settings import Settings
 from factory.simulation import Observer, Simulation
 from factory.trace import Run
+
+if TYPE_CHECKING:
+    from factory.monitor import Monitor, Report
 
 Size = tuple[int, int]
 
@@ -52,12 +56,15 @@ def run_file(
     quiet: bool,
     options: dict[str, Any],
 ) -> Run:
-    """One run, filmed and logged as asked. Raises MissingError where a film needs GL that is not
-    there, before anything is written."""
+    """One run, filmed, logged and watched by a monitor as asked. Raises MissingError where a film
+    needs GL that is not there, before anything is written."""
     from factory.building import refuse_unproved
     from factory.progress import Progress
 
     refuse_unproved(layout.factory)
+    if options.get("monitor") and options.get("world") == "ideal":
+        message = "the ideal world has no bodies for a monitor to observe"
+        raise InputError(Diagnostic("Usage", message, None, "leave out --world ideal"))
     if video is not None:
         if options.get("world") == "ideal":
             message = "the ideal world has no bodies to film"
@@ -71,6 +78,9 @@ def run_file(
     made = simulation(source, layout, settings, options)
     with ExitStack() as stack:
         observers: list[Observer] = [stack.enter_context(Interruption()).observe]
+        watcher = _monitor(made) if options.get("monitor") else None
+        if watcher is not None:
+            observers.append(watcher.observe)
         if log is not None:
             from factory.log import LogWriter
 
@@ -81,7 +91,21 @@ def run_file(
             film = Film(made, video, size or (1280, 720), options["fps"], options["camera"])
             observers.append(stack.enter_context(film).observe)
         observers.append(stack.enter_context(Progress(made.units, quiet)).observe)
-        return made.run(observers, options.get("max_time"))
+        record = made.run(observers, options.get("max_time"))
+    if watcher is None:
+        return record
+    report = watcher.report()
+    return replace(record, monitor=report, refines_net=record.refines_net and report.refines_net)
+
+
+def _monitor(made: Simulation) -> Monitor:
+    """A monitor that watches the engine of a simulation."""
+    from factory.monitor import Anatomy, Monitor, subject_of
+
+    subject = subject_of(made.layout, made.settings, made.jitter, made.start, made.wip)
+    monitor = Monitor(subject, Anatomy.of(made.world.m, made.layout.factory))
+    monitor.watch(made.world.m, made.world.d)
+    return monitor
 
 
 def render_file(
@@ -182,6 +206,22 @@ def summarise(record: Run, factory: Factory, verbose: bool) -> None:
         )
         for pair in physics.contacts[:8]:
             say(f"  touched: {pair}")
+    if record.monitor is not None:
+        say(verdict(record.monitor))
     busy = sorted(zip(factory.robots, record.utilisation, strict=True), key=lambda p: -p[1])
     rows = [(r.name, r.type, f"{100 * u:.0f} %") for r, u in (busy if verbose else busy[:6])]
     table("Utilisation", ("robot", "type", "busy"), rows)
+
+
+def verdict(report: Report) -> str:
+    """What a monitor found, in a line for people."""
+    counts = f"{len(report.seen)} firings seen, {len(report.inferred)} inferred"
+    if report.refines_net:
+        return f"monitor: {counts}; they explain the run"
+    return f"monitor: {counts}; {len(report.violations)} VIOLATIONS"
+
+
+def say_violations(report: Report | None, shown: int = 8) -> None:
+    """The first violations, on stderr."""
+    for violation in report.violations[:shown] if report else ():
+        print(violation.diagnostic(), file=sys.stderr)

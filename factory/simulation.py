@@ -201,13 +201,16 @@ def physical_model(
 
 
 def start_positions(layout: Layout, marking: Marking) -> np.ndarray:
-    """Arc length of every robot in a marking: where its last operation left it, or its B end where
-    it waits with no part at the beginning of its cycle."""
-    net = layout.factory.net
-    positions = np.zeros(len(layout.factory.robots))
-    for robot, gear in zip(layout.factory.robots, net.gears, strict=True):
+    """Every axis in a marking: a robot where its last operation left it, or at its B end where it
+    waits with no part at the beginning of its cycle, and then its lift may still be down."""
+    factory, net = layout.factory, layout.factory.net
+    positions = np.zeros(len(factory.robots) + len(layout.lifts))
+    lifts = {robot: len(factory.robots) + n for n, robot in enumerate(layout.lifts)}
+    for robot, gear in zip(factory.robots, net.gears, strict=True):
         step = next(i for i, place in enumerate(gear.places) if place in marking) // 2
         positions[robot.index] = layout.home(robot.index, robot.operations[step])
+        if robot.index in lifts and step:
+            positions[lifts[robot.index]] = factory.strokes[robot.index]
     return positions
 
 

@@ -29,7 +29,8 @@ class World(Protocol):
     time: float
 
     def sense(self) -> tuple[Array, Array]:
-        """Positions x (R,) [m] and speeds (R,) [m/s] of all robots, in arc length."""
+        """Positions x [m] and speeds [m/s] of all axes: in arc length of all carriages, then the
+        heights of all lifts."""
 
     def prepared(self, operation: Operation, unit: int) -> bool:
         """Whether the world is in the domain of an operation's mode as far as parts go: a feeder
@@ -40,8 +41,8 @@ class World(Protocol):
     ) -> None:
         """Operations that start or end now, each with the number of the unit it works on."""
 
-    def step(self, bundle: Bundle | None, robots: Index) -> None:
-        """One tick: the robots of the active modes follow their field, all others stand."""
+    def step(self, bundle: Bundle | None, axes: Index) -> None:
+        """One tick: the axes of the active modes follow their field, all others stand."""
 
     def delivered(self) -> int:
         """Products that have left the factory."""
@@ -49,11 +50,11 @@ class World(Protocol):
 
 @dataclass(slots=True)
 class _Active:
-    """The modes under way: operations, their bundle, the robots of each slot, and the clocks."""
+    """The modes under way: operations, their bundle, the axes of each slot, and the clocks."""
 
     operations: tuple[int, ...]
     bundle: Bundle | None
-    robots: Index
+    axes: Index
     clocks: Array
 
 
@@ -105,7 +106,7 @@ class Supervisor:
         ended = self._finished()
         if started or ended:
             self._fire(started, ended)
-        self.world.step(self.active.bundle, self.active.robots)
+        self.world.step(self.active.bundle, self.active.axes)
 
     def marking(self) -> tuple[str, ...]:
         """The names of the marked places."""
@@ -124,9 +125,9 @@ class Supervisor:
                 continue
             if positions is None:
                 positions = self.world.sense()[0]
-            robots = list(operation.robots)
-            mode = Bundle.of([self.modes[operation.index]], [self.limits.of(operation.robots)])
-            if mode.in_domain(positions[robots])[0]:
+            axes = self.factory.axes[operation.index]
+            mode = Bundle.of([self.modes[operation.index]], [self.limits.of(axes)])
+            if mode.in_domain(positions[list(axes)])[0]:
                 found.append(operation.index)
         return found
 
@@ -137,7 +138,7 @@ class Supervisor:
         if active.bundle is None:
             return []
         x, v = self.world.sense()
-        x, v = x[active.robots], v[active.robots]
+        x, v = x[active.axes], v[active.axes]
         active.clocks = active.bundle.tick(active.clocks, x, self.tick)
         done = active.bundle.finished(x, active.clocks)
         if not done.any():
@@ -209,13 +210,13 @@ class Supervisor:
         """Rebuild the bundle of active modes; clocks of those that go on are kept."""
         numbers = tuple(operations)
         clocks = dict(zip(self.active.operations, self.active.clocks, strict=True))
-        chosen = [self.factory.operations[o] for o in numbers]
+        chosen = [self.factory.axes[o] for o in numbers]
         bundle = (
-            Bundle.of([self.modes[o] for o in numbers], [self.limits.of(o.robots) for o in chosen])
+            Bundle.of([self.modes[o] for o in numbers], [self.limits.of(axes) for axes in chosen])
             if numbers
             else None
         )
-        robots = np.array([r for o in chosen for r in o.robots], np.intp)
+        axes = np.array([axis for axes in chosen for axis in axes], np.intp)
         self.active = _Active(
-            numbers, bundle, robots, np.array([clocks.get(o, 0.0) for o in numbers])
+            numbers, bundle, axes, np.array([clocks.get(o, 0.0) for o in numbers])
         )

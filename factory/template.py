@@ -82,3 +82,9 @@ class Template:
         return tuple(
             i for i, label in enumerate(self.before) if label == NOPART and i != self.carrier - 1
         )
+
+
+def variable_number(variable: str) -> tuple[int, str]:
+    """What orders the label variables of a template: their number, `LAB10` after `LAB2`."""
+    digits = "".join(c for c in variable if c.isdigit())
+    return int(digits or 0), variable

@@ -2,9 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
+from factory.approach import Pair
 from factory.errors import Diagnostic
+
+if TYPE_CHECKING:
+    from factory.monitor.report import Report
 
 
 @dataclass(frozen=True, slots=True)
@@ -17,7 +23,11 @@ class Event:
 
 @dataclass(frozen=True, slots=True)
 class PhysicsFigures:
-    """What only the engine can tell; see the specification of `run` for each."""
+    """What only the engine can tell; see the specification of `run` for each.
+
+    `mating_forces`: by operation, the largest force of a contact between inputs that it was
+    joining [N]; `excluded`: pairs of parts whose contact was off.
+    """
 
     handoffs: int = 0
     handoff_gap_max_mm: float = 0.0
@@ -26,11 +36,20 @@ class PhysicsFigures:
     unintended_contacts: int = 0
     engine_warnings: int = 0
     contacts: tuple[str, ...] = ()
+    mating_forces: Mapping[str, float] = field(default_factory=dict)
+    excluded: tuple[Pair, ...] = ()
+
+    @property
+    def mating_force_max_n(self) -> float:
+        """The largest force with which inputs touched while they were being joined [N]."""
+        return max(self.mating_forces.values(), default=0.0)
 
 
 @dataclass(frozen=True, slots=True)
 class Run:
-    """The record of a run: figures and events. `trouble` is None for a run that reached its end."""
+    """The record of a run: figures and events. `trouble` is None for a run that reached its end;
+    `monitor` the verdict of a monitor, if one watched it: `refines_net` is then its and that of the
+    replay."""
 
     world: str
     units: int
@@ -50,6 +69,7 @@ class Run:
     seed: int = 0
     jitter: float = 0.0
     trouble: Diagnostic | None = None
+    monitor: Report | None = None
 
     @property
     def realtime_factor(self) -> float:
@@ -73,7 +93,10 @@ class Run:
 
     def as_json(self) -> dict[str, object]:
         """The document that `run --json` prints."""
-        physics = self.physics
+        physics, monitor = self.physics, self.monitor
+        watched = (
+            {"monitor_time_s": monitor.time_s, "monitor": monitor.as_json()} if monitor else {}
+        )
         keys = (
             "handoffs",
             "handoff_gap_max_mm",
@@ -81,6 +104,7 @@ class Run:
             "product_error_max_mm",
             "unintended_contacts",
             "engine_warnings",
+            "mating_force_max_n",
         )
         return {
             "schema": 1,
@@ -102,5 +126,8 @@ class Run:
             "refines_net": self.refines_net,
             **{key: getattr(physics, key) if physics else None for key in keys},
             "contacts": list(physics.contacts) if physics else None,
+            "mating_forces_n": dict(physics.mating_forces) if physics else None,
+            "excluded": [list(pair) for pair in physics.excluded] if physics else None,
+            **watched,
             "events": [{"t": round(e.t, 6), "transition": e.transition} for e in self.events],
         }

@@ -167,7 +167,7 @@ def test_a_carrier_may_stop_ahead_of_its_tools() -> None:
 def laid_out_with(template: object) -> Layout:
     """The paper's example with one template replaced, under its own name or as weld."""
     name = template.name if template.name in ("mate", "weld") else "weld"  # type: ignore[attr-defined]
-    templates = {**TEMPLATES, name: template}
+    templates = {**TEMPLATES, name: replace(template, name=name)}  # type: ignore[type-var]
     factory = compile_pag(paper(), templates, catalogue())  # type: ignore[arg-type]
     return lay_out(factory, product_geometry(factory.pag))
 

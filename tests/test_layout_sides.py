@@ -9,6 +9,7 @@ import pytest
 import factory.layout.embedding as embedding
 from factory.geometry import product_geometry
 from factory.layout.plan import Layout
+from factory.mating.judged import judged
 from factory.simulation import Simulation
 from tests.test_compiler import PAPER, compiled
 
@@ -45,13 +46,27 @@ def test_parts_of_a_product_do_not_pass_through_each_other(text: str) -> None:
 
 
 def test_inputs_from_the_wrong_sides_are_seen(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Planted fault: the sides that are shortest, whatever lies where."""
-    right = laid_out(BALANCED)
+    """Planted fault: every robot on the other side. The parts run into each other for real."""
+    admitted = embedding.admissible
 
-    def swapped(factory, product, payloads, sides):
-        found = embedding_uncrossed(factory, product, payloads, sides)
-        return {robot: -side for robot, side in found.items()}
+    def swapped(factory, sides):
+        return {robot: -side for robot, side in admitted(factory, sides).items()}
 
-    embedding_uncrossed = embedding.uncrossed
-    monkeypatch.setattr(embedding, "uncrossed", swapped)
-    assert deepest(laid_out(BALANCED)) > 0.01 > deepest(right)
+    monkeypatch.setattr(embedding, "admissible", swapped)
+    simulation = Simulation(laid_out(BALANCED), units=1)
+    run = simulation.run()
+    assert run.trouble is not None and run.trouble.code == "Stalled"
+    assert run.physics.mating_force_max_n > 10
+
+
+def test_sides_are_right_for_any_sides_to_begin_with() -> None:
+    plan = judged(compiled(BALANCED), product_geometry(compiled(BALANCED).pag))
+    guests = range(1, len(plan.robots))
+    for chosen in range(2 ** len(guests)):
+        sides = {g: 1 if chosen >> g - 1 & 1 else -1 for g in guests}
+        for operation in plan.operations:
+            pair = [r for r in operation.robots if r != operation.carrier]
+            if len(pair) == 2:
+                sides[pair[1]] = -sides[pair[0]]
+        found = embedding.admissible(plan, sides)
+        assert embedding.admissible(plan, found) == found

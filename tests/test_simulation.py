@@ -193,7 +193,7 @@ def test_robots_that_touch_are_seen_in_the_ideal_world(paper: Layout) -> None:
 
 def test_a_robot_reads_only_its_own_mode(paper: Layout) -> None:
     """Planted fault: r1 asks for the state of a mode it is not in."""
-    link = Link(Simulation(paper, world="ideal", units=1).world)
+    link = Link(Simulation(paper, world="ideal", units=1).world, paper.factory.axes)
     assert len(link.read(paper.factory.by_label["sub1"], 2)[0]) == 3
     with pytest.raises(AssertionError, match="not in the mode of sub1"):
         link.read(paper.factory.by_label["sub1"], 0)

@@ -123,13 +123,12 @@ def plan(
     file: Path, folders: Sequence[Path], settings: Any, floor: str | None
 ) -> tuple[Any, Any, Any]:
     """PAG to layout; warnings on stderr. Gives source, factory and layout."""
-    from factory.geometry import product_geometry
     from factory.layout.embedding import lay_out
     from factory.pipeline import read
 
     source = read(file, folders)
     factory = source.compile()
-    product = product_geometry(source.pag)
+    product = source.product
     room = pair(floor, "--floor", "4x3", float)
     return source, factory, lay_out(factory, product, settings.clearance, room)
 

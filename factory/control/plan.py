@@ -32,8 +32,9 @@ def operation_modes(layout: Layout, eps: float) -> tuple[Mode, ...]:
     modes = tuple(operation_mode(layout, operation, eps) for operation in operations)
     starts = operation_starts(layout)
     count = len(layout.guidepaths)
+    count += len(layout.lifts)
     limits = Limits(np.ones(count), np.ones(count))
-    bundle = Bundle.of(modes, [limits.of(operation.robots) for operation in operations])
+    bundle = Bundle.of(modes, [limits.of(axes) for axes in layout.factory.axes])
     inside = bundle.in_domain(np.concatenate(starts))
     faults = [
         _unprepared(operation, within)
@@ -46,7 +47,7 @@ def operation_modes(layout: Layout, eps: float) -> tuple[Mode, ...]:
 
 
 def operation_starts(layout: Layout) -> list[Array]:
-    """For each operation where its robots are when it starts (k,): where the ones before left
+    """For each operation where its axes (k,) are when it starts: where the ones before left
     them."""
     factory = layout.factory
     left: dict[tuple[int, int], float] = {}
@@ -54,7 +55,11 @@ def operation_starts(layout: Layout) -> list[Array]:
         for step, number in enumerate(robot.operations):
             before = factory.operations[robot.operations[step - 1]]
             left[number, robot.index] = layout.goal(before.index, before.robots.index(robot.index))
-    return [np.array([left[o.index, robot] for robot in o.robots]) for o in factory.operations]
+    for axis, robot in enumerate(layout.lifts, start=len(factory.robots)):
+        gear, stroke = factory.robots[robot].operations, factory.strokes[robot]
+        left[gear[0], axis] = 0.0
+        left[gear[-1], axis] = stroke
+    return [np.array([left[o.index, a] for a in factory.axes[o.index]]) for o in factory.operations]
 
 
 def _unprepared(operation: Operation, inside: bool) -> Diagnostic:
@@ -70,7 +75,8 @@ def _unprepared(operation: Operation, inside: bool) -> Diagnostic:
 
 def operation_mode(layout: Layout, operation: Operation, eps: float) -> Mode:
     """The mode of one operation. A robot that brings something to a carrier that brings something
-    too keeps its distance until the carrier stands: they would meet diagonally."""
+    too keeps its distance until the carrier stands: they would meet diagonally. So does one that is
+    to lower what it brings: it does so when all others stand."""
     paths = [layout.guidepaths[robot] for robot in operation.robots]
     carrier = operation.template.carrier - 1
     gate, standoff = np.full(len(paths), -1), np.zeros(len(paths))
@@ -78,6 +84,11 @@ def operation_mode(layout: Layout, operation: Operation, eps: float) -> Mode:
         for slot, label in enumerate(operation.before):
             if slot != carrier and label != NOPART:
                 gate[slot], standoff[slot] = carrier, layout.standoff(operation, slot)
+    elif operation.lowered >= 0:
+        others = (s for s, label in enumerate(operation.before) if label != NOPART)
+        slot = operation.lowered
+        gate[slot] = next(other for other in others if other != slot)
+        standoff[slot] = layout.standoff(operation, slot)
     r = np.array([path.r for path in paths])
     stations = [
         path.length - layout.stations[operation.index] - path.reach if slot == carrier else np.nan
@@ -95,7 +106,31 @@ def operation_mode(layout: Layout, operation: Operation, eps: float) -> Mode:
         standoff=standoff,
     )
     template = operation.template
-    return mode_of(_inside(template) if template.before[carrier] != NOPART else template, setting)
+    if template.before[carrier] != NOPART:
+        template = _inside(template)
+    return _with_lifts(mode_of(template, setting), layout, operation)
+
+
+def _with_lifts(mode: Mode, layout: Layout, operation: Operation) -> Mode:
+    """The mode with the lifts that its robots raise, or lower: one that is lowered is up until its
+    own robot stands, which stands after all others."""
+    factory, count = layout.factory, len(operation.robots)
+    axes = factory.axes[operation.index][count:]
+    if not axes:
+        return mode
+    robots = [layout.lifts[axis - len(factory.robots)] for axis in axes]
+    strokes = np.array([factory.strokes[robot] for robot in robots])
+    goals = np.array([layout.goal(operation.index, count + n) for n in range(len(axes))])
+    lowers = goals < strokes
+    own = np.array([operation.robots.index(robot) for robot in robots])
+    return replace(
+        mode,
+        goals=np.append(mode.goals, goals),
+        lower=np.append(mode.lower, np.zeros(len(axes))),
+        upper=np.append(mode.upper, strokes),
+        gate=np.append(mode.gate, np.where(lowers, own, -1)),
+        standoff=np.append(mode.standoff, np.where(lowers, strokes, 0.0)),
+    )
 
 
 @lru_cache(maxsize=256)
@@ -117,9 +152,10 @@ def _inside(template: Template) -> Template:
 def robot_limits(
     layout: Layout, settings: Settings, seed: int = 0, jitter: float = 0.0
 ) -> tuple[Limits, np.ndarray]:
-    """Each robot's speed and acceleration, and the factor (R,) on its controller's gain, drawn
-    within ± jitter by the seed."""
+    """Each axis's speed and acceleration, and the factor on its controller's gain: drawn for each
+    robot within ± jitter by the seed, and the same for its lift."""
     count = len(layout.guidepaths)
     draw = np.random.default_rng(seed).uniform(1 - jitter, 1 + jitter, size=(2, count))
-    speed = settings.speed * draw[0]
-    return Limits(speed, np.full(count, settings.acceleration)), draw[1]
+    robots = [*range(count), *layout.lifts]
+    speed = settings.speed * draw[0, robots]
+    return Limits(speed, np.full(len(robots), settings.acceleration)), draw[1, robots]

@@ -18,6 +18,7 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
+from factory.approach import MARGIN
 from factory.factory import Operation
 from factory.layout.certificate import Certificate, Fault, Shared
 from factory.layout.crossings import CHUNK, embedding_faults
@@ -69,6 +70,7 @@ def certify(layout: Layout) -> Certificate:
         *islice(embedding_faults(layout), MOST),
         *islice(search.faults(), MOST),
         *islice(_standoffs(layout, found), MOST),
+        *islice(_raised(layout, found), MOST),
     ]
     top = max(region.z[1] for region in swept)
     return Certificate(
@@ -250,7 +252,29 @@ def _standoffs(layout: Layout, found: Mapping[str, Pile]) -> Iterator[Fault]:
                     " station of its guidepath: it could never start"
                 )
                 yield _fault(layout, message, (guest,), -room)
-            yield from _met(layout, pile, guest)
+            if slot != operation.lowered:
+                yield from _met(layout, pile, guest)
+
+
+def _raised(layout: Layout, found: Mapping[str, Pile]) -> Iterator[Fault]:
+    """What is to be lowered comes above all that the others bring."""
+    for operation in layout.factory.operations[:-1]:
+        if operation.lowered < 0:
+            continue
+        guest = operation.robots[operation.lowered]
+        low = found[operation.before[operation.lowered]].z[0] + layout.elevations[guest]
+        for robot, label in zip(operation.robots, operation.before, strict=True):
+            if robot == guest or label == NOPART:
+                continue
+            over = low - found[label].z[1] - layout.elevations[operation.carrier]
+            if over < MARGIN - TOLERANCE:
+                name = layout.factory.robots[guest].name
+                message = (
+                    f"{name} comes {over * 1000:.1f} mm over '{label}' in '{operation.label}';"
+                    f" {MARGIN * 1000:g} mm are needed"
+                )
+                here = Region(guest, PAYLOADS, PAYLOAD_BODY, found[label].box, found[label].z)
+                yield _fault(layout, message, (here,), MARGIN - over)
 
 
 def _legs(layout: Layout) -> dict[tuple[int, int], tuple[float, float]]:
@@ -271,7 +295,8 @@ def _way(
     legs: Mapping[tuple[int, int], tuple[float, float]],
 ) -> Region:
     """What a robot's payload sweeps in a mode before its gate opens."""
-    robot, pile = operation.robots[slot], found[operation.before[slot]]
+    robot = operation.robots[slot]
+    pile = found[operation.before[slot]].raised(layout.elevations[robot])
     start, end = legs[operation.index, robot]
     end += layout.standoff(operation, slot)
     box = sweep(layout.guidepaths[robot], pile.box, max(start, end), end)

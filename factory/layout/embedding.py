@@ -23,9 +23,10 @@ from factory.layout.shapes import (
     project,
     symmetric_shapes,
 )
-from factory.layout.sides import uncrossed
+from factory.layout.sides import admissible
 from factory.layout.stretching import Shape, Sides, Stretched, stretch, up
 from factory.layout.sweeps import ALWAYS, KINDS, OUTFEED, STATIONS, Region, hull, piles, regions
+from factory.mating.judged import judged
 
 SHED = 0.1
 """Length of the open part of the outfeed beyond the product, and of what its end has to spare
@@ -41,7 +42,7 @@ def lay_out(
     """The layout of a factory with its clearance certificate. Raises RunError (Layout) where it
     does not fit a floor of the given width and depth, saying by how much and where, or where an
     operation's template asks for what cannot be kept clear."""
-    draft = _draft(factory, product, Clearance(clearance))
+    draft = _draft(judged(factory, product), product, Clearance(clearance))
     layout = draft.layout()
     draft.stretched.travel[0] = round(draft.stretched.travel[0] - _spare(layout), 3)
     layout = draft.layout()
@@ -111,7 +112,7 @@ class _Draft:
 def _draft(factory: Factory, product: Product, c: Clearance) -> _Draft:
     payloads = payload_boxes(factory, product)
     compact = stretch(factory, symmetric_shapes(factory, payloads, c), c).sides
-    sides = uncrossed(factory, product, payloads, compact)
+    sides = admissible(factory, compact)
     axes = headings(factory, sides)
     shapes = exact_shapes(factory, payloads, axes, sides, c)
     stretched = stretch(factory, shapes.__getitem__, c, sides)

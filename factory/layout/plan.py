@@ -13,6 +13,7 @@ from functools import cached_property
 from types import MappingProxyType
 from typing import TYPE_CHECKING
 
+from factory.approach import Pair
 from factory.factory import Factory, Operation
 from factory.geometry import Product
 from factory.layout.dimensions import BOOM, PAYLOAD, POST, Clearance
@@ -28,6 +29,9 @@ Extent = tuple[float, float, float, float]
 """(ulo, uhi, tlo, thi): a box in a robot's frame, about the product's middle [m]."""
 
 Point2 = tuple[float, float]
+
+BESIDE = 0.005
+"""What is to be lowered stays this far short of its meeting point until the others stand [m]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -137,17 +141,64 @@ class Layout:
         return (xhi - xlo) * (yhi - ylo)
 
     def goal(self, operation: int, slot: int) -> float:
-        """Arc length of the goal of the robot in `slot` of an operation.
+        """Arc length of the goal of the robot in `slot` of an operation; beyond its robots, height
+        of the goal of a lift (see `Factory.axes`).
 
-        A non-carrier delivers at A + 2r; a carrier stands `stations[operation]` from its B end.
+        A non-carrier delivers at A + 2r; a carrier stands `stations[operation]` from its B end. A
+        lift is up but for the operation it delivers to.
         """
         chosen = self.factory.operations[operation]
+        if slot >= len(chosen.robots):
+            robot = self.lifts[self.factory.axes[operation][slot] - len(self.guidepaths)]
+            last = self.factory.robots[robot].operations[-1]
+            return 0.0 if operation == last else self.factory.strokes[robot]
         path = self.guidepaths[chosen.robots[slot]]
         point = chosen.template.law.goals[slot]
         if slot != chosen.template.carrier - 1 or point.end == "A":
             return point.multiple * path.r
         exact = {"B": 0.0, "S": 2.0}[point.end]
         return path.length - self.stations[operation] + (point.multiple - exact) * path.r
+
+    @cached_property
+    def lifts(self) -> tuple[int, ...]:
+        """The robots that have a lift, in the order of their axes."""
+        return tuple(self.factory.strokes)
+
+    @cached_property
+    def elevations(self) -> tuple[float, ...]:
+        """How far above its place in the product each robot carries what it brings [m]: the stroke
+        of its own lift over the height at which the robot it delivers to carries it."""
+        strokes, operations = self.factory.strokes, self.factory.operations
+        found: list[float] = []
+        for robot in self.factory.robots:
+            below = 0.0
+            if robot.index:
+                below = found[operations[robot.operations[-1]].carrier]
+            found.append(below + strokes.get(robot.index, 0.0))
+        return tuple(found)
+
+    def side(self, operation: Operation) -> int:
+        """From which side, +1 or -1, of the axis of its approach the last input of an operation
+        comes, in the directions of the product."""
+        carrier = operation.template.carrier - 1
+        last = operation.last
+        guests = (s for s, label in enumerate(operation.before) if label != NOPART and s != carrier)
+        guest = operation.robots[next(guests) if last == carrier else last]
+        heading = self.guidepaths[guest].heading
+        side = -1 if heading[0] + heading[1] > 0 else +1
+        return -side if last == carrier else side
+
+    @cached_property
+    def excluded(self) -> tuple[Pair, ...]:
+        """The pairs of parts that pass through each other as their operations join them, or overlap
+        in the finished product; contact between them is off."""
+        found: dict[Pair, None] = {}
+        for operation in self.factory.operations[:-1]:
+            approach = operation.approach
+            if approach is not None and any(approach.excluded):
+                which = approach.sides.index(self.side(operation))
+                found.update(dict.fromkeys(approach.excluded[which]))
+        return tuple(found)
 
     def home(self, robot: int, operation: int) -> float:
         """Arc length at which a robot waits before an operation: the goal of the one before, or B
@@ -172,7 +223,10 @@ class Layout:
         return Feeder(
             path.world((back - half, back + half, across - half, across + half), middle),
             path.world((back, ahead, across - BOOM / 2, across + BOOM / 2), middle),
-            PAYLOAD + float(solid.high[2] - self.product.low[2]) + self.clearance,
+            PAYLOAD
+            + self.elevations[operation.carrier]
+            + float(solid.high[2] - self.product.low[2])
+            + self.clearance,
         )
 
     def standoff(self, operation: Operation, slot: int) -> float:
@@ -180,8 +234,11 @@ class Layout:
         [m].
 
         Where the carrier brings a pile too, both would meet diagonally; from here on the payload is
-        clear of the pile wherever that is on its way.
+        clear of the pile wherever that is on its way. What is lowered comes above the pile, and
+        waits just beside its place.
         """
+        if slot == operation.lowered:
+            return BESIDE
         carrier = operation.template.carrier - 1
         pile, label = operation.before[carrier], operation.before[slot]
         if slot == carrier or NOPART in (pile, label):

@@ -51,7 +51,7 @@ ALWAYS = -1
 @dataclass(frozen=True, slots=True)
 class Region:
     """A rectangle in one layer: which robot is there (a station counts to the robot it serves),
-    with what, carrying which label, from z low to z high [m], and in the mode of which
+    with what, carrying which label, from z low to z high [m], a lift up, and in the mode of which
     operation, ALWAYS for an uncoupled region."""
 
     robot: int
@@ -69,6 +69,10 @@ class Pile:
 
     box: Box
     z: tuple[float, float]
+
+    def raised(self, height: float) -> Pile:
+        """The same, so much higher [m]."""
+        return Pile(self.box, (self.z[0] + height, self.z[1] + height))
 
 
 def piles(factory: Factory, product: Product) -> dict[str, Pile]:
@@ -159,7 +163,7 @@ def _payloads(layout: Layout, robot: int, found: Mapping[str, Pile]) -> Iterator
         label = operation.after[operation.robots.index(robot)]
         if label == NOPART:
             continue
-        pile, at = found[label], stops[step]
+        pile, at = found[label].raised(layout.elevations[robot]), stops[step]
         step = (step + 1) % len(gear)
         onward = operations[gear[step]]
         leaves = onward.after[onward.robots.index(robot)] == NOPART

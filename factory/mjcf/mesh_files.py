@@ -3,7 +3,8 @@ looks.
 
 A closed mesh is written as STL. One that is open, or wound to and fro, as most CAD exports are,
 would be drawn with holes: it is written as OBJ with every triangle seen from both sides, and with
-normals that are smooth over rounded surfaces and sharp at edges."""
+normals that are smooth over rounded surfaces and sharp at edges. So is a mesh of several bodies,
+that is to look as if of one; what collides in its place is written as STL, a file a body."""
 
 from __future__ import annotations
 
@@ -13,6 +14,7 @@ import struct
 import numpy as np
 
 from factory.geometry import Array, Mesh
+from factory.meshes import Indices
 
 CREASE = 31.0
 """Triangles that meet at a smaller angle are shaded as one rounded surface [degrees]."""
@@ -23,9 +25,27 @@ def mesh_file(mesh: Mesh) -> tuple[str, bytes]:
     import trimesh
 
     body = trimesh.Trimesh(mesh.vertices, mesh.faces, process=False)
+    if mesh.pieces:
+        body.merge_vertices()
+        outside = Mesh(mesh.name, np.asarray(body.vertices), np.asarray(body.faces))
+        return f"{mesh.name}.obj", obj(outside.vertices, outside.faces, corner_normals(outside))
     if body.is_watertight and body.is_winding_consistent and body.volume > 0:
         return f"{mesh.name}.stl", stl(mesh)
     return f"{mesh.name}.obj", two_sided_obj(mesh)
+
+
+def piece_files(mesh: Mesh) -> list[tuple[str, bytes]]:
+    """The files of the convex bodies that collide in a mesh's place: names, counted from 1, and
+    contents."""
+    import trimesh
+
+    found = []
+    for number, vertices in enumerate(mesh.pieces, 1):
+        hull = trimesh.convex.convex_hull(vertices)
+        name = f"{mesh.name}.{number}"
+        piece = Mesh(name, np.asarray(hull.vertices), np.asarray(hull.faces))
+        found.append((f"{name}.stl", stl(piece)))
+    return found
 
 
 def stl(mesh: Mesh) -> bytes:
@@ -42,17 +62,20 @@ def stl(mesh: Mesh) -> bytes:
 def two_sided_obj(mesh: Mesh) -> bytes:
     """A mesh as an OBJ file in which every triangle has a back too, lit from its own side."""
     normals = corner_normals(mesh)
-    across, inverse = np.unique(
-        np.round(np.concatenate([normals, -normals[:, ::-1]]).reshape(-1, 3), 4),
-        axis=0,
-        return_inverse=True,
+    return obj(
+        mesh.vertices,
+        np.concatenate([mesh.faces, mesh.faces[:, ::-1]]),
+        np.concatenate([normals, -normals[:, ::-1]]),
     )
-    faces = np.concatenate([mesh.faces, mesh.faces[:, ::-1]]) + 1
-    shade = inverse.reshape(-1, 3) + 1
+
+
+def obj(vertices: Array, faces: Indices, normals: Array) -> bytes:
+    """An OBJ file of triangles (m, 3) with a normal at each corner (m, 3, 3)."""
+    across, inverse = np.unique(np.round(normals.reshape(-1, 3), 4), axis=0, return_inverse=True)
+    indices = np.stack([faces, inverse.reshape(-1, 3)], axis=2).reshape(-1, 6) + 1
     text = io.StringIO()
-    np.savetxt(text, mesh.vertices, fmt="v %.9g %.9g %.9g")
+    np.savetxt(text, vertices, fmt="v %.9g %.9g %.9g")
     np.savetxt(text, across, fmt="vn %.4f %.4f %.4f")
-    indices = np.stack([faces, shade], axis=2).reshape(-1, 6)
     np.savetxt(text, indices, fmt="f %d//%d %d//%d %d//%d")
     return text.getvalue().encode()
 

@@ -25,6 +25,7 @@ from factory.mjcf.outfeed import TRAY_MASS, add_tray
 from factory.mjcf.parts import add_meshes, add_parts, parked_at, place_in
 from factory.mjcf.robots import (
     Drive,
+    Hoist,
     add_paints,
     heading_quaternion,
     instantiate,
@@ -37,11 +38,21 @@ from factory.settings import Settings
 CARRIAGE_MASS = 1.9
 """What a `dot` weighs without payload [kg]; only used to size gains and forces."""
 
+HEAD_MASS = 0.4
+"""What the head of a `lift` weighs without payload [kg]."""
+
+HOIST_MASS = 2.0
+"""What a `lift`'s hoist accelerates without payload: its head, and its motor's inertia [kg]."""
+
 STIFFNESS = 70.0
 """Natural frequency of a robot's position loop at full payload [rad/s]."""
 
-BITS = 24
-"""Units whose parts can be told apart by contact masks; bit 0 is that of robots and stations."""
+HOIST_STIFFNESS = 200.0
+"""The same of a lift's, which holds a weight: half a payload unaccounted for lets it sag by 0.1
+mm [rad/s]."""
+
+GRAVITY = 9.81
+"""[m/s²]; the engine's own."""
 
 
 @dataclass(frozen=True)
@@ -115,16 +126,18 @@ def build_model(
     world = add(root, "worldbody")
     add_scene(world, layout)
     equality, actuator = Element("equality"), Element("actuator")
-    _robots(layout, catalogue, drives, defaults, asset, world, actuator)
+    hoists = _hoists(factory, masses, settings)
+    _robots(layout, catalogue, drives, hoists, defaults, asset, world, actuator)
     load = masses[factory.pag.root] + TRAY_MASS
     add_tray(world, actuator, layout, drive_for(load, settings.outfeed_acceleration, settings))
     add_parts(world, layout, copies)
     _welds(equality, layout, copies)
-    root.extend([equality, actuator])
+    contact = _exclusions(layout, copies)
+    root.extend([*([contact] if len(contact) else []), equality, actuator])
     _home(add(root, "keyframe"), layout, actuator)
     ElementTree.indent(root)
     xml = ElementTree.tostring(root, encoding="unicode") + "\n"
-    joints = len(factory.robots) + 1 + sum(copies.values())
+    joints = len(factory.robots) + len(hoists) + 1 + sum(copies.values())
     return Model(layout, settings, copies, masses, drives, xml, files, joints, len(equality))
 
 
@@ -152,10 +165,27 @@ def _drive(factory: Factory, robot: int, masses: Mapping[str, float], settings: 
     return drive_for(CARRIAGE_MASS + load, settings.acceleration, settings)
 
 
-def drive_for(mass: float, acceleration: float, settings: Settings) -> Drive:
+def drive_for(
+    mass: float, acceleration: float, settings: Settings, stiffness: float = STIFFNESS
+) -> Drive:
     """Critically damped gains for a mass [kg], and the force that its acceleration [m/s²] takes."""
-    kp, kv = mass * STIFFNESS**2, 2 * mass * STIFFNESS
+    kp, kv = mass * stiffness**2, 2 * mass * stiffness
     return Drive(round(kp, 3), round(kv, 3), round(settings.force * mass * acceleration + 5, 3))
+
+
+def _hoists(factory: Factory, masses: Mapping[str, float], settings: Settings) -> dict[int, Hoist]:
+    """The lifts, for the heaviest load of each: what it delivers."""
+    found = {}
+    for robot, stroke in factory.strokes.items():
+        mass = HOIST_MASS + masses[factory.delivered(robot)]
+        drive = drive_for(mass, settings.acceleration + GRAVITY, settings, HOIST_STIFFNESS)
+        found[robot] = Hoist(stroke, drive)
+    return found
+
+
+def held_at(layout: Layout, robot: int) -> float:
+    """How far above its place in the product a robot holds its payload with its lift down [m]."""
+    return layout.elevations[robot] - layout.factory.strokes.get(robot, 0.0)
 
 
 def _options(root: Element, settings: Settings, bodies: int) -> None:
@@ -179,7 +209,7 @@ def _defaults(root: Element) -> Element:
         part,
         "geom",
         contype=2,
-        conaffinity=number(2 ** (BITS + 1) - 1 - 2),
+        conaffinity=1,
         condim=3,
         friction="0.6 0.005 0.0001",
         group=0,
@@ -195,6 +225,7 @@ def _robots(
     layout: Layout,
     catalogue: Catalogue,
     drives: tuple[Drive, ...],
+    hoists: Mapping[int, Hoist],
     defaults: Element,
     asset: Element,
     world: Element,
@@ -215,8 +246,9 @@ def _robots(
             robot.name,
             path,
             drive,
-            low - float(product.low[2]),
+            low - float(product.low[2]) + held_at(layout, robot.index),
             _role(factory, robot.index),
+            hoists.get(robot.index),
         )
         if robot.index == 0:
             add_follower(body, layout)
@@ -252,13 +284,14 @@ def _welds(equality: Element, layout: Layout, copies: Mapping[str, int]) -> None
     factory, product = layout.factory, layout.product
     for robot, path in zip(factory.robots, layout.guidepaths, strict=True):
         w, _, _, z = heading_quaternion(path)
+        holder = names.head if robot.index in factory.strokes else names.carriage
         label = factory.delivered(robot.index)
         for part in factory.contents[label] if label else ():
             pose = (*grip_position(layout, robot.index, part), w, 0, 0, -z)
             _weld(
                 equality,
                 names.grip(robot.name, part),
-                names.carriage(robot.name),
+                holder(robot.name),
                 names.part(part, 1),
                 pose,
             )
@@ -266,7 +299,7 @@ def _welds(equality: Element, layout: Layout, copies: Mapping[str, int]) -> None
         part = operation.label
         path = layout.guidepaths[operation.carrier]
         w, _, _, z = heading_quaternion(path)
-        offset = place_in(product, part, (0.0, 0.0))
+        offset = place_in(product, part, (0.0, 0.0), layout.elevations[operation.carrier])
         pose = (*_turned(offset, path.heading), w, 0, 0, -z)
         _weld(equality, names.feed(part), names.feeder(part), names.part(part, 1), pose, True)
         for n in range(1, copies[part] + 1):
@@ -277,12 +310,30 @@ def _welds(equality: Element, layout: Layout, copies: Mapping[str, int]) -> None
         _weld(equality, names.hold(part), names.OUTFEED_TRAY, names.part(part, 1), pose)
 
 
+def _exclusions(layout: Layout, copies: Mapping[str, int]) -> Element:
+    """The pairs of parts that pass through each other when they are joined, a slot for each unit
+    that can be inside: a run aims them at the copies of one unit."""
+    contact = Element("contact")
+    for one, other in layout.excluded:
+        for n in range(1, min(copies[one], copies[other]) + 1):
+            add(
+                contact,
+                "exclude",
+                name=names.exclusion(one, other, n),
+                body1=names.part(one, n),
+                body2=names.part(other, n),
+            )
+    return contact
+
+
 def grip_position(layout: Layout, robot: int, part: str) -> tuple[float, float, float]:
-    """Where a robot holds a part's centre of mass, in the frame of its carriage [m]."""
+    """Where a robot holds a part's centre of mass, in the frame of its carriage, or of its head
+    [m]."""
     path = layout.guidepaths[robot]
     at = path.middle(0.0)
     foot = path.carriage(0.0)
-    x, y, z = place_in(layout.product, part, (at[0] - foot[0], at[1] - foot[1]))
+    middle = (at[0] - foot[0], at[1] - foot[1])
+    x, y, z = place_in(layout.product, part, middle, held_at(layout, robot))
     return _turned((x, y, z), path.heading)
 
 

@@ -18,6 +18,21 @@ def drive(robot: str) -> str:
     return f"{robot}/drive"
 
 
+def head(robot: str) -> str:
+    """The body of a robot that its lift moves, and that holds its payload, `r3/head`."""
+    return f"{robot}/head"
+
+
+def lift(robot: str) -> str:
+    """The vertical joint of a robot, `r3/lift`."""
+    return f"{robot}/lift"
+
+
+def hoist(robot: str) -> str:
+    """The actuator of a lift, `r3/hoist`."""
+    return f"{robot}/hoist"
+
+
 def copy(label: str, number: int) -> str:
     """The name of a part's copy, counted from 1: `part1#2`."""
     return f"{label}#{number}"
@@ -26,6 +41,11 @@ def copy(label: str, number: int) -> str:
 def part(label: str, number: int) -> str:
     """The body of a part's copy, `part/part1#2`."""
     return f"part/{copy(label, number)}"
+
+
+def piece(body: str, number: int) -> str:
+    """The geom of a part's convex piece, counted from 1: `part/part1#2/3`."""
+    return f"{body}/{number}"
 
 
 def grip(robot: str, label: str) -> str:
@@ -57,6 +77,11 @@ OUTFEED_SLIDE = "outfeed/slide"
 
 OUTFEED_DRIVE = "outfeed/drive"
 """Its actuator."""
+
+
+def exclusion(one: str, other: str, number: int) -> str:
+    """The exclusion of contact between two parts of one unit, `exclude/part1/part2#1`."""
+    return f"exclude/{one}/{copy(other, number)}"
 
 
 def park(label: str, number: int) -> str:

@@ -30,7 +30,7 @@ class RobotModel:
 
 @dataclass(frozen=True, slots=True)
 class Drive:
-    """Gains and limit of a robot's actuator: kp [N/m], kv [N s/m], force [N]."""
+    """Gains and limit of an actuator: kp [N/m], kv [N s/m], force [N]."""
 
     kp: float
     kv: float
@@ -88,13 +88,28 @@ def add_paints(asset: Element) -> None:
         add(asset, "material", name=f"role/{role}", rgba=rgba, specular=0.35, shininess=0.45)
 
 
-def instantiate(
-    model: RobotModel, robot: str, path: Guidepath, drive: Drive, lift: float, role: str = ""
-) -> tuple[Element, list[Element]]:
-    """The body of one robot at its B end and its actuators.
+@dataclass(frozen=True, slots=True)
+class Hoist:
+    """A robot's lift: how far it goes up [m], and its drive."""
 
-    `lift`: how far above z0 the payload's own lowest point is; the finger's pin reaches up to it
-    [m]. `role`: one of ROLES; geometry of the material `paint` takes its colour.
+    stroke: float
+    drive: Drive
+
+
+def instantiate(
+    model: RobotModel,
+    robot: str,
+    path: Guidepath,
+    drive: Drive,
+    top: float,
+    role: str = "",
+    hoist: Hoist | None = None,
+) -> tuple[Element, list[Element]]:
+    """The body of one robot at its B end, its lift down, and its actuators.
+
+    `top`: how far above z0 the lowest point of its payload is carried, with the lift down; the
+    finger's pin reaches up to it [m]. `role`: one of ROLES; geometry of the material `paint` takes
+    its colour. `hoist`: for a type with a lift.
     """
     body = _prefixed(model.body, model.name, names=False)
     for node in body.iter():
@@ -107,7 +122,7 @@ def instantiate(
     body.set("pos", numbers((x, y, 0)))
     body.set("quat", numbers(heading_quaternion(path)))
     body.set("sleep", "allowed")
-    _stretch(body, path, lift)
+    _stretch(body, path, top, hoist.stroke if hoist else 0.0)
     joint = next(j for j in body.iter("joint") if j.get("name") == f"{robot}/slide")
     joint.set("ref", number(path.length))
     actuators = []
@@ -115,10 +130,12 @@ def instantiate(
         copy = _prefixed(actuator, model.name, names=False)
         copy.set("name", f"{robot}/{actuator.get('name')}")
         copy.set("joint", f"{robot}/{actuator.get('joint')}")
-        if actuator.get("name") == "drive":
-            copy.set("kp", number(drive.kp))
-            copy.set("kv", number(drive.kv))
-            copy.set("forcerange", numbers((-drive.force, drive.force)))
+        chosen = {"drive": drive, "hoist": hoist.drive if hoist else None}
+        gains = chosen.get(actuator.get("name") or "")
+        if gains is not None:
+            copy.set("kp", number(gains.kp))
+            copy.set("kv", number(gains.kv))
+            copy.set("forcerange", numbers((-gains.force, gains.force)))
         actuators.append(copy)
     return body, actuators
 
@@ -131,8 +148,9 @@ def heading_quaternion(path: Guidepath) -> tuple[float, float, float, float]:
     return (w, 0.0, 0.0, z)
 
 
-def _stretch(body: Element, path: Guidepath, lift: float) -> None:
-    """Arm to the rim, finger to the nest, pin up to the payload."""
+def _stretch(body: Element, path: Guidepath, top: float, stroke: float) -> None:
+    """Arm to the rim, finger to the nest, pin up to the payload, or to where the column goes into
+    it."""
     rim = path.reach - path.arm
     nest = max(path.reach + path.nest, rim + 0.01)
     for geom in body.iter("geom"):
@@ -142,13 +160,21 @@ def _stretch(body: Element, path: Guidepath, lift: float) -> None:
         elif kind.startswith("finger"):
             _span(geom, rim - 0.01, nest)
         elif kind.startswith("pin"):
-            top = PAYLOAD + lift - 1e-3
-            radius = (geom.get("size") or "0.006").split()[0]
-            geom.set("size", f"{radius} {number(max(top - FINGER_TOP, 1e-3) / 2)}")
-            geom.set("pos", numbers((nest, 0, (top + FINGER_TOP) / 2)))
+            _stand(geom, nest, FINGER_TOP, PAYLOAD + top - 1e-3)
+        elif kind.startswith("column"):
+            _stand(geom, nest, PAYLOAD + top - 2e-3 - stroke, PAYLOAD + top - 2e-3)
+        elif kind.startswith("plate"):
+            _stand(geom, nest, PAYLOAD + top - 2e-3, PAYLOAD + top)
     for site in body.iter("site"):
         if (site.get("name") or "").endswith("/nest"):
             site.set("pos", numbers((nest, 0, PAYLOAD)))
+
+
+def _stand(geom: Element, x: float, low: float, high: float) -> None:
+    """Make an upright cylinder reach from low to high, at least 2 mm."""
+    radius = (geom.get("size") or "0.006").split()[0]
+    geom.set("size", f"{radius} {number(max(high - low, 2e-3) / 2)}")
+    geom.set("pos", numbers((x, 0, (high + low) / 2)))
 
 
 def _span(geom: Element, start: float, end: float) -> None:

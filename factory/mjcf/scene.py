@@ -215,7 +215,8 @@ def _feeder(world: Element, layout: Layout, label: str) -> None:
     across = path.offset * _handedness(path.heading, path.side)
     rear, front, _, _ = project(layout.payloads[label], path.heading, path.side)
     back = -Clearance(layout.clearance).post(path.reach, rear)
-    top = PAYLOAD + float(solid.high[2] - product.low[2]) + layout.clearance
+    raised = layout.elevations[operation.carrier]
+    top = PAYLOAD + raised + float(solid.high[2] - product.low[2]) + layout.clearance
     beam = 0.014
     add(
         body,

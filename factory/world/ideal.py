@@ -54,20 +54,20 @@ class IdealWorld:
                 self.count += 1
                 self.dropoffs.append(self.time)
 
-    def step(self, bundle: Bundle | None, robots: Index) -> None:
+    def step(self, bundle: Bundle | None, axes: Index) -> None:
         """ẋ = F_p(x) for one tick."""
         if bundle is not None:
-            x = self.x[robots]
+            x = self.x[axes]
             x = x + bundle.field(x, self.tick) * self.tick
             if not bundle.in_domain(x).all():
                 raise AssertionError("a configuration in Δ: two robots touch")
-            self.x[robots] = x
+            self.x[axes] = x
         self.time += self.tick
 
-    def move(self, robots: Index, x: Array, v: Array, a: Array) -> None:
-        """From now on `robots` run from x [m] at speed v under acceleration a [m/s²]."""
-        self._plan[robots, 0] = self.time
-        self._plan[robots, 1], self._plan[robots, 2], self._plan[robots, 3] = x, v, a
+    def move(self, axes: Index, x: Array, v: Array, a: Array) -> None:
+        """From now on `axes` run from x [m] at speed v under acceleration a [m/s²]."""
+        self._plan[axes, 0] = self.time
+        self._plan[axes, 1], self._plan[axes, 2], self._plan[axes, 3] = x, v, a
 
     def advance(self, substeps: int) -> None:
         """Timesteps of robots that move on their own (a distributed run)."""

@@ -6,21 +6,26 @@ from __future__ import annotations
 import numpy as np
 
 from factory.engine import mujoco
+from factory.factory import Operation
 from factory.mjcf.model import Model
 from factory.trace import PhysicsFigures
+from factory.world.contacts import Contacts
 from factory.world.stock import Switched
 
 
 class Inspection:
     """Keeps the worst figures of a run. Contacts are looked at after every step of the engine."""
 
-    def __init__(self, m: mujoco.MjModel, d: mujoco.MjData, model: Model) -> None:
-        self.m, self.d, self.model = m, d, model
+    def __init__(self, m: mujoco.MjModel, d: mujoco.MjData, model: Model, held: Contacts) -> None:
+        self.m, self.d, self.model, self.held = m, d, model, held
+        self.joining: dict[int, tuple[int, frozenset[int]]] = {}
+        self.force: dict[str, float] = {}
         self.handoffs = 0
         self.gap = self.residual = 0.0
         self.error: float | None = None
         self.unintended: list[tuple[str, str]] = []
         self._touching: frozenset[tuple[int, int]] = frozenset()
+        self._wrench = np.zeros(6)
         factory, product = model.factory, model.layout.product
         self.parts = factory.contents[factory.pag.root]
         solids = [product.solids[part] for part in self.parts]
@@ -42,15 +47,46 @@ class Inspection:
         if not self.d.ncon:
             self._touching = frozenset()
 
+    def started(self, operation: Operation, unit: int) -> None:
+        """The inputs of an operation are being joined from now on."""
+        holders = frozenset(robot + 1 for robot in operation.robots)
+        self.joining[operation.index] = unit, holders
+
+    def ended(self, operation: Operation) -> None:
+        """They are joined."""
+        self.joining.pop(operation.index, None)
+
     def contacts(self) -> None:
-        """Count the onsets of contacts. Nothing intends any: parts that belong together ignore each
-        other by their masks, and all else is meant to stay apart."""
+        """Keep the forces between inputs that are being joined, and count the onsets of all other
+        contacts: nothing intends those."""
         pairs = self.d.contact.geom[: self.d.ncon]
-        touching = self.d.contact.dist[: self.d.ncon] < 0
-        now = frozenset((int(a), int(b)) for a, b in pairs[touching])
+        now = set()
+        for number in np.flatnonzero(self.d.contact.dist[: self.d.ncon] < 0).tolist():
+            a, b = (int(geom) for geom in pairs[number])
+            operation = self._joined(a, b)
+            if operation is None:
+                now.add((a, b))
+            else:
+                self._press(operation, number)
         for a, b in sorted(now - self._touching):
             self.unintended.append((self.m.geom(a).name, self.m.geom(b).name))
-        self._touching = now
+        self._touching = frozenset(now)
+
+    def _joined(self, one: int, other: int) -> str | None:
+        """The label of the operation that is joining the parts of two geoms, None for none."""
+        a, b = (int(self.m.geom_bodyid[geom]) for geom in (one, other))
+        unit, code = self.held.unit, self.held.code
+        if unit[a] < 0 or unit[a] != unit[b]:
+            return None
+        for number, (worked_on, holders) in self.joining.items():
+            if unit[a] == worked_on and code[a] in holders and code[b] in holders:
+                return self.model.factory.operations[number].label
+        return None
+
+    def _press(self, label: str, contact: int) -> None:
+        mujoco.mj_contactForce(self.m, self.d, contact, self._wrench)
+        force = float(np.linalg.norm(self._wrench[:3]))
+        self.force[label] = max(self.force.get(label, 0.0), force)
 
     def measure(self, bodies: np.ndarray) -> float:
         """The largest displacement [m] of any vertex of any part from its place in the product,
@@ -78,4 +114,6 @@ class Inspection:
             len(self.unintended),
             int(sum(w.number for w in self.d.warning)),
             tuple(pairs),
+            dict(self.force),
+            self.model.layout.excluded,
         )

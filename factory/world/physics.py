@@ -20,7 +20,7 @@ from factory.engine import mujoco
 from factory.errors import Diagnostic, InputError
 from factory.factory import Operation
 from factory.mjcf import names
-from factory.mjcf.model import CARRIAGE_MASS, Model
+from factory.mjcf.model import CARRIAGE_MASS, GRAVITY, HEAD_MASS, HOIST_MASS, Model
 from factory.mjcf.outfeed import TRAY_MASS
 from factory.world.inspection import Inspection
 from factory.world.stock import Stock
@@ -46,7 +46,7 @@ off."""
 class MujocoWorld:
     """A compiled model with its data, and the parts' whereabouts.
 
-    `gains` (R,): factor on each robot's controller gain. Raises InputError (BadMesh) where the
+    `gains`: factor on each axis's controller gain. Raises InputError (BadMesh) where the
     engine refuses the model, with the engine's own words.
     """
 
@@ -64,11 +64,14 @@ class MujocoWorld:
         self.m = load(model)
         self.d = mujoco.MjData(self.m)
         factory = model.factory
-        slides = [*(names.slide(r.name) for r in factory.robots), names.OUTFEED_SLIDE]
-        drives = [*(names.drive(r.name) for r in factory.robots), names.OUTFEED_DRIVE]
+        carriages = [robot.name for robot in factory.robots]
+        self.lift = {robot: len(carriages) + n for n, robot in enumerate(factory.strokes)}
+        lifts = [carriages[robot] for robot in self.lift]
+        slides = [*map(names.slide, carriages), *map(names.lift, lifts), names.OUTFEED_SLIDE]
+        drives = [*map(names.drive, carriages), *map(names.hoist, lifts), names.OUTFEED_DRIVE]
         joint = [self.m.joint(name).id for name in slides]
         actuator = [self.m.actuator(name).id for name in drives]
-        self.tray = len(factory.robots)
+        self.tray = len(slides) - 1
         self.qpos = self.m.jnt_qposadr[joint]
         self.dof = self.m.jnt_dofadr[joint]
         self.tree = self.m.body_treeid[self.m.jnt_bodyid[joint]]
@@ -81,10 +84,16 @@ class MujocoWorld:
         self._moving = np.zeros(len(start), bool)
         self.mass = np.full(len(start), CARRIAGE_MASS)
         self.mass[self.tray] = TRAY_MASS
+        self.mass[list(self.lift.values())] = HOIST_MASS
+        self.weight = np.zeros(len(start))
+        self.weight[list(self.lift.values())] = HEAD_MASS * GRAVITY
         self.d.qpos[self.qpos] = start
         self.d.ctrl[self.control] = start
+        self.d.ctrl[self.control + 2] = self.weight
         self.stock = Stock(self.m, self.d, model, units, counts or {}, wip)
-        self.inspection = Inspection(self.m, self.d, model)
+        self.inspection = Inspection(self.m, self.d, model, self.stock.contacts)
+        for robot, mass in self.stock.loads().items():
+            self._load(robot, mass)
         self.physics_time = 0.0
         mujoco.mj_forward(self.m, self.d)
 
@@ -99,9 +108,9 @@ class MujocoWorld:
         return self.stock.left
 
     def sense(self) -> tuple[Array, Array]:
-        """Measured positions and speeds of all carriages."""
-        robots = slice(self.tray)
-        return self.d.qpos[self.qpos[robots]], self.d.qvel[self.dof[robots]]
+        """Measured positions and speeds of all carriages, then of all lifts."""
+        axes = slice(self.tray)
+        return self.d.qpos[self.qpos[axes]], self.d.qvel[self.dof[axes]]
 
     def prepared(self, operation: Operation, unit: int) -> bool:
         """A feeder presents the part of that unit; the outfeed has room for a product."""
@@ -113,28 +122,40 @@ class MujocoWorld:
         self, started: Sequence[tuple[Operation, int]], ended: Sequence[tuple[Operation, int]]
     ) -> None:
         """Hand the parts of ended operations over: welds off and on in one tick."""
+        for operation, unit in started:
+            self.inspection.started(operation, unit)
         for operation, unit in ended:
+            self.inspection.ended(operation)
             if operation.index == self.model.factory.dropoff.index:
                 self.inspection.measured(self.stock.bodies_of(unit))
             switched = self.stock.hand_over(operation, unit)
             self.inspection.handed_over(switched)
             for slot, robot in enumerate(operation.robots):
-                self.mass[robot] = CARRIAGE_MASS + self.model.masses.get(operation.after[slot], 0.0)
+                self._load(robot, self.model.masses.get(operation.after[slot], 0.0))
 
-    def step(self, bundle: Bundle | None, robots: Index) -> None:
+    def _load(self, robot: int, load: float) -> None:
+        """A robot carries so much from now on [kg]: its drives push accordingly."""
+        self.mass[robot] = CARRIAGE_MASS + load
+        if robot in self.lift:
+            axis = self.lift[robot]
+            self.mass[axis] = HOIST_MASS + load
+            self.weight[axis] = (HEAD_MASS + load) * GRAVITY
+            self.d.ctrl[self.control[axis] + 2] = self.weight[axis]
+
+    def step(self, bundle: Bundle | None, axes: Index) -> None:
         """One tick of the engine, the drives following a reference that obeys F_p under the
         limits."""
-        self._halt(robots)
+        self._halt(axes)
         if bundle is not None:
-            x, v = self.reference[robots], self.speed[robots]
+            x, v = self.reference[axes], self.speed[axes]
             x1, v1, a = follow(bundle, x, v, self.settings.tick)
-            self.move(robots, x, v, a)
+            self.move(axes, x, v, a)
         self.advance(self.settings.substeps)
         if bundle is not None:
-            self.reference[robots], self.speed[robots] = x1, v1
-            still = np.zeros(len(robots))
-            self.move(robots, x1, still, still)
-            self.d.ctrl[self.control[robots] + 1] = v1
+            self.reference[axes], self.speed[axes] = x1, v1
+            still = np.zeros(len(axes))
+            self.move(axes, x1, still, still)
+            self.d.ctrl[self.control[axes] + 1] = v1
         self.settle()
 
     def _halt(self, active: Index) -> None:
@@ -144,19 +165,19 @@ class MujocoWorld:
         moving = self.speed != 0.0
         moving[active] = moving[self.tray] = False
         if moving.any():
-            robots = np.flatnonzero(moving)
-            self.speed[robots] = 0.0
-            still = np.zeros(len(robots))
-            self.move(robots, self.reference[robots], still, still)
+            axes = np.flatnonzero(moving)
+            self.speed[axes] = 0.0
+            still = np.zeros(len(axes))
+            self.move(axes, self.reference[axes], still, still)
 
-    def move(self, robots: Index, x: Array, v: Array, a: Array) -> None:
-        """From now on the references of `robots` run from x [m] at speed v under acceleration a."""
-        self._plan[robots, 0] = self.d.time
-        self._plan[robots, 1], self._plan[robots, 2], self._plan[robots, 3] = x, v, a
-        ctrl = self.control[robots]
+    def move(self, axes: Index, x: Array, v: Array, a: Array) -> None:
+        """From now on the references of `axes` run from x [m] at speed v under acceleration a."""
+        self._plan[axes, 0] = self.d.time
+        self._plan[axes, 1], self._plan[axes, 2], self._plan[axes, 3] = x, v, a
+        ctrl = self.control[axes]
         self.d.ctrl[ctrl], self.d.ctrl[ctrl + 1] = x, v
-        self.d.ctrl[ctrl + 2] = self.mass[robots] * a
-        self._moving[robots] = (v != 0) | (a != 0)
+        self.d.ctrl[ctrl + 2] = self.mass[axes] * a + self.weight[axes]
+        self._moving[axes] = (v != 0) | (a != 0)
 
     def advance(self, substeps: int) -> None:
         """Timesteps of the engine, with the setpoints of all moving robots kept up to date."""

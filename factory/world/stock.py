@@ -11,9 +11,10 @@ import numpy as np
 from factory.engine import mujoco
 from factory.factory import Operation
 from factory.mjcf import names
-from factory.mjcf.model import BITS, Model
-from factory.mjcf.parts import feeder_middle, parked_at, place_in
+from factory.mjcf.model import Model
+from factory.mjcf.parts import parked_at, presented_at
 from factory.pag import NOPART
+from factory.world.contacts import NOBODY, Contacts
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,8 +30,7 @@ class Stock:
     """Copies of parts, fed in the order of units: the n-th part of each label is for unit n.
 
     A weld is aimed at the copy it holds by writing its body at run time; its nominal frame is the
-    same for all copies. Copies of one unit never collide with each other, those of different units
-    do.
+    same for all copies.
     """
 
     def __init__(
@@ -50,6 +50,9 @@ class Stock:
             label: np.array([m.body(names.part(label, n + 1)).id for n in range(count)])
             for label, count in model.copies.items()
         }
+        self.contacts = Contacts(m, self.body, model.layout.excluded)
+        self.tray = len(factory.robots) + 1
+        self.feeder = {o.label: self.tray + 1 + n for n, o in enumerate(factory.leaves)}
         self.grip = self._grips()
         self.feed = {label: m.equality(names.feed(label)).id for label in self.parts}
         self.free: dict[str, deque[int]] = {
@@ -89,9 +92,9 @@ class Stock:
         self.shown[label] = unit
         self.next_unit[label] += 1
         body = int(self.body[label][copy])
-        middle = feeder_middle(self.model.layout, label)
-        self._place(body, place_in(self.model.layout.product, label, middle))
-        self._mask(body, unit)
+        self._place(body, presented_at(self.model.layout, label))
+        self.contacts.enter(label, unit, body)
+        self.contacts.hold([body], self.feeder[label])
         self._switch(self._park(label, copy), False)
         self._switch(self.feed[label], True, body)
 
@@ -120,6 +123,7 @@ class Stock:
         gap = self._gap([self.grip[operation.carrier, label]], [label], unit)
         self._switch(self.feed[label], False)
         self._switch(self.grip[operation.carrier, label], True, self.body_of(label, unit))
+        self.contacts.hold([self.body_of(label, unit)], operation.carrier + 1)
         return Switched(1, gap)
 
     def _pass_on(self, operation: Operation, unit: int) -> Switched:
@@ -135,6 +139,7 @@ class Stock:
         for robot, part in moved:
             self._switch(self.grip[robot, part], False)
             self._switch(self.grip[carrier, part], True, self.body_of(part, unit))
+        self.contacts.hold([self.body_of(part, unit) for part in parts], carrier + 1)
         return Switched(len(moved), gap)
 
     def _release(self, operation: Operation, unit: int) -> Switched:
@@ -142,6 +147,7 @@ class Stock:
         for part in self.parts:
             self._switch(self.grip[operation.carrier, part], False)
             self._switch(self.hold[part], True, self.body_of(part, unit))
+        self.contacts.hold(self.bodies_of(unit).tolist(), self.tray)
         self.on_tray = unit
         self.released += 1
         return Switched(len(self.parts), gap)
@@ -154,6 +160,15 @@ class Stock:
         """The bodies of all parts of a unit, in the order of `parts`."""
         return np.array([self.body_of(part, unit) for part in self.parts])
 
+    def loads(self) -> dict[int, float]:
+        """What each robot that holds something carries [kg]."""
+        found: dict[int, float] = {}
+        for (robot, part), weld in self.grip.items():
+            if self.d.eq_active[weld]:
+                mass = self.model.layout.product.solids[part].mass
+                found[robot] = found.get(robot, 0.0) + mass
+        return found
+
     # --- the outfeed ---------------------------------------------------------------------------
 
     def recycle(self) -> None:
@@ -163,6 +178,7 @@ class Stock:
         self.left.append(float(self.d.time))
         for part in self.parts:
             copy = self.copy_of.pop((part, unit))
+            self.contacts.leave(part, unit)
             self._switch(self.hold[part], False)
             self._put_away(part, copy)
             self.free[part].append(copy)
@@ -215,18 +231,8 @@ class Stock:
     def _put_away(self, label: str, copy: int) -> None:
         body = int(self.body[label][copy])
         self._place(body, parked_at(self.model.layout, label, copy + 1))
-        self._mask(body, None)
+        self.contacts.hold([body], NOBODY)
         self._switch(self._park(label, copy), True)
-
-    def _mask(self, body: int, unit: int | None) -> None:
-        """Contact masks: the parts of a unit share a bit and ignore it; spare copies touch
-        nothing."""
-        start = self.m.body_geomadr[body]
-        geoms = slice(start, start + self.m.body_geomnum[body])
-        own = 0 if unit is None else 1 << (1 + unit % BITS)
-        others = 0 if unit is None else (1 << (BITS + 1)) - 1 - own
-        self.m.geom_contype[geoms] = self.m.body_contype[body] = own
-        self.m.geom_conaffinity[geoms] = self.m.body_conaffinity[body] = others
 
     def _hand_out(self, counts: Mapping[int, int]) -> None:
         """Give the parts that are under way in a marking to the robots that carry them: that of the
@@ -240,7 +246,7 @@ class Stock:
                 ):
                     holder = operation
                     operation = factory.operations[factory.parents[operation.index]]
-                if holder is leaf:
+                if holder.carrier == leaf.carrier:
                     self.taken.add(leaf.label)
                 self._give(leaf.label, unit, holder.carrier)
 
@@ -253,7 +259,8 @@ class Stock:
         holder = self.m.eq_obj1id[weld]
         at = self.d.xpos[holder] + self.d.xmat[holder].reshape(3, 3) @ self.m.eq_data[weld, 3:6]
         self._place(body, (float(at[0]), float(at[1]), float(at[2])))
-        self._mask(body, unit)
+        self.contacts.enter(label, unit, body)
+        self.contacts.hold([body], robot + 1)
         self._switch(self._park(label, copy), False)
         self._switch(weld, True, body)
 

@@ -1,0 +1,94 @@
+"""Who may touch whom: contact masks of parts by who holds them, and the pairs of parts left out.
+
+Parts in the same hands are joined and ignore each other; everything else collides. A holder has a
+code; a part in its hands has the code for its contype and the code's complement for its
+conaffinity, so two parts collide exactly if their codes differ. The lowest bit is that of robots
+and stations, which collide with every part. Written on geoms *and* bodies: the broad phase looks at
+those of bodies.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from factory.approach import Pair
+from factory.engine import mujoco
+
+Index = NDArray[np.intp]
+
+NOBODY = 0
+"""The code of no holder: such a part, a spare one out of sight, touches nothing."""
+
+ALL = (1 << 30) - 1
+"""All bits of a code."""
+
+
+class Contacts:
+    """The masks and exclusions of a model, for parts whose bodies are given by label and copy.
+
+    `code` and `unit` (nbody,): the holder of each part's body and the unit it belongs to, -1 for
+    none. `excluded`: pairs of labels whose parts of one unit do not collide.
+    """
+
+    def __init__(
+        self, m: mujoco.MjModel, bodies: Mapping[str, Index], excluded: Sequence[Pair]
+    ) -> None:
+        self.m = m
+        self.code = np.zeros(m.nbody, np.int64)
+        self.unit = np.full(m.nbody, -1)
+        self.solid = {int(b): self._solid(int(b)) for ids in bodies.values() for b in ids}
+        self.partners: dict[str, list[str]] = {}
+        for one, other in excluded:
+            self.partners.setdefault(one, []).append(other)
+            self.partners.setdefault(other, []).append(one)
+        self._present: dict[tuple[str, int], int] = {}
+        self._signatures: set[int] = set()
+
+    def _solid(self, body: int) -> Index:
+        """The geoms of a part that collide: the one it has, or its convex pieces (group 3)."""
+        geoms = self.m.body_geomadr[body] + np.arange(self.m.body_geomnum[body])
+        return geoms if len(geoms) == 1 else geoms[self.m.geom_group[geoms] == 3]
+
+    def hold(self, bodies: Sequence[int], holder: int) -> None:
+        """From now on parts are in the hands of a holder (its code)."""
+        if not len(bodies):
+            return
+        own = holder << 1
+        others = ((~holder & ALL) << 1) | 1 if holder else 0
+        geoms = np.concatenate([self.solid[int(body)] for body in bodies])
+        chosen = np.asarray(bodies)
+        self.code[chosen] = holder
+        self.m.geom_contype[geoms] = own
+        self.m.geom_conaffinity[geoms] = others
+        self.m.body_contype[chosen] = own
+        self.m.body_conaffinity[chosen] = others
+
+    def enter(self, label: str, unit: int, body: int) -> None:
+        """A part's body comes into the factory, for a unit."""
+        self.unit[body] = unit
+        self._present[label, unit] = body
+        self._exclude(label, unit, body, True)
+
+    def leave(self, label: str, unit: int) -> None:
+        """A part's body leaves the factory with its unit."""
+        body = self._present.pop((label, unit))
+        self._exclude(label, unit, body, False)
+        self.unit[body] = -1
+
+    def _exclude(self, label: str, unit: int, body: int, now: bool) -> None:
+        """Leave out, or no longer, the pairs of a part with those of its unit that are there. The
+        engine reads the exclusions as one sorted list."""
+        changed = False
+        for partner in self.partners.get(label, ()):
+            other = self._present.get((partner, unit))
+            if other is not None:
+                low, high = sorted((body, other))
+                (self._signatures.add if now else self._signatures.discard)((low << 16) + high)
+                changed = True
+        if changed:
+            listed = self.m.exclude_signature
+            listed[:] = 0
+            listed[len(listed) - len(self._signatures) :] = sorted(self._signatures)
