@@ -111,10 +111,11 @@ class Simulation:
         )
 
     def under_way(self) -> dict[str, int]:
-        """How many copies of each part are in the factory in the marking where the run starts."""
+        """How many copies of each part are in the factory in the marking where the run starts,
+        those included that are being taken."""
         factory, counts = self.layout.factory, self.counts
         gone = counts.get(factory.dropoff.end, 0)
-        return {o.label: counts.get(o.end, 0) - gone for o in factory.leaves}
+        return {o.label: counts.get(o.start, 0) - gone for o in factory.leaves}
 
     def run(self, observers: Sequence[Observer] = (), max_time: float | None = None) -> Run:
         """Tick until `units` products have been dropped off, the run stalls or `max_time` [s]

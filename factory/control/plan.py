@@ -55,8 +55,8 @@ def operation_starts(layout: Layout) -> list[Array]:
         for step, number in enumerate(robot.operations):
             before = factory.operations[robot.operations[step - 1]]
             left[number, robot.index] = layout.goal(before.index, before.robots.index(robot.index))
-    for axis, robot in enumerate(layout.lifts, start=len(factory.robots)):
-        gear, stroke = factory.robots[robot].operations, factory.strokes[robot]
+    for axis, lift in enumerate(layout.lifts, start=len(factory.robots)):
+        gear, stroke = factory.robots[lift].operations, factory.strokes[lift]
         left[gear[0], axis] = 0.0
         left[gear[-1], axis] = stroke
     return [np.array([left[o.index, a] for a in factory.axes[o.index]]) for o in factory.operations]

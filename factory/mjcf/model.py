@@ -20,7 +20,7 @@ from xml.sax.saxutils import quoteattr
 from factory.factory import Factory
 from factory.layout.plan import Layout
 from factory.mjcf import names
-from factory.mjcf.elements import add, number, numbers
+from factory.mjcf.elements import add, numbers
 from factory.mjcf.outfeed import TRAY_MASS, add_tray
 from factory.mjcf.parts import add_meshes, add_parts, parked_at, place_in
 from factory.mjcf.robots import (

@@ -62,6 +62,7 @@ class Stock:
         self.shown: dict[str, int] = {}
         self.taken: set[str] = set()
         self.released = counts.get(factory.dropoff.end, 0)
+        self.begun = {o.label: counts.get(o.start, 0) for o in factory.leaves}
         self.units = self.released + units
         self.next_unit = {o.label: counts.get(o.end, 0) for o in factory.leaves}
         self.feeds_robot = {o.carrier: o.label for o in factory.leaves}
@@ -85,7 +86,8 @@ class Stock:
         it, and the robot has delivered the part it took last: until then it may still stand
         there."""
         unit = self.next_unit[label]
-        if label in self.taken or label in self.shown or unit >= self.units or not self.free[label]:
+        wanted = unit < max(self.units, self.begun[label])
+        if label in self.taken or label in self.shown or not wanted or not self.free[label]:
             return
         copy = self.free[label].popleft()
         self.copy_of[label, unit] = copy
