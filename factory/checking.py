@@ -88,7 +88,6 @@ def check_file(file: Path, folders: Sequence[Path], wip: int | None = None) -> C
     """Check a PAG, or a net in PNML. Raises InputError."""
     if is_net(file):
         return check_net(file)
-    from factory.mating import matings, shaped
     from factory.nets.pool import part_pool
     from factory.nets.verify import verify
     from factory.pipeline import read
@@ -99,11 +98,9 @@ def check_file(file: Path, folders: Sequence[Path], wip: int | None = None) -> C
     verdict = verify(factory.net, sources)
     pool = dict(part_pool(factory, wip))
     checked = Checked(source.pag.root, len(source.pag), factory.net, verdict, factory, pool)
-    if not shaped(source.pag):
+    if source.matings is None:
         return checked
-    product = source.product
-    judged = matings(source.pag, source.templates, product)
-    return replace(checked, matings=judged, product=product)
+    return replace(checked, matings=source.matings, product=source.product)
 
 
 def is_net(file: Path) -> bool:

@@ -210,9 +210,8 @@ def test_without_a_lift_the_ball_is_blocked_and_its_pairs_left_out() -> None:
 
 
 def test_a_catalogue_without_lifts_is_told() -> None:
-    from tests.pag_values import catalogue
-
     from factory.compiler import compile_pag
+    from tests.pag_values import catalogue
 
     templates = all_templates()
     pag = read_pag(FENCE, templates)

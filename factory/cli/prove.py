@@ -1,12 +1,13 @@
-"""The commands that need no geometry: check, programs, export."""
+"""The commands that need no layout: check, programs, export."""
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from pathlib import Path
 
 import click
 
-from factory.cli.options import OUTPUT, PATH, SOURCE, writable
+from factory.cli.options import OUTPUT, PATH, SOURCE, writable, writable_folder
 from factory.console import emit, say
 from factory.errors import Diagnostic, InputError, did_you_mean
 
@@ -15,12 +16,14 @@ from factory.errors import Diagnostic, InputError, did_you_mean
 @SOURCE
 @click.option("--certificate", type=PATH, help="Write the proof here.")
 @click.option("--wip", type=click.IntRange(1, 10**9), help="Copies of each part let in at once.")
+@click.option("--clashes", type=PATH, help="Write a picture of each blocked operation in a folder.")
 @OUTPUT
 def check(
     file: Path,
     folders: tuple[Path, ...],
     certificate: Path | None,
     wip: int | None,
+    clashes: Path | None,
     as_json: bool,
     quiet: bool,
     verbose: bool,
@@ -29,7 +32,14 @@ def check(
     from factory.checking import check_file, describe
 
     writable(file, certificate)
+    writable_folder(clashes)
     checked = check_file(file, folders, wip)
+    if clashes is not None:
+        from factory.files import write_all
+
+        files = checked.pictures(clashes)
+        _no_links(files)
+        write_all(files)
     if certificate is not None:
         from factory.files import write_text
 
@@ -39,6 +49,15 @@ def check(
     elif not quiet:
         describe(checked, verbose)
     return 0 if checked.verdict.holds else 1
+
+
+def _no_links(files: Iterable[Path]) -> None:
+    """Pictures have names of our choice, so no link that happens to have one is followed. Raises
+    InputError (BadFile)."""
+    hint = "remove it, or choose another folder"
+    links = [path for path in files if path.is_symlink()]
+    if links:
+        raise InputError(Diagnostic("BadFile", f"'{path}' is a link", None, hint) for path in links)
 
 
 @click.command()
