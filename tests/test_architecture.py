@@ -13,19 +13,39 @@ PACKAGE = Path(__file__).resolve().parent.parent / "factory"
 
 ROOMS = [
     {"errors", "assets", "closing", "files", "engine", "gl"},
-    {"pag", "template", "robots", "settings"},
+    {"pag", "template", "robots", "settings", "approach"},
     {"lang"},
     {"nets"},
     {"factory"},
-    {"prepared", "compiler", "programs", "pipeline", "geometry", "meshes", "export"},
+    {
+        "prepared",
+        "compiler",
+        "programs",
+        "pipeline",
+        "geometry",
+        "meshes",
+        "pieces",
+        "decomposition",
+        "export",
+        "mating",
+    },
     {"layout"},
     {"control", "prediction"},
     {"mjcf"},
     {"trace"},
     {"supervisor", "distributed", "world"},
     {"simulation"},
-    {"log", "render", "progress"},
-    {"console", "interruption", "checking", "building", "running", "doctor"},
+    {"log", "render", "progress", "monitor", "disturbance", "fidelity"},
+    {
+        "console",
+        "interruption",
+        "checking",
+        "approaching",
+        "clashes",
+        "building",
+        "running",
+        "doctor",
+    },
     {"cli", "__main__"},
 ]
 """In the order in which the data walks; rooms of one set may use each other."""
@@ -39,10 +59,13 @@ ENGINE = {
     "world/physics",
     "world/stock",
     "world/inspection",
+    "disturbance/acting",
     "mjcf",
     "render",
     "log",
+    "monitor/record",
     "doctor",
+    "fidelity",
 }
 """Modules that may reach mujoco."""
 

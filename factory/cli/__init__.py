@@ -12,10 +12,12 @@ from typing import Any
 import click
 
 from factory import __version__
+from factory.cli.fidelity import fidelity
 from factory.cli.make import build
 from factory.cli.move import render, run
 from factory.cli.prove import check, export, programs
 from factory.cli.tell import doctor, templates
+from factory.cli.watch import monitor
 from factory.console import emit, fail, say
 from factory.errors import Diagnostic, FactoryError, InputError, MissingError, did_you_mean
 from factory.interruption import stop_on_signals
@@ -145,7 +147,7 @@ def cli(ctx: click.Context, version: bool, as_json: bool) -> None:
         raise click.UsageError("--json comes after the command", ctx)
 
 
-for _command in (check, build, run, render, programs, export, templates, doctor):
+for _command in (check, build, run, render, fidelity, monitor, programs, export, templates, doctor):
     cli.add_command(_command)
 
 __all__ = ["cli", "main", "run_command"]

@@ -32,6 +32,9 @@ from factory.console import emit, say, warn
 @click.option(
     "--distributed", is_flag=True, help="Each robot runs its own program (paper, section 6)."
 )
+@click.option(
+    "--monitor", is_flag=True, help="Watch the engine alone, and judge the run against the net."
+)
 @PICTURE
 @FLOOR
 @MOTION
@@ -48,7 +51,7 @@ def run(
     **options: Any,
 ) -> int:
     """Run FILE.pag until its products are dropped off."""
-    from factory.running import run_file
+    from factory.running import run_file, say_violations
 
     writable(file, video, log)
     settings = settings_of(file, options)
@@ -65,6 +68,7 @@ def run(
         from factory.running import summarise
 
         summarise(record, factory, verbose)
+    say_violations(record.monitor)
     if record.trouble is not None:
         print(record.trouble, file=sys.stderr)
     return 1 if record.trouble is not None or not record.refines_net else 0
