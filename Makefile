@@ -2,13 +2,14 @@
 PY := .venv/bin/python
 FACTORY := $(PY) -m factory
 
-.PHONY: help demo test test-all bench lint golden wheel setup clean
+.PHONY: help demo test test-all bench fidelity lint golden wheel setup clean
 
 help:
 	@echo "make demo      run the paper's example: a video and a poster in renders/"
 	@echo "make test      the test suite (under 10 minutes on 2 cores)"
 	@echo "make test-all  the long campaigns too"
 	@echo "make bench     times and sizes, written to docs/benchmarks.md"
+	@echo "make fidelity  how far the physics can be believed, written to docs/fidelity.md"
 	@echo "make lint      ruff and mypy"
 	@echo "make golden    renew the golden texts (review the diff)"
 	@echo "make wheel     build the wheel in dist/"
@@ -30,6 +31,9 @@ test-all: setup
 
 bench: setup
 	$(PY) -m tests.bench
+
+fidelity: setup
+	$(PY) -m tests.fidelity $(ARGS)
 
 lint:
 	@tools/setup dev

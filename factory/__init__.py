@@ -63,11 +63,10 @@ def load_pag(path: str | PathLike[str], templates: Sequence[Path] = ()) -> PAG:
 
 def compile(pag: PAG, templates: Sequence[Path] = ()) -> Factory:
     """The factory (R, ~, N) that makes a product (paper, section 5). Raises InputError."""
-    from factory.compiler import compile_pag
-    from factory.pipeline import all_templates
+    from factory.pipeline import Source, all_templates
     from factory.robots import load_catalogue
 
-    return compile_pag(pag, all_templates(templates), load_catalogue())
+    return Source(pag, all_templates(templates), load_catalogue()).compile()
 
 
 def verify(plan: Factory) -> Verdict:

@@ -11,8 +11,11 @@ import sys
 import time
 from pathlib import Path
 
+import imageio.v3 as iio
 import pytest
 
+from factory.errors import MissingError
+from factory.gl import probe
 from factory.log import read_log
 from tests.command_line import PAPER, ROOT, Terminal, files_in, spawn
 
@@ -90,6 +93,31 @@ def test_a_run_that_is_stopped_closes_its_files(out: Path, number: signal.Signal
     kept = read_log(log)
     assert kept.complete
     assert len(kept) > 10
+
+
+@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGINT], ids=lambda n: n.name)
+def test_a_film_plays_however_its_run_ends(out: Path, number: signal.Signals) -> None:
+    """Under the name that was asked for, and as long as the log that was kept beside it."""
+    try:
+        probe()
+    except MissingError:
+        pytest.skip("no GL here")
+    log, film = out / "run.log", out / "film.mp4"
+    words = ["run", PAPER, "--units", "1000000", "--log", log, "--video", film, "-q"]
+    words += ["--size", "64x48", "--fps", "10"]
+    with subprocess.Popen(
+        [sys.executable, "-m", "factory", *map(str, words)], cwd=ROOT, stderr=subprocess.PIPE
+    ) as process:
+        deadline = time.monotonic() + 120
+        while not (film.exists() and film.stat().st_size > 12_000):
+            assert time.monotonic() < deadline and process.poll() is None
+            time.sleep(0.02)
+        process.send_signal(number)
+        process.communicate(timeout=60)
+    assert sorted(path.name for path in out.iterdir()) == ["film.mp4", "run.log"]
+    frames = len(iio.imread(film, plugin="pyav"))
+    assert frames > 20
+    assert abs(frames / 10 - read_log(log).time[-1]) < 2.0
 
 
 # --- what a machine may lack ----------------------------------------------------------------------

@@ -40,7 +40,8 @@ class Witness:
         active = [(e, int(m.eq_obj1id[e]), int(m.eq_obj2id[e])) for e in on]
         pairs = [tuple(c.geom.tolist()) for c in d.contact]
         marking = [p for p, marked in enumerate(supervisor.marked) if marked]
-        self.rows.append((world.time, d.qpos.copy(), d.qvel.copy(), marking, active, pairs))
+        state = d.qpos.copy(), d.qvel.copy(), d.ctrl.copy()
+        self.rows.append((world.time, *state, marking, active, pairs))
 
 
 @pytest.fixture(scope="module")
@@ -50,7 +51,7 @@ def recorded(layout, tmp_path_factory: pytest.TempPathFactory):
     m = simulation.world.m
     part = m.geom("part/part3#1").id
     reach = 0.03  # the engine lists contacts from this far on, so that there are some to log
-    m.geom_margin[part] = m.geom_gap[part] = m.body_margin[m.geom_bodyid[part]] = reach
+    m.geom_gap[part] = m.body_margin[m.geom_bodyid[part]] = reach
     witness = Witness(simulation)
     with LogWriter(path, simulation, command=["factory", "run"]) as writer:
         run = simulation.run([writer.observe, witness.observe])
@@ -62,9 +63,10 @@ def test_a_log_says_what_happened_to_the_bit(recorded) -> None:
     log = read_log(path)
     assert log.complete and is_log(path)
     assert len(log) == len(witness.rows) == round(run.sim_time_s / 0.01) + 1
-    for row, (time, qpos, qvel, marking, active, pairs) in enumerate(witness.rows):
+    for row, (time, qpos, qvel, ctrl, marking, active, pairs) in enumerate(witness.rows):
         assert log.time[row] == time
         assert (log.qpos[row] == qpos).all() and (log.qvel[row] == qvel).all()
+        assert log.ctrl is not None and (log.ctrl[row] == ctrl).all()
         assert log.marking[row].tolist() == marking
         assert [tuple(a) for a in log.active[row].tolist()] == active
         assert [tuple(c) for c in log.contacts[row].tolist()] == pairs
@@ -84,6 +86,8 @@ def test_the_header_has_all_that_made_the_run(recorded) -> None:
     assert header["pag"]["text"] == PAPER.read_text("utf-8") and len(header["pag"]["sha256"]) == 64
     assert header["versions"]["mujoco"] == mujoco.__version__
     assert header["settings"]["timestep"] == simulation.settings.timestep
+    assert header["wip"] is None and len(header["start"]) == 6
+    assert set(header["templates"]) == {"atomic", "mate", "weld", "dropoff"}
     assert header["places"] == [p.name for p in simulation.supervisor.net.places]
 
 
@@ -93,9 +97,34 @@ def test_the_model_in_a_log_is_the_engines(recorded) -> None:
     assert log.xml == simulation.model.xml and dict(log.files) == dict(simulation.model.files)
 
 
+def test_a_log_without_setpoints_is_still_read(
+    layout, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Older versions kept none."""
+    arrays = LogWriter._arrays
+
+    def older(self: LogWriter) -> dict:
+        return {k: a for k, a in arrays(self).items() if not k.startswith("ctrl")}
+
+    monkeypatch.setattr(LogWriter, "_arrays", older)
+    simulation = Simulation(layout, "mujoco", 1)
+    with LogWriter(tmp_path / "old", simulation) as writer:
+        simulation.run([writer.observe], 0.1)
+    log = read_log(tmp_path / "old")
+    assert log.complete and log.ctrl is None and len(log) == 11
+
+
 def test_what_is_read_is_locked(recorded) -> None:
     log = read_log(recorded[0])
-    for values in (log.time, log.qpos, log.qvel, log.fired, log.marking.values, log.active.values):
+    for values in (
+        log.time,
+        log.qpos,
+        log.qvel,
+        log.ctrl,
+        log.fired,
+        log.marking.values,
+        log.active.values,
+    ):
         with pytest.raises(ValueError):
             values[...] = 0
 

@@ -3,14 +3,16 @@ appended to.
 
     factory-log 1\\n          magic
     <I length>{...}          header, JSON: versions, command line, world, seed, jitter, units,
-                             settings, names of robots, places and transitions, the PAG's name,
-                             text and SHA-256, nq, nv
+                             wip, numbers of the places marked at the start, settings, names of
+                             robots, places and transitions, the PAG's name, text and SHA-256, the
+                             templates that it uses, what a monitor knows of the layout, nq, nv
     blocks                   see factory.log.blocks: a letter, length, CRC-32, compressed arrays
 
     M  the model, once: `xml`, and `mesh/NAME` for each mesh file, bytes (mujoco only)
     T  ticks, about a simulated second of them:
        time (n,) [s], delivered (n,)      products that have left since the run began
        qpos (n, nq), qvel (n, nv)         the engine's; in the ideal world arc lengths and speeds
+       ctrl (n, nu)                       the engine's setpoints
        marking_at, _count, marking        rows where the marking changes, how many places, which
        active_at, _count, active          the same for the active constraints: number, two bodies
        contact_at, _count, contact        rows with contacts, how many, pairs of geoms

@@ -37,7 +37,8 @@ class Log:
 
     `marking[i]`: numbers of the marked places; `active[i]` (k, 3): active constraints, and the two
     bodies each joins; `contacts[i]` (k, 2) geoms, `distances[i]` (k,) [m]; `fired` and `fired_t`:
-    transitions by number and time [s]. `complete`: whether the file was closed properly."""
+    transitions by number and time [s]. `ctrl`: the setpoints; None in the ideal world, and in
+    logs of older versions. `complete`: whether the file was closed properly."""
 
     header: Mapping[str, Any] = field(repr=False)
     xml: str = field(repr=False)
@@ -52,6 +53,7 @@ class Log:
     distances: Ragged = field(repr=False)
     fired: Index = field(repr=False)
     fired_t: NDArray[np.float64] = field(repr=False)
+    ctrl: NDArray[np.float64] | None = field(default=None, repr=False)
     complete: bool = True
 
     def __len__(self) -> int:
@@ -124,8 +126,17 @@ def _read(data: memoryview) -> Log:
         _single("contact", "contact_dist", ticks, counts),
         _joined("fired", ticks, np.int32),
         _joined("fired_t", ticks, np.float64),
+        _setpoints(ticks),
         complete,
     )
+
+
+def _setpoints(ticks: Sequence[Arrays]) -> NDArray[np.float64] | None:
+    if not ticks or "ctrl_first" not in ticks[0]:
+        return None
+    rows = [unpack_rows("ctrl", a, len(a["time"])) for a in ticks]
+    found: NDArray[np.float64] = _locked(np.concatenate(rows))
+    return found
 
 
 def _locked(values: Any) -> Any:

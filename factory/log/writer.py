@@ -16,7 +16,9 @@ import numpy as np
 
 from factory.closing import Closing
 from factory.errors import InputError
+from factory.lang import write_pag, write_template
 from factory.log.blocks import LENGTH, MAGIC, Arrays, bad_log, block, pack_rows
+from factory.monitor.subject import subject_of
 
 if TYPE_CHECKING:
     from factory.pipeline import Source
@@ -45,6 +47,7 @@ class LogWriter(Closing):
         self.ticks = max(1, round(1.0 / simulation.settings.tick))
         nq, nv = (s.shape[0] for s in self._state())
         self.qpos, self.qvel = np.empty((self.ticks, nq)), np.empty((self.ticks, nv))
+        self.ctrl = np.empty((self.ticks, simulation.world.d.ctrl.size if self.physical else 0))
         self.seen = 0
         self.row = 0
         self.marked = self.aimed = b""
@@ -76,6 +79,7 @@ class LogWriter(Closing):
             self.marked = marked
             self.markings.append((row, np.flatnonzero(np.frombuffer(marked, "u1"))))
         if self.physical:
+            self.ctrl[row] = world.d.ctrl
             self._constraints(world, row)
         events = supervisor.events
         while self.seen < len(events):
@@ -133,6 +137,7 @@ class LogWriter(Closing):
             "delivered": np.array(self.delivered, np.int32),
             **pack_rows("qpos", self.qpos[: self.row]),
             **pack_rows("qvel", self.qvel[: self.row]),
+            **(pack_rows("ctrl", self.ctrl[: self.row]) if self.physical else {}),
             **_ragged("marking", self.markings, ()),
             **_ragged("active", self.active, (3,)),
             **_ragged("contact", [c[:2] for c in self.contacts], (2,)),
@@ -159,21 +164,32 @@ def _header(
     net = simulation.supervisor.net
     pag = source.pag if source else factory.pag
     file = Path(pag.file)
-    text = file.read_text("utf-8", errors="replace") if file.is_file() else ""
+    text = file.read_text("utf-8", errors="replace") if file.is_file() else write_pag(pag)
+    settings, jitter = simulation.settings, simulation.jitter
+    subject = subject_of(simulation.layout, settings, jitter, simulation.start, simulation.wip)
     return {
         "versions": {"python": platform.python_version(), **_versions()},
         "command": list(sys.argv if command is None else command),
         "world": simulation.kind,
         "seed": simulation.seed,
-        "jitter": simulation.jitter,
+        "jitter": jitter,
         "units": simulation.units,
-        "settings": asdict(simulation.settings),
+        "wip": simulation.wip,
+        "start": sorted(simulation.start),
+        "settings": asdict(settings),
         "product": file.stem or "factory",
         "pag": {
             "file": str(file),
             "text": text,
             "sha256": hashlib.sha256(text.encode()).hexdigest(),
         },
+        "templates": {
+            name: write_template(template)
+            for name, template in sorted(
+                {o.template.name: o.template for o in factory.operations}.items()
+            )
+        },
+        "monitor": subject.as_json(),
         "robots": [robot.name for robot in factory.robots],
         "places": [place.name for place in net.places],
         "transitions": [transition.name for transition in net.transitions],

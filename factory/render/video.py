@@ -1,8 +1,9 @@
 """Video files that are playable whatever ends the writing.
 
-Frames go to a hidden Matroska file beside the target, flushed every second, so what a killed
-process leaves can still be played. Closed, it takes its name, rewrapped as MP4 where that is asked
-for: nothing half-written is ever seen under the name itself."""
+Frames go to the file itself in fragments of a quarter of a second, each whole in itself: as
+fragmented MP4, or Matroska for `.mkv`. So what a killed process leaves is a film of that name that
+plays up to its last second. Closed, an MP4 is rewrapped, its index first, and takes the place of
+the fragments in one move."""
 
 from __future__ import annotations
 
@@ -14,9 +15,16 @@ from typing import Any
 
 from factory.closing import Closing
 from factory.errors import Diagnostic, InputError, MissingError
+from factory.files import partial_of
 from factory.render.painter import Pixels
 
 FILMS, STILLS = (".mp4", ".mkv"), (".png",)
+
+FRAGMENTS = {
+    ".mp4": ("mp4", {"movflags": "empty_moov+default_base_moof", "frag_duration": "250000"}),
+    ".mkv": ("matroska", {"cluster_time_limit": "250"}),
+}
+"""For each ending how it is written so that it can be cut off anywhere."""
 
 LARGEST, SMALLEST = 7680, 16
 
@@ -60,15 +68,13 @@ class VideoFile(Closing):
         self.path, self.frames, self.encoded = path, 0, 0
         self.coder = ThreadPoolExecutor(1, "video")
         self.pending: Future[None] | None = None
-        self.partial = path.with_name(f".{path.name}.part")
         av = _av()
         self.rate = rate = Fraction(fps).limit_denominator(1001)
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
-            options = {"cluster_time_limit": "250", "flush_packets": "1"}
-            self.container: Any = av.open(
-                str(self.partial), "w", format="matroska", options=options
-            )
+            kind, options = FRAGMENTS[path.suffix.lower()]
+            options = {**options, "flush_packets": "1"}
+            self.container: Any = av.open(str(path), "w", format=kind, options=options)
         except OSError as error:
             raise _bad(
                 f"'{path}' cannot be written: {error.strerror}", "choose another file"
@@ -122,21 +128,19 @@ class VideoFile(Closing):
             self.container.close()
             self.container = None
         if not self.frames:
-            self.partial.unlink(missing_ok=True)
-        elif self.path.suffix.lower() == ".mkv":
-            self.partial.replace(self.path)
-        else:
-            _rewrap(self.partial, self.path, self.rate)
+            self.path.unlink(missing_ok=True)
+        elif self.path.suffix.lower() == ".mp4":
+            _rewrap(self.path, self.rate)
 
 
-def _rewrap(source: Path, target: Path, rate: Fraction) -> None:
-    """The same video as MP4, its index first, as browsers like it. Matroska's times are whole
-    milliseconds; without B-frames packet n is frame n, and its time n / rate."""
+def _rewrap(path: Path, rate: Fraction) -> None:
+    """The same video without fragments, its index first, as browsers like it. Without B-frames
+    packet n is frame n, and its time n / rate."""
     av = _av()
-    partial = target.with_name(f".{target.name}.mp4.part")
+    partial = partial_of(path)
     try:
         with (
-            av.open(str(source)) as old,
+            av.open(str(path)) as old,
             av.open(str(partial), "w", format="mp4", options={"movflags": "faststart"}) as new,
         ):
             stream = new.add_stream_from_template(old.streams.video[0])
@@ -146,8 +150,7 @@ def _rewrap(source: Path, target: Path, rate: Fraction) -> None:
                 packet.pts = packet.dts = number
                 packet.duration = 1
                 new.mux(packet)
-        partial.replace(target)
-        source.unlink()
+        partial.replace(path)
     finally:
         partial.unlink(missing_ok=True)
 

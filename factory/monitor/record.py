@@ -1,0 +1,101 @@
+"""Watching a run that is over, from its log alone."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import fields
+from typing import Any
+
+import numpy as np
+
+from factory.compiler import compile_pag
+from factory.engine import mujoco
+from factory.errors import Diagnostic, InputError
+from factory.factory import Factory
+from factory.lang import read_pag, read_template
+from factory.log.reader import Log
+from factory.monitor.anatomy import Anatomy
+from factory.monitor.monitor import Monitor
+from factory.monitor.report import Report
+from factory.monitor.sight import Sight
+from factory.monitor.subject import Subject, subject_from
+from factory.robots import load_catalogue
+from factory.settings import Settings
+
+AGAIN = "record it again: `factory run FILE.pag --log OUT`"
+
+
+def watch_log(log: Log) -> tuple[Report, Subject]:
+    """The verdict on a recorded run, and the factory that it is of: compiled again from what the
+    log's header holds.
+
+    The log's events and markings are not read. Raises InputError (BadLog) for a log of the ideal
+    world, of an older version, or of another factory than its header says.
+    """
+    if not log.xml:
+        raise InputError(
+            _bad("the log is of the ideal world, in which there is nothing to observe")
+        )
+    if log.ctrl is None or "monitor" not in log.header:
+        raise InputError(_bad("the log was kept by an older version, without setpoints"))
+    if not len(log):
+        raise InputError(_bad("the log has no tick"))
+    try:
+        subject = _subject(log.header)
+        monitor = Monitor(subject, Anatomy.of(_model(log), subject.factory))
+        for sight in sights(log):
+            monitor.see(sight)
+    except (ValueError, KeyError, TypeError, AttributeError, IndexError) as error:
+        raise InputError(_bad(f"the log is not of the factory in its header: {error}")) from error
+    return monitor.report(), subject
+
+
+def sights(log: Log) -> Iterator[Sight]:
+    """What a log shows, row by row; the same array of welds for as long as none is switched."""
+    assert log.ctrl is not None
+    welds = np.empty((0, 3), np.intp)
+    span = (-1, -1)
+    for row in range(len(log)):
+        now = int(log.active.starts[row]), int(log.active.ends[row])
+        if now != span:
+            found, span = log.active[row].astype(np.intp), now
+            if not np.array_equal(found, welds):
+                welds = found
+        yield Sight(float(log.time[row]), log.qpos[row], log.qvel[row], log.ctrl[row], welds)
+
+
+def _subject(header: Mapping[str, Any]) -> Subject:
+    factory = _factory(header)
+    known = {f.name for f in fields(Settings)}
+    settings = Settings(**{k: v for k, v in header["settings"].items() if k in known})
+    wip = header["wip"]
+    return subject_from(
+        factory,
+        header["monitor"],
+        settings,
+        [int(place) for place in header["start"]],
+        None if wip is None else int(wip),
+    )
+
+
+def _factory(header: Mapping[str, Any]) -> Factory:
+    """The factory that a log's PAG and templates compile to."""
+    templates = {name: read_template(text, name) for name, text in header["templates"].items()}
+    pag = read_pag(header["pag"]["text"], templates, header["pag"]["file"])
+    factory = compile_pag(pag, templates, load_catalogue())
+    made = [t.name for t in factory.net.threaded.transitions]
+    if made != list(header["transitions"]) or [r.name for r in factory.robots] != header["robots"]:
+        raise ValueError("its net is not that of its PAG")
+    return factory
+
+
+def _model(log: Log) -> Any:
+    files = {f"meshes/{name}": content for name, content in log.files.items()}
+    try:
+        return mujoco.MjModel.from_xml_string(log.xml, files)
+    except ValueError as error:
+        raise InputError(_bad(f"the log's model is broken: {error}")) from error
+
+
+def _bad(words: str) -> Diagnostic:
+    return Diagnostic("BadLog", words, None, AGAIN)

@@ -1,0 +1,45 @@
+"""What is seen of a factory after a tick: the engine's state and its active constraints."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Index = NDArray[np.intp]
+
+
+@dataclass(frozen=True, slots=True)
+class Sight:
+    """The state at a time [s]: the engine's `qpos`, `qvel` and setpoints `ctrl`; `welds` (k, 3):
+    the active constraints by number, and the two bodies that each joins.
+
+    As long as no constraint is switched or aimed anew, `welds` is one and the same array."""
+
+    time: float
+    qpos: Array = field(repr=False)
+    qvel: Array = field(repr=False)
+    ctrl: Array = field(repr=False)
+    welds: Index = field(repr=False)
+
+
+class Eyes:
+    """Looks at a running engine."""
+
+    def __init__(self, m: Any, d: Any) -> None:
+        self.m, self.d = m, d
+        self._seen = b""
+        self._welds: Index = np.empty((0, 3), np.intp)
+
+    def look(self) -> Sight:
+        """The present state; its arrays are the engine's own and change with the next tick."""
+        m, d = self.m, self.d
+        seen = d.eq_active.tobytes() + m.eq_obj2id.tobytes() + m.eq_obj1id.tobytes()
+        if seen != self._seen:
+            self._seen = seen
+            on = np.flatnonzero(d.eq_active)
+            self._welds = np.stack([on, m.eq_obj1id[on], m.eq_obj2id[on]], axis=1)
+        return Sight(float(d.time), d.qpos, d.qvel, d.ctrl, self._welds)

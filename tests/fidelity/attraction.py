@@ -1,0 +1,280 @@
+"""Domains of attraction: each mode alone, in physics, from starts drawn in the D_p that it claims.
+
+A start is drawn in W - Δ, inside and on its borders: at the stops A and B, next to Δ (robots that
+all but touch), at the corner and along the edges of the L that a gate makes of W. The robots of the
+mode are put there in the engine, parts in their hands; the rest of the factory stands where it is
+when the mode starts for the first unit. The goal is reached when all are in the goal ball, at rest,
+the clock run out, before `patience`. A claimed start from which it is not, or on whose way there is
+a contact, is a defect. A start that has a contact to begin with is one too, counted apart: no
+factory can be there."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from factory.control.mode import Array
+from factory.control.navigation import Bundle
+from factory.engine import mujoco
+from factory.layout.plan import Layout
+from factory.nets.petri import Marking
+from factory.simulation import Simulation
+from factory.supervisor import REST
+from tests.fidelity.products import CAMPAIGN, layout
+from tests.fidelity.tables import table
+
+KINDS = ("inside", "stop", "touching", "gate")
+
+CLOSE = 1e-3
+"""`touching` is within this of Δ [m]."""
+
+DEEP = 1e-3
+"""Parts that are being joined may touch, but at the start they are in each other no deeper [m]."""
+
+KEPT = 5
+"""Defects that are kept of each mode."""
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """One start x [m], the kind of place it is, and what came of it: `reached`, `missed`, `contact`
+    on the way or `overlap` at the start; `seconds` [s] it took, and the geoms that touched."""
+
+    start: tuple[float, ...]
+    kind: str
+    result: str
+    seconds: float
+    contacts: tuple[tuple[str, str], ...] = ()
+
+
+class Bench:
+    """One operation's mode in the engine, alone, to be started from anywhere in its domain."""
+
+    def __init__(self, plan: Layout, number: int) -> None:
+        self.simulation = Simulation(plan, units=2, start=marking_at(plan, number))
+        supervisor = self.simulation.supervisor
+        assert supervisor.active.operations == (number,)
+        assert supervisor.active.bundle is not None
+        self.world, self.axes = self.simulation.world, supervisor.active.axes
+        self.bundle: Bundle = supervisor.active.bundle
+        self.mode = self.bundle.modes[0]
+        self.world.apply([(plan.factory.operations[number], 0)], [])
+        self.tick = self.simulation.settings.tick
+        self.kept = mujoco.MjData(self.world.m)
+        mujoco.mj_copyData(self.kept, self.world.m, self.world.d)
+
+    @property
+    def patience(self) -> float:
+        """How long a start is given [s]: twice the way through the whole of W at the speed limit,
+        the dwell and 3 s."""
+        way = (self.mode.upper - self.mode.lower) / self.bundle.speed
+        return float(2 * way.sum() + self.mode.dwell + 3.0)
+
+    def put(self, x: Array) -> list[tuple[str, str]]:
+        """The robots at x, at rest, with what they hold; gives the geoms that touch there
+        and should not."""
+        world, m, d = self.world, self.world.m, self.world.d
+        mujoco.mj_copyData(d, m, self.kept)
+        world.inspection.tick()
+        still = np.zeros(len(x))
+        d.qpos[world.qpos[self.axes]] = x
+        world.reference[self.axes], world.speed[self.axes] = x, still
+        world.move(self.axes, x, still, still)
+        mujoco.mj_kinematics(m, d)
+        for weld in np.flatnonzero(d.eq_active):
+            if m.equality(weld).name.startswith("grip/"):
+                holder, part = m.eq_obj1id[weld], m.eq_obj2id[weld]
+                at = m.jnt_qposadr[m.body_jntadr[part]]
+                turn = d.xmat[holder].reshape(3, 3)
+                d.qpos[at : at + 3] = d.xpos[holder] + turn @ m.eq_data[weld, 3:6]
+        d.qvel[d.qvel == 0.0] = -0.0
+        mujoco.mj_forward(m, d)
+        seen = len(world.inspection.unintended)
+        world.inspection.contacts()
+        deep = d.contact.geom[: d.ncon][d.contact.dist[: d.ncon] < -DEEP]
+        inside = [(m.geom(a).name, m.geom(b).name) for a, b in deep]
+        return list(dict.fromkeys([*world.inspection.unintended[seen:], *inside]))
+
+    def reach(self, x: Array, kind: str = "inside") -> Outcome:
+        """The mode from x until its goal, or until patience is at its end."""
+        start = tuple(float(value) for value in x)
+        if touching := self.put(x):
+            return Outcome(start, kind, "overlap", 0.0, tuple(touching))
+        world, begun = self.world, self.world.time
+        seen, clock = len(world.inspection.unintended), np.zeros(1)
+        result = "missed"
+        while world.time - begun < self.patience:
+            world.step(self.bundle, self.axes)
+            q, v = (sensed[self.axes] for sensed in world.sense())
+            clock = self.bundle.tick(clock, q, self.tick)
+            if self.bundle.finished(q, clock)[0] and (np.abs(v) < REST).all():
+                result = "reached"
+                break
+        touched = tuple(dict.fromkeys(world.inspection.unintended[seen:]))
+        if touched:
+            result = "contact"
+        return Outcome(start, kind, result, round(world.time - begun, 6), touched)
+
+
+def marking_at(plan: Layout, number: int) -> Marking:
+    """The marking where, for the first unit, all that an operation needs is done and it has just
+    started."""
+    factory, net = plan.factory, plan.factory.net
+    wanted = {o.index for o in factory.operations if _within(plan, o.index, number)}
+    events = {e for o in wanted for e in (factory.operations[o].start, factory.operations[o].end)}
+    events.remove(factory.operations[number].end)
+    marking = net.initial_marking
+    while events:
+        event = next(e for e in net.threaded.net.enabled(marking) if e in events)
+        marking = net.threaded.net.follower(marking, [event])
+        events.remove(event)
+    return marking
+
+
+def _within(plan: Layout, operation: int, number: int) -> bool:
+    """Whether an operation is `number` or makes something for it."""
+    factory = plan.factory
+    while operation != number and operation != factory.dropoff.index:
+        operation = factory.parents[operation]
+    return operation == number
+
+
+def draw(bundle: Bundle, chance: np.random.Generator, kind: str) -> Array | None:
+    """A start of a kind in the domain of a bundle's one mode; None where the mode has no such
+    place."""
+    mode = bundle.modes[0]
+    gated = np.flatnonzero(mode.gate >= 0)
+    if (kind == "gate" and not len(gated)) or (kind == "touching" and not len(mode.pairs)):
+        return None
+    for _ in range(1000):
+        x = chance.uniform(mode.lower, mode.upper)
+        if kind == "stop":
+            ends = chance.integers(3, size=mode.size)
+            ends[chance.integers(mode.size)] = chance.integers(2)
+            x = np.select([ends == 0, ends == 1], [mode.lower, mode.upper], x)
+        elif kind == "touching":
+            _close_in(bundle, x, chance)
+        elif kind == "gate":
+            robot = int(chance.choice(gated))
+            if chance.random() < 0.5:
+                x[robot] = mode.goals[robot] + mode.standoff[robot]
+            else:
+                gate = mode.gate[robot]
+                x[gate] = mode.goals[gate] + chance.uniform(-0.7, 0.7) * mode.eps
+        if (x >= mode.lower).all() and (x <= mode.upper).all() and bundle.in_domain(x)[0]:
+            return x
+    return None
+
+
+def _close_in(bundle: Bundle, x: Array, chance: np.random.Generator) -> None:
+    """Bring a pair to within CLOSE of touching, on random sides of their meeting point."""
+    mode = bundle.modes[0]
+    pair = int(chance.integers(len(mode.pairs)))
+    (i, j), (at_i, at_j) = mode.pairs[pair], mode.meet[pair]
+    apart = mode.touch[pair] + chance.uniform(0, CLOSE)
+    share = chance.uniform()
+    side_i, side_j = chance.choice([-1, 1], size=2)
+    x[i], x[j] = at_i + side_i * share * apart, at_j + side_j * (1 - share) * apart
+
+
+def try_mode(plan: Layout, number: int, count: int, seed: int = 0) -> list[Outcome]:
+    """`count` starts of each kind that an operation's mode has."""
+    bench, chance = Bench(plan, number), np.random.default_rng([seed, number])
+    outcomes = []
+    for kind in KINDS:
+        for _ in range(count):
+            x = draw(bench.bundle, chance, kind)
+            if x is not None:
+                outcomes.append(bench.reach(x, kind))
+    return outcomes
+
+
+def chosen(plan: Layout) -> list[int]:
+    """One operation of each template and pattern of gates in a factory."""
+    found: dict[tuple[str, bool], int] = {}
+    simulation = Simulation(plan, units=1)
+    for operation in plan.factory.operations:
+        gated = bool((simulation.modes[operation.index].gate >= 0).any())
+        found.setdefault((operation.template.name, gated), operation.index)
+    return sorted(found.values())
+
+
+def measure(quick: bool = False) -> dict:
+    """Starts in the domain of one mode of each template of each product."""
+    count, modes = (5 if quick else 100), []
+    for name in CAMPAIGN[:1] if quick else CAMPAIGN:
+        plan = layout(name)
+        for number in chosen(plan):
+            operation = plan.factory.operations[number]
+            outcomes = try_mode(plan, number, count)
+            modes.append(summary(name, operation.template.name, operation.label, outcomes))
+    return {"starts_of_each_kind": count, "modes": modes}
+
+
+def summary(product: str, template: str, label: str, outcomes: Sequence[Outcome]) -> dict:
+    """What the starts of one mode came to; a `defect` is any but `reached`."""
+    defects = [o for o in outcomes if o.result != "reached"]
+    touched = Counter(" - ".join(_kinds(c)) for o in defects for c in o.contacts)
+    return {
+        "product": product,
+        "template": template,
+        "label": label,
+        "starts": len(outcomes),
+        "results": dict(Counter(o.result for o in outcomes)),
+        "defects_by_kind": dict(Counter(o.kind for o in defects)),
+        "starts_by_kind": dict(Counter(o.kind for o in outcomes)),
+        "share_reached": (len(outcomes) - len(defects)) / len(outcomes) if outcomes else None,
+        "longest_s": max((o.seconds for o in outcomes if o.result == "reached"), default=None),
+        "touched": dict(touched.most_common()),
+        "defects": [
+            {"start": o.start, "kind": o.kind, "result": o.result, "contacts": o.contacts}
+            for o in defects[:KEPT]
+        ],
+    }
+
+
+def _kinds(pair: tuple[str, str]) -> tuple[str, ...]:
+    """Two geoms without the numbers of copies."""
+    return tuple(sorted(name.partition("#")[0] for name in pair))
+
+
+def section(results: dict) -> str:
+    """The report."""
+    head = ("product", "mode", "starts", "reached", "missed", "contact", "overlap at the start")
+    rows = [
+        (
+            m["product"],
+            f"{m['template']}({m['label']})",
+            m["starts"],
+            f"{100 * m['share_reached']:.1f} %" if m["starts"] else None,
+            *(m["results"].get(result, 0) for result in ("missed", "contact", "overlap")),
+        )
+        for m in results["modes"]
+    ]
+    faults = [m for m in results["modes"] if m["defects_by_kind"]]
+    lines = [
+        f"* `{m['product']}` {m['template']}({m['label']}): "
+        + ", ".join(
+            f"{bad} of {m['starts_by_kind'][kind]} starts {kind}"
+            for kind, bad in m["defects_by_kind"].items()
+        )
+        + ("; touched: " + ", ".join(m["touched"]) if m["touched"] else "")
+        for m in faults
+    ]
+    total = sum(m["starts"] for m in results["modes"])
+    bad = sum(sum(m["defects_by_kind"].values()) for m in results["modes"])
+    return "\n\n".join(
+        [
+            "## Domains of attraction",
+            f"Each mode alone in MuJoCo from {results['starts_of_each_kind']} starts of each kind"
+            " in the D_p that it claims: inside, at the stops, within 1 mm of Δ, at the edges that"
+            " gates make. Reached: in the goal ball and at rest, the clock run out, without a"
+            " contact, within twice the time for the whole of W, the dwell and 3 s.",
+            table(head, rows),
+            f"**{total} starts, {bad} defects.**" + (" Where:" if lines else ""),
+            *(["\n".join(lines)] if lines else []),
+        ]
+    )

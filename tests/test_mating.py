@@ -1,0 +1,564 @@
+"""How inputs come together: slide, lower or blocked, at three levels, against brute force and the
+engine."""
+
+from __future__ import annotations
+
+import re
+import time
+import xml.etree.ElementTree as ElementTree
+from collections.abc import Mapping
+from dataclasses import replace
+from itertools import product as every
+from pathlib import Path
+
+import mujoco
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.spatial import ConvexHull
+
+import factory.checking
+from factory.clashes import draw, picture_names
+from factory.compiler import expand
+from factory.geometry import Product, product_geometry
+from factory.lang import read_pag
+from factory.mating import (
+    BLOCKED,
+    LEFT_OUT,
+    NO_DEEPER,
+    STRICT,
+    TOLERANCE,
+    Mating,
+    Matings,
+    approaches,
+    matings,
+    shaped,
+)
+from factory.mating.contacts import CHUNK
+from factory.mating.depth import deepest, exact, polytope, rough
+from factory.mating.meetings import meetings
+from factory.pag import PAG
+from factory.pipeline import all_templates
+from factory.template import Template
+from tests.command_line import Terminal
+from tests.strategies import pags, random_pag_text
+
+TEMPLATES = all_templates()
+MM = 1e-3
+ALONG_Y = "root = r; r = mate ( a, b ); "
+ALONG_X = (
+    "root = r; r = mate ( s, far ); s = mate ( a, b ); far = atomic ( box = (0.01, 0.01, 0.01),"
+)
+ALONG_X += " pos = (0, 9, 0) ); "
+
+Span = tuple[tuple[float, float], tuple[float, float], tuple[float, float]]
+
+
+def block(*spans: tuple[float, float]) -> np.ndarray:
+    """The corners of a box from its intervals in x, y and z [mm]."""
+    return np.array(list(every(*spans)), float) * MM
+
+
+def prism(radius: float, low: float, high: float, axis: int, sides: int = 48) -> np.ndarray:
+    """A round peg along an axis through the origin [mm]."""
+    angles = 2 * np.pi * np.arange(sides) / sides
+    rim = np.column_stack([np.cos(angles), np.sin(angles)]) * radius
+    ends = [np.insert(rim, axis, value, axis=1) for value in (low, high)]
+    return np.concatenate(ends) * MM
+
+
+def plate(hole: float, axis: int, size: float = 30, thick: float = 5) -> list[np.ndarray]:
+    """A plate across an axis, with a square hole of half width `hole`, in four boxes [mm]."""
+    spans = (
+        [(-size, -hole), (-size, size)],
+        [(hole, size), (-size, size)],
+        [(-hole, hole), (-size, -hole)],
+        [(-hole, hole), (hole, size)],
+    )
+    found = []
+    for span in spans:
+        span.insert(axis, (-thick, thick))
+        found.append(block(*span))
+    return found
+
+
+def judged(text: str, **pieces: list[np.ndarray]) -> Matings:
+    """The matings of a PAG whose parts `pieces` are made of these convex bodies."""
+    atoms = "; ".join(f"{name} = atomic ( box = (1, 1, 1) )" for name in pieces)
+    pag = read_pag(text + atoms, TEMPLATES)
+    product = product_geometry(pag)
+    solids = dict(product.solids)
+    for name, bodies in pieces.items():
+        corners = np.concatenate(bodies)
+        low, high = corners.min(axis=0), corners.max(axis=0)
+        solid = replace(solids[name], pieces=tuple(bodies), corners=corners, low=low, high=high)
+        solids[name] = solid
+    return matings(pag, TEMPLATES, replace_solids(product, solids))
+
+
+def replace_solids(product: Product, solids: Mapping[str, object]) -> Product:
+    return Product(solids, product.low, product.high)  # type: ignore[arg-type]
+
+
+def one(found: Matings, label: str = "") -> Mating:
+    """The mating of a label, or the first."""
+    return next(m for m in found.all if label in ("", m.label))
+
+
+# --- hand-made cases --------------------------------------------------------------------------
+
+
+def test_two_boxes_side_by_side_slide_from_one_side_only() -> None:
+    a, b = block((0, 10), (0, 10), (0, 10)), block((0, 10), (10, 20), (0, 10))
+    found = one(judged(ALONG_Y, a=[a], b=[b]))
+    assert (found.approach.kind, found.approach.axis) == ("slide", 1)
+    assert found.approach.sides == (+1,)
+    assert found.approach.excluded == ((),)
+    assert found.level == STRICT and found.clashes == ()
+    swapped = one(judged(ALONG_Y, a=[b], b=[a]))
+    assert swapped.approach.sides == (-1,)
+
+
+def test_what_lies_beside_the_way_comes_from_both_sides() -> None:
+    a, b = block((0, 10), (0, 10), (0, 10)), block((10, 20), (0, 10), (0, 10))
+    assert one(judged(ALONG_Y, a=[a], b=[b])).approach.sides == (-1, +1)
+    assert one(judged(ALONG_X, a=[a], b=[b]), "s").approach.sides == (+1,)
+
+
+def hooks() -> tuple[list[np.ndarray], list[np.ndarray]]:
+    """Two hooks that hold each other along y."""
+    high = (0, 10)
+    a = [block((0, 30), (0, 10), high), block((20, 30), (10, 30), high)]
+    a.append(block((10, 20), (20, 30), high))
+    b = [block((0, 20), (40, 50), high), block((0, 10), (10, 40), high)]
+    b.append(block((10, 20), (10, 20), high))
+    return a, b
+
+
+def test_hooks_that_hold_each_other_are_lowered() -> None:
+    a, b = hooks()
+    found = one(judged(ALONG_Y, a=a, b=b))
+    assert (found.approach.kind, found.slide, found.lower) == ("lower", BLOCKED, STRICT)
+    assert found.approach.lowered == "b"
+    assert found.approach.stroke == pytest.approx(0.030)
+    assert found.approach.sides == (-1, +1)
+    assert found.approach.excluded == ((), ())
+
+
+def test_hooks_between_covers_are_blocked_and_told() -> None:
+    a, b = hooks()
+    covers = [block((0, 30), (0, 50), z) for z in ((-5, 0), (10, 15))]
+    found = one(judged(ALONG_Y, a=a + covers, b=b))
+    assert found.approach.kind == "blocked"
+    assert [clash.parts for clash in found.clashes] == [("a", "b")]
+    assert found.clashes[0].depth == pytest.approx(10 * MM)
+    assert found.clashes[0].finished == 0.0
+    assert found.approach.excluded == ((("a", "b"),),) * len(found.approach.sides)
+
+
+@pytest.mark.parametrize(
+    ("axis", "text", "kind"),
+    [
+        (1, ALONG_Y, "slide"),
+        (0, ALONG_X, "slide"),
+        (2, ALONG_Y, "lower"),
+        (2, ALONG_X, "lower"),
+        (0, ALONG_Y, "blocked"),
+        (1, ALONG_X, "blocked"),
+    ],
+)
+def test_a_peg_goes_into_its_hole_along_its_axis_alone(axis: int, text: str, kind: str) -> None:
+    found = judged(text, a=plate(8, axis), b=[prism(7.99, -20, 20, axis)])
+    mating = one(found, "r" if text == ALONG_Y else "s")
+    assert mating.approach.kind == kind
+    if kind == "blocked":
+        assert mating.clashes[0].depth > 5 * MM
+    else:
+        assert mating.level == STRICT
+
+
+def test_a_box_in_a_frame_is_lowered_and_under_a_lid_is_blocked() -> None:
+    frame, inner = plate(8, 2), block((-8, 8), (-8, 8), (-4, 4))
+    assert one(judged(ALONG_Y, a=frame, b=[inner])).approach.kind == "lower"
+    lids = [block((-30, 30), (-30, 30), z) for z in ((-7, -5), (5, 7))]
+    closed = one(judged(ALONG_Y, a=frame + lids, b=[inner]))
+    assert closed.approach.kind == "blocked"
+    assert closed.clashes[0].parts == ("a", "b")
+
+
+def test_with_a_floor_the_box_is_still_lowered_or_the_frame_is_put_over_it() -> None:
+    frame, inner = plate(8, 2), block((-8, 8), (-8, 8), (-5, 4))
+    floor = block((-30, 30), (-30, 30), (-7, -5))
+    lid = block((-30, 30), (-30, 30), (5, 7))
+    into = one(judged(ALONG_Y, a=[*frame, floor], b=[inner]))
+    assert (into.approach.kind, into.approach.lowered) == ("lower", "b")
+    over = one(judged(ALONG_Y, a=[*frame, lid], b=[inner]))
+    assert (over.approach.kind, over.approach.lowered) == ("lower", "a")
+    assert over.approach.stroke == pytest.approx(0.029)
+
+
+def test_a_pile_that_its_carrier_holds_is_not_lowered() -> None:
+    frame, inner = plate(8, 2), block((-8, 8), (-8, 8), (-5, 4))
+    lid = block((-30, 30), (-30, 30), (5, 7))
+    beside = block((-90, -80), (-4, 4), (-4, 4))
+    text = "root = r; r = mate ( a, c, b ); "
+    found = judged(text, a=[*frame, lid], c=[beside], b=[inner])
+    assert one(found, "r").approach.kind == "blocked"
+    assert one(found, "r/2").approach.kind == "slide"
+    last = judged(text, a=[inner], c=[beside], b=[*frame, lid])
+    assert one(last, "r").approach.lowered == "b"
+
+
+def test_a_press_fit_is_clean_only_with_finished_overlaps_left_out() -> None:
+    found = judged(ALONG_Y, a=plate(8, 1), b=[block((-8.05, 8.05), (-20, 20), (-7, 7))])
+    mating = one(found)
+    assert (mating.approach.kind, mating.slide) == ("slide", NO_DEEPER)
+    assert mating.approach.excluded == ((("a", "b"),), (("a", "b"),))
+    assert [found.count(level) for level in (LEFT_OUT, NO_DEEPER, STRICT)] == [1, 1, 0]
+    assert [mating.best(level) for level in (LEFT_OUT, STRICT)] == ["slide", "blocked"]
+
+
+def test_a_snap_fit_goes_deeper_on_its_way() -> None:
+    peg = [block((-7, 7), (-20, 20), (-7, 7)), block((-9, 9), (6, 20), (-7, 7))]
+    peg.append(block((-9, 9), (-20, -6), (-7, 7)))
+    loose = one(judged(ALONG_Y, a=plate(8, 1), b=peg))
+    assert (loose.approach.kind, loose.clashes[0].depth) == ("blocked", pytest.approx(1 * MM))
+    assert loose.clashes[0].shift == pytest.approx(1 * MM, abs=1.1 * MM)
+    tight = one(judged(ALONG_Y, a=plate(8, 1), b=[*peg, block((-8.05, 0), (-5, 5), (-7, 7))]))
+    assert (tight.approach.kind, tight.slide) == ("slide", LEFT_OUT)
+
+
+@pytest.mark.parametrize(("by", "level"), [(0.05, BLOCKED), (0.005, STRICT)])
+def test_planted_fault_something_is_in_the_way_by_a_hair(by: float, level: int) -> None:
+    peg = [block((-7, 7), (-20, 20), (-7, 7)), block((-8 - by, 0), (6, 20), (-7, 7))]
+    peg.append(block((-8 - by, 0), (-20, -6), (-7, 7)))
+    assert one(judged(ALONG_Y, a=plate(8, 1), b=peg)).slide == level
+
+
+def test_sides_may_differ_in_what_they_exclude() -> None:
+    """From +y the last one passes a lug that it overlaps in the end, from -y another."""
+    body = block((0, 10), (0, 10), (0, 10))
+    lugs = {"a": block((-10, 0.1), (0, 10), (0, 10)), "c": block((0, 10), (9.9, 20), (0, 10))}
+    text = "root = r; r = mate ( a, c, b ); "
+    found = one(judged(text, **{n: [v] for n, v in lugs.items()}, b=[body]), "r")
+    assert found.approach.sides == (-1,)
+    assert found.approach.excluded == ((("a", "b"), ("b", "c")),)
+
+
+def test_positions_are_those_of_the_input_that_comes() -> None:
+    text = "root = r;\nr = mate ( a, c,\n b );\n"
+    where = (block((0, 10), (k, k + 10), (0, 10)) for k in (0, 20, 40))
+    found = judged(text, **{name: [body] for name, body in zip("acb", where, strict=True)})
+    assert [(m.label, m.position.line) for m in found.all if m.position] == [("r/2", 2), ("r", 3)]
+
+
+# --- the axes, and where parts meet -----------------------------------------------------------
+
+
+def test_axes_alternate_with_the_robots_that_bring() -> None:
+    text = """root = r; r = weld ( t ); t = mate ( u, d, e ); u = weld ( v ); v = mate ( a, b );
+    e = mate ( f, g ); a = atomic(); b = atomic(); d = atomic(); f = atomic(); g = atomic()"""
+    pag = read_pag(text, TEMPLATES)
+    found = {m.label: (m.axis, m.either) for m in meetings(expand(pag, TEMPLATES), "r").all}
+    assert found == {"v": (0, True), "t/2": (1, True), "e": (0, True), "t": (1, False)}
+
+
+@given(pags(max_labels=30))
+@settings(max_examples=60)
+def test_parts_meet_at_their_lowest_common_operation(pag: PAG) -> None:
+    nodes = expand(pag, TEMPLATES)
+    found = meetings(nodes, pag.root)
+    above = {name: label for label, node in nodes.items() for name in node.inputs}
+
+    def ancestors(label: str) -> list[str]:
+        chain = [label]
+        while chain[-1] in above:
+            chain.append(above[chain[-1]])
+        return chain
+
+    pairs = [(i, j) for j in range(len(found.parts)) for i in range(j)]
+    if not pairs:
+        return
+    got = found.of(*(np.array(side) for side in zip(*pairs, strict=True)))
+    for (i, j), number in zip(pairs, got, strict=True):
+        mine = set(ancestors(found.parts[i]))
+        lowest = next(label for label in ancestors(found.parts[j]) if label in mine)
+        assert found.all[number].label == lowest
+
+
+# --- products with no shapes of their own -----------------------------------------------------
+
+
+@given(pags(max_labels=60))
+@settings(max_examples=80)
+def test_default_boxes_always_slide(pag: PAG) -> None:
+    """Theorem: neighbouring intervals of the path to and fro go ahead of each other."""
+    plain = tuple(n if n.inputs else replace(n, parameters=()) for n in pag.nodes)
+    bare = replace(pag, nodes=plain)
+    assert not shaped(bare)
+    found = matings(bare, TEMPLATES, product_geometry(bare))
+    assert all(m.approach.kind == "slide" and m.level == STRICT for m in found.all)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_large_default_products_always_slide(seed: int) -> None:
+    pag = read_pag(random_pag_text(1500 + seed, seed), TEMPLATES)
+    found = matings(pag, TEMPLATES, product_geometry(pag))
+    assert found.count(STRICT) == len(found.all) and not found.of_kind("lower")
+
+
+def test_ten_thousand_parts_are_judged_fast() -> None:
+    pag = read_pag(random_pag_text(19_999, 1), TEMPLATES)
+    product = product_geometry(pag)
+    begin = time.process_time()
+    assert len(approaches(pag, TEMPLATES, product)) == 9_999
+    assert time.process_time() - begin < 2.0
+    assert len(product.solids) > CHUNK
+
+
+# --- the depth of a path ----------------------------------------------------------------------
+
+
+def convex_pair(seed: int) -> tuple[np.ndarray, np.ndarray]:
+    """Two convex bodies near each other, of some centimetres: random, prisms, or alike."""
+    rng = np.random.default_rng(seed)
+    found = []
+    for kind in rng.integers(3, size=2):
+        if kind == 0:
+            found.append(rng.normal(size=(int(rng.integers(4, 24)), 3)) * 0.02)
+        else:
+            sides, axis = int(rng.integers(3, 14)), int(rng.integers(3))
+            found.append(prism(20, -15, 25, axis, sides) * rng.uniform(0.5, 1.5))
+    if seed % 5 == 0:
+        found[1] = found[0].copy()
+    return found[0], found[1] + rng.normal(size=3) * 0.04
+
+
+def brute(p: np.ndarray, q: np.ndarray, direction: np.ndarray, shifts: np.ndarray) -> np.ndarray:
+    """D(λ) from the hull of all differences of vertices."""
+    hull = ConvexHull((q[:, None] - p[None]).reshape(-1, 3) * 100).equations
+    heights = -hull[:, 3] / 100
+    return np.array([(heights - hull[:, :3] @ (shift * direction)).min() for shift in shifts])
+
+
+@pytest.mark.parametrize("seed", range(120))
+def test_depths_are_those_of_the_hull_of_all_differences(seed: int) -> None:
+    p, q = convex_pair(seed)
+    direction = np.eye(3)[seed % 3] * (1 if seed % 2 else -1)
+    mine, theirs, here = polytope(p), polytope(q), np.zeros((1, 3))
+    difference = exact(mine, theirs)
+    shifts = np.linspace(0, 0.4, 1601)
+    expected = brute(p, q, direction, shifts)
+    finished = difference.heights(here).min()
+    assert max(finished, 0) == pytest.approx(max(expected[0], 0), abs=1e-8)
+    assert np.sign(finished) == np.sign(expected[0])
+    depth, shift = deepest(difference, here, direction)
+    at_shift = brute(p, q, direction, shift)[0]
+    assert max(depth[0], 0) >= expected.max() - 1e-8
+    assert max(depth[0], 0) == pytest.approx(max(at_shift, 0), abs=1e-8)
+    assert (depth[0] > 0) == (max(expected.max(), at_shift) > 0)
+    assert deepest(rough(mine, theirs), here, direction)[0][0] >= depth[0] - 1e-9
+
+
+def test_one_difference_serves_bodies_wherever_they_are() -> None:
+    p, q = convex_pair(1)
+    apart = np.random.default_rng(0).normal(size=(50, 3)) * 0.05
+    together = deepest(exact(polytope(p), polytope(q)), apart, np.eye(3)[0])[0]
+    alone = [
+        deepest(exact(polytope(p + by), polytope(q)), np.zeros((1, 3)), np.eye(3)[0])[0][0]
+        for by in apart
+    ]
+    assert np.maximum(together, 0) == pytest.approx(np.maximum(alone, 0), abs=1e-8)
+    assert ((together > 0) == (np.array(alone) > 0)).all() and 5 < (together > 0).sum() < 45
+
+
+def test_planted_fault_without_the_edges_depths_are_too_large() -> None:
+    """Two beams that cross aslant meet at edges: faces alone do not see that they are apart."""
+    beam = block((-40, 40), (-5, 5), (-5, 5))
+    turn = np.linalg.qr(np.random.default_rng(3).normal(size=(3, 3)))[0]
+    worst = 0.0
+    for height in np.linspace(0, 0.03, 31):
+        p, q = polytope(beam @ turn + [0, 0, height]), polytope(beam)
+        depths = [d(p, q).heights(np.zeros((1, 3))).min() for d in (rough, exact)]
+        worst = max(worst, float(depths[0] - depths[1]))
+    assert worst > 1 * MM
+
+
+class Engine:
+    """Two convex meshes in MuJoCo; how deep they are in each other when one is shifted."""
+
+    def __init__(self, p: np.ndarray, q: np.ndarray) -> None:
+        spec = mujoco.MjSpec()
+        for name, vertices in (("p", p), ("q", q)):
+            mesh = spec.add_mesh(name=name)
+            mesh.uservert = vertices.ravel()
+            mesh.userface = ConvexHull(vertices).simplices.ravel()
+            body = spec.worldbody.add_body(name=name, mocap=name == "p")
+            body.add_geom(type=mujoco.mjtGeom.mjGEOM_MESH, meshname=name, name=name)
+            if name == "q":
+                body.add_freejoint()
+        self.m = spec.compile()
+        self.d = mujoco.MjData(self.m)
+
+    def depth(self, shift: np.ndarray) -> float:
+        self.d.mocap_pos[0] = shift
+        mujoco.mj_forward(self.m, self.d)
+        return max((-float(contact.dist) for contact in self.d.contact), default=0.0)
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_what_is_called_clean_gives_no_contact_in_the_engine(seed: int) -> None:
+    p, q = convex_pair(seed)
+    engine, difference = Engine(p, q), exact(polytope(p), polytope(q))
+    for direction in (*np.eye(3), *-np.eye(3)):
+        depth, shift = deepest(difference, np.zeros((1, 3)), direction)
+        if depth[0] <= TOLERANCE:
+            found = [engine.depth(by * direction) for by in np.linspace(0, 0.2, 60)]
+            assert max(found) <= TOLERANCE + 1e-6
+        elif depth[0] > 1 * MM:
+            assert engine.depth(shift[0] * direction) > 0.5 * MM
+
+
+# --- check ------------------------------------------------------------------------------------
+
+CLOSED = """root = r;
+r = mate ( a, b );
+a = mate ( low, left, right, front, rear, lid );
+low = atomic ( box = (0.06, 0.06, 0.01), pos = (0, 0, 0.005) );
+left = atomic ( box = (0.01, 0.06, 0.03), pos = (-0.025, 0, 0.025) );
+right = atomic ( box = (0.01, 0.06, 0.03), pos = (0.025, 0, 0.025) );
+front = atomic ( box = (0.04, 0.01, 0.03), pos = (0, -0.025, 0.025) );
+rear = atomic ( box = (0.04, 0.01, 0.03), pos = (0, 0.025, 0.025) );
+lid = atomic ( box = (0.06, 0.06, 0.01), pos = (0, 0, 0.045) );
+b = atomic ( box = (0.03, 0.03, 0.02), pos = (0, 0, 0.022) )
+"""
+
+
+@pytest.fixture
+def closed(tmp_path: Path) -> Path:
+    """A box in a closed box."""
+    file = tmp_path / "closed.pag"
+    file.write_text(CLOSED)
+    return file
+
+
+def test_check_tells_figures_and_names_what_is_blocked(run: Terminal, closed: Path) -> None:
+    done = run("check", closed)
+    out = done.out
+    assert done.status == 0
+    assert (
+        "approach: 5 of 6 operations clean with finished overlaps left out, 5 with paths no deeper,"
+        " 5 strictly; 2 lowered, 1 blocked" in out
+    )
+    assert f"{closed}:2:15: Blocked warning: b cannot come to r: b and front 20.00 mm" in out
+    assert "--clashes DIR draws each of them" in out
+
+
+def test_check_lists_approaches_and_clashes(run: Terminal, closed: Path) -> None:
+    document = run("check", closed, "--json").json
+    found = document["approaches"]
+    assert {k: found[k] for k in ("operations", "slide", "lower", "blocked")} == {
+        "operations": 6,
+        "slide": 3,
+        "lower": 2,
+        "blocked": 1,
+    }
+    assert (found["left_out"], found["no_deeper"], found["strict"]) == (5, 5, 5)
+    last = found["list"][-1]
+    assert (last["label"], last["kind"], last["axis"], last["level"]) == (
+        "r",
+        "blocked",
+        "y",
+        "none",
+    )
+    clash = document["clashes"][0]
+    assert (clash["label"], clash["parts"]) == ("r", ["b", "front"])
+    assert clash["depth_mm"] == pytest.approx(20) and clash["line"] == 2
+    assert Path(clash["file"]) == closed
+
+
+def test_check_computes_no_geometry_where_no_part_has_a_shape(
+    run: Terminal, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    file = tmp_path / "plain.pag"
+    file.write_text("root = r; r = mate ( a, b ); a = atomic(); b = atomic()")
+    monkeypatch.setattr("factory.pipeline.product_geometry", pytest.fail)
+    document = run("check", file, "--clashes", tmp_path / "none", "--json").json
+    assert document["approaches"] is None and document["clashes"] == []
+    assert not (tmp_path / "none").exists()
+
+
+def test_pictures_are_written_into_the_folder_alone(run: Terminal, tmp_path: Path) -> None:
+    file, folder = tmp_path / "odd.pag", tmp_path / "pictures" / "here"
+    file.write_text(
+        CLOSED.replace("root = r", "root = ..").replace("r = mate ( a", ".. = mate ( a")
+    )
+    before = set(tmp_path.rglob("*"))
+    assert run("check", file, "--clashes", folder).status == 0
+    new = set(tmp_path.rglob("*")) - before - {folder, folder.parent}
+    assert [path.parent for path in new] == [folder]
+    text = new.pop().read_text()
+    root = ElementTree.fromstring(text)
+    assert root.tag.endswith("svg") and "href" not in text and "url(" not in text
+    words = "".join(root.itertext())
+    assert "b and front pass through each other, 20.00 mm deep" in words
+    assert 'class="clash"' in text and " mm" in words
+
+
+def test_a_link_in_the_folder_is_not_followed(run: Terminal, closed: Path, out: Path) -> None:
+    aim = closed.parent / "elsewhere.svg"
+    (out / "clash-001-r.svg").symlink_to(aim)
+    done = run("check", closed, "--clashes", out)
+    assert done.status == 2 and "is a link" in done.err
+    assert not aim.exists()
+
+
+def test_a_file_where_the_folder_should_be_is_refused(run: Terminal, closed: Path) -> None:
+    done = run("check", closed, "--clashes", closed)
+    assert done.status == 2 and "is a file, not a folder" in done.err
+
+
+def test_names_of_pictures_are_safe_and_differ() -> None:
+    a, b = hooks()
+    covers = [block((0, 30), (0, 50), z) for z in ((-5, 0), (10, 15))]
+    mating = one(judged(ALONG_Y, a=a + covers, b=b))
+    labels = ["../../etc/x", "a/2", "a_2", "..", "é" * 300, "c:\\d", "x\0y"]
+    names = picture_names([replace(mating, label=label) for label in labels])
+    assert len(set(names)) == len(labels)
+    assert all(re.fullmatch(r"clash-\d{3}-[\w.-]{1,40}\.svg", name) for name in names)
+
+
+def test_a_picture_is_the_same_every_time_and_survives_odd_labels() -> None:
+    pag = read_pag(CLOSED.replace("front", "fé"), TEMPLATES)
+    product = product_geometry(pag)
+    found = matings(pag, TEMPLATES, product)
+    (mating,) = found.of_kind("blocked")
+    picture = draw(mating, found, product)
+    assert picture == draw(mating, matings(pag, TEMPLATES, product), product)
+    odd = ElementTree.fromstring(draw(replace(mating, label="<&>" + "x" * 90), found, product))
+    assert "<&>xxxx" in "".join(odd.itertext())
+
+
+@given(st.integers(0, 10_000))
+@settings(max_examples=15)
+def test_random_products_have_nested_levels_and_consistent_exclusions(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    spans = rng.integers(0, 40, (5, 3, 1)) + np.concatenate(
+        [np.zeros((5, 3, 1), int), rng.integers(4, 30, (5, 3, 1))], axis=2
+    )
+    shapes = {f"p{i}": [block(*map(tuple, spans[i]))] for i in range(5)}
+    text = "root = r; r = mate ( s, t ); s = mate ( p0, p1, p2 ); t = mate ( p3, p4 ); "
+    found = judged(text, **shapes)
+    assert found.count(STRICT) <= found.count(NO_DEEPER) <= found.count(LEFT_OUT)
+    for mating in found.all:
+        approach = mating.approach
+        assert len(approach.excluded) == len(approach.sides) > 0
+        assert (mating.level == STRICT) == (not any(approach.excluded))
+        assert (approach.kind == "blocked") == bool(mating.clashes) == (mating.level == BLOCKED)
+
+
+def test_matings_of_a_single_part_are_none(templates: Mapping[str, Template]) -> None:
+    pag = read_pag("root = a; a = atomic ( sphere = 0.1 )", templates)
+    assert matings(pag, templates, product_geometry(pag)).all == ()
+    assert factory.checking.SHOWN > 0

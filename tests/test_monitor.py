@@ -1,0 +1,537 @@
+"""The monitor: it explains every good run, and catches what is planted in the engine under it, with
+time, robot, label and source line."""
+
+from __future__ import annotations
+
+import ast
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+from layout_values import random_layout
+
+import factory
+from factory.errors import InputError
+from factory.lang import read_pag
+from factory.layout.plan import Layout
+from factory.log import Log, LogWriter, read_log
+from factory.monitor import Anatomy, Monitor, Report, Subject, subject_of
+from factory.monitor.explanation import Explanation
+from factory.monitor.record import watch_log
+from factory.nets.history import legal_marking
+from factory.pipeline import all_templates, read
+from factory.settings import Settings
+from factory.simulation import Simulation
+from tests.command_line import PAPER, ROOT, Terminal
+from tests.test_simulation import PRODUCTS, UNARY, laid_out, random_marking
+
+
+def monitor_of(simulation: Simulation) -> Monitor:
+    subject = subject_of(
+        simulation.layout,
+        simulation.settings,
+        simulation.jitter,
+        simulation.start,
+        simulation.wip,
+    )
+    world = simulation.world
+    monitor = Monitor(subject, Anatomy.of(world.m, simulation.layout.factory))
+    monitor.watch(world.m, world.d)
+    return monitor
+
+
+def watched(simulation: Simulation, max_time: float | None = None) -> tuple[Any, Report]:
+    monitor = monitor_of(simulation)
+    run = simulation.run([monitor.observe], max_time)
+    return run, monitor.report()
+
+
+def assert_explained(simulation: Simulation, run: Any, report: Report) -> None:
+    """The verdict is good, and the firings are those of the supervisor, each in its interval."""
+    assert run.trouble is None and run.refines_net
+    assert report.refines_net, report.violations
+    firings = {(f.transition, f.unit): f for f in (*report.seen, *report.inferred)}
+    assert len(firings) == len(report.seen) + len(report.inferred) == len(run.events)
+    names = simulation.layout.factory.net.threaded.transitions
+    count = Counter({names[e].name: n for e, n in simulation.counts.items()})
+    for event in run.events:
+        firing = firings[event.transition, count[event.transition]]
+        count[event.transition] += 1
+        assert firing.earliest - 1e-9 <= event.t <= firing.latest + 1e-9
+
+
+@pytest.fixture(scope="module")
+def paper() -> Layout:
+    return factory.lay_out(factory.compile(factory.load_pag(PAPER)))
+
+
+# --- good runs ------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", PRODUCTS)
+@pytest.mark.parametrize("distributed", [False, True])
+def test_every_shape_of_product_is_explained(name: str, distributed: bool) -> None:
+    simulation = Simulation(
+        laid_out(PRODUCTS[name]), units=2, seed=1, jitter=0.3, distributed=distributed
+    )
+    assert_explained(simulation, *watched(simulation))
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_the_papers_example_is_explained(paper: Layout, seed: int) -> None:
+    simulation = Simulation(
+        paper,
+        units=3,
+        seed=seed,
+        jitter=0.3,
+        wip=1 + seed // 2 if seed % 2 else None,
+        distributed=seed == 4,
+        settings=Settings(timestep=0.001, substeps=4 + seed),
+    )
+    assert_explained(simulation, *watched(simulation))
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_a_run_from_a_marking_is_explained(paper: Layout, seed: int) -> None:
+    simulation = Simulation(paper, units=2, seed=seed, start=random_marking(paper, seed))
+    assert_explained(simulation, *watched(simulation))
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_random_factories_give_no_false_alarm(seed: int) -> None:
+    style = ("plain", "small", "medium", "mixed")[seed % 4]
+    layout = random_layout(3 + seed, seed, style=style)
+    simulation = Simulation(
+        layout, units=2, seed=seed, jitter=0.3 * (seed % 2), distributed=seed % 4 == 3
+    )
+    assert_explained(simulation, *watched(simulation))
+
+
+def test_firings_are_seen_to_a_tick(paper: Layout) -> None:
+    """Parts that change hands show X_e, the first robot that leaves shows X_s; what has no motion
+    of its own is inferred: the first atomic_s, and the ends of welds."""
+    simulation = Simulation(paper, units=2)
+    run, report = watched(simulation)
+    count: Counter[str] = Counter()
+    when = {}
+    for event in run.events:
+        when[event.transition, count[event.transition]] = event.t
+        count[event.transition] += 1
+    for firing in report.seen:
+        assert firing.seen == pytest.approx(when[firing.transition, firing.unit], abs=1e-9)
+        assert firing.latest - firing.seen <= simulation.settings.tick + 1e-9
+    inferred = {(f.transition, f.unit) for f in report.inferred}
+    assert inferred == {
+        *((f"part{n}_s", 0) for n in (1, 2, 3)),
+        *(("sub2_e", unit) for unit in (0, 1)),
+    }
+    assert report.time_s > 0
+
+
+def test_robots_that_lower_what_they_bring_are_explained() -> None:
+    layout = factory.lay_out(read(ROOT / "examples" / "gearbox.pag").compile())
+    lifts = [r for r in layout.factory.robots if r.type == "lift"]
+    assert lifts
+    simulation = Simulation(layout, units=1, seed=2, jitter=0.3)
+    assert_explained(simulation, *watched(simulation))
+
+
+def test_it_reads_neither_the_supervisor_nor_the_world() -> None:
+    imported = set()
+    for path in sorted((ROOT / "factory" / "monitor").glob("*.py")):
+        for node in ast.walk(ast.parse(path.read_text("utf-8"))):
+            if isinstance(node, ast.ImportFrom):
+                imported.add(node.module or "")
+    rooms = {name.split(".")[1] for name in imported if name.startswith("factory.")}
+    assert not rooms & {"supervisor", "distributed", "world", "simulation", "control", "running"}
+
+
+# --- planted faults -------------------------------------------------------------------------------
+
+
+def plant(simulation: Simulation, when: Callable[[], bool], act: Callable[[], None]) -> list[float]:
+    """Do something to the engine once, at the beginning of a tick; gives the time, when done."""
+    step, done = simulation.supervisor.step, list[float]()
+
+    def stepped() -> None:
+        if not done and when():
+            act()
+            done.append(simulation.world.time)
+        step()
+
+    simulation.supervisor.step = stepped  # type: ignore[method-assign]
+    return done
+
+
+def after(simulation: Simulation, transition: str) -> Callable[[], bool]:
+    return lambda: any(e.transition == transition for e in simulation.supervisor.events)
+
+
+def assert_caught(
+    report: Report, code: str, robot: str, label: str, line: int, t: float, late: float = 0.05
+) -> None:
+    """Some violation has that code, robot, label and line, near that time; none is before it."""
+    assert not report.refines_net
+    found = [
+        (v.code, v.robot, v.label, v.position.line if v.position else 0) for v in report.violations
+    ]
+    assert (code, robot, label, line) in found
+    caught = report.violations[found.index((code, robot, label, line))]
+    assert t - 0.03 <= caught.t <= t + late
+    assert t - 0.03 <= report.violations[0].t
+    assert caught.position is not None and caught.position.file == str(PAPER)
+    assert caught.message and str(caught.diagnostic())
+
+
+def weld(simulation: Simulation, name: str) -> int:
+    return int(simulation.world.m.equality(name).id)
+
+
+def address(simulation: Simulation, body: str) -> int:
+    m = simulation.world.m
+    return int(m.jnt_qposadr[m.body_jntadr[m.body(body).id]])
+
+
+def test_a_weld_that_is_never_released(paper: Layout) -> None:
+    simulation = Simulation(paper, units=1)
+    stock, kept = simulation.world.stock, weld(simulation, "grip/r5/part1")
+    switch = stock._switch
+
+    def sticky(number: int, on: bool, body: int | None = None) -> None:
+        if number != kept or on:
+            switch(number, on, body)
+
+    stock._switch = sticky
+    run, report = watched(simulation, 3)
+    t = next(e.t for e in run.events if e.transition == "sub1_e")
+    assert_caught(report, "TwoHolders", "r5", "part1", 6, t)
+    assert "r3 and r5 hold part1#1 both" in report.violations[0].message
+
+
+def test_a_part_that_is_let_go(paper: Layout) -> None:
+    simulation = Simulation(paper, units=1)
+    grip = weld(simulation, "grip/r3/part1")
+
+    def let_go() -> None:
+        simulation.world.d.eq_active[grip] = 0
+
+    done = plant(simulation, after(simulation, "sub1_e"), let_go)
+    _, report = watched(simulation, 3)
+    assert_caught(report, "Dropped", "r3", "part1", 6, done[0])
+    assert report.violations[0].message == "nobody holds part1#1, which r3 held"
+
+
+def test_a_part_that_is_knocked_off_its_place(paper: Layout) -> None:
+    simulation = Simulation(paper, units=1)
+
+    def knock() -> None:
+        simulation.world.d.qpos[address(simulation, "part/part2#1") + 2] -= 0.05
+
+    done = plant(simulation, after(simulation, "sub1_e"), knock)
+    _, report = watched(simulation)
+    assert_caught(report, "Dropped", "r3", "part2", 7, done[0])
+
+
+def test_a_part_that_hangs_off_its_weld(paper: Layout) -> None:
+    simulation = Simulation(paper, units=1)
+    grip = weld(simulation, "grip/r3/part1")
+
+    def shift() -> None:
+        simulation.world.m.eq_data[grip, 3] += 0.005
+
+    done = plant(simulation, after(simulation, "sub1_e"), shift)
+    _, report = watched(simulation)
+    assert_caught(report, "Dropped", "r3", "part1", 6, done[0])
+
+
+def test_a_weld_with_a_wrong_frame(paper: Layout) -> None:
+    simulation = Simulation(paper, units=1)
+    simulation.world.m.eq_data[weld(simulation, "grip/r1/part2"), 4] += 0.001
+    _, report = watched(simulation, 0.1)
+    assert_caught(report, "Frame", "r1", "part2", 7, 0.0)
+
+
+def test_grips_aimed_at_each_others_parts(paper: Layout) -> None:
+    simulation = Simulation(paper, units=1)
+    m = simulation.world.m
+    grips = [weld(simulation, f"grip/r3/part{n}") for n in (1, 2)]
+
+    def exchange() -> None:
+        m.eq_obj2id[grips] = m.eq_obj2id[grips[::-1]]
+
+    done = plant(simulation, after(simulation, "sub1_e"), exchange)
+    _, report = watched(simulation, 3)
+    assert_caught(report, "Exchanged", "r3", "part1", 6, done[0])
+    assert_caught(report, "Exchanged", "r3", "part2", 7, done[0])
+
+
+def test_copies_of_two_units_exchanged(paper: Layout) -> None:
+    """Bodies and welds both: nothing moves, and every part is held where it should be."""
+    simulation = Simulation(paper, units=2)
+    m, d = simulation.world.m, simulation.world.d
+
+    def exchange() -> None:
+        one, two = (int(m.body(f"part/part1#{n}").id) for n in (1, 2))
+        at, to = address(simulation, "part/part1#1"), address(simulation, "part/part1#2")
+        pose = d.qpos[at : at + 7].copy()
+        d.qpos[at : at + 7], d.qpos[to : to + 7] = d.qpos[to : to + 7], pose
+        first = [e for e in range(m.neq) if d.eq_active[e] and m.eq_obj2id[e] == one]
+        second = [e for e in range(m.neq) if d.eq_active[e] and m.eq_obj2id[e] == two]
+        m.eq_obj2id[first], m.eq_obj2id[second] = two, one
+
+    done = plant(
+        simulation,
+        lambda: sum(e.transition == "part1_e" for e in simulation.supervisor.events) == 2,
+        exchange,
+    )
+    _, report = watched(simulation, 4)
+    assert_caught(report, "Exchanged", "r5", "part1", 6, done[0])
+
+
+def hurry(simulation: Simulation, label: str, delay: float) -> list[float]:
+    """The supervisor ends an operation so long after it started, whatever its robots do."""
+    supervisor, done = simulation.supervisor, list[float]()
+    number = simulation.layout.factory.by_label[label].index
+    finished = supervisor._finished
+
+    def hasty() -> list[int]:
+        found = list(finished())
+        since = supervisor.since.get(number, float("inf"))
+        if not done and since + delay <= supervisor.world.time and number not in found:
+            done.append(supervisor.world.time)
+            found.append(number)
+        return found
+
+    supervisor._finished = hasty
+    return done
+
+
+@pytest.mark.parametrize(
+    ("label", "delay", "robot", "line"),
+    [
+        ("part1", 0.05, "r5", 6),
+        ("sub1", 0.2, "r5", 5),
+        ("sub3", 0.1, "r3", 3),
+        ("dropoff", 0.1, "r1", 3),
+    ],
+)
+def test_an_operation_ended_before_its_goal(
+    paper: Layout, label: str, delay: float, robot: str, line: int
+) -> None:
+    simulation = Simulation(paper, units=2)
+    done = hurry(simulation, label, delay)
+    _, report = watched(simulation, 4)
+    assert_caught(report, "Early", robot, label, line, done[0])
+
+
+def test_a_weld_ended_before_its_dwell(paper: Layout) -> None:
+    simulation = Simulation(paper, units=1)
+    done = hurry(simulation, "sub2", 0.9)
+    _, report = watched(simulation, 4)
+    assert_caught(report, "Early", "r4", "sub2", 4, done[0])
+
+
+def test_a_weld_ended_on_the_way_to_it(paper: Layout) -> None:
+    """Nobody stops there, and the next operation starts before this one can have ended."""
+    simulation = Simulation(paper, units=1)
+    done = hurry(simulation, "sub2", 0.2)
+    _, report = watched(simulation, 4)
+    assert_caught(report, "Order", "r2", "sub3", 3, done[0])
+    assert_caught(report, "Early", "r3", "sub2", 4, done[0], late=1.0)
+    assert "for sub2_e comes first" in report.violations[0].message
+
+
+def test_a_robot_whose_drive_does_nothing(paper: Layout) -> None:
+    simulation = Simulation(paper, units=1)
+    m = simulation.world.m
+
+    def cut() -> None:
+        m.actuator_biasprm[4, 1:3] = m.actuator_gaintype[4] = m.actuator_gainprm[4] = 0
+
+    done = plant(simulation, after(simulation, "part1_e"), cut)
+    run, report = watched(simulation)
+    assert run.trouble.code == "Stalled"
+    assert_caught(report, "Stuck", "r5", "sub1", 5, done[0], late=0.5)
+    assert_caught(report, "Stalled", "r5", "sub1", 5, done[0], late=1.0)
+
+
+def test_a_robot_whose_joint_is_locked(paper: Layout) -> None:
+    simulation = Simulation(paper, units=1)
+    m = simulation.world.m
+
+    def lock() -> None:
+        m.dof_frictionloss[m.jnt_dofadr[m.joint("r6/slide").id]] = 1e4
+
+    done = plant(simulation, lambda: simulation.world.time > 0.1, lock)
+    _, report = watched(simulation, 2)
+    assert_caught(report, "Stuck", "r6", "sub1", 5, done[0], late=0.3)
+
+
+def test_an_operation_that_does_not_go_on(paper: Layout) -> None:
+    simulation = Simulation(paper, units=1)
+    number = paper.factory.by_label["sub2"].index
+    finished = simulation.supervisor._finished
+    simulation.supervisor._finished = lambda: [o for o in finished() if o != number]
+    run, report = watched(simulation)
+    t = next(e.t for e in run.events if e.transition == "sub2_s")
+    assert_caught(report, "Stalled", "r3", "sub2", 4, t, late=0.6)
+
+
+def test_more_parts_let_in_than_allowed(paper: Layout) -> None:
+    """The world lets in what it has; the monitor was told that one unit is to be inside at once."""
+    simulation = Simulation(paper, units=2)
+    simulation.wip = 1
+    run, report = watched(simulation)
+    t = [e.t for e in run.events if e.transition == "part1_s"][1]
+    assert_caught(report, "Order", "r5", "part1", 6, t)
+    assert "for dropoff_e comes first" in report.violations[0].message
+
+
+def test_parts_that_the_marking_does_not_account_for(paper: Layout) -> None:
+    start = legal_marking(paper.factory.net, "r3:sub1")
+    simulation = Simulation(paper, units=1, start=start)
+    simulation.start = paper.factory.net.initial_marking
+    monitor = monitor_of(simulation)
+    found = [(v.code, v.robot, v.label) for v in monitor.violations]
+    assert ("Start", "r3", "part1") in found
+
+
+def test_firings_in_an_impossible_order(paper: Layout) -> None:
+    """The difference constraints alone: one firing too early is one violation."""
+    subject: Subject = subject_of(paper, Settings())
+    events = paper.factory.net.threaded.net.transition_index
+    explanation = Explanation(subject, 0.015)
+    for name, t in (("part1_e", 1.0), ("part2_e", 1.0), ("sub1_e", 3.0)):
+        explanation.saw(events[name], 0, t, t + 0.01, t, "r3")
+    _, inferred, found = explanation.solve(0.0, 9.0)
+    assert not found
+    bounds = {f.transition: (f.earliest, f.latest) for f in inferred}
+    assert bounds["sub1_s"] == (1.0, 3.01) and bounds["part1_s"] == (0.0, 1.01)
+    explanation.saw(events["sub2_s"], 0, 0.0, 2.0, 2.0, "r3")
+    _, _, found = explanation.solve(0.0, 9.0)
+    assert [(v.code, v.robot, v.label, v.t) for v in found] == [("Order", "r3", "sub2", 2.0)]
+    explanation.saw(events["sub3_s"], 0, 0.0, 4.0, 4.0, "r2")
+    _, _, found = explanation.solve(0.0, 9.0)
+    assert [v.label for v in found] == ["sub2", "sub3"]
+    assert "part3_e comes first, and was not seen" in found[1].message
+
+
+def test_a_feeder_that_presents_while_its_robot_still_works_there() -> None:
+    """Found by the monitor: a run from a marking fed a part into the one that was still there."""
+    layout = laid_out(UNARY)
+    start = legal_marking(layout.factory.net, "r1:a")
+    simulation = Simulation(layout, units=2, start=start)
+    assert_explained(simulation, *watched(simulation))
+
+
+# --- logs and the command line --------------------------------------------------------------------
+
+
+def test_a_log_gives_the_same_verdict(paper: Layout, tmp_path: Path) -> None:
+    path = tmp_path / "run.log"
+    start = legal_marking(paper.factory.net, "sub1")
+    simulation = Simulation(paper, units=2, seed=2, jitter=0.3, wip=2, start=start)
+    monitor = monitor_of(simulation)
+    with LogWriter(path, simulation) as writer:
+        simulation.run([writer.observe, monitor.observe])
+    live, (recorded, subject) = monitor.report(), watch_log(read_log(path))
+    assert recorded.refines_net
+    assert (recorded.seen, recorded.inferred) == (live.seen, live.inferred)
+    assert subject.factory.net == paper.factory.net and subject.wip == 2
+
+
+def test_a_log_stands_by_itself(tmp_path: Path, run: Terminal) -> None:
+    """The PAG, the templates and the meshes that a run was made of may all be gone."""
+    (tmp_path / "rivet.op").write_text(
+        """rivet = (R, j, ~, <a; b>, F) where R = < dot, tool >; j = 1; ~ = { S1 = A2 };
+        <a; b> = < LAB1, nopart; LAB2, nopart >;
+        F = navigation on W to ( S1 + 2r, A2 + 2r ) within eps for dwell;
+        parameters = ( dwell = 0.8 );"""
+    )
+    pag = tmp_path / "p.pag"
+    pag.write_text(
+        "root = c; c = rivet ( b, dwell = 0.3 ); b = mate ( x, y );\nx = atomic (); y = atomic ()"
+    )
+    log = tmp_path / "run.log"
+    assert run("run", pag, "--templates", tmp_path, "--log", log, "--units", 2).status == 0
+    for path in tmp_path.iterdir():
+        if path != log:
+            path.unlink()
+    document = run("monitor", log, "--json").json
+    assert document["refines_net"] and document["product"] == "c"
+    assert len(document["firings_seen"]) + len(document["firings_inferred"]) == 2 * 10
+
+
+def test_a_text_without_a_file_is_kept_in_the_log(tmp_path: Path) -> None:
+    templates = all_templates()
+    plan = factory.compile(read_pag(PRODUCTS["kary"], templates))
+    with LogWriter(tmp_path / "log", simulation := Simulation(factory.lay_out(plan))) as writer:
+        simulation.run([writer.observe])
+    assert watch_log(read_log(tmp_path / "log"))[0].refines_net
+
+
+def test_logs_that_cannot_be_watched(paper: Layout, tmp_path: Path, run: Terminal) -> None:
+    path = tmp_path / "ideal"
+    with LogWriter(path, simulation := Simulation(paper, "ideal")) as writer:
+        simulation.run([writer.observe])
+    done = run("monitor", path, "--json")
+    assert done.status == 2 and done.codes == ["BadLog"]
+    assert "ideal world" in done.json["errors"][0]["message"]
+    assert run("monitor", PAPER, "--json").codes == ["BadLog"]
+    with LogWriter(path, simulation := Simulation(paper)) as writer:
+        simulation.run([writer.observe], 0.1)
+    log = read_log(path)
+    for key in ("monitor", "start", "templates"):
+        header = {k: v for k, v in log.header.items() if k != key}
+        with pytest.raises(InputError, match="BadLog"):
+            watch_log(factory_log(log, header))
+    with pytest.raises(InputError, match="not of the factory in its header"):
+        watch_log(factory_log(log, {**log.header, "transitions": ["x_s"]}))
+    with pytest.raises(InputError, match="older version"):
+        watch_log(factory_log(log, dict(log.header), ctrl=None))
+
+
+def factory_log(log: Log, header: dict[str, Any], **changes: Any) -> Log:
+    return replace(log, header=header, **changes)
+
+
+def test_run_with_a_monitor(run: Terminal) -> None:
+    document = run("run", PAPER, "--units", 1, "--monitor", "--json").json
+    assert document["refines_net"] and document["monitor"]["refines_net"]
+    assert document["monitor"]["violations"] == []
+    found = document["monitor"]["firings_seen"] + document["monitor"]["firings_inferred"]
+    assert len(found) == document["transitions_fired"]
+    assert 0 < document["monitor_time_s"] < document["wall_time_s"]
+    spent = document["physics_time_s"] + document["supervisor_time_s"]
+    assert spent == pytest.approx(document["wall_time_s"])
+    assert "they explain the run" in run("run", PAPER, "--monitor").out
+    refused = run("run", PAPER, "--world", "ideal", "--monitor", "--json")
+    assert refused.status == 2 and refused.codes == ["Usage"]
+
+
+def test_a_faulty_run_fails(run: Terminal, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Two parts are never let go: status 1, beside the run and from its log."""
+    from factory.world.stock import Stock
+
+    switch = Stock._switch
+
+    def sticky(self: Stock, number: int, on: bool, body: int | None = None) -> None:
+        if on or self.m.equality(number).name != "grip/r5/part1":
+            switch(self, number, on, body)
+
+    monkeypatch.setattr(Stock, "_switch", sticky)
+    log = tmp_path / "log"
+    done = run("run", PAPER, "--monitor", "--max-time", 1, "--json", "--log", log)
+    assert done.status == 1 and not done.json["refines_net"]
+    violation = done.json["monitor"]["violations"][0]
+    assert violation["code"] == "TwoHolders" and violation["robot"] == "r5"
+    assert violation["label"] == "part1" and violation["line"] == 6
+    assert violation["file"] == str(PAPER)
+    assert "TwoHolders" in done.err and "part1 = atomic()" in done.err
+    again = run("monitor", log, "--json")
+    assert again.status == 1
+    assert again.json["violations"] == done.json["monitor"]["violations"]
+    assert "VIOLATIONS" in run("monitor", log).out

@@ -1,0 +1,292 @@
+"""The convex bodies that collide in a part's place: round a round body, exactly those of a mesh of
+several, made by a library for the rest, and kept."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator
+from itertools import pairwise
+from pathlib import Path
+from types import SimpleNamespace
+
+import mujoco
+import numpy as np
+import pytest
+import trimesh
+from hypothesis import given
+from hypothesis import strategies as st
+from layout_values import table_pag
+
+import factory
+from factory import decomposition
+from factory.geometry import Solid, product_geometry
+from factory.meshes import Array
+from factory.mjcf import names
+from factory.mjcf.model import model_files
+from factory.pag import PAG
+from factory.pieces import (
+    MOST_PIECES,
+    ROUND,
+    box_piece,
+    components,
+    cylinder_piece,
+    is_closed,
+    sphere_piece,
+)
+from factory.simulation import physical_model
+
+radii = st.floats(1e-4, 2.0)
+
+
+@pytest.fixture(autouse=True)
+def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    return tmp_path / "cache" / "klavins-factory" / "pieces"
+
+
+def ring(sides: int = 24, inner: float = 0.005, outer: float = 0.01) -> list[trimesh.Trimesh]:
+    """A ring as wedges that share their faces."""
+    turns = np.linspace(0, 2 * np.pi, sides + 1)
+    found = []
+    for a, b in pairwise(turns):
+        flat = [(r * np.cos(t), r * np.sin(t)) for t in (a, b) for r in (inner, outer)]
+        found.append(
+            trimesh.convex.convex_hull(np.array([(*p, z) for p in flat for z in (0, 0.01)]))
+        )
+    return found
+
+
+def solid_of(folder: Path, mesh: trimesh.Trimesh, kind: str = "obj", **given: object) -> Solid:
+    mesh.export(folder / f"m.{kind}")
+    parameters = {"mesh": f"m.{kind}", **given}
+    pag = table_pag("p", ("p", "atomic", "", parameters))  # type: ignore[arg-type]
+    return product_geometry(PAG(pag.root, pag.nodes, folder=str(folder))).solids["p"]
+
+
+def hull_volume(points: Array) -> float:
+    return float(trimesh.convex.convex_hull(points).volume)
+
+
+# --- primitives -----------------------------------------------------------------------------------
+
+
+def faces_of(points: Array) -> tuple[Array, Array]:
+    """Outward normals of a polytope's faces, and how far they are from the origin."""
+    hull = trimesh.convex.convex_hull(points)
+    return hull.face_normals, np.einsum("ij,ij->i", hull.face_normals, hull.triangles[:, 0])
+
+
+@given(radii, radii)
+def test_a_cylinder_is_inside_its_polytope_and_little_smaller(radius: float, half: float) -> None:
+    piece = cylinder_piece(radius, half)
+    assert np.abs(piece[:, 2]) == pytest.approx(half)
+    reach = np.hypot(piece[:, 0], piece[:, 1])
+    assert reach.max() <= radius + max(ROUND, 7.6e-5 * radius)
+    rim = piece[: len(piece) // 2, :2]
+    middles = (rim + np.roll(rim, 1, axis=0)) / 2
+    assert np.hypot(*middles.T) == pytest.approx(radius, rel=1e-12)
+
+
+@given(radii)
+def test_a_sphere_is_inside_its_polytope_and_little_smaller(radius: float) -> None:
+    piece = sphere_piece(radius)
+    assert np.linalg.norm(piece, axis=1).max() <= radius + max(ROUND, 4.6e-3 * radius)
+    _, distance = faces_of(piece / radius)
+    assert distance.min() >= 1 - 1e-9
+
+
+def test_pieces_stand_where_the_part_does() -> None:
+    quarter = (0.5**0.5, 0.5**0.5, 0.0, 0.0)
+    for shape in ({"box": (0.1, 0.2, 0.3)}, {"cylinder": (0.05, 0.3)}, {"sphere": 0.1}):
+        given = {**shape, "quat": quarter, "pos": (1.0, 2.0, 3.0)}
+        pag = table_pag("p", ("p", "atomic", "", given))  # type: ignore[arg-type]
+        (solid,) = product_geometry(pag).solids.values()
+        (piece,) = solid.pieces
+        assert piece.min(axis=0) == pytest.approx(solid.low, abs=5e-4)
+        assert piece.max(axis=0) == pytest.approx(solid.high, abs=5e-4)
+    assert len(box_piece(np.ones(3))) == 8
+
+
+# --- meshes ---------------------------------------------------------------------------------------
+
+
+def test_what_is_convex_or_open_has_its_hull(tmp_path: Path) -> None:
+    opened = trimesh.creation.annulus(0.05, 0.1, 0.1)
+    opened.update_faces(np.arange(len(opened.faces)) > 4)
+    for mesh in (trimesh.creation.icosphere(2, 0.1), opened):
+        solid = solid_of(tmp_path, mesh)
+        assert solid.mesh is not None and solid.mesh.pieces == ()
+        assert len(solid.pieces) == 1 and solid.pieces[0] is solid.corners
+
+
+@pytest.mark.parametrize("kind", ["obj", "ply", "glb"])
+def test_wedges_that_touch_are_the_pieces(tmp_path: Path, kind: str) -> None:
+    mesh = trimesh.util.concatenate(ring())
+    mesh.visual = trimesh.visual.ColorVisuals()
+    pos = (0.1, 0.0, 0.0)
+    solid = solid_of(tmp_path, mesh, kind, density=1000.0, pos=pos)
+    assert len(solid.pieces) == 24
+    whole = sum(body.volume for body in ring())
+    assert sum(map(hull_volume, solid.pieces)) == pytest.approx(whole, rel=1e-4)
+    assert solid.mass == pytest.approx(1000 * whole, rel=1e-5)
+    assert solid.centre == pytest.approx([0.1, 0, 0.005], abs=1e-7)
+    true = trimesh.creation.annulus(0.005, 0.01, 0.01, sections=256).moment_inertia * 1000
+    assert np.diag(solid.inertia) == pytest.approx(np.diag(true), rel=0.05)
+    inside = np.concatenate(solid.pieces) - pos
+    assert np.hypot(inside[:, 0], inside[:, 1]).min() == pytest.approx(0.005, rel=1e-5)
+
+
+def test_bodies_apart_are_the_pieces_of_any_file(tmp_path: Path) -> None:
+    boxes = [trimesh.creation.box((0.1, 0.1, 0.1)) for _ in range(2)]
+    boxes[1].apply_translation((0.2, 0, 0))
+    for kind in ("stl", "obj"):
+        solid = solid_of(tmp_path, trimesh.util.concatenate(boxes), kind)
+        assert [len(piece) for piece in solid.pieces] == [8, 8]
+        assert solid.mass == pytest.approx(2.0)
+
+
+def test_one_body_that_is_not_convex_spoils_it(tmp_path: Path) -> None:
+    tube = trimesh.creation.annulus(0.05, 0.1, 0.1)
+    block = trimesh.creation.box((0.1, 0.1, 0.1)).apply_translation((0.3, 0, 0))
+    solid = solid_of(tmp_path, trimesh.util.concatenate([tube, block]))
+    assert solid.mesh is not None and len(solid.mesh.pieces) != 2
+
+
+def test_too_many_bodies_are_their_hull(tmp_path: Path) -> None:
+    one = trimesh.creation.box((0.1, 0.1, 0.1))
+    many = [one.copy().apply_translation((0.2 * n, 0, 0)) for n in range(MOST_PIECES + 1)]
+    assert len(solid_of(tmp_path, trimesh.util.concatenate(many)).pieces) == 1
+
+
+def test_closed_is_every_edge_to_and_fro() -> None:
+    box = trimesh.creation.box()
+    assert is_closed(box.faces) and not is_closed(box.faces[1:])
+    assert is_closed(np.concatenate([box.faces, box.faces + 8]))
+    assert (
+        len(components(np.tile(box.vertices, (2, 1)), np.vstack([box.faces, box.faces + 8]))) == 2
+    )
+
+
+# --- decomposition --------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def library(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[int]]:
+    """A library in CoACD's place, which cuts a mesh's box in two, and the calls made."""
+    calls: list[int] = []
+
+    def run_coacd(mesh: object, **_: object) -> list[tuple[Array, Array]]:
+        calls.append(1)
+        ((low, high),) = [(mesh[0].min(axis=0), mesh[0].max(axis=0))]  # type: ignore[index]
+        boxes = [trimesh.creation.box((high - low) / (2, 1, 1)) for _ in range(2)]
+        sliver = trimesh.creation.box((1e-9, 1e-3, 1e-3))
+        return [(np.asarray(b.vertices), np.asarray(b.faces)) for b in (*boxes, sliver)]
+
+    fake = SimpleNamespace(
+        Mesh=lambda *arrays: arrays, run_coacd=run_coacd, set_log_level=lambda level: None
+    )
+    monkeypatch.setitem(sys.modules, "coacd", fake)
+    monkeypatch.setattr(decomposition, "version", lambda name: "1.0.0")
+    yield calls
+
+
+def test_what_else_is_closed_is_decomposed_once(
+    tmp_path: Path, library: list[int], cache: Path
+) -> None:
+    tube = trimesh.creation.annulus(0.05, 0.1, 0.1)
+    first, again = solid_of(tmp_path, tube), solid_of(tmp_path, tube)
+    assert len(first.pieces) == len(again.pieces) == 2 and len(library) == 1
+    assert all(np.array_equal(a, b) for a, b in zip(first.pieces, again.pieces, strict=True))
+    assert first.mass == pytest.approx(1000 * tube.volume)  # that of the mesh, not of the pieces
+    assert len(list(cache.iterdir())) == 1
+
+
+def test_a_damaged_cache_is_made_again(tmp_path: Path, library: list[int], cache: Path) -> None:
+    tube = trimesh.creation.annulus(0.05, 0.1, 0.1)
+    solid_of(tmp_path, tube)
+    (kept,) = cache.iterdir()
+    whole = kept.read_bytes()
+    for content in (b"", b"rubbish", whole[:-40], whole.replace(b"counts", b"c0unts")):
+        kept.write_bytes(content)
+        assert len(solid_of(tmp_path, tube).pieces) == 2
+        assert kept.read_bytes() == whole
+    assert len(library) == 5
+
+
+def test_a_cache_that_cannot_be_written_is_no_error(tmp_path: Path, library: list[int]) -> None:
+    (tmp_path / "cache").write_text("a file where the folder should be")
+    tube = trimesh.creation.annulus(0.05, 0.1, 0.1)
+    assert len(solid_of(tmp_path, tube).pieces) == 2
+
+
+def test_a_library_that_fails_leaves_the_hull(
+    tmp_path: Path, library: list[int], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(sys.modules["coacd"], "run_coacd", lambda *_, **__: 1 / 0)
+    assert len(solid_of(tmp_path, trimesh.creation.annulus(0.05, 0.1, 0.1)).pieces) == 1
+
+
+def test_nearly_convex_meshes_are_not_decomposed(tmp_path: Path, library: list[int]) -> None:
+    bump = trimesh.creation.icosphere(3, 0.1)
+    bump.vertices[0] *= 0.97
+    assert bump.volume < bump.convex_hull.volume
+    assert len(solid_of(tmp_path, bump).pieces) == 1 and not library
+
+
+def test_the_real_library(tmp_path: Path) -> None:
+    pytest.importorskip("coacd")
+    tube = trimesh.creation.annulus(0.05, 0.1, 0.1, sections=16)
+    pieces = solid_of(tmp_path, tube).pieces
+    assert len(pieces) > 3
+    assert sum(map(hull_volume, pieces)) == pytest.approx(tube.volume, rel=0.1)
+
+
+# --- in the engine --------------------------------------------------------------------------------
+
+PEG = """root = s; s = mate(ring, peg);
+ring = atomic ( mesh = "ring.obj", rgba = (1, 0, 0, 1) );
+peg = atomic ( cylinder = (0.0048, 0.03) )"""
+
+
+def test_pieces_collide_and_are_not_drawn(tmp_path: Path) -> None:
+    trimesh.util.concatenate(ring()).export(tmp_path / "ring.obj")
+    (tmp_path / "p.pag").write_text(PEG)
+    layout = factory.lay_out(factory.compile(factory.load_pag(tmp_path / "p.pag")))
+    model = physical_model(layout, 2)
+    for path, content in model_files(model, tmp_path / "m.xml").items():
+        path.parent.mkdir(exist_ok=True)
+        path.write_bytes(content)
+    m = mujoco.MjModel.from_xml_path(str(tmp_path / "m.xml"))
+    for number in (1, 2):
+        name = names.part("ring", number)
+        body = m.body(name)
+        geoms = range(body.geomadr[0], body.geomadr[0] + body.geomnum[0])
+        assert len(geoms) == 25 and body.mass[0] == pytest.approx(
+            layout.product.solids["ring"].mass
+        )
+        drawn, *pieces = geoms
+        assert m.geom(drawn).name == name and m.geom(name).group[0] == 1
+        assert m.geom_contype[drawn] == m.geom_conaffinity[drawn] == 0
+        assert (m.geom_group[pieces] == 3).all()
+        assert ((m.geom_contype[pieces] != 0) == (number == 1)).all()
+        assert m.geom(names.piece(name, 3)).id == pieces[2]
+    assert m.geom(names.part("peg", 1)).group[0] == 0
+
+
+def test_a_peg_fits_its_hole_in_the_engine(tmp_path: Path) -> None:
+    """What the engine makes of the pieces: a bore as wide as its sides, not as a hull has it."""
+    trimesh.util.concatenate(ring()).export(tmp_path / "ring.obj")
+    (tmp_path / "p.pag").write_text(PEG)
+    layout = factory.lay_out(factory.compile(factory.load_pag(tmp_path / "p.pag")))
+    files = {Path(k).name: v for k, v in physical_model(layout, 1).files.items()}
+    pieces = sorted(name for name in files if name.count(".") == 2)
+    assets = "".join(f'<mesh name="{n}" file="{n}"/>' for n in pieces)
+    geoms = "".join(f'<geom type="mesh" mesh="{n}"/>' for n in pieces)
+    for radius, touches in ((0.00494, False), (0.00497, True)):
+        xml = f"""<mujoco><asset>{assets}</asset><worldbody>{geoms}
+            <body><freejoint/><geom type="cylinder" size="{radius} 0.03"/></body>
+            </worldbody></mujoco>"""
+        m = mujoco.MjModel.from_xml_string(xml, files)
+        d = mujoco.MjData(m)
+        mujoco.mj_forward(m, d)
+        assert bool(d.ncon) == touches
