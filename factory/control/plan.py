@@ -74,9 +74,10 @@ def _unprepared(operation: Operation, inside: bool) -> Diagnostic:
 
 
 def operation_mode(layout: Layout, operation: Operation, eps: float) -> Mode:
-    """The mode of one operation. A robot that brings something to a carrier that brings something
-    too keeps its distance until the carrier stands: they would meet diagonally. So does one that is
-    to lower what it brings: it does so when all others stand."""
+    """The mode of one operation. The way of a robot that is not the carrier ends at its goal: what
+    is left of its guidepath is taken by the others. A robot that brings something to a carrier that
+    brings something too keeps its distance until the carrier stands: they would meet diagonally. So
+    does one that is to lower what it brings: it does so when all others stand."""
     paths = [layout.guidepaths[robot] for robot in operation.robots]
     carrier = operation.template.carrier - 1
     gate, standoff = np.full(len(paths), -1), np.zeros(len(paths))
@@ -108,7 +109,11 @@ def operation_mode(layout: Layout, operation: Operation, eps: float) -> Mode:
     template = operation.template
     if template.before[carrier] != NOPART:
         template = _inside(template)
-    return _with_lifts(mode_of(template, setting), layout, operation)
+    mode = mode_of(template, setting)
+    if operation.inputs and operation.index != layout.factory.dropoff.index:
+        guests = np.arange(len(paths)) != carrier
+        mode = replace(mode, lower=np.where(guests, mode.goals, mode.lower))
+    return _with_lifts(mode, layout, operation)
 
 
 def _with_lifts(mode: Mode, layout: Layout, operation: Operation) -> Mode:

@@ -22,6 +22,13 @@ TOLERANCE = 2e-5
 """Overlaps of no more than this [m] do not count: what welds in the engine give way, and far above
 what numbers written with five digits are rounded by."""
 
+CLEAR = 5e-5
+"""On their way bodies that do not overlap still need so much room between them [m], or they scrape:
+faces that are flush catch at their edges when a weld gives way by its 0.03 mm."""
+
+LAST = 1e-3
+"""But for the last bit of the way [m]: finished parts may touch."""
+
 SIGNS = (-1, +1)
 """The sides from which the last input comes: its path is shifted to this side of the axis."""
 
@@ -31,12 +38,13 @@ CHUNK = 4096
 
 @dataclass(frozen=True)
 class Contacts:
-    """Pairs of parts that overlap by more than the tolerance in some place of a path, by meeting.
+    """Pairs of parts that overlap by more than the tolerance in some place of a path, or scrape, by
+    meeting.
 
     `meeting`, `one` < `other` (n,): numbers of the meeting and the parts; `finished` (n,): the
     depth in the finished product, 0 where apart; `path` (n, 2): the greatest depth if the last
     input comes from the lower or the upper side, and `shift` (n, 2) how far from its place that is
-    [m].
+    [m]; `graze` (n, 2): the greatest depth but for the last bit of the way.
     """
 
     meeting: Ints
@@ -45,6 +53,12 @@ class Contacts:
     finished: Array
     path: Array = field(repr=False)
     shift: Array = field(repr=False)
+    graze: Array = field(repr=False)
+
+    @property
+    def faulty(self) -> NDArray[np.bool_]:
+        """Which pairs (n, 2) overlap or scrape on the way from either side."""
+        return np.asarray((self.path > TOLERANCE) | (self.graze > -CLEAR))
 
     def rows(self, meeting: int) -> range:
         """The rows of one meeting."""
@@ -66,19 +80,21 @@ class Finder:
         pairs = np.concatenate(parts, axis=1) if parts else np.zeros((3, 0), np.int64)
         moving, standing, meeting = pairs
         finished, path, shift = _box_paths(self.bodies, moving, standing, axis)
-        self._refine(moving, standing, axis, finished, path, shift)
+        graze = _box_paths(self.bodies, moving, standing, axis, LAST)[1]
+        self._refine(moving, standing, axis, finished, path, shift, graze)
         idle = self.bodies.part[moving] < self.meetings.splits[meeting]
-        path[idle], shift[idle] = finished[idle, None], 0.0
-        return self._by_parts(meeting, moving, standing, finished, path, shift)
+        path[idle], shift[idle], graze[idle] = finished[idle, None], 0.0, -np.inf
+        return self._by_parts(meeting, moving, standing, finished, path, shift, graze)
 
     def _chunks(self, axis: int) -> Iterator[tuple[Ints, Ints]]:
-        """Pairs (moving, standing) of bodies whose boxes overlap across the axis, the part of the
-        moving one being the later, in chunks."""
+        """Pairs (moving, standing) of bodies whose boxes overlap or are near across the axis, the
+        part of the moving one being the later, in chunks."""
         from shapely import STRtree, box
 
         u, v = (i for i in range(3) if i != axis)
         low, high, part = self.bodies.low, self.bodies.high, self.bodies.part
-        flat = box(low[:, u], low[:, v], high[:, u], high[:, v])
+        c = CLEAR / 2
+        flat = box(low[:, u] - c, low[:, v] - c, high[:, u] + c, high[:, v] + c)
         tree = STRtree(flat)
         for start in range(0, len(flat), CHUNK):
             one, other = tree.query(flat[start : start + CHUNK])
@@ -94,7 +110,8 @@ class Finder:
         chosen = wanted[meeting]
         moving, standing, meeting = moving[chosen], standing[chosen], meeting[chosen]
         path = _box_paths(self.bodies, moving, standing, axis)[1]
-        hit = path.max(axis=1, initial=0.0) > TOLERANCE
+        graze = _box_paths(self.bodies, moving, standing, axis, LAST)[1]
+        hit = ((path > TOLERANCE) | (graze > -CLEAR)).any(axis=1)
         return np.stack([moving[hit], standing[hit], meeting[hit]])
 
     def _refine(
@@ -105,6 +122,7 @@ class Finder:
         finished: Array,
         path: Array,
         shift: Array,
+        graze: Array,
     ) -> None:
         """Replaces the depths of boxes by those of the bodies where these are no boxes."""
         groups: dict[tuple[bytes, bytes], list[int]] = {}
@@ -123,7 +141,9 @@ class Finder:
                 for side, sign in enumerate(SIGNS):
                     direction = sign * np.eye(3)[axis]
                     path[rows, side], shift[rows, side] = deepest(difference, apart, direction)
-                left = path[rows].max(axis=1) > TOLERANCE
+                    further = apart + LAST * direction
+                    graze[rows, side] = deepest(difference, further, direction)[0]
+                left = ((path[rows] > TOLERANCE) | (graze[rows] > -CLEAR)).any(axis=1)
                 rows, apart = rows[left], apart[left]
                 if not len(rows):
                     break
@@ -153,20 +173,21 @@ class Finder:
         finished: Array,
         path: Array,
         shift: Array,
+        graze: Array,
     ) -> Contacts:
         """Of all bodies of two parts the deepest."""
         part = self.bodies.part
-        kept = path.max(axis=1, initial=0.0) > TOLERANCE
+        kept = ((path > TOLERANCE) | (graze > -CLEAR)).any(axis=1)
         one, other, meeting = part[standing[kept]], part[moving[kept]], meeting[kept]
-        finished, path, shift = finished[kept], path[kept], shift[kept]
+        finished, path, shift, graze = finished[kept], path[kept], shift[kept], graze[kept]
         order = np.lexsort((other, one, meeting))
         meeting, one, other = meeting[order], one[order], other[order]
-        finished, path, shift = finished[order], path[order], shift[order]
+        finished, path, shift, graze = finished[order], path[order], shift[order], graze[order]
         new = np.ones(len(order), bool)
         new[1:] = (np.diff(one) != 0) | (np.diff(other) != 0)
         starts = np.flatnonzero(new)
         if not len(starts):
-            return Contacts(meeting, one, other, finished, path, shift)
+            return Contacts(meeting, one, other, finished, path, shift, graze)
         deepest_paths = np.maximum.reduceat(path, starts)
         group = np.cumsum(new) - 1
         at = np.where(path >= deepest_paths[group], shift, np.inf)
@@ -177,14 +198,16 @@ class Finder:
             np.maximum(np.maximum.reduceat(finished, starts), 0.0),
             deepest_paths,
             np.minimum.reduceat(at, starts),
+            np.maximum.reduceat(graze, starts),
         )
 
 
 def _box_paths(
-    bodies: Bodies, moving: Ints, standing: Ints, axis: int
+    bodies: Bodies, moving: Ints, standing: Ints, axis: int, last: float = 0.0
 ) -> tuple[Array, Array, Array]:
     """The depths of bounding boxes (see `factory.mating.depth`) in closed form: in the end (n,), on
-    the way from the lower and the upper side (n, 2), and how far away it is deepest (n, 2)."""
+    the way from the lower and the upper side up to the `last` bit of it (n, 2), and how far away it
+    is deepest (n, 2)."""
     low, high = bodies.low, bodies.high
     up, down = high[standing] - low[moving], high[moving] - low[standing]
     depth = np.minimum(up, down)
@@ -193,8 +216,8 @@ def _box_paths(
     path, shift = np.empty((len(moving), 2)), np.empty((len(moving), 2))
     half = (up[:, axis] + down[:, axis]) / 2
     for side, sign in enumerate(SIGNS):
-        ahead = sign * (up[:, axis] - down[:, axis]) / 2
-        along = np.where(ahead > 0, half, depth[:, axis])
+        ahead = sign * (up[:, axis] - down[:, axis]) / 2 - last
+        along = np.where(ahead > 0, half, half - np.abs(ahead))
         path[:, side] = np.minimum(across, along)
         least = np.maximum(ahead - (half - path[:, side]), 0.0)
         shift[:, side] = np.where(ahead > 0, least, 0.0)

@@ -1,9 +1,9 @@
 """How the inputs of each operation of a product can come together: they slide, one is lowered, or
 they are blocked.
 
-Three levels say how strictly. At a *strict* one no two parts ever overlap; at one that goes *no
-deeper* they overlap on the way by no more than in the finished product; at the third, pairs that
-overlap in the finished product are *left out*. All of it up to TOLERANCE.
+Three levels say how strictly. At a *strict* one no two parts ever overlap, nor scrape along each
+other; at one that goes *no deeper* they overlap on the way by no more than in the finished product;
+at the third, pairs that overlap in the finished product are *left out*. All of it up to TOLERANCE.
 """
 
 from __future__ import annotations
@@ -204,7 +204,7 @@ class _Judge:
 
     def _excluded(self, number: int, axis: int, column: int) -> tuple[Pair, ...]:
         contacts = self.contacts[axis]
-        rows = [r for r in contacts.rows(number) if contacts.path[r, column] > TOLERANCE]
+        rows = [r for r in contacts.rows(number) if contacts.faulty[r, column]]
         return tuple(sorted(self._pair(contacts, row) for row in rows))
 
     def _pair(self, contacts: Contacts, row: int) -> Pair:
@@ -244,7 +244,7 @@ def _deeper(contacts: Contacts) -> NDArray[np.bool_]:
 def _levels(contacts: Contacts, count: int) -> tuple[Ints, Ints]:
     """The level of each meeting from each side (count, 2), and how many pairs clash there."""
     levels, clashing = np.empty((count, 2), np.int64), np.empty((count, 2), np.int64)
-    faults = (_clashes(contacts), _deeper(contacts), contacts.path > TOLERANCE)
+    faults = (_clashes(contacts), _deeper(contacts), contacts.faulty)
     for side in (0, 1):
         clashing[:, side], deeper, overlaps = (
             np.bincount(contacts.meeting[fault[:, side]], minlength=count) for fault in faults

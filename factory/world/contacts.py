@@ -50,7 +50,7 @@ class Contacts:
     def _solid(self, body: int) -> Index:
         """The geoms of a part that collide: the one it has, or its convex pieces (group 3)."""
         geoms = self.m.body_geomadr[body] + np.arange(self.m.body_geomnum[body])
-        return geoms if len(geoms) == 1 else geoms[self.m.geom_group[geoms] == 3]
+        return np.asarray(geoms if len(geoms) == 1 else geoms[self.m.geom_group[geoms] == 3])
 
     def hold(self, bodies: Sequence[int], holder: int) -> None:
         """From now on parts are in the hands of a holder (its code)."""

@@ -92,6 +92,10 @@ class MujocoWorld:
         self.d.ctrl[self.control + 2] = self.weight
         self.stock = Stock(self.m, self.d, model, units, counts or {}, wip)
         self.inspection = Inspection(self.m, self.d, model, self.stock.contacts)
+        for operation in factory.operations:
+            begun, over = ((counts or {}).get(t, 0) for t in (operation.start, operation.end))
+            if begun > over:
+                self.inspection.started(operation, over)
         for robot, mass in self.stock.loads().items():
             self._load(robot, mass)
         self.physics_time = 0.0
