@@ -21,7 +21,7 @@ from factory.simulation import Observer, Simulation
 from factory.trace import Run
 
 if TYPE_CHECKING:
-    from factory.monitor import Monitor, Report
+    from factory.monitor import Report, beside
 
 Size = tuple[int, int]
 
@@ -78,7 +78,7 @@ def run_file(
     made = simulation(source, layout, settings, options)
     with ExitStack() as stack:
         observers: list[Observer] = [stack.enter_context(Interruption()).observe]
-        watcher = _monitor(made) if options.get("monitor") else None
+        watcher = beside(made) if options.get("monitor") else None
         if watcher is not None:
             observers.append(watcher.observe)
         if log is not None:
@@ -96,16 +96,6 @@ def run_file(
         return record
     report = watcher.report()
     return replace(record, monitor=report, refines_net=record.refines_net and report.refines_net)
-
-
-def _monitor(made: Simulation) -> Monitor:
-    """A monitor that watches the engine of a simulation."""
-    from factory.monitor import Anatomy, Monitor, subject_of
-
-    subject = subject_of(made.layout, made.settings, made.jitter, made.start, made.wip)
-    monitor = Monitor(subject, Anatomy.of(made.world.m, made.layout.factory))
-    monitor.watch(made.world.m, made.world.d)
-    return monitor
 
 
 def render_file(

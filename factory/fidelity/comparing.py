@@ -139,6 +139,7 @@ def _compared(layout: Layout, ideal: Run, run: Run) -> SeedRecord:
     physics = run.physics
     figures: dict[str, float | None] = {
         "illegal_records": illegal,
+        "monitor_violations": len(run.monitor.violations) if run.monitor else None,
         "cycle_time_s": run.cycle_time_s,
         "ideal_cycle_time_s": ideal.cycle_time_s,
         "cycle_from_ideal_percent": _over(run.cycle_time_s, ideal.cycle_time_s),

@@ -5,6 +5,7 @@ The run is the same, to the last bit, with and without it.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from time import perf_counter
 from typing import Any
 
@@ -22,6 +23,7 @@ from factory.fidelity.shadow import Shadow
 from factory.fidelity.steps import Steps
 from factory.fidelity.welds import HOLD, Velocities, Welds
 from factory.mjcf.names import label_of
+from factory.monitor import beside
 from factory.simulation import Simulation
 from factory.trace import Run
 
@@ -51,9 +53,13 @@ class Measurement:
         self._steps = Steps(self.m, self.d, simulation.settings.substeps)
 
     def run(self, max_time: float | None = None) -> Run:
-        """Run the simulation, measuring."""
+        """Run the simulation, measuring, with a monitor beside it."""
+        watcher = beside(self.simulation)
         with self._steps:
-            return self.simulation.run([self.observe], max_time)
+            run = self.simulation.run([self.observe, watcher.observe], max_time)
+        report = watcher.report()
+        self.seconds += report.time_s
+        return replace(run, monitor=report)
 
     def observe(self, world: Any, supervisor: Any) -> None:
         """After a tick. The shadow is still where the tick began: where welds were switched."""

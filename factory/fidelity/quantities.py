@@ -60,6 +60,12 @@ _ALL = (
         0,
     ),
     Quantity(
+        "monitor_violations",
+        "violations",
+        "What the independent monitor, which sees the engine alone, could not explain by the net.",
+        0,
+    ),
+    Quantity(
         "firing_difference_mean_s",
         "s",
         "Mean over all firings of |t in MuJoCo - t in the ideal world|, the n-th firing of a "

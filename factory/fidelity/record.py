@@ -77,7 +77,7 @@ class SeedRecord:
     @property
     def passed(self) -> bool:
         """Whether both runs ended, refine the net and nothing touched."""
-        wrong = ("illegal_records", "unintended_contacts")
+        wrong = ("illegal_records", "monitor_violations", "unintended_contacts")
         return not self.trouble and not any(self.figures.get(key) for key in wrong)
 
     def as_json(self) -> dict[str, Any]:

@@ -4,11 +4,26 @@ finds out what each robot does and who carries each part, and judges the run aga
 It sees positions, speeds, setpoints and active constraints; it never reads the supervisor, its
 events or its marking. It works beside a run, or on a log (`factory.monitor.record`)."""
 
+from typing import Any
+
 from factory.monitor.anatomy import Anatomy
 from factory.monitor.monitor import Monitor
 from factory.monitor.report import Firing, Report, Violation
 from factory.monitor.sight import Sight
 from factory.monitor.subject import Subject, subject_of
+
+
+def beside(simulation: Any) -> Monitor:
+    """A monitor that watches the engine of a simulation; it is an observer of its run. Of the
+    simulation it takes the engine, the layout and where it starts, and nothing that goes on."""
+    subject = subject_of(
+        simulation.layout, simulation.settings, simulation.jitter, simulation.start, simulation.wip
+    )
+    m, d = simulation.world.m, simulation.world.d
+    monitor = Monitor(subject, Anatomy.of(m, simulation.layout.factory))
+    monitor.watch(m, d)
+    return monitor
+
 
 __all__ = [
     "Anatomy",
@@ -18,5 +33,6 @@ __all__ = [
     "Sight",
     "Subject",
     "Violation",
+    "beside",
     "subject_of",
 ]

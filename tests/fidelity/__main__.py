@@ -14,7 +14,7 @@ from importlib.metadata import version
 from pathlib import Path
 from time import perf_counter
 
-SECTIONS = ("disturbances", "attraction", "long_runs")
+SECTIONS = ("seeds", "disturbances", "attraction", "long_runs")
 """Modules of this package with `measure` and `section`, in the order of the report."""
 
 DOCS = Path(__file__).resolve().parent.parent.parent / "docs"
@@ -33,18 +33,20 @@ def setting() -> dict[str, str]:
 
 
 def measured(name: str, quick: bool, folder: Path = FOLDER) -> None:
-    """Measure a section and keep what it found at once."""
+    """Measure a section and keep what it found at once: one that takes long yields all that it has
+    found so far, again and again."""
     begin = perf_counter()
-    results = import_module(f"tests.fidelity.{name}").measure(quick)
-    kept = {
-        "section": name,
-        "quick": quick,
-        "seconds": round(perf_counter() - begin, 1),
-        **setting(),
-        "results": results,
-    }
-    folder.mkdir(parents=True, exist_ok=True)
-    (folder / f"{name}.json").write_text(json.dumps(kept, indent=1, ensure_ascii=False) + "\n")
+    found = import_module(f"tests.fidelity.{name}").measure(quick)
+    for results in [found] if isinstance(found, dict) else found:
+        kept = {
+            "section": name,
+            "quick": quick,
+            "seconds": round(perf_counter() - begin, 1),
+            **setting(),
+            "results": results,
+        }
+        folder.mkdir(parents=True, exist_ok=True)
+        (folder / f"{name}.json").write_text(json.dumps(kept, indent=1, ensure_ascii=False) + "\n")
 
 
 def report(folder: Path = FOLDER) -> str:

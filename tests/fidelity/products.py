@@ -2,13 +2,19 @@
 
 from __future__ import annotations
 
+import os
 from functools import lru_cache
 from pathlib import Path
 
 import factory
 from factory.layout.plan import Layout
 
-EXAMPLES = Path(__file__).resolve().parent.parent.parent / "examples"
+ROOT = Path(__file__).resolve().parent.parent.parent
+
+EXAMPLES = ROOT / "examples"
+
+BRICKS = Path(os.environ.get("FACTORY_LDRAW", ROOT.parent / "shared" / "products" / "ldraw"))
+"""Where the LDraw products are, if they are on this machine."""
 
 PAPER = "paper"
 
@@ -24,5 +30,16 @@ CAMPAIGN = (*SMALL, "stool", *REAL)
 
 @lru_cache
 def layout(name: str) -> Layout:
-    """The factory of an example, laid out."""
-    return factory.lay_out(factory.compile(factory.load_pag(EXAMPLES / f"{name}.pag")))
+    """The factory of an example, or of an LDraw product by the name of its file, laid out."""
+    return factory.lay_out(factory.compile(factory.load_pag(file_of(name))))
+
+
+def file_of(name: str) -> Path:
+    """The PAG of an example, or of an LDraw product by the name of its file."""
+    file = EXAMPLES / f"{name}.pag"
+    return file if file.is_file() else BRICKS / f"{name}.pag"
+
+
+def is_here(name: str) -> bool:
+    """Whether a product is on this machine."""
+    return file_of(name).is_file()
