@@ -14,7 +14,14 @@ from importlib.metadata import version
 from pathlib import Path
 from time import perf_counter
 
-SECTIONS = ("seeds", "disturbances", "attraction", "long_runs")
+SECTIONS = (
+    "seeds",
+    "approaches",
+    "convergence",
+    "disturbances",
+    "attraction",
+    "long_runs",
+)
 """Modules of this package with `measure` and `section`, in the order of the report."""
 
 DOCS = Path(__file__).resolve().parent.parent.parent / "docs"

@@ -24,6 +24,15 @@ SMALL = (PAPER, "lamp")
 REAL = ("gearbox",)
 """Real products with meshes, by the names of their files in examples/: made 50 times in a run."""
 
+BRICKS_NAMES = (
+    "30023-1-Lighthouse",
+    "889-1-RadarTruck",
+    "6966-1-JediStarfighter-Mini",
+    "4494-1-Imperial_Shuttle-Mini",
+    "5935-1-IslandHopper",
+)
+"""The LDraw products."""
+
 CAMPAIGN = (*SMALL, "stool", *REAL)
 """Products whose modes are tried."""
 
