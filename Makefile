@@ -2,7 +2,7 @@
 PY := .venv/bin/python
 FACTORY := $(PY) -m factory
 
-.PHONY: help demo test test-all bench fidelity lint golden wheel setup clean
+.PHONY: help demo test test-all oracles bench fidelity lint golden wheel setup clean
 
 help:
 	@echo "make demo      run the paper's example: a video and a poster in renders/"
@@ -17,6 +17,9 @@ help:
 setup:
 	@tools/setup test
 
+oracles:
+	@tools/oracles
+
 demo: setup
 	$(FACTORY) check examples/paper.pag
 	$(FACTORY) run examples/paper.pag --units 3 --video renders/paper.mp4
@@ -26,11 +29,11 @@ demo: setup
 test: setup
 	$(PY) -m pytest -q -n 2 -m "not slow" $(ARGS)
 
-test-all: setup
+test-all: setup oracles
 	$(PY) -m pytest -q -n 2 $(ARGS)
 
 bench: setup
-	$(PY) -m tests.bench
+	$(PY) -m tests.bench $(ARGS)
 
 fidelity: setup
 	$(PY) -m tests.fidelity $(ARGS)
@@ -48,4 +51,4 @@ wheel: setup
 	$(PY) -m pip wheel --quiet --no-deps --wheel-dir dist .
 
 clean:
-	rm -rf .venv build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	rm -rf .venv .oracles .rivals build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis

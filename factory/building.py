@@ -12,6 +12,7 @@ from factory.factory import Factory
 from factory.files import write_all
 from factory.layout.certificate import Certificate
 from factory.layout.plan import Layout
+from factory.mjcf.binary import beside, kept, key_of, packed, seal_of, sealed
 from factory.mjcf.model import Model, model_files
 from factory.nets.verdict import Verdict
 from factory.pipeline import Source
@@ -21,7 +22,8 @@ from factory.simulation import physical_model
 
 @dataclass(frozen=True)
 class Built:
-    """What was built and the files written; `clearance`: the certificate's figures."""
+    """What was built and its files, those included that were there already; `clearance`: the
+    certificate's figures."""
 
     model: Model
     mjcf: Path | None
@@ -57,23 +59,35 @@ def build_all(
     Raises RunError where the layout is not certified, InputError where the engine refuses the
     model; nothing is written then."""
     from factory.layout.clearance import certify
-    from factory.world.physics import load
 
     certificate = layout.certificate or certify(layout)
     if not certificate.holds:
         raise RunError(fault.diagnostic() for fault in certificate.faults)
     model = physical_model(layout, units, settings, source.catalogue, wip)
-    load(model)
     files: dict[Path, bytes] = {}
     if output is not None:
         mjcf = mjcf or output / f"{_stem(source)}.xml"
+    path = beside(mjcf) if mjcf else None
+    binary = _binary(model, path)
     if mjcf is not None:
         files |= model_files(model, mjcf)
     if output is not None:
         texts = _documents(layout, certificate, verdict)
         files |= {output / f"{_stem(source)}.{end}": t.encode() for end, t in texts.items()}
-    write_all(files)
-    return Built(model, mjcf, tuple(files), certificate.summary())
+    write_all(files | binary)
+    named = (*files, path, seal_of(path)) if path else tuple(files)
+    return Built(model, mjcf, named, certificate.summary())
+
+
+def _binary(model: Model, path: Path | None) -> dict[Path, bytes]:
+    """The engine's binary model and its seal, to be written; nothing where they are at `path`
+    already: the engine has accepted this model before. Raises InputError where it does not."""
+    if path and kept(path, key_of(model)) is not None:
+        return {}
+    from factory.world.physics import load
+
+    m = load(model)
+    return sealed(path, key_of(model), packed(m)) if path else {}
 
 
 def _stem(source: Source) -> str:
@@ -82,7 +96,8 @@ def _stem(source: Source) -> str:
 
 def _documents(layout: Layout, clear: Certificate, verdict: Verdict) -> dict[str, str]:
     """Everything about the factory but the model, as texts by the endings of their files."""
-    from factory.export import exporters
+    from factory.export.dot import write_dot
+    from factory.export.pnml import write_pnml
     from factory.layout.drawing import write_svg
     from factory.nets.certificate import certificate
     from factory.programs import program_of, write_program
@@ -94,7 +109,8 @@ def _documents(layout: Layout, clear: Certificate, verdict: Verdict) -> dict[str
         "programs.txt": "\n\n".join(programs) + "\n",
         "proof.json": _json(certificate(factory.net, verdict)),
         "clearance.json": _json(clear.as_json()),
-        **{name: write(factory) for name, write in exporters().items()},
+        "dot": write_dot(factory.net),
+        "pnml": write_pnml(factory.net),
     }
 
 

@@ -9,9 +9,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cache
 from types import MappingProxyType
 
 from factory.approach import Approach
+from factory.collector import collector_paused
 from factory.errors import Diagnostic, InputError, Position, did_you_mean
 from factory.factory import Factory, Operation, Robot
 from factory.nets.gears import Gear, GearNet
@@ -62,6 +64,7 @@ class _Draft:
         return len(self.types) - 1
 
 
+@collector_paused()
 def compile_pag(
     pag: PAG,
     templates: Mapping[str, Template],
@@ -172,9 +175,14 @@ def _compile_nodes(
 
 def _brought(node: Node) -> list[str]:
     """a, with the template's label variables replaced by the labels of the inputs."""
-    variables = sorted(node.template.inputs, key=variable_number)
-    actual = dict(zip(variables, node.inputs, strict=True))
-    return [actual.get(variable, NOPART) for variable in node.template.before]
+    return [NOPART if i < 0 else node.inputs[i] for i in _arguments(node.template.before)]
+
+
+@cache
+def _arguments(before: tuple[str, ...]) -> tuple[int, ...]:
+    """For each label of a template's a the number of the input that it stands for, -1 for none."""
+    variables = sorted({*before} - {NOPART}, key=variable_number)
+    return tuple(-1 if label == NOPART else variables.index(label) for label in before)
 
 
 def _claim_carrier(node: Node, carrier: int, draft: _Draft, catalogue: Catalogue) -> None:
@@ -283,6 +291,7 @@ def gear_net(robots: tuple[Robot, ...], operations: tuple[Operation, ...]) -> Ge
         gear_places, gear_events = [], []
         for step, number in enumerate(robot.operations):
             before, operation = operations[robot.operations[step - 1]], operations[number]
+            done, begun = before.end, operation.start
             slot = slot_of[number][robot.index]
             label = operation.before[slot]
             stays = label != NOPART and operation.after[slot] != NOPART
@@ -290,8 +299,8 @@ def gear_net(robots: tuple[Robot, ...], operations: tuple[Operation, ...]) -> Ge
             places.append(
                 Place(
                     f"{robot.name}:{label}",
-                    (before.end,),
-                    (operation.start,),
+                    (done,),
+                    (begun,),
                     "hold" if stays else "wait",
                     label,
                     1,
@@ -299,12 +308,10 @@ def gear_net(robots: tuple[Robot, ...], operations: tuple[Operation, ...]) -> Ge
                 )
             )
             slots.append((robot.index,))
-            pairs[operation.start].append(((wait, 0), (number, slot)))
-            pairs[before.end].append(
-                ((before.place, slot_of[before.index][robot.index]), (wait, 0))
-            )
+            pairs[begun].append(((wait, 0), (number, slot)))
+            pairs[done].append(((before.place, slot_of[before.index][robot.index]), (wait, 0)))
             gear_places += [wait, number]
-            gear_events += [before.end, operation.start]
+            gear_events += [done, begun]
         gears.append(Gear(robot.name, robot.type, tuple(gear_places), tuple(gear_events)))
     redistribution: tuple[Redistribution, ...] = tuple(tuple(sorted(p)) for p in pairs)
     net = ThreadedNet(PetriNet(transitions, tuple(places)), redistribution)

@@ -61,12 +61,14 @@ def table(title: str, columns: tuple[str, ...], rows: Iterable[tuple[str, ...]])
     """A table for people on stdout, as wide as it needs to be."""
     from rich import box
     from rich.console import Console
+    from rich.markup import escape
     from rich.table import Table
     from rich.text import Text
 
+    title = escape(title)
     made = Table(title=title or None, box=box.SIMPLE_HEAD, title_justify="left", pad_edge=False)
     for column in columns:
-        made.add_column(column, overflow="fold")
+        made.add_column(escape(column), overflow="fold")
     for row in rows:
         made.add_row(*(Text(cell) for cell in row))
     console = Console(width=None if sys.stdout.isatty() else 160, highlight=False)

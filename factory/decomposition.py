@@ -11,14 +11,13 @@ from __future__ import annotations
 import contextlib
 import hashlib
 import io
-import os
 from collections.abc import Callable
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
 import numpy as np
 
-from factory.files import write_bytes
+from factory.files import user_cache, write_bytes
 from factory.meshes import Array, Indices, Mesh
 from factory.pieces import FLATNESS, convex_bodies, is_closed
 
@@ -84,10 +83,8 @@ def _decomposed(mesh: Mesh) -> tuple[Array, ...]:
 
 
 def cache_folder() -> Path:
-    """Where decompositions are kept: in $XDG_CACHE_HOME, or ~/.cache."""
-    given = os.environ.get("XDG_CACHE_HOME", "")
-    base = Path(given) if os.path.isabs(given) else Path(os.path.expanduser("~")) / ".cache"
-    return base / "klavins-factory" / "pieces"
+    """Where decompositions are kept."""
+    return user_cache() / "pieces"
 
 
 def _key(mesh: Mesh, release: str) -> str:

@@ -146,6 +146,11 @@ class DistributedSupervisor:
         """The names of the places that the record marks."""
         return tuple(p.name for p, m in zip(self.net.places, self.marked, strict=True) if m)
 
+    def limit(self, limits: Limits) -> None:
+        """From now on axes have these limits."""
+        self.limits = limits
+        self.bundles.clear()
+
     def step(self) -> None:
         """As many timesteps of the world as a supervisor's tick has; robots tick in between."""
         for _ in range(self.ticks):

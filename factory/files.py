@@ -53,6 +53,13 @@ def make_folder(folder: Path) -> list[Path]:
     return missing
 
 
+def user_cache() -> Path:
+    """Where what can be made again is kept for this user: in $XDG_CACHE_HOME, or ~/.cache."""
+    given = os.environ.get("XDG_CACHE_HOME", "")
+    base = Path(given) if os.path.isabs(given) else Path(os.path.expanduser("~")) / ".cache"
+    return base / "klavins-factory"
+
+
 def partial_of(path: Path) -> Path:
     """The hidden name beside a file under which this process writes it."""
     return path.with_name(f".{path.name[:200]}.{os.getpid()}.part")

@@ -23,8 +23,8 @@ def check_prepared(
     robots: Sequence[Robot], operations: Sequence[Operation]
 ) -> Iterator[Diagnostic]:
     """Every violation of NotPrepared, templates first."""
-    used = dict.fromkeys(o.template for o in operations)
-    faults = [fault for template in used for fault in _unreachable(template)]
+    used = {id(o.template): o.template for o in operations}
+    faults = [fault for template in used.values() for fault in _unreachable(template)]
     yield from faults
     if faults:
         return

@@ -19,9 +19,10 @@ from factory.pipeline import Source
 from factory.settings import Settings
 from factory.simulation import Observer, Simulation
 from factory.trace import Run
+from factory.wholes import fusing_pays
 
 if TYPE_CHECKING:
-    from factory.monitor import Report, beside
+    from factory.monitor import Report
 
 Size = tuple[int, int]
 
@@ -43,6 +44,7 @@ def simulation(
         None if start is None else legal_marking(net, start),
         options.get("wip"),
         bool(options.get("distributed")),
+        fuse=fusing_pays(layout.factory) if options.get("fuse") is None else options["fuse"],
     )
 
 
@@ -62,9 +64,14 @@ def run_file(
     from factory.progress import Progress
 
     refuse_unproved(layout.factory)
-    if options.get("monitor") and options.get("world") == "ideal":
-        message = "the ideal world has no bodies for a monitor to observe"
-        raise InputError(Diagnostic("Usage", message, None, "leave out --world ideal"))
+    if options.get("world") == "ideal":
+        for key, purpose in (
+            ("monitor", "for a monitor to observe"),
+            ("fuse", "that could become one"),
+        ):
+            if options.get(key):
+                message = f"the ideal world has no bodies {purpose}"
+                raise InputError(Diagnostic("Usage", message, None, "leave out --world ideal"))
     if video is not None:
         if options.get("world") == "ideal":
             message = "the ideal world has no bodies to film"
@@ -78,8 +85,11 @@ def run_file(
     made = simulation(source, layout, settings, options)
     with ExitStack() as stack:
         observers: list[Observer] = [stack.enter_context(Interruption()).observe]
-        watcher = beside(made) if options.get("monitor") else None
-        if watcher is not None:
+        watcher = None
+        if options.get("monitor"):
+            from factory.monitor import beside
+
+            watcher = beside(made)
             observers.append(watcher.observe)
         if log is not None:
             from factory.log import LogWriter
@@ -196,6 +206,15 @@ def summarise(record: Run, factory: Factory, verbose: bool) -> None:
         )
         for pair in physics.contacts[:8]:
             say(f"  touched: {pair}")
+        if physics.mating_forces:
+            most = max(physics.mating_forces, key=physics.mating_forces.__getitem__)
+            say(f"inputs pressed on each other with {physics.mating_force_max_n:.3f} N in {most}")
+        if physics.excluded:
+            say(f"{len(physics.excluded)} pairs that clash when joined pass through each other")
+        for one, other in physics.excluded if verbose else ():
+            say(f"  left out: {one} - {other}")
+        if physics.fused:
+            say("parts joined for good are one rigid body (--no-fuse keeps them apart)")
     if record.monitor is not None:
         say(verdict(record.monitor))
     busy = sorted(zip(factory.robots, record.utilisation, strict=True), key=lambda p: -p[1])

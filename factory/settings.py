@@ -1,14 +1,13 @@
-"""What a user may set, by option or in `factory.toml`: speeds, timestep, clearance."""
+"""What a user may set, by option, by environment or in `factory.toml`: speeds, timestep,
+clearance."""
 
 from __future__ import annotations
 
-import re
-import tomllib
+import os
 from collections.abc import Mapping
-from dataclasses import dataclass, fields, replace
-from pathlib import Path
+from dataclasses import dataclass, replace
 
-from factory.errors import Diagnostic, InputError, Position, did_you_mean
+from factory.errors import Diagnostic, InputError
 
 RANGES = {
     "speed": (1e-3, 100.0),
@@ -64,42 +63,39 @@ class Settings:
         return replace(self, **given)  # type: ignore[arg-type]
 
 
-def load_settings(path: Path) -> Settings:
-    """The settings of a `factory.toml`; the defaults where there is no such file.
-
-    Raises InputError with every fault of the file: broken TOML, an unknown key, or a value that is
-    no number within its range.
-    """
-    if not path.is_file():
-        return Settings()
-    try:
-        text = path.read_bytes().decode("utf-8-sig")
-        table = tomllib.loads(text)
-    except (OSError, ValueError) as error:
-        raise InputError(_broken(path, error)) from error
-    faults = []
-    for key, value in table.items():
-        fault = _fault(key, value)
+def environment() -> dict[str, float]:
+    """The settings that the environment states: `FACTORY_SPEED` and so on; an empty variable states
+    none. Raises InputError (BadValue) with every one that is no number within its range."""
+    found, faults = {}, []
+    for name in RANGES:
+        variable = f"FACTORY_{name.upper()}"
+        text = os.environ.get(variable, "").strip()
+        if not text:
+            continue
+        value = _number(text, int if name == "substeps" else float)
+        fault = _out_of_range(name, value) if value is not None else wrong_type(name, value)
         if fault is not None:
-            faults.append(replace(fault, position=_place(path, text, key)))
+            faults.append(replace(fault, message=f"in the environment {variable}: {fault.message}"))
+        elif value is not None:
+            found[name] = value
     if faults:
         raise InputError(faults)
-    return Settings().with_options(
-        {k: v if k == "substeps" else float(v) for k, v in table.items()}
-    )
+    return found
 
 
-def _fault(key: str, value: object) -> Diagnostic | None:
-    """What is wrong with a key of `factory.toml`."""
-    if key not in RANGES:
-        hint = did_you_mean(key, [f.name for f in fields(Settings)], "keys")
-        return Diagnostic("UnknownParameter", f"unknown key '{key}'", None, hint)
-    kind = "whole number" if key == "substeps" else "number"
-    if isinstance(value, bool) or not isinstance(value, int | float):
-        return Diagnostic("BadValue", f"{key} must be a {kind}", None, _example(key))
-    if key == "substeps" and not isinstance(value, int):
-        return Diagnostic("BadValue", f"{key} must be a {kind}", None, _example(key))
-    return _out_of_range(key, value)
+def _number(text: str, kind: type[int] | type[float]) -> float | None:
+    try:
+        return kind(text)
+    except ValueError:
+        return None
+
+
+def wrong_type(name: str, value: object) -> Diagnostic | None:
+    """What is wrong with the value of a setting, if it is no number within its range."""
+    kind = "whole number" if name == "substeps" else "number"
+    if isinstance(value, bool) or not isinstance(value, int if name == "substeps" else int | float):
+        return Diagnostic("BadValue", f"{name} must be a {kind}", None, _example(name))
+    return _out_of_range(name, value)
 
 
 def _out_of_range(name: str, value: float) -> Diagnostic | None:
@@ -113,23 +109,3 @@ def _out_of_range(name: str, value: float) -> Diagnostic | None:
 
 def _example(name: str) -> str:
     return f"for example {name} = {getattr(Settings(), name)}"
-
-
-def _place(path: Path, text: str, key: str) -> Position:
-    """Where a key stands in a file: its first mention at the start of a line, or in a header."""
-    for number, line in enumerate(text.splitlines(), 1):
-        if found := re.match(rf"""\s*\[*\s*["']?({re.escape(key)})\b""", line):
-            return Position(str(path), number, found.start(1) + 1, line)
-    return Position(str(path), 1, 1)
-
-
-def _broken(path: Path, error: Exception) -> Diagnostic:
-    """What tomllib says, at the place it speaks of."""
-    words = getattr(error, "strerror", None) or str(error)
-    found = re.search(r" \(at line (\d+), column (\d+)\)", words)
-    if found is None:
-        return Diagnostic("Syntax", words, Position(str(path), 1, 1), "see https://toml.io")
-    line, column = int(found[1]), int(found[2])
-    text = path.read_text("utf-8-sig").splitlines()[line - 1]
-    at = Position(str(path), line, column, text)
-    return Diagnostic("Syntax", words.replace(found[0], ""), at, "see https://toml.io")

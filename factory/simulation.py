@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from time import perf_counter
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
+from factory.control.mode import Mode
 from factory.control.plan import operation_modes, robot_limits
 from factory.distributed import DistributedSupervisor
 from factory.errors import Diagnostic, InputError, RunError
@@ -21,6 +23,7 @@ from factory.robots import Catalogue, load_catalogue
 from factory.settings import Settings
 from factory.supervisor import Supervisor
 from factory.trace import PhysicsFigures, Run
+from factory.wholes import bodies_of, fused_copies
 from factory.world.ideal import IdealWorld
 
 if TYPE_CHECKING:
@@ -38,11 +41,24 @@ LOOK = "look at these robots in `factory render`, or give --max-time more"
 SMALLER = "take smaller speeds, a smaller --timestep, or check that the parts are in metres"
 
 
+@dataclass(frozen=True)
+class Compiled:
+    """What runs that differ in seed and jitter alone share: modes and, in MuJoCo, the model and the
+    engine's model `loaded` of it. A run writes into a copy of that one."""
+
+    modes: tuple[Mode, ...]
+    model: Model | None = None
+    loaded: Any = None
+
+
 class Simulation:
     """One run, ready to go: `run()` does it; `model` is what the engine is given (mujoco only).
 
     Raises InputError where the engine refuses the model, or a mode starts outside its domain. A
     run that stalls or takes too long is a Run with its trouble; `require` makes that an error.
+    `compiled`: what it shares with earlier runs, made by `compiled` for the same layout, world,
+    units, settings, wip and `fuse`, from the beginning. `fuse`: parts that are joined
+    for good become one rigid body.
     """
 
     def __init__(
@@ -57,12 +73,14 @@ class Simulation:
         start: Marking | None = None,
         wip: int | None = None,
         distributed: bool = False,
+        compiled: Compiled | None = None,
+        fuse: bool = False,
     ) -> None:
         self.layout, self.kind, self.units = layout, world, units
         self.seed, self.jitter, self.wip = seed, jitter, wip
         self.settings = settings or Settings()
         factory = layout.factory
-        self.modes = operation_modes(layout, self.settings.eps)
+        self.modes = compiled.modes if compiled else operation_modes(layout, self.settings.eps)
         self.limits, gains = robot_limits(layout, self.settings, seed, jitter)
         self.delays = operation_delays(layout, self.modes, self.limits, self.settings, world)
         self.start = factory.net.initial_marking if start is None else start
@@ -82,10 +100,12 @@ class Simulation:
                 self.settings.timestep,
             )
         else:
-            self.model = physical_model(
-                layout, units, self.settings, catalogue, wip, self.under_way()
+            loaded = compiled.loaded if compiled else None
+            self.model = compiled.model if compiled else None
+            self.model = self.model or physical_model(
+                layout, units, self.settings, catalogue, wip, self.under_way(), fuse
             )
-            self.world = _mujoco(self.model, positions, gains, units, self.counts, wip)
+            self.world = _mujoco(self.model, positions, gains, units, self.counts, wip, loaded)
         self.before = self.world.delivered()
         self.supervisor = self._distributed() if distributed else self._central()
 
@@ -186,6 +206,25 @@ class Simulation:
         return Diagnostic(code, message, places[0].position if places else None, hint)
 
 
+def compiled(
+    layout: Layout,
+    world: Literal["mujoco", "ideal"],
+    units: int,
+    settings: Settings,
+    catalogue: Catalogue,
+    wip: int | None = None,
+    fuse: bool = False,
+) -> Compiled:
+    """What many runs share. Raises InputError as `Simulation` does."""
+    modes = operation_modes(layout, settings.eps)
+    if world == "ideal":
+        return Compiled(modes)
+    from factory.world.physics import load
+
+    model = physical_model(layout, units, settings, catalogue, wip, fuse=fuse)
+    return Compiled(modes, model, load(model))
+
+
 def physical_model(
     layout: Layout,
     units: int | None = None,
@@ -193,12 +232,20 @@ def physical_model(
     catalogue: Catalogue | None = None,
     wip: int | None = None,
     under_way: Mapping[str, int] | None = None,
+    fuse: bool = False,
 ) -> Model:
-    """The MJCF model of a layout with the pool of parts it needs for `units` (None: for ever)."""
+    """The MJCF model of a layout with the bodies it needs for `units` (None: for ever): the pool of
+    parts, or with `fuse` bodies of sub-assemblies too, and then few parts."""
     from factory.mjcf.model import build_model, part_copies
 
-    copies = part_copies(part_pool(layout.factory), units, wip, under_way)
-    return build_model(layout, catalogue or load_catalogue(), copies, settings or Settings())
+    factory = layout.factory
+    bodies = bodies_of(factory, layout.product, fuse)
+    if bodies.wholes:
+        copies = fused_copies(bodies, factory, units)
+    else:
+        copies = part_copies(part_pool(factory), units, wip, under_way)
+    catalogue, settings = catalogue or load_catalogue(), settings or Settings()
+    return build_model(layout, catalogue, copies, settings, bodies)
 
 
 def start_positions(layout: Layout, marking: Marking) -> np.ndarray:

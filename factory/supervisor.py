@@ -15,6 +15,7 @@ import numpy as np
 
 from factory.control.mode import Array, Index, Limits, Mode
 from factory.control.navigation import Bundle
+from factory.control.obstacles import ranges
 from factory.factory import Factory, Operation
 from factory.nets.petri import Marking
 from factory.trace import Event
@@ -48,14 +49,20 @@ class World(Protocol):
         """Products that have left the factory."""
 
 
+AHEAD = 0.005
+"""How far ahead of its reference a robot may be [m], before its goal is looked at too late."""
+
+
 @dataclass(slots=True)
 class _Active:
-    """The modes under way: operations, their bundle, the axes of each slot, and the clocks."""
+    """The modes under way: operations, their bundle, the axes of each slot, the clocks, and the
+    time [s] before which none of them can end."""
 
     operations: tuple[int, ...]
     bundle: Bundle | None
     axes: Index
     clocks: Array
+    earliest: float = 0.0
 
 
 class Supervisor:
@@ -75,14 +82,10 @@ class Supervisor:
         start: Marking | None = None,
         counts: dict[int, int] | None = None,
     ) -> None:
-        self.factory, self.modes, self.limits, self.world, self.tick = (
-            factory,
-            modes,
-            limits,
-            world,
-            tick,
-        )
+        self.factory, self.modes, self.world, self.tick = factory, modes, world, tick
         self.net = factory.net.threaded
+        self.limit(limits)
+        self.axes = np.array([axis for axes in factory.axes for axis in axes], np.intp)
         marking = factory.net.initial_marking if start is None else start
         self.threads = dict(factory.net.marking_of(marking).threads)
         self.marked = bytearray(len(self.net.places))
@@ -100,6 +103,11 @@ class Supervisor:
         self.active = _Active((), None, np.empty(0, np.intp), np.empty(0))
         self._activate(o.index for o in factory.operations if self.marked[o.place])
 
+    def limit(self, limits: Limits) -> None:
+        """From the next operation on, axes have these limits."""
+        self.limits = limits
+        self.all = Bundle.of(self.modes, [limits.of(axes) for axes in self.factory.axes])
+
     def step(self) -> None:
         """Fire what is enabled as one detached set, then let the world go on for one tick."""
         started = self._startable()
@@ -115,32 +123,29 @@ class Supervisor:
     def _startable(self) -> list[int]:
         """Operations X with X_s enabled: waits marked (their goals are everything), the robots in
         the domain of X's mode, and the world prepared."""
-        found = []
-        positions: Array | None = None
-        for event in sorted(self.ready):
-            operation = self.factory.operations[event // 2]
-            if self.marked[operation.place]:
-                continue
-            if not self.world.prepared(operation, self.fired[operation.start]):
-                continue
-            if positions is None:
-                positions = self.world.sense()[0]
-            axes = self.factory.axes[operation.index]
-            mode = Bundle.of([self.modes[operation.index]], [self.limits.of(axes)])
-            if mode.in_domain(positions[list(axes)])[0]:
-                found.append(operation.index)
-        return found
+        possible = [
+            operation
+            for event in sorted(self.ready)
+            if not self.marked[(operation := self.factory.operations[event // 2]).place]
+            and self.world.prepared(operation, self.fired[operation.start])
+        ]
+        if not possible:
+            return []
+        bundle, axes = self._bundle([operation.index for operation in possible])
+        inside = bundle.in_domain(self.world.sense()[0][axes])
+        return [o.index for o, within in zip(possible, inside, strict=True) if within]
 
     def _finished(self) -> list[int]:
         """Operations X with X_e enabled: robots in the goal ball, at rest, and the clock run
         out."""
         active = self.active
-        if active.bundle is None:
+        if active.bundle is None or self.world.time < active.earliest:
             return []
         x, v = self.world.sense()
         x, v = x[active.axes], v[active.axes]
-        active.clocks = active.bundle.tick(active.clocks, x, self.tick)
-        done = active.bundle.finished(x, active.clocks)
+        there = active.bundle.at_goal(x)
+        active.clocks += self.tick * there
+        done = active.bundle.finished(there, active.clocks)
         if not done.any():
             return []
         still = np.logical_and.reduceat(np.abs(v) < REST, active.bundle.starts)
@@ -208,15 +213,18 @@ class Supervisor:
 
     def _activate(self, operations: Iterable[int]) -> None:
         """Rebuild the bundle of active modes; clocks of those that go on are kept."""
-        numbers = tuple(operations)
+        numbers = list(operations)
         clocks = dict(zip(self.active.operations, self.active.clocks, strict=True))
-        chosen = [self.factory.axes[o] for o in numbers]
-        bundle = (
-            Bundle.of([self.modes[o] for o in numbers], [self.limits.of(axes) for axes in chosen])
-            if numbers
-            else None
-        )
-        axes = np.array([axis for axes in chosen for axis in axes], np.intp)
-        self.active = _Active(
-            numbers, bundle, axes, np.array([clocks.get(o, 0.0) for o in numbers])
-        )
+        bundle, axes = self._bundle(numbers)
+        kept = np.array([clocks.get(o, 0.0) for o in numbers])
+        if not numbers:
+            self.active = _Active((), None, axes, kept)
+            return
+        soonest = bundle.soonest(self.world.sense()[0][axes], AHEAD)
+        self.active = _Active(tuple(numbers), bundle, axes, kept, self.world.time + soonest)
+
+    def _bundle(self, numbers: Sequence[int]) -> tuple[Bundle, Index]:
+        """The modes of some operations, and their axes."""
+        chosen = np.array(numbers, np.intp)
+        robots = ranges(self.all.starts[chosen], self.all.sizes[chosen])
+        return self.all.select(numbers), self.axes[robots]

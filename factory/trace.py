@@ -38,6 +38,7 @@ class PhysicsFigures:
     contacts: tuple[str, ...] = ()
     mating_forces: Mapping[str, float] = field(default_factory=dict)
     excluded: tuple[Pair, ...] = ()
+    fused: bool = False
 
     @property
     def mating_force_max_n(self) -> float:
@@ -127,6 +128,7 @@ class Run:
             **{key: getattr(physics, key) if physics else None for key in keys},
             "contacts": list(physics.contacts) if physics else None,
             "mating_forces_n": dict(physics.mating_forces) if physics else None,
+            "fused": physics.fused if physics else None,
             "excluded": [list(pair) for pair in physics.excluded] if physics else None,
             **watched,
             "events": [{"t": round(e.t, 6), "transition": e.transition} for e in self.events],

@@ -6,6 +6,8 @@ import json
 import os
 import subprocess
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -71,6 +73,17 @@ def spawn(*words: object, cwd: Path | None = None, **variables: str) -> Done:
     )
     assert "Traceback" not in done.stderr, done.stderr
     return Done(done.returncode, done.stdout, done.stderr)
+
+
+@contextmanager
+def started(*words: object, **options: Any) -> Iterator[subprocess.Popen[Any]]:
+    """A command in a process of its own, which does not outlive the block, whatever happens."""
+    command = [sys.executable, "-m", "factory", *(str(word) for word in words)]
+    with subprocess.Popen(command, cwd=ROOT, **options) as process:
+        try:
+            yield process
+        finally:
+            process.kill()
 
 
 def files_in(folder: Path) -> dict[str, bytes]:

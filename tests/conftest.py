@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 
 import pytest
@@ -14,6 +14,9 @@ from tests.command_line import Terminal
 
 TESTS = Path(__file__).parent
 ROOT = TESTS.parent
+
+collect_ignore_glob = ["bench/rivals/*", "oracles/*"]
+"""Scripts for environments of their own."""
 
 settings.register_profile(
     "factory", deadline=None, suppress_health_check=[HealthCheck.too_slow], derandomize=True
@@ -27,6 +30,14 @@ def pytest_addoption(parser: pytest.Parser) -> None:
         action="store_true",
         help="write what was found to tests/golden instead of comparing it",
     )
+
+
+@pytest.fixture(scope="session", autouse=True)
+def _a_cache_of_its_own(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
+    """Tests leave the user's cache alone."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("XDG_CACHE_HOME", str(tmp_path_factory.mktemp("cache")))
+        yield
 
 
 @pytest.fixture

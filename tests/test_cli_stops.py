@@ -17,7 +17,7 @@ import pytest
 from factory.errors import MissingError
 from factory.gl import probe
 from factory.log import read_log
-from tests.command_line import PAPER, ROOT, Terminal, files_in, spawn
+from tests.command_line import PAPER, ROOT, Terminal, files_in, spawn, started
 
 # --- a run that fails, or is stopped --------------------------------------------------------------
 
@@ -73,13 +73,7 @@ def test_a_factory_that_does_not_fit(run: Terminal, out: Path) -> None:
 def test_a_run_that_is_stopped_closes_its_files(out: Path, number: signal.Signals) -> None:
     log = out / "run.log"
     words = ["run", PAPER, "--units", "1000000", "--log", log, "--json"]
-    with subprocess.Popen(
-        [sys.executable, "-m", "factory", *map(str, words)],
-        cwd=ROOT,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-    ) as process:
+    with started(*words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
         deadline = time.monotonic() + 60
         while not (log.exists() and log.stat().st_size > 20_000):
             assert time.monotonic() < deadline
@@ -105,9 +99,7 @@ def test_a_film_plays_however_its_run_ends(out: Path, number: signal.Signals) ->
     log, film = out / "run.log", out / "film.mp4"
     words = ["run", PAPER, "--units", "1000000", "--log", log, "--video", film, "-q"]
     words += ["--size", "64x48", "--fps", "10"]
-    with subprocess.Popen(
-        [sys.executable, "-m", "factory", *map(str, words)], cwd=ROOT, stderr=subprocess.PIPE
-    ) as process:
+    with started(*words, stderr=subprocess.PIPE) as process:
         deadline = time.monotonic() + 120
         while not (film.exists() and film.stat().st_size > 12_000):
             assert time.monotonic() < deadline and process.poll() is None

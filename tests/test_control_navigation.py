@@ -227,15 +227,43 @@ def test_an_empty_bundle_answers_with_empty_arrays() -> None:
     assert bundle.gradient(nothing).size == bundle.in_domain(nothing).size == 0
 
 
-def test_the_clock_runs_in_the_goal_ball_only() -> None:
-    mode = Mode(np.ones(1), np.zeros(1), np.ones(1), EPS, dwell=2 * DT)
-    bundle, clock = bundle_of([mode]), np.zeros(1)
-    clock = bundle.tick(clock, np.array([0.5]), DT)
-    assert clock == [0.0]
-    for expected in (False, True):
-        clock = bundle.tick(clock, np.ones(1), DT)
-        assert bundle.finished(np.ones(1), clock) == [expected]
-    assert bundle.finished(np.array([0.5]), clock) == [False]
+def test_a_mode_ends_in_the_goal_ball_when_its_clock_has_run_out() -> None:
+    bundle = bundle_of([Mode(np.ones(1), np.zeros(1), np.ones(1), EPS, dwell=2 * DT)])
+    inside, outside = bundle.at_goal(np.ones(1)), bundle.at_goal(np.array([0.5]))
+    for ticks, expected in ((0, False), (1, False), (2, True)):
+        assert bundle.finished(inside, np.full(1, ticks * DT)) == [expected]
+    assert bundle.finished(outside, np.full(1, 2 * DT)) == [False]
+
+
+@settings(max_examples=50, deadline=None)
+@given(st.integers(1, 4), st.floats(0.0, 3.0), st.integers(0, 2**32 - 1))
+def test_no_mode_ends_sooner_than_it_can(count: int, ahead: float, seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    bundle = bundle_of([mate(rng.uniform(0.5, 2, 2), ahead) for _ in range(count)])
+    x = np.concatenate([mode.upper for mode in bundle.modes])
+    soonest, time = bundle.soonest(x, 0.0), 0.0
+    while not bundle.at_goal(x).any():
+        x = x + bundle.field(x, DT) * DT
+        time += DT
+    assert soonest <= time + 1e-9
+
+
+@settings(max_examples=50, deadline=None)
+@given(st.lists(st.integers(1, 5), min_size=1, max_size=8), st.integers(0, 2**32 - 1))
+def test_a_selection_is_the_bundle_of_the_selected(sizes: list[int], seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    modes = [Mode(rng.random(size), np.zeros(size), np.ones(size), EPS) for size in sizes]
+    chosen = [int(n) for n in rng.permutation(len(modes))[: rng.integers(1, len(modes) + 1)]]
+    found, expected = bundle_of(modes).select(chosen), bundle_of([modes[n] for n in chosen])
+    for name in Bundle.__dataclass_fields__:
+        one, other = getattr(found, name), getattr(expected, name)
+        if name in ("gates", "pairs"):
+            for inner in type(other).__dataclass_fields__:
+                assert np.array_equal(getattr(one, inner), getattr(other, inner)), (name, inner)
+        elif name != "modes":
+            assert np.array_equal(one, other), name
+    x = rng.random(sum(modes[n].size for n in chosen))
+    assert np.array_equal(found.field(x, DT), expected.field(x, DT))
 
 
 @settings(max_examples=200, deadline=None)

@@ -49,7 +49,7 @@ def test_bodies_are_inside_their_regions(layout: Layout) -> None:
         mujoco.mj_kinematics(m, d)
         for geom in range(m.ngeom):
             name = m.geom(geom).name
-            if m.geom_contype[geom] == 0 or name == "floor" or name.startswith("part/"):
+            if m.geom_contype[geom] == 0 or name == "ground" or name.startswith("part/"):
                 continue
             looked_at.add(name.rpartition("/")[2])
             assert inside(layout, name, *bounds(m, d, geom)), name

@@ -6,9 +6,12 @@ import mujoco
 import numpy as np
 import pytest
 
-import factory.layout.embedding as embedding
+import factory.layout.arranging as arranging
+import factory.layout.optimising as optimising
 from factory.geometry import product_geometry
+from factory.layout.embedding import lay_out
 from factory.layout.plan import Layout
+from factory.layout.sides import admissible, admitted
 from factory.mating.judged import judged
 from factory.simulation import Simulation
 from tests.test_compiler import PAPER, compiled
@@ -21,7 +24,7 @@ b = atomic(box = (0.05, 0.05, 0.05), pos = (0.02, 0.02, 0.06))"""
 
 def laid_out(text: str) -> Layout:
     plan = compiled(text)
-    return embedding.lay_out(plan, product_geometry(plan.pag))
+    return lay_out(plan, product_geometry(plan.pag))
 
 
 def deepest(layout: Layout) -> float:
@@ -47,12 +50,12 @@ def test_parts_of_a_product_do_not_pass_through_each_other(text: str) -> None:
 
 def test_inputs_from_the_wrong_sides_are_seen(monkeypatch: pytest.MonkeyPatch) -> None:
     """Planted fault: every robot on the other side. The parts run into each other for real."""
-    admitted = embedding.admissible
 
     def swapped(factory, sides):
-        return {robot: -side for robot, side in admitted(factory, sides).items()}
+        return {robot: -side for robot, side in admissible(factory, sides).items()}
 
-    monkeypatch.setattr(embedding, "admissible", swapped)
+    monkeypatch.setattr(optimising, "admissible", swapped)
+    monkeypatch.setattr(arranging, "admitted", lambda *given: not admitted(*given))
     simulation = Simulation(laid_out(BALANCED), units=1)
     run = simulation.run()
     assert run.trouble is not None and run.trouble.code == "Stalled"
@@ -68,5 +71,5 @@ def test_sides_are_right_for_any_sides_to_begin_with() -> None:
             pair = [r for r in operation.robots if r != operation.carrier]
             if len(pair) == 2:
                 sides[pair[1]] = -sides[pair[0]]
-        found = embedding.admissible(plan, sides)
-        assert embedding.admissible(plan, found) == found
+        found = admissible(plan, sides)
+        assert admissible(plan, found) == found

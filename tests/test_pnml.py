@@ -1,20 +1,17 @@
-"""PNML: read ∘ write is the identity; what is broken is diagnosed; exporters are found."""
+"""PNML: read ∘ write is the identity; what is broken is diagnosed."""
 
 from __future__ import annotations
 
 import random
 import re
 from dataclasses import replace
-from pathlib import Path
 from xml.etree import ElementTree
 
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-import factory.export
 from factory.errors import InputError
-from factory.export import exporters
 from factory.export.dot import write_dot
 from factory.export.pnml import read_pnml, write_pnml
 from factory.factory import Factory
@@ -264,20 +261,6 @@ def test_garbled_documents_give_diagnostics_only(seed: int) -> None:
         placed = [verdict.holds or bool(verdict.witness)]
     assert placed
     assert all(placed)
-
-
-def test_exporters_are_found_by_directory() -> None:
-    found = exporters()
-    assert list(found) == sorted(found)
-    assert {"pnml", "dot"} <= set(found)
-    folder = Path(factory.export.__file__ or "").parent
-    defining = [
-        p for p in folder.glob("*.py") if re.search(r"^FORMAT = ", p.read_text("utf-8"), re.M)
-    ]
-    assert len(found) == len(defining)
-    made = factory_of(paper())
-    for export in found.values():
-        assert export(made) == export(made.net) == export(made)
 
 
 def test_dot_shows_robots_tokens_and_arcs() -> None:

@@ -12,10 +12,17 @@ from typing import Any
 import click
 
 from factory import __version__
+from factory.cli.analyze import analyze
+from factory.cli.bring import import_, new
+from factory.cli.defaults import from_environment, with_defaults
+from factory.cli.explain import Code, tell_code
 from factory.cli.fidelity import fidelity
 from factory.cli.make import build
 from factory.cli.move import render, run
-from factory.cli.prove import check, export, programs
+from factory.cli.prove import check, programs
+from factory.cli.report import report
+from factory.cli.sweep import sweep
+from factory.cli.take import export
 from factory.cli.tell import doctor, templates
 from factory.cli.watch import monitor
 from factory.console import emit, fail, say
@@ -102,6 +109,8 @@ def _usage(error: click.ClickException) -> Diagnostic:
         message = f"there is no option '{error.option_name}'"
         if error.possibilities:
             hint = did_you_mean(error.option_name, sorted(error.possibilities), "options")
+    if isinstance(error, click.BadParameter):
+        message += from_environment(error)
     return Diagnostic("Usage", message, None, hint)
 
 
@@ -132,12 +141,16 @@ class _Commands(click.Group):
 
 @click.group(cls=_Commands, context_settings=CONTEXT, invoke_without_command=True)
 @click.option("--version", is_flag=True, help="Show the version and exit.")
+@click.option("--explain", type=Code(), help="Say more about the code of an error and exit.")
 @click.option("--json", "as_json", is_flag=True, hidden=True)
 @click.pass_context
-def cli(ctx: click.Context, version: bool, as_json: bool) -> None:
+def cli(ctx: click.Context, version: bool, explain: str | None, as_json: bool) -> None:
     """Compile a product assembly graph (PAG) into a factory, prove it live, run it in MuJoCo."""
     if version:
         emit({"version": __version__}) if as_json else say(f"factory {__version__}")
+        ctx.exit()
+    if explain is not None:
+        tell_code(explain, as_json)
         ctx.exit()
     if ctx.invoked_subcommand is None:
         if not as_json:
@@ -147,7 +160,25 @@ def cli(ctx: click.Context, version: bool, as_json: bool) -> None:
         raise click.UsageError("--json comes after the command", ctx)
 
 
-for _command in (check, build, run, render, fidelity, monitor, programs, export, templates, doctor):
+for _command in (
+    new,
+    import_,
+    check,
+    build,
+    run,
+    render,
+    fidelity,
+    analyze,
+    report,
+    sweep,
+    monitor,
+    programs,
+    export,
+    templates,
+    doctor,
+):
     cli.add_command(_command)
+for _command in (check, build, run, render, fidelity, analyze, report, programs, export):
+    with_defaults(_command)
 
 __all__ = ["cli", "main", "run_command"]

@@ -19,6 +19,7 @@ from factory.cli.options import (
     writable,
     writable_folder,
 )
+from factory.collector import collector_paused
 from factory.console import emit, say, warn
 
 
@@ -33,6 +34,7 @@ from factory.console import emit, say, warn
 @FLOOR
 @MOTION
 @OUTPUT
+@collector_paused()
 def build(
     file: Path,
     folders: tuple[Path, ...],
@@ -48,6 +50,8 @@ def build(
 ) -> int:
     """Compile, verify and lay out FILE.pag; write the MJCF model, the floor plan, the net."""
     from factory.building import build_all, refuse_unproved
+    from factory.layout.durations import Pace
+    from factory.layout.gain import gain
 
     begin = perf_counter()
     writable(file, mjcf)
@@ -58,6 +62,7 @@ def build(
     spent = perf_counter() - begin
     warn(layout.product.warnings, quiet)
     built = build_all(source, layout, settings, mjcf, output, units, wip, verdict)
+    gained = gain(layout, Pace.of(settings))
     document = {
         "product": source.pag.root,
         "mjcf": str(built.mjcf) if built.mjcf else None,
@@ -69,6 +74,7 @@ def build(
         "area_m2": round(layout.area, 6),
         "compile_s": spent,
         "clearance": built.clearance,
+        "layout": gained.as_json(),
         "files": [str(path) for path in built.files],
         "warnings": [d.as_json() for d in layout.product.warnings],
     }
@@ -83,6 +89,7 @@ def build(
             f"floor {layout.area:.2f} m², guidepaths {layout.guidepath_length:.2f} m, "
             f"clearance {settings.clearance * 1000:g} mm proved"
         )
+        say(str(gained))
         for path in built.files[:20]:
             say(f"  {path}")
     return 0

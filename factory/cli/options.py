@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 import click
+from click.shell_completion import CompletionItem
 
 from factory.errors import Diagnostic, InputError
 
@@ -17,6 +18,29 @@ F = TypeVar("F", bound=Callable[..., Any])
 
 PATH = click.Path(path_type=Path, readable=False)
 """A path as it is given; what is wrong with it the stage that opens it says, as a diagnostic."""
+
+
+class PagPath(click.Path):
+    """A path whose completions in the shell are PAG files, and folders beside them; where there are
+    no PAG files, whatever the shell completes paths to."""
+
+    def shell_complete(
+        self, ctx: click.Context, param: click.Parameter, incomplete: str
+    ) -> list[CompletionItem]:
+        folder, begun = os.path.split(incomplete)
+        try:
+            names = sorted(n for n in os.listdir(folder or ".") if n.startswith(begun))
+        except OSError:
+            names = []
+        shown = [os.path.join(folder, n) for n in names if begun or not n.startswith(".")]
+        found = [name for name in shown if name.endswith(".pag")]
+        if not found:
+            return super().shell_complete(ctx, param, incomplete)
+        folders = [f"{name}/" for name in shown if os.path.isdir(name)]
+        return [CompletionItem(name) for name in (*found, *folders)]
+
+
+PAG_PATH = PagPath(path_type=Path, readable=False)
 
 
 def options(*decorators: Callable[[F], F]) -> Callable[[F], F]:
@@ -34,7 +58,7 @@ OUTPUT = options(
     click.option("-v", "--verbose", is_flag=True, help="Say more."),
 )
 SOURCE = options(
-    click.argument("file", type=PATH),
+    click.argument("file", type=PAG_PATH),
     click.option(
         "--templates",
         "folders",
@@ -83,6 +107,11 @@ RUN = options(
         "--from", "start", help="Start from a legal marking: place names, comma-separated."
     ),
     click.option(
+        "--fuse/--no-fuse",
+        default=None,
+        help="Parts joined for good become one rigid body; by itself for large factories.",
+    ),
+    click.option(
         "--max-time", type=Number(0, min_open=True), help="Stop after this simulated time [s]."
     ),
 )
@@ -94,12 +123,13 @@ PICTURE = options(
 
 
 def settings_of(file: Path, options: dict[str, Any]) -> Any:
-    """Options before the `factory.toml` beside the PAG or in the current folder."""
-    from factory.settings import load_settings
+    """Options before the environment, that before the `factory.toml` beside the PAG or in the
+    current folder."""
+    from factory.defaults import defaults_for
+    from factory.settings import environment
 
     names = ("speed", "acceleration", "force", "timestep", "substeps", "clearance")
-    beside = file.parent / "factory.toml"
-    settings = load_settings(beside if beside.is_file() else Path("factory.toml"))
+    settings = defaults_for(file).settings().with_options(environment())
     return settings.with_options({name: options.get(name) for name in names})
 
 
@@ -123,6 +153,7 @@ def plan(
     file: Path, folders: Sequence[Path], settings: Any, floor: str | None
 ) -> tuple[Any, Any, Any]:
     """PAG to layout; warnings on stderr. Gives source, factory and layout."""
+    from factory.layout.durations import Pace
     from factory.layout.embedding import lay_out
     from factory.pipeline import read
 
@@ -130,7 +161,8 @@ def plan(
     factory = source.compile()
     product = source.product
     room = pair(floor, "--floor", "4x3", float)
-    return source, factory, lay_out(factory, product, settings.clearance, room)
+    layout = lay_out(factory, product, settings.clearance, room, Pace.of(settings))
+    return source, factory, layout
 
 
 def writable(file: Path | None, *outputs: Path | None) -> None:

@@ -1,4 +1,4 @@
-"""The commands that need no layout: check, programs, export."""
+"""The commands that need no layout: check and programs."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from pathlib import Path
 import click
 
 from factory.cli.options import OUTPUT, PATH, SOURCE, writable, writable_folder
+from factory.collector import collector_paused
 from factory.console import emit, say
 from factory.errors import Diagnostic, InputError, did_you_mean
 
@@ -18,6 +19,7 @@ from factory.errors import Diagnostic, InputError, did_you_mean
 @click.option("--wip", type=click.IntRange(1, 10**9), help="Copies of each part let in at once.")
 @click.option("--clashes", type=PATH, help="Write a picture of each blocked operation in a folder.")
 @OUTPUT
+@collector_paused()
 def check(
     file: Path,
     folders: tuple[Path, ...],
@@ -87,44 +89,4 @@ def programs(
         emit({"programs": texts})
     else:
         say("\n\n".join(texts.values()))
-    return 0
-
-
-@click.command()
-@SOURCE
-@click.option("--format", "form", required=True, help="pnml or dot.")
-@click.option("-o", "--output", type=PATH, help="A file; stdout without.")
-@OUTPUT
-def export(
-    file: Path,
-    folders: tuple[Path, ...],
-    form: str,
-    output: Path | None,
-    as_json: bool,
-    quiet: bool,
-    verbose: bool,
-) -> int:
-    """Write the net of FILE.pag for other tools."""
-    from factory.export import exporters
-    from factory.files import write_text
-    from factory.pipeline import read
-
-    writable(file, output)
-    known = exporters()
-    if form not in known:
-        hint = did_you_mean(form, list(known), "formats")
-        raise InputError(Diagnostic("Usage", f"unknown format '{form}'", None, hint))
-    text = known[form](read(file, folders).compile())
-    if output is not None:
-        write_text(output, text)
-    if as_json:
-        emit(
-            {
-                "format": form,
-                "output": str(output) if output else None,
-                **({} if output else {"text": text}),
-            }
-        )
-    elif output is None:
-        say(text.rstrip("\n"))
     return 0

@@ -32,7 +32,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from factory.control.mode import Array, Index, Limits, Mode, Truth, lock
-from factory.control.obstacles import Gates, Pairs
+from factory.control.obstacles import Gates, Pairs, ranges
 from factory.control.profile import landing_speed
 
 KAPPA = 4.0
@@ -59,13 +59,15 @@ class _Terms:
 @dataclass(frozen=True, slots=True, eq=False)
 class Bundle:
     """All active modes, concatenated: a configuration x (n,) has the robots of the first mode
-    first, in the mode's order. `starts` (modes,): the number of each mode's first robot.
+    first, in the mode's order. `starts` (modes,): the number of each mode's first robot; `sizes`
+    (modes,): how many it has.
 
     No call loops over robots or modes; arrays are made once, by `of`.
     """
 
     modes: tuple[Mode, ...]
     starts: Index
+    sizes: Index
     owner: Index
     goal: Array
     lower: Array
@@ -95,6 +97,7 @@ class Bundle:
         return cls(
             tuple(modes),
             starts,
+            sizes,
             np.repeat(np.arange(len(modes)), sizes),
             _joined([mode.goals for mode in modes]),
             _joined([mode.lower for mode in modes]),
@@ -108,6 +111,32 @@ class Bundle:
             Gates.of(modes, starts),
             Pairs.of(modes, starts),
             np.repeat(np.where(still, 0.0, 1.0), sizes) if still.any() else None,
+        )
+
+    def select(self, numbers: Sequence[int]) -> Bundle:
+        """The bundle of some of the modes, by number and in that order."""
+        chosen = np.array(numbers, np.intp)
+        sizes = self.sizes[chosen]
+        starts = np.cumsum(sizes) - sizes
+        robots = ranges(self.starts[chosen], sizes)
+        shift = starts - self.starts[chosen]
+        return Bundle(
+            tuple(self.modes[n] for n in numbers),
+            starts,
+            sizes,
+            np.repeat(np.arange(len(chosen)), sizes),
+            self.goal[robots],
+            self.lower[robots],
+            self.upper[robots],
+            self.eps[robots],
+            self.softness[robots],
+            self.speed[robots],
+            self.acceleration[robots],
+            self.span[chosen],
+            self.dwell[chosen],
+            self.gates.select(chosen, shift),
+            self.pairs.select(chosen, shift),
+            None if self.moving is None else self.moving[robots],
         )
 
     def potential(self, x: Array) -> Array:
@@ -156,13 +185,16 @@ class Bundle:
         """How far (modes,) [m] each mode's farthest robot is from its goal."""
         return np.maximum.reduceat(np.abs(x - self.goal), self.starts)
 
-    def tick(self, clock: Array, x: Array, dt: float) -> Array:
-        """The clocks (modes,) [s] after a tick at x: rate 1 in the goal ball, else 0."""
-        return clock + dt * self.at_goal(x)
+    def soonest(self, x: Array, ahead: float) -> float:
+        """A time [s] before which no mode is in its goal ball: each takes as long as its farthest
+        robot at its speed limit, `ahead` [m] left out."""
+        way = np.abs(x - self.goal) - self.eps - ahead
+        return float(np.maximum.reduceat(way / self.speed, self.starts).min())
 
-    def finished(self, x: Array, clock: Array) -> Truth:
-        """Whether (x, clock) is in each mode's goal G_p (modes,); to a nanosecond."""
-        return self.at_goal(x) & (clock >= self.dwell - 1e-9)
+    def finished(self, there: Truth, clock: Array) -> Truth:
+        """Whether each mode's (x, clock) is in its goal G_p (modes,): x is `there`, in the goal
+        ball, and its clock, which has rate 1 there and else 0, has run out; to a nanosecond."""
+        return np.asarray(there & (clock >= self.dwell - 1e-9))
 
     def _offset(self, x: Array) -> Array:
         """u (n,): the offset of each robot from where it may go now."""

@@ -16,6 +16,20 @@ OPEN = 0.8
 """A gate is fully open where its robot is this near to its goal [eps]."""
 
 
+def ranges(first: Index, count: Index) -> Index:
+    """first[0], first[0] + 1, ... (count[0] of them), first[1], ...: all in one array."""
+    before = np.cumsum(count) - count
+    return np.asarray(np.arange(count.sum()) + np.repeat(first - before, count))
+
+
+def rows_of(owner: Index, chosen: Index) -> tuple[Index, Index]:
+    """The rows whose owner is among the `chosen`: for each the place of its owner there, and its
+    number. The rows are sorted by owner."""
+    first = np.searchsorted(owner, chosen)
+    count = np.searchsorted(owner, chosen, side="right") - first
+    return np.repeat(np.arange(len(chosen)), count), ranges(first, count)
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Gates:
     """tau, how far from its goal each gated robot stays: a C² step of the gate robot's distance to
@@ -43,6 +57,14 @@ class Gates:
         eps = np.array([mode.eps for mode in modes])
         inner, width = OPEN * eps[mode_of], (1 - OPEN) * eps[mode_of]
         return cls(robot, gate[robot] + starts[mode_of], inner, width, standoff[robot], mode_of)
+
+    def select(self, chosen: Index, shift: Index) -> Gates:
+        """The gates of some modes, by number and in that order, whose robots now have numbers
+        higher by `shift`."""
+        mode, at = rows_of(self.mode, chosen)
+        moved = shift[mode]
+        robot, gate = self.robot[at] + moved, self.gate[at] + moved
+        return Gates(robot, gate, self.inner[at], self.width[at], self.standoff[at], mode)
 
     def closed(self, offset: Array) -> Array:
         """tau (g,) [m] where the robots are `offset` [m] from their goals."""
@@ -90,6 +112,13 @@ class Pairs:
             np.concatenate([np.empty(0), *(mode.reach for mode in modes)]),
             np.repeat(np.arange(len(modes)), [len(mode.pairs) for mode in modes]),
         )
+
+    def select(self, chosen: Index, shift: Index) -> Pairs:
+        """The pairs of some modes, by number and in that order, whose robots now have numbers
+        higher by `shift`."""
+        mode, at = rows_of(self.mode, chosen)
+        robots = self.robots[:, at] + shift[mode]
+        return Pairs(robots, self.meet[:, at], self.touch[at], self.reach[at], mode)
 
     def apart(self, x: Array) -> Array:
         """The distance (m,) [m] of each pair in the tree of guidepaths."""

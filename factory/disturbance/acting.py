@@ -168,7 +168,8 @@ class _Acting:
         speed = np.array(limits.speed)
         speed[self._of((slowed.robot,))] *= slowed.factor
         changed = Limits(speed, limits.acceleration)
-        self.simulation.limits = self.simulation.supervisor.limits = changed
+        self.simulation.limits = changed
+        self.simulation.supervisor.limit(changed)
 
     def _drag(self, dragged: Dragged) -> None:
         axes = self._of((dragged.robot,))

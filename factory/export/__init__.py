@@ -1,26 +1,58 @@
-"""Exporters, found by directory: every module here that defines `FORMAT` and `export`."""
+"""Exporters, found by directory: every module here that defines `FORMAT`, `TAKES` and `export`.
+
+`FORMAT` is the name of the format and the ending of its files; `TAKES` what it is made from: "net"
+(a PAG, or a net in PNML), "pag" or "log". `export(subject)` gives a text, bytes where `BINARY` is
+set, or several files by name beside the file asked for, that itself under ""; where the subject is
+`whole`, files in a folder. `OF`, where there is a choice, says what `--of` means. The module's
+docstring is its line in `factory export --help`.
+"""
 
 from __future__ import annotations
 
 import pkgutil
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from importlib import import_module
-from types import MappingProxyType
+from types import MappingProxyType, ModuleType
 
-from factory.factory import Factory
-from factory.nets.gears import GearNet
-from factory.nets.marked import MarkedNet
+from factory.export.subject import Subject
 
-Exporter = Callable[[Factory | GearNet | MarkedNet], str]
+Made = str | bytes | Mapping[str, bytes]
+"""What an exporter gives: a text, bytes, or files by their names."""
+
+
+@dataclass(frozen=True, slots=True)
+class Exporter:
+    """A format, what it takes, and what writes it; `of`: what `--of` means, "" for nothing;
+    `folder`: whether it writes a whole folder if asked to."""
+
+    format: str
+    takes: str
+    summary: str
+    export: Callable[[Subject], Made]
+    binary: bool = False
+    of: str = ""
+    folder: bool = False
 
 
 def exporters() -> Mapping[str, Exporter]:
-    """What writes a factory's net as text, by the name of the format; sorted by name."""
+    """The exporters by the names of their formats, sorted."""
     modules = (import_module(f"{__name__}.{m.name}") for m in pkgutil.iter_modules(__path__))
-    found = {m.FORMAT: m.export for m in modules if hasattr(m, "FORMAT") and hasattr(m, "export")}
-    return MappingProxyType(dict(sorted(found.items())))
+    found = [_exporter(module) for module in modules if hasattr(module, "FORMAT")]
+    return MappingProxyType({e.format: e for e in sorted(found, key=lambda e: e.format)})
 
 
-def net_of(subject: Factory | GearNet | MarkedNet) -> GearNet | MarkedNet:
-    """The net of a factory; a net itself."""
-    return subject.net if isinstance(subject, Factory) else subject
+def _exporter(module: ModuleType) -> Exporter:
+    summary = " ".join((module.__doc__ or "").strip().partition("\n\n")[0].split())
+    return Exporter(
+        module.FORMAT,
+        module.TAKES,
+        summary,
+        module.export,
+        getattr(module, "BINARY", False),
+        getattr(module, "OF", ""),
+        getattr(module, "FOLDER", False),
+    )
+
+
+__all__ = ["Exporter", "Made", "Subject", "exporters"]

@@ -1,24 +1,24 @@
-"""Graphviz: the net as a drawing, one colour for each robot's gear, tokens as dots."""
+"""Graphviz: the net, one colour for each robot's gear (`--of net`), or the assembly tree
+(`--of tree`)."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 
-from factory.export import net_of
-from factory.factory import Factory
+from factory.export.palette import colour
+from factory.export.subject import Subject
+from factory.export.swimlanes import owners_of
+from factory.export.views import pag_of, view_of
 from factory.nets.gears import GearNet
 from factory.nets.marked import MarkedNet, marked
+from factory.pag import PAG
 
-FORMAT = "dot"
-
-_COLOURS = (
-    "#0072b2", "#d55e00", "#009e73", "#cc79a7", "#8c6d00", "#56b4e9", "#7f3c8d", "#e73f74",
-)  # fmt: skip
+FORMAT, TAKES, OF = "dot", "net", "net or tree"
 
 
-def export(subject: Factory | GearNet | MarkedNet) -> str:
-    """The net as a DOT graph."""
-    return write_dot(net_of(subject))
+def export(subject: Subject) -> str:
+    """The net or the assembly tree as a DOT graph."""
+    return write_tree(pag_of(subject)) if view_of(subject) == "tree" else write_dot(subject.net)
 
 
 def write_dot(net: GearNet | MarkedNet) -> str:
@@ -29,8 +29,21 @@ def write_dot(net: GearNet | MarkedNet) -> str:
     return "\n".join(_lines(marked(net))) + "\n"
 
 
+def write_tree(pag: PAG) -> str:
+    """A digraph from the parts to the product; an assembly shows the operation that makes it."""
+    number = {node.label: n for n, node in enumerate(pag.nodes)}
+    lines = ["digraph assembly {", '  graph [rankdir=LR, fontname="sans-serif"];']
+    lines.append('  node [fontname="sans-serif", fontsize=10, shape=box, style=rounded];')
+    for node in pag.nodes:
+        words = f"{node.label}\n{node.operation}" if node.inputs else node.label
+        lines.append(f"  n{number[node.label]} [label={_quote(words)}];")
+    for node in pag.nodes:
+        lines += [f"  n{number[label]} -> n{number[node.label]};" for label in node.inputs]
+    return "\n".join([*lines, "}"]) + "\n"
+
+
 def _lines(net: MarkedNet) -> Iterator[str]:
-    owners = _owners(net)
+    owners = owners_of(net)
     yield "digraph factory {"
     yield '  graph [rankdir=LR, fontname="sans-serif"];'
     yield '  node [fontname="sans-serif", fontsize=10];'
@@ -46,18 +59,10 @@ def _lines(net: MarkedNet) -> Iterator[str]:
     yield "}"
 
 
-def _owners(net: MarkedNet) -> list[list[int]]:
-    owners: list[list[int]] = [[] for _ in net.tokens]
-    for number, gear in enumerate(net.gears):
-        for place in gear.places:
-            owners[place].append(number)
-    return owners
-
-
 def _robot(net: MarkedNet, number: int, robot: str, owners: list[list[int]]) -> Iterator[str]:
     """A cluster with the places of one robot alone."""
     yield f"  subgraph cluster_{number} {{"
-    yield f"    label={_quote(robot)}; color={_quote(_colour([number]))}; style=rounded;"
+    yield f"    label={_quote(robot)}; color={_quote(colour([number]))}; style=rounded;"
     for place in net.gears[number].places:
         if owners[place] == [number]:
             yield f"    {_place(net, place, [number])}"
@@ -69,22 +74,17 @@ def _place(net: MarkedNet, index: int, owners: list[int]) -> str:
     mode = place.mode if place.mode not in ("", place.name) else ""
     shown = [place.name, mode, "●" * tokens if tokens < 5 else f"● {tokens}"]
     label = "\n".join(line for line in shown if line)
-    width = 2 if len(owners) > 1 else 1
-    colour = _quote(_colour(owners))
-    return f"p{index} [shape=ellipse, penwidth={width}, color={colour}, label={_quote(label)}];"
+    width, paint = 2 if len(owners) > 1 else 1, _quote(colour(owners))
+    return f"p{index} [shape=ellipse, penwidth={width}, color={paint}, label={_quote(label)}];"
 
 
 def _arcs(net: MarkedNet, owners: list[list[int]]) -> Iterator[str]:
     for index, place in enumerate(net.net.places):
-        colour = _quote(_colour(owners[index]))
+        paint = _quote(colour(owners[index]))
         for event in place.left:
-            yield f"  t{event} -> p{index} [color={colour}];"
+            yield f"  t{event} -> p{index} [color={paint}];"
         for event in place.right:
-            yield f"  p{index} -> t{event} [color={colour}];"
-
-
-def _colour(owners: list[int]) -> str:
-    return _COLOURS[owners[0] % len(_COLOURS)] if len(owners) == 1 else "#333333"
+            yield f"  p{index} -> t{event} [color={paint}];"
 
 
 def _quote(text: str) -> str:

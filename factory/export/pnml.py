@@ -1,8 +1,9 @@
 """PNML 2009 (ISO/IEC 15909-2), place/transition nets: the net for other tools, and back.
 
-What the standard has no place for (the gears, modes, labels, slots and redistribution functions)
-stands in `toolspecific` elements of tool `factory`, version 1. `read_pnml` of what `write_pnml`
-gives for a legally marked gear net is equal to that net.
+Nodes stand where the SVG of the net has them. What the standard has no place for (the gears, modes,
+labels, slots and redistribution functions) stands in `toolspecific` elements of tool `factory`,
+version 1. `read_pnml` of what `write_pnml` gives for a legally marked gear net is equal to that
+net.
 """
 
 from __future__ import annotations
@@ -12,9 +13,10 @@ from collections.abc import Iterable, Iterator
 from xml.sax.saxutils import escape, quoteattr
 
 from factory.errors import Position
-from factory.export import net_of
 from factory.export.pnml_reader import NET_TYPE, PNML, TOOL, VERSION, read_pnml
-from factory.factory import Factory
+from factory.export.subject import Subject
+from factory.export.swimlanes import Swimlanes, swimlanes
+from factory.layout.plan import Point2
 from factory.nets.gears import Gear, GearNet
 from factory.nets.marked import MarkedNet, marked
 from factory.nets.petri import Place, Transition
@@ -22,14 +24,20 @@ from factory.nets.threaded import Redistribution
 
 __all__ = ["FORMAT", "export", "read_pnml", "write_pnml"]
 
-FORMAT = "pnml"
+FORMAT, TAKES = "pnml", "net"
+
+BELOW, ABOVE = (0.0, 22.0), (0.0, -26.0)
+"""Where names are drawn."""
+
+ROUND, BAR = (24.0, 24.0), 6.0
+"""Size of a place, width of a transition's bar."""
 
 _ILLEGAL = re.compile("[^\t\n\r\u0020-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 
 
-def export(subject: Factory | GearNet | MarkedNet) -> str:
+def export(subject: Subject) -> str:
     """The net as PNML."""
-    return write_pnml(net_of(subject))
+    return write_pnml(subject.net)
 
 
 def write_pnml(net: GearNet | MarkedNet) -> str:
@@ -39,6 +47,7 @@ def write_pnml(net: GearNet | MarkedNet) -> str:
 
 def _lines(net: GearNet | MarkedNet) -> Iterator[str]:
     subject = marked(net)
+    at = swimlanes(subject)
     moves: tuple[Redistribution, ...] = ()
     if isinstance(net, GearNet):
         moves = net.threaded.redistribution
@@ -49,9 +58,12 @@ def _lines(net: GearNet | MarkedNet) -> Iterator[str]:
         yield _tool(_gear(gear) for gear in subject.gears)
     yield '<page id="page">'
     for index, place in enumerate(subject.net.places):
-        yield from _place(subject, index, place)
+        yield from _place(subject, index, place, at)
     for index, transition in enumerate(subject.net.transitions):
-        yield from _transition(index, transition, moves[index] if moves else None)
+        move = moves[index] if moves else None
+        low, high = at.spans[index]
+        graphics = _drawn(at.middle(index), (BAR, high - low))
+        yield from _transition(index, transition, move, graphics)
     yield from _arcs(subject)
     yield "</page>\n</net>\n</pnml>"
 
@@ -75,8 +87,10 @@ def _gear(gear: Gear) -> str:
     return f"\n<gear{''.join(attributes)}/>"
 
 
-def _name(name: str) -> str:
-    return f"<name><text>{escape(_ILLEGAL.sub('?', name))}</text></name>"
+def _name(name: str, offset: Point2) -> str:
+    """A node's name, and where it is drawn relative to the node."""
+    place = f'<graphics><offset x="{offset[0]:.0f}" y="{offset[1]:.0f}"/></graphics>'
+    return f"<name>{place}<text>{escape(_ILLEGAL.sub('?', name))}</text></name>"
 
 
 def _source(at: Position | None) -> str:
@@ -86,27 +100,36 @@ def _source(at: Position | None) -> str:
     return f"<source{where}{_attribute('column', at.column)}/>"
 
 
-def _place(net: MarkedNet, index: int, place: Place) -> Iterator[str]:
+def _drawn(at: Point2, size: Point2) -> str:
+    """Where a node is drawn, and how large."""
+    position = f'<position x="{at[0]:.0f}" y="{at[1]:.0f}"/>'
+    return f'<graphics>{position}<dimension x="{size[0]:.0f}" y="{size[1]:.0f}"/></graphics>'
+
+
+def _place(net: MarkedNet, index: int, place: Place, at: Swimlanes) -> Iterator[str]:
     attributes = [_attribute("mode", place.mode), _attribute("label", place.label)]
     attributes.append(_attribute("size", place.size))
     if net.slots:
         robots = " ".join(net.gears[g].robot for g in net.slots[index] if 0 <= g < len(net.gears))
         attributes.append(_attribute("slots", robots))
     tokens = net.tokens[index]
-    yield f'<place id="p{index}">{_name(place.name)}'
+    yield f'<place id="p{index}">{_name(place.name, BELOW)}{_drawn(at.places[index], ROUND)}'
     if tokens:
         yield f"<initialMarking><text>{tokens}</text></initialMarking>"
     yield _tool([f"<mode{''.join(attributes)}/>", _source(place.position)]) + "</place>"
 
 
-def _transition(index: int, transition: Transition, moves: Redistribution | None) -> Iterator[str]:
+def _transition(
+    index: int, transition: Transition, moves: Redistribution | None, graphics: str
+) -> Iterator[str]:
     content = []
     if moves is not None:
         pairs = "".join(f'<move from="p{p} {i}" to="p{q} {j}"/>' for (p, i), (q, j) in moves)
         content.append(f"<redistribution>{pairs}</redistribution>")
     content.append(_source(transition.position))
     extra = _tool(content) if any(content) else ""
-    yield f'<transition id="t{index}">{_name(transition.name)}{extra}</transition>'
+    name = _name(transition.name, ABOVE)
+    yield f'<transition id="t{index}">{name}{graphics}{extra}</transition>'
 
 
 def _arcs(net: MarkedNet) -> Iterator[str]:

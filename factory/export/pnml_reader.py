@@ -6,6 +6,7 @@ import re
 from collections import Counter
 from collections.abc import Iterable
 
+from factory.collector import collector_paused
 from factory.errors import Diagnostic, InputError, Position, did_you_mean
 from factory.export.pnml_gears import Document, claimed
 from factory.export.xml_tree import Element, position, read_xml
@@ -17,6 +18,9 @@ PNML = "http://www.pnml.org/version-2009/grammar/pnml"
 NET_TYPE = "http://www.pnml.org/version-2009/grammar/ptnet"
 TOOL, VERSION = "factory", "1"
 
+DRAWN = frozenset({"graphics"})
+"""Elements that say how a net looks, and are not read."""
+
 MOST = 20
 """How many faults are listed."""
 
@@ -24,6 +28,7 @@ _NODES = ("place", "transition", "referencePlace", "referenceTransition")
 _NUMBER = re.compile(r"[0-9]{1,9}")
 
 
+@collector_paused()
 def read_pnml(text: str, file: str = "<text>") -> GearNet | MarkedNet:
     """The net in a PNML document, with its initial marking.
 
@@ -32,7 +37,7 @@ def read_pnml(text: str, file: str = "<text>") -> GearNet | MarkedNet:
     place/transition net with arcs of weight 1.
     """
     lines = text.split("\n")
-    return _Reader(file, lines).net(read_xml(text, file, lines))
+    return _Reader(file, lines).net(read_xml(text, file, lines, DRAWN))
 
 
 class _Reader:

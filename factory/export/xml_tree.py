@@ -34,8 +34,9 @@ class Element:
 class _Builder:
     """Makes the tree from expat's events; a stack in place of recursion."""
 
-    def __init__(self, file: str, lines: list[str]) -> None:
-        self.file, self.lines = file, lines
+    def __init__(self, file: str, lines: list[str], ignored: frozenset[str]) -> None:
+        self.file, self.lines, self.ignored = file, lines, ignored
+        self.depth = 0  # within elements that are ignored
         self.root: Element | None = None
         self.stack: list[Element] = []
         self.parser = expat.ParserCreate("utf-8", namespace_separator=" ")
@@ -47,6 +48,9 @@ class _Builder:
 
     def start(self, name: str, attributes: dict[str, str]) -> None:
         namespace, _, local = name.rpartition(" ")
+        if self.depth or (self.stack and local in self.ignored):
+            self.depth += 1
+            return
         line, column = self.parser.CurrentLineNumber, self.parser.CurrentColumnNumber + 1
         element = Element(local, namespace, attributes, line, column)
         if self.stack:
@@ -56,10 +60,13 @@ class _Builder:
         self.stack.append(element)
 
     def end(self, name: str) -> None:
-        self.stack.pop()
+        if self.depth:
+            self.depth -= 1
+        else:
+            self.stack.pop()
 
     def data(self, text: str) -> None:
-        if not self.stack[-1].children:
+        if not self.depth and not self.stack[-1].children:
             self.stack[-1].text += text
 
     def doctype(self, *_: object) -> None:
@@ -78,17 +85,20 @@ def position(file: str, lines: list[str], line: int, column: int) -> Position:
     return Position(file, line, column, shown.rstrip("\r"))
 
 
-def read_xml(text: str, file: str, lines: list[str]) -> Element:
-    """The root element of an XML document.
+def read_xml(
+    text: str, file: str, lines: list[str], ignored: frozenset[str] = frozenset()
+) -> Element:
+    """The root element of an XML document, without the elements that are `ignored`.
 
     Raises InputError (Syntax) where it is not well-formed or declares a document type.
     """
-    builder = _Builder(file, lines)
+    builder = _Builder(file, lines, ignored)
     try:
         builder.parser.Parse(text.encode("utf-8", "surrogatepass"), True)
     except expat.ExpatError as error:
         hint = "every element that is opened must be closed, and & and < in text escaped"
         message = f"not well-formed XML: {expat.ErrorString(error.code)}"
         builder.refuse(message, error.lineno, error.offset + 1, hint)
+    del builder.parser  # it holds the builder, so both would wait for the cycle collector
     assert builder.root is not None
     return builder.root

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import copyreg
 import signal
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import dataclass, field, replace
 from multiprocessing import active_children, get_context
 from time import perf_counter
-from types import MappingProxyType
 
 import numpy as np
 
@@ -21,6 +19,7 @@ from factory.fidelity.quantities import QUANTITIES
 from factory.fidelity.record import Fidelity, SeedRecord
 from factory.layout.plan import Layout
 from factory.mjcf.model import product_name
+from factory.pickling import pickle_locked_mappings
 from factory.settings import Settings
 from factory.simulation import Simulation
 from factory.trace import Run
@@ -29,12 +28,7 @@ Alter = Callable[[mujoco.MjModel], None]
 """Changes the engine's model before the run: a softer weld, a planted fault."""
 
 
-def _proxy(contents: dict[object, object]) -> MappingProxyType[object, object]:
-    return MappingProxyType(contents)
-
-
-copyreg.pickle(MappingProxyType, lambda proxy: (_proxy, (dict(proxy),)))
-"""So that layouts, whose mappings are locked, can go to another process."""
+pickle_locked_mappings()  # of which layouts are full
 
 
 @dataclass(frozen=True)

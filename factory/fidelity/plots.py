@@ -57,17 +57,17 @@ def plots(found: Fidelity, study: Study | None = None) -> dict[str, bytes]:
         }
         if study is not None:
             made["convergence.png"] = _convergence(study)
-        return {name: _png(figure) for name, figure in made.items() if figure is not None}
+        return {name: png(figure) for name, figure in made.items() if figure is not None}
 
 
-def _figure(columns: int = 1, height: float = 3.4, rows: int = 1) -> tuple[Any, Any]:
+def figure_and_axes(columns: int = 1, height: float = 3.4, rows: int = 1) -> tuple[Any, Any]:
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(8.4, height), layout="constrained")
     return figure, figure.subplots(rows, columns, squeeze=False)
 
 
-def _png(figure: Any) -> bytes:
+def png(figure: Any) -> bytes:
     stream = BytesIO()
     figure.savefig(stream, format="png", dpi=130, metadata={"Software": None})
     return stream.getvalue()
@@ -89,7 +89,7 @@ def _limits(found: Fidelity) -> Any:
         for k, q in QUANTITIES.items()
         if q.limit and (value := worst[k]) is not None and not (q.least and value > 0)
     ]
-    figure, ((axes,),) = _figure(height=0.6 + 0.27 * len(rows))
+    figure, ((axes,),) = figure_and_axes(height=0.6 + 0.27 * len(rows))
     labels, shares = [row[0] for row in rows][::-1], [100 * row[1] for row in rows][::-1]
     axes.barh(labels, shares, color=[RED if s > 100 else BLUE for s in shares], height=0.6)
     axes.axvline(100, color=RED, linewidth=1)
@@ -100,7 +100,7 @@ def _limits(found: Fidelity) -> Any:
 
 def _times(found: Fidelity) -> Any:
     """Distributions of differences in firing times and durations."""
-    figure, ((left, right),) = _figure(2)
+    figure, ((left, right),) = figure_and_axes(2)
     cycle = np.mean(found.values("ideal_cycle_time_s") or [np.nan])
     apart = np.concatenate([np.array(r.differences) for r in found.seeds])
     spent = np.concatenate([np.array(r.durations) for r in found.seeds])
@@ -127,7 +127,7 @@ def _handoffs(found: Fidelity) -> Any:
     handoffs = [h for record in found.seeds for h in record.handoffs]
     if not handoffs:
         return None
-    figure, ((left, right),) = _figure(2)
+    figure, ((left, right),) = figure_and_axes(2)
     energy = [max(h.energy_mJ_per_kg, LEAST) for h in handoffs]
     limit = QUANTITIES["handoff_energy_max_mJ_per_kg"].limit or 0.0
     for axes, values, words in (
@@ -161,7 +161,7 @@ def _product(found: Fidelity) -> Any:
     ]
     if len(rows) > MOST:
         rows = sorted(rows, key=lambda row: -row[2])[:MOST]
-    figure, ((above,), (below,)) = _figure(rows=2, height=4.6)
+    figure, ((above,), (below,)) = figure_and_axes(rows=2, height=4.6)
     at = np.arange(len(rows))
     above.bar(at - 0.2, [1e3 * r[1] for r in rows], 0.4, color=BLUE, label="centre of mass")
     above.bar(at + 0.2, [1e3 * r[2] for r in rows], 0.4, color=ORANGE, label="worst vertex")
@@ -189,7 +189,7 @@ def _approach(found: Fidelity) -> Any:
     if not least:
         return None
     rows = [least[kinds] for kinds in sorted(least, reverse=True)]
-    figure, ((axes,),) = _figure(height=0.8 + 0.4 * len(rows))
+    figure, ((axes,),) = figure_and_axes(height=0.8 + 0.4 * len(rows))
     at = np.arange(len(rows))
     axes.barh(at, [r.least_mm for r in rows], 0.5, color=BLUE, label="closest approach")
     axes.plot([r.certified_mm for r in rows], at, "|", ms=18, mew=2, color=RED, label="certified")
@@ -206,7 +206,7 @@ def _convergence(study: Study) -> Any:
 
     unsettled = study.unsettled()
     hues = matplotlib.colormaps["turbo"](np.linspace(0.05, 0.95, max(1, len(unsettled))))
-    figure, (row,) = _figure(len(study.series), height=4.6 + 0.08 * len(unsettled))
+    figure, (row,) = figure_and_axes(len(study.series), height=4.6 + 0.08 * len(unsettled))
     for axes, series in zip(row, study.series, strict=True):
         _one_series(axes, series, dict(zip(unsettled, hues, strict=False)))
         axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.16), fontsize=7.5, ncols=2)

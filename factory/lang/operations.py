@@ -49,13 +49,13 @@ def signature(template: Template) -> Signature:
 class AssemblyReader:
     """Makes assemblies of definitions; what is wrong goes to the findings.
 
-    `folder` is where mesh paths start.
+    `folder` is where mesh paths start; None: they are not followed.
     """
 
     source: Source
     findings: Findings
     signatures: Mapping[str, Signature]
-    folder: str
+    folder: str | None
     values: ValueReader = field(init=False)
     meshes: dict[str, tuple[str, str] | None] = field(default_factory=dict)
 
@@ -177,11 +177,14 @@ class AssemblyReader:
             self.findings.add("BadMesh", problem[0], position, problem[1])
 
 
-def _mesh_problem(folder: str, path: str) -> tuple[str, str] | None:
-    """What is wrong with a mesh path, and a way out."""
-    full = os.path.join(folder, path)
+def _mesh_problem(folder: str | None, path: str) -> tuple[str, str] | None:
+    """What is wrong with a mesh path, and a way out; whether it is there only where it starts at a
+    folder."""
     if os.path.splitext(path)[1].lower() not in MESHES:
         return f"{quoted(path)} is not a mesh file", f"mesh files end in {', '.join(MESHES)}"
+    if folder is None:
+        return None
+    full = os.path.join(folder, path)
     if os.path.isfile(full):
         return None
     if os.path.isdir(full):

@@ -9,27 +9,29 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping
 
+from factory.collector import collector_paused
 from factory.lang.operations import AssemblyReader, signature
 from factory.lang.pag_syntax import draft_of
-from factory.lang.source import Findings, collector_paused, read_text, source_of
+from factory.lang.source import Findings, read_text, source_of
 from factory.lang.tree import TreeCheck, count_of, root_of
 from factory.pag import PAG
 from factory.template import Template
 
 
+@collector_paused()
 def read_pag(
-    text: str, templates: Mapping[str, Template], file: str = "<text>", folder: str = "."
+    text: str, templates: Mapping[str, Template], file: str = "<text>", folder: str | None = "."
 ) -> PAG:
-    """The PAG a text stands for; mesh paths start at `folder`. Raises InputError."""
-    with collector_paused():
-        source, findings = source_of(text, file), Findings()
-        draft = draft_of(source, findings)
-        signatures = {name: signature(template) for name, template in templates.items()}
-        reader = AssemblyReader(source, findings, signatures, folder)
-        nodes = tuple([reader.read(definition) for definition in draft.definitions])
-        TreeCheck(draft, nodes, source, findings).run()
-        findings.raise_if_any()
-        return PAG(root_of(draft), nodes, count_of(draft), folder, file)
+    """The PAG a text stands for; mesh paths start at `folder`, or are not followed where that is
+    None. Raises InputError."""
+    source, findings = source_of(text, file), Findings()
+    draft = draft_of(source, findings)
+    signatures = {name: signature(template) for name, template in templates.items()}
+    reader = AssemblyReader(source, findings, signatures, folder)
+    nodes = tuple([reader.read(definition) for definition in draft.definitions])
+    TreeCheck(draft, nodes, source, findings).run()
+    findings.raise_if_any()
+    return PAG(root_of(draft), nodes, count_of(draft), folder or ".", file)
 
 
 def load_pag(path: str | os.PathLike[str], templates: Mapping[str, Template]) -> PAG:

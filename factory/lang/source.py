@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import gc
 import os
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -127,16 +124,3 @@ def quoted(found: str, width: int = 60) -> str:
     if shown.startswith('"'):
         return shown
     return f'"{shown}"' if "'" in shown else f"'{shown}'"
-
-
-@contextmanager
-def collector_paused() -> Iterator[None]:
-    """Hold Python's cycle collector off: a reader makes many small values and no cycles, and
-    walking those over and over would double its time."""
-    enabled = gc.isenabled()
-    gc.disable()
-    try:
-        yield
-    finally:
-        if enabled:
-            gc.enable()

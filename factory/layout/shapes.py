@@ -1,5 +1,5 @@
-"""The shapes that stretching works with: piles in the frame of the robot that carries them,
-arms, lanes."""
+"""The shapes that stretching and packing work with: piles in the frame of the robot that carries
+them, arms, lanes."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from factory.factory import Factory
 from factory.geometry import Product
 from factory.layout.dimensions import Clearance
 from factory.layout.plan import Box, Extent, Point2
-from factory.layout.stretching import Shape, Sides, is_tool, up
+from factory.layout.stretching import Shape, is_tool, up
 from factory.layout.sweeps import hull
 
 NOWHERE: Extent = (0.0, 0.0, 0.0, 0.0)
@@ -55,24 +55,42 @@ def exact_shapes(
     factory: Factory,
     payloads: Mapping[str, Box],
     axes: list[tuple[Point2, Point2]],
-    sides: Sides,
     c: Clearance,
 ) -> list[Shape]:
-    """Shapes from the payloads as they lie in the world: parts never turn. Carriers come first,
-    since a robot's arm ends beside its carrier's line."""
-    shapes: list[Shape] = []
-    for robot, carrier in enumerate(carriers(factory)):
-        u, t = axes[robot]
-        numbers = carried(factory, robot)
-        piles = {n: project(payloads[factory.operations[n].label], u, t) for n in numbers}
-        last, tool = _last(piles), is_tool(factory, robot)
-        held = _worked_on(factory, robot, shapes[carrier], sides[robot]) if tool else last
-        lane = sides[robot] * shapes[carrier].offset if carrier >= 0 else 0.0
-        belt = c.c - last[0] if carrier < 0 else 0.0
-        arm = up(max(c.rim, c.rim + lane, belt))
-        offset, nest = round((held[2] + held[3]) / 2, 3), round((held[0] + held[1]) / 2, 3)
-        shapes.append(Shape(piles, last, offset, arm, up(c.reach(arm, lane)), nest, tool))
-    return shapes
+    """Shapes from the payloads as they lie in the world: parts never turn."""
+    on = carriers(factory)
+    return [
+        oriented_shape(factory, payloads, robot, on[robot], *axes[robot], c)
+        for robot in range(len(factory.robots))
+    ]
+
+
+def oriented_shape(
+    factory: Factory,
+    payloads: Mapping[str, Box],
+    robot: int,
+    carrier: int,
+    u: Point2,
+    t: Point2,
+    c: Clearance,
+) -> Shape:
+    """The shape of a robot that lies in a frame (u, t). Its arm ends beside the line of its
+    carrier, which runs beside the product's middle as the carrier's last pile lies."""
+    numbers = carried(factory, robot)
+    piles = {n: project(payloads[factory.operations[n].label], u, t) for n in numbers}
+    last, tool = _last(piles), is_tool(factory, robot)
+    held, lane, belt = last, 0.0, c.c - last[0]
+    if carrier >= 0:
+        made = factory.operations[factory.robots[carrier].operations[-2]].label
+        along = project(payloads[made], u, t)
+        lane, belt = -round((along[0] + along[1]) / 2, 3), 0.0
+    if tool:
+        held = project(
+            payloads[factory.operations[factory.robots[robot].operations[0]].label], u, t
+        )
+    arm = up(max(c.rim, c.rim + lane, belt))
+    offset, nest = round((held[2] + held[3]) / 2, 3), round((held[0] + held[1]) / 2, 3)
+    return Shape(piles, last, offset, arm, up(c.reach(arm, lane)), nest, tool)
 
 
 def carried(factory: Factory, robot: int) -> list[int]:
@@ -101,11 +119,3 @@ def project(box: Box, u: Point2, t: Point2) -> Extent:
 
 def _last(piles: Mapping[int, Extent]) -> Extent:
     return list(piles.values())[-1] if piles else NOWHERE
-
-
-def _worked_on(factory: Factory, robot: int, carrier: Shape, side: int) -> Extent:
-    """The pile that a tool works on, in the tool's frame: its heading is against the carrier's
-    side."""
-    pile = carrier.piles[factory.robots[robot].operations[0]]
-    along = sorted((-side * pile[2], -side * pile[3]))
-    return along[0], along[1], pile[0], pile[1]

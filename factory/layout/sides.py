@@ -30,14 +30,14 @@ def admissible(factory: Factory, sides: Sides) -> Sides:
         axes.append((u, t))
         for number in robot.operations:
             operation = factory.operations[number]
-            if operation.carrier == robot.index and not _admitted(operation, result, t):
+            if operation.carrier == robot.index and not admitted(operation, result, t):
                 for guest in operation.robots:
                     if guest != robot.index:
                         result[guest] = -result[guest]
     return result
 
 
-def _admitted(operation: Operation, sides: Sides, t: Point2) -> bool:
+def admitted(operation: Operation, sides: Sides, t: Point2) -> bool:
     """Whether the inputs of an operation can come from where they do."""
     approach = operation.approach
     if approach is None or len(operation.inputs) < 2:

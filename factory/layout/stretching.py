@@ -81,13 +81,11 @@ class Subtree:
 
 @dataclass(frozen=True)
 class Stretched:
-    """The result: travel of each robot, station of each operation, side of each robot, and of each
-    robot's subtree the extent behind its B station."""
+    """The result: travel of each robot, station of each operation, side of each robot."""
 
     travel: list[float]
     stations: list[float]
     sides: Sides
-    subtrees: list[Subtree]
 
 
 def stretch(
@@ -115,7 +113,7 @@ def stretch(
         travel[robot.index] = subtrees[robot.index].travel
     last = shape(0).last
     travel[0] = up(max(subtrees[0].front) - min(0.0, last[0]) + clearance.c)
-    return Stretched(travel, stations, chosen, subtrees)
+    return Stretched(travel, stations, chosen)
 
 
 def up(length: float) -> float:
@@ -167,7 +165,7 @@ class _Builder:
     def add(self, operation: Operation) -> float:
         """Places one operation; the distance of its station from B [m]."""
         guests = [r for r in operation.robots if r != operation.carrier]
-        _check_guests(operation, guests)
+        check_guests(operation, guests)
         if not self.piles:
             self._choose_mates(guests)
             if not guests:
@@ -182,7 +180,7 @@ class _Builder:
             self.station = up(max(wanted))
         for guest in guests:
             self._take_up(guest)
-        at = self.station + _ahead(operation, self.shape.reach)
+        at = self.station + ahead_of(operation, self.shape.reach)
         self._include(PAYLOADS, at + pile[0] - self.half, at + pile[1] + self.half)
         self.piles.append((at, pile))
         return self.station
@@ -269,14 +267,14 @@ class _Builder:
             self.tree.include(layer, station + tree.low[layer], station + tree.high[layer], *across)
 
 
-def _ahead(operation: Operation, reach: float) -> float:
+def ahead_of(operation: Operation, reach: float) -> float:
     """How far ahead of its station a carrier has its goal [m]; 0 where it meets what is brought."""
     point = operation.template.law.goals[operation.template.carrier - 1]
     exact = {"B": 0.0, "S": 2.0}.get(point.end, point.multiple)
     return (exact - point.multiple) * reach / 2
 
 
-def _check_guests(operation: Operation, guests: list[int]) -> None:
+def check_guests(operation: Operation, guests: list[int]) -> None:
     """Two guidepaths can end at one point of a third, one from each side; a third cannot."""
     goals = operation.template.law.goals
     wrong = [g for g in guests if goals[operation.robots.index(g)].end != "A"]

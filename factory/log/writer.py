@@ -166,7 +166,10 @@ def _header(
     file = Path(pag.file)
     text = file.read_text("utf-8", errors="replace") if file.is_file() else write_pag(pag)
     settings, jitter = simulation.settings, simulation.jitter
-    subject = subject_of(simulation.layout, settings, jitter, simulation.start, simulation.wip)
+    bodies = simulation.model.carried if simulation.model else None
+    subject = subject_of(
+        simulation.layout, settings, jitter, simulation.start, simulation.wip, bodies
+    )
     return {
         "versions": {"python": platform.python_version(), **_versions()},
         "command": list(sys.argv if command is None else command),

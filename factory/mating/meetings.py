@@ -74,7 +74,7 @@ class Meetings:
         """The meetings at which the parts one[i] < other[i] do: the highest between them."""
         found = np.empty(len(one), np.int64)
         row = np.frexp((other - one).astype(float))[1] - 1
-        for k in np.unique(row).tolist():
+        for k in sorted(set(row.tolist())):
             at = row == k
             table = self._table[k]
             found[at] = np.minimum(table[one[at]], table[other[at] - 2**k])

@@ -11,13 +11,18 @@ Number = float | int
 
 def number(value: Number) -> str:
     """The shortest text that reads back as the same number; lengths to a nanometre."""
-    rounded = round(float(value), 9)
-    return f"{int(rounded)}" if rounded == int(rounded) else repr(rounded)
+    whole = int(value)
+    if whole != value:
+        rounded = round(float(value), 9)
+        whole = int(rounded)
+        if whole != rounded:
+            return repr(rounded)
+    return str(whole)
 
 
 def numbers(values: Iterable[Number]) -> str:
     """Numbers separated by spaces."""
-    return " ".join(number(v) for v in values)
+    return " ".join([number(v) for v in values])
 
 
 def exact(values: Iterable[Number]) -> str:

@@ -20,20 +20,21 @@ from xml.sax.saxutils import quoteattr
 from factory.factory import Factory
 from factory.layout.plan import Layout
 from factory.mjcf import names
-from factory.mjcf.elements import add, numbers
+from factory.mjcf.elements import add
 from factory.mjcf.outfeed import TRAY_MASS, add_tray
-from factory.mjcf.parts import add_meshes, add_parts, parked_at, place_in
+from factory.mjcf.parts import add_meshes, add_parts, add_wholes
 from factory.mjcf.robots import (
     Drive,
     Hoist,
     add_paints,
-    heading_quaternion,
     instantiate,
     load_robot_model,
 )
 from factory.mjcf.scene import add_assets, add_follower, add_scene, add_visuals
+from factory.mjcf.welds import add_welds, exclusions, held_at
 from factory.robots import Catalogue
 from factory.settings import Settings
+from factory.wholes import Bodies, bodies_of
 
 CARRIAGE_MASS = 1.9
 """What a `dot` weighs without payload [kg]; only used to size gains and forces."""
@@ -59,11 +60,13 @@ GRAVITY = 9.81
 class Model:
     """A factory as MJCF: the XML, its mesh files by name, and the numbers the run needs.
 
-    `copies`: bodies of each part; `masses`: of each label carried [kg]; `drives`: of each robot.
+    `carried`: what bodies there are, `copies`: how many of each; `masses`: of each label carried
+    [kg]; `drives`: of each robot.
     """
 
     layout: Layout
     settings: Settings
+    carried: Bodies = field(repr=False)
     copies: Mapping[str, int]
     masses: Mapping[str, float]
     drives: tuple[Drive, ...]
@@ -82,8 +85,13 @@ class Model:
         return self.layout.factory
 
     @cached_property
+    def excluded(self) -> tuple[tuple[str, str], ...]:
+        """The pairs of bodies that pass through each other when they are joined."""
+        return self.carried.lifted(self.factory, self.layout.excluded)
+
+    @cached_property
     def bodies(self) -> int:
-        """How many bodies of parts there are."""
+        """How many bodies of parts and sub-assemblies there are."""
         return sum(self.copies.values())
 
 
@@ -104,14 +112,18 @@ def part_copies(
 
 
 def build_model(
-    layout: Layout, catalogue: Catalogue, copies: Mapping[str, int], settings: Settings
+    layout: Layout,
+    catalogue: Catalogue,
+    copies: Mapping[str, int],
+    settings: Settings,
+    bodies: Bodies | None = None,
 ) -> Model:
-    """The model of a laid-out factory. Raises InputError where the MJCF of a robot type is
-    unusable."""
+    """The model of a laid-out factory, of one body a part unless other `bodies` are given. Raises
+    InputError where the MJCF of a robot type is unusable."""
     factory, product = layout.factory, layout.product
+    bodies = bodies or bodies_of(factory, product)
     masses = {
-        label: sum(product.solids[part].mass for part in parts)
-        for label, parts in factory.contents.items()
+        label: sum(bodies.mass[body] for body in found) for label, found in bodies.carried.items()
     }
     drives = tuple(_drive(factory, robot.index, masses, settings) for robot in factory.robots)
     root = Element("mujoco", {"model": product_name(factory)})
@@ -131,14 +143,17 @@ def build_model(
     load = masses[factory.pag.root] + TRAY_MASS
     add_tray(world, actuator, layout, drive_for(load, settings.outfeed_acceleration, settings))
     add_parts(world, layout, copies)
-    _welds(equality, layout, copies)
-    contact = _exclusions(layout, copies)
+    add_wholes(world, layout, bodies, copies)
+    add_welds(equality, layout, bodies, copies)
+    contact = exclusions(layout, bodies, copies)
     root.extend([*([contact] if len(contact) else []), equality, actuator])
     _home(add(root, "keyframe"), layout, actuator)
     ElementTree.indent(root)
     xml = ElementTree.tostring(root, encoding="unicode") + "\n"
     joints = len(factory.robots) + len(hoists) + 1 + sum(copies.values())
-    return Model(layout, settings, copies, masses, drives, xml, files, joints, len(equality))
+    return Model(
+        layout, settings, bodies, copies, masses, drives, xml, files, joints, len(equality)
+    )
 
 
 def product_name(factory: Factory) -> str:
@@ -181,11 +196,6 @@ def _hoists(factory: Factory, masses: Mapping[str, float], settings: Settings) -
         drive = drive_for(mass, settings.acceleration + GRAVITY, settings, HOIST_STIFFNESS)
         found[robot] = Hoist(stroke, drive)
     return found
-
-
-def held_at(layout: Layout, robot: int) -> float:
-    """How far above its place in the product a robot holds its payload with its lift down [m]."""
-    return layout.elevations[robot] - layout.factory.strokes.get(robot, 0.0)
 
 
 def _options(root: Element, settings: Settings, bodies: int) -> None:
@@ -277,80 +287,3 @@ def _role(factory: Factory, robot: int) -> str:
         return "tool"
     first = factory.operations[factory.robots[robot].operations[0]]
     return "carrier" if first.inputs else "fed"
-
-
-def _welds(equality: Element, layout: Layout, copies: Mapping[str, int]) -> None:
-    """Grips, feeders, parking places, and the star that holds a finished product together."""
-    factory, product = layout.factory, layout.product
-    for robot, path in zip(factory.robots, layout.guidepaths, strict=True):
-        w, _, _, z = heading_quaternion(path)
-        holder = names.head if robot.index in factory.strokes else names.carriage
-        label = factory.delivered(robot.index)
-        for part in factory.contents[label] if label else ():
-            pose = (*grip_position(layout, robot.index, part), w, 0, 0, -z)
-            _weld(
-                equality,
-                names.grip(robot.name, part),
-                holder(robot.name),
-                names.part(part, 1),
-                pose,
-            )
-    for operation in factory.leaves:
-        part = operation.label
-        path = layout.guidepaths[operation.carrier]
-        w, _, _, z = heading_quaternion(path)
-        offset = place_in(product, part, (0.0, 0.0), layout.elevations[operation.carrier])
-        pose = (*_turned(offset, path.heading), w, 0, 0, -z)
-        _weld(equality, names.feed(part), names.feeder(part), names.part(part, 1), pose, True)
-        for n in range(1, copies[part] + 1):
-            at = (*parked_at(layout, part, n), 1, 0, 0, 0)
-            _weld(equality, names.park(part, n), "world", names.part(part, n), at, n > 1)
-    for part in factory.contents[factory.pag.root]:
-        pose = (*place_in(product, part, (0.0, 0.0)), 1, 0, 0, 0)
-        _weld(equality, names.hold(part), names.OUTFEED_TRAY, names.part(part, 1), pose)
-
-
-def _exclusions(layout: Layout, copies: Mapping[str, int]) -> Element:
-    """The pairs of parts that pass through each other when they are joined, a slot for each unit
-    that can be inside: a run aims them at the copies of one unit."""
-    contact = Element("contact")
-    for one, other in layout.excluded:
-        for n in range(1, min(copies[one], copies[other]) + 1):
-            add(
-                contact,
-                "exclude",
-                name=names.exclusion(one, other, n),
-                body1=names.part(one, n),
-                body2=names.part(other, n),
-            )
-    return contact
-
-
-def grip_position(layout: Layout, robot: int, part: str) -> tuple[float, float, float]:
-    """Where a robot holds a part's centre of mass, in the frame of its carriage, or of its head
-    [m]."""
-    path = layout.guidepaths[robot]
-    at = path.middle(0.0)
-    foot = path.carriage(0.0)
-    middle = (at[0] - foot[0], at[1] - foot[1])
-    x, y, z = place_in(layout.product, part, middle, held_at(layout, robot))
-    return _turned((x, y, z), path.heading)
-
-
-def _turned(
-    v: tuple[float, float, float], heading: tuple[float, float]
-) -> tuple[float, float, float]:
-    """A vector of the world in a frame whose x is the heading."""
-    u, w = heading
-    return (v[0] * u + v[1] * w, -v[0] * w + v[1] * u, v[2])
-
-
-def _weld(
-    equality: Element,
-    name: str,
-    body1: str,
-    body2: str,
-    pose: tuple[float, ...],
-    active: bool = False,
-) -> None:
-    add(equality, "weld", name=name, body1=body1, body2=body2, relpose=numbers(pose), active=active)

@@ -9,20 +9,21 @@ from xml.etree.ElementTree import Element
 from factory.geometry import Mesh, Product, Solid
 from factory.layout.dimensions import PAYLOAD
 from factory.layout.plan import Layout, Point2
+from factory.meshes import Array
 from factory.mjcf.elements import add, exact, numbers
 from factory.mjcf.mesh_files import mesh_file, piece_files
 from factory.mjcf.names import part, piece
+from factory.wholes import Bodies
 
 PARKED = -0.6
 """Height at which the first spare copy of a part is kept, under the floor [m]."""
 
 
 def place_in(
-    product: Product, label: str, middle: Point2, elevation: float = 0.0
+    product: Product, centre: Array, middle: Point2, elevation: float = 0.0
 ) -> tuple[float, float, float]:
-    """Where a part's centre of mass is when the product's middle is there, z0 and `elevation` [m]
-    under its lowest point."""
-    centre = product.solids[label].centre
+    """Where the centre of mass of a body (3,) is when the product's middle is there, z0 and
+    `elevation` [m] under its lowest point."""
     x, y, _ = product.middle
     return (
         float(middle[0] + centre[0] - x),
@@ -31,8 +32,8 @@ def place_in(
     )
 
 
-def feeder_middle(layout: Layout, label: str) -> Point2:
-    """The product's middle for a robot at the feeder of a part."""
+def middle_at(layout: Layout, label: str) -> Point2:
+    """The product's middle where a label is made: for a part, at its feeder."""
     operation = layout.factory.by_label[label]
     path = layout.guidepaths[operation.carrier]
     return path.middle(layout.goal(operation.index, operation.template.carrier - 1))
@@ -41,13 +42,14 @@ def feeder_middle(layout: Layout, label: str) -> Point2:
 def presented_at(layout: Layout, label: str) -> tuple[float, float, float]:
     """Where a part's centre of mass is in its feeder."""
     carrier = layout.factory.by_label[label].carrier
-    middle = feeder_middle(layout, label)
-    return place_in(layout.product, label, middle, layout.elevations[carrier])
+    centre = layout.product.solids[label].centre
+    middle = middle_at(layout, label)
+    return place_in(layout.product, centre, middle, layout.elevations[carrier])
 
 
 def parked_at(layout: Layout, label: str, number: int) -> tuple[float, float, float]:
-    """Where a spare copy is kept: under its feeder, out of sight."""
-    x, y = feeder_middle(layout, label)
+    """Where a spare copy is kept: under the place where it is made, out of sight."""
+    x, y = middle_at(layout, label)
     return x, y, PARKED - 0.4 * (number - 1)
 
 
@@ -62,23 +64,47 @@ def add_parts(world: Element, layout: Layout, copies: Mapping[str, int]) -> None
             _add_part(world, solid, number, at)
 
 
+def add_wholes(world: Element, layout: Layout, bodies: Bodies, copies: Mapping[str, int]) -> None:
+    """The bodies that sub-assemblies become, parked: each has the geoms of all its parts."""
+    solids = layout.product.solids
+    for label, whole in bodies.wholes.items():
+        for number in range(1, copies[label] + 1):
+            name = part(label, number)
+            at = parked_at(layout, label, number)
+            body = _add_body(world, name, at, whole.mass, whole.inertia)
+            for inside in whole.parts:
+                _add_geoms(body, f"{name}/{inside}", solids[inside], whole.centre, False)
+
+
 def _add_part(world: Element, solid: Solid, number: int, at: tuple[float, float, float]) -> None:
     name = part(solid.label, number)
+    body = _add_body(world, name, at, solid.mass, solid.inertia)
+    _add_geoms(body, name, solid, solid.centre, number == 1)
+
+
+def _add_body(
+    world: Element, name: str, at: tuple[float, float, float], mass: float, inertia: Array
+) -> Element:
+    """A free body whose origin is its centre of mass."""
     body = add(world, "body", name=name, pos=at)
     add(body, "freejoint", name=name)
-    i = solid.inertia
+    i = inertia
     add(
         body,
         "inertial",
         pos="0 0 0",
-        mass=exact([solid.mass]),
+        mass=exact([mass]),
         fullinertia=exact([i[0, 0], i[1, 1], i[2, 2], i[0, 1], i[0, 2], i[1, 2]]),
     )
-    collides = {} if number == 1 else {"contype": 0, "conaffinity": 0}
-    place = {
-        "pos": numbers(solid.position - solid.centre),
-        "quat": numbers(solid.quaternion),
-    }
+    return body
+
+
+def _add_geoms(body: Element, name: str, solid: Solid, centre: Array, collides: bool) -> None:
+    """A part's geoms in a body with that centre of mass. What is drawn of a part of several pieces
+    has class `shown`, thus no contacts; its pieces, group 3, are not drawn. A part collides with
+    all its geoms but those: contact masks are written to these."""
+    masks = {} if collides else {"contype": 0, "conaffinity": 0}
+    place = {"pos": numbers(solid.position - centre), "quat": numbers(solid.quaternion)}
     pieces = solid.mesh.pieces if solid.mesh else ()
     add(
         body,
@@ -90,11 +116,8 @@ def _add_part(world: Element, solid: Solid, number: int, at: tuple[float, float,
         size=None if solid.mesh else solid.size,
         **place,
         rgba=solid.rgba,
-        **({} if pieces else collides),
+        **({} if pieces else masks),
     )
-    # What is drawn of a part of several pieces has class `shown`, thus no contacts; its pieces,
-    # group 3, are not drawn. Of a part's body the only geom collides, or those of group 3: contact
-    # masks are written to these.
     for n in range(1, len(pieces) + 1):
         add(
             body,
@@ -105,7 +128,7 @@ def _add_part(world: Element, solid: Solid, number: int, at: tuple[float, float,
             mesh=f"mesh/{solid.mesh.name}.{n}" if solid.mesh else None,
             group=3,
             **place,
-            **collides,
+            **masks,
         )
 
 

@@ -17,12 +17,14 @@ from factory.layout.plan import Layout
 from factory.mjcf.elements import add, numbers
 from factory.mjcf.names import feeder
 from factory.mjcf.outfeed import add_outfeed
-from factory.mjcf.parts import feeder_middle
+from factory.mjcf.parts import middle_at
 from factory.mjcf.robots import heading_quaternion
 
 VIEW = 32.0
 """Vertical field of view of the cameras [degrees]: narrow, for a calm perspective."""
 
+GROUND = 0.1
+"""Half the thickness of the floor [m]: spare copies are kept below it."""
 
 KEY, FILL = (0.40, 0.48, -0.78), (-0.65, 0.30, -0.70)
 """Directions of the two lights; the first casts the shadows."""
@@ -126,10 +128,15 @@ def _floor_and_light(world: Element, layout: Layout) -> None:
         type="plane",
         size=(radius * 20, radius * 20, 0.1),
         material="floor",
-        contype=1,
-        conaffinity=1,
+        contype=0,
+        conaffinity=0,
         castshadow=False,
     )
+    # What is drawn is endless; what collides is a slab, since the engine tries every geom of every
+    # awake body against a plane, but only what comes near against a box.
+    ground = add(world, "body", name="ground", pos=(x, y, -GROUND))
+    size = (radius * 20, radius * 20, GROUND)
+    add(ground, "geom", name="ground", class_="station", type="box", size=size, group=3)
     for name, ray, shadow, diffuse, specular in (
         ("key", KEY, True, "0.50 0.49 0.47", "0.12 0.12 0.12"),
         ("fill", FILL, False, "0.14 0.145 0.16", "0 0 0"),
@@ -210,7 +217,7 @@ def _feeder(world: Element, layout: Layout, label: str) -> None:
     operation = layout.factory.by_label[label]
     path = layout.guidepaths[operation.carrier]
     solid, product = layout.product.solids[label], layout.product
-    x, y = feeder_middle(layout, label)
+    x, y = middle_at(layout, label)
     body = add(world, "body", name=feeder(label), pos=(x, y, 0.0), quat=heading_quaternion(path))
     across = path.offset * _handedness(path.heading, path.side)
     rear, front, _, _ = project(layout.payloads[label], path.heading, path.side)

@@ -17,7 +17,12 @@ def beside(simulation: Any) -> Monitor:
     """A monitor that watches the engine of a simulation; it is an observer of its run. Of the
     simulation it takes the engine, the layout and where it starts, and nothing that goes on."""
     subject = subject_of(
-        simulation.layout, simulation.settings, simulation.jitter, simulation.start, simulation.wip
+        simulation.layout,
+        simulation.settings,
+        simulation.jitter,
+        simulation.start,
+        simulation.wip,
+        simulation.model.carried,
     )
     m, d = simulation.world.m, simulation.world.d
     monitor = Monitor(subject, Anatomy.of(m, simulation.layout.factory))

@@ -8,18 +8,15 @@ from typing import Any
 
 import numpy as np
 
-from factory.compiler import compile_pag
 from factory.engine import mujoco
 from factory.errors import Diagnostic, InputError
-from factory.factory import Factory
-from factory.lang import read_pag, read_template
 from factory.log.reader import Log
+from factory.log.recompiled import factory_of
 from factory.monitor.anatomy import Anatomy
 from factory.monitor.monitor import Monitor
 from factory.monitor.report import Report
 from factory.monitor.sight import Sight
 from factory.monitor.subject import Subject, subject_from
-from factory.robots import load_catalogue
 from factory.settings import Settings
 
 AGAIN = "record it again: `factory run FILE.pag --log OUT`"
@@ -65,7 +62,7 @@ def sights(log: Log) -> Iterator[Sight]:
 
 
 def _subject(header: Mapping[str, Any]) -> Subject:
-    factory = _factory(header)
+    factory = factory_of(header)
     known = {f.name for f in fields(Settings)}
     settings = Settings(**{k: v for k, v in header["settings"].items() if k in known})
     wip = header["wip"]
@@ -76,17 +73,6 @@ def _subject(header: Mapping[str, Any]) -> Subject:
         [int(place) for place in header["start"]],
         None if wip is None else int(wip),
     )
-
-
-def _factory(header: Mapping[str, Any]) -> Factory:
-    """The factory that a log's PAG and templates compile to."""
-    templates = {name: read_template(text, name) for name, text in header["templates"].items()}
-    pag = read_pag(header["pag"]["text"], templates, header["pag"]["file"])
-    factory = compile_pag(pag, templates, load_catalogue())
-    made = [t.name for t in factory.net.threaded.transitions]
-    if made != list(header["transitions"]) or [r.name for r in factory.robots] != header["robots"]:
-        raise ValueError("its net is not that of its PAG")
-    return factory
 
 
 def _model(log: Log) -> Any:

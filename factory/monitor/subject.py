@@ -13,6 +13,7 @@ from factory.layout.plan import Layout
 from factory.nets.history import firings
 from factory.nets.petri import Marking
 from factory.settings import Settings
+from factory.wholes import Bodies, bodies_of
 
 PATIENCE = 4.0
 """Nothing may happen for this many times the longest time an operation can take."""
@@ -23,8 +24,9 @@ class Subject:
     """The factory under watch.
 
     `goals[i]`: arc length [m] of the goal of each robot of operation i; `radii[i]`: its goal ball
-    [m]; `places[part]`: a part's centre of mass in the frame of the product [m]; `start`: the
-    marking in which the run begins; `wip`: the bound on what is let in; `patience` [s].
+    [m]; `places[label]`: the centre of mass of a part, or a sub-assembly that is one body, in the
+    frame of the product [m]; `start`: the marking in which the run begins; `wip`: the bound on
+    what is let in; `patience` [s].
     """
 
     factory: Factory
@@ -89,8 +91,10 @@ def subject_of(
     jitter: float = 0.0,
     start: Marking | None = None,
     wip: int | None = None,
+    bodies: Bodies | None = None,
 ) -> Subject:
-    """The subject that a layout is, run with these settings from a marking (m_0 where None)."""
+    """The subject that a layout is, run with these settings from a marking (m_0 where None), of one
+    body a part unless other `bodies` are given."""
     factory, product = layout.factory, layout.product
     goals = tuple(
         tuple(layout.goal(o.index, slot) for slot in range(len(o.robots)))
@@ -100,10 +104,8 @@ def subject_of(
         eps if isinstance(eps := o.template.law.eps, float) else settings.eps
         for o in factory.operations
     )
-    places = {
-        part: (float(c[0]), float(c[1]), float(c[2]))
-        for part, c in ((p, product.solids[p].centre) for p in factory.contents[factory.pag.root])
-    }
+    centres = (bodies or bodies_of(factory, product)).centre
+    places = {label: (float(c[0]), float(c[1]), float(c[2])) for label, c in centres.items()}
     slowest = settings.speed * (1 - jitter)
     longest = max(path.length for path in layout.guidepaths)
     travel = longest / slowest + slowest / settings.acceleration

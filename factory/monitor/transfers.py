@@ -58,7 +58,7 @@ class Transfers:
     def judge(self, switches: Sequence[Switch]) -> list[tuple[Operation, int]]:
         """The operations that have ended, each with its unit."""
         passed: dict[int, list[int]] = {}
-        for switch in switches:
+        for switch in self._fused(switches):
             holder, before = self._holder(switch), self.at[switch.copy]
             if holder is None or holder == before:
                 continue
@@ -71,6 +71,50 @@ class Transfers:
             if operation is not None:
                 passed.setdefault(operation.index, []).append(switch.copy)
         return [self._end(number, copies) for number, copies in sorted(passed.items())]
+
+    def _fused(self, switches: Sequence[Switch]) -> list[Switch]:
+        """The switches but those by which bodies in one pair of hands, now parked, have become the
+        one body, parked before, that is made of the same parts."""
+        anatomy, at = self.anatomy, self.at
+        gone: dict[Holder, list[int]] = {}
+        for switch in switches:
+            held = at[switch.copy]
+            if held and held[0] == GRIP and self._kinds(switch) == {PARK}:
+                gone.setdefault(held, []).append(switch.copy)
+        parked: set[int] = set()
+        for switch in switches if gone else ():
+            label, held = anatomy.label[switch.copy], at[switch.copy]
+            if not held or held[0] != PARK or PARK in self._kinds(switch):
+                continue
+            parts = set(self.subject.factory.contents[label])
+            for holder, copies in gone.items():
+                inside = [c for c in copies if parts.issuperset(self._parts([c]))]
+                if set(self._parts(inside)) == parts:
+                    parked.update(inside)
+                    self._become(switch.copy, holder, inside)
+        return [switch for switch in switches if switch.copy not in parked]
+
+    def _kinds(self, switch: Switch) -> set[int]:
+        """The kinds of holders that a copy has now."""
+        return {holder[0] for weld in switch.after if (holder := self.anatomy.holder[weld])}
+
+    def _become(self, whole: int, holder: Holder, copies: Sequence[int]) -> None:
+        """Copies in some hands have become one body; blames that they are for several units."""
+        units = {self.unit[copy] for copy in copies}
+        if len(units) > 1:
+            name, label = self.anatomy.copies[whole], self.anatomy.label[whole]
+            message = f"{name} is made of parts for units {sorted(units)}"
+            self.blame("Exchanged", holder[1], label, message)
+        for copy in copies:
+            self._put(copy, (PARK, -1))
+            self.unit[copy] = -1
+        self._put(whole, holder)
+        self.unit[whole] = max(units)
+
+    def _parts(self, copies: Sequence[int]) -> list[str]:
+        """The labels of the parts that copies are, or are made of."""
+        contents = self.subject.factory.contents
+        return [part for copy in copies for part in contents[self.anatomy.label[copy]]]
 
     # --- one copy ------------------------------------------------------------------------------
 
@@ -165,7 +209,7 @@ class Transfers:
     def _complete(self, robot: int, label: str, copies: set[int], code: str) -> None:
         """Blame parts that are missing or too many in what should be the sub-assembly `label`."""
         wanted = set(self.subject.factory.contents.get(label, ()))
-        found = [self.anatomy.label[copy] for copy in sorted(copies)]
+        found = self._parts(sorted(copies))
         missing, extra = sorted(wanted - set(found)), sorted(set(found) - wanted)
         twice = sorted({part for part in found if found.count(part) > 1}) if not extra else []
         for part, what in [

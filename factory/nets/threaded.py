@@ -31,13 +31,14 @@ class ThreadedNet:
     redistribution: tuple[Redistribution, ...] = field(repr=False)
 
     def __post_init__(self) -> None:
-        places = self.net.places
+        sizes = [place.size for place in self.net.places]
+        preset, postset = self.net.preset, self.net.postset
         for event, pairs in enumerate(self.redistribution):
             before = [slot for slot, _ in pairs]
             after = [slot for _, slot in pairs]
-            wanted = [(p, i) for p in self.net.preset[event] for i in range(places[p].size)]
-            reached = [(q, i) for q in self.net.postset[event] for i in range(places[q].size)]
-            if sorted(before) != sorted(wanted) or sorted(after) != sorted(reached):
+            wanted = [(p, i) for p in preset[event] for i in range(sizes[p])]
+            reached = [(q, i) for q in postset[event] for i in range(sizes[q])]
+            if sorted(before) != wanted or sorted(after) != reached:
                 name = self.net.transitions[event].name
                 raise ValueError(f"the redistribution function of {name} is not a bijection")
 

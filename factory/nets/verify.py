@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from itertools import islice
 
+from factory.collector import collector_paused
 from factory.errors import Position
 from factory.nets.behaviour import behaviour
 from factory.nets.composition import MOST, Composition, compose
@@ -21,6 +22,7 @@ from factory.nets.verdict import Fault, Verdict, Witness, listing, testify
 __all__ = ["Verdict", "Witness", "verify"]
 
 
+@collector_paused()
 def verify(
     net: GearNet | MarkedNet,
     sources: Mapping[str, Position] | None = None,

@@ -33,6 +33,10 @@ class Snapshot:
         return cls(d.qpos.copy(), active, m.eq_obj1id[active].copy(), m.eq_obj2id[active].copy())
 
 
+UNSEEN = ("part", "ground")
+"""Kinds of bodies that do not count for what a picture of the factory has to show."""
+
+
 def extent(m: mujoco.MjModel, d: mujoco.MjData) -> Array:
     """Points (n, 3) round everything that stands in a factory and its robots at both ends of their
     rails."""
@@ -41,7 +45,7 @@ def extent(m: mujoco.MjModel, d: mujoco.MjData) -> Array:
     for g in range(m.ngeom):
         body = int(m.geom_bodyid[g])
         name = m.body(body).name
-        if m.geom_type[g] == mujoco.mjtGeom.mjGEOM_PLANE or names.kind(name) == "part":
+        if m.geom_type[g] == mujoco.mjtGeom.mjGEOM_PLANE or names.kind(name) in UNSEEN:
             continue
         corners = _corners(m, g) @ d.geom_xmat[g].reshape(3, 3).T + d.geom_xpos[g]
         found.append(corners)

@@ -48,9 +48,10 @@ class Contacts:
         self._signatures: set[int] = set()
 
     def _solid(self, body: int) -> Index:
-        """The geoms of a part that collide: the one it has, or its convex pieces (group 3)."""
+        """The geoms of a body that collide: all but those of group 1, which are shown in place of
+        convex pieces."""
         geoms = self.m.body_geomadr[body] + np.arange(self.m.body_geomnum[body])
-        return np.asarray(geoms if len(geoms) == 1 else geoms[self.m.geom_group[geoms] == 3])
+        return np.asarray(geoms[self.m.geom_group[geoms] != 1])
 
     def hold(self, bodies: Sequence[int], holder: int) -> None:
         """From now on parts are in the hands of a holder (its code)."""

@@ -26,12 +26,15 @@ class Inspection:
         self.unintended: list[tuple[str, str]] = []
         self._touching: frozenset[tuple[int, int]] = frozenset()
         self._wrench = np.zeros(6)
-        factory, product = model.factory, model.layout.product
-        self.parts = factory.contents[factory.pag.root]
-        solids = [product.solids[part] for part in self.parts]
-        self._owner = np.repeat(np.arange(len(solids)), [len(s.corners) for s in solids])
-        self._local = np.concatenate([s.corners - s.centre for s in solids])
-        self._nominal = np.concatenate([s.corners for s in solids]) - solids[0].centre
+        solids, bodies = model.layout.product.solids, model.carried
+        found = bodies.carried[model.factory.pag.root]
+        corners = [
+            np.concatenate([solids[part].corners for part in bodies.parts(body)]) for body in found
+        ]
+        self._owner = np.repeat(np.arange(len(found)), [len(points) for points in corners])
+        self._nominal = np.concatenate(corners) - bodies.centre[found[0]]
+        places = np.array([bodies.centre[body] for body in found])
+        self._local = np.concatenate(corners) - places[self._owner]
 
     def handed_over(self, switched: Switched) -> None:
         """Count a hand-off and keep the largest gap."""
@@ -99,9 +102,10 @@ class Inspection:
         fitted = (here - self.d.xpos[bodies[0]]) @ turn[0]
         return float(np.linalg.norm(fitted - self._nominal, axis=1).max())
 
-    def measured(self, bodies: np.ndarray) -> None:
-        """Keep the error of a finished product."""
-        self.error = max(self.error or 0.0, self.measure(bodies))
+    def measured(self, bodies: np.ndarray, misfit: float) -> None:
+        """Keep the error of a finished product, and how far off [m] its parts were when they became
+        one body."""
+        self.error = max(self.error or 0.0, self.measure(bodies), misfit)
 
     def figures(self) -> PhysicsFigures:
         """The figures of the run so far."""
@@ -115,5 +119,6 @@ class Inspection:
             int(sum(w.number for w in self.d.warning)),
             tuple(pairs),
             dict(self.force),
-            self.model.layout.excluded,
+            self.model.excluded,
+            bool(self.model.carried.wholes),
         )

@@ -8,6 +8,7 @@ sight.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from copy import copy
 from time import perf_counter
 
 import numpy as np
@@ -20,6 +21,7 @@ from factory.engine import mujoco
 from factory.errors import Diagnostic, InputError
 from factory.factory import Operation
 from factory.mjcf import names
+from factory.mjcf.binary import cached, keep
 from factory.mjcf.model import CARRIAGE_MASS, GRAVITY, HEAD_MASS, HOIST_MASS, Model
 from factory.mjcf.outfeed import TRAY_MASS
 from factory.world.inspection import Inspection
@@ -37,17 +39,20 @@ GIVEN_UP = tuple(
 AWAKE = -0.0
 """Written over a speed of zero it wakes a sleeping body and changes nothing else."""
 
-
 DOZE = int(mujoco.mjMINAWAKE) // 2
 """Steps of the engine between looks at who sleeps: it takes twice as many of a slow body to doze
 off."""
+
+SLOW = 0.02
+"""A robot under way that is slower than this might fall asleep [m/s]."""
 
 
 class MujocoWorld:
     """A compiled model with its data, and the parts' whereabouts.
 
-    `gains`: factor on each axis's controller gain. Raises InputError (BadMesh) where the
-    engine refuses the model, with the engine's own words.
+    `gains`: factor on each axis's controller gain; `loaded`: what `load` has given for the model,
+    of which a copy is run. Raises InputError (BadMesh) where the engine refuses the model, with the
+    engine's own words.
     """
 
     def __init__(
@@ -58,10 +63,11 @@ class MujocoWorld:
         units: int,
         counts: Mapping[int, int] | None = None,
         wip: int | None = None,
+        loaded: mujoco.MjModel | None = None,
     ) -> None:
         self.model, self.settings = model, model.settings
         self.done = (counts or {}).get(model.factory.dropoff.end, 0)
-        self.m = load(model)
+        self.m = load(model) if loaded is None else copy(loaded)
         self.d = mujoco.MjData(self.m)
         factory = model.factory
         carriages = [robot.name for robot in factory.robots]
@@ -80,8 +86,17 @@ class MujocoWorld:
         start = np.append(start, 0.0)
         self.reference = np.array(start, float)
         self.speed = np.zeros_like(self.reference)
-        self._plan = np.zeros((len(start), 4))
-        self._moving = np.zeros(len(start), bool)
+        self.tick = self.settings.tick
+        self._plan = np.zeros((4, len(start)))
+        self._plan[1] = start
+        self._due = np.zeros(len(start), bool)
+        self._active = np.empty(0, np.intp)
+        self._ctrl = self._inputs(self._active)
+        self._course: Array | None = None
+        self._gone = 0
+        self._creeping = self._active
+        ahead = self.settings.timestep * np.arange(self.settings.substeps + 1.0)
+        self._powers = ahead[:, None] ** np.arange(3)
         self.mass = np.full(len(start), CARRIAGE_MASS)
         self.mass[self.tray] = TRAY_MASS
         self.mass[list(self.lift.values())] = HOIST_MASS
@@ -131,7 +146,8 @@ class MujocoWorld:
         for operation, unit in ended:
             self.inspection.ended(operation)
             if operation.index == self.model.factory.dropoff.index:
-                self.inspection.measured(self.stock.bodies_of(unit))
+                self.stock.fuse(operation.carrier)
+                self.inspection.measured(*self.stock.finished(unit))
             switched = self.stock.hand_over(operation, unit)
             self.inspection.handed_over(switched)
             for slot, robot in enumerate(operation.robots):
@@ -152,86 +168,125 @@ class MujocoWorld:
         self._halt(axes)
         if bundle is not None:
             x, v = self.reference[axes], self.speed[axes]
-            x1, v1, a = follow(bundle, x, v, self.settings.tick)
-            self.move(axes, x, v, a)
-        self.advance(self.settings.substeps)
-        if bundle is not None:
+            x1, v1, a = follow(bundle, x, v, self.tick)
             self.reference[axes], self.speed[axes] = x1, v1
-            still = np.zeros(len(axes))
-            self.move(axes, x1, still, still)
-            self.d.ctrl[self.control[axes] + 1] = v1
+            self._course, self._creeping = self._setpoints(axes, x, v, a, 0.0)
+            self._course[-1, : len(axes)] = x1  # to the last bit, so that who stands is seen to
+            self._gone, self._due[axes] = 0, False
+        self.advance(self.settings.substeps)
+        self._course = None
         self.settle()
 
     def _halt(self, active: Index) -> None:
         """Robots whose operation has ended stop where their reference is. They may hand over at a
         low speed: left as a setpoint it would carry them out of the goal, and of the next
         domain."""
-        moving = self.speed != 0.0
-        moving[active] = moving[self.tray] = False
-        if moving.any():
-            axes = np.flatnonzero(moving)
-            self.speed[axes] = 0.0
-            still = np.zeros(len(axes))
-            self.move(axes, self.reference[axes], still, still)
+        if active is self._active:
+            return
+        left = np.zeros(len(self.speed), bool)
+        left[self._active] = True
+        left[active] = False
+        axes = np.flatnonzero(left)
+        still = np.zeros(len(axes))
+        self.speed[axes] = 0.0
+        self.d.ctrl[self._inputs(axes)] = np.concatenate(
+            [self.reference[axes], still, self.weight[axes]]
+        )
+        self._active, self._ctrl = active, self._inputs(active)
 
     def move(self, axes: Index, x: Array, v: Array, a: Array) -> None:
-        """From now on the references of `axes` run from x [m] at speed v under acceleration a."""
-        self._plan[axes, 0] = self.d.time
-        self._plan[axes, 1], self._plan[axes, 2], self._plan[axes, 3] = x, v, a
-        ctrl = self.control[axes]
-        self.d.ctrl[ctrl], self.d.ctrl[ctrl + 1] = x, v
-        self.d.ctrl[ctrl + 2] = self.mass[axes] * a + self.weight[axes]
-        self._moving[axes] = (v != 0) | (a != 0)
+        """From now on the references of `axes` run from x [m] at speed v under acceleration a, in
+        steps that have not been set otherwise."""
+        plan = self._plan
+        plan[0, axes] = self.d.time
+        plan[1, axes], plan[2, axes], plan[3, axes] = x, v, a
+        self._due[axes] = True
 
     def advance(self, substeps: int) -> None:
-        """Timesteps of the engine, with the setpoints of all moving robots kept up to date."""
+        """Timesteps of the engine, with the setpoints of all moving robots kept up to date: of
+        those in modes, and of those that `move` has set going or stopped."""
         m, d = self.m, self.d
-        moving = np.flatnonzero(self._moving)
-        ctrl, dof = self.control[moving], self.dof[moving]
-        begun, x, v, a = self._plan[moving].T
+        table, ctrl, setpoints = self._course, self._ctrl, d.ctrl
+        axes = np.flatnonzero(self._due)
+        if len(axes):
+            begun, x, v, a = self._plan[:, axes]
+            own, slow = self._setpoints(axes, x, v, a, d.time - begun)
+            inputs = self._inputs(axes)
+        gone, self._gone = self._gone, self._gone + substeps
         for step in range(substeps):
-            if len(moving):
-                tau = d.time - begun
-                d.ctrl[ctrl] = x + tau * (v + 0.5 * tau * a)
-                d.ctrl[ctrl + 1] = v + a * tau
-                if step % DOZE == 0:
-                    self._rouse(dof, self.tree[moving])
+            dozing = (gone + step) % DOZE == 0
+            if table is not None:
+                setpoints[ctrl] = table[gone + step]
+                if dozing and len(self._creeping):
+                    self._rouse(self._creeping)
+            if len(axes):
+                setpoints[inputs] = own[step]
+                if dozing and len(slow):
+                    self._rouse(slow)
             begin = perf_counter()
             mujoco.mj_step(m, d)
             self.physics_time += perf_counter() - begin
             if d.ncon:
                 self.inspection.contacts()
+        if table is not None:
+            setpoints[ctrl] = table[gone + substeps]
+        if len(axes):
+            setpoints[inputs] = own[substeps]
+            self._due[axes] = self._plan[2:, axes].any(axis=0)
 
-    def _rouse(self, dof: Index, tree: Index) -> None:
+    def _inputs(self, axes: Index) -> Index:
+        """Where in `ctrl` the setpoints of axes are (3 n,): positions, speeds, forces."""
+        ctrl = self.control[axes]
+        return np.concatenate([ctrl, ctrl + 1, ctrl + 2])
+
+    def _setpoints(
+        self, axes: Index, x: Array, v: Array, a: Array, since: Array | float
+    ) -> tuple[Array, Index]:
+        """The setpoints of axes at the next steps (k, 3 n), which have gone `since` [s] from x at
+        speed v under acceleration a; and those of the axes that are slow."""
+        n = len(axes)
+        if np.ndim(since):
+            x, v = x + since * (v + 0.5 * since * a), v + a * since
+        slow = (np.abs(v) < SLOW) & ((v != 0.0) | (a != 0.0))
+        terms = np.zeros((3, 3 * n))
+        terms[0, :n], terms[0, n : 2 * n] = x, v
+        terms[0, 2 * n :] = self.mass[axes] * a + self.weight[axes]
+        terms[1, :n], terms[1, n : 2 * n] = v, a
+        terms[2, :n] = 0.5 * a
+        return self._powers @ terms, axes[slow]
+
+    def _rouse(self, axes: Index) -> None:
         """Wake robots that sleep, and keep those awake that creep: the engine puts to sleep what
         has been slow for a while, and a robot under way never comes to its goal then."""
-        speed, asleep = self.d.qvel[dof], self.d.tree_asleep[tree]
-        self.d.qvel[dof[speed == 0.0]] = AWAKE
-        self.d.tree_asleep[tree[asleep < 0]] = -1 - mujoco.mjMINAWAKE
+        dof, tree = self.dof[axes], self.tree[axes]
+        self.d.qvel[dof[self.d.qvel[dof] == 0.0]] = AWAKE
+        self.d.tree_asleep[tree[self.d.tree_asleep[tree] < 0]] = -1 - mujoco.mjMINAWAKE
 
     def settle(self) -> None:
         """After a tick: look at welds, and move the outfeed's tray."""
         self.inspection.tick()
+        if self.stock.joining:
+            self.stock.settle()
         unit, way = self.stock.on_tray, self.model.layout.outfeed_way
         if unit is not None and self._tray_is_at(way):
-            self.inspection.measured(self.stock.bodies_of(unit))
+            self.inspection.measured(*self.stock.finished(unit))
             self.stock.recycle()
             unit = None
-        load = 0.0 if unit is None else self.model.masses[self.model.factory.pag.root]
-        self.mass[self.tray] = TRAY_MASS + load
-        self._send_tray(0.0 if unit is None else way)
+        place = 0.0 if unit is None else way
+        if self.reference[self.tray] != place or self.speed[self.tray]:
+            self._send_tray(place)
 
     def _tray_is_at(self, place: float) -> bool:
         """Whether the outfeed's tray rests at a place of its way [m]."""
         x, v = self.d.qpos[self.qpos[self.tray]], self.d.qvel[self.dof[self.tray]]
-        return bool(abs(x - place) < NEAR and abs(v) < NEAR / self.settings.tick)
+        return bool(abs(x - place) < NEAR and abs(v) < NEAR / self.tick)
 
     def _send_tray(self, place: float) -> None:
         """One tick of the tray's way to a place, as fast as its limits allow."""
-        tray = np.array([self.tray])
-        x, v, dt = self.reference[tray], self.speed[tray], self.settings.tick
-        if x[0] == place and v[0] == 0.0:
-            return
+        tray, dt = np.array([self.tray]), self.tick
+        x, v = self.reference[tray], self.speed[tray]
+        loaded = self.stock.on_tray is not None
+        self.mass[self.tray] = TRAY_MASS + loaded * self.model.masses[self.model.factory.pag.root]
         limit = np.array([self.settings.outfeed_acceleration])
         left = place - (x + v * (dt / 2))
         wanted = np.minimum(landing_speed(np.abs(left), limit, dt), self.settings.outfeed)
@@ -257,7 +312,16 @@ class MujocoWorld:
 
 
 def load(model: Model) -> mujoco.MjModel:
-    """The engine's model of what `model_files` gives."""
+    """The engine's model of what `model_files` gives; from the user's cache if it is there. Raises
+    InputError (BadMesh) where the engine refuses it."""
+    m = cached(model)
+    if m is None:
+        m = _compiled(model)
+        keep(model, m)
+    return m
+
+
+def _compiled(model: Model) -> mujoco.MjModel:
     xml = model.xml
     files: Mapping[str, bytes] = {
         f"meshes/{name}": content for name, content in model.files.items()

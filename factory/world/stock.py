@@ -15,6 +15,7 @@ from factory.mjcf.model import Model
 from factory.mjcf.parts import parked_at, presented_at
 from factory.pag import NOPART
 from factory.world.contacts import NOBODY, Contacts
+from factory.world.fusing import RIGID, SETTLING, fuse, misfit
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,7 +31,10 @@ class Stock:
     """Copies of parts, fed in the order of units: the n-th part of each label is for unit n.
 
     A weld is aimed at the copy it holds by writing its body at run time; its nominal frame is the
-    same for all copies.
+    same for all copies. `load`: the labels of the bodies that each robot holds, and the unit they
+    are for. Where the model has bodies for sub-assemblies, `joining` are the robots (index) whose
+    bodies have yet to settle before one takes their place, and since when [s]; `misfit`: how far
+    out of place any vertex of a unit's parts was when that happened [m].
     """
 
     def __init__(
@@ -43,18 +47,20 @@ class Stock:
         wip: int | None = None,
     ) -> None:
         self.m, self.d, self.model, self.wip = m, d, model, wip
-        factory = model.factory
-        self.parts = factory.contents[factory.pag.root]
-        self.first = self.parts[0]
+        factory, self.bodies = model.factory, model.carried
+        self.parts = self.bodies.carried[factory.pag.root]
+        self.load: dict[int, tuple[int, list[str]]] = {}
+        self.joining: dict[int, tuple[str, float]] = {}
+        self.misfit: dict[int, float] = {}
         self.body = {
             label: np.array([m.body(names.part(label, n + 1)).id for n in range(count)])
             for label, count in model.copies.items()
         }
-        self.contacts = Contacts(m, self.body, model.layout.excluded)
+        self.contacts = Contacts(m, self.body, model.excluded)
         self.tray = len(factory.robots) + 1
         self.feeder = {o.label: self.tray + 1 + n for n, o in enumerate(factory.leaves)}
-        self.grip = self._grips()
-        self.feed = {label: m.equality(names.feed(label)).id for label in self.parts}
+        self.grip, self.park = self._grips(), self._parks()
+        self.feed = {o.label: m.equality(names.feed(o.label)).id for o in factory.leaves}
         self.free: dict[str, deque[int]] = {
             label: deque(range(count)) for label, count in model.copies.items()
         }
@@ -71,7 +77,7 @@ class Stock:
         self.left: list[float] = []
         self._hide_spares()
         self._hand_out(counts)
-        for label in self.parts:
+        for label in self.feed:
             self.feed_next(label)
 
     # --- feeding -------------------------------------------------------------------------------
@@ -97,7 +103,7 @@ class Stock:
         self._place(body, presented_at(self.model.layout, label))
         self.contacts.enter(label, unit, body)
         self.contacts.hold([body], self.feeder[label])
-        self._switch(self._park(label, copy), False)
+        self._switch(self.park[label, copy], False)
         self._switch(self.feed[label], True, body)
 
     # --- handing over --------------------------------------------------------------------------
@@ -126,25 +132,33 @@ class Stock:
         self._switch(self.feed[label], False)
         self._switch(self.grip[operation.carrier, label], True, self.body_of(label, unit))
         self.contacts.hold([self.body_of(label, unit)], operation.carrier + 1)
+        self.load[operation.carrier] = unit, [label]
         return Switched(1, gap)
 
     def _pass_on(self, operation: Operation, unit: int) -> Switched:
-        contents, carrier = self.model.factory.contents, operation.carrier
+        carrier = operation.carrier
+        for robot in operation.robots:
+            self.fuse(robot)
+        _, kept = self.load.setdefault(carrier, (unit, []))
         moved = [
-            (robot, part)
-            for robot, label in zip(operation.robots, operation.before, strict=True)
-            if robot != carrier and label in contents
-            for part in contents[label]
+            (robot, label)
+            for robot in operation.robots
+            if robot != carrier and robot in self.load
+            for label in self.load.pop(robot)[1]
         ]
-        parts = [part for _, part in moved]
-        gap = self._gap([self.grip[carrier, part] for part in parts], parts, unit)
-        for robot, part in moved:
-            self._switch(self.grip[robot, part], False)
-            self._switch(self.grip[carrier, part], True, self.body_of(part, unit))
-        self.contacts.hold([self.body_of(part, unit) for part in parts], carrier + 1)
+        labels = [label for _, label in moved]
+        gap = self._gap([self.grip[carrier, label] for label in labels], labels, unit)
+        for robot, label in moved:
+            self._switch(self.grip[robot, label], False)
+            self._switch(self.grip[carrier, label], True, self.body_of(label, unit))
+        self.contacts.hold([self.body_of(label, unit) for label in labels], carrier + 1)
+        self.load[carrier] = unit, kept + labels
+        if operation.label in self.bodies.wholes:
+            self.joining[carrier] = operation.label, float(self.d.time)
         return Switched(len(moved), gap)
 
     def _release(self, operation: Operation, unit: int) -> Switched:
+        del self.load[operation.carrier]
         gap = self._gap([self.hold[part] for part in self.parts], self.parts, unit)
         for part in self.parts:
             self._switch(self.grip[operation.carrier, part], False)
@@ -154,6 +168,46 @@ class Stock:
         self.released += 1
         return Switched(len(self.parts), gap)
 
+    # --- joined for good -----------------------------------------------------------------------
+
+    def settle(self) -> None:
+        """Let one body take the place of those that a robot has joined, once they have settled."""
+        now = self.d.time
+        for robot, (_, since) in list(self.joining.items()):
+            if now - since > SETTLING and robot in self.joining and self._misfit(robot) < RIGID:
+                self.fuse(robot)
+
+    def _misfit(self, robot: int) -> float:
+        unit, labels = self.load[robot]
+        bodies = [self.body_of(label, unit) for label in labels]
+        places = np.array([self.bodies.centre[label] for label in labels])
+        return misfit(
+            self.d, bodies, places, np.array([self.bodies.radius[label] for label in labels])
+        )
+
+    def fuse(self, robot: int) -> None:
+        """Let one body take the place of those that a robot (index) has joined, if it has not yet.
+        Where no copy of that body is free, its holder's bodies become one first."""
+        if robot not in self.joining:
+            return
+        label, _ = self.joining.pop(robot)
+        if not self.free[label]:
+            self.fuse(next(r for r, (_, held) in self.load.items() if label in held))
+        unit, labels = self.load[robot]
+        self.misfit[unit] = max(self.misfit.get(unit, 0.0), self._misfit(robot))
+        copy = self.free[label].popleft()
+        whole = int(self.body[label][copy])
+        fuse(self.m, self.d, [self.body_of(each, unit) for each in labels], whole)
+        for each in labels:
+            self._switch(self.grip[robot, each], False)
+            self._retire(each, unit)
+        self.copy_of[label, unit] = copy
+        self._switch(self.park[label, copy], False)
+        self._switch(self.grip[robot, label], True, whole)
+        self.contacts.enter(label, unit, whole)
+        self.contacts.hold([whole], robot + 1)
+        self.load[robot] = unit, [label]
+
     def body_of(self, label: str, unit: int) -> int:
         """The body of the part `label` in a unit."""
         return int(self.body[label][self.copy_of[label, unit]])
@@ -162,13 +216,16 @@ class Stock:
         """The bodies of all parts of a unit, in the order of `parts`."""
         return np.array([self.body_of(part, unit) for part in self.parts])
 
+    def finished(self, unit: int) -> tuple[np.ndarray, float]:
+        """The bodies of a finished product, and its misfit [m]."""
+        return self.bodies_of(unit), self.misfit.get(unit, 0.0)
+
     def loads(self) -> dict[int, float]:
         """What each robot that holds something carries [kg]."""
         found: dict[int, float] = {}
         for (robot, part), weld in self.grip.items():
             if self.d.eq_active[weld]:
-                mass = self.model.layout.product.solids[part].mass
-                found[robot] = found.get(robot, 0.0) + mass
+                found[robot] = found.get(robot, 0.0) + self.bodies.mass[part]
         return found
 
     # --- the outfeed ---------------------------------------------------------------------------
@@ -178,22 +235,27 @@ class Stock:
         unit, self.on_tray = self.on_tray, None
         assert unit is not None
         self.left.append(float(self.d.time))
+        self.misfit.pop(unit, None)
         for part in self.parts:
-            copy = self.copy_of.pop((part, unit))
-            self.contacts.leave(part, unit)
             self._switch(self.hold[part], False)
-            self._put_away(part, copy)
-            self.free[part].append(copy)
-            self.feed_next(part)
+            self._retire(part, unit)
+
+    def _retire(self, label: str, unit: int) -> None:
+        """Return a body of a unit out of sight, and a part to its feeder where that is empty."""
+        copy = self.copy_of.pop((label, unit))
+        self.contacts.leave(label, unit)
+        self._put_away(label, copy)
+        self.free[label].append(copy)
+        if label in self.feed:
+            self.feed_next(label)
 
     # --- welds and bodies ----------------------------------------------------------------------
 
     def _grips(self) -> dict[tuple[int, str], int]:
         found: dict[tuple[int, str], int] = {}
         for robot in self.model.factory.robots:
-            label = self.model.factory.delivered(robot.index)
-            for part in self.model.factory.contents.get(label, ()):
-                found[robot.index, part] = self.m.equality(names.grip(robot.name, part)).id
+            for label in self.bodies.handled(self.model.factory, robot.index):
+                found[robot.index, label] = self.m.equality(names.grip(robot.name, label)).id
         return found
 
     def _gap(self, welds: list[int], parts: Sequence[str], unit: int) -> float:
@@ -234,7 +296,7 @@ class Stock:
         body = int(self.body[label][copy])
         self._place(body, parked_at(self.model.layout, label, copy + 1))
         self.contacts.hold([body], NOBODY)
-        self._switch(self._park(label, copy), True)
+        self._switch(self.park[label, copy], True)
 
     def _hand_out(self, counts: Mapping[int, int]) -> None:
         """Give the parts that are under way in a marking to the robots that carry them: that of the
@@ -250,7 +312,9 @@ class Stock:
                     operation = factory.operations[factory.parents[operation.index]]
                 if holder.carrier == leaf.carrier:
                     self.taken.add(leaf.label)
-                self._give(leaf.label, unit, holder.carrier)
+                for label in self.bodies.carried[holder.label]:
+                    if (label, unit) not in self.copy_of:
+                        self._give(label, unit, holder.carrier)
 
     def _give(self, label: str, unit: int, robot: int) -> None:
         """Put a copy into a robot's hands."""
@@ -263,15 +327,20 @@ class Stock:
         self._place(body, (float(at[0]), float(at[1]), float(at[2])))
         self.contacts.enter(label, unit, body)
         self.contacts.hold([body], robot + 1)
-        self._switch(self._park(label, copy), False)
+        self._switch(self.park[label, copy], False)
         self._switch(weld, True, body)
+        self.load.setdefault(robot, (unit, []))[1].append(label)
 
     def _hide_spares(self) -> None:
+        for weld in (*self.feed.values(), *self.hold.values()):
+            self._switch(weld, False)
         for label, bodies in self.body.items():
-            self._switch(self.feed[label], False)
-            self._switch(self.hold[label], False)
             for copy in range(len(bodies)):
                 self._put_away(label, copy)
 
-    def _park(self, label: str, copy: int) -> int:
-        return int(self.m.equality(names.park(label, copy + 1)).id)
+    def _parks(self) -> dict[tuple[str, int], int]:
+        return {
+            (label, copy): self.m.equality(names.park(label, copy + 1)).id
+            for label, bodies in self.body.items()
+            for copy in range(len(bodies))
+        }

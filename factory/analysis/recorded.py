@@ -1,0 +1,86 @@
+"""Runs to compare with: how they were made, and what they left."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
+from typing import Any, get_args
+
+import numpy as np
+from numpy.typing import NDArray
+
+from factory.analysis.measured import Record
+from factory.control.profile import World
+from factory.errors import Diagnostic, InputError
+from factory.factory import Factory
+from factory.settings import Settings
+from factory.trace import Event, Run
+
+
+@dataclass(frozen=True, slots=True)
+class Conditions:
+    """How a run was made, which is what its prediction has to assume."""
+
+    settings: Settings
+    world: World
+    seed: int
+    jitter: float
+    wip: int | None
+
+
+def record_of(run: Run) -> Record:
+    """What a run on the spot left."""
+    return Record("a run on the spot", run.events, run.dropoffs)
+
+
+def logged_record(
+    source: str,
+    events: Sequence[tuple[float, str]],
+    time: NDArray[np.float64],
+    delivered: NDArray[np.int32],
+) -> Record:
+    """What a log holds; the moment of a dropoff is the first tick after it."""
+    grown = np.flatnonzero(np.diff(delivered)) + 1
+    left = tuple(time[grown].tolist())
+    return Record(source, tuple(Event(t, name) for t, name in events), left)
+
+
+def conditions(source: str, header: Mapping[str, Any]) -> Conditions:
+    """How the run in a log was made. Raises InputError (BadLog)."""
+    try:
+        usual = asdict(Settings())
+        given = {k: v for k, v in header["settings"].items() if v != usual.get(k, v)}
+        settings = Settings().with_options(given)
+        wip = header.get("wip")
+        world, seed, jitter = header["world"], int(header["seed"]), float(header["jitter"])
+        if world not in get_args(World) or not 0 <= jitter < 1 or seed < 0:
+            raise ValueError(f"world {world}, seed {seed}, jitter {jitter}")
+        return Conditions(settings, world, seed, jitter, None if wip is None else int(wip))
+    except (KeyError, TypeError, ValueError, AttributeError) as error:
+        message = f"'{source}' does not say how it was made: {error}"
+        raise InputError(Diagnostic("BadLog", message, None, HINT)) from error
+
+
+HINT = "`factory run FILE.pag --log OUT` writes one that fits"
+
+
+def check_log(source: str, header: Mapping[str, Any], factory: Factory) -> None:
+    """The run in a log must be one of this factory, from its initial marking, with a product at the
+    least. Raises InputError (BadLog)."""
+    net = factory.net.threaded
+    names = [transition.name for transition in net.transitions]
+    if header.get("transitions") != names:
+        message = f"'{source}' is the log of another factory: other operations, or other robots"
+        raise InputError(Diagnostic("BadLog", message, None, HINT))
+    if header.get("start") != sorted(factory.net.initial_marking):
+        message = f"the run in '{source}' began in the middle (--from)"
+        raise InputError(
+            Diagnostic("BadLog", message, None, "take one that began at the beginning")
+        )
+
+
+def check_products(record: Record) -> None:
+    """A run that left no product says nothing. Raises InputError (BadLog)."""
+    if not record.dropoffs:
+        message = f"'{record.source}' has no finished product"
+        raise InputError(Diagnostic("BadLog", message, None, "take a longer run"))

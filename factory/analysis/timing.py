@@ -1,0 +1,159 @@
+"""The delays of a factory's operations, and what they become when robots change."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from types import MappingProxyType
+
+import numpy as np
+
+from factory.control.mode import Array, Limits, Mode
+from factory.control.plan import operation_modes, operation_starts, robot_limits
+from factory.control.profile import World, ideal_time, mode_time, trapezoid_time
+from factory.factory import Factory
+from factory.layout.plan import Layout
+from factory.settings import Settings
+from factory.simulation import start_positions
+
+AT_ONCE = 1e6
+"""A factor on a speed that leaves only the acceleration as a bound."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Change:
+    """What is different of some robots (index): factors on their `speed`, their `acceleration` and
+    the length of each of their ways (`way`), and how many robots share the work of one
+    (`copies`)."""
+
+    speed: Mapping[int, float] = field(default_factory=dict)
+    acceleration: Mapping[int, float] = field(default_factory=dict)
+    way: Mapping[int, float] = field(default_factory=dict)
+    copies: Mapping[int, int] = field(default_factory=dict)
+
+
+AS_IT_IS = Change()
+
+
+@dataclass(frozen=True)
+class Timing:
+    """What delays follow from: the modes of a layout, where each starts, and the robots' limits.
+
+    Speeds are those of `seed` and `jitter`, as in a run. Raises InputError where a mode cannot
+    reach its goal.
+    """
+
+    layout: Layout
+    settings: Settings = Settings()  # noqa: RUF009
+    world: World = "mujoco"
+    seed: int = 0
+    jitter: float = 0.0
+
+    @property
+    def factory(self) -> Factory:
+        """The factory that is laid out."""
+        return self.layout.factory
+
+    @cached_property
+    def modes(self) -> Sequence[Mode]:
+        """The mode of each operation."""
+        return operation_modes(self.layout, self.settings.eps)
+
+    @cached_property
+    def limits(self) -> Limits:
+        """The limits of each axis."""
+        return robot_limits(self.layout, self.settings, self.seed, self.jitter)[0]
+
+    @cached_property
+    def starts(self) -> list[Array]:
+        """Where the axes of each operation are when it starts, in the long run."""
+        return operation_starts(self.layout)
+
+    @cached_property
+    def rest(self) -> float:
+        """What an operation takes in which nobody moves and nothing dwells: the tick until what
+        follows can fire, and in the engine the time to settle [s]."""
+        settle = self.settings.settle if self.world == "mujoco" else 0.0
+        return settle + self.settings.tick
+
+    @cached_property
+    def delays(self) -> tuple[float, ...]:
+        """The delay of every operation [s], as `factory.prediction` has it."""
+        return tuple(self.delay(number) for number in range(len(self.modes)))
+
+    def delay(self, number: int, change: Change = AS_IT_IS) -> float:
+        """The delay of one operation [s]."""
+        return self._delay(number, self.starts[number], change)
+
+    def changed(self, change: Change) -> tuple[float, ...]:
+        """The delay of every operation with a change [s]."""
+        delays = list(self.delays)
+        robots = [
+            self.factory.robots[robot]
+            for robot in {*change.speed, *change.acceleration, *change.way}
+        ]
+        for number in {number for robot in robots for number in robot.operations}:
+            delays[number] = self.delay(number, change)
+        return tuple(delays)
+
+    @cached_property
+    def first(self) -> Mapping[int, float]:
+        """The delays of operations that take another time when first done [s]: the robots stand at
+        their B ends then."""
+        positions = start_positions(self.layout, self.factory.net.initial_marking)
+        found = {}
+        for operation in self.factory.operations:
+            begins = [
+                self.factory.robots[r].operations[0] == operation.index
+                for r in self._of(operation.index)
+            ]
+            if any(begins):
+                here = positions[list(self.factory.axes[operation.index])]
+                start = np.where(begins, here, self.starts[operation.index])
+                found[operation.index] = self._delay(operation.index, start, AS_IT_IS)
+        return MappingProxyType(found)
+
+    def travel(self, number: int, slot: int) -> float:
+        """How long one robot moves in an operation, if it need not wait on its way [s]."""
+        mode = self.modes[number]
+        axis = self.factory.axes[number][slot]
+        v, a = float(self.limits.speed[axis]), float(self.limits.acceleration[axis])
+        way = 0.0 if mode.is_still else abs(float(self.starts[number][slot] - mode.goals[slot]))
+        if self.world == "mujoco":
+            return float(trapezoid_time(way, v, a))
+        return max(0.0, float(ideal_time(way, v, a) - ideal_time(mode.eps, v, a)))
+
+    @cached_property
+    def outfeed(self) -> float:
+        """How long the outfeed's tray is away after a dropoff [s]; 0 in the ideal world."""
+        if self.world == "ideal":
+            return 0.0
+        return 2 * self.leaving
+
+    @cached_property
+    def leaving(self) -> float:
+        """How long a product takes from its dropoff until it counts [s]; 0 in the ideal world."""
+        if self.world == "ideal":
+            return 0.0
+        speed, gain = self.settings.outfeed, self.settings.outfeed_acceleration
+        return float(trapezoid_time(self.layout.outfeed_way, speed, gain)) + self.settings.tick
+
+    def _of(self, number: int) -> tuple[int, ...]:
+        """The robot of each axis of an operation."""
+        count, lifts = len(self.factory.robots), self.layout.lifts
+        return tuple(a if a < count else lifts[a - count] for a in self.factory.axes[number])
+
+    def _delay(self, number: int, start: Array, change: Change) -> float:
+        mode, robots = self.modes[number], self._of(number)
+        limits = self.limits.of(self.factory.axes[number])
+        if not (change.speed.keys() | change.acceleration.keys()).isdisjoint(robots):
+            speed = [change.speed.get(robot, 1.0) for robot in robots]
+            gain = [change.acceleration.get(robot, 1.0) for robot in robots]
+            limits = Limits(limits.speed * speed, limits.acceleration * gain)
+        if not change.way.keys().isdisjoint(robots):
+            carriages = len(self.factory.operations[number].robots)
+            shares = [change.way.get(robot, 1.0) for robot in robots[:carriages]]
+            factor = np.array(shares + [1.0] * (len(robots) - carriages))
+            start = mode.goals + (start - mode.goals) * factor
+        return mode_time(mode, start, limits, self.world) + self.rest

@@ -1,0 +1,68 @@
+"""The events of a log as rows of a table: what fired when, of which operation, on which line."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from factory.errors import InputError
+from factory.export.subject import Subject
+from factory.factory import Factory
+from factory.log import Log
+from factory.log.blocks import bad_log
+from factory.log.recompiled import factory_of
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """A transition that fired: at `time_s` [s]; `kind` is start or end; `operation` the label it
+    makes; `unit` how often it has fired by then; `robots` those of the operation."""
+
+    time_s: float
+    transition: str
+    kind: str
+    operation: str
+    template: str
+    unit: int
+    carrier: str
+    robots: tuple[str, ...]
+    file: str
+    line: int
+    column: int
+
+
+COLUMNS = tuple(Row.__dataclass_fields__)
+"""The names of the columns."""
+
+
+def compiled(subject: Subject) -> Factory:
+    """The factory of a log. Raises InputError (BadLog) where the log is not of the factory that its
+    header describes."""
+    try:
+        return factory_of(subject.log.header)
+    except (ValueError, KeyError, TypeError, AttributeError, IndexError) as error:
+        words = f"is not of the factory in its header: {error}"
+        raise InputError(bad_log(subject.file, words)) from error
+
+
+def rows(log: Log, factory: Factory) -> Iterator[Row]:
+    """The events in the order in which they were recorded."""
+    units: Counter[int] = Counter()
+    for time, number in zip(log.fired_t.tolist(), log.fired.tolist(), strict=True):
+        units[number] += 1
+        operation = factory.operations[number // 2]
+        at = operation.position
+        yield Row(
+            round(time, 9),
+            factory.net.threaded.transitions[number].name,
+            "end" if number % 2 else "start",
+            operation.label,
+            operation.template.name,
+            units[number],
+            factory.robots[operation.carrier].name,
+            tuple(factory.robots[r].name for r in operation.robots),
+            at.file if at else "",
+            at.line if at else 0,
+            at.column if at else 0,
+        )

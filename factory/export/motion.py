@@ -1,0 +1,117 @@
+"""The motion in a log: where each body of the engine is, frame by frame, and when it moves."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from factory.control.mode import Truth
+from factory.errors import Diagnostic, InputError
+from factory.export.subject import Subject
+from factory.log import Log
+from factory.meshes import Array, Indices
+from factory.mjcf.parts import PARKED
+
+if TYPE_CHECKING:
+    from factory.engine import mujoco
+
+RATE = 50.0
+"""Frames a second, at most."""
+
+STILL = 1e-6
+"""What moves less from frame to frame [m], or in a component of its quaternion, stands still."""
+
+
+@dataclass(frozen=True)
+class Motion:
+    """A log's motion: `rows` of the log that are frames; for each its bodies' positions (n, bodies,
+    3) [m] and quaternions (n, bodies, 4), each relative to its parent."""
+
+    m: mujoco.MjModel
+    rows: Indices
+    position: Array = field(repr=False)
+    quaternion: Array = field(repr=False)
+
+    def name(self, body: int) -> str:
+        """The name of a body."""
+        return str(self.m.body(body).name)
+
+    def parent(self, body: int) -> str:
+        """The name of the body that its pose is relative to."""
+        return self.name(int(self.m.body_parentid[body]))
+
+    def shown(self) -> Iterator[list[int]]:
+        """For each frame the bodies whose pose a reader needs to draw this frame and, by going
+        straight from pose to pose, all up to the next: those that have moved or are about to."""
+        change = np.abs(np.diff(self.position, axis=0)).max(axis=2)
+        turned = np.abs(np.diff(self.quaternion, axis=0)).max(axis=2)
+        moved = (change > STILL) | (turned > STILL)
+        ends = np.ones((1, moved.shape[1]), bool)
+        needed = np.concatenate([ends, moved]) | np.concatenate([moved, ends])
+        for frame in needed:
+            yield [int(body) for body in np.flatnonzero(frame) if body]
+
+    def parked(self) -> Truth:
+        """For each frame and body whether it is a spare one, out of sight under the floor."""
+        return np.asarray(self.position[:, :, 2] < PARKED / 2)
+
+
+def motion_of(subject: Subject) -> Motion:
+    """The motion of a log. Raises InputError for a log of the ideal world or one without a tick."""
+    from factory.engine import mujoco
+
+    log = subject.log
+    if not log.xml:
+        message = f"'{subject.file}' is of the ideal world, which has no bodies to show"
+        hint = "keep a log of a run in MuJoCo: `factory run FILE.pag --log OUT`"
+        raise InputError(Diagnostic("BadLog", message, None, hint))
+    if not len(log):
+        raise InputError(Diagnostic("BadLog", "the log has no tick", None, "run for longer"))
+    m = _model(log)
+    d, rows = mujoco.MjData(m), _frames(log)
+    position = np.empty((len(rows), m.nbody, 3))
+    quaternion = np.empty((len(rows), m.nbody, 4))
+    for frame, row in enumerate(rows):
+        d.qpos[:] = log.qpos[row]
+        mujoco.mj_kinematics(m, d)
+        position[frame], quaternion[frame] = d.xpos, d.xquat
+        for body in np.flatnonzero(m.body_parentid):
+            place = position[frame, body], quaternion[frame, body]
+            _relative(d, int(m.body_parentid[body]), int(body), *place)
+    return Motion(m, rows, position, quaternion)
+
+
+def _relative(d: mujoco.MjData, parent: int, body: int, position: Array, turn: Array) -> None:
+    """Writes the pose of a body relative to its parent."""
+    from factory.engine import mujoco
+
+    back = np.zeros(4)
+    mujoco.mju_negQuat(back, d.xquat[parent])
+    mujoco.mju_rotVecQuat(position, d.xpos[body] - d.xpos[parent], back)
+    mujoco.mju_mulQuat(turn, back, d.xquat[body])
+
+
+def _frames(log: Log) -> Indices:
+    """Rows of a log at most RATE a second, the first and the last among them."""
+    kept, next_time = [], -np.inf
+    for row, time in enumerate(log.time.tolist()):
+        if time >= next_time - 1e-9 or row == len(log) - 1:
+            kept.append(row)
+            next_time = time + 1 / RATE
+    return np.array(kept, np.int64)
+
+
+def _model(log: Log) -> mujoco.MjModel:
+    from factory.engine import mujoco
+
+    files = {f"meshes/{name}": content for name, content in log.files.items()}
+    try:
+        m = mujoco.MjModel.from_xml_string(log.xml, files)
+    except ValueError as error:
+        raise InputError(Diagnostic("BadLog", f"the log's model is broken: {error}")) from error
+    if m.nq != log.qpos.shape[1]:
+        raise InputError(Diagnostic("BadLog", "the log's states are not those of its model"))
+    return m

@@ -1,0 +1,29 @@
+"""Parquet of a log's events: the columns of the CSV with their types, the robots as a list."""
+
+from __future__ import annotations
+
+import io
+from dataclasses import asdict
+
+from factory.export.events import COLUMNS, compiled, rows
+from factory.export.subject import Subject, optional
+
+FORMAT, TAKES, BINARY = "parquet", "log", True
+
+
+def export(subject: Subject) -> bytes:
+    """The table. Raises MissingError where there is no pyarrow."""
+    pyarrow = optional("pyarrow", "pyarrow", "Parquet")
+    parquet = optional("pyarrow.parquet", "pyarrow", "Parquet")
+    types = {
+        "time_s": pyarrow.float64(),
+        "unit": pyarrow.int32(),
+        "robots": pyarrow.list_(pyarrow.string()),
+        "line": pyarrow.int32(),
+        "column": pyarrow.int32(),
+    }
+    schema = pyarrow.schema([(name, types.get(name, pyarrow.string())) for name in COLUMNS])
+    found = [asdict(row) for row in rows(subject.log, compiled(subject))]
+    content = io.BytesIO()
+    parquet.write_table(pyarrow.Table.from_pylist(found, schema), content)
+    return content.getvalue()

@@ -1,0 +1,117 @@
+"""What is exported: a PAG with all that follows from it, a net in PNML, or a log."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+from factory.checking import is_net
+from factory.errors import Diagnostic, InputError, MissingError, did_you_mean
+from factory.factory import Factory
+from factory.geometry import Product
+from factory.layout.plan import Layout
+from factory.log import Log, is_log, read_log
+from factory.nets.gears import GearNet
+from factory.nets.marked import MarkedNet
+from factory.pipeline import Source, read
+from factory.settings import Settings
+
+SOURCES = {"net": ("a PAG", "a net in PNML"), "pag": ("a PAG",), "log": ("a log",)}
+"""What an exporter can take, as people call it."""
+
+
+@dataclass(frozen=True)
+class Subject:
+    """A file to be exported, read and compiled only as far as an exporter asks.
+
+    `of`: what is wanted of it, "" for the usual; `name`: of the file that is written; `whole`:
+    whether a folder with everything is wanted; `room`: width and depth of the floor there is [m].
+    """
+
+    file: Path
+    folders: tuple[Path, ...] = ()
+    settings: Settings = field(default_factory=Settings)
+    room: tuple[float, float] | None = None
+    of: str = ""
+    name: str = ""
+    whole: bool = False
+
+    @cached_property
+    def kind(self) -> str:
+        """What the file is."""
+        if is_log(self.file):
+            return "a log"
+        return "a net in PNML" if is_net(self.file) else "a PAG"
+
+    def require(self, form: str, takes: str) -> None:
+        """Raises InputError (Usage) where a format is not made from such a file."""
+        wanted = SOURCES[takes]
+        if self.kind not in wanted:
+            message = f"{form} is made from {' or '.join(wanted)}; '{self.file}' is {self.kind}"
+            hint = f"give {wanted[0]}"
+            if takes == "log":
+                hint = "keep one first: `factory run FILE.pag --log OUT`"
+            raise InputError(Diagnostic("Usage", message, None, hint))
+
+    @property
+    def stem(self) -> str:
+        """The name of the product."""
+        return self.file.stem or "factory"
+
+    @cached_property
+    def source(self) -> Source:
+        """The PAG with its templates. Raises InputError."""
+        return read(self.file, self.folders)
+
+    @cached_property
+    def factory(self) -> Factory:
+        """What it compiles to."""
+        return self.source.compile()
+
+    @property
+    def product(self) -> Product:
+        """The solids of its parts. Raises InputError where a mesh cannot be read."""
+        return self.source.product
+
+    @cached_property
+    def net(self) -> GearNet | MarkedNet:
+        """The factory's net, or that of a PNML file. Raises InputError."""
+        if self.kind == "a PAG":
+            return self.factory.net
+        from factory.export.pnml_reader import read_pnml
+        from factory.lang.source import read_text
+
+        return read_pnml(read_text(self.file), str(self.file))
+
+    @cached_property
+    def layout(self) -> Layout:
+        """The factory laid out. Raises InputError where there is no room."""
+        from factory.layout.embedding import lay_out
+
+        return lay_out(self.factory, self.product, self.settings.clearance, self.room)
+
+    @cached_property
+    def log(self) -> Log:
+        """The log. Raises InputError (BadLog)."""
+        return read_log(self.file)
+
+    def choose(self, valid: list[str], noun: str) -> str:
+        """What `of` names; the first where it names nothing. Raises InputError (Usage)."""
+        if self.of and self.of not in valid:
+            hint = did_you_mean(self.of, valid, noun)
+            message = f"--of '{self.of}' is none of the {noun}"
+            raise InputError(Diagnostic("Usage", message, None, hint))
+        return self.of or valid[0]
+
+
+def optional(module: str, package: str, what: str, extra: str = "export") -> Any:
+    """A module of an optional package. Raises MissingError with the line that installs it."""
+    try:
+        return import_module(module)
+    except ImportError as error:
+        hint = f"pip install 'klavins-factory[{extra}]'"
+        message = f"{what} needs {package}: {error}"
+        raise MissingError(Diagnostic("Missing", message, None, hint)) from error

@@ -1,0 +1,205 @@
+"""URDF of the factory as the engine has it: a prismatic joint for each robot, lift and the outfeed
+(its position is the arc length or height of the run's log), a floating one for each part; meshes
+stand beside the file in a folder of its name.
+
+Links have the names of the bodies in the MJCF, the log and the MCAP.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from math import atan2, hypot
+from typing import TYPE_CHECKING, Any
+from xml.etree import ElementTree
+from xml.etree.ElementTree import Element
+
+import numpy as np
+
+from factory.export.subject import Subject
+from factory.geometry import rotation
+from factory.layout.plan import Layout
+from factory.meshes import Array, Mesh
+from factory.mjcf import names
+from factory.mjcf.elements import add, exact, numbers
+from factory.mjcf.mesh_files import stl
+from factory.simulation import physical_model
+
+if TYPE_CHECKING:
+    from factory.engine import mujoco
+
+FORMAT, TAKES = "urdf", "pag"
+
+DRAWN = 3
+"""Geoms of groups below this one are drawn."""
+
+
+def export(subject: Subject) -> str | Mapping[str, bytes]:
+    """The URDF; with its meshes, where there are any."""
+    from factory.world.physics import load
+
+    layout = subject.layout
+    model = physical_model(layout, 1, subject.settings, subject.source.catalogue)
+    folder = f"{subject.name.rpartition('.')[0] or subject.name or subject.stem}_meshes"
+    writer = _Writer(load(model), layout, subject.settings.speed, folder)
+    text = writer.text(subject.stem)
+    if not writer.files:
+        return text
+    return {"": text.encode(), **{f"{folder}/{name}": c for name, c in writer.files.items()}}
+
+
+class _Writer:
+    """Writes the bodies of a compiled model as links; notes the meshes that it meets."""
+
+    def __init__(self, m: mujoco.MjModel, layout: Layout, speed: float, folder: str) -> None:
+        self.m, self.speed, self.folder = m, speed, folder
+        self.limits = _limits(layout)
+        self.files: dict[str, bytes] = {}
+        self.force = {
+            int(joint): float(most)
+            for (joint, _), (_, most) in zip(m.actuator_trnid, m.actuator_forcerange, strict=True)
+        }
+
+    def text(self, name: str) -> str:
+        """The document."""
+        root = Element("robot", {"name": name})
+        extension = add(root, "mujoco")
+        add(extension, "compiler", strippath="false", fusestatic="false", meshdir=".")
+        for body in range(self.m.nbody):
+            self._link(root, body)
+        for body in range(1, self.m.nbody):
+            self._joint(root, body)
+        ElementTree.indent(root)
+        return '<?xml version="1.0"?>\n' + ElementTree.tostring(root, encoding="unicode") + "\n"
+
+    def _link(self, root: Element, body: int) -> None:
+        from factory.engine import mujoco
+
+        m = self.m
+        link = add(root, "link", name=m.body(body).name)
+        if m.body_jntnum[body]:
+            self._inertial(link, body)
+        first = m.body_geomadr[body]
+        for geom in range(first, first + m.body_geomnum[body]):
+            if m.geom_type[geom] == mujoco.mjtGeom.mjGEOM_PLANE:
+                continue  # the floor has no end, and URDF no word for that
+            if m.geom_group[geom] < DRAWN:
+                for offset, shape in self._shapes(geom, False):
+                    self._paint(self._shape(link, "visual", geom, offset, shape), geom)
+            if m.geom_contype[geom] or m.geom_conaffinity[geom]:
+                for offset, shape in self._shapes(geom, True):
+                    self._shape(link, "collision", geom, offset, shape)
+
+    def _inertial(self, link: Element, body: int) -> None:
+        m = self.m
+        inertial = add(link, "inertial")
+        _origin(inertial, m.body_ipos[body], m.body_iquat[body])
+        add(inertial, "mass", value=exact([m.body_mass[body]]))
+        moments = zip(("ixx", "iyy", "izz"), m.body_inertia[body], strict=True)
+        products = {"ixy": "0", "ixz": "0", "iyz": "0"}
+        add(inertial, "inertia", **{axis: exact([i]) for axis, i in moments}, **products)
+
+    def _joint(self, root: Element, body: int) -> None:
+        from factory.engine import mujoco
+
+        m, name = self.m, self.m.body(body).name
+        joint = m.body_jntadr[body]
+        slides = joint >= 0 and int(m.jnt_type[joint]) == int(mujoco.mjtJoint.mjJNT_SLIDE)
+        word = "prismatic" if slides else "floating" if joint >= 0 else "fixed"
+        element = add(root, "joint", name=m.joint(joint).name if joint >= 0 else name, type=word)
+        at, turn = m.body_pos[body], m.body_quat[body]
+        if slides:
+            axis = m.jnt_axis[joint]
+            at = at - _turned(turn, axis) * m.qpos0[m.jnt_qposadr[joint]]
+        _origin(element, at, turn)
+        add(element, "parent", link=m.body(m.body_parentid[body]).name)
+        add(element, "child", link=name)
+        if slides:
+            add(element, "axis", xyz=numbers(m.jnt_axis[joint]))
+            low, high = self.limits.get(m.joint(joint).name, m.jnt_range[joint])
+            effort = exact([self.force.get(int(joint), 0.0)])
+            limit = {"lower": numbers([low]), "upper": numbers([high]), "effort": effort}
+            add(element, "limit", **limit, velocity=numbers([self.speed]))
+
+    def _shapes(self, geom: int, colliding: bool) -> Iterator[tuple[Array, Element]]:
+        """The shapes of a geom, and how far along its axis each is."""
+        from factory.engine import mujoco
+
+        m, size, here = self.m, self.m.geom_size[geom], np.zeros(3)
+        kind = mujoco.mjtGeom(m.geom_type[geom])
+        if kind == mujoco.mjtGeom.mjGEOM_MESH:
+            yield here, self._mesh(int(m.geom_dataid[geom]), colliding)
+        elif kind == mujoco.mjtGeom.mjGEOM_SPHERE:
+            yield here, Element("sphere", {"radius": numbers([size[0]])})
+        elif kind in (mujoco.mjtGeom.mjGEOM_CYLINDER, mujoco.mjtGeom.mjGEOM_CAPSULE):
+            length = {"radius": numbers([size[0]]), "length": numbers([2 * size[1]])}
+            yield here, Element("cylinder", length)
+            if kind == mujoco.mjtGeom.mjGEOM_CAPSULE:
+                for end in (-size[1], size[1]):
+                    ball = Element("sphere", {"radius": numbers([size[0]])})
+                    yield np.array([0.0, 0.0, end]), ball
+        else:
+            half = size if kind == mujoco.mjtGeom.mjGEOM_BOX else m.geom_aabb[geom, 3:]
+            yield here, Element("box", {"size": numbers(2 * half)})
+
+    def _mesh(self, mesh: int, colliding: bool) -> Element:
+        """A mesh as a file; of one that collides the hull, as which it does."""
+        import trimesh
+
+        m = self.m
+        first, count = m.mesh_vertadr[mesh], m.mesh_vertnum[mesh]
+        vertices = np.asarray(m.mesh_vert[first : first + count], float)
+        first, count = m.mesh_faceadr[mesh], m.mesh_facenum[mesh]
+        faces = np.asarray(m.mesh_face[first : first + count], np.int64)
+        name = f"{m.mesh(mesh).name}{'.hull' if colliding else ''}.stl"
+        if name not in self.files:
+            if colliding:
+                hull = trimesh.convex.convex_hull(vertices)
+                vertices, faces = np.asarray(hull.vertices), np.asarray(hull.faces)
+            self.files[name] = stl(Mesh(name, vertices, faces))
+        return Element("mesh", {"filename": f"{self.folder}/{name}"})
+
+    def _paint(self, element: Element, geom: int) -> None:
+        m = self.m
+        paint = m.geom_matid[geom]
+        rgba = m.mat_rgba[paint] if paint >= 0 else m.geom_rgba[geom]
+        material = add(element, "material", name=f"geom{geom}")
+        add(material, "color", rgba=numbers(round(float(c), 4) for c in rgba))
+
+    def _shape(self, link: Element, tag: str, geom: int, offset: Array, shape: Element) -> Element:
+        """A shape of a link, where its geom is and the offset along."""
+        turn = self.m.geom_quat[geom]
+        element = add(link, tag)
+        _origin(element, self.m.geom_pos[geom] + _turned(turn, offset), turn)
+        add(element, "geometry").append(shape)
+        return element
+
+
+def _limits(layout: Layout) -> dict[str, tuple[float, float]]:
+    """How far each joint goes [m]."""
+    found = {names.OUTFEED_SLIDE: (0.0, layout.outfeed_way)}
+    for robot, path in zip(layout.factory.robots, layout.guidepaths, strict=True):
+        found[names.slide(robot.name)] = min(path.reach, path.length), path.length
+    for index, stroke in layout.factory.strokes.items():
+        found[names.lift(layout.factory.robots[index].name)] = 0.0, stroke
+    return found
+
+
+def _origin(parent: Element, at: Iterable[float], quaternion: Array) -> None:
+    add(parent, "origin", xyz=numbers(at), rpy=numbers(roll_pitch_yaw(quaternion)))
+
+
+def roll_pitch_yaw(quaternion: Array) -> tuple[float, float, float]:
+    """The angles [rad] about the fixed axes x, y and z, in that order, of a unit quaternion."""
+    turn = rotation(quaternion)
+    pitch = atan2(-turn[2, 0], hypot(turn[0, 0], turn[1, 0]))
+    if abs(turn[2, 0]) > 1 - 1e-12:  # only roll and yaw together are determined
+        return atan2(-turn[1, 2], turn[1, 1]), pitch, 0.0
+    return atan2(turn[2, 1], turn[2, 2]), pitch, atan2(turn[1, 0], turn[0, 0])
+
+
+def _turned(quaternion: Array, vector: Array) -> Array:
+    from factory.engine import mujoco
+
+    found: Any = np.zeros(3)
+    mujoco.mju_rotVecQuat(found, np.asarray(vector, float), np.asarray(quaternion, float))
+    return np.asarray(found)

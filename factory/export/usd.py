@@ -1,0 +1,67 @@
+"""USD (binary, z upwards, metres) of a log's motion, frame by frame, by MuJoCo's own exporter."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from factory.export.motion import Motion, motion_of
+from factory.export.subject import Subject, optional
+from factory.log import Log
+
+if TYPE_CHECKING:
+    pass
+
+FORMAT, TAKES, BINARY = "usd", "log", True
+
+NAME = "usd"
+"""Of the exporter's folder, within a temporary one."""
+
+
+def export(subject: Subject) -> Mapping[str, bytes]:
+    """The stage and its textures. Raises MissingError where there is no usd-core."""
+    usd = optional("pxr.Usd", "usd-core", "USD", "usd")
+    motion = motion_of(subject)
+    textures = f"{Path(subject.name or subject.stem).stem}_textures"
+    with tempfile.TemporaryDirectory() as folder:
+        _record(motion, subject.log, folder)
+        (written,) = Path(folder, NAME, "frames").iterdir()
+        _finish(usd, written, motion, subject.log, textures)
+        found = {"": written.read_bytes()}
+        for image in sorted(Path(folder, NAME, "assets").iterdir()):
+            found[f"{textures}/{image.name}"] = image.read_bytes()
+    return found
+
+
+def _record(motion: Motion, log: Log, folder: str) -> None:
+    """Every frame, by MuJoCo's exporter."""
+    from factory.engine import mujoco
+
+    exporter = optional("mujoco.usd.exporter", "usd-core", "USD", "usd")
+    m, d = motion.m, mujoco.MjData(motion.m)
+    scene = exporter.USDExporter(
+        model=m, output_directory=NAME, output_directory_root=folder, verbose=False
+    )
+    for row in motion.rows:
+        d.qpos[:] = log.qpos[row]
+        mujoco.mj_kinematics(m, d)
+        mujoco.mj_comPos(m, d)
+        mujoco.mj_camlight(m, d)
+        scene.update_scene(d)
+    scene.save_scene("usdc")
+
+
+def _finish(usd: Any, path: Path, motion: Motion, log: Log, textures: str) -> None:
+    """Frames as fast as they are in the log; textures beside the file."""
+    utilities = optional("pxr.UsdUtils", "usd-core", "USD", "usd")
+    stage = usd.Stage.Open(str(path))
+    step = float(np.median(np.diff(log.time[motion.rows]))) if len(motion.rows) > 1 else 1.0
+    stage.SetTimeCodesPerSecond(round(1 / step, 6))
+    optional("pxr.UsdGeom", "usd-core", "USD", "usd").SetStageMetersPerUnit(stage, 1.0)
+    layer = stage.GetRootLayer()
+    utilities.ModifyAssetPaths(layer, lambda asset: f"{textures}/{Path(asset).name}")
+    layer.Save()

@@ -1,0 +1,163 @@
+"""Bills of materials with levels: how rows become drafts."""
+
+from __future__ import annotations
+
+import re
+
+from factory.errors import Diagnostic, InputError
+from factory.importing.bill_rows import Row, Table
+from factory.importing.draft import MATE, MOST_NODES, PART, Draft, Faults, too_many
+from factory.importing.part_maker import PartMaker, fits
+from factory.importing.places import Place
+from factory.importing.tree_file import mesh_name
+from factory.lang.source import Source, quoted
+from factory.lang.values import GEOMETRY
+from factory.lang.words import number
+from factory.pag import Value
+
+MOST_COPIES = 10_000
+"""The greatest quantity of a row."""
+
+
+class BillReader:
+    """Makes drafts of rows; what is wrong goes to the faults."""
+
+    def __init__(self, source: Source, parts: PartMaker, faults: Faults) -> None:
+        self.source, self.parts, self.faults = source, parts, faults
+        self.table = Table(source, faults)
+
+    def read(self, name: str) -> list[Draft]:
+        """The drafts of a bill; the product of several rows at the top is called `name`. Raises
+        InputError with every fault."""
+        rows = self.table.rows()
+        if not rows:
+            message, hint = "the bill has no rows", "below the header, a row is like 1,leg,4"
+            raise InputError(Diagnostic("EmptyNode", message, self.source.start(), hint))
+        if "item" in self.table.header.columns or any("." in _level(row) for row in rows):
+            self._number_parents(rows)
+        else:
+            self._level_parents(rows)
+        for row in rows:
+            self._check(row)
+        self.faults.raise_if_any()
+        drafts = self._expand(rows, name)
+        self.parts.check_places()
+        self.faults.raise_if_any()
+        return drafts
+
+    def _level_parents(self, rows: list[Row]) -> None:
+        """Levels 0, 1, 2: a row goes into the last one above it that is one level higher."""
+        above: list[tuple[int, int]] = []
+        for index, row in enumerate(rows):
+            text = _level(row)
+            if not re.fullmatch(r"[0-9]{1,9}", text):
+                hint = "levels are 0, 1, 2, or numbers like 1, 1.1, 1.2"
+                self._bad_level(row, f"{quoted(text)} is no level", hint)
+                continue
+            level = int(text)
+            before = above[-1][0] if above else level
+            while above and above[-1][0] >= level:
+                above.pop()
+            if level > before + 1:
+                hint = "a row is at most one level below the row before it"
+                self._bad_level(row, f"level {level} comes after level {before}", hint)
+            elif not above and index and level < int(_level(rows[0]) or 0):
+                hint = "the product, or its first part, comes first"
+                self._bad_level(row, f"level {level} is above that of the first row", hint)
+            row.parent = above[-1][1] if above else -1
+            above.append((level, index))
+
+    def _number_parents(self, rows: list[Row]) -> None:
+        """Numbers 1, 1.1, 1.2: a row goes into the one that has its number but the last."""
+        seen: dict[str, int] = {}
+        for index, row in enumerate(rows):
+            text = _level(row).rstrip(".")
+            above = text.rpartition(".")[0]
+            if not re.fullmatch(r"[0-9]+(\.[0-9]+)*", text):
+                self._bad_level(row, f"{quoted(text)} is no number like 1.2", "as in 1, 1.1, 1.2")
+            elif text in seen:
+                line = rows[seen[text]].position.line
+                message = f"number {text} is there twice, first in line {line}"
+                hint = "give each row its own; spreadsheets make 1.10 into 1.1: write it as text"
+                self._bad_level(row, message, hint)
+            elif above and above not in seen:
+                hint = "a sub-assembly's row comes before those of its parts"
+                self._bad_level(row, f"number {text} has no row {above} above it", hint)
+            row.parent = seen.get(above, -1)
+            seen.setdefault(text, index)
+
+    def _bad_level(self, row: Row, message: str, hint: str) -> None:
+        column = "level" if "level" in row.cells else "item"
+        self.faults.add("BadLevel", message, row.at(column), hint)
+
+    def _check(self, row: Row) -> None:
+        if not row.cells.get("name") and not row.cells.get("mesh"):
+            hint = "write its name, or its mesh"
+            self.faults.add("MissingPart", "the row names no part", row.at("name"), hint)
+        text = row.cells.get("quantity", "") or "1"
+        value = _number(text)
+        if value is None or value != int(value) or not 1 <= value <= MOST_COPIES:
+            message = f"the quantity {quoted(text)} is no whole number from 1 to {MOST_COPIES}"
+            hint = "how many go into one of the row above it"
+            self.faults.add("BadValue", message, row.at("quantity"), hint)
+        else:
+            row.quantity = int(value)
+
+    def _expand(self, rows: list[Row], name: str) -> list[Draft]:
+        """A draft for each copy of each row, below one for the product."""
+        below: dict[int, list[int]] = {}
+        for index, row in enumerate(rows):
+            below.setdefault(row.parent, []).append(index)
+        drafts = [Draft(name, rows[0].position)]
+        stack = [(0, -1)]
+        while stack:
+            parent, of = stack.pop()
+            for index in below.get(of, ()):
+                for _ in range(rows[index].quantity):
+                    if len(drafts) > MOST_NODES:
+                        raise too_many(rows[index].position)
+                    drafts[parent].inputs.append(len(drafts))
+                    if index in below:
+                        stack.append((len(drafts), index))
+                    drafts.append(self._draft(rows[index], index in below))
+        return drafts
+
+    def _draft(self, row: Row, is_group: bool) -> Draft:
+        mesh = row.cells.get("mesh", "")
+        name = row.cells.get("name") or mesh_name(mesh)
+        if is_group:
+            return Draft(name, row.at("name"), MATE)
+        given: dict[str, Value] = {"mesh": mesh} if mesh else {}
+        if any(row.cells.get(axis) for axis in "xyz"):
+            given["pos"] = tuple(self._length(row, axis) for axis in "xyz")
+        for column in ("mass", "density"):
+            value = self._value(row, column)
+            if value is not None:
+                given[column] = value
+        made = self.parts.parameters(given, Place(), row.at("mesh"))
+        return Draft(name, row.at("name"), PART, [], made)
+
+    def _length(self, row: Row, axis: str) -> float:
+        """In the unit of the bill, whatever that of its column is."""
+        value = self._value(row, axis) or 0.0
+        unit = self.table.header.units.get(axis)
+        return value if unit is None else round(value * unit / self.parts.unit, 12)
+
+    def _value(self, row: Row, column: str) -> float | None:
+        text = row.cells.get(column, "")
+        value = _number(text)
+        kind = GEOMETRY.get(column)
+        if text and (value is None or (kind is not None and not fits(kind, (value,)))):
+            message = f"'{column}' takes {kind.wanted if kind else 'a number'}, not {quoted(text)}"
+            self.faults.add("BadValue", message, row.at(column), "for example 0.25")
+        return value
+
+
+def _level(row: Row) -> str:
+    """What a row says of its level; leading dots, as some programs print them, do not count."""
+    return (row.cells.get("level") or row.cells.get("item", "")).lstrip(". ")
+
+
+def _number(text: str) -> float | None:
+    """A number, with a decimal comma too."""
+    return number(text.replace(",", "."))

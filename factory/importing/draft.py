@@ -1,0 +1,92 @@
+"""A product as a file describes it, before it is a PAG: nodes that point at their inputs."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+
+from factory.errors import Diagnostic, InputError, Position
+from factory.lang.source import Findings
+from factory.pag import Parameter
+
+PART, MATE = "atomic", "mate"
+
+MOST_NODES = 100_000
+"""A product of more parts and sub-assemblies is refused: its file is a mistake, or a bomb."""
+
+SHOWN = 20
+"""At most so many faults of one file are told."""
+
+
+@dataclass(slots=True)
+class Draft:
+    """One node. `inputs` are indices in the list of drafts, of which the first is the product; a
+    part has none. `name` is what the file calls it, "" for nothing; a `kept` name is a label that
+    the user has chosen, so no other node may have it."""
+
+    name: str
+    position: Position
+    operation: str = MATE
+    inputs: list[int] = field(default_factory=list)
+    parameters: tuple[Parameter, ...] = ()
+    kept: bool = False
+
+    @property
+    def is_part(self) -> bool:
+        return self.operation == PART
+
+
+@dataclass(slots=True)
+class Faults(Findings):
+    """The errors found in one product's files, and the warnings."""
+
+    warnings: list[Diagnostic] = field(default_factory=list)
+
+    def warn(self, code: str, message: str, position: Position, hint: str) -> None:
+        """Note something that does not keep the product from being made."""
+        self.warnings.append(Diagnostic(code, message, position, hint))
+
+    def raise_if_any(self) -> None:
+        """Raise one InputError with the first errors found, if there is any; what is said of
+        several places is said once."""
+        found: dict[tuple[str, str], list[Diagnostic]] = {}
+        for diagnostic in sorted(self.diagnostics, key=_place):
+            found.setdefault((diagnostic.code, diagnostic.message), []).append(diagnostic)
+        told = [_once(alike) for alike in found.values()]
+        if len(told) > SHOWN:
+            message = f"and {len(told) - SHOWN} more errors"
+            told = [*told[:SHOWN], Diagnostic(told[-1].code, message)]
+        if told:
+            raise InputError(told)
+
+
+def _once(alike: list[Diagnostic]) -> Diagnostic:
+    """The first of several diagnostics that say the same."""
+    places = len({d.position for d in alike}) - 1
+    more = f" (and in {places} more place{'s' * (places > 1)})" if places else ""
+    return replace(alike[0], message=alike[0].message + more)
+
+
+def _place(diagnostic: Diagnostic) -> tuple[str, int, int]:
+    at = diagnostic.position
+    return (at.file, at.line, at.column) if at else ("", 0, 0)
+
+
+def postorder(drafts: Sequence[Draft]) -> list[int]:
+    """Every node that the first one is made of after its inputs, itself last."""
+    order, stack = [], [(0, False)]
+    while stack:
+        index, expanded = stack.pop()
+        if expanded or not drafts[index].inputs:
+            order.append(index)
+        else:
+            stack.append((index, True))
+            stack.extend((child, False) for child in reversed(drafts[index].inputs))
+    return order
+
+
+def too_many(position: Position) -> InputError:
+    """The refusal of a product that is larger than any."""
+    message = f"the product has more than {MOST_NODES} parts and sub-assemblies"
+    hint = "import its sub-assemblies one by one"
+    return InputError(Diagnostic("TooLarge", message, position, hint))

@@ -1,0 +1,221 @@
+"""LDraw models as drafts: sub-models are sub-assemblies, each building step adds to what is
+there."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from factory.errors import Diagnostic
+from factory.importing.draft import MATE, MOST_NODES, PART, Draft, Faults, too_many
+from factory.importing.ldraw.colours import INHERITED, direct_colour
+from factory.importing.ldraw.lines import LDrawFile, Reference, key_of
+from factory.importing.ldraw.shapes import LDU, LIBRARY, UPRIGHT, Shapes, matrix, mesh_of
+from factory.importing.ldraw.shelf import Shelf
+from factory.importing.mesh_store import MeshStore
+from factory.importing.places import quaternion, rounded
+from factory.lang.source import quoted
+from factory.meshes import Array
+from factory.pag import Parameter
+
+DENSITY = 1050.0
+"""Of ABS [kg/m³]."""
+
+BRICK = (0.008, 0.008, 0.0096)
+"""The box that stands for a part of unknown shape: a brick with one stud [m]."""
+
+TURNED = 1e-3
+"""A matrix this close to a rotation is one: files are written with three digits and more."""
+
+Colour = tuple[float, float, float, float] | None
+
+
+@dataclass(frozen=True, slots=True)
+class _Place:
+    """Where a model stands in the product [LDU], and the colour that it hands down."""
+
+    turn: Array
+    at: Array
+    colour: int
+
+
+def read_ldraw(
+    path: Path, library: Path | None, boxes: bool, store: MeshStore, faults: Faults
+) -> list[Draft]:
+    """The drafts of a model, its main file first. Parts whose shape is nowhere are an error
+    (MissingPart), or with `boxes` a box. Raises InputError with every fault found."""
+    shelf = Shelf(path, library, faults)
+    reader = _ModelReader(shelf, Shapes(shelf), boxes, store, faults)
+    faults.raise_if_any()
+    reader.survey()
+    faults.raise_if_any()
+    drafts = reader.expand()
+    faults.raise_if_any()
+    return drafts
+
+
+class _ModelReader:
+    def __init__(
+        self, shelf: Shelf, shapes: Shapes, boxes: bool, store: MeshStore, faults: Faults
+    ) -> None:
+        self.shelf, self.shapes, self.boxes = shelf, shapes, boxes
+        self.store, self.faults = store, faults
+        self.meshes: dict[tuple[int, bytes], str] = {}
+        self.there: dict[tuple[str, bytes], list[Reference]] = {}
+        self.greys: set[int] = set()
+
+    def survey(self) -> None:
+        """Goes through every model once: nothing missing, empty, made of itself or too large."""
+        size: dict[int, int] = {}
+        stack, path = [(self.shelf.main, False)], dict[int, None]()
+        while stack:
+            model, expanded = stack.pop()
+            if expanded:
+                path.pop(id(model))
+                size[id(model)] = 1 + sum(self._size(r, size) for r in model.references)
+                if size[id(model)] > MOST_NODES:
+                    raise too_many(model.position)
+            elif id(model) not in size and id(model) not in path:
+                path[id(model)] = None
+                stack.append((model, True))
+                stack += [(below, False) for below in self._models_in(model, path)]
+
+    def _size(self, reference: Reference, size: dict[int, int]) -> int:
+        below = self.shelf.find(reference.file, reference.position)
+        return 1 if below is None else size.get(id(below), 1)
+
+    def _models_in(self, model: LDrawFile, path: dict[int, None]) -> list[LDrawFile]:
+        if not any(model.steps):
+            message = f"the model {quoted(model.name)} has no parts"
+            hint = "a model places parts and other models by lines of type 1"
+            self.faults.add("EmptyNode", message, model.position, hint)
+        if model.triangles:
+            message = f"{quoted(model.name)} has surfaces of its own, which are left out"
+            hint = "only parts have shapes: put them in a 0 FILE of their own, ending in .dat"
+            self.faults.warn("BadMesh", message, model.position, hint)
+        found = []
+        for reference in model.references:
+            below = self.shelf.find(reference.file, reference.position)
+            if below is not None and id(below) in path:
+                message = f"the model {quoted(reference.file)} is made of itself"
+                hint = "remove this line, or the one that leads here"
+                self.faults.add("CyclicModel", message, reference.position, hint)
+            elif below is not None and not below.is_part:
+                found.append(below)
+            else:
+                self._check_part(reference, below)
+        return found
+
+    def _check_part(self, reference: Reference, file: LDrawFile | None) -> None:
+        if abs(np.linalg.det(matrix(reference))) < 1e-9:
+            message = f"the matrix of {quoted(reference.file)} makes it flat"
+            self.faults.add(
+                "BadValue", message, reference.position, "1 0 0 0 1 0 0 0 1 turns nothing"
+            )
+        if self.boxes:
+            return
+        if file is None and key_of(reference.file) not in self.shelf.refused:
+            message = f"there is no part file {quoted(reference.file)}"
+            self.faults.add("MissingPart", message, reference.position, LIBRARY)
+        elif file is not None and self.shapes.of(file) is None:
+            trouble = self.shapes.troubles.get(id(file))
+            if trouble is not None:
+                self.faults.diagnostics.append(trouble)
+
+    def expand(self) -> list[Draft]:
+        """A draft for every model, step and part of the product."""
+        main = self.shelf.main
+        drafts = [Draft(_name(main), main.position)]
+        stack = [(main, 0, _Place(np.eye(3), np.zeros(3), INHERITED[0]))]
+        while stack:
+            model, index, place = stack.pop()
+            steps = [step for step in model.steps if step]
+            for number, step in reversed(list(enumerate(steps))):
+                entries = [self._enter(reference, place, drafts) for reference in step]
+                drafts[index].inputs = [entry for entry, _ in entries]
+                stack += [(file, entry, at) for entry, (file, at) in entries if file is not None]
+                if number > 0:
+                    drafts.append(Draft("", step[0].position))
+                    drafts[index].inputs.insert(0, len(drafts) - 1)
+                    index = len(drafts) - 1
+        self._refuse_twice()
+        return drafts
+
+    def _enter(
+        self, reference: Reference, place: _Place, drafts: list[Draft]
+    ) -> tuple[int, tuple[LDrawFile | None, _Place]]:
+        """Adds the draft of one line; its number, and the model that it stands for, if any."""
+        turn = place.turn @ matrix(reference)
+        at = place.turn @ np.array(reference.place[:3]) + place.at
+        colour = place.colour if reference.colour in INHERITED else reference.colour
+        here = _Place(turn, at, colour)
+        file = self.shelf.find(reference.file, reference.position)
+        if file is not None and not file.is_part:
+            drafts.append(Draft(_name(file), reference.position, MATE))
+            return len(drafts) - 1, (file, here)
+        where = np.round(np.concatenate([turn.ravel(), at]), 3) + 0.0
+        self.there.setdefault((key_of(reference.file), where.tobytes()), []).append(reference)
+        drafts.append(Draft("", reference.position, PART, [], self._look(reference, file, here)))
+        return len(drafts) - 1, (None, here)
+
+    def _refuse_twice(self) -> None:
+        for references in self.there.values():
+            first, *others = sorted(references, key=lambda r: (r.position.file, r.position.line))
+            for reference in others:
+                line = first.position.line
+                message = f"{quoted(reference.file)} is in the place where line {line} has put it"
+                hint = "a part is used once: remove one of the two lines, or move one"
+                self.faults.add("UsedTwice", message, reference.position, hint)
+
+    def _look(
+        self, reference: Reference, file: LDrawFile | None, place: _Place
+    ) -> tuple[Parameter, ...]:
+        """The geometry of a part: shape, place, density, colour."""
+        turn = UPRIGHT @ place.turn @ UPRIGHT.T
+        rigid = np.abs(turn @ turn.T - np.eye(3)).max() < TURNED and np.linalg.det(turn) > 0
+        mesh = self._mesh(reference, file, np.eye(3) if rigid else place.turn)
+        found = [Parameter("mesh", mesh) if mesh else Parameter("box", BRICK)]
+        at = UPRIGHT @ place.at * LDU
+        if not mesh:
+            at = at - turn @ np.array([0.0, 0.0, BRICK[2] / 2])
+        found.append(Parameter("pos", rounded(at)))
+        if rigid and np.abs(turn - np.eye(3)).max() > 1e-9:
+            found.append(Parameter("quat", quaternion(turn)))
+        found.append(Parameter("density", DENSITY))
+        rgba = self._rgba(place.colour, reference)
+        return (*found, Parameter("rgba", rgba)) if rgba else tuple(found)
+
+    def _mesh(self, reference: Reference, file: LDrawFile | None, turn: Array) -> str:
+        """The path of a part's mesh; "" where it has none."""
+        triangles = self.shapes.of(file) if file is not None else None
+        if file is None or triangles is None:
+            return ""
+        key = (id(file), np.round(turn, 6).tobytes())
+        if key not in self.meshes:
+            content = mesh_of(triangles, turn)
+            if content is None and not self.boxes:
+                message = f"the part {quoted(reference.file)} has no surfaces"
+                self.faults.add("BadMesh", message, reference.position, "--boxes does without")
+            stem = re.sub(r"\.(dat|ldr)$", "", key_of(file.name))
+            self.meshes[key] = self.store.add(stem, ".obj", content) if content else ""
+        return self.meshes[key]
+
+    def _rgba(self, code: int, reference: Reference) -> Colour:
+        if code in INHERITED:
+            return None
+        known = self.shelf.colours.get(code) or direct_colour(code)
+        if known is None and code not in self.greys:
+            self.greys.add(code)
+            message = f"colour {code} is not known: the part gets one of the factory's"
+            hint = "a library's LDConfig.ldr defines colours, or a line 0 !COLOUR"
+            self.faults.warnings.append(
+                Diagnostic("UnknownColour", message, replace(reference.position, column=3), hint)
+            )
+        return known
+
+
+def _name(file: LDrawFile) -> str:
+    return re.sub(r"(?i)\.(ldr|mpd|dat)$", "", file.name)

@@ -1,0 +1,123 @@
+"""The shapes of LDraw parts: triangles of a file and of all that it refers to."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from factory.errors import Diagnostic
+from factory.importing.ldraw.lines import LDrawFile, Reference
+from factory.importing.ldraw.shelf import Shelf
+from factory.lang.source import quoted
+from factory.meshes import Array
+
+LDU = 0.0004
+"""[m]"""
+
+UPRIGHT = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
+"""From LDraw's axes, -y up, to the factory's, z up."""
+
+MOST_TRIANGLES = 1_000_000
+"""Of one part; sub-files of sub-files can multiply without end."""
+
+LIBRARY = "--library DIR names a parts library (or LDRAWDIR does); --boxes does without"
+"""The way out where a part file is missing."""
+
+
+def matrix(reference: Reference) -> Array:
+    """The matrix (3, 3) of a reference."""
+    return np.array(reference.place[3:]).reshape(3, 3)
+
+
+class Shapes:
+    """Triangles (n, 3, 3) of files [LDU], each found once. What cannot be found is in `troubles`,
+    by the file that lacks it."""
+
+    def __init__(self, shelf: Shelf) -> None:
+        self.shelf = shelf
+        self.done: dict[int, Array] = {}
+        self.troubles: dict[int, Diagnostic] = {}
+
+    def of(self, file: LDrawFile) -> Array | None:
+        """The triangles of a part; None, with its trouble noted, where they are not to be had."""
+        stack, path = [(file, False)], dict[int, None]()
+        while stack:
+            current, expanded = stack.pop()
+            if id(current) in self.done or id(current) in self.troubles:
+                continue
+            if expanded:
+                path.pop(id(current))
+                self._join(current)
+                continue
+            path[id(current)] = None
+            stack.append((current, True))
+            stack += [(below, False) for below in self._below(current, path)]
+        return self.done.get(id(file))
+
+    def _below(self, file: LDrawFile, path: dict[int, None]) -> list[LDrawFile]:
+        found = []
+        for reference in file.references:
+            below = self.shelf.find(reference.file, reference.position)
+            if below is not None and id(below) in path:
+                message = f"{quoted(reference.file)} is made of itself"
+                self._lacks(file, "CyclicModel", message, reference, "remove the line")
+            elif below is not None:
+                found.append(below)
+        return found
+
+    def _lacks(self, file: LDrawFile, code: str, message: str, at: Reference, hint: str) -> None:
+        self.troubles.setdefault(id(file), Diagnostic(code, message, at.position, hint))
+
+    def _join(self, file: LDrawFile) -> None:
+        """The triangles of a file whose sub-files are done."""
+        pieces, count = [np.array(file.triangles).reshape(-1, 3, 3)], len(file.triangles)
+        for reference in file.references:
+            below = self.shelf.find(reference.file, reference.position)
+            if below is None:
+                message = f"there is no part file {quoted(reference.file)}"
+                self._lacks(file, "MissingPart", message, reference, LIBRARY)
+                return
+            if id(below) in self.troubles:
+                self.troubles.setdefault(id(file), self.troubles[id(below)])
+                return
+            if id(below) not in self.done:
+                return
+            count += len(self.done[id(below)])
+            if count > MOST_TRIANGLES:
+                message = f"{quoted(file.name)} has more than {MOST_TRIANGLES} triangles"
+                self._lacks(file, "TooLarge", message, reference, "use a simpler part")
+                return
+            pieces.append(_placed(self.done[id(below)], reference))
+        self.done[id(file)] = np.concatenate(pieces)
+
+
+def _placed(triangles: Array, reference: Reference) -> Array:
+    """Triangles as a reference places them; a mirror turns them round."""
+    turn = matrix(reference)
+    moved = triangles @ turn.T + np.array(reference.place[:3])
+    inside_out = reference.inverted != (np.linalg.det(turn) < 0)
+    return np.asarray(moved[:, ::-1] if inside_out else moved)
+
+
+def mesh_of(triangles: Array, turn: Array) -> bytes | None:
+    """An OBJ file [m], z up, of triangles [LDU] that `turn` has turned; None if it is empty."""
+    import trimesh
+
+    corners = triangles @ turn.T @ UPRIGHT.T * LDU
+    if np.linalg.det(turn) < 0:
+        corners = corners[:, ::-1]
+    corners = np.round(corners, 7) + 0.0
+    points, faces = np.unique(corners.reshape(-1, 3), axis=0, return_inverse=True)
+    body = trimesh.Trimesh(points, faces.reshape(-1, 3), process=False)
+    body.update_faces(body.nondegenerate_faces())
+    if not len(body.faces):
+        return None
+    if body.is_watertight and body.is_winding_consistent and body.volume < 0:
+        body.invert()
+    return _obj(points, np.asarray(body.faces))
+
+
+def _obj(points: Array, faces: Array) -> bytes:
+    lines = ["# made by factory import from LDraw parts; metres, z up"]
+    lines += [f"v {x:.7g} {y:.7g} {z:.7g}" for x, y, z in points.tolist()]
+    lines += [f"f {a + 1} {b + 1} {c + 1}" for a, b, c in faces.tolist()]
+    return ("\n".join(lines) + "\n").encode()

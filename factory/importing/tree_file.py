@@ -1,0 +1,224 @@
+"""Trees of parts as nested JSON or YAML: what the nodes may say, and how they become drafts."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import PurePosixPath
+
+from factory.errors import did_you_mean
+from factory.importing.document import Value as Node
+from factory.importing.draft import MATE, MOST_NODES, PART, Draft, Faults, too_many
+from factory.importing.labels import label_of
+from factory.importing.part_maker import PartMaker, fits
+from factory.importing.places import Place
+from factory.lang.operations import MESHES, Signature
+from factory.lang.source import quoted
+from factory.lang.values import GEOMETRY, SHAPES, Kind
+from factory.pag import Parameter, Value
+
+GROUP = ("name", "children", "operation", "parameters", "at", "quat")
+LEAF = ("name", "part", "at", *(name for name in GEOMETRY if name not in ("pos", "mesh")))
+"""The keys of a sub-assembly, and those of a part."""
+
+EXAMPLE = '{"part": "leg.stl", "at": [0, 0, 0.1]} or {"name": "frame", "children": [...]}'
+BARE = '"part": true is a part with no shape of its own'
+
+
+@dataclass(slots=True)
+class TreeReader:
+    """Makes drafts of nodes; what is wrong goes to the faults.
+
+    `operations`: the templates that nodes may name.
+    """
+
+    operations: Mapping[str, Signature]
+    parts: PartMaker
+    faults: Faults
+    drafts: list[Draft] = field(default_factory=list)
+
+    def read(self, root: Node, name: str) -> list[Draft]:
+        """The drafts of a tree; a root without a name is called `name`. Raises InputError with
+        every fault."""
+        self.drafts.append(Draft(name, root.position))
+        stack = [(root, 0, Place())]
+        while stack:
+            node, index, place = stack.pop()
+            children, inside = self._node(node, self.drafts[index], place)
+            first = len(self.drafts)
+            for child in children:
+                if len(self.drafts) > MOST_NODES:
+                    raise too_many(child.position)
+                self.drafts.append(Draft("", child.position))
+            below = range(first, len(self.drafts))
+            self.drafts[index].inputs = list(below)
+            entries = zip(children, below, strict=True)
+            stack += [(child, number, inside) for child, number in entries][::-1]
+        self.parts.check_places()
+        self.faults.raise_if_any()
+        return self.drafts
+
+    def _node(self, node: Node, draft: Draft, place: Place) -> tuple[tuple[Node, ...], Place]:
+        """Fills in a draft; its children, and the frame that they are in."""
+        if node.kind == "text":
+            self._part({"part": node}, draft, place)
+            return (), place
+        if node.kind != "object":
+            message = f"a node is an object or the name of a mesh, not {node.words}"
+            self.faults.add("Syntax", message, node.position, f"for example {EXAMPLE}")
+            return (), place
+        before = len(self.faults.diagnostics)
+        is_group = any(key.content in ("children", "operation") for key, _ in node.content)
+        fields = self._fields(node, GROUP if is_group else LEAF)
+        self._name(fields, draft)
+        if is_group:
+            return self._group(fields, draft, place)
+        if not {"part", *SHAPES} & set(fields) and len(self.faults.diagnostics) == before:
+            self._empty(draft, "it has neither children nor a part")
+        self._part(fields, draft, place)
+        return (), place
+
+    def _fields(self, node: Node, keys: tuple[str, ...]) -> dict[str, Node]:
+        """The values of a node by their keys, of which each is known and there once."""
+        fields: dict[str, Node] = {}
+        for key, value in node.content:
+            known = {"mesh": "part", "pos": "at"}.get(str(key.content), str(key.content))
+            if known in LEAF and known not in keys:
+                message, hint = "a sub-assembly is no part", "make the part one of its children"
+                self.faults.add("UnknownParameter", message, key.position, hint)
+            elif known not in keys:
+                hint = did_you_mean(known, list(keys), "keys")
+                what = "a sub-assembly" if "children" in keys else "a part"
+                message = f"{what} has no key {quoted(known)}"
+                self.faults.add("UnknownParameter", message, key.position, hint)
+            elif known in fields:
+                message = f"{quoted(known)} is given twice"
+                self.faults.add("BadValue", message, key.position, "remove one of the two")
+            else:
+                fields[known] = value
+        return fields
+
+    def _name(self, fields: dict[str, Node], draft: Draft) -> None:
+        name = fields.pop("name", None)
+        if name is None:
+            return
+        if name.kind != "text" or not label_of(name.content):
+            message = f"'name' takes a text with a letter or a digit, not {name.words}"
+            self.faults.add("BadValue", message, name.position, 'for example "name": "leg"')
+        else:
+            draft.name, draft.position = label_of(name.content), name.position
+            draft.kept = True
+
+    def _empty(self, draft: Draft, why: str) -> None:
+        what = quoted(draft.name) if draft.name else "a node"
+        hint = BARE if "neither" in why else f"for example {EXAMPLE}"
+        self.faults.add("EmptyNode", f"{what} is empty: {why}", draft.position, hint)
+
+    def _group(
+        self, fields: dict[str, Node], draft: Draft, place: Place
+    ) -> tuple[tuple[Node, ...], Place]:
+        children = fields.get("children")
+        if children is None or children.kind != "list" or not children.content:
+            none = children is None or children.kind in ("list", "null")
+            self._empty(draft, "it has no children" if none else "its children are no list")
+            return (), place
+        inside = place.inside(self._length("at", fields), self._numbers("quat", fields))
+        self._operation(fields, draft, len(children.content))
+        return children.content, inside
+
+    def _operation(self, fields: dict[str, Node], draft: Draft, count: int) -> None:
+        node = fields.get("operation")
+        if node is not None and node.kind != "text":
+            message = f"'operation' takes a text, not {node.words}"
+            self.faults.add("BadValue", message, node.position, 'for example "operation": "glue"')
+            return
+        name = MATE if node is None else str(node.content)
+        found = self.operations.get(name)
+        at = draft.position if node is None else node.position
+        if found is None or found.inputs == 0 or name == "dropoff":
+            usable = [o.name for o in self.operations.values() if o.inputs and o.name != "dropoff"]
+            hint = did_you_mean(name, sorted(usable), "operations")
+            message = f"there is no operation {quoted(name)} on sub-assemblies"
+            self.faults.add("UnknownOperation", message, at, hint)
+            return
+        few, many = count < found.inputs and name != MATE, count > found.inputs
+        if few or (many and not found.further):
+            message = f"{quoted(name)} takes {found.takes}, not {count}"
+            hint = "mate the children in a node of their own first"
+            self.faults.add("WrongInputs", message, at, hint)
+        draft.operation = name
+        draft.parameters = self._parameters(fields.get("parameters"), found)
+
+    def _parameters(self, node: Node | None, operation: Signature) -> tuple[Parameter, ...]:
+        made: list[Parameter] = []
+        if node is not None and node.kind != "object":
+            message = f"'parameters' takes an object, not {node.words}"
+            hint = 'for example "parameters": {"dwell": 2}'
+            self.faults.add("BadValue", message, node.position, hint)
+        elif node is not None:
+            for key, value in node.content:
+                kind = operation.parameters.get(str(key.content))
+                if kind is None:
+                    hint = did_you_mean(str(key.content), list(operation.parameters), "parameters")
+                    message = f"{quoted(operation.name)} has no parameter {key.words}"
+                    self.faults.add("UnknownParameter", message, key.position, hint)
+                elif (found := self._value(str(key.content), kind, value)) is not None:
+                    made.append(Parameter(key.content, found))
+        return tuple(made)
+
+    def _part(self, fields: dict[str, Node], draft: Draft, place: Place) -> None:
+        draft.operation = PART
+        part = fields.pop("part", None)
+        given: dict[str, Value] = {}
+        if part is not None and part.kind == "text":
+            given["mesh"] = part.content
+            draft.name = draft.name or mesh_name(part.content)
+        elif part is not None and not (part.kind == "boolean" and part.content):
+            message = f"'part' takes the name of a mesh file, or true, not {part.words}"
+            self.faults.add("BadValue", message, part.position, f"for example {EXAMPLE}")
+        for name, node in fields.items():
+            of = "pos" if name == "at" else name
+            value = self._value(name, GEOMETRY[of], node)
+            if value is not None:
+                given[of] = value
+        at = draft.position if part is None else part.position
+        draft.parameters = self.parts.parameters(given, place, at)
+
+    def _length(self, name: str, fields: dict[str, Node]) -> tuple[float, ...] | None:
+        found = self._numbers(name, fields)
+        return None if found is None else tuple(x * self.parts.unit for x in found)
+
+    def _numbers(self, name: str, fields: dict[str, Node]) -> tuple[float, ...] | None:
+        if name not in fields:
+            return None
+        kind = GEOMETRY["pos" if name == "at" else name]
+        found = self._value(name, kind, fields[name])
+        return found if isinstance(found, tuple) else None
+
+    def _value(self, name: str, kind: Kind, node: Node) -> Value | None:
+        """What a parameter of this kind takes; None after a fault."""
+        if kind.length == 0 and node.kind == "text" and node.content.isprintable():
+            return str(node.content)
+        numbers = (node,) if node.kind == "number" else node.content
+        if (node.kind == "list") == (kind.length > 1) and node.kind in ("list", "number"):
+            found = tuple(n.content for n in numbers if n.kind == "number")
+            if len(found) == len(numbers) and fits(kind, found):
+                return found if kind.length > 1 else found[0]
+        message = f"{quoted(name)} takes {kind.wanted}, not {_shown(node)}"
+        listed = kind.example.replace("( ", "[").replace(" )", "]")
+        self.faults.add("BadValue", message, node.position, f'for example "{name}": {listed}')
+        return None
+
+
+def mesh_name(path: str) -> str:
+    """What a part is called after its mesh: the file's name without folder and ending."""
+    name = PurePosixPath(path.replace("\\", "/"))
+    return name.stem if name.suffix.lower() in MESHES else name.name
+
+
+def _shown(node: Node) -> str:
+    """What was found, for a message: a list with what is in it."""
+    if node.kind != "list":
+        return node.words
+    inside = ", ".join(item.words for item in node.content[:6])
+    return f"[{inside}{', ...' * (len(node.content) > 6)}]"

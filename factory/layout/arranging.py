@@ -1,0 +1,81 @@
+"""Arrange a whole factory: dynamic programming over the tree of guidepaths.
+
+A robot can lie on the floor in four ways (its heading and its side, each of two directions along
+one axis), and its branch lies as it does. Leaves first, each robot is packed once for each way that
+its carrier may ask for; then the sides are read off from the output robot on.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from factory.factory import Operation
+from factory.layout.outline import Outline
+from factory.layout.packing import Packing, Task
+from factory.layout.plan import Box, Point2
+from factory.layout.shapes import carriers, oriented_shape
+from factory.layout.sides import admitted
+from factory.layout.stretching import Shape, Sides, Stretched, up
+
+Frame = tuple[Point2, Point2]
+"""(u, t): how a robot lies on the floor."""
+
+OUTPUT: Frame = ((1.0, 0.0), (0.0, 1.0))
+"""How the output robot does."""
+
+
+def arrange(
+    task: Task, payloads: Mapping[str, Box], sides: Sides | None = None
+) -> tuple[Stretched, list[Shape]]:
+    """Travels, stations and sides with the shapes that they give; with `sides` these alone are
+    looked at. Linear."""
+    factory, on = task.factory, carriers(task.factory)
+    table: list[dict[Frame, Outline]] = [{} for _ in factory.robots]
+    for robot, frames in reversed(list(enumerate(_frames(on, sides)))):
+        for u, t in frames:
+            shape = oriented_shape(factory, payloads, robot, on[robot], u, t, task.clearance)
+
+            def outline(guest: int, side: int, u: Point2 = u, t: Point2 = t) -> Outline:
+                return table[guest][turned(u, t, side)]
+
+            def admits(operation: Operation, chosen: Sides, t: Point2 = t) -> bool:
+                if sides is not None:
+                    return all(sides[robot] == side for robot, side in chosen.items())
+                return admitted(operation, chosen, t)
+
+            table[robot][u, t] = Packing(task, robot, shape, outline, admits).packed()
+    return _chosen(task, table)
+
+
+def turned(u: Point2, t: Point2, side: int) -> Frame:
+    """The frame of a robot on one side of a path with the frame (u, t)."""
+    return (-side * t[0], -side * t[1]), u
+
+
+def _frames(on: Sequence[int], sides: Sides | None) -> list[tuple[Frame, ...]]:
+    """The frames in which each robot may lie."""
+    found: list[tuple[Frame, ...]] = [(OUTPUT,)]
+    for robot, carrier in list(enumerate(on))[1:]:
+        both = (-1, +1) if sides is None else (sides[robot],)
+        frames = [turned(u, t, side) for u, t in found[carrier] for side in both]
+        found.append(tuple(dict.fromkeys(frames)))
+    return found
+
+
+def _chosen(task: Task, table: Sequence[Mapping[Frame, Outline]]) -> tuple[Stretched, list[Shape]]:
+    """What was chosen for the frames that the output robot's gives."""
+    robots, operations = len(table), len(task.factory.operations)
+    travel, stations, sides = [0.0] * robots, [0.0] * operations, Sides()
+    frames, outlines = [OUTPUT] * robots, list[Outline]()
+    for robot in range(robots):
+        u, t = frames[robot]
+        outlines.append(table[robot][u, t])
+        plan = outlines[-1].plan
+        for number, station in plan.stations.items():
+            stations[number] = station
+        for guest, side in plan.sides.items():
+            sides[guest], travel[guest] = side, plan.travels[guest]
+            frames[guest] = turned(u, t, side)
+    last = outlines[0].shape.last
+    travel[0] = up(outlines[0].ahead - min(0.0, last[0]) + task.clearance.c)
+    return Stretched(travel, stations, sides), [outline.shape for outline in outlines]

@@ -1,0 +1,124 @@
+"""From lengths to a layout: every guidepath placed on the floor, the outfeed before the output
+robot."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from math import floor
+
+from factory.factory import Factory
+from factory.geometry import Product
+from factory.layout.dimensions import CARRIAGE, Clearance
+from factory.layout.plan import Box, Extent, Guidepath, Layout, Point2
+from factory.layout.shapes import carriers
+from factory.layout.stretching import Shape, Sides, Stretched, up
+from factory.layout.sweeps import ALWAYS, KINDS, OUTFEED, Region, hull, piles, regions
+
+SHED = 0.1
+"""Length of the open part of the outfeed beyond the product, and of what its end has to spare
+[m]."""
+
+
+def headings(factory: Factory, sides: Sides) -> list[tuple[Point2, Point2]]:
+    """(u, t) of each robot: a robot on side +1 of its carrier heads against the carrier's t."""
+    axes: list[tuple[Point2, Point2]] = [((1.0, 0.0), (0.0, 1.0))] * len(factory.robots)
+    for robot, carrier in enumerate(carriers(factory)):
+        if carrier >= 0:
+            (u, t), side = axes[carrier], sides[robot]
+            axes[robot] = ((-side * t[0], -side * t[1]), u)
+    return axes
+
+
+@dataclass(frozen=True, slots=True)
+class Draft:
+    """All that is needed to place the robots of a factory on a floor."""
+
+    factory: Factory
+    product: Product
+    clearance: Clearance
+    payloads: Mapping[str, Box]
+    shapes: Sequence[Shape]
+    stretched: Stretched
+
+    def layout(self) -> Layout:
+        """The layout that these lengths give, the output robot's path as short as can be; the
+        floor it takes is not known yet."""
+        travel = list(self.stretched.travel)
+        travel[0] = round(travel[0] - _spare(self._layout(travel)), 3)
+        return self._layout(travel)
+
+    def _layout(self, travel: Sequence[float]) -> Layout:
+        guidepaths = self._guidepaths(travel)
+        return Layout(
+            self.factory,
+            self.product,
+            self.clearance.c,
+            guidepaths,
+            tuple(self.stretched.stations),
+            self.payloads,
+            _outfeed(guidepaths[0], self.shapes[0].last, self.clearance),
+        )
+
+    def _guidepaths(self, travel: Sequence[float]) -> tuple[Guidepath, ...]:
+        """Places every robot, carriers first: its A is a station of its carrier."""
+        paths: list[Guidepath] = []
+        axes = headings(self.factory, self.stretched.sides)
+        for robot, carrier in enumerate(carriers(self.factory)):
+            (u, t), shape, a = axes[robot], self.shapes[robot], (0.0, 0.0)
+            if carrier >= 0:
+                number = self.factory.robots[robot].operations[-1]
+                on = paths[carrier]
+                a = on.middle(on.length - self.stretched.stations[number])
+            a = (round(a[0], 3), round(a[1], 3))
+            paths.append(
+                Guidepath(u, t, a, travel[robot], shape.reach, shape.offset, shape.arm, shape.nest)
+            )
+        return tuple(paths)
+
+
+def _outfeed(path: Guidepath, last: Extent, c: Clearance) -> Box:
+    """The conveyor: under the product at A and ahead, twice the product's length and some. It is
+    no wider than the product, so that what keeps clear of the one keeps clear of the other."""
+    ahead = 2 * last[1] - last[0] + 3 * SHED
+    return path.world((last[0] - c.c / 2, ahead, last[2], last[3]), path.a)
+
+
+def _spare(layout: Layout) -> float:
+    """How much shorter the output robot's path can be: the outfeed has to be clear of what is
+    beside its own course, of the product in the making, and of no more [whole mm]."""
+    start, _, low, high = layout.outfeed
+    c = layout.clearance
+    found = piles(layout.factory, layout.product)
+    ahead = [
+        region.box[1]
+        for region in regions(layout, found, _beside(layout))
+        if region.kind != OUTFEED
+        and (region.robot != 0 or region.mode == ALWAYS)
+        and region.box[2] < high + c
+        and region.box[3] > low - c
+        and not _runs_under(region)
+    ]
+    spare = start - c - max(ahead)
+    return min(floor(spare * 1000 + 1e-6) / 1000, layout.guidepaths[0].travel - up(c))
+
+
+def _beside(layout: Layout) -> list[int]:
+    """The robots that may come near the outfeed's course with what they carry, or their feeders
+    with a post."""
+    _, _, low, high = layout.outfeed
+    whole = hull(list(layout.payloads.values()))
+    room = layout.clearance + 2 * (whole[1] - whole[0] + whole[3] - whole[2] + 2 * CARRIAGE)
+    room += max(map(abs, whole))
+    near = [0]
+    for robot, path in enumerate(layout.guidepaths[1:], start=1):
+        far = room + 2 * path.reach
+        y = path.a[1] - path.heading[1] * path.length
+        if min(y, path.a[1]) < high + far and max(y, path.a[1]) > low - far:
+            near.append(robot)
+    return near
+
+
+def _runs_under(region: Region) -> bool:
+    """Whether a region is that of the output robot itself, which comes as far as A."""
+    return region.robot == 0 and KINDS[region.kind] in ("carriage", "mast", "arm")

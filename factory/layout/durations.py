@@ -1,0 +1,119 @@
+"""How long robots take, from lengths alone: what the layout is optimised by.
+
+A robot goes from rest to rest along a trapezoid of speed. `factory.prediction` predicts the run
+itself, from the modes; the tests hold the two together.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import sqrt
+
+from factory.factory import Operation
+from factory.layout.plan import Layout
+from factory.pag import NOPART
+from factory.settings import Settings
+
+
+@dataclass(frozen=True, slots=True)
+class Pace:
+    """Speed [m/s] and acceleration [m/s²] of the robots, radius eps of a goal ball [m], and the
+    time [s] lost between two operations."""
+
+    speed: float = 0.5
+    acceleration: float = 2.0
+    eps: float = 2e-4
+    lost: float = 0.01
+
+    @classmethod
+    def of(cls, settings: Settings) -> Pace:
+        """That of a run with these settings."""
+        lost = settings.tick + settings.settle
+        return cls(settings.speed, settings.acceleration, settings.eps, lost)
+
+    def rest(self, distance: float, start: float = 0.0) -> float:
+        """The least time [s] to come to rest `distance` [m] ahead from the speed `start`."""
+        v, a = self.speed, self.acceleration
+        peak = max(min(v, sqrt(a * distance + start * start / 2)), start)
+        if not peak:
+            return 0.0
+        cruise = max(distance - (2 * peak * peak - start * start) / (2 * a), 0.0)
+        return (2 * peak - start) / a + cruise / peak
+
+    def landing(self, distance: float) -> float:
+        """The least time [s] to come to rest `distance` [m] ahead, from whatever speed."""
+        return self.rest(distance, min(self.speed, sqrt(2 * self.acceleration * distance)))
+
+    def staged(self, distance: float, standoff: float, opens: float) -> float:
+        """The time [s] at which a robot rests `distance` [m] ahead that may go beyond its standoff
+        when its gate `opens` [s] and not before."""
+        stage = max(distance - standoff, 0.0)
+        way, speed = self._gone(stage, opens)
+        return opens + self.rest(max(distance - way, 0.0), speed)
+
+    def entered(self, rested: float) -> float:
+        """When a robot enters its goal ball that comes to rest at `rested` [s]."""
+        return max(rested - sqrt(2 * self.eps / self.acceleration), 0.0)
+
+    def _gone(self, distance: float, time: float) -> tuple[float, float]:
+        """How far [m] and how fast a robot is after a time on its way from rest to rest."""
+        v, a = self.speed, self.acceleration
+        peak = min(v, sqrt(a * distance))
+        if not peak:
+            return 0.0, 0.0
+        left = self.rest(distance) - time
+        if left <= 0:
+            return distance, 0.0
+        ramp = peak / a
+        if time < ramp:
+            return a * time * time / 2, a * time
+        if left < ramp:
+            return distance - a * left * left / 2, a * left
+        return peak * (time - ramp / 2), peak
+
+
+def gear_times(layout: Layout, pace: Pace) -> list[float]:
+    """For each robot the summed delays [s] of its gear: the greatest is the cycle time."""
+    delays = operation_times(layout, pace)
+    return [sum(delays[n] for n in robot.operations) for robot in layout.factory.robots]
+
+
+def operation_times(layout: Layout, pace: Pace) -> list[float]:
+    """The delay [s] of each operation from rest, dwell included."""
+    factory = layout.factory
+    stops: dict[tuple[int, int], float] = {}
+    ways: dict[tuple[int, int], float] = {}
+    for robot in factory.robots:
+        for number in robot.operations:
+            slot = factory.operations[number].robots.index(robot.index)
+            stops[number, robot.index] = layout.goal(number, slot)
+        for step, number in enumerate(robot.operations):
+            before = stops[robot.operations[step - 1], robot.index]
+            ways[number, robot.index] = abs(stops[number, robot.index] - before)
+    return [_operation_time(layout, operation, ways, pace) for operation in factory.operations]
+
+
+def _operation_time(
+    layout: Layout, operation: Operation, ways: dict[tuple[int, int], float], pace: Pace
+) -> float:
+    carrier = operation.template.carrier - 1
+    rested = [pace.rest(ways[operation.index, robot]) for robot in operation.robots]
+    lowered = operation.lowered
+    gate = carrier
+    if operation.before[carrier] == NOPART:
+        gate = next((s for s, x in enumerate(operation.before) if x != NOPART and s != lowered), -1)
+    for slot, label in enumerate(operation.before):
+        brings = operation.before[carrier] != NOPART and label != NOPART
+        if slot != gate and (slot == lowered or (brings and slot != carrier)):
+            way = ways[operation.index, operation.robots[slot]]
+            standoff = layout.standoff(operation, slot)
+            rested[slot] = pace.staged(way, standoff, pace.entered(rested[gate]))
+    longest = max(rested)
+    if lowered >= 0:
+        stroke = layout.factory.strokes[operation.robots[lowered]]
+        longest = max(longest, pace.entered(rested[lowered]) + pace.rest(stroke))
+    for robot in operation.robots:
+        first = layout.factory.robots[robot].operations[0] == operation.index
+        if first and robot in layout.factory.strokes:
+            longest = max(longest, pace.rest(layout.factory.strokes[robot]))
+    return longest + operation.dwell + pace.lost

@@ -1,0 +1,105 @@
+"""One side of a guidepath: what stands beside it already, and how far a further robot must come.
+
+Everything is pushed outwards until it is clear, so a short branch can stand under the crown of a
+long one and a long one can reach past a short one: the contours fit into each other.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import inf
+
+from factory.layout.dimensions import LAYERS
+from factory.layout.outline import Block, Outline
+from factory.layout.stretching import up
+
+WINDOW = 16
+"""So many blocks a layer are looked at; what was there before is a wall."""
+
+TOUCH = 1e-9
+"""Blocks [m] that overlap by less do not."""
+
+
+@dataclass(frozen=True, slots=True)
+class Flank:
+    """The blocks beside a path, by layer: (from, to, near, far), along the path and away from it,
+    in the order in which they were put there.
+
+    `nested`: whether a robot may come past another, or stop before it.
+    """
+
+    blocks: tuple[tuple[Block, ...], ...] = ((), (), ())
+    nested: bool = True
+
+    def barred(self, layer: int, end: float) -> Flank:
+        """The same with nothing of a layer to come to the path before `end`."""
+        blocks = list(self.blocks)
+        blocks[layer] = (*blocks[layer], (-inf, end, 0.0, 2 * TOUCH))
+        return Flank(tuple(blocks), self.nested)
+
+    def travel(self, outline: Outline, station: float, least: float) -> float:
+        """How far a robot has to come that ends at a station, at least so far [m]; infinity where
+        its path is blocked."""
+        travel, settled = least, False
+        while not settled and travel < inf:
+            settled = True
+            for layer in LAYERS:
+                if self.blocks[layer]:
+                    further = self._pushed(outline, layer, station, travel)
+                    settled = settled and further == travel
+                    travel = further
+        return travel
+
+    def _pushed(self, outline: Outline, layer: int, station: float, travel: float) -> float:
+        beside = self.blocks[layer]
+        low, high = outline.lane[layer]
+        low, high = low + station + TOUCH, high + station - TOUCH
+        rear = outline.rear(layer)
+        for start, end, near, _ in beside:
+            if low < end and high > start and near < travel + rear - TOUCH:
+                return inf
+        for ulo, uhi, tlo, thi in outline.blocks[layer]:
+            tlo, thi = tlo + station + TOUCH, thi + station - TOUCH
+            for start, end, near, far in beside:
+                if (
+                    tlo < end
+                    and thi > start
+                    and travel - uhi < far - TOUCH
+                    and travel - ulo > near + TOUCH
+                ):
+                    if far == inf:
+                        return inf
+                    travel = up(far + uhi)
+        return travel
+
+    def starts(self, outline: Outline, least: float) -> set[float]:
+        """The stations after `least` where something of an outline comes clear of something."""
+        found = set[float]()
+        for layer in LAYERS:
+            edges = {outline.lane[layer][0], *(block[2] for block in outline.blocks[layer])}
+            for _, end, _, _ in self.blocks[layer]:
+                found.update(end - edge for edge in edges if least < end - edge < inf)
+        return found
+
+    def taken(self, outline: Outline, station: float, travel: float) -> Flank:
+        """The same with a robot that comes so far to a station."""
+        blocks = []
+        for layer in LAYERS:
+            low, high = outline.lane[layer]
+            rear = outline.rear(layer)
+            new = [(station + low, station + high, 0.0, travel + rear)] if low < high else []
+            new += [
+                (station + tlo, station + thi, travel - uhi, travel - ulo)
+                for ulo, uhi, tlo, thi in outline.blocks[layer]
+            ]
+            if not self.nested:
+                new = [(start, end, 0.0, inf) for start, end, _, _ in new]
+            blocks.append(_window((*self.blocks[layer], *new)))
+        return Flank(tuple(blocks), self.nested)
+
+
+def _window(blocks: tuple[Block, ...]) -> tuple[Block, ...]:
+    if len(blocks) <= WINDOW:
+        return blocks
+    old, new = blocks[: -WINDOW + 1], blocks[-WINDOW + 1 :]
+    return ((-inf, max(block[1] for block in old), 0.0, inf), *new)

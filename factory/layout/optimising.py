@@ -1,0 +1,114 @@
+"""Choose the layout that users pay least for: the cycle time first, then the length of the
+guidepaths, then the floor.
+
+The first feasible layout is the simple construction: sides by a rule of thumb, subtrees as boxes
+(`stretching`). Against it stand a few that are packed by their contours (`arranging`); each further
+one gives more weight to the robots that are the slowest in the best so far.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+
+from factory.factory import Factory
+from factory.geometry import Product
+from factory.layout.arranging import arrange
+from factory.layout.dimensions import Clearance
+from factory.layout.drafting import Draft, headings
+from factory.layout.durations import Pace, gear_times
+from factory.layout.packing import Task
+from factory.layout.plan import Box, Layout, Point2
+from factory.layout.shapes import exact_shapes, payload_boxes, symmetric_shapes
+from factory.layout.sides import admissible
+from factory.layout.stretching import Sides, stretch
+from factory.layout.sweeps import Region, hull, piles, regions
+
+EFFORT = 800
+"""Robots times layouts that are looked at, four layouts at most."""
+
+UNWEIGHTED = 2
+"""The first so many take all robots to matter the same."""
+
+LARGE = 1500
+"""A factory of more robots is packed once, with the sides of the first feasible layout."""
+
+
+def first_feasible(factory: Factory, product: Product, c: Clearance) -> Layout:
+    """The layout of the simple construction."""
+    payloads = payload_boxes(factory, product)
+    sides = _first_sides(factory, payloads, c)
+    shapes = exact_shapes(factory, payloads, headings(factory, sides), c)
+    stretched = stretch(factory, shapes.__getitem__, c, sides)
+    return Draft(factory, product, c, payloads, shapes, stretched).layout()
+
+
+def optimised(
+    factory: Factory, product: Product, c: Clearance, pace: Pace, floor: Point2 | None = None
+) -> Layout:
+    """The best layout found, of those that fit a floor if there are any. Never worse than the first
+    feasible one, but for a factory that is LARGE. Near linear, deterministic."""
+    payloads = payload_boxes(factory, product)
+    count = len(factory.robots)
+    task = Task(factory, c, pace, [1.0] * count)
+    if count > LARGE:
+        sides = _first_sides(factory, payloads, c)
+        return _packed(replace(task, width=1), product, payloads, sides)
+    best = first_feasible(factory, product, c)
+    times = gear_times(best, pace)
+    least = _score(best, times, floor)
+    for chosen in _tasks(task, max(1, EFFORT // count)):
+        weights = chosen.weights or _weights(times)
+        layout = _packed(replace(chosen, weights=weights), product, payloads)
+        found = gear_times(layout, pace)
+        score = _score(layout, found, floor)
+        if score < least:
+            best, times, least = layout, found, score
+    return best
+
+
+def bounds(found: Sequence[Region], clearance: float) -> Box:
+    """The floor that regions take."""
+    half, box = clearance / 2, hull([region.box for region in found])
+    return box[0] - half, box[1] + half, box[2] - half, box[3] + half
+
+
+def _score(layout: Layout, times: Sequence[float], floor: Point2 | None) -> tuple[float, ...]:
+    """What a layout is judged by, the less the better: how much the floor is too small [m], cycle
+    time [s], guidepaths [m], and the floor [m²] on which they lie."""
+    excess = 0.0
+    if floor is not None:
+        swept = regions(layout, piles(layout.factory, layout.product))
+        xlo, xhi, ylo, yhi = bounds(swept, layout.clearance)
+        excess = max(xhi - xlo - floor[0], yhi - ylo - floor[1], 0.0)
+    ends = [p for g in layout.guidepaths for p in (g.carriage(0.0), g.carriage(g.length))]
+    x, y = zip(*ends, strict=True)
+    area = (max(x) - min(x)) * (max(y) - min(y))
+    found = excess, max(times), layout.guidepath_length, area
+    return tuple(round(value, 6) for value in found)
+
+
+def _first_sides(factory: Factory, payloads: Mapping[str, Box], c: Clearance) -> Sides:
+    compact = stretch(factory, symmetric_shapes(factory, payloads, c), c).sides
+    return admissible(factory, compact)
+
+
+def _packed(
+    task: Task, product: Product, payloads: Mapping[str, Box], sides: Sides | None = None
+) -> Layout:
+    stretched, shapes = arrange(task, payloads, sides)
+    return Draft(task.factory, product, task.clearance, payloads, shapes, stretched).layout()
+
+
+def _tasks(task: Task, count: int) -> Iterator[Task]:
+    """So many ways to look for a layout; no weights stand for those of the best so far."""
+    ways = ((True, 1.0), (False, 0.5), (True, 0.5), (False, 1.0))
+    for number, (corridor, breadth) in enumerate(ways[:count]):
+        weights = task.weights if number < UNWEIGHTED else ()
+        yield replace(task, corridor=corridor, breadth=breadth, weights=weights)
+
+
+def _weights(times: Sequence[float]) -> list[float]:
+    """How much the time of each robot matters: 1 for the slowest."""
+    longest = max(times)
+    return [(1 + (time / longest) ** 4) / 2 for time in times]

@@ -1,0 +1,121 @@
+"""The outline of a subtree: what a robot, and all that brings it something, take of the floor.
+
+Frame of a robot: u ahead along its heading, t along the heading of the robot it delivers to, the
+origin at its B station. Blocks are rectangles of one layer with half a clearance around them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from math import inf
+
+from factory.layout.dimensions import LAYERS
+from factory.layout.stretching import Shape
+
+Block = tuple[float, float, float, float]
+"""(ulo, uhi, tlo, thi) [m]; on one side of a path (from, to, near, far), away from its line."""
+
+DETAILED = 4
+"""Guests whose crowns an outline keeps apart; of more, all on one side are one block."""
+
+
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """What was chosen for a robot: the side and the travel [m] of each robot that delivers to it,
+    and the station [m] of each of its operations."""
+
+    sides: dict[int, int] = field(default_factory=dict)
+    travels: dict[int, float] = field(default_factory=dict)
+    stations: dict[int, float] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True)
+class Outline:
+    """By layer: the `lane` (tlo, thi) of the robot's own path, and the blocks, of which the first
+    is what the robot itself takes about its stations. `least`: its least travel [m]."""
+
+    shape: Shape
+    plan: Plan
+    lane: tuple[tuple[float, float], ...]
+    blocks: tuple[tuple[Block, ...], ...]
+    least: float
+    front: tuple[float, ...] = field(init=False)
+    low: tuple[float, ...] = field(init=False)
+    high: tuple[float, ...] = field(init=False)
+
+    def __post_init__(self) -> None:
+        blocks = self.blocks
+        for name, values in (
+            ("front", [max((b[1] for b in blocks[layer]), default=-inf) for layer in LAYERS]),
+            ("low", [min((b[2] for b in blocks[layer]), default=inf) for layer in LAYERS]),
+            ("high", [max((b[3] for b in blocks[layer]), default=-inf) for layer in LAYERS]),
+        ):
+            object.__setattr__(self, name, tuple(values))
+
+    @property
+    def ahead(self) -> float:
+        """The farthest extent ahead [m]."""
+        return max(self.front)
+
+    def rear(self, layer: int) -> float:
+        """How far behind its B station the robot's own path reaches in a layer [m]."""
+        return -self.blocks[layer][0][0] if self.blocks[layer] else 0.0
+
+    @property
+    def behind(self) -> float:
+        """The farthest extent behind [m]."""
+        return -min(block[0] for blocks in self.blocks for block in blocks)
+
+    @property
+    def crown(self) -> float:
+        """How far ahead what brings it something reaches [m]; less than nothing without any."""
+        return max((b[1] for blocks in self.blocks for b in blocks[1:]), default=-inf)
+
+
+@dataclass(frozen=True, slots=True)
+class Guest:
+    """A robot that delivers to another: its outline, from which side, how far it comes [m] and how
+    far it is to come at least, at which station."""
+
+    robot: int
+    outline: Outline
+    side: int
+    travel: float
+    wanted: float = 0.0
+    station: float = 0.0
+
+    def seen(self, layer: int) -> list[Block]:
+        """What it takes of a layer in its carrier's frame: its lane with what is about its B end,
+        and its crown, the box of everything that brings it something."""
+        blocks = self.outline.blocks[layer]
+        if not blocks:
+            return []
+        own = blocks[0]
+        near = min(0.0, self.travel - own[1])
+        found = [(own[2], own[3], near, self.travel - own[0])]
+        if len(blocks) > 1:
+            ulo, uhi, tlo, thi = box_of(blocks[1:])
+            found.append((tlo, thi, self.travel - uhi, self.travel - ulo))
+        at = self.station
+        if self.side > 0:
+            return [(at + tlo, at + thi, near, far) for tlo, thi, near, far in found]
+        return [(at + tlo, at + thi, -far, -near) for tlo, thi, near, far in found]
+
+
+def box_of(blocks: Sequence[Block]) -> Block:
+    """The bounding box of blocks."""
+    ulo, uhi, tlo, thi = zip(*blocks, strict=True)
+    return min(ulo), max(uhi), min(tlo), max(thi)
+
+
+def crowns(guests: Sequence[Guest], layer: int) -> list[Block]:
+    """What the guests of a robot take of a layer, in its frame."""
+    if len(guests) <= DETAILED:
+        return [block for guest in guests for block in guest.seen(layer)]
+    found = []
+    for side in (-1, +1):
+        blocks = [b for guest in guests if guest.side == side for b in guest.seen(layer)]
+        if blocks:
+            found.append(box_of(blocks))
+    return found

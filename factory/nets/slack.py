@@ -1,0 +1,79 @@
+"""Slack: how much longer a place may keep its tokens before it sets the pace of a marked graph."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from heapq import heappop, heappush
+from math import inf
+
+from factory.nets.cycle_ratio import CycleRatio
+
+
+@dataclass(frozen=True, slots=True)
+class Slack:
+    """By how many seconds the tightest circuit through a place is shorter than r per token, and
+    its places in order; infinite, with no places, where the place lies on no circuit."""
+
+    seconds: float
+    circuit: tuple[int, ...]
+
+
+def slacks(found: CycleRatio, places: Iterable[int]) -> dict[int, Slack]:
+    """The slack of each of some places.
+
+    With the reduced times of the proof, which are not negative, a circuit is as long as what it
+    lacks; so Dijkstra's way back from a place's end to its beginning gives the tightest. One search
+    for all places that begin at one transition.
+    """
+    number = {int(place): edge for edge, place in enumerate(found.edges)}
+    wanted: dict[int, list[int]] = {}
+    result: dict[int, Slack] = {}
+    for place in places:
+        if place in number:
+            wanted.setdefault(int(found.before[number[place]]), []).append(place)
+        else:
+            result[place] = Slack(inf, ())
+    inward: dict[int, list[int]] = {}
+    for edge, event in enumerate(found.after.tolist()):
+        inward.setdefault(event, []).append(edge)
+    for target, chosen in wanted.items():
+        distance, onward = _ways_to(found, inward, target)
+        for place in chosen:
+            edge = number[place]
+            event = int(found.after[edge])
+            circuit = [place]
+            seconds = distance[event] + float(found.reduced[edge])
+            while event != target:
+                circuit.append(int(found.edges[onward[event]]))
+                event = int(found.after[onward[event]])
+            result[place] = Slack(seconds if seconds > found.tolerance else 0.0, tuple(circuit))
+    return result
+
+
+def _ways_to(
+    found: CycleRatio, inward: dict[int, list[int]], target: int
+) -> tuple[dict[int, float], dict[int, int]]:
+    """For every transition the shortest reduced way to `target`, and its first edge."""
+    before, reduced = found.before, found.reduced
+    distance: dict[int, float] = {}
+    onward: dict[int, int] = {}
+    heap: list[tuple[float, int, int]] = [(0.0, target, -1)]
+    while heap:
+        way, event, edge = heappop(heap)
+        if event in distance:
+            continue
+        distance[event], onward[event] = way, edge
+        for back in inward[event]:
+            if int(before[back]) not in distance:
+                heappush(heap, (way + float(reduced[back]), int(before[back]), back))
+    return distance, onward
+
+
+def circuits(found: CycleRatio, places: Iterable[int]) -> tuple[Slack, ...]:
+    """The tightest circuits through some places, each once, the critical ones first."""
+    kept: dict[frozenset[int], Slack] = {}
+    for slack in slacks(found, places).values():
+        if slack.circuit:
+            kept.setdefault(frozenset(slack.circuit), slack)
+    return tuple(sorted(kept.values(), key=lambda slack: (slack.seconds, min(slack.circuit))))

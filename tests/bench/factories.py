@@ -1,0 +1,90 @@
+"""Factories of a given size in steady production."""
+
+from __future__ import annotations
+
+import tempfile
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import factory
+from factory.layout.plan import Layout
+from factory.settings import Settings
+from factory.simulation import Simulation
+
+ENDLESS = 1000
+"""Units asked for: more than the pool of parts ever needs, so that it is the whole pool."""
+
+SEEN = 3
+"""Products that the ideal world makes to tell when production is steady."""
+
+
+def balanced(parts: int) -> str:
+    """A PAG without geometry: a balanced binary tree of mates, 2 parts - 1 robots."""
+    level = [f"p{i + 1}" for i in range(parts)]
+    lines = [f"{name} = atomic()" for name in level]
+    while len(level) > 1:
+        pairs = zip(level[::2], level[1::2], strict=False)
+        odd = level[len(level) - len(level) % 2 :]
+        level = []
+        for one, other in pairs:
+            name = f"n{len(lines)}"
+            lines.append(f"{name} = mate ( {one}, {other} )")
+            level.append(name)
+        level += odd
+    return f"root = {level[0]};\n" + ";\n".join(lines) + "\n"
+
+
+def robots_at_least(robots: int) -> str:
+    """The balanced product with so many robots, or one more."""
+    return balanced(robots // 2 + 1)
+
+
+def laid_out(text: str) -> Layout:
+    """A PAG's factory on its floor."""
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "product.pag"
+        file.write_text(text)
+        return factory.lay_out(factory.compile(factory.load_pag(file)))
+
+
+@dataclass(frozen=True)
+class Case:
+    """A factory in MuJoCo: so many robots or one more, the engine's timestep [s], copies of each
+    part let in at once (None: the whole pool), whether parts that are joined become one body."""
+
+    robots: int
+    timestep: float
+    wip: int | None = None
+    fuse: bool = False
+
+    def simulation(self, layout: Layout, **given: Any) -> Simulation:
+        """A run of it, ready to go."""
+        settings = Settings(timestep=self.timestep)
+        return Simulation(
+            layout, units=ENDLESS, settings=settings, wip=self.wip, fuse=self.fuse, **given
+        )
+
+
+@dataclass(frozen=True)
+class Steady:
+    """When production is steady and how long a cycle takes then [s], by the ideal world: from the
+    second product on its products come at even times."""
+
+    since: float
+    cycle: float
+
+    @classmethod
+    def of(cls, layout: Layout, wip: int | None) -> Steady:
+        """Asks the ideal world, which takes seconds."""
+        simulation = Simulation(layout, "ideal", units=ENDLESS, wip=wip)
+        while len(simulation.world.dropoffs) < SEEN:
+            simulation.supervisor.step()
+        times = simulation.world.dropoffs
+        return cls(times[-2], times[-1] - times[-2])
+
+
+def run_until(simulation: Simulation, time: float) -> None:
+    """Tick until this simulated time [s]."""
+    while simulation.world.time < time:
+        simulation.supervisor.step()

@@ -1,0 +1,129 @@
+"""How fast factories run in steady production."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import asdict
+from functools import partial
+from time import perf_counter
+from typing import Any
+
+from tests.bench.factories import Case, Steady, laid_out, robots_at_least, run_until
+from tests.bench.processes import fresh, interleaved, median, resident, serve, spread
+from tests.fidelity.tables import table
+
+AIMS: Sequence[tuple[Case, float, float]] = (
+    (Case(40, 0.002), 20.0, 10.0),
+    (Case(300, 0.004), 3.5, 5.0),
+    (Case(300, 0.002, None, True), 6.0, 5.0),
+    (Case(1000, 0.004, 2), 0.7, 5.0),
+    (Case(1000, 0.002, 2, True), 2.0, 5.0),
+)
+"""What is measured, with the least multiple of real time and the greatest share of the supervisor
+in percent that are aimed at."""
+
+LEAST = 10.0
+"""Simulated at least [s], and at least one cycle."""
+
+MEMORY = 1500.0
+"""The largest resident set aimed at, with 1,000 robots [MB]."""
+
+
+def work(
+    robots: int,
+    timestep: float,
+    wip: int | None = None,
+    fuse: bool = False,
+    window: float | None = None,
+) -> dict[str, Any]:
+    """One run of a factory, warmed up, over a window [s]; None: one cycle, and at least LEAST."""
+    case = Case(robots, timestep, wip, fuse)
+    layout = laid_out(robots_at_least(robots))
+    steady = Steady.of(layout, wip)
+    span = max(LEAST, steady.cycle) if window is None else window
+    simulation = case.simulation(layout)
+    world = simulation.world
+    run_until(simulation, steady.since)
+    start, physics, made = world.time, world.physics_time, world.delivered()
+    begin = perf_counter()
+    run_until(simulation, start + span)
+    wall = perf_counter() - begin
+    engine, simulated = world.physics_time - physics, world.time - start
+    return {
+        "robots": len(layout.factory.robots),
+        "bodies": world.model.bodies,
+        "from_s": start,
+        "to_s": world.time,
+        "cycle_s": steady.cycle,
+        "made": world.delivered() - made,
+        "realtime": simulated / wall,
+        "supervisor_percent": 100 * (wall - engine) / wall,
+        "step_us": 1e6 * engine / (simulated / timestep),
+        "memory_MB": resident(),
+    }
+
+
+def measure(quick: bool = False) -> dict[str, Any]:
+    """Every case, in turns."""
+    cases = AIMS[:1] if quick else AIMS
+    window = 1.0 if quick else None
+    jobs = [partial(fresh, work, **asdict(case), window=window) for case, *_ in cases]
+    found = interleaved(jobs, 2 if quick else 3)
+    return {
+        "runs": len(found[0]),
+        "rows": [
+            {
+                **asdict(case),
+                "aim": aim,
+                "share": share,
+                "found": median(own),
+                "spread": spread(own, "realtime"),
+            }
+            for (case, aim, share), own in zip(cases, found, strict=True)
+        ],
+    }
+
+
+def section(results: dict[str, Any]) -> str:
+    """The report."""
+    head = (
+        *("robots", "timestep", "bodies", "pool", "contact", "window", "times real time", "aim"),
+        *("supervisor", "aim", "engine's step", "memory"),
+    )
+    rows = []
+    for row in results["rows"]:
+        found = row["found"]
+        wip, kind = row["wip"], "fused" if row["fuse"] else "one a part"
+        rows.append(
+            (
+                found["robots"],
+                f"{1000 * row['timestep']:g} ms",
+                f"{found['bodies']}, {kind}",
+                "whole" if wip is None else f"`--wip {wip}`",
+                "on",
+                f"{found['from_s']:.1f}–{found['to_s']:.1f} s",
+                f"**{found['realtime']:.2f}** ({row['spread']})",
+                f">= {row['aim']:g}",
+                f"{found['supervisor_percent']:.1f} %",
+                f"< {row['share']:g} %",
+                f"{found['step_us']:.0f} µs",
+                f"{found['memory_MB']:.0f} MB",
+            )
+        )
+    return "\n\n".join(
+        [
+            "## Steady production",
+            "A balanced tree of mates of parts without geometry, contact between payloads on,"
+            " jitter 0. Each figure is the median (least–greatest) of"
+            f" {results['runs']} processes, which took turns. The window begins when the ideal"
+            " world, under the same net, has delivered its second product, and lasts one cycle of"
+            f" it and at least {LEAST:g} s (`--quick`: 1 s). Memory is the process's largest"
+            f" resident set, layout included (aim with 1,000 robots: < {MEMORY:g} MB); the"
+            " supervisor's share is all time in the run loop that is not the engine's `mj_step`.",
+            table(head, rows),
+        ]
+    )
+
+
+if __name__ == "__main__":
+    serve(work)

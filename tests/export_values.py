@@ -1,0 +1,115 @@
+"""What the tests of exports share: the files, and the readers that read them back."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from factory.export import Made, Subject, exporters
+from factory.layout.plan import Layout
+from factory.simulation import Simulation
+from tests.command_line import PAPER, ROOT
+
+LAMP = ROOT / "examples" / "lamp.pag"
+MESHES = ROOT / "tests" / "baselines" / "meshes.pag"
+PYTHON = ROOT / ".oracles" / "bin" / "python"
+ORACLES = Path(__file__).parent / "oracles"
+
+
+def subject(file: Path = PAPER, of: str = "", name: str = "") -> Subject:
+    """A file as exporters get it; read, compiled and laid out once."""
+    known = _read(file)
+    found = replace(known, of=of, name=name)
+    found.__dict__.update({k: v for k, v in known.__dict__.items() if k in SHARED})
+    return found
+
+
+SHARED = ("kind", "source", "factory", "layout", "log")
+
+
+@cache
+def _read(file: Path) -> Subject:
+    found = Subject(file)
+    if found.kind == "a log":
+        assert len(found.log)
+    else:
+        assert found.layout
+    return found
+
+
+@cache
+def made(form: str, file: Path = PAPER, of: str = "", name: str = "") -> Any:
+    """What an exporter makes of a file."""
+    return exporters()[form].export(subject(file, of, name))
+
+
+def write(made: Made, path: Path) -> Path:
+    """What was made, in files."""
+    if isinstance(made, str):
+        made = made.encode()
+    for name, content in ({"": made} if isinstance(made, bytes) else made).items():
+        target = path.parent / name if name else path
+        target.parent.mkdir(parents=True, exist_ok=True)
+        target.write_bytes(content)
+    return path
+
+
+def kept_log(layout: Layout, path: Path, **options: Any) -> Path:
+    """A log of a run."""
+    from factory.log import LogWriter
+
+    simulation = Simulation(layout, **options)
+    with LogWriter(path, simulation) as log:
+        simulation.run(observers=[log])
+    return path
+
+
+def ask(oracle: str, *words: object) -> Any:
+    """What a program of tests/oracles prints. Skips the test where they are not installed."""
+    if not PYTHON.exists():
+        pytest.skip("run tools/oracles to have it read back by somebody else's program")
+    script = ORACLES / f"{oracle}.py"
+    done = subprocess.run(
+        [PYTHON, script, *map(str, words)], capture_output=True, text=True, timeout=300
+    )
+    assert done.returncode == 0, done.stderr
+    return json.loads(done.stdout.splitlines()[-1])
+
+
+@dataclass(frozen=True)
+class Reader:
+    """A reader of a format: its name, its licence, what it is shown to accept, and the check."""
+
+    form: str
+    name: str
+    licence: str
+    shows: str
+    check: Callable[[Path], None]
+
+
+READERS: dict[str, Reader] = {}
+
+
+def reads(form: str, name: str, licence: str) -> Callable[[Callable[[Path], None]], None]:
+    """Registers a check, whose docstring says what it shows, as a row of docs/exports.md."""
+
+    def register(check: Callable[[Path], None]) -> None:
+        shows = " ".join((check.__doc__ or "").split())
+        READERS[f"{form}-{name}"] = Reader(form, name, licence, shows, check)
+
+    return register
+
+
+def table(readers: Mapping[str, Reader]) -> str:
+    """The table of docs/exports.md."""
+    lines = ["| format | reader | licence | what it read back |", "|---|---|---|---|"]
+    for reader in sorted(readers.values(), key=lambda r: (r.form, r.name)):
+        lines.append(f"| `{reader.form}` | {reader.name} | {reader.licence} | {reader.shows} |")
+    return "\n".join(lines) + "\n"

@@ -1,0 +1,486 @@
+"""Every export, read back by a reader that is not ours; the table of them in docs/exports.md."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections import Counter
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from factory.export import exporters
+from factory.export.bodies import parts_of
+from factory.geometry import rotation
+from factory.layout.plan import Layout
+from factory.nets.marked import MarkedNet, marked
+from factory.nets.replay import replay
+from factory.simulation import physical_model
+from factory.world.physics import load
+from tests.command_line import PAPER, ROOT
+from tests.export_values import LAMP, MESHES, READERS, ask, kept_log, made, reads, subject, table
+from tests.export_values import write as written
+from tests.structured_text import Controller
+
+DOCUMENT = ROOT / "docs" / "exports.md"
+
+
+def paper_net() -> MarkedNet:
+    return marked(subject(PAPER).net)
+
+
+def arcs_of(net: MarkedNet) -> list[list[str]]:
+    """The arcs by the names of their ends."""
+    names = [t.name for t in net.net.transitions]
+    found = []
+    for place in net.net.places:
+        found += [[names[e], place.name] for e in place.left]
+        found += [[place.name, names[e]] for e in place.right]
+    return sorted(found)
+
+
+@pytest.fixture(scope="module")
+def log(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return kept_log(subject(LAMP).layout, tmp_path_factory.mktemp("log") / "lamp.log", units=2)
+
+
+# nets
+
+
+@reads("pnml", "pm4py", "AGPL-3.0, a process of its own")
+def pnml_by_pm4py(folder: Path) -> None:
+    """the same places, transitions, arcs and tokens; every place has its position"""
+    net = paper_net()
+    found = ask("pm4py_pnml", written(made("pnml"), folder / "paper.pnml"))
+    places = [p.name for p in net.net.places]
+    ids = {f"p{n}": name for n, name in enumerate(places)}
+    ids |= {f"t{n}": t.name for n, t in enumerate(net.net.transitions)}
+    assert [ids[p] for p in sorted(found["places"], key=lambda p: int(p[1:]))] == places
+    assert found["transitions"] == sorted(t.name for t in net.net.transitions)
+    assert sorted([ids[a], ids[b]] for a, b in found["arcs"]) == arcs_of(net)
+    tokens = {p: n for p, n in zip(places, net.tokens, strict=True) if n}
+    assert {ids[p]: n for p, n in found["marking"].items()} == tokens
+    assert found["drawn"] == len(places)
+
+
+@reads("dot", "pydot", "MIT")
+def dot_by_pydot(folder: Path) -> None:
+    """the same arcs, the robots as clusters; of the tree an edge for each input"""
+    import pydot
+
+    net = paper_net()
+    (graph,) = pydot.graph_from_dot_data(made("dot"))
+    clusters = [c.get_label().strip('"') for c in graph.get_subgraphs()]
+    assert clusters == [gear.robot for gear in net.gears]
+    ids = {f"p{n}": p.name for n, p in enumerate(net.net.places)}
+    ids |= {f"t{n}": t.name for n, t in enumerate(net.net.transitions)}
+    edges = [[ids[e.get_source()], ids[e.get_destination()]] for e in graph.get_edges()]
+    assert sorted(edges) == arcs_of(net)
+    (tree,) = pydot.graph_from_dot_data(made("dot", PAPER, "tree"))
+    pag = subject(PAPER).source.pag
+    assert len(tree.get_edges()) == len(pag) - 1
+
+
+@reads("svg", "svgelements", "MIT")
+def svg_by_svgelements(folder: Path) -> None:
+    """a circle for each place and token inside the page, a bar for each transition, every name;
+    of the tree a box for each label"""
+    from svgelements import SVG, Circle, Rect, Text
+
+    net, path = paper_net(), written(made("svg"), folder / "net.svg")
+    drawn = list(SVG.parse(path).elements())
+    circles = [e for e in drawn if isinstance(e, Circle)]
+    round_ones = Counter(round(float(c.rx), 1) for c in circles)
+    assert round_ones[12.0] == len(net.net.places)
+    assert round_ones[4.5] >= sum(net.tokens)
+    bars = [e for e in drawn if isinstance(e, Rect) and "bar" in str(e.values.get("class"))]
+    assert len(bars) == len(net.net.transitions)
+    words = {e.text for e in drawn if isinstance(e, Text)}
+    assert words >= {gear.robot for gear in net.gears}
+    assert words >= {t.name for t in net.net.transitions}
+    page = SVG.parse(path)
+    for circle in circles:
+        x0, y0, x1, y1 = circle.bbox()
+        assert 0 <= x0 < x1 <= float(page.width)
+        assert 0 <= y0 < y1 <= float(page.height)
+    tree = list(SVG.parse(written(made("svg", PAPER, "tree"), folder / "t.svg")).elements())
+    assert {n.label for n in subject(PAPER).source.pag.nodes} <= {
+        e.text for e in tree if isinstance(e, Text)
+    }
+
+
+# the floor
+
+
+@reads("dxf", "ezdxf", "MIT")
+def dxf_by_ezdxf(folder: Path) -> None:
+    """its audit finds nothing; millimetres, a layer for each kind of thing, the floor's extents
+    (the library that writes it)"""
+    import ezdxf
+
+    layout = subject(LAMP).layout
+    document = ezdxf.readfile(written(made("dxf", LAMP), folder / "lamp.dxf"))
+    audit = document.audit()
+    assert (audit.errors, audit.fixes, document.units) == ([], [], 4)
+    found = Counter((e.dxf.layer, e.dxftype()) for e in document.modelspace())
+    assert found["GUIDEPATHS", "LINE"] == len(layout.guidepaths)
+    assert found["ROBOTS", "LWPOLYLINE"] == 2 * len(layout.guidepaths)
+    assert found["FEEDERS", "LWPOLYLINE"] == 2 * len(layout.factory.leaves)
+    (floor,) = document.modelspace().query('LWPOLYLINE[layer=="FLOOR"]')
+    corners = np.array(floor.get_points("xy")) / 1e3
+    xlo, xhi, ylo, yhi = layout.floor
+    assert np.allclose([*corners.min(axis=0), *corners.max(axis=0)], [xlo, ylo, xhi, yhi])
+
+
+@reads("dxf", "trimesh", "MIT")
+def dxf_by_trimesh(folder: Path) -> None:
+    """millimetres, the floor's extents, the guidepaths' total length"""
+    import trimesh
+
+    layout = subject(LAMP).layout
+    path = trimesh.load_path(written(made("dxf", LAMP), folder / "lamp.dxf"))
+    xlo, xhi, ylo, yhi = layout.floor
+    assert path.units == "millimeters"
+    assert np.allclose(np.asarray(path.bounds), 1e3 * np.array([[xlo, ylo], [xhi, yhi]]))
+    ways = [e for e in path.entities if e.layer == "GUIDEPATHS"]
+    length = sum(e.length(path.vertices) for e in ways)
+    assert length == pytest.approx(1e3 * sum(p.travel for p in layout.guidepaths))
+
+
+# programs
+
+
+@reads("st", "blark", "GPL-2.0, a process of its own")
+def st_by_blark(folder: Path) -> None:
+    """it parses: the types, a function block for each robot, the program. That is syntax alone (of
+    TwinCAT's dialect), not types, nor what the programs do"""
+    path = folder / "p.pag"
+    path.write_text("root = s; s = weld ( a-1, dwell = 0.5 ); a-1 = atomic ()")
+    found = ask("blark_st", written(made("st", path), folder / "p.st"))
+    assert [kind for kind, _ in found] == [
+        *["DataTypeDeclaration"] * 3,
+        *["FunctionBlock"] * 2,
+        "Program",
+    ]
+    assert [name for kind, name in found if kind == "FunctionBlock"] == ["ROBOT_r1", "ROBOT_r2"]
+
+
+@reads("st", "an executor of the tests", "ours")
+def st_by_an_executor(folder: Path) -> None:
+    """run with drives that go straight to their set-points, blocks scanned in random order: what
+    fires refines the net, and products are made"""
+    for file in (PAPER, LAMP, MESHES):
+        layout = subject(file).layout
+        fired = _execute(made("st", file), layout, units=3)
+        names = [layout.factory.net.threaded.transitions[n].name for n in fired]
+        assert names.count("dropoff_e") >= 3
+        assert replay(layout.factory.net, names).refines
+
+
+def _execute(text: str, layout: Layout, units: int, scans: int = 20_000) -> list[int]:
+    """The transitions that fire, by number: X_s when the first robot enters X, X_e when its carrier
+    ends it."""
+    controller, factory = Controller(text), layout.factory
+    rng = np.random.default_rng(0)
+    for axis, path in enumerate(layout.guidepaths):
+        controller.axes[axis].Position = controller.axes[axis].Target = path.length
+    fired: list[int] = []
+    entered: Counter[int] = Counter()
+    dropped = 0
+    for _ in range(scans):
+        controller.clock[0] += 0.05
+        for axis in controller.axes:
+            step = min(max(axis.Target - axis.Position, -0.03), 0.03)
+            axis.Position, axis.Speed = axis.Position + step, step / 0.05
+        for robot in rng.permutation(len(factory.robots)).tolist():
+            gear = factory.robots[robot].operations
+            memory, cell = controller.memories[robot], controller.cells[robot]
+            before, done = memory.State, cell.Finished
+            controller.scan(robot)
+            number = gear[before // 3]
+            enters = before % 3 == 0 and memory.State % 3 == 1
+            if enters and memory.Unit == entered[number]:
+                entered[number] += 1
+                fired.append(2 * number)
+            if cell.Finished > done and factory.operations[number].carrier == robot:
+                fired.append(2 * number + 1)
+                dropped += number == factory.dropoff.index
+        if dropped == units:
+            return fired
+    raise AssertionError(f"{dropped} products only; {[m.State for m in controller.memories]}")
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        (r"(\(\* wait [^\n]*\n +IF )[^\n]* THEN", r"\1Ready THEN"),
+        (r"Finished := Cells\[3\]\.Finished \+ 1", "Finished := Cells[3].Finished + 2"),
+        ("Carries := L_sub1", "Carries := L_part1"),
+    ],
+    ids=["no conditions", "miscounted", "wrong label"],
+)
+def test_faults_planted_in_the_programs_show(old: str, new: str) -> None:
+    text, count = re.subn(old, new, made("st"))
+    assert count
+    layout = subject(PAPER).layout
+    names = [t.name for t in layout.factory.net.threaded.transitions]
+    try:
+        fired = _execute(text, layout, 3, scans=2_000)
+    except AssertionError:
+        return
+    assert not replay(layout.factory.net, [names[n] for n in fired]).refines
+
+
+# products
+
+
+@reads("stl", "trimesh", "MIT")
+def stl_by_trimesh(folder: Path) -> None:
+    """closed, with the extents of the parts in millimetres; the product, and each sub-assembly"""
+    import trimesh
+
+    for file in (MESHES, LAMP):
+        chosen = subject(file)
+        for label in (node.label for node in chosen.source.pag.nodes):
+            mesh = trimesh.load(written(made("stl", file, label), folder / "x.stl"))
+            assert mesh.is_watertight, label
+            solids = [chosen.product.solids[p] for p in parts_of(chosen.source.pag, label)]
+            low, high = np.min([s.low for s in solids], 0), np.max([s.high for s in solids], 0)
+            assert np.allclose(mesh.bounds, 1e3 * np.array([low, high]), atol=0.2), label
+
+
+@reads("gltf", "trimesh", "MIT")
+def gltf_by_trimesh(folder: Path) -> None:
+    """the assembly tree as its scene graph, in metres, y upwards (the library that writes it)"""
+    import trimesh
+
+    chosen = subject(MESHES)
+    for ending in ("glb", "gltf"):
+        content = made("gltf", MESHES, "", f"x.{ending}")
+        scene = trimesh.load_scene(written(content, folder / f"x.{ending}"))
+        tree = {child: parent for parent, child, _ in scene.graph.to_edgelist()}
+        for node in chosen.source.pag.nodes:
+            assert all(tree[label] == node.label for label in node.inputs)
+        low, high = chosen.product.low, chosen.product.high
+        upright = [[low[0], low[2], -high[1]], [high[0], high[2], -low[1]]]
+        assert np.allclose(scene.bounds, upright, atol=2e-4)
+
+
+@reads("gltf", "pygltflib", "MIT")
+def gltf_by_pygltflib(folder: Path) -> None:
+    """valid references; each part's colour, and its triangles within its extents"""
+    from pygltflib import GLTF2
+    from pygltflib.validator import validate
+
+    content = made("gltf", MESHES, "", "x.glb")
+    document = GLTF2().load(str(written(content, folder / "x.glb")))
+    validate(document)
+    chosen = subject(MESHES)
+    nodes = {node.name: node for node in document.nodes}
+    for part in parts_of(chosen.source.pag, chosen.source.pag.root):
+        solid = chosen.product.solids[part]
+        primitive = document.meshes[nodes[part].mesh].primitives[0]
+        colour = document.materials[primitive.material].pbrMetallicRoughness.baseColorFactor
+        assert np.allclose(colour, solid.rgba, atol=0.01)
+        accessor = document.accessors[primitive.attributes.POSITION]
+        size = np.array(accessor.max) - np.array(accessor.min)
+        assert np.allclose(size, solid.high - solid.low, atol=2e-4), part
+
+
+# robots
+
+
+@reads("urdf", "MuJoCo", "Apache-2.0")
+def urdf_by_mujoco(folder: Path) -> None:
+    """the same bodies, joints and masses; for random joint values the same poses, to a nanometre"""
+    import mujoco
+
+    for file in (MESHES, LAMP):
+        path = written(made("urdf", file, "", "x.urdf"), folder / file.stem / "x.urdf")
+        one = load(physical_model(subject(file).layout, 1, subject(file).settings))
+        other = mujoco.MjModel.from_xml_path(str(path))
+        assert (one.nbody, one.njnt) == (other.nbody, other.njnt)
+        here, there = mujoco.MjData(one), mujoco.MjData(other)
+        for joint, value in _random_joints(one).items():
+            here.joint(joint).qpos[0] = there.joint(joint).qpos[0] = value
+        for m, d in ((one, here), (other, there)):
+            mujoco.mj_kinematics(m, d)
+        for body in range(1, one.nbody):
+            name = one.body(body).name
+            assert np.allclose(here.body(name).xpos, there.body(name).xpos, atol=1e-9), name
+            assert np.allclose(here.body(name).xquat, there.body(name).xquat, atol=1e-9), name
+            if one.body_jntnum[body]:
+                assert one.body(name).mass == pytest.approx(other.body(name).mass)
+                assert np.allclose(_inertia(one, name), _inertia(other, name), rtol=1e-6)
+
+
+def _inertia(m: Any, name: str) -> Any:
+    """The inertia tensor of a body in its own frame, and its centre of mass."""
+    body = m.body(name)
+    turn = rotation(body.iquat)
+    return [*(turn @ np.diag(body.inertia) @ turn.T).ravel().round(12), *body.ipos]
+
+
+def _random_joints(m: Any) -> dict[str, float]:
+    rng = np.random.default_rng(1)
+    slides = (m.joint(j).name for j in range(m.njnt) if m.jnt_type[j] == 2)
+    return {name: float(rng.uniform(0.05, 0.2)) for name in slides}
+
+
+@reads("urdf", "yourdfpy", "MIT, a process of its own")
+def urdf_by_yourdfpy(folder: Path) -> None:
+    """valid, every mesh is found; for random joint values the poses that MuJoCo has"""
+    import mujoco
+
+    path = written(made("urdf", MESHES, "", "x.urdf"), folder / "x.urdf")
+    m = load(physical_model(subject(MESHES).layout, 1, subject(MESHES).settings))
+    values, d = _random_joints(m), mujoco.MjData(m)
+    for joint, value in values.items():
+        d.joint(joint).qpos[0] = value
+    mujoco.mj_kinematics(m, d)
+    found = ask("yourdfpy_urdf", path, json.dumps(values))
+    assert found["valid"]
+    kinds = Counter(found["joints"].values())
+    assert kinds["prismatic"] == len(values)
+    assert kinds["floating"] == len(subject(MESHES).factory.leaves)
+    for name in values:
+        body = m.body(int(m.jnt_bodyid[m.joint(name).id])).name
+        assert np.allclose(found["at"][body], d.body(body).xpos, atol=1e-8), body
+
+
+# runs
+
+
+@reads("csv", "DuckDB", "MIT")
+def csv_by_duckdb(log: Path) -> None:
+    """the events of the log, in order, with numbers as numbers"""
+    _table_by_duckdb(log, "csv")
+
+
+@reads("parquet", "DuckDB", "MIT")
+def parquet_by_duckdb(log: Path) -> None:
+    """the events of the log, in order, with their types; the robots as lists"""
+    _table_by_duckdb(log, "parquet")
+
+
+def _table_by_duckdb(log: Path, form: str) -> None:
+    import duckdb
+
+    path = written(made(form, log), log.with_name(f"x.{form}"))
+    with duckdb.connect() as database:
+        query = "select time_s, transition, unit, robots, line from read_{}('{}')"
+        found = database.sql(query.format(form, path)).fetchall()
+    events = subject(log).log.events
+    assert [(t, name) for t, name, *_ in found] == [(round(t, 9), name) for t, name in events]
+    assert max(unit for _, _, unit, *_ in found) == 2
+    operations = {o.label: o for o in subject(LAMP).factory.operations}
+    for _, name, _, robots, line in found:
+        operation = operations[name[:-2]]
+        shown = robots if form == "parquet" else robots.split()
+        assert shown == [f"r{r + 1}" for r in operation.robots]
+        assert operation.position is None or line == operation.position.line
+
+
+@reads("mcap", "mcap", "MIT")
+def mcap_by_mcap(log: Path) -> None:
+    """Foxglove's schemas, checksums, time in order; each body where the engine has it in every
+    frame, each event with its source line"""
+    import mujoco
+    from mcap.reader import make_reader
+    from mcap_protobuf.decoder import DecoderFactory
+
+    path = written(made("mcap", log), log.with_name("x.mcap"))
+    topics: dict[str, list[Any]] = {}
+    with path.open("rb") as stream:
+        reader = make_reader(stream, validate_crcs=True, decoder_factories=[DecoderFactory()])
+        for schema, channel, message, content in reader.iter_decoded_messages():
+            assert schema is not None
+            assert schema.name.startswith("foxglove.")
+            topics.setdefault(channel.topic, []).append((message.log_time, content))
+    assert set(topics) == {"/tf", "/scene", "/joints", "/events"}
+    kept = subject(log).log
+    said = [(t, content.name) for t, content in topics["/events"]]
+    assert said == [(round(t * 1e9), name) for t, name in kept.events]
+    files = {f"meshes/{name}": content for name, content in kept.files.items()}
+    m = mujoco.MjModel.from_xml_string(kept.xml, files)
+    d, at = mujoco.MjData(m), dict[str, Any]()
+    poses = dict(topics["/tf"])
+    rows = {round(t * 1e9): row for row, t in enumerate(kept.time.tolist())}
+    for time, _ in topics["/joints"]:
+        for transform in poses[time].transforms if time in poses else ():
+            at[transform.child_frame_id] = transform
+        d.qpos[:] = kept.qpos[rows[time]]
+        mujoco.mj_kinematics(m, d)
+        for body in range(1, m.nbody):
+            shown, parent = at[m.body(body).name], int(m.body_parentid[body])
+            assert shown.parent_frame_id == m.body(parent).name
+            moved = [shown.translation.x, shown.translation.y, shown.translation.z]
+            place = d.xpos[parent] + rotation(d.xquat[parent]) @ moved
+            assert np.abs(place - d.xpos[body]).max() < 1e-4, (time, m.body(body).name)
+    drawn = {e.id for _, update in topics["/scene"] for e in update.entities}
+    assert {f"part/{o.label}#1" for o in subject(LAMP).factory.leaves} <= drawn
+
+
+@reads("mcap", "Rerun", "Apache-2.0 or MIT, a process of its own")
+def mcap_by_rerun(log: Path) -> None:
+    """its importer turns `/tf` into transforms by frame and the events into its text log; from
+    `/scene` it makes no geometry: that comes from the URDF, whose frames have the same names"""
+    path = written(made("mcap", log), log.with_name("r.mcap"))
+    chunks = ask("rerun_mcap", path, log.with_name("r.rrd"))["chunks"]
+    moved = [c for c in chunks if " /tf " in c and "Transform3D:translation" in c]
+    assert moved
+    assert any(" /events " in c and "TextLog:text" in c for c in chunks)
+    assert any(" /joints " in c for c in chunks)
+
+
+@reads("usd", "usd-core", "TOST-1.0 (Apache-2.0 and a clause on trademarks)")
+def usd_by_usd_core(log: Path) -> None:
+    """metres, z upwards, the log's pace; robots' carriages where the engine has them, in the first
+    frame and the last (the library that writes it)"""
+    import mujoco
+    from pxr import Usd, UsdGeom
+
+    stage = Usd.Stage.Open(str(written(made("usd", log, "", "x.usd"), log.with_name("x.usd"))))
+    assert (UsdGeom.GetStageMetersPerUnit(stage), UsdGeom.GetStageUpAxis(stage)) == (1.0, "Z")
+    kept = subject(log).log
+    seconds = (stage.GetEndTimeCode() - 1) / stage.GetTimeCodesPerSecond()
+    assert seconds == pytest.approx(kept.time[-1] - kept.time[0], abs=0.05)
+    files = {f"meshes/{name}": content for name, content in kept.files.items()}
+    m = mujoco.MjModel.from_xml_string(kept.xml, files)
+    d = mujoco.MjData(m)
+    drawn = {prim.GetName(): prim for prim in stage.Traverse()}
+    for row, code in ((0, 0), (-1, stage.GetEndTimeCode() - 1)):
+        d.qpos[:] = kept.qpos[row]
+        mujoco.mj_kinematics(m, d)
+        for robot in subject(LAMP).factory.robots:
+            geom = m.geom(f"{robot.name}/carriage").id
+            prim = drawn[f"Mesh_Xform_{robot.name}_carriage_id{geom}_geom"]
+            place = UsdGeom.Xformable(prim).ComputeLocalToWorldTransform(code).ExtractTranslation()
+            assert np.allclose(place, d.geom_xpos[geom], atol=1e-5)
+
+
+@pytest.mark.parametrize("which", READERS)
+def test_read_back(which: str, tmp_path: Path, request: pytest.FixtureRequest) -> None:
+    reader = READERS[which]
+    takes_log = exporters()[reader.form].takes == "log"
+    reader.check(request.getfixturevalue("log") if takes_log else tmp_path)
+
+
+def test_the_table_in_the_docs(request: pytest.FixtureRequest) -> None:
+    text = DOCUMENT.read_text("utf-8")
+    start, end = "<!-- readers -->\n", "<!-- end -->"
+    head, _, rest = text.partition(start)
+    old, _, tail = rest.partition(end)
+    if request.config.getoption("--update-golden"):
+        DOCUMENT.write_text(head + start + table(READERS) + end + tail, "utf-8")
+        return
+    assert old == table(READERS)
+
+
+def test_every_format_has_a_reader_or_says_that_there_is_none() -> None:
+    without = set(exporters()) - {reader.form for reader in READERS.values()}
+    text = DOCUMENT.read_text("utf-8")
+    for form in sorted(without):
+        assert f"`{form}`: no independent reader" in text

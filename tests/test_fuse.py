@@ -1,0 +1,208 @@
+"""Parts joined for good as one rigid body: momentum, product error, times; the monitor sees it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import factory
+from factory.engine import mujoco
+from factory.layout.plan import Layout
+from factory.monitor import beside
+from factory.simulation import Simulation
+from factory.wholes import FUSE_FROM, bodies_of, fused_copies, fusing_pays
+from factory.world.fusing import fuse, misfit
+from tests.command_line import PAPER, ROOT, Terminal
+from tests.test_simulation import laid_out
+
+EXAMPLES = ROOT / "examples"
+
+
+def layout_of(name: str) -> Layout:
+    return factory.lay_out(factory.compile(factory.load_pag(EXAMPLES / f"{name}.pag")))
+
+
+def free_bodies(rng: np.random.Generator, count: int) -> tuple[mujoco.MjModel, mujoco.MjData, int]:
+    """`count` free boxes somewhere, and at the origin the body that they are together."""
+    mass, half = rng.uniform(0.1, 3, count), rng.uniform(0.02, 0.2, (count, 3))
+    place = rng.uniform(-0.5, 0.5, (count, 3))
+    centre = mass @ place / mass.sum()
+    boxes = [
+        f'<geom type="box" size="{h[0]} {h[1]} {h[2]}" mass="{m}" pos="{{}} {{}} {{}}"/>'
+        for h, m in zip(half, mass, strict=True)
+    ]
+    parts = "".join(
+        f'<body pos="{p[0]} {p[1]} {p[2]}"><freejoint/>{box.format(0, 0, 0)}</body>'
+        for p, box in zip(place, boxes, strict=True)
+    )
+    inside = "".join(box.format(*(p - centre)) for p, box in zip(place, boxes, strict=True))
+    whole = f'<body pos="9 9 9"><freejoint/>{inside}</body>'
+    m = mujoco.MjModel.from_xml_string(
+        f"<mujoco><option gravity='0 0 0'/><worldbody>{parts}{whole}</worldbody></mujoco>"
+    )
+    return m, mujoco.MjData(m), count + 1
+
+
+def momentum(m: mujoco.MjModel, d: mujoco.MjData, bodies: list[int]) -> np.ndarray:
+    """Linear and angular momentum about the origin (6,) of some bodies, by the engine's account."""
+    mujoco.mj_forward(m, d)
+    mujoco.mj_subtreeVel(m, d)
+    mass, place = m.body_mass[bodies, None], d.xipos[bodies]
+    linear = mass * d.subtree_linvel[bodies]
+    return np.append(
+        linear.sum(axis=0), (np.cross(place, linear) + d.subtree_angmom[bodies]).sum(axis=0)
+    )
+
+
+@settings(max_examples=25, deadline=None)
+@given(st.integers(2, 5), st.integers(0, 2**32 - 1))
+def test_momentum_goes_over_to_the_one_body(count: int, seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    m, d, whole = free_bodies(rng, count)
+    d.qvel[: 6 * count] = rng.normal(0, 1, 6 * count)
+    bodies = list(range(1, whole))
+    before = momentum(m, d, bodies)
+    fuse(m, d, bodies, whole)
+    after = momentum(m, d, [whole])
+    assert np.allclose(after, before, atol=1e-9)
+    assert np.allclose(d.xipos[whole], m.body_mass[bodies] @ d.xipos[bodies] / m.body_mass[whole])
+
+
+def test_a_rigid_motion_goes_over_unchanged() -> None:
+    m, d, whole = free_bodies(np.random.default_rng(5), 3)
+    turning = np.array([0.3, -0.2, 0.5])
+    for body in range(1, whole):
+        v = 6 * (body - 1)
+        d.qvel[v : v + 3] = np.arange(3) + np.cross(turning, d.qpos[7 * (body - 1) :][:3])
+        d.qvel[v + 3 : v + 6] = turning
+    mujoco.mj_forward(m, d)
+    before = d.energy.copy()
+    fuse(m, d, [1, 2, 3], whole)
+    assert np.allclose(d.qvel[-3:], turning)
+    assert np.array_equal(before, d.energy)
+
+
+def test_misfit_sees_a_shift_and_a_turn() -> None:
+    m, d, _ = free_bodies(np.random.default_rng(1), 2)
+    mujoco.mj_forward(m, d)
+    places, radii = d.xpos[1:3].copy(), np.array([0.1, 0.1])
+    assert misfit(d, [1, 2], places, radii) < 1e-12
+    d.qpos[7] += 1e-5
+    mujoco.mj_forward(m, d)
+    assert misfit(d, [1, 2], places, radii) == pytest.approx(1e-5)
+    d.qpos[7] -= 1e-5
+    d.qpos[10:14] = np.cos(5e-4), 0, 0, np.sin(5e-4)
+    mujoco.mj_forward(m, d)
+    assert misfit(d, [1, 2], places, radii) > 1e-3 * 0.1
+
+
+@pytest.mark.parametrize("name", ["paper", "lamp", "gearbox"])
+def test_a_fused_run_agrees_with_the_unfused(name: str) -> None:
+    layout = layout_of(name)
+    one, other = (Simulation(layout, units=2, jitter=0.3, seed=2, fuse=f) for f in (False, True))
+    apart, fused = one.run(), other.run()
+    assert fused.products == apart.products == 2
+    assert [e.transition for e in fused.events] == [e.transition for e in apart.events]
+    assert all(abs(a.t - b.t) < 0.021 for a, b in zip(apart.events, fused.events, strict=True))
+    assert fused.physics and apart.physics
+    assert fused.physics.fused and not apart.physics.fused
+    assert fused.physics.unintended_contacts == 0
+    assert fused.physics.handoffs < apart.physics.handoffs
+    gap = fused.physics.handoff_gap_max_mm
+    assert gap == pytest.approx(apart.physics.handoff_gap_max_mm, abs=0.01)
+    error = fused.physics.product_error_max_mm
+    assert error is not None and 0 < error < 0.002, "what is rounded away when bodies become one"
+    assert other.model and one.model and other.model.bodies != one.model.bodies
+
+
+def test_mass_and_inertia_add_up() -> None:
+    layout = layout_of("gearbox")
+    bodies = bodies_of(layout.factory, layout.product, True)
+    root = bodies.wholes[layout.factory.pag.root]
+    assert root.mass == pytest.approx(layout.product.mass)
+    solids = [layout.product.solids[part] for part in root.parts]
+    centre = sum(s.mass * s.centre for s in solids) / root.mass
+    assert np.allclose(root.centre, centre)
+    away = [s.centre - centre for s in solids]
+    inertia = sum(
+        s.inertia + s.mass * (r @ r * np.eye(3) - np.outer(r, r))
+        for s, r in zip(solids, away, strict=True)
+    )
+    assert np.allclose(root.inertia, inertia)
+    for label, radius in bodies.radius.items():
+        corners = np.concatenate([layout.product.solids[p].corners for p in bodies.parts(label)])
+        assert np.linalg.norm(corners - bodies.centre[label], axis=1).max() <= radius + 1e-12
+
+
+def test_what_is_only_worked_upon_stays_the_body_that_it_is() -> None:
+    layout = laid_out(
+        "root = c; c = weld(b); b = mate(a, d); a = weld(e); e = atomic(); d = atomic()"
+    )
+    bodies = bodies_of(layout.factory, layout.product, True)
+    assert dict(bodies.carried) == {
+        "e": ("e",), "a": ("e",), "d": ("d",), "b": ("b",), "c": ("b",),
+    }  # fmt: skip
+    copies = fused_copies(bodies, layout.factory, None)
+    assert copies == {"e": 2, "d": 2, "b": 2}
+    run = Simulation(layout, units=3, fuse=True).run()
+    assert run.products == 3 and run.physics and run.physics.unintended_contacts == 0
+
+
+@pytest.mark.parametrize("name", ["paper", "lamp"])
+def test_the_monitor_explains_a_fused_run(name: str) -> None:
+    simulation = Simulation(layout_of(name), units=3, jitter=0.3, seed=1, fuse=True)
+    monitor = beside(simulation)
+    run = simulation.run([monitor.observe])
+    report = monitor.report()
+    assert run.products == 3
+    assert report.refines_net, [str(v) for v in report.violations]
+
+
+def test_the_monitor_catches_a_body_made_of_another_unit() -> None:
+    """Planted: the product appears in the output robot's hands, but one input stays there."""
+    simulation = Simulation(layout_of("paper"), units=2, fuse=True)
+    stock = simulation.world.stock
+    retire = stock._retire
+    kept: list[str] = []
+
+    def faulty(label: str, unit: int) -> None:
+        retire(label, unit)
+        if label == "part1" and not kept:
+            kept.append(label)
+            park = stock.park[label, stock.free[label][0]]
+            robot = simulation.layout.factory.by_label["sub1"].carrier
+            stock._switch(park, False)
+            stock._switch(stock.grip[robot, label], True)
+
+    stock._retire = faulty
+    monitor = beside(simulation)
+    simulation.run([monitor.observe], max_time=20)
+    assert kept and not monitor.report().refines_net
+
+
+def test_large_factories_are_fused_by_themselves(tmp_path: Path) -> None:
+    small = layout_of("balanced").factory
+    assert len(small.robots) < FUSE_FROM and not fusing_pays(small)
+    text = "root = n1;\n" + "".join(f"n{k} = mate(n{2 * k}, n{2 * k + 1});\n" for k in range(1, 64))
+    text += ";\n".join(f"n{k} = atomic()" for k in range(64, 128))
+    (tmp_path / "tree.pag").write_text(text)
+    assert fusing_pays(factory.compile(factory.load_pag(tmp_path / "tree.pag")))
+    chain = "root = n119;\nn1 = mate(q0, q1);\n"
+    chain += "".join(f"n{k} = mate(n{k - 1}, q{k});\n" for k in range(2, 120))
+    chain += ";\n".join(f"q{n} = atomic()" for n in range(120))
+    (tmp_path / "chain.pag").write_text(chain)
+    assert not fusing_pays(factory.compile(factory.load_pag(tmp_path / "chain.pag")))
+
+
+def test_run_says_that_it_fuses(run: Terminal, tmp_path: Path) -> None:
+    assert run("run", PAPER, "--fuse", "--json").json["fused"] is True
+    assert run("run", PAPER, "--json").json["fused"] is False
+    log = tmp_path / "run.log"
+    said = run("run", PAPER, "--fuse", "--monitor", "--log", log).out
+    assert "parts joined for good are one rigid body" in said
+    assert "they explain the run" in said
+    assert "they explain the run" in run("monitor", log).out

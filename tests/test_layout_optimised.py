@@ -1,0 +1,219 @@
+"""The optimised layout: never worse than the first feasible one, never below the bound, and what
+its contours allow."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from math import inf
+from pathlib import Path
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from layout_values import STYLES, paper_layout, random_layout, row_of_inserts, table_pag
+from pag_values import SHAPES, factory_of
+
+import factory.layout.optimising as optimising
+from factory.control.plan import operation_modes, robot_limits
+from factory.errors import RunError
+from factory.geometry import product_geometry
+from factory.layout.bounds import cycle_time_bound
+from factory.layout.dimensions import LAYERS, Clearance
+from factory.layout.durations import Pace, gear_times, operation_times
+from factory.layout.embedding import lay_out
+from factory.layout.flank import Flank
+from factory.layout.gain import gain
+from factory.layout.optimising import first_feasible
+from factory.layout.outline import Outline, Plan
+from factory.layout.plan import Layout
+from factory.layout.stretching import Shape
+from factory.pipeline import read
+from factory.prediction import operation_delays
+from factory.settings import Settings
+from tests.command_line import Terminal
+
+PACE = Pace.of(Settings())
+EXAMPLES = Path(__file__).resolve().parent.parent / "examples"
+
+sizes, seeds = st.integers(2, 24), st.integers(0, 10_000)
+shapes, styles = st.sampled_from(SHAPES), st.sampled_from(STYLES)
+
+
+def cycle(layout: Layout) -> float:
+    return max(gear_times(layout, PACE))
+
+
+@settings(max_examples=25)
+@given(sizes, seeds, shapes, styles)
+def test_between_the_bound_and_the_first_layout(
+    size: int, seed: int, shape: str, style: str
+) -> None:
+    """The bound is that of the first layout too, which no search has touched."""
+    layout = random_layout(size, seed, shape, style)
+    first = first_feasible(layout.factory, layout.product, Clearance())
+    bound = cycle_time_bound(layout.factory, layout.product, layout.clearance, PACE)
+    assert 0 < bound <= cycle(layout) + 1e-9
+    assert cycle(layout) <= cycle(first) + 1e-9
+
+
+@settings(max_examples=20)
+@given(sizes, seeds, shapes, styles)
+def test_times_are_those_of_the_modes(size: int, seed: int, shape: str, style: str) -> None:
+    """Scalar times against those predicted from the modes of the operations."""
+    layout = random_layout(size, seed, shape, style)
+    given = Settings()
+    modes, (limits, _) = operation_modes(layout, given.eps), robot_limits(layout, given)
+    predicted = operation_delays(layout, modes, limits, given, "mujoco")
+    assert operation_times(layout, PACE) == pytest.approx(predicted, abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("name", "figures"),
+    [
+        ("paper", (2.548, 2.548, 2.541)),
+        ("lamp", (3.752, 3.752, 2.923)),
+        ("stool", (5.027, 4.530, 3.323)),
+        ("shelf", (6.075, 5.710, 3.205)),
+        ("gearbox", (10.298, 8.550, 6.499)),
+        ("chest", (7.660, 6.072, 3.222)),
+        ("balanced", (2.516, 2.156, 1.355)),
+    ],
+)
+def test_what_the_examples_gain(name: str, figures: tuple[float, float, float]) -> None:
+    """Cycle times [s] of the first layout and the one found, and the bound."""
+    source = read(EXAMPLES / f"{name}.pag")
+    found = gain(lay_out(source.compile(), source.product), PACE)
+    first, chosen = found.first.predicted_cycle_time_s, found.chosen.predicted_cycle_time_s
+    assert (first, chosen, found.bound) == pytest.approx(figures, abs=6e-4)
+
+
+def test_the_search_and_the_bound_agree_where_the_paper_s_robots_are_close() -> None:
+    """The paper's layout is as good as any: all that is missing is a millimetre of rounding."""
+    layout = paper_layout()
+    bound = cycle_time_bound(layout.factory, layout.product, layout.clearance, PACE)
+    assert cycle(layout) - bound < 0.01
+
+
+def test_large_factories_are_packed_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(optimising, "LARGE", 0)
+    for seed in range(12):
+        layout = random_layout(8 + seed, seed, SHAPES[seed % 4], STYLES[seed % len(STYLES)])
+        assert layout.certificate is not None and layout.certificate.holds
+    chest = read(EXAMPLES / "chest.pag")
+    assert cycle(lay_out(chest.compile(), chest.product)) < 7.0
+
+
+def test_the_output_robot_need_not_pass_the_branches_ahead() -> None:
+    """A balanced tree: the product leaves between the branches; boxes would make its way as long
+    as they are."""
+    rows = [(f"p{n}", "atomic", "", {}) for n in range(16)]
+    level, number = [row[0] for row in rows], 0
+    while len(level) > 1:
+        pairs = list(zip(level[::2], level[1::2], strict=True))
+        level = [f"s{number + n}" for n in range(len(pairs))]
+        rows += [(s, "mate", " ".join(p), {}) for s, p in zip(level, pairs, strict=True)]
+        number += len(pairs)
+    factory = factory_of(table_pag(level[0], *rows))
+    product = product_geometry(factory.pag)
+    first = first_feasible(factory, product, Clearance())
+    passed = lay_out(factory, product).guidepaths[0].travel
+    assert passed < 0.3 < 0.6 < first.guidepaths[0].travel
+
+
+def test_slower_robots_get_another_layout() -> None:
+    """The pace is part of what is optimised; the same pace gives the same layout."""
+    source = read(EXAMPLES / "gearbox.pag")
+    factory, slow = source.compile(), replace(PACE, speed=0.1)
+    one, again = (lay_out(factory, source.product, pace=slow) for _ in range(2))
+    assert one.guidepaths == again.guidepaths
+    assert one.guidepaths != lay_out(factory, source.product).guidepaths
+    assert one.certificate is not None
+    first = first_feasible(one.factory, source.product, Clearance())
+    assert max(gear_times(one, slow)) < max(gear_times(first, slow))
+
+
+def test_a_floor_that_only_the_first_layout_fits() -> None:
+    """Nested branches are deeper; on a floor that is too shallow they are laid out as boxes."""
+    source = read(EXAMPLES / "shelf.pag")
+    factory, product = source.compile(), source.product
+    xlo, xhi, ylo, yhi = lay_out(factory, product).floor
+    shallow = (10.0, yhi - ylo - 0.01)
+    found = lay_out(factory, product, floor=shallow)
+    assert found.floor[3] - found.floor[2] <= shallow[1]
+    assert cycle(found) > cycle(lay_out(factory, product))
+    with pytest.raises(RunError, match="too deep"):
+        lay_out(factory, product, floor=(10.0, 0.3))
+    assert xhi > xlo
+
+
+def test_a_row_of_inserts_stands_on_both_sides() -> None:
+    layout = row_of_inserts(9)
+    headings = {path.heading for path in layout.guidepaths[1:]}
+    assert len(headings) == 2
+    assert max(layout.stations) < 8 * 0.08
+
+
+def outline(lane: tuple[float, float], front: float, crown: float = 0.0) -> Outline:
+    """A robot whose own things are `front` ahead of its B end and 0.1 m behind, with a crown so
+    wide on either side, from 0.05 m ahead to 0.3 m behind."""
+    own = (-0.1, front, *lane)
+    blocks = (own, (-0.3, 0.05, -crown, crown)) if crown else (own,)
+    shape = Shape({}, (0.0, 0.0, 0.0, 0.0), 0.0, 0.035, 0.08, 0.0, False)
+    return Outline(shape, Plan(), (lane,) * 3, (blocks,) * 3, 0.0)
+
+
+NARROW = (-0.04, 0.04)
+
+
+def test_beside_a_path_a_long_robot_goes_past_the_crown_of_a_short_one() -> None:
+    flank = Flank().taken(outline(NARROW, 0.0, 0.5), 0.0, 0.1)
+    long = outline(NARROW, 0.0, 0.5)
+    assert flank.travel(long, 0.3, 0.1) == inf, "its own path would cross that crown"
+    assert flank.travel(long, 0.6, 0.1) == pytest.approx(0.45), "behind 0.4 m, 0.05 m ahead"
+    assert flank.travel(long, 1.0, 0.1) == pytest.approx(0.1), "beside it, no further than need be"
+
+
+def test_beside_a_path_a_short_robot_stops_before_the_crown_of_a_long_one() -> None:
+    flank = Flank().taken(outline(NARROW, 0.0, 0.5), 0.0, 0.6)
+    short = outline(NARROW, 0.0)
+    assert flank.travel(short, 0.2, 0.3) == pytest.approx(0.3), "0.55 m is where the crown begins"
+    assert flank.travel(short, 0.2, 0.5) == inf, "its rear would be in the crown"
+    assert flank.travel(short, 0.07, 0.3) == inf, "their lanes would overlap"
+    assert {round(start, 3) for start in flank.starts(short, 0.0)} == {0.08, 0.54}
+
+
+def test_boxes_do_not_nest() -> None:
+    flank = Flank(nested=False).taken(outline(NARROW, 0.0, 0.5), 0.0, 0.6)
+    assert flank.travel(outline(NARROW, 0.0), 0.2, 0.3) == inf
+    assert flank.travel(outline(NARROW, 0.0), 0.6, 0.3) == pytest.approx(0.3)
+
+
+def test_what_is_far_back_becomes_a_wall() -> None:
+    flank = Flank()
+    for number in range(20):
+        flank = flank.taken(outline(NARROW, 0.0), 0.08 * number, 0.1)
+    assert all(len(flank.blocks[layer]) <= 16 for layer in LAYERS)
+    assert flank.travel(outline(NARROW, 0.0), 0.08 * 20, 0.1) == pytest.approx(0.1)
+    assert flank.travel(outline(NARROW, 0.0), 0.0, 0.1) == inf
+
+
+def test_a_slow_pace_takes_longer() -> None:
+    slow = replace(PACE, speed=0.1)
+    assert max(gear_times(paper_layout(), slow)) > 1.5 * cycle(paper_layout())
+    assert slow.rest(1.0) == pytest.approx(10.05) and slow.rest(0.0) == 0.0
+    assert PACE.staged(1.0, 0.2, 0.0) == PACE.rest(1.0)
+    assert PACE.staged(1.0, 0.2, 9.0) == pytest.approx(9.0 + PACE.rest(0.2))
+
+
+def test_build_tells_what_was_gained(run: Terminal) -> None:
+    chest = EXAMPLES / "chest.pag"
+    told = run("build", chest)
+    assert told.status == 0
+    words = "cycle 6.07 s (r12); first feasible layout 7.66 s, 2.95 m², 7.26 m;"
+    assert f"{words} no layout below 3.22 s" in told.out
+    found = run("build", chest, "--json").json["layout"]
+    assert found["predicted_cycle_time_s"] == pytest.approx(6.072, abs=1e-3)
+    assert found["bottleneck"] == "r12"
+    assert found["first_feasible"]["predicted_cycle_time_s"] == pytest.approx(7.66, abs=1e-3)
+    assert found["cycle_time_bound_s"] == pytest.approx(3.222, abs=1e-3)
+    assert found["guidepath_length_m"] < found["first_feasible"]["guidepath_length_m"]

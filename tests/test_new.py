@@ -1,0 +1,231 @@
+"""Getting started: `factory new`, defaults in the environment and in factory.toml, completion."""
+
+from __future__ import annotations
+
+import re
+import shutil
+import subprocess
+import tomllib
+from pathlib import Path
+
+import pytest
+import trimesh
+
+from factory.defaults import OPTIONS, load_defaults
+from factory.settings import RANGES, Settings
+from factory.starting import LABELS
+from tests.command_line import PAPER, Terminal, files_in, spawn
+
+# --- factory new ----------------------------------------------------------------------------------
+
+
+def test_a_new_product_runs_at_once(run: Terminal, tmp_path: Path) -> None:
+    """Nothing to warn about, nothing in the way, and the physics makes it."""
+    folder = tmp_path / "handbell"
+    assert run("new", folder).status == 0
+    assert set(files_in(folder)) == {
+        *("handbell.pag", "factory.toml", "README.md"),
+        *("meshes/bell.stl", "meshes/grip.stl"),
+    }
+    pag = folder / "handbell.pag"
+    document = run("check", pag, "--json").json
+    assert (document["product"], document["labels"], document["live"]) == ("handbell", 7, True)
+    assert document["clashes"] == []
+    built = run("build", pag, "--json")
+    assert built.json["warnings"] == []
+    done = run("run", pag, "--json").json
+    assert (done["products"], done["refines_net"], done["unintended_contacts"]) == (1, True, 0)
+    for mesh in ("bell", "grip"):
+        solid = trimesh.load(folder / "meshes" / f"{mesh}.stl")
+        assert solid.is_watertight and solid.volume > 0
+
+
+def test_the_commands_that_its_readme_tells_are_right(
+    run: Terminal, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    run("new", tmp_path / "bell-2")
+    monkeypatch.chdir(tmp_path / "bell-2")
+    told = re.findall(r"^ {4}factory ([^#\n]*)", Path("README.md").read_text(), re.M)
+    assert [line.split()[0] for line in told] == ["check", "build", "run", "run"]
+    for line in told[:3]:
+        quick = ["--world", "ideal"] if "run" in line else []
+        assert run(*line.split(), "-q", *quick).status == 0
+
+
+def test_its_factory_toml_tells_every_key_and_its_default(run: Terminal, tmp_path: Path) -> None:
+    """Commented out, all of them; taken at their word, they change nothing."""
+    run("new", tmp_path / "x")
+    text = (tmp_path / "x" / "factory.toml").read_text()
+    assert tomllib.loads(text) == {}
+    said = tomllib.loads(re.sub(r"(?m)^# (?=\w+ = )", "", text))
+    assert set(said) == {*RANGES, *OPTIONS} - {"settle", "wip"}
+    assert {k: v for k, v in said.items() if k in RANGES} == {
+        k: getattr(Settings(), k) for k in RANGES if k != "settle"
+    }
+    (tmp_path / "x" / "factory.toml").write_text(re.sub(r"(?m)^# (?=\w+ = )", "", text))
+    load_defaults(tmp_path / "x" / "factory.toml")
+
+
+@pytest.mark.parametrize("name", ["a b", "é", "", "-x", "..", "root", "a;b", "a" * 70, *LABELS])
+def test_names_that_no_product_can_have(run: Terminal, tmp_path: Path, name: str) -> None:
+    done = run("new", "--json", "--", tmp_path / "sub" / name if name else "")
+    assert (done.status, done.codes) == (2, ["BadValue"])
+    assert files_in(tmp_path) == {}
+
+
+def test_what_is_there_is_left_alone(run: Terminal, tmp_path: Path) -> None:
+    (tmp_path / "a").mkdir()
+    assert run("new", tmp_path / "a").status == 0
+    before = files_in(tmp_path)
+    assert run("new", tmp_path / "a", "--json").codes == ["BadFile"]
+    (tmp_path / "b").write_text("mine")
+    assert run("new", tmp_path / "b", "--json").codes == ["BadFile"]
+    (tmp_path / "c").symlink_to(tmp_path / "nowhere")
+    assert run("new", tmp_path / "c", "--json").codes == ["BadFile"]
+    assert {k: v for k, v in files_in(tmp_path).items() if k != "b"} == before
+
+
+# --- defaults -------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def pag(tmp_path: Path) -> Path:
+    file = tmp_path / "p.pag"
+    file.write_text(PAPER.read_text())
+    return file
+
+
+def test_options_come_before_the_environment_and_that_before_the_file(
+    run: Terminal, pag: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def units(*words: object) -> tuple[int, str]:
+        found = run("run", pag, "--json", *words).json
+        return found["units"], found["world"]
+
+    assert units("--world", "ideal") == (1, "ideal")
+    pag.with_name("factory.toml").write_text('world = "ideal"\nunits = 2\nseed = 3\n')
+    assert units() == (2, "ideal")
+    monkeypatch.setenv("FACTORY_UNITS", "3")
+    assert units() == (3, "ideal")
+    assert units("--units", 1) == (1, "ideal")
+    monkeypatch.setenv("FACTORY_UNITS", "many")
+    done = run("run", pag, "--json")
+    assert done.codes == ["Usage"]
+    assert "FACTORY_UNITS" in done.err
+
+
+def test_settings_too(run: Terminal, pag: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def seconds(*words: object) -> float:
+        found = run("run", pag, "--world", "ideal", "--json", *words).json["sim_time_s"]
+        assert isinstance(found, float)
+        return found
+
+    plain = seconds()
+    pag.with_name("factory.toml").write_text("speed = 0.1")
+    slow = seconds()
+    monkeypatch.setenv("FACTORY_SPEED", "0.05")
+    slower = seconds()
+    assert plain < slow < slower
+    assert seconds("--speed", 0.5) == plain
+    monkeypatch.setenv("FACTORY_SPEED", "")
+    assert seconds() == slow
+
+
+def test_faults_of_the_environment_name_the_variable(
+    run: Terminal, pag: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name, value in (("SPEED", "fast"), ("EPS", "nan"), ("SUBSTEPS", "2.5"), ("FORCE", "-1")):
+        monkeypatch.setenv(f"FACTORY_{name}", value)
+    done = run("build", pag, "--json")
+    assert done.codes == ["BadValue"] * 4
+    for name in ("FACTORY_SPEED", "FACTORY_EPS", "FACTORY_SUBSTEPS", "FACTORY_FORCE"):
+        assert f"BadValue in the environment {name}: " in done.err
+
+
+@pytest.mark.parametrize(
+    ("text", "where", "message", "hint"),
+    [
+        ("units = 1\nunit = 3", "2:1", "unknown key 'unit'", "did you mean 'units'?"),
+        ("units = 'three'", "1:1", "units must be a whole number", "for example units = 1"),
+        ("units = true", "1:1", "units must be a whole number", "units = 1"),
+        ("seed = 1\nworld = 3", "2:1", "world must be a text in quotes", 'world = "mujoco"'),
+        ("templates = 'mine'", "1:1", "templates must be a list of texts", 'templates = ["mine"]'),
+        ("templates = [3]", "1:1", "templates must be a list of texts", "mine"),
+        ("world = 'moon'", "1:1", "world: 'moon' is not one of", ""),
+        ("units = 0", "1:1", "units: 0 is not in the range", ""),
+        ("jitter = 7", "1:1", "jitter: 7", ""),
+        ("jitter = nan", "1:1", "jitter: ", ""),
+    ],
+)
+def test_faults_of_options_in_the_file(
+    run: Terminal, pag: Path, text: str, where: str, message: str, hint: str
+) -> None:
+    pag.with_name("factory.toml").write_text(text)
+    done = run("run", pag)
+    assert done.status == 2
+    assert f"factory.toml:{where}: " in done.err
+    assert message in done.err
+    assert hint in done.err
+
+
+def test_each_command_takes_what_it_has_an_option_for(
+    run: Terminal, pag: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Folders are those beside the file, wherever one is; a file beside the PAG beats the one in
+    the current folder."""
+    mine = pag.parent / "mine"
+    mine.mkdir()
+    (mine / "join.op").write_text("nonsense")
+    monkeypatch.chdir(mine)
+    pag.with_name("factory.toml").write_text("units = 3\ntemplates = ['mine']")
+    for command in (("check",), ("programs",), ("export", "--format", "dot")):
+        assert run(command[0], pag, *command[1:], "--json").codes[0] == "Syntax"
+    pag.with_name("factory.toml").write_text("units = 3")
+    (mine / "factory.toml").write_text("nonsense = 1")
+    assert run("check", pag, "-q").status == 0
+    pag.with_name("factory.toml").unlink()
+    assert run("check", pag, "--json").codes == ["UnknownParameter"]
+
+
+def test_values_of_picture_options(run: Terminal, pag: Path) -> None:
+    pag.with_name("factory.toml").write_text("size = '64x48'\nfloor = '0.1x0.1'")
+    assert run("build", pag, "--json").codes == ["Layout"]
+    assert run("build", pag, "--floor", "40x40", "-q").status == 0
+
+
+# --- completion in the shell ----------------------------------------------------------------------
+
+
+def completions(words: str, cwd: Path) -> list[str]:
+    """What a shell would offer for the last word."""
+    number = str(len(words.split(" ")) - 1)
+    variables = {"_FACTORY_COMPLETE": "bash_complete", "COMP_WORDS": words, "COMP_CWORD": number}
+    done = spawn(cwd=cwd, **variables)
+    return [line.partition(",")[2] for line in done.out.splitlines() if line.startswith("plain,")]
+
+
+def test_commands_options_codes_and_products_are_completed(tmp_path: Path) -> None:
+    for name in ("lamp.pag", "log.txt", ".hidden.pag", "stand.pag"):
+        (tmp_path / name).write_text("")
+    (tmp_path / "more").mkdir()
+    (tmp_path / "more" / "chair.pag").write_text("")
+    assert completions("factory im", tmp_path) == ["import"]
+    assert {"check", "run", "new"} <= set(completions("factory ", tmp_path))
+    assert completions("factory check ", tmp_path) == ["lamp.pag", "stand.pag", "more/"]
+    assert completions("factory run l", tmp_path) == ["lamp.pag"]
+    assert completions("factory run more/", tmp_path) == ["more/chair.pag"]
+    assert completions("factory run lamp.pag --wo", tmp_path) == ["--world"]
+    assert completions("factory run --world ", tmp_path) == ["mujoco", "ideal"]
+    assert completions("factory --explain undef", tmp_path) == ["UndefinedLabel"]
+
+
+@pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
+def test_each_shell_gets_its_script(shell: str, tmp_path: Path) -> None:
+    if shell == "bash" and shutil.which("bash") is None:
+        pytest.skip("there is no bash")
+    done = spawn(cwd=tmp_path, _FACTORY_COMPLETE=f"{shell}_source")
+    assert done.status == 0
+    assert "_FACTORY_COMPLETE" in done.out and "factory" in done.out
+    if shell == "bash":
+        checked = subprocess.run(["bash", "-n"], input=done.out, text=True, capture_output=True)
+        assert (checked.returncode, checked.stderr) == (0, "")

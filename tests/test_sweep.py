@@ -1,0 +1,517 @@
+"""Many runs at once: the grid, the rows, what is survived, and the figures of the summary."""
+
+from __future__ import annotations
+
+import os
+import signal
+import socket
+import sqlite3
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator, Sequence
+from functools import partial
+from pathlib import Path
+from subprocess import PIPE
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy import stats
+
+from factory.errors import InputError, MissingError, RunError
+from factory.layout.embedding import lay_out
+from factory.pipeline import read
+from factory.settings import Settings
+from factory.simulation import Simulation
+from factory.sweep import Recipe, local, points, read_axes, summarise, sweeping
+from factory.sweep.grid import Point, Value
+from factory.sweep.local import run_local
+from factory.sweep.store import COLUMNS, Store
+from factory.sweep.sweeping import sweep
+from factory.sweep.work import FIGURES, Outcome, Runner
+from tests.command_line import PAPER, ROOT, Terminal, files_in
+from tests.deadly import Deadly, Stillborn
+
+FACTORY = [sys.executable, "-m", "factory"]
+SOON = 90.0
+
+
+def recipe_of(kind: type[Recipe] = Recipe, **fixed: Value) -> Recipe:
+    source = read(PAPER)
+    settings = {name: getattr(Settings(), name) for name in Settings.__dataclass_fields__}
+    return kind(source.compile(), source.product, {**settings, "world": "ideal", **fixed})
+
+
+def rows_of(path: Path, columns: str = "point") -> list[tuple[Any, ...]]:
+    connection = sqlite3.connect(path)
+    try:
+        return connection.execute(f"SELECT {columns} FROM runs ORDER BY rowid").fetchall()
+    finally:
+        connection.close()
+
+
+def has_rows(path: Path, least: int) -> bool:
+    """Whether so many rows are there by now."""
+    try:
+        return len(rows_of(path)) >= least
+    except sqlite3.OperationalError:
+        return False
+
+
+def wait_for(what: Callable[[], bool]) -> None:
+    end = time.monotonic() + SOON
+    while not what():
+        assert time.monotonic() < end
+        time.sleep(0.02)
+
+
+@pytest.fixture
+def here(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Runs are done in this process, which starts at once."""
+
+    def run_here(recipe: Recipe, wanted: Sequence[Point], jobs: int) -> Iterator[Outcome]:
+        runner = Runner(recipe)
+        for point in wanted:
+            yield runner(point)
+
+    monkeypatch.setattr(sweeping, "run_local", run_here)
+
+
+# The grid
+
+
+@pytest.mark.parametrize(
+    ("text", "values"),
+    [
+        ("seed=0:4", (0, 1, 2, 3)),
+        ("seed=5", (5,)),
+        ("seed=0:10:4,7,0", (0, 4, 8, 7)),
+        ("jitter=0.1,0.3", (0.1, 0.3)),
+        ("speed=0.2:0.6:0.1", (0.2, 0.3, 0.4, 0.5)),
+        ("speed=1,1.0,1e0", (1.0,)),
+        ("world=ideal,mujoco", ("ideal", "mujoco")),
+        (" wip = 1 : 3 , 9", (1, 2, 9)),
+    ],
+)
+def test_axes_are_lists_and_ranges(text: str, values: tuple[Value, ...]) -> None:
+    (axis,) = read_axes([text])
+    assert axis.values == values
+    assert [type(value) for value in axis.values] == [type(value) for value in values]
+
+
+@pytest.mark.parametrize(
+    ("text", "message", "hint"),
+    [
+        ("sped=1", "unknown key 'sped'", "did you mean 'speed'?"),
+        ("seed", "'seed' gives no values", "--vary seed=0:100"),
+        ("seed=", "seed takes a whole number, not ''", "--vary seed=0:100"),
+        ("seed=1.5", "seed takes a whole number, not '1.5'", "--vary seed=0:100"),
+        ("seed=-1", "seed = -1 is not between 0 and 9.22337e+18", "--vary seed=0:100"),
+        ("seed=4:4", "the range '4:4' of seed is empty", "START less than END"),
+        ("seed=0:4:-1", "the range '0:4:-1' of seed is empty", "START less than END"),
+        ("seed=0:1:1:1", "'0:1:1:1' of seed has no step", "seed=START:END:STEP"),
+        ("speed=0.1:0.5", "'0.1:0.5' of speed has no step", "speed=START:END:STEP"),
+        ("speed=0.1:0.5:0", "the range '0.1:0.5:0' of speed is empty", "speed=START:END:STEP"),
+        ("speed=fast", "speed takes a number, not 'fast'", "--vary speed=0.5"),
+        ("speed=nan", "speed takes a number, not 'nan'", "--vary speed=0.5"),
+        ("speed=1000", "speed = 1000 is not between 0.001 and 100", "for example speed = 0.5"),
+        ("jitter=0.95", "jitter = 0.95 is not between 0 and 0.9", "--vary jitter=0.1,0.3"),
+        ("world=mujoko", "there is no world 'mujoko'", "did you mean 'mujoco'?"),
+        ("seed=0:10000000", "10000000 values of seed are more than 1000000", "take fewer"),
+    ],
+)
+def test_a_bad_axis_is_told(text: str, message: str, hint: str) -> None:
+    with pytest.raises(InputError) as caught:
+        read_axes([text])
+    (diagnostic,) = caught.value.diagnostics
+    assert diagnostic.message == message
+    assert hint in diagnostic.hint
+
+
+def test_every_bad_axis_is_told_at_once() -> None:
+    with pytest.raises(InputError) as caught:
+        read_axes(["sed=1", "seed=0:2", "seed=3", "speed=x"])
+    messages = [d.message for d in caught.value.diagnostics]
+    assert messages == [
+        "unknown key 'sed'",
+        "speed takes a number, not 'x'",
+        "seed is varied twice",
+    ]
+    with pytest.raises(InputError, match="2000000 runs are more than 1000000"):
+        read_axes(["seed=0:1000000", "jitter=0.1,0.2"])
+
+
+@given(st.integers(0, 50), st.integers(1, 50), st.integers(1, 9))
+def test_a_range_is_pythons(start: int, length: int, step: int) -> None:
+    (axis,) = read_axes([f"seed={start}:{start + length}:{step}"])
+    assert axis.values == tuple(range(start, start + length, step))
+    (axis,) = read_axes([f"speed={1 + start / 10}:{1 + (start + length) / 10}:{step / 10}"])
+    assert axis.values == tuple(round(1 + n / 10, 9) for n in range(start, start + length, step))
+
+
+def test_seeds_vary_fastest_and_settings_slowest() -> None:
+    axes = read_axes(["seed=0:2", "units=3,4", "clearance=0.02,0.03"])
+    found = list(points(axes))
+    assert len(found) == len(set(found)) == 8
+    assert [tuple(dict(p).values()) for p in found[:5]] == [
+        (0.02, 3, 0),
+        (0.02, 3, 1),
+        (0.02, 4, 0),
+        (0.02, 4, 1),
+        (0.03, 3, 0),
+    ]
+
+
+# Rows
+
+
+def test_runs_that_share_a_model_are_the_runs_alone() -> None:
+    """A run writes into its model: none may see what another has left there."""
+    runner = Runner(recipe_of(world="mujoco", jitter=0.3, units=2))
+    source = read(PAPER)
+    layout = lay_out(source.compile(), source.product)
+    for seed in (3, 1, 3):
+        shared = runner.run((("seed", seed),))
+        alone = Simulation(layout, "mujoco", 2, seed, 0.3).run()
+        assert shared.events == alone.events
+        assert shared.physics == alone.physics
+
+
+def test_a_row_is_what_run_tells(run: Terminal, out: Path, here: None) -> None:
+    database = out / "r.db"
+    words = ("--world", "ideal", "--jitter", "0.3", "--speed", "0.4")
+    done = run("sweep", PAPER, "--vary", "seed=7,8", *words, "-o", database, "--json")
+    assert done.status == 0
+    assert (done.json["runs"], done.json["done"], done.json["failed"]) == (2, 2, 0)
+    alone = run("run", PAPER, "--seed", "8", "--units", "4", *words, "--json").json
+    timed = ("wall_time_s", "supervisor_time_s", "realtime_factor")
+    kept = [name for name in FIGURES if name not in timed]
+    row = rows_of(database, ",".join(kept))[1]
+    assert dict(zip(kept, row, strict=True)) == {name: alone[name] for name in kept}
+    keys = rows_of(database, "point, status, seed, jitter, speed, units, world, wip, clearance")
+    assert keys[1] == ('{"seed":8}', "done", 8, 0.3, 0.4, 4, "ideal", None, 0.02)
+    assert files_in(out).keys() == {"r.db"}
+
+
+def test_the_database_is_in_wal_mode_and_open_to_readers(tmp_path: Path, here: None) -> None:
+    recipe, axes = recipe_of(), read_axes(["seed=0:3"])
+    database = tmp_path / "r.db"
+    sweep(recipe, axes, database)
+    with sqlite3.connect(database) as connection:
+        assert connection.execute("PRAGMA journal_mode").fetchone() == ("wal",)
+    connection.close()
+    with Store(database, recipe.identity(axes)) as store:
+        store.add(Outcome((("seed", 9),), "Broken it is"), recipe.at(()))
+        assert summarise(database).failed == 1  # committed already, and not hidden
+
+
+def test_a_sweep_goes_on_where_it_was(tmp_path: Path, here: None) -> None:
+    recipe, database = recipe_of(), tmp_path / "r.db"
+    first = sweep(recipe, read_axes(["seed=0:3"]), database)
+    kept = rows_of(database, "*")
+    more = sweep(recipe, read_axes(["seed=1:6"]), database)
+    assert (first.done, first.there, more.done, more.there) == (3, 0, 3, 2)
+    assert rows_of(database, "*")[:3] == kept
+    assert sweep(recipe, read_axes(["seed=0:6"]), database).done == 0
+
+
+def test_a_run_that_fails_is_a_row_with_its_reason(
+    run: Terminal, tmp_path: Path, here: None
+) -> None:
+    database = tmp_path / "r.db"
+    words = ["sweep", PAPER, "--world", "ideal", "-o", database, "--vary"]
+    done = run(*words, "clearance=0.02,5", "--max-time", "30", "--floor", "4x4", "--summary")
+    assert done.status == 1
+    (good, bad) = rows_of(database, "clearance, status, reason, sim_time_s")
+    assert good[:3] == (0.02, "done", None) and good[3] > 0
+    assert bad[1] == "failed" and bad[2].startswith("Layout the factory takes ") and bad[3] is None
+    assert "1 failed: Layout" in done.err
+    database.unlink()
+    done = run(*words, "seed=0:2", "--max-time", "1")
+    assert done.status == 1
+    reason = "Timeout not finished after 1.00 s of simulated time; "
+    for row in rows_of(database, "status, reason, sim_time_s"):
+        assert row[0] == "failed" and row[1].startswith(reason) and row[2] == 1.0
+    assert run(*words, "seed=0:3", "--max-time", "1", "--json").json["there"] == 2
+    assert run(*words, "seed=0:3", "--max-time", "1", "--json", "--retry").json["failed"] == 3
+
+
+def test_another_sweep_is_refused(tmp_path: Path, run: Terminal, here: None) -> None:
+    database = tmp_path / "r.db"
+    words = ["sweep", "--world", "ideal", "-o", database, "--vary", "seed=0:1"]
+    assert run(*words, PAPER).status == 0
+    before = database.read_bytes()
+    product = tmp_path / "paper.pag"
+    product.write_text(PAPER.read_text().replace("part3 = atomic()", "part3 = atomic(mass=2)"))
+    for more, message in (
+        ([product], "the product, a mesh, a template or a robot type has changed"),
+        ([PAPER, "--speed", "0.3"], "speed 0.5 there, 0.3 here"),
+        ([PAPER, "--vary", "units=1"], "varied seed there, seed, units here"),
+        ([PAPER, "--max-time", "9"], "max_time - there, 9.0 here"),
+        ([ROOT / "examples" / "lamp.pag"], "product sub3 there, lamp here"),
+    ):
+        refused = run(*words, *more)
+        assert refused.status == 2
+        assert f"BadFile {database}: it holds another sweep: {message}\n" in refused.err
+    assert database.read_bytes() == before
+    product.write_text("// the same\n" + PAPER.read_text())
+    assert run(*words, product).status == 0
+
+
+def test_files_of_others_are_left_alone(tmp_path: Path, run: Terminal, here: None) -> None:
+    text, other = tmp_path / "text", tmp_path / "other.db"
+    text.write_text("no database at all, but long enough to be taken for one " * 20)
+    with sqlite3.connect(other) as connection:
+        connection.execute("CREATE TABLE runs (x)")
+    connection.close()
+    before = files_in(tmp_path)
+    for path, message in (
+        (text, "file is not a database"),
+        (other, "it is the database of another program"),
+    ):
+        for words in (["-o", path, PAPER, "--vary", "seed=0:2"], [path, "--summary"]):
+            refused = run("sweep", *words)
+            assert (refused.status, refused.err.splitlines()[0]) == (
+                2,
+                f"BadFile {path}: {message}",
+            )
+    assert files_in(tmp_path) == before
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        ([PAPER, "-o", "r.db"], "Usage nothing varies"),
+        (["-o", "r.db", "--vary", "seed=1"], "Usage there is no FILE.pag"),
+        ([PAPER, "--vary", "seed=1"], "Usage there is no database for the results"),
+        (["--summary"], "Usage there is no database"),
+        (["r.db", "--summary"], "BadFile r.db: there is no such file"),
+        ([PAPER, "-o", "r.db", "--vary", "sed=1"], "UnknownParameter unknown key 'sed'"),
+        ([PAPER, "-o", "r.db", "--vary", "seed=1", "--seed", "2"], "both given and varied"),
+        ([PAPER, "-o", "r.db", "--vary", "seed=1", "--on", "spark://x"], "--on takes `local`"),
+        ([PAPER, "-o", "r.db", "--vary", "seed=1", "--on", "dask://x"], "--on takes `local`"),
+        ([PAPER, "-o", "nowhere/r.db", "--vary", "seed=1"], "'nowhere' does not exist"),
+        (["no.pag", "-o", "r.db", "--vary", "seed=1"], "no.pag"),
+    ],
+)
+def test_bad_command_lines_write_nothing(
+    run: Terminal,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    words: list[object],
+    message: str,
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    refused = run("sweep", *words)
+    assert refused.status == 2
+    assert message in refused.err
+    assert not files_in(tmp_path)
+
+
+# Processes that die
+
+
+def test_a_killed_worker_loses_the_run_under_way_alone(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(local, "TRIES", 2)
+    recipe = recipe_of()
+    deadly = Deadly(recipe.factory, recipe.product, recipe.fixed, mark=tmp_path / "mark")
+    grid = list(points(read_axes(["seed=2,0,3,1,4:8"])))
+    found = {dict(o.point)["seed"]: o for o in run_local(deadly, grid, 2)}
+    assert sorted(found) == list(range(8))
+    assert found[1].reason == "Killed the process died in 2 tries (exit status -9)"
+    assert found[2].reason == "" and found[2].tries == 2
+    assert all(found[n].reason == "" and found[n].tries == 1 for n in (0, 3, 4, 5, 6, 7))
+
+
+def test_workers_that_die_as_they_start_end_the_sweep() -> None:
+    recipe = recipe_of()
+    stillborn = Stillborn(recipe.factory, recipe.product, recipe.fixed)
+    with pytest.raises(RunError, match=r"die as they start \(exit status 7\)"):
+        list(run_local(stillborn, list(points(read_axes(["seed=0:9"]))), 1))
+
+
+def children(pid: int) -> list[int]:
+    """The processes below a process."""
+    found = subprocess.run(["ps", "-eo", "pid=,ppid="], capture_output=True, text=True).stdout
+    return [int(line.split()[0]) for line in found.splitlines() if int(line.split()[1]) == pid]
+
+
+def all_dead(processes: list[int]) -> bool:
+    return not any(map(alive, processes))
+
+
+def alive(pid: int) -> bool:
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+    except OSError:
+        return False
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="looks into /proc")
+def test_a_stopped_sweep_keeps_its_rows_and_goes_on(
+    tmp_path: Path, run: Terminal, here: None
+) -> None:
+    """After Ctrl-C and after kill -9. Its workers end too: nobody is left to work for."""
+    database = tmp_path / "r.db"
+    words = ["sweep", str(PAPER), "--vary", "seed=0:40", "--jitter", "0.3", "--world", "ideal"]
+    words += ["--units", "10", "-o", str(database)]
+    kept: list[tuple[Any, ...]] = []
+    for number, status in ((signal.SIGINT, 130), (signal.SIGKILL, -9)):
+        process = subprocess.Popen([*FACTORY, *words, "--jobs", "2"], cwd=ROOT, stderr=PIPE)
+        wait_for(partial(has_rows, database, len(kept) + 3))
+        workers = children(process.pid)
+        process.send_signal(number)
+        _, errors = process.communicate(timeout=SOON)
+        assert process.returncode == status
+        assert errors.strip() == (b"Interrupted stopped by the user" if status == 130 else b"")
+        assert len(workers) >= 2
+        wait_for(partial(all_dead, workers))
+        rows = rows_of(database, "*")
+        assert rows[: len(kept)] == kept
+        assert len(kept) + 3 <= len(rows) < 40
+        kept = rows
+    assert run(*words, "--json").json["there"] == len(kept)
+    assert rows_of(database, "*")[: len(kept)] == kept
+    assert sorted(rows_of(database, "seed")) == [(n,) for n in range(40)]
+    assert files_in(tmp_path).keys() == {"r.db"}
+
+
+# A cluster
+
+
+def free_port() -> int:
+    with socket.socket() as found:
+        found.bind(("127.0.0.1", 0))
+        return int(found.getsockname()[1])
+
+
+@pytest.fixture
+def cluster(tmp_path: Path) -> Iterator[tuple[str, list[subprocess.Popen[bytes]]]]:
+    """A Dask scheduler and two workers on loopback, each a process."""
+    pytest.importorskip("distributed")
+    port, started = free_port(), []
+
+    def start(*words: str) -> None:
+        command = [sys.executable, "-m", "dask", *words, "--no-dashboard"]
+        log = (tmp_path / f"{len(started)}.log").open("wb")
+        with log:
+            started.append(
+                subprocess.Popen(
+                    command,
+                    cwd=tmp_path,
+                    env={**os.environ, "PYTHONPATH": str(ROOT), "OMP_NUM_THREADS": "1"},
+                    stdout=log,
+                    stderr=log,
+                )
+            )
+
+    start("scheduler", "--host", "127.0.0.1", "--port", str(port), "--no-show")
+    for _ in range(2):
+        start("worker", f"tcp://127.0.0.1:{port}", "--nthreads", "1", "--no-nanny")
+    try:
+        yield f"dask://127.0.0.1:{port}", started
+    finally:
+        for process in started:
+            process.kill()
+            process.wait()
+
+
+def test_a_cluster_survives_the_death_of_a_worker(
+    tmp_path: Path, cluster: tuple[str, list[subprocess.Popen[bytes]]]
+) -> None:
+    from distributed import Client
+
+    from factory.sweep.cluster import run_dask
+
+    place, (_, first, _) = cluster
+    with Client(place.replace("dask", "tcp"), set_as_default=False) as client:
+        client.wait_for_workers(2, timeout=SOON)
+    grid, seen = list(points(read_axes(["seed=0:30"]))), []
+    for outcome in run_dask(recipe_of(jitter=0.3, units=5), grid, place):
+        seen.append(outcome)
+        ours = [o for o in seen if o.worker.endswith(f":{first.pid}")]
+        if ours and first.poll() is None:
+            first.kill()
+            first.wait()
+    assert sorted(dict(o.point)["seed"] for o in seen) == list(range(30))
+    assert all(o.reason == "" for o in seen)
+    assert len({o.worker for o in seen}) == 2
+    at_home = Runner(recipe_of(jitter=0.3, units=5))(grid[7])
+    (there,) = (o for o in seen if o.point == grid[7])
+    assert there.figures["sim_time_s"] == at_home.figures["sim_time_s"]
+
+
+def test_nobody_at_the_address(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    pytest.importorskip("distributed")
+    from factory.sweep import cluster
+
+    monkeypatch.setattr(cluster, "PATIENCE", "0.3s")
+    place = f"dask://127.0.0.1:{free_port()}"
+    with pytest.raises(MissingError, match=f"no Dask scheduler answers at {place}"):
+        sweep(recipe_of(), read_axes(["seed=0:2"]), tmp_path / "r.db", on=place)
+
+
+# The summary
+
+
+def test_the_summary_is_numpys(tmp_path: Path, here: None) -> None:
+    database = tmp_path / "r.db"
+    axes = read_axes(["seed=0:8", "jitter=0.3,0.1"])
+    sweep(recipe_of(), axes, database)
+    found = summarise(database)
+    assert [group.values for group in found.groups] == [(("jitter", 0.1),), (("jitter", 0.3),)]
+    for group in found.groups:
+        jitter = dict(group.values)["jitter"]
+        rows = rows_of(database, "jitter, cycle_time_s")
+        values = np.array([row[1] for row in rows if row[0] == jitter])
+        told = group.figures["cycle_time_s"]
+        low, high = stats.t.interval(
+            0.95, len(values) - 1, loc=values.mean(), scale=stats.sem(values)
+        )
+        assert (group.done, group.failed, told.n) == (8, 0, 8)
+        assert told.mean == pytest.approx(values.mean(), rel=1e-12)
+        assert told.deviation == pytest.approx(values.std(ddof=1), rel=1e-12)
+        assert (told.low, told.high) == pytest.approx((low, high), rel=1e-9)
+        assert (told.least, told.greatest) == (values.min(), values.max())
+        assert "handoffs" not in group.figures  # no such thing in the ideal world
+
+
+def test_failed_runs_count_and_nothing_more(tmp_path: Path) -> None:
+    recipe, axes = recipe_of(), read_axes(["seed=0:3"])
+    database = tmp_path / "r.db"
+    with Store(database, recipe.identity(axes)) as store:
+        for seed, reason, cycle in ((0, "", 2.0), (1, "Stalled so", 99.0), (2, "Stalled so", None)):
+            outcome = Outcome((("seed", seed),), reason, {"cycle_time_s": cycle})
+            store.add(outcome, recipe.at(outcome.point))
+    found = summarise(database)
+    (group,) = found.groups
+    assert (group.done, group.failed) == (1, 2)
+    assert found.reasons == {"Stalled so": 2}
+    told = group.figures["cycle_time_s"]
+    assert (told.n, told.mean, told.deviation, told.low) == (1, 2.0, None, None)
+
+
+def test_summaries_are_told_and_drawn(tmp_path: Path, run: Terminal, here: None) -> None:
+    pytest.importorskip("matplotlib")
+    database = tmp_path / "r.db"
+    words = ["--world", "ideal", "--vary", "seed=0:3", "--vary", "speed=0.3,0.5"]
+    assert run("sweep", PAPER, *words, "-o", database, "-q").out == ""
+    told = run("sweep", database, "--summary")
+    assert "speed 0.3: 3 runs" in told.out and "cycle_time_s" in told.out
+    drawn = run("sweep", "--plots", tmp_path / "plots", "-o", database, "--json").json
+    summary = drawn["summary"]
+    assert [g["values"] for g in summary["groups"]] == [{"speed": 0.3}, {"speed": 0.5}]
+    assert summary["groups"][0]["figures"]["cycle_time_s"]["n"] == 3
+    pictures = files_in(tmp_path / "plots")
+    assert pictures.keys() == {"cycle_time_s.png", "sim_time_s.png"}
+    assert all(picture.startswith(b"\x89PNG") for picture in pictures.values())
+
+
+def test_columns_are_named_once() -> None:
+    assert set(FIGURES) < set(COLUMNS)
+    assert {"seed", "jitter", "world", "clearance", "reason", "row_time_s"} < set(COLUMNS)
