@@ -45,7 +45,12 @@ def warn(diagnostics: Iterable[Diagnostic], quiet: bool = False) -> None:
     if quiet:
         return
     for diagnostic in diagnostics:
-        print(replace(diagnostic, message=f"warning: {diagnostic.message}"), file=sys.stderr)
+        print(warning(diagnostic), file=sys.stderr)
+
+
+def warning(diagnostic: Diagnostic) -> str:
+    """A diagnostic as it is shown where it is no error."""
+    return str(replace(diagnostic, message=f"warning: {diagnostic.message}"))
 
 
 def fail(error: FactoryError, as_json: bool) -> int:

@@ -53,6 +53,7 @@ ROOMS = [
     {
         "console",
         "checking",
+        "receipt",
         "approaching",
         "clashes",
         "building",

@@ -1,0 +1,114 @@
+"""A second build of what has not changed is left out, and nothing else is."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from factory.files import user_cache
+from tests.command_line import PAPER, ROOT, Terminal, files_in
+
+MESHED = """root = a;
+a = mate(b, c);
+b = atomic(mesh = "wing.stl", pos = (0, 0, 0.05));
+c = atomic(box = (0.1, 0.1, 0.05), pos = (0, 0, 0.2))
+"""
+
+
+def lines(run: Terminal, *words: object) -> str:
+    done = run("build", *words)
+    assert done.status == 0, done.err
+    return done.out
+
+
+def again(text: str) -> bool:
+    return "up to date" in text
+
+
+@pytest.fixture
+def product(tmp_path: Path) -> Path:
+    """A product with a mesh of its own."""
+    import trimesh
+
+    trimesh.creation.box((0.1, 0.1, 0.1)).export(tmp_path / "wing.stl")
+    (tmp_path / "p.pag").write_text(MESHED)
+    return tmp_path / "p.pag"
+
+
+def test_the_second_build_says_the_same_and_writes_nothing(run: Terminal, out: Path) -> None:
+    first = run("build", PAPER, "-o", out / "x", "--json").json
+    times = {path: path.stat().st_mtime_ns for path in (out / "x").rglob("*")}
+    written = files_in(out)
+    second = run("build", PAPER, "-o", out / "x", "--json").json
+    assert {**first, "compile_s": 0} == {**second, "compile_s": 0}
+    assert files_in(out) == written
+    assert times == {path: path.stat().st_mtime_ns for path in (out / "x").rglob("*")}
+    assert again(lines(run, PAPER, "-o", out / "x"))
+
+
+@pytest.mark.parametrize("what", ["changed", "cut short", "gone"])
+def test_a_file_that_is_not_as_it_was_is_built_again(run: Terminal, out: Path, what: str) -> None:
+    mjcf = out / "m.xml"
+    lines(run, PAPER, "--mjcf", mjcf)
+    content = mjcf.read_bytes()
+    if what == "gone":
+        mjcf.unlink()
+    else:
+        mjcf.write_bytes(content[:-1] if what == "cut short" else content + b" ")
+    assert not again(lines(run, PAPER, "--mjcf", mjcf))
+    assert mjcf.read_bytes() == content
+    assert again(lines(run, PAPER, "--mjcf", mjcf))
+
+
+def test_other_settings_are_another_build(run: Terminal, out: Path) -> None:
+    lines(run, PAPER, "-o", out / "x")
+    for words in (["--floor", "9x9"], ["--units", "2"], ["--wip", "1"], ["--force", "4"]):
+        assert not again(lines(run, PAPER, "-o", out / "x", *words)), words
+    assert not again(lines(run, PAPER, "-o", out / "x")), "the last one wrote other files"
+
+
+def test_a_product_that_changed_is_built(run: Terminal, out: Path, product: Path) -> None:
+    import trimesh
+
+    lines(run, product, "-o", out / "x")
+    assert again(lines(run, product, "-o", out / "x"))
+    trimesh.creation.box((0.1, 0.1, 0.12)).export(product.with_name("wing.stl"))
+    assert not again(lines(run, product, "-o", out / "x"))
+    product.write_text(MESHED.replace("0.2)", "0.3)"))
+    assert not again(lines(run, product, "-o", out / "x"))
+    assert again(lines(run, product, "-o", out / "x"))
+
+
+def test_a_template_that_changed_or_came_is_seen(run: Terminal, out: Path, tmp_path: Path) -> None:
+    mine = tmp_path / "mine"
+    mine.mkdir()
+    words = (PAPER, "-o", out / "x", "--templates", mine)
+    lines(run, *words)
+    assert again(lines(run, *words))
+    text = (ROOT / "templates" / "weld.op").read_text()
+    (mine / "weld.op").write_text(text)
+    assert not again(lines(run, *words))
+    (mine / "weld.op").write_text(text + "\n")
+    assert not again(lines(run, *words))
+
+
+@pytest.mark.parametrize("content", [b"", b"{}", b"[1]", b"\xff", b'{"inputs": 3}'])
+def test_a_damaged_receipt_costs_a_build(
+    run: Terminal, out: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, content: bytes
+) -> None:
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    lines(run, PAPER, "-o", out / "x")
+    (receipt,) = (user_cache() / "builds").glob("*.json")
+    receipt.write_bytes(content)
+    assert not again(lines(run, PAPER, "-o", out / "x"))
+    assert again(lines(run, PAPER, "-o", out / "x"))
+
+
+def test_warnings_are_given_again(run: Terminal, out: Path, tmp_path: Path) -> None:
+    text = "root = a; a = mate(b, c); b = atomic(box = (6, 1, 1)); c = atomic()"
+    (tmp_path / "p.pag").write_text(text.replace(";", ";\n"))
+    first, second = (run("build", tmp_path / "p.pag", "-o", out / "x") for _ in range(2))
+    assert again(second.out)
+    assert first.err == second.err
+    assert "warning" in first.err
