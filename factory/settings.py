@@ -17,7 +17,7 @@ RANGES = {
     "substeps": (1, 100),
     "clearance": (1e-4, 10.0),
     "force": (1e-3, 1e6),
-    "settle": (1e-6, 10.0),
+    "settle": (0.0, 10.0),
     "outfeed": (1e-3, 10.0),
 }
 """Least and greatest value of each setting: beyond lie nothing but overflows and endless runs."""

@@ -1,0 +1,104 @@
+"""The command `report`."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import click
+
+from factory.cli.options import (
+    FLOOR,
+    MOTION,
+    OUTPUT,
+    PATH,
+    SOURCE,
+    Number,
+    plan,
+    settings_of,
+    writable,
+)
+from factory.console import emit, say, warn
+
+
+@click.command()
+@SOURCE
+@click.option("-o", "--output", type=PATH, required=True, help="The page: OUT.html.")
+@click.option("--units", type=click.IntRange(1, 10_000), default=3, help="Products of the run.")
+@click.option("--seed", type=click.IntRange(0), default=0, help="Of what jitter draws.")
+@click.option(
+    "--jitter",
+    type=Number(0, 0.9),
+    default=0.0,
+    help="Draw each robot's speed and gain within ± this share.",
+)
+@click.option("--wip", type=click.IntRange(1, 10**9), help="Copies of each part let in at once.")
+@click.option("--max-time", type=Number(0, min_open=True), help="Stop after this time [s].")
+@FLOOR
+@MOTION
+@OUTPUT
+def report(
+    file: Path,
+    folders: tuple[Path, ...],
+    output: Path,
+    floor: str | None,
+    as_json: bool,
+    quiet: bool,
+    verbose: bool,
+    **options: Any,
+) -> int:
+    """Write one HTML page about a run of FILE.pag, or the run in a LOG that `run --log` kept."""
+    from factory.files import write_text
+    from factory.log import is_log
+    from factory.report import page, recording_of
+
+    writable(file, output)
+    status = 0
+    if is_log(file):
+        recording = recording_of(file)
+    else:
+        recording, status = _run(file, folders, floor, quiet, as_json, options)
+    text = page(recording)
+    write_text(output, text)
+    size = len(text.encode())
+    document = {
+        "output": str(output),
+        "bytes": size,
+        "products": int(recording.log.delivered[-1]),
+        "sim_time_s": round(recording.end, 6),
+        "predicted": recording.layout is not None,
+    }
+    if as_json:
+        emit(document)
+    elif not quiet:
+        say(f"{output}: {size / 1e6:.1f} MB, {recording.end:.2f} s of a run")
+        if recording.missing:
+            say(f"  no predictions: {recording.missing}")
+    return status
+
+
+def _run(
+    file: Path,
+    folders: tuple[Path, ...],
+    floor: str | None,
+    quiet: bool,
+    as_json: bool,
+    options: dict[str, Any],
+) -> tuple[Any, int]:
+    """A run to be told about, with its log in a folder that is gone afterwards; status 1 where it
+    was troubled."""
+    from factory.report import recording_of
+    from factory.running import run_file
+
+    settings = settings_of(file, options)
+    source, _, layout = plan(file, folders, settings, floor)
+    warn(layout.product.warnings, quiet)
+    with TemporaryDirectory(prefix="factory-") as folder:
+        log = Path(folder) / "run.log"
+        run = run_file(source, layout, settings, None, log, None, quiet or as_json, options)
+        recording = recording_of(log, layout)
+    if run.trouble is not None:
+        print(run.trouble, file=sys.stderr)
+    return recording, int(run.trouble is not None or not run.refines_net)

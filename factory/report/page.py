@@ -1,0 +1,125 @@
+"""The page: everything about a run in one HTML file that refers to nothing outside itself."""
+
+from __future__ import annotations
+
+import hashlib
+from base64 import b64encode
+from html import escape
+from importlib.resources import files
+from typing import Any
+
+from factory.report.fidelity import fidelity
+from factory.report.floor import floor_plan
+from factory.report.frames import frames
+from factory.report.links import data, labels_of
+from factory.report.measured import measured
+from factory.report.net_drawing import net_drawing
+from factory.report.packing import Pack, json_inside
+from factory.report.prediction import predicted
+from factory.report.recording import Recording
+from factory.report.scene import scene
+from factory.report.sections import (
+    fidelity_words,
+    heading,
+    made_how,
+    pace,
+    proof_words,
+    utilisation,
+)
+from factory.report.tree import assembly_tree
+from factory.report.words import proof
+
+SCRIPTS = (
+    "three.min.js",
+    "data.js",
+    "selection.js",
+    "views.js",
+    "gantt.js",
+    "replay.js",
+    "report.js",
+)
+"""In the order in which they run."""
+
+
+def page(recording: Recording) -> str:
+    """The page as a text, the same for the same recording."""
+    labels = labels_of(recording.factory)
+    run, plan = measured(recording), predicted(recording)
+    proved, found = proof(recording.factory), fidelity(recording)
+    pack = Pack()
+    document = {
+        **data(recording.factory),
+        "name": recording.name,
+        "end": round(recording.end, 6),
+        "roles": list(recording.roles),
+        "start": list(recording.start),
+        "fired": recording.log.fired.tolist(),
+        "times": [round(t, 4) for t in recording.log.fired_t.tolist()],
+        "scene": scene(recording, labels, pack),
+        "frames": frames(recording, pack),
+        "arrays": pack.index,
+    }
+    fields = {
+        "name": escape(recording.name, quote=True),
+        "counts": escape(_counts(recording)),
+        "heading": heading(recording, run, plan, proved, found),
+        "tree": assembly_tree(recording.pag, labels),
+        "floor": floor_plan(recording, labels),
+        "net": net_drawing(recording),
+        "pace": pace(recording, run, plan),
+        "utilisation": utilisation(recording, run, plan),
+        "proof": proof_words(proved),
+        "fidelity": fidelity_words(found),
+        "how": made_how(recording),
+        "options": _options(document),
+    }
+    return _filled(fields, document, pack.text(), proved.document)
+
+
+def _counts(recording: Recording) -> str:
+    factory, net = recording.factory, recording.factory.net.threaded
+    return (
+        f"{len(factory.leaves)} parts, {len(factory.robots)} robots, {len(net.places)} places, "
+        f"{len(net.transitions)} transitions"
+    )
+
+
+def _options(document: dict[str, Any]) -> str:
+    """What the field that finds things by name offers."""
+    kinds = (("robot", "robots"), ("part", "labels"), ("transition", "transitions"))
+    return "".join(
+        f'<option value="{escape(f"{kind} {name}", quote=True)}"></option>'
+        for kind, key in kinds
+        for name in document[key]
+    )
+
+
+def _filled(fields: dict[str, str], document: object, packed: str, certificate: object) -> str:
+    """The template with everything in its place, in one pass: what is filled in is not looked
+    at again."""
+    scripts = [_asset(name) for name in SCRIPTS]
+    fields |= {
+        "policy": _policy(scripts),
+        "style": _asset("report.css"),
+        "data": json_inside(document),
+        "certificate": json_inside(certificate),
+        "packed": packed,
+        "scripts": "\n".join(f"<script>{script}</script>" for script in scripts),
+        "licence": escape(_asset("three.LICENSE.txt")),
+    }
+    pieces = _asset("report.html").split("%%")
+    return "".join(fields[piece] if n % 2 else piece for n, piece in enumerate(pieces))
+
+
+def _policy(scripts: list[str]) -> str:
+    """A content security policy under which only these scripts run, and nothing is fetched."""
+    digests = (b64encode(hashlib.sha256(s.encode()).digest()).decode() for s in scripts)
+    allowed = " ".join(f"'sha256-{digest}'" for digest in digests)
+    return (
+        f"default-src 'none'; script-src {allowed}; style-src 'unsafe-inline'; "
+        "img-src data: blob:; base-uri 'none'; form-action 'none'"
+    )
+
+
+def _asset(name: str) -> str:
+    return (files("factory.report") / "assets" / name).read_text("utf-8")

@@ -1,0 +1,134 @@
+"""What a report is of: a log with its motion, the factory it compiles to and, where it can be had,
+the layout that it ran in."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+
+from factory.analysis.recorded import conditions
+from factory.errors import InputError
+from factory.export.events import compiled
+from factory.export.motion import Motion, motion_of
+from factory.export.subject import Subject
+from factory.factory import Factory
+from factory.lang import read_pag, read_template
+from factory.layout.durations import Pace
+from factory.layout.embedding import lay_out
+from factory.layout.plan import Layout
+from factory.log import Log
+from factory.log.blocks import bad_log
+from factory.mjcf.names import carriage
+from factory.mjcf.robots import ROLES
+from factory.monitor import subject_of
+from factory.pag import PAG
+from factory.pipeline import Source
+from factory.robots import load_catalogue
+
+
+@dataclass(frozen=True)
+class Recording:
+    """A run to be told about. `layout` is what predictions follow from; where it is None, `missing`
+    says why there are none."""
+
+    file: str
+    log: Log = field(repr=False)
+    motion: Motion = field(repr=False)
+    factory: Factory = field(repr=False)
+    layout: Layout | None = field(default=None, repr=False)
+    missing: str = ""
+
+    @property
+    def name(self) -> str:
+        """The name of the product."""
+        return str(self.log.header["product"])
+
+    @property
+    def start(self) -> tuple[int, ...]:
+        """The places that are marked when the run begins."""
+        return tuple(int(place) for place in self.log.header["start"])
+
+    @property
+    def from_start(self) -> bool:
+        """Whether that is the net's initial marking."""
+        return frozenset(self.start) == self.factory.net.initial_marking
+
+    @property
+    def pag(self) -> PAG:
+        """The assembly tree."""
+        return self.factory.pag
+
+    @property
+    def end(self) -> float:
+        """When the run ended [s]."""
+        return float(self.log.time[-1])
+
+    @cached_property
+    def roles(self) -> tuple[str, ...]:
+        """What each robot is for, as its paint shows: output, carrier, fed or tool, else shared."""
+        m = self.motion.m
+        paints = {i: m.mat(i).name.removeprefix("role/") for i in range(m.nmat)}
+        found = []
+        for robot in self.factory.robots:
+            body = m.body(carriage(robot.name))
+            first = int(body.geomadr[0])
+            worn = (int(m.geom_matid[g]) for g in range(first, first + int(body.geomnum[0])))
+            roles = (paints[paint] for paint in worn if paints.get(paint) in ROLES)
+            found.append(next(roles, "shared"))
+        return tuple(found)
+
+
+def recording_of(path: Path, layout: Layout | None = None) -> Recording:
+    """The recording in a log; of the `layout` that it was made with, if that is at hand, else of
+    one that is made again. Raises InputError (BadLog) for what is no log of a run in MuJoCo."""
+    subject = Subject(path)
+    motion, factory = motion_of(subject), compiled(subject)
+    _check(str(path), subject.log)
+    if layout is not None:
+        return Recording(str(path), subject.log, motion, layout.factory, layout)
+    try:
+        layout = _laid_out(subject.log, str(path))
+    except InputError as error:
+        why = error.diagnostics[0].message
+        return Recording(str(path), subject.log, motion, factory, None, why)
+    except (KeyError, TypeError, ValueError, AttributeError) as error:
+        return Recording(str(path), subject.log, motion, factory, None, str(error))
+    return Recording(str(path), subject.log, motion, layout.factory, layout)
+
+
+def _check(name: str, log: Log) -> None:
+    """The header must have what a report says of it. Raises InputError (BadLog)."""
+    header = log.header
+    conditions(name, header)
+    try:
+        said = header["product"], header["pag"]["file"], header["pag"]["sha256"]
+        if not all(isinstance(word, str) for word in said):
+            raise TypeError("a name in its header is no text")
+        marked = {int(place) for place in header["start"]}
+        if not marked <= set(range(len(header["places"]))) or int(header["units"]) < 1:
+            raise ValueError("its start or its units are out of range")
+        dict(header.get("versions", {}))
+    except (KeyError, TypeError, ValueError, AttributeError) as error:
+        raise InputError(bad_log(Path(name), f"is damaged: {error}")) from error
+
+
+def _laid_out(log: Log, name: str) -> Layout:
+    """The layout of a log, made again. Raises InputError where meshes are gone, ValueError where it
+    is not the one that the run was in."""
+    header, made = log.header, conditions(name, log.header)
+    templates = {word: read_template(text, word) for word, text in header["templates"].items()}
+    file = str(header["pag"]["file"])
+    pag = read_pag(header["pag"]["text"], templates, file, os.path.dirname(file) or ".")
+    source = Source(pag, templates, load_catalogue())
+    factory, product = source.compile(), source.product
+    pace = Pace.of(made.settings)
+    layout = lay_out(factory, product, made.settings.clearance, None, pace)
+    goals = subject_of(layout, made.settings, made.jitter, None, made.wip).as_json()["goals"]
+    if goals != header["monitor"]["goals"]:
+        raise ValueError("the run was in another layout than the one its PAG gets now")
+    return layout
+
+
+__all__ = ["Recording", "recording_of"]

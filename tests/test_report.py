@@ -1,0 +1,297 @@
+"""The report: one file that holds what the log holds and refers to nothing outside itself, and in
+which nothing of the user's is taken for anything but text."""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import json
+import re
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import factory
+from factory.analysis import Timing, analyse
+from factory.analysis.recorded import logged_record
+from factory.errors import InputError
+from factory.log import LogWriter, read_log
+from factory.log.blocks import LENGTH, MAGIC
+from factory.pag import PAG, Assembly
+from factory.report import page, recording_of
+from factory.report.fidelity import fidelity
+from factory.report.links import labels_of, links
+from factory.report.measured import measured
+from factory.report.packing import json_inside
+from factory.report.tree import assembly_tree
+from factory.report.words import proof
+from factory.simulation import Simulation
+from tests.command_line import PAPER, files_in
+from tests.report_values import Page
+
+EVIL = """</script></title><img src=x onerror="alert(1)">'"&<!--"""
+
+
+@pytest.fixture(scope="module")
+def log(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A log of two units of the paper's example."""
+    path = tmp_path_factory.mktemp("log") / "paper.log"
+    layout = factory.lay_out(factory.compile(factory.load_pag(PAPER)))
+    simulation = Simulation(layout, "mujoco", 2, 1, 0.2)
+    with LogWriter(path, simulation) as writer:
+        simulation.run([writer.observe])
+    return path
+
+
+@pytest.fixture(scope="module")
+def recording(log: Path):
+    return recording_of(log)
+
+
+@pytest.fixture(scope="module")
+def made(recording) -> Page:
+    return Page(page(recording))
+
+
+def altered(log: Path, to: Path, change) -> Path:
+    """A log with another header."""
+    data = log.read_bytes()[len(MAGIC) :]
+    (length,) = LENGTH.unpack_from(data)
+    header = json.loads(data[LENGTH.size : LENGTH.size + length])
+    change(header)
+    text = json.dumps(header).encode()
+    to.write_bytes(MAGIC + LENGTH.pack(len(text)) + text + data[LENGTH.size + length :])
+    return to
+
+
+def test_nothing_outside_the_page_is_referred_to(made: Page) -> None:
+    for tag, attributes in made.tags:
+        assert tag not in {"link", "iframe", "object", "embed", "base"}
+        assert not {"src", "href", "action"} & attributes.keys(), (tag, attributes)
+        assert not [name for name in attributes if name.startswith("on")]
+    style = next(text for text in made.words if ":root" in text)
+    assert "url(" not in style and "@import" not in style
+
+
+def test_only_its_own_scripts_may_run(made: Page) -> None:
+    digests = {
+        f"'sha256-{base64.b64encode(hashlib.sha256(code.encode()).digest()).decode()}'"
+        for code in made.code
+    }
+    allowed = set(re.findall(r"'sha256-[^']+'", made.policy))
+    assert allowed == digests and len(digests) == 7
+    assert "default-src 'none'" in made.policy and "unsafe-eval" not in made.policy
+
+
+def test_the_same_log_gives_the_same_bytes(recording) -> None:
+    assert page(recording) == page(recording)
+
+
+def test_poses_are_those_of_the_log(made: Page, recording) -> None:
+    motion, log = recording.motion, recording.log
+    time = made.array("time")
+    assert time[0] == pytest.approx(log.time[0]) and time[-1] == pytest.approx(recording.end)
+    assert np.diff(time).max() < 0.061
+    rows = np.searchsorted(log.time[motion.rows], time - 1e-4)
+    for body in made.data["frames"]["moving"]:
+        error = made.track(f"x{body}", 3).T - motion.position[rows, body]
+        assert np.abs(error).max() < 1e-4
+    robots = {motion.m.body(f"{r.name}/carriage").id for r in recording.factory.robots}
+    assert robots <= set(made.data["frames"]["moving"])
+
+
+def test_the_token_game_ends_in_the_marking_of_the_log(made: Page, recording) -> None:
+    log = recording.log
+    assert made.marked_at_end() == set(log.marking[len(log) - 1].tolist())
+
+
+def test_every_view_has_every_robot_label_transition_and_place(made: Page, recording) -> None:
+    wanted = {
+        "robot": len(recording.factory.robots),
+        "label": len(recording.pag.nodes),
+        "transition": len(recording.factory.net.threaded.transitions),
+        "place": len(recording.factory.net.threaded.places),
+    }
+    for kind, count in wanted.items():
+        drawn = {a[f"data-{kind}"] for _, a in made.tags if f"data-{kind}" in a}
+        assert drawn == {str(n) for n in range(count)}, kind
+    things = made.data["scene"]["things"]
+    assert {t["robot"] for t in things if "robot" in t} == set(range(wanted["robot"]))
+    parts = {labels_of(recording.factory)[leaf.label] for leaf in recording.factory.leaves}
+    assert {t["label"] for t in things if t.get("copy")} == parts
+
+
+def test_what_is_linked_is_linked_both_ways(recording) -> None:
+    found = links(recording.factory)
+    for number, link in enumerate(found["robot"]):
+        for transition in link["transitions"]:
+            assert number in found["transition"][transition]["robots"]
+        for place in link["places"]:
+            assert number in found["place"][place]["robots"]
+    labels = labels_of(recording.factory)
+    sub2 = found["label"][labels["sub2"]]
+    assert sub2["solids"] == sorted(labels[n] for n in ("part1", "part2", "sub1", "sub2"))
+
+
+def test_a_stage_of_a_sub_assembly_is_about_that() -> None:
+    plan = factory.compile(factory.load_pag(PAPER.parent / "shelf.pag"))
+    found, labels = links(plan), labels_of(plan)
+    staged = [o for o in plan.operations if "/" in o.label]
+    assert staged
+    for operation in staged:
+        whole = labels[operation.label.partition("/")[0]]
+        assert found["transition"][operation.start]["labels"] == [whole]
+        assert operation.index in found["label"][whole]["operations"]
+
+
+def test_what_is_measured_is_what_analyze_says(recording) -> None:
+    log, layout = recording.log, recording.layout
+    record = logged_record("log", log.events, log.time, log.delivered)
+    timing = Timing(layout, seed=1, jitter=0.2)
+    told = analyse(timing, 2, record=record).measured
+    found = measured(recording)
+    assert found.dropoffs == record.dropoffs
+    for share, pair in zip(found.busy, told.busy, strict=True):
+        assert share * recording.end == pytest.approx(pair.measured * told.last.measured)
+    for mean, duration in zip(found.durations, told.durations, strict=True):
+        assert mean == pytest.approx(duration.time.measured)
+
+
+def test_the_proof_is_told_and_checked(recording) -> None:
+    told = proof(recording.factory)
+    assert told.holds and len(told.claims) == 5 and all(claim.why for claim in told.claims)
+    gears = next(claim for claim in told.claims if claim.name == "Gear net")
+    assert "6 gears" in gears.why
+
+
+def test_a_broken_proof_is_told(recording) -> None:
+    net = recording.factory.net
+    robot = replace(net.gears[2], transitions=net.gears[2].transitions[::-1])
+    gears = (*net.gears[:2], robot, *net.gears[3:])
+    told = proof(replace(recording.factory, net=replace(net, gears=gears)))
+    assert not told.holds
+    assert any(claim.holds is False and claim.why for claim in told.claims)
+
+
+def test_a_good_run_has_good_figures(recording) -> None:
+    found = fidelity(recording)
+    assert found.refines and found.monitor is not None and found.monitor.refines_net
+    figures = {figure.key: figure.value for figure in found.figures}
+    assert not [figure for figure in found.figures if figure.exceeded]
+    assert figures["handoffs"] == 22
+    assert 0 < figures["handoff_gap_max_mm"] < 0.2 and 0 < figures["weld_residual_max_mm"] < 0.2
+    assert 0 < figures["tracking_error_max_mm"] < 0.5
+    assert 0 < figures["duration_difference_mean_s"] < 0.3
+
+
+def test_planted_faults_show_in_the_figures(recording) -> None:
+    log, m = recording.log, recording.motion.m
+    joint = m.jnt_qposadr[m.body("part/part2#1").jntadr[0]]
+    qpos, ctrl = log.qpos.copy(), log.ctrl.copy()
+    qpos[:, joint] += 2e-3
+    ctrl[:, m.actuator_ctrladr[0]] += 5e-3
+    found = fidelity(replace(recording, log=replace(log, qpos=qpos, ctrl=ctrl), layout=None))
+    bad = {figure.key: figure.value for figure in found.figures if figure.exceeded}
+    assert bad["product_position_max_mm"] == pytest.approx(2, abs=0.2)
+    assert bad["weld_residual_max_mm"] == pytest.approx(2, abs=0.2)
+    assert bad["tracking_error_max_mm"] == pytest.approx(5, abs=0.5)
+    fired = log.fired[::-1].copy()
+    assert not fidelity(replace(recording, log=replace(log, fired=fired), layout=None)).refines
+
+
+def test_hostile_names_are_text(log: Path, tmp_path: Path, made: Page) -> None:
+    def change(header) -> None:
+        header["product"] = EVIL
+        header["versions"] = {EVIL: EVIL}
+        header["command"] = [EVIL]
+        header["pag"]["file"] = EVIL
+
+    found = Page(page(recording_of(altered(log, tmp_path / "evil.log", change))))
+    assert [tag for tag, _ in found.tags] == [tag for tag, _ in made.tags]
+    assert found.data["name"] == EVIL
+    assert sum(EVIL in "".join(found.words[n : n + 1]) for n in range(len(found.words))) >= 3
+    assert found.code == made.code
+
+
+def test_hostile_labels_are_text() -> None:
+    nodes = (Assembly(EVIL, "mate", ("a", "b")), Assembly("a", "atomic"), Assembly("b", EVIL))
+    pag = PAG(EVIL, nodes)
+    drawn = assembly_tree(pag, {node.label: n for n, node in enumerate(nodes)})
+    assert "<img" not in drawn and "</script" not in drawn and 'onerror="' not in drawn
+    inside = json_inside({"label": EVIL})
+    assert "<" not in inside and ">" not in inside and json.loads(inside) == {"label": EVIL}
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (lambda h: h.pop("product"), "'product'"),
+        (lambda h: h.update(start=[0, 99]), "out of range"),
+        (lambda h: h["pag"].update(file=3), "no text"),
+        (lambda h: h.update(seed="x"), "does not say how it was made"),
+    ],
+    ids=["product", "start", "file", "seed"],
+)
+def test_damaged_logs_are_refused(log: Path, tmp_path: Path, change, words: str) -> None:
+    with pytest.raises(InputError) as caught:
+        recording_of(altered(log, tmp_path / "bad.log", change))
+    assert caught.value.diagnostics[0].code == "BadLog"
+    assert words in caught.value.diagnostics[0].message
+
+
+MESHED = """root = pair; pair = mate ( a, b );
+a = atomic ( mesh = "cube.obj", scale = 0.04 );
+b = atomic ( box = (0.02, 0.02, 0.02), pos = (0.05, 0, 0.02) )"""
+
+CUBE = """v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 0 0 1\nv 1 0 1\nv 1 1 1\nv 0 1 1
+f 1 4 3 2\nf 5 6 7 8\nf 1 2 6 5\nf 2 3 7 6\nf 3 4 8 7\nf 4 1 5 8\n"""
+
+
+def test_a_log_is_enough_where_meshes_are_gone(run, tmp_path: Path, out: Path) -> None:
+    (tmp_path / "pair.pag").write_text(MESHED)
+    (tmp_path / "cube.obj").write_text(CUBE)
+    kept = tmp_path / "pair.log"
+    assert run("run", tmp_path / "pair.pag", "--units", 1, "--log", kept, "--quiet").status == 0
+    assert run("report", kept, "-o", out / "one.html", "--json").json["predicted"]
+    (tmp_path / "cube.obj").unlink()
+    assert run("monitor", kept, "--quiet").status == 0
+    done = run("report", kept, "-o", out / "two.html")
+    assert done.status == 0 and "no predictions: there is no mesh file 'cube.obj'" in done.out
+    found = Page((out / "two.html").read_text("utf-8"))
+    assert any("No prediction: there is no mesh file" in words for words in found.words)
+    assert len(found.data["scene"]["things"]) == len(
+        Page((out / "one.html").read_text("utf-8")).data["scene"]["things"]
+    )
+
+
+def test_a_pag_is_run_first_and_leaves_nothing_but_the_page(run, out: Path, monkeypatch) -> None:
+    temporary = out.parent / "temporary"
+    temporary.mkdir()
+    monkeypatch.setattr("tempfile.tempdir", str(temporary))
+    done = run("report", PAPER, "-o", out / "paper.html", "--units", 1, "--json")
+    assert done.status == 0 and done.json["products"] == 1 and done.json["predicted"]
+    written = files_in(out)
+    assert list(written) == ["paper.html"] and not files_in(temporary)
+    assert len(written["paper.html"]) == done.json["bytes"] < 1_000_000
+
+
+def test_what_cannot_be_told_is_refused(run, log: Path, out: Path, tmp_path: Path) -> None:
+    ideal = tmp_path / "ideal.log"
+    assert run("run", PAPER, "--world", "ideal", "--log", ideal, "--quiet").status == 0
+    done = run("report", ideal, "-o", out / "x.html", "--json")
+    assert (done.status, done.codes) == (2, ["BadLog"])
+    assert run("report", log, "-o", out).status == 2
+    assert run("report", log, "-o", log).status == 2
+    assert run("report", log).status == 2
+    assert run("report", PAPER, "-o", out / "none" / "x.html").status == 2
+    assert not files_in(out)
+
+
+def test_a_log_that_was_cut_off_is_told_as_far_as_it_goes(log: Path, tmp_path: Path) -> None:
+    cut = tmp_path / "cut.log"
+    cut.write_bytes(log.read_bytes()[:-4000])
+    assert not read_log(cut).complete
+    found = Page(page(recording_of(cut)))
+    assert any("cut off" in words for words in found.words)
