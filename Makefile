@@ -2,7 +2,7 @@
 PY := .venv/bin/python
 FACTORY := $(PY) -m factory
 
-.PHONY: help demo test test-all oracles bench fidelity lint golden wheel setup clean
+.PHONY: help demo test test-all oracles bench fidelity docs gallery lint golden wheel setup clean
 
 help:
 	@echo "make demo      run the paper's example: a video and a poster in renders/"
@@ -10,6 +10,8 @@ help:
 	@echo "make test-all  the long campaigns too"
 	@echo "make bench     times and sizes, written to docs/benchmarks.md"
 	@echo "make fidelity  how far the physics can be believed, written to docs/fidelity.md"
+	@echo "make docs      the documentation site, in docs/_build/html"
+	@echo "make gallery   render the stills of the gallery anew"
 	@echo "make lint      ruff and mypy"
 	@echo "make golden    renew the golden texts (review the diff)"
 	@echo "make wheel     build the wheel in dist/"
@@ -38,10 +40,18 @@ bench: setup
 fidelity: setup
 	$(PY) -m tests.fidelity $(ARGS)
 
+docs:
+	@tools/setup docs
+	$(PY) -m sphinx -W --keep-going -q -d docs/_build/trees docs docs/_build/html
+	@echo "see docs/_build/html/index.html"
+
+gallery: setup
+	$(PY) tools/gallery $(ARGS)
+
 lint:
 	@tools/setup dev
-	$(PY) -m ruff check factory tests
-	$(PY) -m ruff format --check factory tests
+	$(PY) -m ruff check factory tests docs tools/gallery
+	$(PY) -m ruff format --check factory tests docs tools/gallery
 	$(PY) -m mypy
 
 golden: setup
@@ -51,4 +61,4 @@ wheel: setup
 	$(PY) -m pip wheel --quiet --no-deps --wheel-dir dist .
 
 clean:
-	rm -rf .venv .oracles .rivals build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	rm -rf .venv .oracles .rivals build dist docs/_build *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis

@@ -78,17 +78,28 @@ def verify(plan: Factory) -> Verdict:
 
 
 def lay_out(
-    plan: Factory, clearance: float = 0.02, floor: tuple[float, float] | None = None
+    plan: Factory,
+    clearance: float = 0.02,
+    floor: tuple[float, float] | None = None,
+    relay: bool = False,
+    cycle: float | None = None,
 ) -> Layout:
     """The stretched tree of guidepaths (paper, section 5.1), sized by the parts' real geometry.
 
-    `clearance` and `floor` (width, depth) in [m]. Raises InputError for a mesh that cannot be read,
+    `clearance` and `floor` (width, depth) in [m]. `relay`: several robots share guidepaths that
+    set the pace, to reach a `cycle` time [s] or the least there can be; the layout's factory has
+    more robots then. Raises InputError for a mesh that cannot be read,
     RunError where the factory does not fit the floor.
     """
     from factory.geometry import product_geometry
     from factory.layout.embedding import lay_out as embed
 
-    return embed(plan, product_geometry(plan.pag), clearance, floor)
+    layout = embed(plan, product_geometry(plan.pag), clearance, floor)
+    if relay:
+        from factory.relaying import relayed
+
+        layout = relayed(layout, Settings(), cycle, floor)
+    return layout
 
 
 def run(

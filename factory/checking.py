@@ -84,8 +84,14 @@ def gear_json(gear: Gear, places: Sequence[Place]) -> dict[str, Any]:
     }
 
 
-def check_file(file: Path, folders: Sequence[Path], wip: int | None = None) -> Checked:
-    """Check a PAG, or a net in PNML. Raises InputError."""
+def check_file(
+    file: Path,
+    folders: Sequence[Path],
+    wip: int | None = None,
+    relayed: Factory | None = None,
+) -> Checked:
+    """Check a PAG, or a net in PNML; `relayed`: what the PAG compiles to with relays, where these
+    are wanted. Raises InputError."""
     if is_net(file):
         return check_net(file)
     from factory.nets.pool import part_pool
@@ -93,11 +99,11 @@ def check_file(file: Path, folders: Sequence[Path], wip: int | None = None) -> C
     from factory.pipeline import read
 
     source = read(file, folders)
-    factory = source.compile()
+    factory = relayed or source.compile()
     sources = {r.name: r.position for r in factory.robots if r.position}
     verdict = verify(factory.net, sources)
     pool = dict(part_pool(factory, wip))
-    checked = Checked(source.pag.root, len(source.pag), factory.net, verdict, factory, pool)
+    checked = Checked(source.pag.root, len(factory.pag), factory.net, verdict, factory, pool)
     if source.matings is None:
         return checked
     return replace(checked, matings=source.matings, product=source.product)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable
 from contextlib import ExitStack
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -23,8 +23,11 @@ from factory.wholes import fusing_pays
 
 if TYPE_CHECKING:
     from factory.monitor import Report
+    from factory.render import PanelName
 
 Size = tuple[int, int]
+
+SIZE = 1280, 720
 
 
 def simulation(
@@ -64,6 +67,7 @@ def run_file(
     from factory.progress import Progress
 
     refuse_unproved(layout.factory)
+    shown: Shown | None = None
     if options.get("world") == "ideal":
         for key, purpose in (
             ("monitor", "for a monitor to observe"),
@@ -77,11 +81,14 @@ def run_file(
             message = "the ideal world has no bodies to film"
             raise InputError(Diagnostic("Usage", message, None, "leave out --world ideal"))
         from factory.gl import probe
-        from factory.render import camera_named, check_output
+        from factory.render import check_output
 
-        check_output(video, size or (1280, 720), options["fps"])
-        camera_named(options["camera"])
+        check_output(video, size or SIZE, options["fps"])
+        shown = Shown.of(options, size or SIZE, [part.label for part in layout.factory.leaves])
         probe()
+    elif options.get("poster") is not None:
+        message = "--poster is of a film, and there is none"
+        raise InputError(Diagnostic("Usage", message, None, "give --video OUT.mp4 as well"))
     made = simulation(source, layout, settings, options)
     with ExitStack() as stack:
         observers: list[Observer] = [stack.enter_context(Interruption()).observe]
@@ -98,7 +105,8 @@ def run_file(
         if video is not None:
             from factory.render import Film
 
-            film = Film(made, video, size or (1280, 720), options["fps"], options["camera"])
+            assert shown is not None
+            film = Film(made, video, size or SIZE, options["fps"], **shown.options)
             observers.append(stack.enter_context(film).observe)
         observers.append(stack.enter_context(Progress(made.units, quiet)).observe)
         record = made.run(observers, options.get("max_time"))
@@ -126,23 +134,25 @@ def render_file(
     from factory.gl import probe
     from factory.log import is_log, read_log
     from factory.progress import Progress
-    from factory.render import Film, Still, camera_named, check_output, render_log
+    from factory.render import Film, Still, check_output, render_log
 
     moment = _moment(at)
     is_still = check_output(output, size, options["fps"], still=None)
-    camera = options["camera"]
-    camera_named(camera)
+    shown = Shown.of(options, size)
+    if is_still and shown.poster is not None:
+        message = "--poster is of a film; this is a still"
+        raise InputError(Diagnostic("Usage", message, None, "leave out --poster"))
     probe()
     if is_log(file):
         log = read_log(file)
-        frames = render_log(log, output, size, options["fps"], camera, moment)
+        frames = render_log(log, output, size, options["fps"], at=moment, **shown.options)
         return _picture(output, frames, size, options["fps"], is_still)
     made = prepare()
     with ExitStack() as stack:
         picture: Any = (
-            Still(made, output, size, camera, moment)
+            Still(made, output, size, at=moment, **shown.still)
             if is_still
-            else Film(made, output, size, options["fps"], camera)
+            else Film(made, output, size, options["fps"], **shown.options)
         )
         observers = [
             stack.enter_context(Interruption()).observe,
@@ -152,6 +162,39 @@ def render_file(
         enough = moment if is_still and moment != "end" else options.get("max_time")
         made.run(observers, enough)
     return _picture(output, 1 if is_still else picture.frames, size, options["fps"], is_still)
+
+
+@dataclass(frozen=True, slots=True)
+class Shown:
+    """What a picture shows, as the command line asks for it: the camera, the `panels` beside it, a
+    `title`, and where a `poster` goes."""
+
+    camera: str
+    panels: tuple[PanelName, ...] = ()
+    title: str = ""
+    poster: Path | None = None
+
+    @classmethod
+    def of(cls, options: dict[str, Any], size: Size, parts: list[str] | None = None) -> Shown:
+        """Raises InputError (BadValue) for names that don't exist, or a size with no room."""
+        from factory.render import camera_named, check_output, panels_named
+        from factory.render.area import shared
+
+        camera, panels = camera_named(options["camera"], parts), panels_named(options["panels"])
+        shared(size, panels)
+        if options["poster"] is not None:
+            check_output(options["poster"], size, still=True)
+        return cls(camera, panels, options["title"], options["poster"])
+
+    @property
+    def still(self) -> dict[str, Any]:
+        """As arguments of a still."""
+        return {"camera": self.camera, "panels": self.panels, "title": self.title}
+
+    @property
+    def options(self) -> dict[str, Any]:
+        """As arguments of a film."""
+        return {**self.still, "poster": self.poster}
 
 
 def _moment(at: str) -> float | Literal["end"]:

@@ -11,6 +11,7 @@ import numpy as np
 from factory.factory import Factory
 from factory.geometry import Product
 from factory.meshes import Array
+from factory.pag import NOPART
 
 FUSE_FROM = 100
 """From so many robots on, runs are fused unless told otherwise."""
@@ -126,11 +127,16 @@ def fusing_pays(factory: Factory) -> bool:
 def fused_copies(bodies: Bodies, factory: Factory, units: int | None) -> dict[str, int]:
     """How many copies of each body a fused run needs: a part is in its feeder and in the hands of
     its robot, or not yet fused; a sub-assembly in the hands of one robot; the product on the
-    outfeed's tray too."""
-    most = 2 if units is None else min(2, units)
-    copies = {operation.label: most for operation in factory.leaves}
+    outfeed's tray too; and what is relayed in the hands of each further robot."""
+    copies = {operation.label: 2 for operation in factory.leaves}
     (root,) = bodies.carried[factory.pag.root]
-    return {**copies, **{label: most if label == root else 1 for label in bodies.wholes}}
+    copies |= {label: 2 if label == root else 1 for label in bodies.wholes}
+    for operation in factory.operations[:-1]:
+        carrier = operation.template.carrier - 1
+        if len(operation.inputs) == 1 and operation.before[carrier] == NOPART:
+            copies[bodies.carried[operation.label][0]] += 1
+    most = max(copies.values()) if units is None else units
+    return {label: min(number, most) for label, number in copies.items()}
 
 
 def _meeting(

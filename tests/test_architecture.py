@@ -34,7 +34,7 @@ ROOMS = [
         "wholes",
     },
     {"layout"},
-    {"control", "prediction"},
+    {"control", "prediction", "relaying"},
     {"mjcf"},
     {"trace"},
     {"supervisor", "distributed", "world"},

@@ -134,6 +134,7 @@ def test_examples_check(run: Terminal, file: Path) -> None:
     n, robots = document["transitions"] // 2 - 1, document["robots"]
     assert document["places"] == 2 * n + robots + 1
     assert document["tokens"] == robots
+    assert document["clashes"] == []
 
 
 @pytest.mark.parametrize("file", EXAMPLES, ids=lambda p: p.stem)

@@ -9,7 +9,17 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from factory.cli.options import FLOOR, MOTION, OUTPUT, PATH, SOURCE, Number, plan, settings_of
+from factory.cli.options import (
+    FLOOR,
+    MOTION,
+    OUTPUT,
+    PATH,
+    RELAY,
+    SOURCE,
+    Number,
+    plan,
+    settings_of,
+)
 from factory.cli.options import writable as check_writable
 from factory.console import emit, say, table, warn
 from factory.errors import Diagnostic, InputError, did_you_mean
@@ -24,8 +34,13 @@ if TYPE_CHECKING:
 @click.command()
 @SOURCE
 @click.option("--units", type=click.IntRange(1, 10_000), default=20, help="Products to look at.")
-@click.option("--world", type=click.Choice(["mujoco", "ideal"]), default="mujoco")
-@click.option("--seed", type=click.IntRange(0), default=0)
+@click.option(
+    "--world",
+    type=click.Choice(["mujoco", "ideal"]),
+    default="mujoco",
+    help="Whose times: MuJoCo's, or those of the paper's ideal world.",
+)
+@click.option("--seed", type=click.IntRange(0), default=0, help="Of what jitter draws.")
 @click.option(
     "--jitter",
     type=Number(0, 0.9),
@@ -41,6 +56,7 @@ if TYPE_CHECKING:
 @click.option("--delays", type=PATH, help="For a net in PNML: a TOML file of place = seconds.")
 @click.option("-o", "--output", type=PATH, help="A picture: .svg or .png.")
 @FLOOR
+@RELAY
 @MOTION
 @OUTPUT
 def analyze(
@@ -108,7 +124,7 @@ def _analyze_pag(
     check_picture(output)
     log = _log(options["measured"], options["on_the_spot"])
     made = _conditions(file, log, options)
-    source, factory, layout = plan(file, folders, made.settings, options["floor"])
+    source, factory, layout = plan(file, folders, made.settings, options["floor"], options)
     refuse_unproved(factory)
     warn(layout.product.warnings, quiet)
     timing = Timing(layout, made.settings, made.world, made.seed, made.jitter)

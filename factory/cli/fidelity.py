@@ -14,6 +14,7 @@ from factory.cli.options import (
     MOTION,
     OUTPUT,
     PATH,
+    RELAY,
     SOURCE,
     Number,
     plan,
@@ -43,6 +44,7 @@ from factory.console import emit, say, table, warn
 @click.option("-o", "--output", type=PATH, help="A folder for a report, or a .json file.")
 @click.option("--max-time", type=Number(0, min_open=True), help="Stop a run after this time [s].")
 @FLOOR
+@RELAY
 @MOTION
 @OUTPUT
 def fidelity(
@@ -74,7 +76,7 @@ def fidelity(
         is_file = output.suffix.lower() == ".json"
         writable(file, output) if is_file else writable_folder(output)
     settings = settings_of(file, options)
-    _, factory, layout = plan(file, folders, settings, floor)
+    _, factory, layout = plan(file, folders, settings, floor, options)
     refuse_unproved(factory)
     warn(layout.product.warnings, quiet)
     jobs = jobs or os.cpu_count() or 1

@@ -14,6 +14,7 @@ from factory.cli.options import (
     MOTION,
     OUTPUT,
     PATH,
+    RELAY,
     SOURCE,
     plan,
     settings_of,
@@ -33,6 +34,7 @@ from factory.console import emit, say, warning
 )
 @click.option("--wip", type=click.IntRange(1, 10**9), help="Copies of each part let in at once.")
 @FLOOR
+@RELAY
 @MOTION
 @OUTPUT
 @collector_paused()
@@ -60,7 +62,9 @@ def build(
     name = receipt.request(file, {**options, **wanted, "floor": floor, "settings": settings})
     told = receipt.find(name)
     if told is None:
-        told = _built(file, folders, mjcf, output, units, wip, floor, settings, begin, name)
+        told = _built(
+            file, folders, mjcf, output, units, wip, floor, settings, options, begin, name
+        )
     else:
         told["document"]["compile_s"] = perf_counter() - begin
         told["lines"].append("nothing has changed since: these files are up to date")
@@ -83,6 +87,7 @@ def _built(
     wip: int | None,
     floor: str | None,
     settings: Any,
+    options: dict[str, Any],
     begin: float,
     name: str,
 ) -> dict[str, Any]:
@@ -93,7 +98,7 @@ def _built(
     from factory.layout.durations import Pace
     from factory.layout.gain import gain
 
-    source, factory, layout = plan(file, folders, settings, floor)
+    source, factory, layout = plan(file, folders, settings, floor, options)
     verdict = refuse_unproved(factory)
     spent = perf_counter() - begin
     built = build_all(source, layout, settings, mjcf, output, units, wip, verdict)

@@ -14,6 +14,7 @@ from factory.cli.options import (
     OUTPUT,
     PATH,
     PICTURE,
+    RELAY,
     RUN,
     SOURCE,
     pair,
@@ -37,6 +38,7 @@ from factory.console import emit, say, warn
 )
 @PICTURE
 @FLOOR
+@RELAY
 @MOTION
 @OUTPUT
 def run(
@@ -53,9 +55,9 @@ def run(
     """Run FILE.pag until its products are dropped off."""
     from factory.running import run_file, say_violations
 
-    writable(file, video, log)
+    writable(file, video, log, options["poster"])
     settings = settings_of(file, options)
-    source, factory, layout = plan(file, folders, settings, floor)
+    source, factory, layout = plan(file, folders, settings, floor, options)
     warn(layout.product.warnings, quiet)
     size = pair(options["size"], "--size", "1280x720", int)
     record = run_file(source, layout, settings, video, log, size, quiet or as_json, options)
@@ -87,6 +89,7 @@ def run(
 @RUN
 @PICTURE
 @FLOOR
+@RELAY
 @MOTION
 @OUTPUT
 def render(
@@ -103,12 +106,12 @@ def render(
     """Film FILE.pag, or a LOG that `run --log` has kept, headless through EGL."""
     from factory.running import render_file, simulation
 
-    writable(file, output)
+    writable(file, output, options["poster"])
     size = pair(options["size"], "--size", "1280x720", int) or (1280, 720)
 
     def prepare() -> Any:
         settings = settings_of(file, options)
-        source, _, layout = plan(file, folders, settings, floor)
+        source, _, layout = plan(file, folders, settings, floor, options)
         warn(layout.product.warnings, quiet)
         return simulation(source, layout, settings, options)
 

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from math import isfinite
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any, TypeVar
 
 import click
@@ -90,10 +91,25 @@ FLOOR = options(
     click.option("--clearance", type=float, help="Least distance between things [m]."),
     click.option("--floor", help="Width x depth of the floor there is [m], as 4x3."),
 )
+RELAY = options(
+    click.option(
+        "--relay", is_flag=True, help="Share guidepaths that set the pace among several robots."
+    ),
+    click.option(
+        "--cycle",
+        type=Number(0, min_open=True),
+        help="The cycle time that relays are to reach [s]; as short as they can by default.",
+    ),
+)
 RUN = options(
-    click.option("--world", type=click.Choice(["mujoco", "ideal"]), default="mujoco"),
+    click.option(
+        "--world",
+        type=click.Choice(["mujoco", "ideal"]),
+        default="mujoco",
+        help="MuJoCo's physics, or the paper's ideal world.",
+    ),
     click.option("--units", type=click.IntRange(1, 10**9), default=1, help="Products to make."),
-    click.option("--seed", type=click.IntRange(0), default=0),
+    click.option("--seed", type=click.IntRange(0), default=0, help="Of what jitter draws."),
     click.option(
         "--jitter",
         type=Number(0, 0.9),
@@ -117,8 +133,17 @@ RUN = options(
 )
 PICTURE = options(
     click.option("--size", default="1280x720", help="Of the picture, as 1280x720."),
-    click.option("--fps", type=click.IntRange(1, 120), default=30),
-    click.option("--camera", default="overview", help="overview, top or product."),
+    click.option("--fps", type=click.IntRange(1, 120), default=30, help="Pictures a second."),
+    click.option(
+        "--camera",
+        default="overview",
+        help="overview, orbit, top, product, or part:LABEL to follow a part.",
+    ),
+    click.option(
+        "--with", "panels", help="Beside the 3-D: net, gantt or net,gantt (modes over time)."
+    ),
+    click.option("--title", default="", help="Shown at the beginning of a film."),
+    click.option("--poster", type=PATH, help="A still of a film's best moment (.png)."),
 )
 
 
@@ -150,9 +175,14 @@ def pair(text: str | None, option: str, example: str, number: type) -> tuple[Any
 
 
 def plan(
-    file: Path, folders: Sequence[Path], settings: Any, floor: str | None
+    file: Path,
+    folders: Sequence[Path],
+    settings: Any,
+    floor: str | None,
+    options: Mapping[str, Any] = MappingProxyType({}),
 ) -> tuple[Any, Any, Any]:
-    """PAG to layout; warnings on stderr. Gives source, factory and layout."""
+    """PAG to layout; warnings on stderr. Gives source, factory and layout. `options`: those of
+    RELAY, where a command has them."""
     from factory.layout.durations import Pace
     from factory.layout.embedding import lay_out
     from factory.pipeline import read
@@ -162,7 +192,11 @@ def plan(
     product = source.product
     room = pair(floor, "--floor", "4x3", float)
     layout = lay_out(factory, product, settings.clearance, room, Pace.of(settings))
-    return source, factory, layout
+    if options.get("relay") or options.get("cycle"):
+        from factory.relaying import relayed
+
+        layout = relayed(layout, settings, options.get("cycle"), room)
+    return source, layout.factory, layout
 
 
 def writable(file: Path | None, *outputs: Path | None) -> None:

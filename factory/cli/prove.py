@@ -2,15 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import click
 
-from factory.cli.options import OUTPUT, PATH, SOURCE, writable, writable_folder
+from factory.cli.options import (
+    OUTPUT,
+    PATH,
+    RELAY,
+    SOURCE,
+    plan,
+    settings_of,
+    writable,
+    writable_folder,
+)
 from factory.collector import collector_paused
 from factory.console import emit, say
 from factory.errors import Diagnostic, InputError, did_you_mean
+
+if TYPE_CHECKING:
+    from factory.factory import Factory
 
 
 @click.command()
@@ -18,6 +31,7 @@ from factory.errors import Diagnostic, InputError, did_you_mean
 @click.option("--certificate", type=PATH, help="Write the proof here.")
 @click.option("--wip", type=click.IntRange(1, 10**9), help="Copies of each part let in at once.")
 @click.option("--clashes", type=PATH, help="Write a picture of each blocked operation in a folder.")
+@RELAY
 @OUTPUT
 @collector_paused()
 def check(
@@ -29,13 +43,14 @@ def check(
     as_json: bool,
     quiet: bool,
     verbose: bool,
+    **options: Any,
 ) -> int:
     """Parse, compile and prove FILE.pag (or a net in FILE.pnml)."""
     from factory.checking import check_file, describe
 
     writable(file, certificate)
     writable_folder(clashes)
-    checked = check_file(file, folders, wip)
+    checked = check_file(file, folders, wip, _relayed(file, folders, options))
     if clashes is not None:
         from factory.files import write_all
 
@@ -53,6 +68,20 @@ def check(
     return 0 if checked.verdict.holds else 1
 
 
+def _relayed(file: Path, folders: Sequence[Path], options: dict[str, Any]) -> Factory | None:
+    """The factory with relays, where they are asked for: they depend on the layout. Raises
+    InputError (Usage) for a net, which has none."""
+    from factory.checking import is_net
+
+    if not (options["relay"] or options["cycle"]):
+        return None
+    if is_net(file):
+        message = "--relay is for a PAG: a net has no guidepaths"
+        raise InputError(Diagnostic("Usage", message, None, "leave it out"))
+    factory: Factory = plan(file, folders, settings_of(file, {}), None, options)[1]
+    return factory
+
+
 def _no_links(files: Iterable[Path]) -> None:
     """Pictures have names of our choice, so no link that happens to have one is followed. Raises
     InputError (BadFile)."""
@@ -65,6 +94,7 @@ def _no_links(files: Iterable[Path]) -> None:
 @click.command()
 @SOURCE
 @click.option("--robot", help="Only this robot, as r3.")
+@RELAY
 @OUTPUT
 def programs(
     file: Path,
@@ -73,12 +103,13 @@ def programs(
     as_json: bool,
     quiet: bool,
     verbose: bool,
+    **options: Any,
 ) -> int:
     """Print each robot's program, in the paper's form."""
     from factory.pipeline import read
     from factory.programs import program_of, write_program
 
-    factory = read(file, folders).compile()
+    factory = _relayed(file, folders, options) or read(file, folders).compile()
     names = [r.name for r in factory.robots]
     if robot is not None and robot not in names:
         hint = did_you_mean(robot, names, "robots")

@@ -11,7 +11,9 @@ from factory.console import emit, say, table
 
 
 @click.command()
-@click.option("--templates", "folders", multiple=True, type=PATH)
+@click.option(
+    "--templates", "folders", multiple=True, type=PATH, help="A folder of further operations."
+)
 @OUTPUT
 def templates(folders: tuple[Path, ...], as_json: bool, quiet: bool, verbose: bool) -> int:
     """List the operations and robot types there are."""

@@ -29,11 +29,11 @@ def arrange(
 ) -> tuple[Stretched, list[Shape]]:
     """Travels, stations and sides with the shapes that they give; with `sides` these alone are
     looked at. Linear."""
-    factory, on = task.factory, carriers(task.factory)
+    factory, on, c = task.factory, carriers(task.factory), task.clearance
     table: list[dict[Frame, Outline]] = [{} for _ in factory.robots]
     for robot, frames in reversed(list(enumerate(_frames(on, sides)))):
         for u, t in frames:
-            shape = oriented_shape(factory, payloads, robot, on[robot], u, t, task.clearance)
+            shape = oriented_shape(factory, payloads, robot, on[robot], u, t, c, task.wide)
 
             def outline(guest: int, side: int, u: Point2 = u, t: Point2 = t) -> Outline:
                 return table[guest][turned(u, t, side)]

@@ -78,7 +78,8 @@ def _junction(layout: Layout, robot: int, carrier: int) -> Iterator[Fault]:
         return
     on, number = layout.guidepaths[carrier], factory.robots[robot].operations[-1]
     operation, other = factory.operations[number], factory.robots[carrier].name
-    if t != on.heading:
+    in_line = len(operation.robots) == 2 and len(operation.inputs) == 1 and t == on.side
+    if t != on.heading and not (in_line and u == on.heading):
         message = f"{name}: its side {t} is not {other}'s heading {on.heading}: it is mirrored"
         yield _fault(layout, message, robot, carrier)
     wanted = on.middle(on.length - layout.stations[number])

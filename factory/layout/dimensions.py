@@ -8,6 +8,7 @@ payloads.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import ceil
 
 CARRIAGES, ARMS, PAYLOADS = LAYERS = range(3)
 """The layers in which things can meet, from the floor up. What stands on the floor is in all of
@@ -59,6 +60,12 @@ class Clearance:
     def rim(self) -> float:
         """How far an arm's end stays behind the line of another robot's mast, and of a post."""
         return max(MAST, POST) / 2 + self.c
+
+    @property
+    def spread(self) -> float:
+        """How far the lanes of robots that relay each other lie to either side of the line on which
+        one robot would run [whole mm]."""
+        return ceil((CARRIAGE + self.c) * 500 - 1e-6) / 1000
 
     def reach(self, arm: float, lane: float = 0.0) -> float:
         """How far the carriage stays behind: of the arm's end, and of the other robot's carriage

@@ -45,11 +45,14 @@ class Draft:
         """The layout that these lengths give, the output robot's path as short as can be; the
         floor it takes is not known yet."""
         travel = list(self.stretched.travel)
-        travel[0] = round(travel[0] - _spare(self._layout(travel)), 3)
+        lanes = (-1, +1) if any(shape.spread for shape in self.shapes) else (0,)
+        spare = min(_spare(self._layout(travel, lane)) for lane in lanes)
+        travel[0] = round(travel[0] - spare, 3)
         return self._layout(travel)
 
-    def _layout(self, travel: Sequence[float]) -> Layout:
-        guidepaths = self._guidepaths(travel)
+    def _layout(self, travel: Sequence[float], lane: int = 0) -> Layout:
+        """With every robot that has room for two lanes in the middle of it, or in one of them."""
+        guidepaths = self._guidepaths(travel, lane)
         return Layout(
             self.factory,
             self.product,
@@ -60,7 +63,7 @@ class Draft:
             _outfeed(guidepaths[0], self.shapes[0].last, self.clearance),
         )
 
-    def _guidepaths(self, travel: Sequence[float]) -> tuple[Guidepath, ...]:
+    def _guidepaths(self, travel: Sequence[float], lane: int) -> tuple[Guidepath, ...]:
         """Places every robot, carriers first: its A is a station of its carrier."""
         paths: list[Guidepath] = []
         axes = headings(self.factory, self.stretched.sides)
@@ -71,8 +74,9 @@ class Draft:
                 on = paths[carrier]
                 a = on.middle(on.length - self.stretched.stations[number])
             a = (round(a[0], 3), round(a[1], 3))
+            offset = round(shape.offset + lane * shape.spread, 3)
             paths.append(
-                Guidepath(u, t, a, travel[robot], shape.reach, shape.offset, shape.arm, shape.nest)
+                Guidepath(u, t, a, travel[robot], shape.reach, offset, shape.arm, shape.nest)
             )
         return tuple(paths)
 

@@ -35,11 +35,16 @@ def lay_out(
     saying by how much and where, or where an operation's template asks for what cannot be kept
     clear."""
     known = judged(factory, product)
-    layout = optimised(known, product, Clearance(clearance), pace or Pace(), floor)
+    return certified(optimised(known, product, Clearance(clearance), pace or Pace(), floor), floor)
+
+
+def certified(layout: Layout, floor: Point2 | None = None) -> Layout:
+    """A layout with its certificate and the floor it takes. Raises RunError (Layout) as `lay_out`
+    does."""
     certificate = certify(layout)
     if not certificate.holds:
         raise RunError(fault.diagnostic() for fault in certificate.faults)
-    around = bounds(certificate.regions, clearance)
+    around = bounds(certificate.regions, layout.clearance)
     layout = replace(layout, floor=around, certificate=certificate)
     if floor is not None:
         _check_floor(layout, certificate.regions, floor)
@@ -80,4 +85,4 @@ def _at_edge(layout: Layout, found: tuple[Region, ...], edge: int) -> str:
     return f"{name}'s {KINDS[region.kind]}"
 
 
-__all__ = ["lay_out", "project"]
+__all__ = ["certified", "lay_out", "project"]

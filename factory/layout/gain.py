@@ -25,41 +25,55 @@ class Figures:
 @dataclass(frozen=True, slots=True)
 class Gain:
     """The figures of a layout and of the first feasible one; the robot that allows no shorter cycle
-    and the least cycle time that any layout could have [s]."""
+    and the least cycle time that any layout without relays could have [s]. Where there are relays:
+    the figures without them, and how many robots they add."""
 
     chosen: Figures
     first: Figures
     bottleneck: str
     bound: float
+    plain: Figures | None = None
+    added: int = 0
 
     def as_json(self) -> dict[str, object]:
         """As a part of a document."""
+        relays = {"robots_added": self.added, "without": asdict(self.plain)} if self.plain else {}
         return {
             **asdict(self.chosen),
+            **({"relays": relays} if relays else {}),
             "bottleneck": self.bottleneck,
             "cycle_time_bound_s": round(self.bound, 6),
             "first_feasible": asdict(self.first),
         }
 
     def __str__(self) -> str:
-        first = self.first
+        first, plain, relays, other = self.first, self.plain, "", ""
+        if plain:
+            words = f"{self.added} robot{'' if self.added == 1 else 's'} more to relay"
+            relays = f"; {words}, {plain.predicted_cycle_time_s:.2f} s without"
+            other = " without relays"
         return (
-            f"cycle {self.chosen.predicted_cycle_time_s:.2f} s ({self.bottleneck}); first feasible"
+            f"cycle {self.chosen.predicted_cycle_time_s:.2f} s ({self.bottleneck}){relays};"
+            f" first feasible"
             f" layout {first.predicted_cycle_time_s:.2f} s, {first.area_m2:.2f} m²,"
-            f" {first.guidepath_length_m:.2f} m; no layout below {self.bound:.2f} s"
+            f" {first.guidepath_length_m:.2f} m; no layout{other} below"
+            f" {self.bound:.2f} s"
         )
 
 
 def gain(layout: Layout, pace: Pace) -> Gain:
     """Compare a layout for robots of a pace."""
-    factory, product, c = layout.factory, layout.product, layout.clearance
+    plain = layout.plain or layout
+    factory, product, c = plain.factory, layout.product, layout.clearance
     times = gear_times(layout, pace)
     slowest = max(range(len(times)), key=times.__getitem__)
     return Gain(
         _figures(layout, pace),
         _figures(first_feasible(factory, product, Clearance(c)), pace),
-        factory.robots[slowest].name,
+        layout.factory.robots[slowest].name,
         cycle_time_bound(factory, product, c, pace),
+        _figures(plain, pace) if layout.plain else None,
+        len(layout.factory.robots) - len(factory.robots),
     )
 
 

@@ -8,7 +8,7 @@ one gives more weight to the robots that are the slowest in the best so far.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
 
 from factory.factory import Factory
@@ -34,27 +34,35 @@ LARGE = 1500
 """A factory of more robots is packed once, with the sides of the first feasible layout."""
 
 
-def first_feasible(factory: Factory, product: Product, c: Clearance) -> Layout:
+def first_feasible(
+    factory: Factory, product: Product, c: Clearance, wide: Collection[int] = ()
+) -> Layout:
     """The layout of the simple construction."""
     payloads = payload_boxes(factory, product)
     sides = _first_sides(factory, payloads, c)
-    shapes = exact_shapes(factory, payloads, headings(factory, sides), c)
+    shapes = exact_shapes(factory, payloads, headings(factory, sides), c, wide)
     stretched = stretch(factory, shapes.__getitem__, c, sides)
     return Draft(factory, product, c, payloads, shapes, stretched).layout()
 
 
 def optimised(
-    factory: Factory, product: Product, c: Clearance, pace: Pace, floor: Point2 | None = None
+    factory: Factory,
+    product: Product,
+    c: Clearance,
+    pace: Pace,
+    floor: Point2 | None = None,
+    wide: Collection[int] = (),
 ) -> Layout:
     """The best layout found, of those that fit a floor if there are any. Never worse than the first
-    feasible one, but for a factory that is LARGE. Near linear, deterministic."""
+    feasible one, but for a factory that is LARGE. `wide`: robots whose ways have room for relays.
+    Near linear, deterministic."""
     payloads = payload_boxes(factory, product)
     count = len(factory.robots)
-    task = Task(factory, c, pace, [1.0] * count)
+    task = Task(factory, c, pace, [1.0] * count, wide=wide)
     if count > LARGE:
         sides = _first_sides(factory, payloads, c)
         return _packed(replace(task, width=1), product, payloads, sides)
-    best = first_feasible(factory, product, c)
+    best = first_feasible(factory, product, c, wide)
     times = gear_times(best, pace)
     least = _score(best, times, floor)
     for chosen in _tasks(task, max(1, EFFORT // count)):

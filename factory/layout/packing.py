@@ -8,7 +8,7 @@ beam), since where a station is best depends on the next.
 from __future__ import annotations
 
 from bisect import bisect_left
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import accumulate, product
 from math import inf
@@ -52,7 +52,8 @@ class Task:
     `weights`: how much the time of each robot matters, 1 for the bottleneck; `breadth`: how much of
     its extent to the sides a robot is charged to be slower for those it delivers to; `width`: how
     many ways are kept; `corridor`: whether the output robot's way ahead is kept free for the
-    product, so that the outfeed can begin beside the others.
+    product, so that the outfeed can begin beside the others; `wide`: robots whose ways have room
+    for relays.
     """
 
     factory: Factory
@@ -62,6 +63,7 @@ class Task:
     breadth: float = 1.0
     width: int = 6
     corridor: bool = True
+    wide: Collection[int] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -147,7 +149,7 @@ class Packing:
 
     def _strip(self, side: int, pile: Extent) -> tuple[float, ...]:
         """How far to a side the robot's own path takes the floor, by layer, with a pile."""
-        lane = side * self.shape.offset + self.half
+        lane = side * self.shape.offset + self.half + self.shape.spread
         post = self.post[side] + self.half
         load = max((pile[3] if side > 0 else -pile[2]) + self.half, post)
         floor = [max(lane + CARRIAGE / 2, post), max(lane + MAST / 2, post)]

@@ -42,7 +42,8 @@ class Guidepath:
     product's middle when the robot delivers (x, y); `travel`: how far before that it receives (the
     station at its B end); `reach` = 2r: how far the carriage stays behind the product's middle;
     `offset`: how far the carriage's line is to the side t; `arm`: how far behind the middle the arm
-    ends; `nest`: where ahead of the middle the payload's own middle is, reached by the finger. All
+    ends; `nest`: where ahead of the middle the payload's own middle is, reached by the finger;
+    `aside`: how far to the side t of the carriage's line that is, in a lane beside another's. All
     lengths in [m].
 
     Arc length x of the carriage runs from A = 0; delivering at x = reach, receiving at B = reach +
@@ -57,6 +58,7 @@ class Guidepath:
     offset: float
     arm: float
     nest: float
+    aside: float = 0.0
 
     @property
     def length(self) -> float:
@@ -113,7 +115,8 @@ class Layout:
     which each of its robots has its goal.
 
     `stations[i]`: distance [m] of operation i from its carrier's B end; `payloads[label]`: the box
-    of a sub-assembly about the product's middle; `outfeed`: the box of the conveyor in the world.
+    of a sub-assembly about the product's middle; `outfeed`: the box of the conveyor in the world;
+    `plain`: the layout without relays, None where this is one.
     """
 
     factory: Factory
@@ -125,6 +128,7 @@ class Layout:
     outfeed: Box = (0.0, 0.0, 0.0, 0.0)
     floor: Box = (0.0, 0.0, 0.0, 0.0)
     certificate: Certificate | None = field(default=None, repr=False, compare=False)
+    plain: Layout | None = field(default=None, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "payloads", MappingProxyType(dict(self.payloads)))
@@ -218,7 +222,7 @@ class Layout:
         rear, front, _, _ = path.frame(self.payloads[label])
         back = -Clearance(self.clearance).post(path.reach, rear)
         ahead = round((rear + front) / 2, 3)
-        across, half = path.offset, POST / 2
+        across, half = path.offset + path.aside, POST / 2
         solid = self.product.solids[label]
         return Feeder(
             path.world((back - half, back + half, across - half, across + half), middle),

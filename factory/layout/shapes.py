@@ -3,7 +3,7 @@ them, arms, lanes."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 
 from factory.factory import Factory
 from factory.geometry import Product
@@ -56,11 +56,12 @@ def exact_shapes(
     payloads: Mapping[str, Box],
     axes: list[tuple[Point2, Point2]],
     c: Clearance,
+    wide: Collection[int] = (),
 ) -> list[Shape]:
     """Shapes from the payloads as they lie in the world: parts never turn."""
     on = carriers(factory)
     return [
-        oriented_shape(factory, payloads, robot, on[robot], *axes[robot], c)
+        oriented_shape(factory, payloads, robot, on[robot], *axes[robot], c, wide)
         for robot in range(len(factory.robots))
     ]
 
@@ -73,9 +74,11 @@ def oriented_shape(
     u: Point2,
     t: Point2,
     c: Clearance,
+    wide: Collection[int] = (),
 ) -> Shape:
     """The shape of a robot that lies in a frame (u, t). Its arm ends beside the line of its
-    carrier, which runs beside the product's middle as the carrier's last pile lies."""
+    carrier, which runs beside the product's middle as the carrier's last pile lies. `wide`: robots
+    with room for relays, which run to either side of such a line."""
     numbers = carried(factory, robot)
     piles = {n: project(payloads[factory.operations[n].label], u, t) for n in numbers}
     last, tool = _last(piles), is_tool(factory, robot)
@@ -84,13 +87,15 @@ def oriented_shape(
         made = factory.operations[factory.robots[carrier].operations[-2]].label
         along = project(payloads[made], u, t)
         lane, belt = -round((along[0] + along[1]) / 2, 3), 0.0
+        lane += c.spread if carrier in wide else 0.0
     if tool:
         held = project(
             payloads[factory.operations[factory.robots[robot].operations[0]].label], u, t
         )
     arm = up(max(c.rim, c.rim + lane, belt))
     offset, nest = round((held[2] + held[3]) / 2, 3), round((held[0] + held[1]) / 2, 3)
-    return Shape(piles, last, offset, arm, up(c.reach(arm, lane)), nest, tool)
+    spread = c.spread if robot in wide else 0.0
+    return Shape(piles, last, offset, arm, up(c.reach(arm, lane)), nest, tool, spread)
 
 
 def carried(factory: Factory, robot: int) -> list[int]:

@@ -46,7 +46,8 @@ Sides = dict[int, int]
 class Shape:
     """What the layout must know of a robot: the box of each pile it carries, by operation, and
     of the last one, how far its carriage line is to the side, how far behind the middle its arm
-    ends and its carriage is (`reach`, 2r), and how far ahead its finger goes (`nest`) [m]."""
+    ends and its carriage is (`reach`, 2r), how far ahead its finger goes (`nest`), and how far its
+    lane reaches to either side for relays (`spread`) [m]."""
 
     piles: Mapping[int, Extent]
     last: Extent
@@ -55,6 +56,7 @@ class Shape:
     reach: float
     nest: float
     tool: bool
+    spread: float = 0.0
 
 
 class Subtree:
@@ -148,7 +150,7 @@ class _Builder:
 
     def _strip(self, side: int) -> list[float]:
         """How far to a side the robot's own path takes the floor, by layer."""
-        lane = side * self.shape.offset + self.half
+        lane = side * self.shape.offset + self.half + self.shape.spread
         payload = NOTHING if self.shape.tool else self._payload_strip(side, self.shape.last)
         return [lane + CARRIAGE / 2, lane + MAST / 2, payload]
 

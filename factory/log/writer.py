@@ -162,9 +162,10 @@ def _header(
 ) -> dict[str, Any]:
     factory = simulation.layout.factory
     net = simulation.supervisor.net
-    pag = source.pag if source else factory.pag
+    pag = source.pag if source and simulation.layout.plain is None else factory.pag
     file = Path(pag.file)
-    text = file.read_text("utf-8", errors="replace") if file.is_file() else write_pag(pag)
+    as_given = file.is_file() and simulation.layout.plain is None
+    text = file.read_text("utf-8", errors="replace") if as_given else write_pag(pag)
     settings, jitter = simulation.settings, simulation.jitter
     bodies = simulation.model.carried if simulation.model else None
     subject = subject_of(

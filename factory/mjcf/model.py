@@ -257,7 +257,7 @@ def _robots(
             path,
             drive,
             low - float(product.low[2]) + held_at(layout, robot.index),
-            _role(factory, robot.index),
+            role_of(factory, robot.index),
             hoists.get(robot.index),
         )
         if robot.index == 0:
@@ -279,7 +279,7 @@ def _home(keyframe: Element, layout: Layout, actuator: Element) -> None:
     add(keyframe, "key", name="home", ctrl=tuple(setpoints))
 
 
-def _role(factory: Factory, robot: int) -> str:
+def role_of(factory: Factory, robot: int) -> str:
     """What a robot does, for its paint."""
     if robot == 0:
         return "output"

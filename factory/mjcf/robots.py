@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from copy import deepcopy
 from dataclasses import dataclass, field
+from math import atan2, cos, hypot, sin
 from pathlib import Path
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
 
 from factory.errors import Diagnostic, InputError, Position
 from factory.layout.dimensions import FINGER_TOP, PAYLOAD
-from factory.layout.plan import Guidepath
+from factory.layout.plan import Guidepath, Point2
 from factory.mjcf.elements import add, number, numbers
 from factory.mjcf.names import carriage
 from factory.robots import RobotType
@@ -152,13 +153,15 @@ def _stretch(body: Element, path: Guidepath, top: float, stroke: float) -> None:
     """Arm to the rim, finger to the nest, pin up to the payload, or to where the column goes into
     it."""
     rim = path.reach - path.arm
-    nest = max(path.reach + path.nest, rim + 0.01)
+    u, t = path.heading, path.side
+    left = path.aside * (u[0] * t[1] - u[1] * t[0]) + 0.0
+    nest = (max(path.reach + path.nest, rim + 0.01), left)
     for geom in body.iter("geom"):
         kind = (geom.get("name") or "").rpartition("/")[2]
         if kind.startswith("arm"):
-            _span(geom, 0.0, rim)
+            _span(geom, (0.0, 0.0), (rim, 0.0))
         elif kind.startswith("finger"):
-            _span(geom, rim - 0.01, nest)
+            _span(geom, (rim - 0.01, 0.0), nest)
         elif kind.startswith("pin"):
             _stand(geom, nest, FINGER_TOP, PAYLOAD + top - 1e-3)
         elif kind.startswith("column"):
@@ -167,19 +170,23 @@ def _stretch(body: Element, path: Guidepath, top: float, stroke: float) -> None:
             _stand(geom, nest, PAYLOAD + top - 2e-3, PAYLOAD + top)
     for site in body.iter("site"):
         if (site.get("name") or "").endswith("/nest"):
-            site.set("pos", numbers((nest, 0, PAYLOAD)))
+            site.set("pos", numbers((*nest, PAYLOAD)))
 
 
-def _stand(geom: Element, x: float, low: float, high: float) -> None:
+def _stand(geom: Element, at: Point2, low: float, high: float) -> None:
     """Make an upright cylinder reach from low to high, at least 2 mm."""
     radius = (geom.get("size") or "0.006").split()[0]
     geom.set("size", f"{radius} {number(max(high - low, 2e-3) / 2)}")
-    geom.set("pos", numbers((x, 0, (high + low) / 2)))
+    geom.set("pos", numbers((*at, (high + low) / 2)))
 
 
-def _span(geom: Element, start: float, end: float) -> None:
-    """Make a box reach from start to end along the local x."""
+def _span(geom: Element, start: Point2, end: Point2) -> None:
+    """Make a box reach from start to end."""
     _, y, z = (float(v) for v in (geom.get("pos") or "0 0 0").split())
     half = [float(v) for v in (geom.get("size") or "1 1 1").split()]
-    geom.set("pos", numbers(((start + end) / 2, y, z)))
-    geom.set("size", numbers(((end - start) / 2, half[1], half[2])))
+    ahead, aside = end[0] - start[0], end[1] - start[1]
+    geom.set("pos", numbers(((start[0] + end[0]) / 2, y + (start[1] + end[1]) / 2, z)))
+    geom.set("size", numbers((hypot(ahead, aside) / 2, half[1], half[2])))
+    if aside:
+        turn = atan2(aside, ahead) / 2
+        geom.set("quat", numbers((cos(turn), 0, 0, sin(turn))))

@@ -38,7 +38,7 @@ def watch_log(log: Log) -> tuple[Report, Subject]:
     if not len(log):
         raise InputError(_bad("the log has no tick"))
     try:
-        subject = _subject(log.header)
+        subject = recorded_subject(log.header)
         monitor = Monitor(subject, Anatomy.of(_model(log), subject.factory))
         for sight in sights(log):
             monitor.see(sight)
@@ -61,7 +61,9 @@ def sights(log: Log) -> Iterator[Sight]:
         yield Sight(float(log.time[row]), log.qpos[row], log.qvel[row], log.ctrl[row], welds)
 
 
-def _subject(header: Mapping[str, Any]) -> Subject:
+def recorded_subject(header: Mapping[str, Any]) -> Subject:
+    """The factory that a log is of. Raises ValueError, KeyError, TypeError or AttributeError where
+    the header is of none."""
     factory = factory_of(header)
     known = {f.name for f in fields(Settings)}
     settings = Settings(**{k: v for k, v in header["settings"].items() if k in known})

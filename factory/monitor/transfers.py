@@ -74,7 +74,7 @@ class Transfers:
 
     def _fused(self, switches: Sequence[Switch]) -> list[Switch]:
         """The switches but those by which bodies in one pair of hands, now parked, have become the
-        one body, parked before, that is made of the same parts."""
+        one body, parked before, that is made of the same parts; no copy becomes another."""
         anatomy, at = self.anatomy, self.at
         gone: dict[Holder, list[int]] = {}
         for switch in switches:
@@ -88,7 +88,8 @@ class Transfers:
                 continue
             parts = set(self.subject.factory.contents[label])
             for holder, copies in gone.items():
-                inside = [c for c in copies if parts.issuperset(self._parts([c]))]
+                others = [c for c in copies if anatomy.label[c] != label]
+                inside = [c for c in others if parts.issuperset(self._parts([c]))]
                 if set(self._parts(inside)) == parts:
                     parked.update(inside)
                     self._become(switch.copy, holder, inside)

@@ -7,6 +7,7 @@ shape."""
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from math import cos, radians, sin, tan
 from typing import Literal, get_args
@@ -18,11 +19,19 @@ from factory.errors import Diagnostic, InputError, did_you_mean
 
 Array = NDArray[np.float64]
 
-Camera = Literal["overview", "top", "product"]
-"""`overview`: the whole factory, aslant; `top`: from above; `product`: follows the product that is
-furthest on its way."""
+Standing = Literal["overview", "orbit", "top", "product"]
+"""`overview`: the whole factory, aslant; `orbit`: the same from all sides in turn; `top`: from
+above; `product`: follows the product that is furthest on its way."""
 
-CAMERAS: tuple[Camera, ...] = get_args(Camera)
+CAMERAS: tuple[Standing, ...] = get_args(Standing)
+
+PART = "part:"
+
+Camera = str
+"""One of CAMERAS, or `part:LABEL`, which follows that part from its feeder to the dropoff."""
+
+TURN = 8.0
+"""How fast `orbit` goes round [degrees/s]."""
 
 FIELD = 24.0
 """Angle of view across the shorter side of the picture [degrees]: narrow, for a calm
@@ -64,12 +73,18 @@ class View:
         return near, 2 * max(far, self.distance + self.depth)
 
 
-def camera_named(name: str) -> Camera:
-    """Raises InputError (BadValue) for a name that no camera has."""
-    for camera in CAMERAS:
-        if camera == name:
-            return camera
-    hint = did_you_mean(name, CAMERAS, "cameras")
+def camera_named(name: str, parts: Sequence[str] | None = None) -> Camera:
+    """Raises InputError (BadValue) for a name that no camera has, and for a part that is none of
+    `parts`, if these are known."""
+    head, colon, label = name.partition(":")
+    if not colon and name in CAMERAS:
+        return name
+    if head + colon == PART and (parts is None or label in parts):
+        return name
+    if head + colon == PART and parts is not None:
+        hint = did_you_mean(label, parts, "parts")
+        raise InputError(Diagnostic("BadValue", f"there is no part '{label}'", None, hint))
+    hint = did_you_mean(name, (*CAMERAS, "part:LABEL"), "cameras")
     raise InputError(Diagnostic("BadValue", f"there is no camera '{name}'", None, hint))
 
 
@@ -127,6 +142,28 @@ def overview(points: Array, frame: Frame) -> View:
             best = view
     assert best is not None
     return best
+
+
+def orbit(points: Array, frame: Frame) -> Callable[[float], View]:
+    """The view at each time [s] from a camera that goes round at an even height and distance, the
+    nearest from which everything is in the frame all the way."""
+    elevation = 36.0 if frame.aspect >= 1 else 50.0
+    middle = (points.min(axis=0) + points.max(axis=0)) / 2
+    tall = tan(radians(FIELD / 2)) / min(1.0, frame.aspect)
+    side = tall * (frame.aspect - 2 * frame.beside)
+    low, high = tall * (1 - 2 * frame.below), tall * (1 - 2 * frame.above)
+    away = 0.0
+    for azimuth in range(0, 360, 5):
+        r, u, f = towards(azimuth, elevation) @ (points - middle).T
+        nearest = np.maximum(np.abs(r) / side, np.maximum(u / high, -u / low)) - f
+        away = max(away, float(nearest.max()))
+    depth = float(np.linalg.norm(points - middle, axis=1).max())
+
+    def view(time: float) -> View:
+        axes = towards(-62.0 + TURN * time, elevation)
+        return View(middle - away * axes[2], axes, tall * frame.aspect, tall, away, depth)
+
+    return view
 
 
 def from_above(points: Array, frame: Frame) -> View:

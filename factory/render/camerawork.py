@@ -12,10 +12,15 @@ import numpy as np
 from factory.engine import mujoco
 from factory.errors import Diagnostic, InputError
 from factory.files import write_bytes
+from factory.monitor.subject import Subject
+from factory.render.area import PanelName, shared
 from factory.render.camera import Camera
 from factory.render.caption import Caption, Words
+from factory.render.history import History
 from factory.render.painter import Painter, Pixels
+from factory.render.stage import Stage
 from factory.render.subject import Snapshot
+from factory.render.title import draw_title
 from factory.render.video import VideoFile
 
 Size = tuple[int, int]
@@ -51,7 +56,8 @@ class Moment:
 @dataclass(frozen=True, slots=True)
 class Take:
     """What a picture is of and how it is taken: the model, the product's name and the units asked
-    for, size, camera, and whether there is a caption."""
+    for, size, camera, and whether there is a caption; `subject`: the factory, which is needed for
+    cameras that follow and for `panels`; `title`: shown at the beginning."""
 
     m: mujoco.MjModel
     product: str
@@ -59,6 +65,18 @@ class Take:
     size: Size
     camera: Camera
     caption: bool
+    subject: Subject | None = None
+    panels: tuple[PanelName, ...] = ()
+    title: str = ""
+
+    @property
+    def detail(self) -> str:
+        """What the title says of the factory."""
+        if self.subject is None:
+            return ""
+        factory = self.subject.factory
+        parts, robots = len(factory.leaves), len(factory.robots)
+        return f"{_count(parts, 'part')}, {_count(robots, 'robot')}, {_count(self.units, 'unit')}"
 
     @property
     def best(self) -> bool:
@@ -67,21 +85,33 @@ class Take:
 
 
 class Camerawork:
-    """Takes captioned pictures of moments."""
+    """Takes captioned pictures of moments, with the panels asked for. `history` holds what has
+    fired up to the moments."""
 
-    def __init__(self, take: Take, samples: int = 1) -> None:
-        self.take = take
-        self.caption = Caption(take.size)
+    def __init__(self, take: Take, samples: int = 1, history: History | None = None) -> None:
+        self.take, self.still = take, samples > 1
+        area, panels = shared(take.size, take.panels)
+        size = area.width, area.height
+        self.caption = Caption(size)
         share = self.caption.share if take.caption else 0.0
-        self.painter = Painter(take.m, take.size, take.camera, share, samples)
+        self.stage = None
+        if panels:
+            assert history is not None, "panels show a history"
+            self.stage = Stage(take.m, take.size, panels, history)
+        self.painter = Painter(take.m, size, take.camera, share, samples, take.subject)
 
     def picture(self, moment: Moment, elapsed: float = 0.0) -> Pixels:
         """One picture; `elapsed` [s] since the last."""
-        pixels = self.painter.paint(moment.shown, elapsed)
-        if not self.take.caption:
-            return pixels
-        words = Words(self.take.product, moment.made, self.take.units, moment.time)
-        return self.caption.draw(pixels, words)
+        pixels = self.painter.paint(moment.shown, elapsed, moment.time)
+        if self.take.caption:
+            words = Words(self.take.product, moment.made, self.take.units, moment.time)
+            pixels = self.caption.draw(pixels, words)
+        if self.take.title:
+            since = 0.0 if self.still else moment.time
+            draw_title(pixels, self.take.title, self.take.detail, since)
+        if self.stage is not None:
+            pixels = self.stage.compose(pixels, moment.time, moment.shown.qpos, elapsed)
+        return pixels
 
     def close(self) -> None:
         """Gives the GL context back."""
@@ -91,8 +121,8 @@ class Camerawork:
 class Reel:
     """Frames of a growing row of moments, at even times, into a video file."""
 
-    def __init__(self, take: Take, path: Path, fps: float) -> None:
-        self.work = Camerawork(take)
+    def __init__(self, take: Take, path: Path, fps: float, history: History | None = None) -> None:
+        self.work = Camerawork(take, history=history)
         try:
             self.file = VideoFile(path, take.size, fps)
         except BaseException:
@@ -121,11 +151,11 @@ class Reel:
             self.work.close()
 
 
-def save(take: Take, moment: Moment, path: Path) -> None:
+def save(take: Take, moment: Moment, path: Path, history: History | None = None) -> None:
     """A picture of a moment as PNG."""
     from PIL import Image
 
-    work = Camerawork(take, SAMPLES)
+    work = Camerawork(take, SAMPLES, history)
     try:
         pixels = work.picture(moment)
     finally:
@@ -138,6 +168,10 @@ def save(take: Take, moment: Moment, path: Path) -> None:
     except OSError as error:
         message = f"'{path}' cannot be written: {error.strerror}"
         raise InputError(Diagnostic("BadValue", message, None, "choose another file")) from error
+
+
+def _count(number: int, noun: str) -> str:
+    return f"{number} {noun}{'' if number == 1 else 's'}"
 
 
 def pictureless() -> InputError:

@@ -6,8 +6,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from factory.closing import Closing
+from factory.monitor.subject import subject_of
+from factory.render.area import PanelName, shared
 from factory.render.camera import camera_named
 from factory.render.camerawork import FPS, SIZE, Moment, Reel, Size, Take, When, pictureless, save
+from factory.render.history import History
+from factory.render.poster import Poster
 from factory.render.subject import Snapshot, held
 from factory.render.video import check_output
 
@@ -18,15 +22,36 @@ if TYPE_CHECKING:
 class _Observer(Closing):
     """What films and stills of a run have in common: an observer, and a context manager."""
 
-    def __init__(self, simulation: Simulation, size: Size, camera: str, caption: bool) -> None:
+    def __init__(
+        self,
+        simulation: Simulation,
+        size: Size,
+        camera: str,
+        caption: bool,
+        panels: tuple[PanelName, ...],
+        title: str,
+    ) -> None:
         if simulation.model is None:
             raise pictureless()
         from factory.mjcf.model import product_name
 
-        self.simulation = simulation
-        product = product_name(simulation.layout.factory)
-        world = simulation.world
-        self.take = Take(world.m, product, simulation.units, size, camera_named(camera), caption)
+        self.simulation, factory = simulation, simulation.layout.factory
+        camera = camera_named(camera, [part.label for part in factory.leaves])
+        shared(size, panels)
+        subject = subject_of(
+            simulation.layout,
+            simulation.settings,
+            simulation.jitter,
+            simulation.start,
+            simulation.wip,
+            simulation.model.carried,
+        )
+        product, m = product_name(factory), simulation.world.m
+        self.take = Take(
+            m, product, simulation.units, size, camera, caption, subject, panels, title
+        )
+        self.history = History(subject)
+        self.number = factory.net.threaded.net.transition_index
         self.last = self._moment()
 
     def __call__(self, world: Any, supervisor: Any) -> None:
@@ -36,7 +61,9 @@ class _Observer(Closing):
         raise NotImplementedError
 
     def _moment(self) -> Moment:
-        world = self.simulation.world
+        world, events = self.simulation.world, self.simulation.supervisor.events
+        for event in events[len(self.history.events) :]:
+            self.history.fire(event.t, self.number[event.transition])
         made = world.delivered() - self.simulation.before
         return Moment(world.time, made, Snapshot.of(world.m, world.d))
 
@@ -45,8 +72,10 @@ class Film(_Observer):
     """Films a run: a frame whenever simulated time reaches the next, from the run itself.
 
     Frame k is at k / fps seconds, so T seconds have ⌊T fps⌋ + 1 frames. Closed after an
-    interruption too, the file holds what happened until then. Raises InputError for a size, rate,
-    ending or camera that will not do, MissingError where there is no GL."""
+    interruption too, the file holds what happened until then. `panels` are beside the 3-D; `title`
+    is shown at the beginning; `poster`: a still (PNG) of the moment that shows most. Raises
+    InputError for a size, rate, ending or camera that will not do, MissingError where there is no
+    GL."""
 
     def __init__(
         self,
@@ -56,10 +85,18 @@ class Film(_Observer):
         fps: float = FPS,
         camera: str = "overview",
         caption: bool = True,
+        panels: tuple[PanelName, ...] = (),
+        title: str = "",
+        poster: Path | str | None = None,
     ) -> None:
         check_output(path, size, fps)
-        super().__init__(simulation, size, camera, caption)
-        self.reel = Reel(self.take, Path(path), fps)
+        super().__init__(simulation, size, camera, caption, panels, title)
+        self.poster = None
+        if poster is not None:
+            check_output(poster, size, still=True)
+            self.poster = Poster(self.take, self.history, Path(poster))
+            self.poster.see(self.last)
+        self.reel = Reel(self.take, Path(path), fps, self.history)
         self.reel.until(self.last)
 
     @property
@@ -69,11 +106,16 @@ class Film(_Observer):
 
     def observe(self, world: Any, supervisor: Any) -> None:
         """Take the frames that are due."""
-        self.reel.until(self._moment())
+        now = self._moment()
+        if self.poster is not None:
+            self.poster.see(now)
+        self.reel.until(now)
 
     def close(self) -> None:
-        """Finish the file."""
+        """Finish the file, and write the poster."""
         self.reel.close()
+        if self.poster is not None:
+            self.poster.save()
 
 
 class Still(_Observer):
@@ -90,9 +132,11 @@ class Still(_Observer):
         camera: str = "overview",
         at: When = "end",
         caption: bool = True,
+        panels: tuple[PanelName, ...] = (),
+        title: str = "",
     ) -> None:
         check_output(path, size, still=True)
-        super().__init__(simulation, size, camera, caption)
+        super().__init__(simulation, size, camera, caption, panels, title)
         self.path, self.at, self.held = Path(path), at, False
 
     def observe(self, world: Any, supervisor: Any) -> None:
@@ -105,7 +149,7 @@ class Still(_Observer):
 
     def close(self) -> None:
         """Take the picture."""
-        save(self.take, self.last, self.path)
+        save(self.take, self.last, self.path, self.history)
 
 
 def still(

@@ -10,8 +10,21 @@ from numpy.typing import NDArray
 from factory import gl
 from factory.closing import Closing
 from factory.engine import mujoco
-from factory.render.camera import Array, Camera, Frame, View, fit, from_above, overview, towards
-from factory.render.subject import Followed, Snapshot, extent
+from factory.monitor.subject import Subject
+from factory.render.camera import (
+    PART,
+    Array,
+    Camera,
+    Frame,
+    View,
+    fit,
+    from_above,
+    orbit,
+    overview,
+    towards,
+)
+from factory.render.following import Followed
+from factory.render.subject import Snapshot, extent
 
 Pixels = NDArray[np.uint8]
 
@@ -41,6 +54,7 @@ class Painter(Closing):
         camera: Camera,
         caption: float = 0.0,
         samples: int = 1,
+        subject: Subject | None = None,
     ) -> None:
         gl.probe()
         self.width, self.height = size
@@ -55,7 +69,11 @@ class Painter(Closing):
         mujoco.mj_kinematics(m, self.d)
         self.frame = Frame(self.width / self.height, below=0.03 + caption)
         self.points = extent(m, self.d)
-        self.followed = Followed(m) if camera == "product" else None
+        self.orbit = orbit(self.points, self.frame)
+        self.followed = None
+        if camera == "product" or camera.startswith(PART):
+            assert subject is not None, "a camera that follows needs to know the factory"
+            self.followed = Followed(m, subject, camera.removeprefix(PART) if ":" in camera else "")
         self.wanted: Array | None = None
         self.body = -1
         self.away, self.glide = np.zeros(3), np.zeros(3)
@@ -77,10 +95,10 @@ class Painter(Closing):
             self.held.free()
             self.held = None
 
-    def paint(self, shown: Snapshot, elapsed: float = 0.0) -> Pixels:
-        """One picture (height, width, 3). `elapsed` [s] since the last one: a camera that follows
-        glides; with 0 it is where it wants to be."""
-        view = self._pose(shown, elapsed)
+    def paint(self, shown: Snapshot, elapsed: float = 0.0, time: float = 0.0) -> Pixels:
+        """One picture (height, width, 3) at a time [s]. `elapsed` [s] since the last one: a camera
+        that follows glides; with 0 it is where it wants to be."""
+        view = self._pose(shown, elapsed, time)
         if self.samples == 1:
             self._draw(view, self.shadows)
             return np.ascontiguousarray(self.pixels[::-1])
@@ -92,7 +110,7 @@ class Painter(Closing):
 
     # --- where the camera stands ------------------------------------------------------------------
 
-    def _pose(self, shown: Snapshot, elapsed: float) -> View:
+    def _pose(self, shown: Snapshot, elapsed: float, time: float) -> View:
         self.d.qpos[:] = shown.qpos
         mujoco.mj_kinematics(self.m, self.d)
         mujoco.mj_camlight(self.m, self.d)
@@ -100,6 +118,8 @@ class Painter(Closing):
             return overview(self.points, self.frame)
         if self.camera == "top":
             return from_above(self.points, self.frame)
+        if self.camera == "orbit":
+            return self.orbit(time)
         return self._following(shown, elapsed)
 
     def _following(self, shown: Snapshot, elapsed: float) -> View:
@@ -126,7 +146,7 @@ class Painter(Closing):
         body, rank = found
         if rank == np.inf and body == self.body and self.wanted is not None:
             return self.wanted, body
-        return np.array(self.d.xpos[body]), body
+        return self.followed.origin(self.d, body), body
 
     def _glide(self, elapsed: float) -> None:
         """The way still to go after a change of body, one step of a critically damped spring

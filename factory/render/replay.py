@@ -9,8 +9,13 @@ import numpy as np
 from factory.engine import mujoco
 from factory.errors import Diagnostic, InputError
 from factory.log import Log
+from factory.monitor.record import AGAIN, recorded_subject
+from factory.monitor.subject import Subject
+from factory.render.area import PanelName, shared
 from factory.render.camera import camera_named
 from factory.render.camerawork import FPS, SIZE, Moment, Reel, Size, Take, When, pictureless, save
+from factory.render.history import History
+from factory.render.poster import Poster
 from factory.render.subject import Snapshot, held
 from factory.render.video import check_output
 
@@ -23,29 +28,45 @@ def render_log(
     camera: str = "overview",
     at: When = "end",
     caption: bool = True,
+    panels: tuple[PanelName, ...] = (),
+    title: str = "",
+    poster: Path | str | None = None,
 ) -> int:
-    """A film, or for .png a still, from a log alone; gives the number of frames.
+    """A film, or for .png a still, from a log alone; gives the number of frames. `panels`, `title`
+    and `poster` are those of `Film`.
 
-    Nothing is simulated again. Raises InputError for a log of the ideal world or one without a
-    tick."""
+    Nothing is simulated again. Raises InputError for a log of the ideal world, one without a tick,
+    or one that is not of the factory in its header."""
     is_still = check_output(path, size, fps, still=None)
-    take = Take(
-        _model(log),
-        str(log.header["product"]),
-        int(log.header["units"]),
-        size,
-        camera_named(camera),
-        caption,
-    )
+    shared(size, panels)
+    m, subject = _model(log), _subject(log)
+    camera = camera_named(camera, [part.label for part in subject.factory.leaves])
+    units = int(log.header["units"])
+    product = str(log.header["product"])
+    take = Take(m, product, units, size, camera, caption, subject, panels, title)
+    history = History(subject)
+    firings = list(zip(log.fired_t.tolist(), log.fired.tolist(), strict=True))
     if is_still:
-        save(take, moment_of(log, _row(log, take, at)), Path(path))
+        moment = moment_of(log, _row(log, take, at))
+        history.catch_up(firings, moment.time)
+        save(take, moment, Path(path), history)
         return 1
-    reel = Reel(take, Path(path), fps)
+    chosen = None
+    if poster is not None:
+        check_output(poster, size, still=True)
+        chosen = Poster(take, history, Path(poster))
+    reel = Reel(take, Path(path), fps, history)
     try:
         for row in range(len(log)):
-            reel.until(moment_of(log, row))
+            moment = moment_of(log, row)
+            history.catch_up(firings, moment.time)
+            if chosen is not None:
+                chosen.see(moment)
+            reel.until(moment)
     finally:
         reel.close()
+    if chosen is not None:
+        chosen.save()
     return reel.frames
 
 
@@ -63,6 +84,15 @@ def moment_of(log: Log, row: int) -> Moment:
     active = log.active[row]
     shown = Snapshot(log.qpos[row], active[:, 0], active[:, 1], active[:, 2])
     return Moment(float(log.time[row]), int(log.delivered[row]), shown)
+
+
+def _subject(log: Log) -> Subject:
+    """The factory that a log is of."""
+    try:
+        return recorded_subject(log.header)
+    except (ValueError, KeyError, TypeError, AttributeError, IndexError) as error:
+        message = f"the log is not of the factory in its header: {error}"
+        raise InputError(Diagnostic("BadLog", message, None, AGAIN)) from error
 
 
 def _model(log: Log) -> mujoco.MjModel:

@@ -192,7 +192,7 @@ class Stock:
             return
         label, _ = self.joining.pop(robot)
         if not self.free[label]:
-            self.fuse(next(r for r, (_, held) in self.load.items() if label in held))
+            self.fuse(next(r for r in self.joining if label in self.load[r][1]))
         unit, labels = self.load[robot]
         self.misfit[unit] = max(self.misfit.get(unit, 0.0), self._misfit(robot))
         copy = self.free[label].popleft()

@@ -22,6 +22,7 @@ SECTIONS = (
     "floors",
     "profile_300",
     "movers",
+    "relays",
     "states",
     "proving",
     "sweeping",

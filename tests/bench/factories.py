@@ -35,6 +35,30 @@ def balanced(parts: int) -> str:
     return f"root = {level[0]};\n" + ";\n".join(lines) + "\n"
 
 
+def cube(parts: int, side: float = 0.3, mass: float = 3.0) -> str:
+    """A PAG of boxes that fill a cube of a side [m] and a mass [kg] together: a balanced binary
+    tree of mates, whose parts are halves of halves, the axes by turns. `parts`: a power of two."""
+    lines: list[str] = []
+    _halved(lines, "n", [(0.0, side)] * 3, parts, mass)
+    return "root = n;\n" + ";\n".join(lines) + "\n"
+
+
+def _halved(
+    lines: list[str], name: str, room: list[tuple[float, float]], parts: int, mass: float
+) -> None:
+    if parts == 1:
+        box = ", ".join(f"{0.96 * (high - low):.6g}" for low, high in room)
+        pos = ", ".join(f"{(low + high) / 2:.6g}" for low, high in room)
+        lines.append(f"{name} = atomic ( box = ({box}), pos = ({pos}), mass = {mass:.6g} )")
+        return
+    lines.append(f"{name} = mate ( {name}a, {name}b )")
+    axis = (len(name) - 1) % 3
+    low, high = room[axis]
+    for letter, half in zip("ab", ((low, (low + high) / 2), ((low + high) / 2, high)), strict=True):
+        inside = [half if n == axis else edges for n, edges in enumerate(room)]
+        _halved(lines, name + letter, inside, parts // 2, mass / 2)
+
+
 def robots_at_least(robots: int) -> str:
     """The balanced product with so many robots, or one more."""
     return balanced(robots // 2 + 1)

@@ -7,7 +7,7 @@ import argparse
 import json
 import os
 import platform
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime
 from importlib import import_module
 from importlib.metadata import version
@@ -39,13 +39,17 @@ def setting() -> dict[str, str]:
     }
 
 
-def measured(name: str, quick: bool, folder: Path = FOLDER) -> None:
+def measured(name: str, quick: bool, folder: Path = FOLDER, only: Sequence[str] = ()) -> None:
     """Measure a section and keep what it found at once: one that takes long yields all that it has
-    found so far, again and again."""
+    found so far, again and again. With `only` it measures these products, and the others that are
+    kept stay as they are."""
     begin = perf_counter()
-    found = import_module(f"tests.fidelity.{name}").measure(quick)
+    measure = import_module(f"tests.fidelity.{name}").measure
+    file = folder / f"{name}.json"
+    kept = json.loads(file.read_text())["results"] if only and file.is_file() else None
+    found = measure(quick, only, kept) if only else measure(quick)
     for results in [found] if isinstance(found, dict) else found:
-        kept = {
+        document = {
             "section": name,
             "quick": quick,
             "seconds": round(perf_counter() - begin, 1),
@@ -53,7 +57,7 @@ def measured(name: str, quick: bool, folder: Path = FOLDER) -> None:
             "results": results,
         }
         folder.mkdir(parents=True, exist_ok=True)
-        (folder / f"{name}.json").write_text(json.dumps(kept, indent=1, ensure_ascii=False) + "\n")
+        file.write_text(json.dumps(document, indent=1, ensure_ascii=False) + "\n")
 
 
 def report(folder: Path = FOLDER) -> str:
@@ -84,12 +88,17 @@ def main() -> None:
     parser = argparse.ArgumentParser(prog="python -m tests.fidelity", description=__doc__)
     parser.add_argument("names", nargs="*", metavar="NAME", help=", ".join(SECTIONS))
     parser.add_argument("--quick", action="store_true", help="a taste of each, in seconds")
+    parser.add_argument(
+        "--only", nargs="+", default=(), metavar="PRODUCT", help="of `seeds`: renew these products"
+    )
     given = parser.parse_args()
+    if given.only and given.names != ["seeds"]:
+        parser.error("--only goes with `seeds`")
     if unknown := set(given.names) - set(SECTIONS):
         parser.error(f"no section {', '.join(sorted(unknown))}; there are {', '.join(SECTIONS)}")
     for name in given.names or SECTIONS:
         print(f"{name} ...", flush=True)
-        measured(name, given.quick)
+        measured(name, given.quick, only=given.only)
         REPORT.write_text(report())
 
 

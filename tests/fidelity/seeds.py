@@ -9,8 +9,9 @@ of the predicted one.
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from datetime import UTC, datetime
 from typing import Any
 
 from factory.fidelity import measure as compared
@@ -90,13 +91,19 @@ def measured(plan: Plan) -> dict[str, Any]:
     }
 
 
-def measure(quick: bool = False) -> Iterator[dict[str, Any]]:
-    """Product after product, with all that is known by then."""
-    found: list[dict[str, Any]] = []
+def measure(
+    quick: bool = False, only: Sequence[str] = (), kept: Mapping[str, Any] | None = None
+) -> Iterator[dict[str, Any]]:
+    """Product after product, with all that is known by then; with `only`, these products, and the
+    others as they were `kept`."""
+    products = [p for p in (kept or {}).get("products", []) if p["product"] not in only]
+    order = [(plan.product, plan.seeds) for plan in PLANS]
     for plan in QUICK if quick else PLANS:
-        if is_here(plan.product):
-            found.append(measured(plan))
-            yield {"jitter": JITTER, "products": found}
+        if is_here(plan.product) and (not only or plan.product in only):
+            products.append({**measured(plan), "date": datetime.now(UTC).strftime("%Y-%m-%d")})
+            if not quick:
+                products.sort(key=lambda p: order.index((p["product"], p["seeds"])))
+            yield {"jitter": JITTER, "products": products}
 
 
 def section(results: dict[str, Any]) -> str:

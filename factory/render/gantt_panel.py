@@ -1,0 +1,114 @@
+"""What each robot did in the last seconds: a bar for each operation, the present at the right."""
+
+from __future__ import annotations
+
+from math import ceil
+
+from factory.control.mode import Array
+from factory.render.colours import (
+    FAINT,
+    FLASH,
+    LINE,
+    WHITE,
+    operation_colours,
+    pale,
+    template_colours,
+)
+from factory.render.history import History, Progress, Spell
+from factory.render.ink import Ink, fitted, width
+from factory.render.painter import Pixels
+from factory.render.rows import Row, Rows
+from factory.render.sheet import Sheet
+
+CYCLES = 2.2
+"""How many rounds of the busiest robot are shown."""
+
+SHORTEST, LONGEST = 6.0, 40.0
+"""Time that is shown [s]."""
+
+STEPS = (1.0, 2.0, 5.0, 10.0)
+"""Time between two lines [s]: the least of which there are no more than eight."""
+
+
+def _window(history: History) -> float:
+    """How much time is shown [s]."""
+    progress, factory = Progress(history.subject), history.factory
+    times = [progress.expected(operation) for operation in factory.operations]
+    busiest = max(sum(times[n] for n in robot.operations) for robot in factory.robots)
+    return float(round(min(max(CYCLES * busiest, SHORTEST), LONGEST)))
+
+
+class GanttPanel:
+    """Draws the robots' modes over time."""
+
+    def __init__(self, size: tuple[int, int], scale: float, history: History, rows: Rows) -> None:
+        self.history, self.factory, self.rows = history, history.factory, rows
+        self.sheet = Sheet(size, scale, rows, 22 * scale)
+        self.colours = operation_colours(self.factory)
+        self.window = _window(history)
+        self.step = next((s for s in STEPS if self.window / s <= 8), STEPS[-1])
+        self.left, self.right = self.sheet.gutter, size[0] - self.sheet.edge
+
+    def draw(self, time: float, x: Array, elapsed: float) -> Pixels:
+        """The panel (height, width, 3) at a time."""
+        ink = self.sheet.blank("Robots over time", "")
+        self._legend(ink)
+        bottom = self.sheet.top + self.rows.count * self.sheet.pitch
+        self._lines(ink, time, bottom)
+        for row in self.rows.shown:
+            for spell in self.history.since(row.robot, time - self.window):
+                self._spell(ink, row, spell, time)
+        thin = self.sheet.scale
+        ink.box(self.right - thin, self.sheet.top, self.right + thin, bottom, FLASH)
+        self.sheet.names(ink)
+        return ink.pixels
+
+    def at(self, time: float, now: float) -> float:
+        """Where a time is across the panel."""
+        return self.right - (now - time) / self.window * (self.right - self.left)
+
+    def _legend(self, ink: Ink) -> None:
+        """The colours of the operations, from the right."""
+        x, y, small = self.right, 20 * self.sheet.scale, self.sheet.points - 2
+        for name, colour in reversed(template_colours(self.factory).items()):
+            if x - width(name, small) < self.sheet.size[0] / 3:
+                break
+            ink.words(x, y, name, small, FAINT, "r")
+            x -= width(name, small) + 0.5 * small
+            ink.box(x - 0.7 * small, y - 0.35 * small, x, y + 0.35 * small, colour, 1.0, 2)
+            x -= 1.6 * small
+
+    def _lines(self, ink: Ink, now: float, bottom: float) -> None:
+        thin, small = self.sheet.scale / 2, self.sheet.points - 2
+        y = bottom + 11 * self.sheet.scale
+        number = max(ceil((now - self.window) / self.step), 0)
+        while number * self.step <= now:
+            x = self.at(number * self.step, now)
+            ink.box(x - thin, self.sheet.top, x + thin, bottom, LINE)
+            if self.left + small < x < self.right - 4 * small:
+                ink.words(x, y, f"{number * self.step:.0f} s", small, FAINT, "m")
+            number += 1
+        ink.words(self.right, y, "now", small, FLASH, "r")
+
+    def _spell(self, ink: Ink, row: Row, spell: Spell, now: float) -> None:
+        """A bar for an operation, a thin one where a robot waits with a part; empty-handed it has
+        none."""
+        if spell.start > now or not spell.step:
+            return
+        left = max(self.at(spell.start, now), self.left)
+        right = self.at(min(spell.end, now), now)
+        y, gear = self.sheet.height(row), self.factory.robots[row.robot].operations
+        if not spell.operation:
+            before = self.colours[gear[spell.step // 2 - 1]]
+            thin = 1.6 * self.sheet.scale
+            ink.box(left, y - thin, right, y + thin, pale(before, 0.35), row.alpha)
+            return
+        operation = self.factory.operations[gear[spell.step // 2]]
+        half, colour = (
+            0.38 * min(self.sheet.pitch, 30 * self.sheet.scale),
+            self.colours[operation.index],
+        )
+        ink.box(left, y - half, right, y + half, colour, row.alpha, 3 * self.sheet.scale)
+        room = right - left - 8 * self.sheet.scale
+        name = fitted(operation.label, self.sheet.small, room)
+        ink.words(left + 4 * self.sheet.scale, y, name, self.sheet.small, WHITE, "l", row.alpha)

@@ -1,0 +1,118 @@
+"""Which robots the panels show, each in a row of its own, and where the rows are.
+
+Up to LIMIT robots all are shown, in the order of their numbers. Beyond, those in the neighbourhood
+of the product that is furthest on its way: who has it now, whom it will meet next. Their rows come,
+go and change places calmly.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from factory.factory import Factory, Operation
+from factory.render.history import History, depths, followed
+
+LIMIT = 20
+"""Robots up to which all are shown."""
+
+NEIGHBOURS = 12
+"""Rows where not all robots are shown."""
+
+COLUMNS = 6.0
+"""Operations side by side where not all robots are shown."""
+
+CALM = 0.25
+"""Time constant of everything that comes, goes or moves to another row [s]."""
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """A robot's row: `at` which height, in rows from the top; `alpha`: how far it has come or
+    gone."""
+
+    robot: int
+    at: float
+    alpha: float = 1.0
+
+
+class Rows:
+    """The rows at present. `reduced`: whether not all robots have one; `named`: how
+    many have, those not counted that go; `first`: the leftmost column
+    of operations to be seen, and `columns` how many are."""
+
+    def __init__(self, history: History) -> None:
+        self.history, self.factory = history, history.factory
+        robots = len(self.factory.robots)
+        self.reduced = robots > LIMIT
+        self.count = NEIGHBOURS if self.reduced else robots
+        self.shown = [] if self.reduced else [Row(r, float(r)) for r in range(robots)]
+        self.columns = min(COLUMNS, self.width) if self.reduced else self.width
+        self.named = robots
+        self.first = 0.0
+        self.focus: Operation | None = None
+
+    @cached_property
+    def column(self) -> tuple[int, ...]:
+        """For each operation its column: the last is rightmost, each as far right as it can be."""
+        depth = depths(self.factory)
+        return tuple(max(depth) - d for d in depth)
+
+    @property
+    def width(self) -> float:
+        """Columns that there are."""
+        return max(self.column) + 1.0
+
+    def advance(self, time: float, elapsed: float) -> None:
+        """To what is shown at a time, `elapsed` [s] after the last; with 0 at once."""
+        if not self.reduced:
+            return
+        self.focus = followed(self.factory, self.history.counts(time))
+        share = 1.0 - float(np.exp(-elapsed / CALM)) if elapsed > 0 and self.shown else 1.0
+        wanted = self.column[self.focus.index] + 1.5 - self.columns / 2
+        wanted = min(max(wanted, 0.0), self.width - self.columns)
+        self.first += share * (wanted - self.first)
+        near = neighbourhood(self.factory, self.focus)
+        place = {robot: float(number) for number, robot in enumerate(near)}
+        self.named = len(near)
+        old = {row.robot: row for row in self.shown}
+        fresh = [Row(r, at, 0.0) for r, at in place.items() if r not in old]
+        moved = (_moved(row, place, share) for row in (*self.shown, *fresh))
+        self.shown = sorted((row for row in moved if row), key=lambda row: row.robot)
+
+
+def _moved(row: Row, place: dict[int, float], share: float) -> Row | None:
+    """A row on its way to its place, or out."""
+    at, there = place.get(row.robot, row.at), float(row.robot in place)
+    alpha = row.alpha + share * (there - row.alpha)
+    return Row(row.robot, row.at + share * (at - row.at), alpha) if alpha > 0.02 else None
+
+
+def neighbourhood(factory: Factory, focus: Operation, most: int = NEIGHBOURS) -> list[int]:
+    """At most so many robots: those of an operation, of the operations that its result goes to, the
+    nearest first, and of those that make what joins it there; then of those that make what these
+    need, and so on. In the order of their numbers."""
+    chosen = list(_ahead(factory, focus))
+    found = set(focus.robots[:most])
+    for operation in chosen:
+        more = found | set(operation.robots)
+        if len(more) > most:
+            break
+        found = more
+        chosen += (factory.by_label[label] for label in operation.inputs)
+    return sorted(found)
+
+
+def _ahead(factory: Factory, focus: Operation) -> Iterator[Operation]:
+    """An operation, those that its inputs come from, and what it leads to, each with what joins it
+    there."""
+    operation = focus
+    while True:
+        yield operation
+        yield from (factory.by_label[label] for label in operation.inputs)
+        if (parent := factory.parents[operation.index]) < 0:
+            return
+        operation = factory.operations[parent]

@@ -1,0 +1,208 @@
+"""The documentation: what the tutorial shows is what the commands print, the reference is complete,
+pages and pictures that are linked are there, and the site is built without warnings."""
+
+from __future__ import annotations
+
+import re
+import shlex
+import shutil
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import click
+import pytest
+
+from factory.cli import cli
+from factory.explanations import codes
+from factory.export import exporters
+from factory.lang.values import GEOMETRY
+from factory.pipeline import all_templates
+from factory.robots import load_catalogue
+from factory.settings import RANGES
+from tests.command_line import ROOT, Terminal
+
+DOCS = ROOT / "docs"
+PAGES = [p for p in sorted(DOCS.rglob("*.md")) if "_build" not in p.parts]
+WRITTEN = [p for p in PAGES if p.parent.name != "reference" or p.name == "index.md"]
+EXAMPLES = sorted(path.stem for path in (ROOT / "examples").glob("*.pag"))
+
+FENCE = re.compile(
+    r"^```(\{code-block\} text|console)\n(?::caption: (\S+)\n)?(.*?)^```$", re.M | re.S
+)
+
+# --- what is shown is what is printed -------------------------------------------------------------
+
+
+def shown(page: str) -> Iterator[tuple[str, str]]:
+    """The blocks of a page to be carried out, in order: a file's name and its text, or "" and a
+    session in the shell."""
+    for kind, caption, text in FENCE.findall((DOCS / page).read_text("utf-8")):
+        if kind == "console" or caption:
+            yield caption, text
+
+
+def session(text: str) -> Iterator[tuple[list[str], list[str]]]:
+    """The commands of a session, each with the lines that it is said to print."""
+    for block in re.split(r"^\$ ", text, flags=re.M)[1:]:
+        command, *lines = block.splitlines()
+        yield shlex.split(command, comments=True), [line for line in lines if line.strip()]
+
+
+def words(text: str) -> list[str]:
+    """Lines with single blanks and without numbers that a machine may round in another way."""
+    lines = [re.sub(r"\d+\.\d+|\d+(?= %)", "#", line) for line in text.splitlines()]
+    return [" ".join(line.split()) for line in lines if line.strip()]
+
+
+@pytest.fixture
+def elsewhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A folder with the examples, in which pictures are small."""
+    shutil.copytree(ROOT / "examples", tmp_path / "examples")
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("FACTORY_SIZE", "64x48")
+    monkeypatch.setenv("FACTORY_FPS", "2")
+    return tmp_path
+
+
+def follow(page: str, run: Terminal, monkeypatch: pytest.MonkeyPatch) -> int:
+    """Does what a page says; how many commands of ours that were."""
+    done = 0
+    for name, text in shown(page):
+        if name:
+            Path(name).parent.mkdir(exist_ok=True)
+            Path(name).write_text(text, "utf-8")
+            continue
+        for command, lines in session(text):
+            if command[0] == "cd":
+                monkeypatch.chdir(command[1])
+                continue
+            assert command[0] == "factory", command
+            ended = run(*command[1:])
+            printed = words(ended.out + ended.err)
+            missing = [line for line in words("\n".join(lines)) if line not in printed]
+            assert not missing, f"{shlex.join(command)} does not print {missing}"
+            assert ended.status == (2 if "broken" in command else 0)
+            done += 1
+    return done
+
+
+def test_the_tutorial_shows_what_is_printed(
+    run: Terminal, elsewhere: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert follow("tutorial.md", run, monkeypatch) >= 15
+    made = {path.name for path in elsewhere.rglob("*")}
+    assert {"paper.mp4", "paper.png", "paper.xml", "results.db", "bell.log"} <= made
+
+
+@pytest.mark.parametrize("page", ["index.md", "ten-minutes.md"])
+def test_the_way_in_shows_what_is_printed(
+    page: str, run: Terminal, elsewhere: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert follow(page, run, monkeypatch) >= 1
+
+
+# --- the reference --------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def reference() -> Iterator[dict[str, str]]:
+    """The pages that are written from the code, by name."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.syspath_prepend(str(DOCS / "_extensions"))
+        from factory_reference import PAGES as written
+
+        yield {name: page() for name, page in written.items()}
+
+
+def headings(page: str) -> list[str]:
+    """The headings of a page under its title, code left out."""
+    bare = re.sub(r"^````.*?^````$", "", page, flags=re.M | re.S)
+    return re.findall(r"^## (.*)$", bare, re.M)
+
+
+def test_the_reference_has_everything_there_is(reference: dict[str, str]) -> None:
+    assert headings(reference["commands"]) == [f"factory {name}" for name in sorted(cli.commands)]
+    assert headings(reference["diagnostics"]) == list(codes())
+    assert headings(reference["operations"]) == sorted(all_templates())
+    assert headings(reference["robots"]) == [*load_catalogue().types, "The catalogue"]
+    for page, names in (("settings", RANGES), ("language", GEOMETRY), ("formats", exporters())):
+        rows = re.findall(r"^\| `(\w+)` \|", reference[page], re.M)
+        assert set(names) <= set(rows), page
+
+
+def test_every_option_is_told(reference: dict[str, str]) -> None:
+    sections = dict(
+        re.findall(r"^## factory (\S+)\n(.*?)(?=^## |\Z)", reference["commands"], re.M | re.S)
+    )
+    for name, command in cli.commands.items():
+        for option in command.params:
+            if isinstance(option, click.Option):
+                assert option.help, f"factory {name} {option.opts[-1]} has no help"
+            if option.name not in ("as_json", "quiet", "verbose") and option.opts[0][0] == "-":
+                assert option.opts[-1] in sections[name], f"factory {name} {option.opts[-1]}"
+
+
+def test_every_page_of_the_reference_is_in_its_index(reference: dict[str, str]) -> None:
+    index = (DOCS / "reference" / "index.md").read_text("utf-8")
+    assert sorted(re.findall(r"^(\w+)$", index, re.M)) == sorted(reference)
+
+
+def test_every_command_and_example_is_in_the_readme_or_the_gallery() -> None:
+    readme, gallery = (
+        (ROOT / "README.md").read_text("utf-8"),
+        (DOCS / "gallery.md").read_text("utf-8"),
+    )
+    for name in cli.commands:
+        assert re.search(rf"`factory {name}\b", readme), name
+    for name in EXAMPLES:
+        assert f"examples/{name}.pag" in gallery, name
+
+
+# --- links and pictures ---------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    "page", [ROOT / "README.md", *WRITTEN], ids=lambda p: p.relative_to(ROOT).as_posix()
+)
+def test_links_lead_somewhere(page: Path, reference: dict[str, str]) -> None:
+    text = re.sub(r"^```.*?^```$|^    .*$", "", page.read_text("utf-8"), flags=re.M | re.S)
+    generated = {(DOCS / "reference" / f"{name}.md").resolve() for name in reference}
+    for target in re.findall(r"\]\(([^)\s]+)\)", text):
+        if re.match(r"https?:", target):
+            continue
+        path, _, anchor = target.partition("#")
+        found = (page.parent / path).resolve() if path else page
+        assert found.exists() or found in generated, f"{page.name} links to {target}"
+        if anchor:
+            assert anchor in anchors(found), f"{page.name} links to {target}"
+
+
+def anchors(page: Path) -> set[str]:
+    """What a page's headings are linked by."""
+    titles = re.findall(r"^#+ (.*)$", page.read_text("utf-8"), re.M)
+    return {re.sub(r"[^\w\- ]", "", title.lower()).replace(" ", "-") for title in titles}
+
+
+@pytest.mark.parametrize("name", EXAMPLES)
+def test_the_gallery_has_small_stills(name: str) -> None:
+    for kind in ("factory", "product"):
+        still = DOCS / "gallery" / f"{name}-{kind}.png"
+        assert 5_000 < still.stat().st_size < 200_000
+
+
+# --- the site -------------------------------------------------------------------------------------
+
+
+@pytest.mark.slow
+def test_the_site_is_built_without_a_warning_and_needs_no_network(tmp_path: Path) -> None:
+    pytest.importorskip("furo", reason="the extra `docs` is not installed")
+    command = [sys.executable, "-m", "sphinx", "-q", "-W", "--keep-going", "-d", tmp_path / "trees"]
+    done = subprocess.run([*command, DOCS, tmp_path / "site"], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    for page in (tmp_path / "site").rglob("*.html"):
+        loaded = re.findall(
+            r'<(?:script|img|link)[^>]+(?:src|href)="(https?:[^"]+)"', page.read_text("utf-8")
+        )
+        assert not loaded, f"{page.name} loads {loaded}"

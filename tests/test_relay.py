@@ -1,0 +1,256 @@
+"""Relays: where a guidepath is shared by several robots the net is proved and the layout certified
+as before, everything goes where it went, and the pace no longer depends on the factory's size."""
+
+from __future__ import annotations
+
+import json
+import random
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from layout_values import STYLES, paper_layout, random_layout, row_of_inserts, table_pag
+from pag_values import SHAPES, factory_of
+
+from factory.assets import templates_folder
+from factory.lang import read_pag, write_pag
+from factory.lang.template_reader import load_templates
+from factory.layout.clearance import certify
+from factory.layout.dimensions import Clearance
+from factory.layout.durations import Pace, gear_times
+from factory.layout.embedding import lay_out
+from factory.layout.optimising import optimised
+from factory.layout.plan import Layout
+from factory.monitor import beside
+from factory.nets.pool import part_pool
+from factory.nets.verify import verify
+from factory.pipeline import read
+from factory.relaying import relayed
+from factory.relaying.naming import named
+from factory.relaying.splitting import split
+from factory.relaying.ways import Way, ways
+from factory.robots import load_catalogue
+from factory.settings import Settings
+from factory.simulation import Simulation
+from factory.template import Template
+from tests.bench.factories import cube, laid_out
+from tests.command_line import Terminal
+
+EXAMPLES = Path(__file__).resolve().parent.parent / "examples"
+SETTINGS = Settings()
+PACE = Pace.of(SETTINGS)
+
+sizes, seeds = st.integers(2, 20), st.integers(0, 10_000)
+shapes, styles = st.sampled_from(SHAPES), st.sampled_from(STYLES)
+
+
+def cycle(layout: Layout) -> float:
+    return max(gear_times(layout, PACE))
+
+
+def templates_of(layout: Layout) -> dict[str, Template]:
+    used = {o.template.name: o.template for o in layout.factory.operations}
+    return {**load_templates([templates_folder()]), **used}
+
+
+def cuttable(plain: Layout) -> tuple[Layout, dict[str, Way]]:
+    """A layout with room for relays on every way that can be cut, and these ways."""
+    wide = {way.robot for way in ways(plain).values()}
+    c = Clearance(plain.clearance)
+    layout = optimised(plain.factory, plain.product, c, PACE, wide=wide)
+    return layout, {k: way for k, way in ways(layout).items() if way.robot in wide}
+
+
+def cut(layout: Layout, found: dict[str, Way], numbers: dict[str, int]) -> Layout:
+    return split(layout, found, numbers, templates_of(layout), load_catalogue())[0]
+
+
+def cut_at_random(plain: Layout, seed: int, most: bool = False) -> tuple[Layout, Layout, int]:
+    """A layout with room for relays, the same with some, and how many they are."""
+    rng = random.Random(seed)
+    layout, found = cuttable(plain)
+    numbers = {k: way.most if most else rng.randint(0, way.most) for k, way in found.items()}
+    return layout, cut(layout, found, numbers), sum(numbers.values())
+
+
+def middles(layout: Layout) -> dict[str, tuple[float, float]]:
+    """Where the product's middle is at the end of every operation."""
+    found = {}
+    for o in layout.factory.operations:
+        path = layout.guidepaths[o.carrier]
+        x, y = path.middle(layout.goal(o.index, o.template.carrier - 1))
+        found[o.label] = round(x, 6), round(y, 6)
+    return found
+
+
+@settings(max_examples=25)
+@given(sizes, seeds, shapes, styles, st.booleans())
+def test_relays_anywhere_are_proved_and_certified(
+    size: int, seed: int, shape: str, style: str, most: bool
+) -> None:
+    """Also that they are gear nets as the language writes them."""
+    before, after, added = cut_at_random(random_layout(size, seed, shape, style), seed, most)
+    assert len(after.factory.robots) == len(before.factory.robots) + added
+    assert verify(after.factory.net).holds
+    assert [str(fault.message) for fault in certify(after).faults] == []
+    pag = after.factory.pag
+    shipped = load_templates([templates_folder()])
+    assert read_pag(write_pag(pag), {**templates_of(after), **shipped}, pag.file) == pag
+    pool, was = part_pool(after.factory), part_pool(before.factory)
+    assert all(pool[part] >= was[part] for part in was)
+
+
+@settings(max_examples=10)
+@given(sizes, seeds, shapes, styles)
+def test_everything_goes_where_it_went(size: int, seed: int, shape: str, style: str) -> None:
+    """All is made at the same places, and the robots of a way run it all between them."""
+    before, after, added = cut_at_random(random_layout(size, seed, shape, style), seed)
+    here, there = middles(before), middles(after)
+    same = [label for label in here if label in there]
+    assert all(here[label] == there[label] for label in same)
+    assert after.outfeed == before.outfeed
+    travels = [sum(g.travel for g in layout.guidepaths) for layout in (before, after)]
+    assert travels[0] == pytest.approx(travels[1])
+    assert len(after.factory.operations) == len(before.factory.operations) + added
+
+
+def test_a_source_line_is_kept() -> None:
+    layout = laid_out(cube(32))
+    after = relayed(layout, SETTINGS)
+    relays = [o for o in after.factory.operations if o.template.name == "relay"]
+    assert relays
+    for relay in relays:
+        assert relay.position == after.factory.by_label[relay.label.partition(".")[0]].position
+
+
+def test_piles_are_written_out_where_they_are_relayed() -> None:
+    factory = row_of_inserts(5).factory
+    pag = named(factory, {"x/3": 1}).pag
+    lines = write_pag(replace(pag, nodes=tuple(node for node in pag.nodes if node.inputs)))
+    assert lines.splitlines() == [
+        "root = x;",
+        "x.2 = mate ( p0, p1 );",
+        "x.3 = insert ( x.2, p2 );",
+        "x.3.relay1 = relay ( x.3 );",
+        "x.4 = insert ( x.3.relay1, p3 );",
+        "x = insert ( x.4, p4 );",
+    ]
+    whole = named(factory, {"x": 2}).pag
+    assert whole.root == "x.relay2"
+    assert whole["x"].inputs == ("p0", "p1", "p2", "p3", "p4")
+
+
+def test_labels_of_the_user_are_not_taken() -> None:
+    rows = [("a.relay1", "weld", "a", {}), ("a", "atomic", "", {})]
+    factory = factory_of(table_pag("a.relay1", *rows))
+    assert named(factory, {"a": 1}).pag["a.relay1"].inputs == ("a.relay1_",)
+
+
+@pytest.mark.parametrize("change", ["step", "lane"])
+def test_a_cut_in_the_wrong_place_is_caught(change: str) -> None:
+    """Too near for what stands there, or in one lane with the robot that takes over."""
+    layout, found = cuttable(laid_out(cube(32)))
+    label = max(found, key=lambda x: found[x].end - found[x].start)
+    good = cut(layout, found, {label: 1})
+    assert certify(good).holds
+    if change == "step":
+        found[label] = replace(found[label], end=found[label].start + 0.1, step=0.05, last=0.0)
+        wrong = cut(layout, found, {label: 1})
+    else:
+        paths = [replace(path, offset=path.offset + path.aside) for path in good.guidepaths]
+        wrong = replace(good, guidepaths=tuple(paths))
+    assert not certify(wrong).holds
+
+
+def test_the_pace_does_not_depend_on_the_size() -> None:
+    """Balanced trees of parts that fill one cube."""
+    plain = [laid_out(cube(parts)) for parts in (16, 64, 256)]
+    found = [relayed(layout, SETTINGS) for layout in plain]
+    before, after = [cycle(layout) for layout in plain], [cycle(layout) for layout in found]
+    assert max(before) > 2 * min(before)
+    assert max(after) < 1.2 * min(after)
+    assert all(
+        len(f.factory.robots) < 1.2 * len(p.factory.robots)
+        for f, p in zip(found, plain, strict=True)
+    )
+    assert all(layout.certificate and layout.certificate.holds for layout in found)
+
+
+def test_a_slower_cycle_takes_fewer_relays() -> None:
+    plain = laid_out(cube(128))
+    fast, slow = (relayed(plain, SETTINGS, wanted) for wanted in (None, 4.0))
+    assert cycle(fast) < cycle(slow) <= 4.0 < cycle(plain)
+    assert len(plain.factory.robots) < len(slow.factory.robots) < len(fast.factory.robots)
+
+
+def test_where_nothing_is_gained_nothing_is_changed() -> None:
+    layout = paper_layout()
+    assert relayed(layout, SETTINGS) is layout
+
+
+@pytest.mark.parametrize(("fuse", "distributed"), [(False, True), (True, False)])
+def test_relays_run(fuse: bool, distributed: bool) -> None:
+    """In MuJoCo, at jitter, with the monitor beside."""
+    layout = relayed(laid_out(cube(32)), SETTINGS)
+    assert layout.plain
+    simulation = Simulation(layout, units=2, seed=4, jitter=0.3, fuse=fuse, distributed=distributed)
+    monitor = beside(simulation)
+    run = simulation.run([monitor.observe])
+    assert (run.products, run.refines_net, run.trouble) == (2, True, None)
+    assert monitor.report().violations == ()
+    physics = run.physics
+    assert physics
+    assert physics.unintended_contacts == physics.engine_warnings == 0
+    assert physics.handoff_gap_max_mm < 0.2
+    assert physics.product_error_max_mm is not None
+    assert physics.product_error_max_mm < 0.1
+
+
+def test_two_bodies_may_be_made_in_one_tick_of_what_is_alike() -> None:
+    """One copy of a relayed sub-assembly goes into a larger one as the next copy is made."""
+    layout = relayed(random_layout(9, 156, SHAPES[156 % len(SHAPES)]), SETTINGS, 0.5)
+    simulation = Simulation(layout, units=3, seed=156, jitter=0.3, fuse=True, distributed=True)
+    monitor = beside(simulation)
+    run = simulation.run([monitor.observe])
+    assert (run.products, run.trouble, monitor.report().violations) == (3, None, ())
+
+
+def test_what_is_lowered_can_be_relayed() -> None:
+    """The robots of a lifted way carry it at its height; the last one has the lift."""
+    source = read(EXAMPLES / "gearbox.pag")
+    plain = lay_out(source.compile(), source.product)
+    assert plain.factory.strokes
+    layout, found = cuttable(plain)
+    lifted = {o.approach.lowered for o in plain.factory.operations if o.approach}
+    chosen = {k: way for k, way in found.items() if k in lifted}
+    after = cut(layout, chosen or found, {k: way.most for k, way in (chosen or found).items()})
+    assert certify(after).holds
+    assert list(after.factory.strokes.values()) == list(plain.factory.strokes.values())
+
+
+def test_by_the_command_line(run: Terminal, tmp_path: Path) -> None:
+    file, log = tmp_path / "cube.pag", tmp_path / "run.log"
+    file.write_text(cube(32))
+    plain = json.loads(run("check", file, "--json").out)
+    found = json.loads(run("check", file, "--relay", "--json").out)
+    assert found["live"] and found["reversible"] and found["robots"] > plain["robots"]
+    assert "relay" not in json.dumps(plain)
+    built = json.loads(run("build", file, "--relay", "--json").out)
+    assert built["robots"] == found["robots"]
+    relays = built["layout"]["relays"]
+    assert relays["robots_added"] == found["robots"] - plain["robots"]
+    assert relays["without"]["predicted_cycle_time_s"] > 4
+    assert built["layout"]["predicted_cycle_time_s"] < 2.5
+    assert run("run", file, "--cycle", "2.4", "--log", log, "-q").status == 0
+    assert run("monitor", log).status == 0
+    assert "relay" in run("programs", file, "--relay").out
+
+
+def test_a_net_has_no_guidepaths(run: Terminal, tmp_path: Path) -> None:
+    file = tmp_path / "net.pnml"
+    file.write_text("<pnml/>")
+    said = run("check", file, "--relay")
+    assert said.status == 2
+    assert "--relay is for a PAG: a net has no guidepaths" in said.err

@@ -1,0 +1,428 @@
+"""The net and the modes over time beside the 3-D: what they show is what the log says, calmly, and
+in the picture's own colours."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import imageio.v3 as iio
+import numpy as np
+import pytest
+
+import factory
+from factory.errors import InputError
+from factory.lang import read_pag
+from factory.log import Log, LogWriter, read_log
+from factory.monitor.record import recorded_subject
+from factory.monitor.subject import subject_of
+from factory.pipeline import all_templates
+from factory.render import Film, camera_named, panels_named, render_log
+from factory.render.area import PANELS, shared
+from factory.render.camera import Frame, orbit
+from factory.render.camerawork import Moment, Take
+from factory.render.colours import GROUND, operation_colours, robot_colours
+from factory.render.following import Followed
+from factory.render.gantt_panel import GanttPanel
+from factory.render.history import History, Progress, depths, followed
+from factory.render.ink import Ink, fitted, width
+from factory.render.net_panel import NetPanel
+from factory.render.poster import Poster
+from factory.render.replay import moment_of
+from factory.render.rows import NEIGHBOURS, Rows, neighbourhood
+from factory.render.subject import Snapshot
+from factory.render.title import FADES, SHOWN, draw_title, strength
+from factory.simulation import Simulation
+from tests.command_line import PAPER, Terminal, files_in
+from tests.strategies import random_pag_text
+from tests.test_render import needs_gl
+
+EXAMPLES = Path(__file__).parent.parent / "examples"
+SIZE = (560, 360)
+
+
+def laid_out(name: str):
+    return factory.lay_out(factory.compile(factory.load_pag(EXAMPLES / f"{name}.pag")))
+
+
+def kept(layout, path: Path, world: str = "mujoco", units: int = 2, **options) -> Log:
+    """The log of a run."""
+    simulation = Simulation(layout, world, units, **options)
+    with LogWriter(path, simulation) as log:
+        simulation.run([log.observe])
+    return read_log(path)
+
+
+def told(log: Log) -> History:
+    """All that happened in a log."""
+    history = History(recorded_subject(log.header))
+    history.catch_up(list(zip(log.fired_t.tolist(), log.fired.tolist(), strict=True)), np.inf)
+    return history
+
+
+@pytest.fixture(scope="module")
+def paper(tmp_path_factory: pytest.TempPathFactory) -> Log:
+    return kept(laid_out("paper"), tmp_path_factory.mktemp("paper") / "log", units=3)
+
+
+@pytest.fixture(scope="module")
+def balanced(tmp_path_factory: pytest.TempPathFactory) -> Log:
+    return kept(laid_out("balanced"), tmp_path_factory.mktemp("balanced") / "log", "ideal")
+
+
+def net_panel(history: History, size=SIZE) -> NetPanel:
+    return NetPanel(size, 1.0, history, Rows(history))
+
+
+# What is shown is what happened.
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_tokens_are_where_the_log_has_its_marking(seed: int, tmp_path: Path) -> None:
+    pag = read_pag(random_pag_text(9 + seed, seed), all_templates())
+    layout = factory.lay_out(factory.compile(pag))
+    log = kept(layout, tmp_path / "log", "ideal", 1)
+    history = told(log)
+    panel = net_panel(history)
+    gears = history.factory.net.gears
+    for row in range(0, len(log), max(1, len(log) // 40)):
+        time = float(log.time[row])
+        marked = set(log.marking[row].tolist())
+        assert history.marking(time) == marked
+        active = dict(panel._active(time, log.qpos[row]))
+        places = {
+            gear.places[int(panel.target(robot, time, active)) % len(gear.places)]
+            for robot, gear in enumerate(gears)
+            if not history.at(robot, time).operation
+        }
+        assert places | set(active) == marked
+        assert all(0.0 <= done <= 1.0 for done, _ in active.values())
+
+
+def test_a_firing_left_out_would_be_noticed(paper: Log) -> None:
+    history = History(recorded_subject(paper.header))
+    firings = list(zip(paper.fired_t.tolist(), paper.fired.tolist(), strict=True))
+    history.catch_up(firings[:5] + firings[6:], np.inf)
+    shown = [history.marking(t) for t in paper.time[1:].tolist()]
+    assert shown != [frozenset(paper.marking[row].tolist()) for row in range(1, len(paper))]
+
+
+def test_operations_go_on_and_reach_their_end(paper: Log) -> None:
+    history = told(paper)
+    progress = Progress(history.subject)
+    slides = [0, 1, 2, 3, 4, 5]
+    weld = history.factory.by_label["sub2"]
+    spell = next(s for s in history.spells[2] if s.operation and s.step // 2 == 1)
+    rows = [r for r in range(len(paper)) if spell.start < paper.time[r] <= spell.end]
+    done = [
+        progress.of(weld, paper.qpos[row][slides], float(paper.time[row]) - spell.start)
+        for row in rows
+    ]
+    assert done[0] < 0.1 and done[-1] > 0.95
+    assert (np.diff(done) > -1e-3).all()
+    half = done[len(done) // 2]
+    assert 0.3 < half < 0.8
+
+
+def test_every_token_is_drawn_in_its_robots_paint(paper: Log) -> None:
+    history = told(paper)
+    panel, paints = net_panel(history), robot_colours(history.factory)
+    for row in (0, len(paper) // 3, len(paper) // 2, len(paper) - 1):
+        pixels = panel.draw(float(paper.time[row]), paper.qpos[row][:6], 0.0)
+        for shown in panel.rows.shown:
+            x, y = panel._at(shown)
+            assert tuple(pixels[int(y), int(x)]) == pytest.approx(paints[shown.robot], abs=2)
+
+
+def test_tokens_glide_and_never_go_back(paper: Log) -> None:
+    panel = net_panel(told(paper))
+    steps = []
+    for row in range(0, len(paper), 8):
+        before = dict(panel.tokens)
+        panel.draw(float(paper.time[row]), paper.qpos[row][:6], 1 / 30 if before else 0.0)
+        steps += [panel.tokens[r] - at for r, at in before.items()]
+    assert max(steps) < 1.2 and min(steps) > -0.02
+    assert sum(step > 0.5 for step in steps) < 0.1 * len(steps)
+
+
+def test_the_modes_of_the_last_seconds_end_at_the_right(paper: Log) -> None:
+    history = told(paper)
+    panel = GanttPanel(SIZE, 1.0, history, Rows(history))
+    weld = history.factory.by_label["sub2"]
+    colour = operation_colours(history.factory)[weld.index]
+    spell = next(s for s in history.spells[3] if s.operation)
+    now = (spell.start + spell.end) / 2
+    y = int(panel.sheet.height(panel.rows.shown[3])) + 5
+    pixels = panel.draw(now, paper.qpos[0][:6], 0.0)
+    assert tuple(pixels[y, int(panel.right) - 4]) == pytest.approx(colour, abs=2)
+    assert tuple(pixels[y, int(panel.at(spell.start, now)) - 4]) == GROUND
+    later = panel.draw(spell.end + 0.5, paper.qpos[0][:6], 0.0)
+    assert tuple(later[y, int(panel.right) - 4]) == GROUND
+    assert tuple(later[y, int(panel.at(spell.end, spell.end + 0.5)) - 4]) == pytest.approx(
+        colour, abs=2
+    )
+
+
+# Many robots.
+
+
+def test_beyond_twenty_robots_the_neighbourhood_of_the_product_is_shown(balanced: Log) -> None:
+    history = told(balanced)
+    rows = Rows(history)
+    assert rows.reduced
+    for time in np.arange(0.0, balanced.time[-1], 0.5):
+        rows.advance(float(time), 0.0)
+        shown = [row.robot for row in rows.shown]
+        assert rows.focus is not None and shown == sorted(shown) and len(shown) <= NEIGHBOURS
+        assert set(rows.focus.robots) <= set(shown)
+        after = history.factory.parents[rows.focus.index]
+        assert after < 0 or set(history.factory.operations[after].robots) <= set(shown)
+
+
+def test_rows_come_and_go_calmly(balanced: Log) -> None:
+    rows, before = Rows(told(balanced)), {}
+    changes = 0
+    for time in np.arange(0.0, balanced.time[-1], 1 / 30):
+        rows.advance(float(time), 1 / 30)
+        now = {row.robot: row for row in rows.shown}
+        both = [(before[r], now[r]) for r in before.keys() & now.keys()]
+        assert all(abs(a.at - b.at) < 2.0 and abs(a.alpha - b.alpha) < 0.2 for a, b in both)
+        gone = [before[r] for r in before.keys() - now.keys()]
+        assert all(row.alpha < 0.05 for row in gone)
+        changes += len(gone)
+        before = now
+    assert changes
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_a_neighbourhood_is_never_too_large(seed: int) -> None:
+    pag = read_pag(random_pag_text(20 + 9 * seed, seed), all_templates())
+    made = factory.compile(pag)
+    for operation in made.operations:
+        found = neighbourhood(made, operation, 5)
+        assert 0 < len(found) <= max(5, len(operation.robots)) and found == sorted(set(found))
+        assert set(operation.robots[:5]) <= set(found)
+    depth = depths(made)
+    assert followed(made, {}) in made.leaves and depth[made.dropoff.index] == 0
+    assert followed(made, {made.dropoff.start: 1}) == made.dropoff
+
+
+# Which product cameras follow.
+
+
+def test_the_product_followed_is_the_same_when_parts_become_one_body(tmp_path: Path) -> None:
+    layout = laid_out("paper")
+    found = []
+    for fuse in (False, True):
+        simulation = Simulation(layout, "mujoco", 2, fuse=fuse)
+        followed = Followed(simulation.world.m, subject_of_(simulation))
+        track: list[np.ndarray] = []
+
+        def look(world, supervisor, followed=followed, track=track) -> None:
+            seen = followed.furthest(world.d, Snapshot.of(world.m, world.d))
+            track.append(np.full(3, np.nan) if seen is None else followed.origin(world.d, seen[0]))
+
+        simulation.run([look])
+        found.append((np.array(track), simulation, followed))
+    (apart, one, first), (fused, other, second) = found
+    assert other.world.inspection.figures().fused and not one.world.inspection.figures().fused
+    assert np.allclose(first.box, second.box, atol=1e-3)
+    ticks = min(len(apart), len(fused))
+    near = np.linalg.norm(apart[:ticks] - fused[:ticks], axis=1) < 0.01
+    assert near.mean() > 0.97
+
+
+def subject_of_(simulation: Simulation):
+    return subject_of(
+        simulation.layout,
+        simulation.settings,
+        start=simulation.start,
+        bodies=simulation.model.carried,
+    )
+
+
+@pytest.mark.parametrize("fuse", [False, True])
+def test_a_part_is_followed_from_its_feeder_to_the_dropoff(fuse: bool) -> None:
+    simulation = Simulation(laid_out("paper"), "mujoco", 2, fuse=fuse)
+    followed = Followed(simulation.world.m, subject_of_(simulation), "part1")
+    ranks, labels = [], []
+
+    def look(world, supervisor) -> None:
+        seen = followed.furthest(world.d, Snapshot.of(world.m, world.d))
+        if seen is not None:
+            ranks.append(seen[1])
+            labels.append(followed.labels[seen[0]])
+
+    simulation.run([look])
+    back = [k for k in range(1, len(ranks)) if ranks[k] < ranks[k - 1]]
+    assert len(back) == 1 and ranks[back[0] - 1] == 3.0  # r1 carries three: it drops off
+    assert set(labels) == ({"part1", "sub1", "sub3"} if fuse else {"part1"})
+    assert ranks[0] == 0.0
+
+
+# Cameras, areas, words.
+
+
+def test_orbit_has_everything_in_the_frame_all_the_way_round() -> None:
+    points = np.random.default_rng(3).uniform((-3, -1, 0), (3, 1, 0.4), (60, 3))
+    frame = Frame(16 / 9, below=0.08)
+    look = orbit(points, frame)
+    distances, edges = [], []
+    for time in range(0, 46, 5):
+        view = look(float(time))
+        right, up, ahead = view.axes @ (points - view.position).T
+        assert (ahead > 0).all()
+        x, y = right / ahead / view.tall, up / ahead / view.tall
+        edges.append(min(16 / 9 - np.abs(x).max(), 1 - y.max(), y.min() + 1))
+        distances.append(view.distance)
+    assert min(edges) > 0 and np.ptp(distances) < 1e-9
+
+
+def test_cameras_may_follow_a_part() -> None:
+    assert camera_named("part:lid", ["lid", "box"]) == "part:lid"
+    assert camera_named("part:anything") == "part:anything"
+    with pytest.raises(InputError, match=r"there is no part 'lod'\n.*did you mean 'lid'"):
+        camera_named("part:lod", ["lid", "box"])
+    with pytest.raises(InputError, match="did you mean 'orbit'"):
+        camera_named("orbt")
+
+
+def test_panels_are_named_or_refused() -> None:
+    assert panels_named("gantt, net") == PANELS and panels_named(None) == ()
+    with pytest.raises(InputError, match=r"there is no panel 'gant'\n.*did you mean 'gantt'"):
+        panels_named("net,gant")
+
+
+@pytest.mark.parametrize("size", [(1280, 720), (720, 1280), (640, 640), (1920, 1080)])
+@pytest.mark.parametrize("panels", [("net",), ("gantt",), PANELS])
+def test_areas_cover_the_picture_once(size, panels) -> None:
+    scene, areas = shared(size, panels)
+    covered = np.zeros((size[1], size[0]), int)
+    for area in (scene, *areas.values()):
+        covered[area.top : area.top + area.height, area.left : area.left + area.width] += 1
+    assert (covered == 1).all() and list(areas) == list(panels)
+    assert 0.4 < scene.width * scene.height / (size[0] * size[1]) < 0.7
+
+
+def test_pictures_too_small_for_panels_are_refused() -> None:
+    with pytest.raises(InputError, match="320x180 has no room for net and gantt"):
+        shared((320, 180), PANELS)
+    assert shared((320, 180), ())[1] == {}
+
+
+def test_a_title_fades_and_then_leaves_the_picture_alone() -> None:
+    assert strength(0.0) == strength(SHOWN) == 1.0 and strength(SHOWN + FADES) == 0.0
+    blank = np.full((360, 640, 3), 100, np.uint8)
+    shown, over = blank.copy(), blank.copy()
+    draw_title(shown, "A very long title " * 9, "3 parts", 0.0)
+    draw_title(over, "A title", "3 parts", SHOWN + FADES)
+    changed = (shown != blank).any(axis=-1)
+    assert (over == blank).all() and 0.02 < changed.mean() < 0.4
+    assert not changed[:, -20:].any() and not changed[180:].any()
+
+
+def test_words_are_cut_to_fit() -> None:
+    assert fitted("gearbox", 12, 1000) == "gearbox"
+    assert fitted("gearbox/12", 12, 0.7 * width("gearbox/12", 12)).endswith("…/12")
+    assert fitted("gearbox", 12, 5) == ""
+    assert all(width(fitted("subassembly", 12, room), 12) <= room for room in range(0, 90, 7))
+
+
+def test_ink_is_where_it_is_put_to_a_fraction_of_a_pixel() -> None:
+    for radius in (0.0, 2.0):
+        pixels = np.zeros((40, 40, 3), np.uint8)
+        Ink(pixels).box(10.25, 10, 20.75, 20, (200, 200, 200), radius=radius)
+        rows = pixels[15, :, 0].astype(int)
+        assert rows[11:20].tolist() == [200] * 9 and rows[9] == rows[21] == 0
+        assert abs(rows[10] - 150) <= 2 and abs(rows[20] - 150) <= 2
+    Ink(pixels).disc(-50, 300, 5, (1, 1, 1))
+    Ink(pixels).words(-3, 39, "over the edge", 12, (255, 255, 255))
+
+
+# Posters.
+
+
+def test_the_poster_is_when_the_product_has_become_whole_and_most_is_there(paper: Log) -> None:
+    subject = recorded_subject(paper.header)
+    history = History(subject)
+    from factory.render.replay import _model
+
+    take = Take(_model(paper), "paper", 3, SIZE, "overview", True, subject)
+    poster = Poster(take, history, Path("poster.png"))
+    firings = list(zip(paper.fired_t.tolist(), paper.fired.tolist(), strict=True))
+    for row in range(len(paper)):
+        history.catch_up(firings, float(paper.time[row]))
+        poster.see(moment_of(paper, row))
+    root = subject.factory.by_label["sub3"]
+    ends = [t for t, event in firings if event == root.end]
+    assert isinstance(poster.moment, Moment)
+    assert min(abs(poster.moment.time - t) for t in ends) < 0.02 and len(ends) == 3
+    assert poster.moment.time > ends[0] + 0.1  # by then more has come in
+
+
+# Films.
+
+
+@needs_gl
+def test_a_film_with_everything(tmp_path: Path) -> None:
+    simulation, size = Simulation(laid_out("paper"), "mujoco", 1), (560, 490)
+    log, film = tmp_path / "run.log", tmp_path / "run.mp4"
+    with (
+        LogWriter(log, simulation) as writer,
+        Film(
+            simulation, film, size, 2, "part:part2", True, PANELS, "Title", tmp_path / "p.png"
+        ) as filming,
+    ):
+        run = simulation.run([writer.observe, filming.observe])
+    frames = iio.imread(film, plugin="pyav").astype(int)
+    assert frames.shape == (int(run.sim_time_s * 2 + 1e-6) + 1, 490, 560, 3)
+    assert iio.imread(tmp_path / "p.png").shape == (490, 560, 3)
+    again = tmp_path / "again.mp4"
+    render_log(read_log(log), again, size, 2, "part:part2", panels=PANELS, title="Title")
+    assert np.abs(frames - iio.imread(again, plugin="pyav")).max() <= 2
+    panels = shared(size, PANELS)[1]
+    for area in panels.values():
+        part = frames[:, area.top : area.top + area.height, area.left : area.left + area.width]
+        assert (np.abs(np.diff(part, axis=0)).max(axis=(1, 2, 3)) > 30).mean() > 0.7
+
+
+# The command line.
+
+
+@needs_gl
+@pytest.mark.parametrize(
+    ("words", "found", "hint"),
+    [
+        (["--with", "net,gant"], "there is no panel 'gant'", "did you mean 'gantt'?"),
+        (["--with", "net,gantt", "--size", "320x240"], "320x240 has no room", "take 1280x720"),
+        (["--camera", "part:part9"], "there is no part 'part9'", "did you mean 'part"),
+        (["--poster", "{out}/p.jpg"], "'p.jpg' has '.jpg'", "valid endings: .png"),
+        (["--poster", "{out}/f.mp4"], "", ""),
+    ],
+    ids=lambda words: " ".join(words) if isinstance(words, list) else "",
+)
+def test_what_cannot_be_shown_is_refused_and_nothing_written(
+    run: Terminal, out: Path, words: list[str], found: str, hint: str
+) -> None:
+    given = [word.format(out=out) for word in words]
+    log = ["--log", out / "run.log"]
+    done = run("run", PAPER, "--video", out / "f.mp4", *log, *given, "--json")
+    assert done.status == 2
+    error = done.json["errors"][0]
+    assert found in error["message"] and hint in error["hint"]
+    assert files_in(out) == {}
+
+
+@needs_gl
+def test_a_poster_is_of_a_film(run: Terminal, out: Path) -> None:
+    for words in (["run", PAPER], ["render", PAPER, "-o", out / "still.png"]):
+        done = run(*words, "--poster", out / "p.png", "--json")
+        assert (done.status, done.codes) == (2, ["Usage"])
+    assert files_in(out) == {}
+
+
+@needs_gl
+def test_a_still_with_panels_on_the_command_line(run: Terminal, out: Path) -> None:
+    picture = out / "still.png"
+    words = ["--with", "net,gantt", "--size", "560x480", "--title", "A title", "--at", "0.5"]
+    assert run("render", PAPER, "-o", picture, *words, "--json").status == 0
+    assert iio.imread(picture).shape == (480, 560, 3) and list(files_in(out)) == ["still.png"]
