@@ -149,6 +149,7 @@ def test_what_is_shipped() -> None:
         "inspect",
         "mate",
         "press",
+        "relay",
         "weld",
     ]
     assert TEMPLATES["dropoff"].result == "nopart"
