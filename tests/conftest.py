@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import signal
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 
@@ -17,6 +18,9 @@ ROOT = TESTS.parent
 
 collect_ignore_glob = ["bench/rivals/*", "oracles/*"]
 """Scripts for environments of their own."""
+
+if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:  # as in what a shell starts with `&`
+    signal.signal(signal.SIGINT, signal.default_int_handler)
 
 settings.register_profile(
     "factory", deadline=None, suppress_health_check=[HealthCheck.too_slow], derandomize=True

@@ -13,6 +13,7 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from dataclasses import replace
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
@@ -156,7 +157,7 @@ def test_a_log_is_no_pag(run: Terminal, log: Path) -> None:
 
 
 def test_the_ideal_world_has_no_bodies(run: Terminal, log: Path, out: Path) -> None:
-    for form in ("mcap", "usd"):
+    for form in ("mcap", "usd") if find_spec("pxr") else ("mcap",):
         done = run("export", log, "--format", form, "-o", out / "x")
         assert done.status == 2
         assert "BadLog" in done.err

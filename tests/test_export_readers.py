@@ -440,6 +440,8 @@ def usd_by_usd_core(log: Path) -> None:
     """metres, z upwards, the log's pace; robots' carriages where the engine has them, in the first
     frame and the last (the library that writes it)"""
     import mujoco
+
+    pytest.importorskip("pxr", reason="the extra `usd` is not installed")
     from pxr import Usd, UsdGeom
 
     stage = Usd.Stage.Open(str(written(made("usd", log, "", "x.usd"), log.with_name("x.usd"))))
