@@ -9,6 +9,7 @@ from collections import deque
 from collections.abc import Callable
 from dataclasses import replace
 from fractions import Fraction
+from functools import cache
 from pathlib import Path
 
 import networkx as nx
@@ -22,6 +23,7 @@ from scipy.sparse import coo_array
 from factory.analysis import Change, Timing, analyse
 from factory.analysis.bounds import wip_curve
 from factory.analysis.flow import flow
+from factory.analysis.steady import reached
 from factory.analysis.timed import timed_net
 from factory.analysis.what_if import scenarios
 from factory.control.mode import Limits
@@ -35,6 +37,7 @@ from factory.nets.slack import circuits, slacks
 from factory.prediction import operation_delays, predict
 from factory.settings import Settings
 from factory.simulation import Simulation
+from factory.trace import Run
 from tests.command_line import PAPER, ROOT, Terminal
 from tests.layout_values import paper_layout, random_layout
 from tests.net_values import net_from
@@ -239,6 +242,23 @@ def test_the_run_that_is_predicted_is_the_ideal_one(jitter: float) -> None:
         ticks = timing.settings.tick * 3 * len(layout.factory.operations)
         assert found.first == pytest.approx(run.dropoffs[0], abs=ticks, rel=0.02)
         assert found.last == pytest.approx(run.dropoffs[-1], abs=ticks, rel=0.02)
+
+
+@given(st.integers(0, 30), st.floats(0.3, 0.99), st.floats(0.1, 10.0))
+def test_units_are_as_many_as_it_takes(early: int, share: float, pace: float) -> None:
+    """The first products come too fast, by `share` of the pace."""
+    dates = np.cumsum(pace * np.where(np.arange(100) <= early, share, 1.0))
+    units = reached(dates, pace)
+    run = made()
+    cycles = {n: replace(run, dropoffs=tuple(dates[:n])).cycle_time_s for n in range(4, 101)}
+    assert all(abs(cycles[n] / pace - 1) <= 1e-3 for n in range(units, 101))
+    assert units == 4 or abs(cycles[units - 1] / pace - 1) > 1e-3
+    assert units <= max(4, 2 * (early + 1))
+
+
+@cache
+def made() -> Run:
+    return Simulation(paper_layout(), "ideal", 1).run()
 
 
 @pytest.mark.parametrize("kind", ["speed", "acceleration", "way"])

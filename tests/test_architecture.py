@@ -43,6 +43,7 @@ ROOMS = [
         "log",
         "render",
         "progress",
+        "plotting",
         "interruption",
         "monitor",
         "disturbance",

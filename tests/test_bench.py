@@ -3,29 +3,28 @@
 from __future__ import annotations
 
 import json
-from importlib import import_module
 from pathlib import Path
 
 import pytest
 
-from tests.bench.__main__ import FOLDER, REPORT, SECTIONS, report
+from tests.bench.__main__ import REPORT
 from tests.bench.factories import laid_out, robots_at_least
 
-KEPT = sorted(FOLDER.glob("*.json"))
+KEPT = sorted(REPORT.folder.glob("*.json"))
 
 
 @pytest.mark.parametrize("file", KEPT, ids=lambda file: file.stem)
 def test_a_section_is_rendered_from_what_was_kept(file: Path) -> None:
-    assert file.stem in SECTIONS
+    assert file.stem in REPORT.sections
     kept = json.loads(file.read_text())
-    text = import_module(f"tests.bench.{file.stem}").section(kept["results"])
+    text = REPORT.module(file.stem).section(kept["results"])
     assert text.startswith("## ")
-    assert text in REPORT.read_text()
+    assert text in REPORT.path.read_text()
 
 
 @pytest.mark.skipif(not KEPT, reason="nothing was measured")
 def test_the_report_is_that_of_all_that_was_kept() -> None:
-    assert report() == REPORT.read_text()
+    assert REPORT.text() == REPORT.path.read_text()
 
 
 @pytest.mark.parametrize(("asked", "robots"), [(1, 1), (10, 11), (41, 41), (100, 101)])

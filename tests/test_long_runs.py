@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from factory.simulation import Simulation
-from tests.fidelity import __main__ as campaigns
 from tests.fidelity import long_runs
+from tests.fidelity.__main__ import REPORT
 from tests.fidelity.products import PAPER, layout
 
 
@@ -97,8 +99,10 @@ def test_memory_that_grows_is_noticed() -> None:
 
 
 def test_a_report_is_written_from_what_is_kept(tmp_path) -> None:
-    campaigns.measured("long_runs", True, tmp_path)
-    text = campaigns.report(tmp_path)
+    report = replace(REPORT, path=tmp_path / "fidelity.md")
+    report.measure("long_runs", True)
+    report.write()
+    text = report.path.read_text("utf-8")
     assert text.startswith("# Fidelity") and "## Long runs" in text and "mujoco" in text
     assert "## Disturbances" not in text
 

@@ -18,7 +18,7 @@ from factory.errors import InputError
 from factory.lang import read_pag
 from factory.layout.plan import Layout
 from factory.log import Log, LogWriter, read_log
-from factory.monitor import Anatomy, Monitor, Report, Subject, subject_of
+from factory.monitor import Anatomy, Monitor, Report, Subject, subject_of, subject_of_run
 from factory.monitor.explanation import Explanation
 from factory.monitor.record import watch_log
 from factory.nets.history import legal_marking
@@ -30,13 +30,7 @@ from tests.test_simulation import PRODUCTS, UNARY, laid_out, random_marking
 
 
 def monitor_of(simulation: Simulation) -> Monitor:
-    subject = subject_of(
-        simulation.layout,
-        simulation.settings,
-        simulation.jitter,
-        simulation.start,
-        simulation.wip,
-    )
+    subject = subject_of_run(simulation)
     world = simulation.world
     monitor = Monitor(subject, Anatomy.of(world.m, simulation.layout.factory))
     monitor.watch(world.m, world.d)

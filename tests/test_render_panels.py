@@ -14,7 +14,7 @@ from factory.errors import InputError
 from factory.lang import read_pag
 from factory.log import Log, LogWriter, read_log
 from factory.monitor.record import recorded_subject
-from factory.monitor.subject import subject_of
+from factory.monitor.subject import subject_of_run
 from factory.pipeline import all_templates
 from factory.render import Film, camera_named, panels_named, render_log
 from factory.render.area import PANELS, shared
@@ -214,7 +214,7 @@ def test_the_product_followed_is_the_same_when_parts_become_one_body(tmp_path: P
     found = []
     for fuse in (False, True):
         simulation = Simulation(layout, "mujoco", 2, fuse=fuse)
-        followed = Followed(simulation.world.m, subject_of_(simulation))
+        followed = Followed(simulation.world.m, subject_of_run(simulation))
         track: list[np.ndarray] = []
 
         def look(world, supervisor, followed=followed, track=track) -> None:
@@ -231,19 +231,10 @@ def test_the_product_followed_is_the_same_when_parts_become_one_body(tmp_path: P
     assert near.mean() > 0.97
 
 
-def subject_of_(simulation: Simulation):
-    return subject_of(
-        simulation.layout,
-        simulation.settings,
-        start=simulation.start,
-        bodies=simulation.model.carried,
-    )
-
-
 @pytest.mark.parametrize("fuse", [False, True])
 def test_a_part_is_followed_from_its_feeder_to_the_dropoff(fuse: bool) -> None:
     simulation = Simulation(laid_out("paper"), "mujoco", 2, fuse=fuse)
-    followed = Followed(simulation.world.m, subject_of_(simulation), "part1")
+    followed = Followed(simulation.world.m, subject_of_run(simulation), "part1")
     ranks, labels = [], []
 
     def look(world, supervisor) -> None:

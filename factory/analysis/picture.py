@@ -12,11 +12,12 @@ from typing import Any
 
 import numpy as np
 
+from factory import plotting
 from factory.analysis.analysing import Analysis
 from factory.analysis.what_if import listed
-from factory.errors import Diagnostic, InputError, MissingError
+from factory.errors import Diagnostic, InputError
+from factory.plotting import BLUE, GREY, ORANGE, PALE, RED
 
-BLUE, ORANGE, RED, GREY, PALE = "#2f5d9b", "#e08a1e", "#c0392b", "#8a9099", "#e3e6ea"
 LIGHT = "#9db8db"
 FORMATS = (".svg", ".png")
 
@@ -29,19 +30,7 @@ BARS = 8
 CYCLES = 2.2
 """So many cycles of the schedule are drawn."""
 
-STYLE: dict[Any, Any] = {
-    "font.size": 9,
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "axes.titlesize": 10,
-    "axes.titlelocation": "left",
-    "axes.grid": True,
-    "grid.color": PALE,
-    "axes.axisbelow": True,
-    "legend.frameon": False,
-    "svg.hashsalt": "factory",
-    "svg.fonttype": "none",
-}
+STYLE = {**plotting.STYLE, "svg.hashsalt": "factory", "svg.fonttype": "none"}
 
 
 def check_picture(path: Path | None) -> None:
@@ -52,12 +41,7 @@ def check_picture(path: Path | None) -> None:
     if path.suffix.lower() not in FORMATS:
         message = f"'{path}' is no name for a picture"
         raise InputError(Diagnostic("BadFile", message, None, "let it end in .svg or .png"))
-    try:
-        import matplotlib.figure  # noqa: F401
-    except ImportError as error:
-        message = f"a picture needs matplotlib: {error}"
-        hint = "pip install 'klavins-factory[plots]', or leave out -o"
-        raise MissingError(Diagnostic("Missing", message, None, hint)) from error
+    plotting.require_matplotlib("a picture needs", "leave out -o")
 
 
 def picture(found: Analysis, suffix: str) -> bytes:

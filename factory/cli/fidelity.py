@@ -28,7 +28,12 @@ from factory.console import emit, say, table, warn
 @click.command()
 @SOURCE
 @click.option("--seeds", type=click.IntRange(1, 10_000), default=5, help="Runs, seeds 0 to K - 1.")
-@click.option("--units", type=click.IntRange(1, 10**6), default=4, help="Products of each run.")
+@click.option(
+    "--units",
+    type=click.IntRange(1, 10**6),
+    help="Products of each run; default: as many, 4 to 100, as it takes until they come at the pace"
+    " of the net.",
+)
 @click.option(
     "--jitter",
     type=Number(0, 0.9),
@@ -51,7 +56,7 @@ def fidelity(
     file: Path,
     folders: tuple[Path, ...],
     seeds: int,
-    units: int,
+    units: int | None,
     jitter: float,
     jobs: int | None,
     convergence: bool,
@@ -114,9 +119,7 @@ def _tell(found: Any, studied: Any, verbose: bool) -> None:
         for key, q in QUANTITIES.items()
         if worst[key] is not None
     ]
-    title = (
-        f"{found.product}: {len(found.seeds)} seeds, {found.units} units, jitter {found.jitter:g}"
-    )
+    title = f"{found.product}: {found.runs}, jitter {found.jitter:g}"
     table(title, ("figure", "worst", "mean", "unit", "limit", ""), rows)
     if verbose:
         for q in QUANTITIES.values():

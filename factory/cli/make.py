@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 from time import perf_counter
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -23,6 +23,12 @@ from factory.cli.options import (
 )
 from factory.collector import collector_paused
 from factory.console import emit, say, warning
+
+if TYPE_CHECKING:
+    from factory.building import Built
+    from factory.layout.plan import Layout
+    from factory.pipeline import Source
+    from factory.settings import Settings
 
 
 @click.command()
@@ -53,6 +59,7 @@ def build(
 ) -> int:
     """Compile, verify and lay out FILE.pag; write the MJCF model, the floor plan, the net."""
     from factory import receipt
+    from factory.building import build_all, refuse_unproved
 
     begin = perf_counter()
     writable(file, mjcf)
@@ -62,9 +69,12 @@ def build(
     name = receipt.request(file, {**options, **wanted, "floor": floor, "settings": settings})
     told = receipt.find(name)
     if told is None:
-        told = _built(
-            file, folders, mjcf, output, units, wip, floor, settings, options, begin, name
-        )
+        source, factory, layout = plan(file, folders, settings, floor, options)
+        verdict = refuse_unproved(factory)
+        spent = perf_counter() - begin
+        built = build_all(source, layout, settings, mjcf, output, units, wip, verdict)
+        told = _told(layout, built, settings, spent)
+        receipt.keep(name, _inputs(source, file, folders), built.files, told)
     else:
         told["document"]["compile_s"] = perf_counter() - begin
         told["lines"].append("nothing has changed since: these files are up to date")
@@ -78,38 +88,20 @@ def build(
     return 0
 
 
-def _built(
-    file: Path,
-    folders: tuple[Path, ...],
-    mjcf: Path | None,
-    output: Path | None,
-    units: int | None,
-    wip: int | None,
-    floor: str | None,
-    settings: Any,
-    options: dict[str, Any],
-    begin: float,
-    name: str,
-) -> dict[str, Any]:
-    """Build, keep the receipt under that name, and give what there is to tell."""
-    from factory import receipt
-    from factory.assets import mjcf_folder, templates_folder
-    from factory.building import build_all, refuse_unproved
+def _told(layout: Layout, built: Built, settings: Settings, spent: float) -> dict[str, Any]:
+    """What there is to tell: the document of `--json`, the lines for people, the warnings."""
     from factory.layout.durations import Pace
     from factory.layout.gain import gain
 
-    source, factory, layout = plan(file, folders, settings, floor, options)
-    verdict = refuse_unproved(factory)
-    spent = perf_counter() - begin
-    built = build_all(source, layout, settings, mjcf, output, units, wip, verdict)
-    gained = gain(layout, Pace.of(settings))
+    root, robots = layout.factory.pag.root, len(layout.factory.robots)
+    model, gained = built.model, gain(layout, Pace.of(settings))
     document = {
-        "product": source.pag.root,
+        "product": root,
         "mjcf": str(built.mjcf) if built.mjcf else None,
-        "robots": len(factory.robots),
-        "parts": built.model.bodies,
-        "joints": built.model.joints,
-        "welds": built.model.welds,
+        "robots": robots,
+        "parts": model.bodies,
+        "joints": model.joints,
+        "welds": model.welds,
         "guidepath_length_m": round(layout.guidepath_length, 6),
         "area_m2": round(layout.area, 6),
         "compile_s": spent,
@@ -119,18 +111,23 @@ def _built(
         "warnings": [d.as_json() for d in layout.product.warnings],
     }
     lines = [
-        f"{source.pag.root}: {document['robots']} robots, {document['parts']} bodies of parts, "
-        f"{document['joints']} joints, {document['welds']} welds",
+        f"{root}: {robots} robots, {model.bodies} bodies of parts, {model.joints} joints, "
+        f"{model.welds} welds",
         f"floor {layout.area:.2f} m², guidepaths {layout.guidepath_length:.2f} m, "
         f"clearance {settings.clearance * 1000:g} mm proved",
         str(gained),
         *(f"  {path}" for path in built.files[:20]),
     ]
     warnings = [warning(diagnostic) for diagnostic in layout.product.warnings]
-    told = {"document": document, "lines": lines, "warnings": warnings}
+    return {"document": document, "lines": lines, "warnings": warnings}
+
+
+def _inputs(source: Source, file: Path, folders: tuple[Path, ...]) -> tuple[Path, ...]:
+    """Every file and folder a build reads: if one changes, the receipt no longer holds."""
+    from factory.assets import mjcf_folder, templates_folder
+
     given = (*folders, templates_folder(), mjcf_folder())
     inside = (path for folder in given for path in folder.iterdir() if path.is_file())
     named = (node.parameter("mesh") for node in source.pag.parts())
     meshes = (Path(source.pag.folder) / str(mesh) for mesh in named if mesh)
-    receipt.keep(name, (file, *given, *inside, *meshes), built.files, told)
-    return told
+    return (file, *given, *inside, *meshes)

@@ -62,6 +62,7 @@ class Motion:
 def motion_of(subject: Subject) -> Motion:
     """The motion of a log. Raises InputError for a log of the ideal world or one without a tick."""
     from factory.engine import mujoco
+    from factory.log.model import model_of
 
     log = subject.log
     if not log.xml:
@@ -70,7 +71,7 @@ def motion_of(subject: Subject) -> Motion:
         raise InputError(Diagnostic("BadLog", message, None, hint))
     if not len(log):
         raise InputError(Diagnostic("BadLog", "the log has no tick", None, "run for longer"))
-    m = _model(log)
+    m = model_of(log)
     d, rows = mujoco.MjData(m), _frames(log)
     position = np.empty((len(rows), m.nbody, 3))
     quaternion = np.empty((len(rows), m.nbody, 4))
@@ -102,16 +103,3 @@ def _frames(log: Log) -> Indices:
             kept.append(row)
             next_time = time + 1 / RATE
     return np.array(kept, np.int64)
-
-
-def _model(log: Log) -> mujoco.MjModel:
-    from factory.engine import mujoco
-
-    files = {f"meshes/{name}": content for name, content in log.files.items()}
-    try:
-        m = mujoco.MjModel.from_xml_string(log.xml, files)
-    except ValueError as error:
-        raise InputError(Diagnostic("BadLog", f"the log's model is broken: {error}")) from error
-    if m.nq != log.qpos.shape[1]:
-        raise InputError(Diagnostic("BadLog", "the log's states are not those of its model"))
-    return m

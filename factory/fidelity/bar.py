@@ -3,37 +3,28 @@
 from __future__ import annotations
 
 import sys
-from typing import TYPE_CHECKING, Self
+from typing import TYPE_CHECKING
 
-from factory.closing import Closing
+from factory.progress import Shown
 
 if TYPE_CHECKING:
-    from rich.progress import Progress
+    from rich.progress import Progress, TaskID
 
 
-class Bar(Closing):
-    """Counts runs that are done; silent where `quiet`, or where stderr is no terminal."""
+class Bar(Shown):
+    """Counts runs that are done."""
 
     def __init__(self, runs: int, quiet: bool = False) -> None:
+        super().__init__(quiet)
         self.runs, self.done = runs, 0
-        self.shown = not quiet and sys.stderr.isatty()
-        self.bar: Progress | None = None
 
-    def __enter__(self) -> Self:
-        if self.shown:
-            from rich.console import Console
-            from rich.progress import Progress
+    def drawn(self) -> tuple[Progress, TaskID]:
+        """The share of the runs that are done."""
+        from rich.console import Console
+        from rich.progress import Progress
 
-            self.bar = Progress(console=Console(file=sys.stderr), transient=True)
-            self.task = self.bar.add_task("runs", total=self.runs)
-            self.bar.start()
-        return self
-
-    def close(self) -> None:
-        """Take the bar away."""
-        if self.bar is not None:
-            self.bar.stop()
-            self.bar = None
+        bar = Progress(console=Console(file=sys.stderr), transient=True)
+        return bar, bar.add_task("runs", total=self.runs)
 
     def advance(self, finished: int) -> None:
         """One more run is done."""

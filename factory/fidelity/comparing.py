@@ -11,6 +11,8 @@ from time import perf_counter
 
 import numpy as np
 
+from factory.analysis.steady import steady_units
+from factory.analysis.timing import Timing
 from factory.control.mode import Array
 from factory.engine import mujoco
 from factory.fidelity.causality import compare, differences, duration_differences, process
@@ -34,10 +36,11 @@ pickle_locked_mappings()  # of which layouts are full
 @dataclass(frozen=True)
 class Case:
     """What is run: a layout, how many units, and the draws; `alter` must be a plain function of a
-    module where processes share the work."""
+    module where processes share the work. Without `units` each seed makes as many as it takes to
+    show its cycle time, by its net."""
 
     layout: Layout
-    units: int = 4
+    units: int | None = None
     jitter: float = 0.3
     settings: Settings = field(default_factory=Settings)
     max_time: float | None = None
@@ -47,7 +50,7 @@ class Case:
 def measure(
     layout: Layout,
     seeds: Sequence[int] = range(5),
-    units: int = 4,
+    units: int | None = None,
     jitter: float = 0.3,
     settings: Settings | None = None,
     jobs: int = 1,
@@ -60,7 +63,7 @@ def measure(
     case = Case(layout, units, jitter, settings or Settings(), max_time)
     records = over_cases([(case, seed) for seed in seeds], jobs, done)
     factory = layout.factory
-    return Fidelity(product_name(factory), len(factory.robots), units, jitter, tuple(records))
+    return Fidelity(product_name(factory), len(factory.robots), jitter, tuple(records))
 
 
 def over_cases(
@@ -103,7 +106,8 @@ def _end_quietly() -> None:
 
 def measure_seed(case: Case, seed: int) -> SeedRecord:
     """One seed in both worlds."""
-    layout, units = case.layout, case.units
+    layout = case.layout
+    units = case.units or steady_units(Timing(layout, case.settings, "mujoco", seed, case.jitter))
     ideal = Simulation(layout, "ideal", units, seed, case.jitter, case.settings)
     physical = Simulation(layout, "mujoco", units, seed, case.jitter, case.settings)
     if case.alter is not None:
@@ -152,6 +156,7 @@ def _compared(layout: Layout, ideal: Run, run: Run) -> SeedRecord:
         }
     return SeedRecord(
         run.seed,
+        run.units,
         figures,
         differences=tuple(np.round(apart, 9).tolist()),
         durations=tuple(np.round(spent, 9).tolist()),

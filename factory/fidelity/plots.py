@@ -2,44 +2,34 @@
 
 from __future__ import annotations
 
-from io import BytesIO
 from typing import Any
 
 import numpy as np
 
-from factory.errors import Diagnostic, MissingError
 from factory.fidelity.convergence import Series, Study
 from factory.fidelity.quantities import QUANTITIES
 from factory.fidelity.record import Approach, Fidelity
+from factory.plotting import (
+    BLUE,
+    GREY,
+    ORANGE,
+    RED,
+    STYLE,
+    figure_and_axes,
+    png,
+    require_matplotlib,
+)
 
-BLUE, ORANGE, RED, GREY = "#2f5d9b", "#e08a1e", "#c0392b", "#8a9099"
 MOST = 40
 """So many parts have a bar each; of more, the worst."""
 
 LEAST = 1e-5
 """Smaller energies are drawn as this [mJ/kg]."""
 
-STYLE: dict[Any, Any] = {
-    "font.size": 9,
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "axes.titlesize": 10,
-    "axes.titlelocation": "left",
-    "axes.grid": True,
-    "grid.color": "#e3e6ea",
-    "axes.axisbelow": True,
-    "legend.frameon": False,
-}
-
 
 def check_plots() -> None:
     """Raises MissingError where there is no matplotlib."""
-    try:
-        import matplotlib.figure  # noqa: F401
-    except ImportError as error:
-        message = f"plots need matplotlib: {error}"
-        hint = "pip install 'klavins-factory[plots]', or -o REPORT.json for figures alone"
-        raise MissingError(Diagnostic("Missing", message, None, hint)) from error
+    require_matplotlib("plots need", "-o REPORT.json for figures alone")
 
 
 def plots(found: Fidelity, study: Study | None = None) -> dict[str, bytes]:
@@ -58,19 +48,6 @@ def plots(found: Fidelity, study: Study | None = None) -> dict[str, bytes]:
         if study is not None:
             made["convergence.png"] = _convergence(study)
         return {name: png(figure) for name, figure in made.items() if figure is not None}
-
-
-def figure_and_axes(columns: int = 1, height: float = 3.4, rows: int = 1) -> tuple[Any, Any]:
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(8.4, height), layout="constrained")
-    return figure, figure.subplots(rows, columns, squeeze=False)
-
-
-def png(figure: Any) -> bytes:
-    stream = BytesIO()
-    figure.savefig(stream, format="png", dpi=130, metadata={"Software": None})
-    return stream.getvalue()
 
 
 def _words(key: str) -> str:

@@ -63,6 +63,7 @@ class SeedRecord:
     """
 
     seed: int
+    units: int
     figures: Figures
     handoffs: tuple[HandOff, ...] = ()
     misplaced: tuple[Misplaced, ...] = ()
@@ -84,6 +85,7 @@ class SeedRecord:
         """The record as the report lists it."""
         return {
             "seed": self.seed,
+            "units": self.units,
             "passed": self.passed,
             "figures": dict(self.figures),
             "handoffs": [asdict(h) for h in self.handoffs],
@@ -102,7 +104,6 @@ class Fidelity:
 
     product: str
     robots: int
-    units: int
     jitter: float
     seeds: tuple[SeedRecord, ...]
 
@@ -110,6 +111,17 @@ class Fidelity:
     def passed(self) -> bool:
         """Whether every seed passed."""
         return all(record.passed for record in self.seeds)
+
+    @property
+    def units(self) -> int:
+        """How many products the longest run was asked for."""
+        return max(record.units for record in self.seeds)
+
+    @property
+    def runs(self) -> str:
+        """Seeds and products in words: `50 seeds, 4 units` or `4 to 61 units`."""
+        least, most = min(record.units for record in self.seeds), self.units
+        return f"{len(self.seeds)} seeds, {least if least == most else f'{least} to {most}'} units"
 
     def values(self, key: str) -> list[float]:
         """A figure over the seeds that have it."""

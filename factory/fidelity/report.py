@@ -68,8 +68,7 @@ def markdown(found: Fidelity, study: Study | None, pictures: list[str]) -> str:
     lines = [
         f"# Fidelity of {found.product}",
         "",
-        f"{found.robots} robots, {found.units} units, {len(found.seeds)} seeds, jitter "
-        f"{found.jitter:g}. {verdict}",
+        f"{found.robots} robots, {found.runs}, jitter {found.jitter:g}. {verdict}",
         "",
         "| figure | worst | mean | unit | limit | |",
         "|---|---:|---:|---|---:|---|",

@@ -18,7 +18,7 @@ from factory.closing import Closing
 from factory.errors import InputError
 from factory.lang import write_pag, write_template
 from factory.log.blocks import LENGTH, MAGIC, Arrays, bad_log, block, pack_rows
-from factory.monitor.subject import subject_of
+from factory.monitor.subject import subject_of_run
 
 if TYPE_CHECKING:
     from factory.pipeline import Source
@@ -167,10 +167,7 @@ def _header(
     as_given = file.is_file() and simulation.layout.plain is None
     text = file.read_text("utf-8", errors="replace") if as_given else write_pag(pag)
     settings, jitter = simulation.settings, simulation.jitter
-    bodies = simulation.model.carried if simulation.model else None
-    subject = subject_of(
-        simulation.layout, settings, jitter, simulation.start, simulation.wip, bodies
-    )
+    subject = subject_of_run(simulation)
     return {
         "versions": {"python": platform.python_version(), **_versions()},
         "command": list(sys.argv if command is None else command),

@@ -10,20 +10,13 @@ from factory.monitor.anatomy import Anatomy
 from factory.monitor.monitor import Monitor
 from factory.monitor.report import Firing, Report, Violation
 from factory.monitor.sight import Sight
-from factory.monitor.subject import Subject, subject_of
+from factory.monitor.subject import Subject, subject_of, subject_of_run
 
 
 def beside(simulation: Any) -> Monitor:
     """A monitor that watches the engine of a simulation; it is an observer of its run. Of the
     simulation it takes the engine, the layout and where it starts, and nothing that goes on."""
-    subject = subject_of(
-        simulation.layout,
-        simulation.settings,
-        simulation.jitter,
-        simulation.start,
-        simulation.wip,
-        simulation.model.carried,
-    )
+    subject = subject_of_run(simulation)
     m, d = simulation.world.m, simulation.world.d
     monitor = Monitor(subject, Anatomy.of(m, simulation.layout.factory))
     monitor.watch(m, d)
@@ -40,4 +33,5 @@ __all__ = [
     "Violation",
     "beside",
     "subject_of",
+    "subject_of_run",
 ]

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from factory.engine import mujoco
 from factory.errors import Diagnostic, InputError
+from factory.log.model import model_of
 from factory.log.reader import Log
 from factory.log.recompiled import factory_of
 from factory.monitor.anatomy import Anatomy
@@ -39,7 +39,7 @@ def watch_log(log: Log) -> tuple[Report, Subject]:
         raise InputError(_bad("the log has no tick"))
     try:
         subject = recorded_subject(log.header)
-        monitor = Monitor(subject, Anatomy.of(_model(log), subject.factory))
+        monitor = Monitor(subject, Anatomy.of(model_of(log, AGAIN), subject.factory))
         for sight in sights(log):
             monitor.see(sight)
     except (ValueError, KeyError, TypeError, AttributeError, IndexError) as error:
@@ -75,14 +75,6 @@ def recorded_subject(header: Mapping[str, Any]) -> Subject:
         [int(place) for place in header["start"]],
         None if wip is None else int(wip),
     )
-
-
-def _model(log: Log) -> Any:
-    files = {f"meshes/{name}": content for name, content in log.files.items()}
-    try:
-        return mujoco.MjModel.from_xml_string(log.xml, files)
-    except ValueError as error:
-        raise InputError(_bad(f"the log's model is broken: {error}")) from error
 
 
 def _bad(words: str) -> Diagnostic:

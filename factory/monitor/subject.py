@@ -117,6 +117,19 @@ def subject_of(
     )
 
 
+def subject_of_run(simulation: Any) -> Subject:
+    """The subject that a simulation is, in either world."""
+    model = simulation.model
+    return subject_of(
+        simulation.layout,
+        simulation.settings,
+        simulation.jitter,
+        simulation.start,
+        simulation.wip,
+        model.carried if model else None,
+    )
+
+
 def subject_from(
     factory: Factory,
     kept: Mapping[str, Any],

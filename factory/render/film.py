@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from factory.closing import Closing
-from factory.monitor.subject import subject_of
+from factory.monitor.subject import subject_of_run
 from factory.render.area import PanelName, shared
 from factory.render.camera import camera_named
 from factory.render.camerawork import FPS, SIZE, Moment, Reel, Size, Take, When, pictureless, save
@@ -38,14 +38,7 @@ class _Observer(Closing):
         self.simulation, factory = simulation, simulation.layout.factory
         camera = camera_named(camera, [part.label for part in factory.leaves])
         shared(size, panels)
-        subject = subject_of(
-            simulation.layout,
-            simulation.settings,
-            simulation.jitter,
-            simulation.start,
-            simulation.wip,
-            simulation.model.carried,
-        )
+        subject = subject_of_run(simulation)
         product, m = product_name(factory), simulation.world.m
         self.take = Take(
             m, product, simulation.units, size, camera, caption, subject, panels, title

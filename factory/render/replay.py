@@ -9,6 +9,7 @@ import numpy as np
 from factory.engine import mujoco
 from factory.errors import Diagnostic, InputError
 from factory.log import Log
+from factory.log.model import model_of
 from factory.monitor.record import AGAIN, recorded_subject
 from factory.monitor.subject import Subject
 from factory.render.area import PanelName, shared
@@ -101,11 +102,4 @@ def _model(log: Log) -> mujoco.MjModel:
         raise pictureless()
     if not len(log):
         raise InputError(Diagnostic("BadLog", "the log has no tick", None, "run for longer"))
-    files = {f"meshes/{name}": content for name, content in log.files.items()}
-    try:
-        m = mujoco.MjModel.from_xml_string(log.xml, files)
-    except ValueError as error:
-        raise InputError(Diagnostic("BadLog", f"the log's model is broken: {error}")) from error
-    if m.nq != log.qpos.shape[1]:
-        raise InputError(Diagnostic("BadLog", "the log's states are not those of its model"))
-    return m
+    return model_of(log)

@@ -2,39 +2,27 @@
 
 from __future__ import annotations
 
-import sys
 from time import perf_counter
-from typing import TYPE_CHECKING, Self
+from typing import TYPE_CHECKING
 
-from factory.closing import Closing
+from factory.progress import Shown, counter
 
 if TYPE_CHECKING:
-    from rich.progress import Progress
+    from rich.progress import Progress, TaskID
 
 
-class Bar(Closing):
-    """Counts the runs of a sweep of which some may be there already; silent where `quiet`, or where
-    stderr is no terminal."""
+class Bar(Shown):
+    """Counts the runs of a sweep, of which some may be there already."""
 
     def __init__(self, total: int, there: int = 0, quiet: bool = False) -> None:
+        super().__init__(quiet)
         self.total, self.there = total, there
         self.done = self.failed = 0
-        self.shown = not quiet and sys.stderr.isatty()
-        self.bar: Progress | None = None
 
-    def __enter__(self) -> Self:
-        self.begin = perf_counter()
-        if self.shown:
-            self.bar = _bar()
-            self.task = self.bar.add_task("", total=self.total, completed=self.there, words="")
-            self.bar.start()
-        return self
-
-    def close(self) -> None:
-        """Take the bar away."""
-        if self.bar is not None:
-            self.bar.stop()
-            self.bar = None
+    def drawn(self) -> tuple[Progress, TaskID]:
+        """The runs there are, and how fast they come."""
+        bar = counter("runs, {task.fields[words]}, left")
+        return bar, bar.add_task("", total=self.total, completed=self.there, words="")
 
     def advance(self, failed: bool) -> None:
         """One more run is done."""
@@ -44,23 +32,3 @@ class Bar(Closing):
             words = f"{self.done / max(perf_counter() - self.begin, 1e-9):.1f} runs/s"
             words += f", {self.failed} failed" if self.failed else ""
             self.bar.update(self.task, completed=self.there + self.done, words=words)
-
-
-def _bar() -> Progress:
-    from rich.console import Console
-    from rich.progress import (
-        BarColumn,
-        MofNCompleteColumn,
-        Progress,
-        TextColumn,
-        TimeRemainingColumn,
-    )
-
-    return Progress(
-        BarColumn(),
-        MofNCompleteColumn(),
-        TextColumn("runs, {task.fields[words]}, left"),
-        TimeRemainingColumn(),
-        console=Console(file=sys.stderr),
-        transient=True,
-    )

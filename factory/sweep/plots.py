@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from itertools import groupby
 from typing import Any
 
-from factory.fidelity.plots import BLUE, STYLE, check_plots, figure_and_axes, png
+from factory.plotting import BLUE, STYLE, figure_and_axes, png, require_matplotlib
 from factory.sweep.summary import Group, Summary
 
 PLOTTED = (
@@ -36,7 +36,7 @@ MOST = 10
 def plots(found: Summary) -> dict[str, bytes]:
     """The plots by file name, FIGURE.png each. Raises MissingError where there is no
     matplotlib."""
-    check_plots()
+    require_matplotlib("plots need", "-o REPORT.json for figures alone")
     import matplotlib
 
     with matplotlib.rc_context(STYLE):

@@ -9,7 +9,7 @@ from typing import Any
 from tests.bench.factories import Case, Steady, laid_out, robots_at_least
 from tests.bench.processes import fresh, interleaved, median, serve, spread
 from tests.bench.replaying import measure_floor
-from tests.fidelity.tables import table
+from tests.tables import table
 
 CASES = (
     Case(40, 0.002),

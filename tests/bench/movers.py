@@ -10,7 +10,7 @@ from typing import Any
 from tests.bench.factories import Case
 from tests.bench.processes import ROOT, fresh, interleaved, median, ratio, run, spread
 from tests.bench.production import work
-from tests.fidelity.tables import table
+from tests.tables import table
 
 RIVALS = ROOT / ".rivals" / "bin" / "python"
 

@@ -10,7 +10,7 @@ from typing import Any
 
 from tests.bench.factories import Case, Steady, laid_out, robots_at_least, run_until
 from tests.bench.processes import fresh, interleaved, median, resident, serve, spread
-from tests.fidelity.tables import table
+from tests.tables import table
 
 AIMS: Sequence[tuple[Case, float, float]] = (
     (Case(40, 0.002), 20.0, 10.0),

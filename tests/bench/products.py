@@ -7,7 +7,7 @@ from typing import Any
 
 from tests.bench.processes import FACTORY, run
 from tests.fidelity.products import BRICKS, EXAMPLES
-from tests.fidelity.tables import table
+from tests.tables import table
 
 UNITS = {"paper": 20, "lamp": 10, "stool": 10, "shelf": 10, "balanced": 10}
 """Units of each example."""

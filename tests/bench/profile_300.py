@@ -9,7 +9,7 @@ from typing import Any
 
 from tests.bench.factories import Case, Steady, laid_out, robots_at_least, run_until
 from tests.bench.processes import ROOT, fresh, serve
-from tests.fidelity.tables import table
+from tests.tables import table
 
 AIM, TOP, WINDOW = 85.0, 8, 5.0
 """Percent of the time in the engine's step; functions shown; simulated [s]."""

@@ -11,8 +11,8 @@ from typing import Any
 
 from tests.bench.factories import robots_at_least
 from tests.bench.processes import FACTORY, fresh, interleaved, median, resident, run, serve
-from tests.fidelity.tables import table
 from tests.strategies import random_pag_text
+from tests.tables import table
 
 LABELS = (100, 1_000, 10_000, 100_000)
 

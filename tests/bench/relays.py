@@ -15,7 +15,7 @@ from factory.prediction import operation_delays, predict
 from factory.relaying import relayed
 from factory.settings import Settings
 from tests.bench.factories import cube, laid_out
-from tests.fidelity.tables import table
+from tests.tables import table
 
 SIZES = (16, 32, 64, 128, 256, 512, 1024)
 """Parts of the product."""

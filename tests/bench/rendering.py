@@ -19,7 +19,7 @@ from factory.render.subject import Snapshot
 from factory.simulation import Simulation
 from tests.bench.factories import Case, Steady, laid_out, robots_at_least, run_until
 from tests.bench.processes import ROOT, fresh, interleaved, median, ratio, serve, spread
-from tests.fidelity.tables import table
+from tests.tables import table
 
 ROBOTS = (6, 40, 100)
 """The paper's example, and balanced trees."""

@@ -12,8 +12,8 @@ from typing import Any
 
 from tests.bench.movers import RIVALS
 from tests.bench.processes import FACTORY, ROOT, interleaved, median, run
-from tests.fidelity.tables import table
 from tests.strategies import random_pag_text
+from tests.tables import table
 
 TOOLS = {"SNAKES": "snakes_states.py", "pm4py": "pm4py_states.py"}
 

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from tests.bench.processes import FACTORY, ROOT, interleaved, median, ratio, run, spread
-from tests.fidelity.tables import table
+from tests.tables import table
 
 RUNS, JOBS = 1_000, (1, 2)
 

@@ -10,7 +10,7 @@ from factory.mating.contacts import CLEAR
 from factory.pipeline import read
 from factory.simulation import Simulation
 from tests.fidelity.products import BRICKS_NAMES, REAL, file_of, is_here, layout
-from tests.fidelity.tables import table
+from tests.tables import table
 
 PRODUCTS = (*REAL, "chest", "stool", "lamp", "shelf", *BRICKS_NAMES)
 """Products whose parts have shapes of their own."""

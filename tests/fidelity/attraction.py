@@ -24,7 +24,7 @@ from factory.nets.petri import Marking
 from factory.simulation import Simulation
 from factory.supervisor import REST
 from tests.fidelity.products import CAMPAIGN, layout
-from tests.fidelity.tables import table
+from tests.tables import table
 
 KINDS = ("inside", "stop", "touching", "gate")
 

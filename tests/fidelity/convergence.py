@@ -8,7 +8,7 @@ from typing import Any
 from factory.fidelity import study
 from factory.fidelity.comparing import Case
 from tests.fidelity.products import PAPER, REAL, layout
-from tests.fidelity.tables import table
+from tests.tables import table
 
 UNITS = 4
 

@@ -28,7 +28,7 @@ from factory.layout.plan import Layout
 from factory.simulation import Simulation
 from factory.trace import Run
 from tests.fidelity.products import SMALL, layout
-from tests.fidelity.tables import table
+from tests.tables import table
 
 ERROR_MM = 0.5
 """The largest product error [mm] of a good product."""

@@ -24,7 +24,7 @@ import numpy as np
 from factory.mjcf import names
 from factory.simulation import Simulation
 from tests.fidelity.products import PAPER, REAL, layout
-from tests.fidelity.tables import table
+from tests.tables import table
 
 RUNS = ((PAPER, 500), *((name, 50) for name in REAL))
 

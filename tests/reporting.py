@@ -1,0 +1,118 @@
+"""A report of sections: each measured by a module of its own and kept as JSON, the whole written
+from what is kept, so that sections can be renewed one by one."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import platform
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from importlib import import_module
+from importlib.metadata import version
+from pathlib import Path
+from time import perf_counter
+from types import ModuleType
+
+DOCS = Path(__file__).resolve().parent.parent / "docs"
+
+
+@dataclass(frozen=True)
+class Report:
+    """`package`: where the modules called like the `sections` are, each with `measure` and
+    `section`, in the order of the report; `head`: what stands before them; `path`: where the report
+    is, beside the folder of the same name with the results; `versions` of which packages it
+    tells."""
+
+    package: str
+    head: str
+    sections: tuple[str, ...]
+    path: Path
+    versions: tuple[str, ...]
+
+    @property
+    def folder(self) -> Path:
+        """Where results are kept."""
+        return self.path.with_suffix("")
+
+    def module(self, name: str) -> ModuleType:
+        """That of a section."""
+        return import_module(f"{self.package}.{name}")
+
+    def parser(self, words: str | None) -> argparse.ArgumentParser:
+        """What every report's command line takes."""
+        parser = argparse.ArgumentParser(prog=f"python -m {self.package}", description=words)
+        parser.add_argument("names", nargs="*", metavar="NAME", help=", ".join(self.sections))
+        parser.add_argument("--quick", action="store_true", help="a taste of each, in seconds")
+        return parser
+
+    def chosen(self, parser: argparse.ArgumentParser, names: Sequence[str]) -> Sequence[str]:
+        """The sections that are named, all where none is; ends the program where one is not
+        there."""
+        if unknown := set(names) - set(self.sections):
+            there = ", ".join(self.sections)
+            parser.error(f"no section {', '.join(sorted(unknown))}; there are {there}")
+        return names or self.sections
+
+    def measure(self, name: str, quick: bool, only: Sequence[str] = ()) -> None:
+        """Measure a section and keep what it found at once: one that takes long yields all that it
+        has found so far, again and again. With `only` it measures these products, and the others
+        that are kept stay as they are."""
+        begin = perf_counter()
+        measure = self.module(name).measure
+        file = self.folder / f"{name}.json"
+        kept = json.loads(file.read_text())["results"] if only and file.is_file() else None
+        found = measure(quick, only, kept) if only else measure(quick)
+        for results in [found] if isinstance(found, dict) else found:
+            document = {
+                "section": name,
+                "quick": quick,
+                "seconds": round(perf_counter() - begin, 1),
+                **self._setting(),
+                "results": results,
+            }
+            self.folder.mkdir(parents=True, exist_ok=True)
+            file.write_text(json.dumps(document, indent=1, ensure_ascii=False) + "\n")
+
+    def text(self) -> str:
+        """The report on all that is kept."""
+        parts = [self.head]
+        for name in self.sections:
+            file = self.folder / f"{name}.json"
+            if file.is_file():
+                kept = json.loads(file.read_text())
+                parts += [self.module(name).section(kept["results"]), _foot(kept)]
+        return "\n\n".join(parts) + "\n"
+
+    def write(self) -> None:
+        """Write it."""
+        self.path.write_text(self.text())
+
+    def _setting(self) -> dict[str, str]:
+        """What it was measured on, and when."""
+        packages = [f"{name} {version(name)}" for name in self.versions]
+        return {
+            "date": datetime.now(UTC).strftime("%Y-%m-%d"),
+            "machine": f"{os.cpu_count()} cores of {_processor()}, {platform.system()}",
+            "versions": ", ".join([f"Python {platform.python_version()}", *packages]),
+        }
+
+
+def _processor() -> str:
+    """What kind of processor this is, as well as the system says."""
+    try:
+        lines = Path("/proc/cpuinfo").read_text().splitlines()
+    except OSError:
+        lines = []
+    named = (line.partition(":")[2].strip() for line in lines if line.startswith("model name"))
+    return next(named, platform.machine())
+
+
+def _foot(kept: Mapping[str, object]) -> str:
+    quick = ", the quick version" if kept["quick"] else ""
+    return (
+        f"*Measured on {kept['date']} in {kept['seconds']} s{quick}: {kept['versions']};"
+        f" {kept['machine']}.*"
+    )
