@@ -8,14 +8,13 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from factory.engine import mujoco
 from factory.geometry import rotation
 from factory.layout.plan import Point2
 from factory.layout.svg import clean, number, polygon, text
 from factory.mjcf import names
 from factory.report.links import about
-from factory.report.recording import Recording
 from factory.report.scene import drawn, stands_for, triangles
+from factory.report.stage import Stage
 
 MARGIN = 80.0
 """Around everything [mm]."""
@@ -26,18 +25,17 @@ RULER = (0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0)
 Floats = NDArray[np.float64]
 
 
-def floor_plan(recording: Recording, labels: dict[str, int]) -> str:
+def floor_plan(stage: Stage, labels: dict[str, int]) -> str:
     """The drawing as SVG, to be put into a page."""
-    return _Plan(recording, labels).text()
+    return _Plan(stage, labels).text()
 
 
 class _Plan:
     """The elements, and how far they reach."""
 
-    def __init__(self, recording: Recording, labels: dict[str, int]) -> None:
-        self.recording, self.labels = recording, labels
-        self.motion, self.m = recording.motion, recording.motion.m
-        self.robots = {robot.name: robot.index for robot in recording.factory.robots}
+    def __init__(self, stage: Stage, labels: dict[str, int]) -> None:
+        self.stage, self.labels, self.m = stage, labels, stage.m
+        self.robots = {robot.name: robot.index for robot in stage.factory.robots}
         self.reach: list[Point2] = []
 
     def text(self) -> str:
@@ -67,7 +65,7 @@ class _Plan:
             name = self.m.geom(geom).name
             yield self._group(name, [self._shape(geom, 0, "rail")])
         for body in range(1, self.m.nbody):
-            name = self.motion.name(body)
+            name = self.m.body(body).name
             if name.startswith("feeder/"):
                 kinds = {"post": "post", "boom": "boom", "head": "boom"}
                 geoms = [(g, self.m.geom(g).name.rpartition("/")[2]) for g in drawn(self.m, body)]
@@ -78,7 +76,7 @@ class _Plan:
 
     def _shape(self, geom: int, body: int, style: str) -> str:
         """The outline of a geom of a body that stands still."""
-        place, turn = self.motion.position[0, body], self.motion.quaternion[0, body]
+        place, turn = self.stage.position[body], self.stage.quaternion[body]
         points = triangles(self.m, geom)[0] @ rotation(turn).T + place
         corners = outline(points)
         self.reach += corners
@@ -93,10 +91,10 @@ class _Plan:
     def _bodies(self, kind: str) -> Iterator[str]:
         """Robots or parts, about their own origin; the page puts them where they are."""
         for body in range(1, self.m.nbody):
-            name, root = self.motion.name(body), not int(self.m.body_parentid[body])
+            name, root = self.m.body(body).name, not int(self.m.body_parentid[body])
             if names.kind(name) != kind or not root:
                 continue
-            parked = bool(self.motion.position[0, body, 2] < 0)
+            parked = bool(self.stage.position[body, 2] < 0)
             extra = f' data-body="{body}"' + (" hidden" if parked else "")
             if kind == "robot":
                 yield self._group(name, self._robot(body, name), extra)
@@ -109,17 +107,16 @@ class _Plan:
 
     def _robot(self, body: int, name: str) -> list[str]:
         """Arm and carriage; the finger reaches below the payload."""
-        turn = rotation(self.motion.quaternion[0, body])
+        turn = rotation(self.stage.quaternion[body])
         robot = name.partition("/")[0]
-        role = self.recording.roles[self.robots[robot]]
+        role = self.stage.roles[self.robots[robot]]
         found = []
         for geom in drawn(self.m, body):
             kind = self.m.geom(geom).name.rpartition("/")[2]
             style = {"arm": "arm", "finger": "arm", "carriage": f"carriage {role}"}.get(kind)
             corners = outline(triangles(self.m, geom)[0] @ turn.T)
-            place = self.motion.position[:, body]
             for x, y in corners:
-                for far in (place.min(axis=0), place.max(axis=0)):
+                for far in self.stage.reach[:, body]:
                     self.reach.append((x + 1e3 * float(far[0]), y - 1e3 * float(far[1])))
             if style:
                 found.append(polygon(corners, style))
@@ -142,25 +139,12 @@ class _Plan:
     def _stations(self) -> Iterator[str]:
         """A ring where the carrier of an operation of several robots holds its payload as it
         ends."""
-        m, d = self.m, mujoco.MjData(self.m)
-        log, factory = self.recording.log, self.recording.factory
-        ends = {int(t): n for n, t in reversed([*enumerate(log.fired.tolist())])}
-        found: dict[tuple[int, int], list[str]] = {}
-        for operation in factory.operations:
-            event = ends.get(operation.end)
-            nest = f"{factory.robots[operation.carrier].name}/nest"
-            if len(operation.robots) < 2 or event is None or not _has_site(m, nest):
-                continue
-            row = min(int(np.searchsorted(log.time, log.fired_t[event] - 1e-9)), len(log) - 1)
-            d.qpos[:] = log.qpos[row]
-            mujoco.mj_kinematics(m, d)
-            x, y = (round(1e3 * float(v)) for v in d.site_xpos[m.site(nest).id][:2])
-            found.setdefault((x, -y), []).append(operation.label)
-        for (x, y), made in found.items():
+        for (x, y), made in self.stage.stations.items():
             of = about(self.labels, made[0])
             marks = f'data-label="{self.labels[of]}"' if of else ""
             title = f"<title>{clean(', '.join(made))}</title>"
-            yield f'<circle class="station" {marks} cx="{x}" cy="{y}" r="11">{title}</circle>'
+            at = f'cx="{round(1e3 * x)}" cy="{round(-1e3 * y)}" r="11"'
+            yield f'<circle class="station" {marks} {at}>{title}</circle>'
 
 
 def outline(points: Floats) -> list[Point2]:
@@ -170,10 +154,6 @@ def outline(points: Floats) -> list[Point2]:
     hull = MultiPoint(np.unique(np.round(1e3 * points[:, :2], 1), axis=0)).convex_hull
     around = hull.exterior if hull.geom_type == "Polygon" else hull
     return [(float(x), -float(y)) for x, y in around.coords]
-
-
-def _has_site(m: mujoco.MjModel, name: str) -> bool:
-    return int(mujoco.mj_name2id(m, mujoco.mjtObj.mjOBJ_SITE.value, name)) >= 0
 
 
 def _ruler(corner: Point2, width: float, size: float) -> str:

@@ -3,29 +3,29 @@ shows or hides with the time."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 from factory.export.swimlanes import LEFT, Swimlanes, owners_of, swimlanes
+from factory.factory import Factory
 from factory.layout.plan import Point2
 from factory.layout.svg import circle, label, line, rectangle, text
 from factory.nets.marked import marked
-from factory.report.recording import Recording
 
 RADIUS = 12.0
 """Of a place."""
 
 
-def net_drawing(recording: Recording) -> str:
+def net_drawing(factory: Factory, roles: Sequence[str]) -> str:
     """The drawing as SVG, to be put into a page."""
-    return _Drawing(recording).text()
+    return _Drawing(factory, roles).text()
 
 
 class _Drawing:
     """The elements, from the ground up."""
 
-    def __init__(self, recording: Recording) -> None:
-        self.net = marked(recording.factory.net)
-        self.roles = recording.roles
+    def __init__(self, factory: Factory, roles: Sequence[str]) -> None:
+        self.net = marked(factory.net)
+        self.roles = roles
         self.at: Swimlanes = swimlanes(self.net)
         self.owners = owners_of(self.net)
 

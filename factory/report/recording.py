@@ -4,27 +4,30 @@ the layout that it ran in."""
 from __future__ import annotations
 
 import os
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
+
+import numpy as np
 
 from factory.analysis.recorded import conditions
 from factory.errors import InputError
 from factory.export.events import compiled
 from factory.export.motion import Motion, motion_of
 from factory.export.subject import Subject
-from factory.factory import Factory
+from factory.factory import Factory, Operation
 from factory.lang import read_pag, read_template
 from factory.layout.durations import Pace
 from factory.layout.embedding import lay_out
 from factory.layout.plan import Layout
 from factory.log import Log
 from factory.log.blocks import bad_log
-from factory.mjcf.names import carriage
-from factory.mjcf.robots import ROLES
+from factory.meshes import Array
 from factory.monitor import subject_of
 from factory.pag import PAG
 from factory.pipeline import Source
+from factory.report.stage import Stage, stations
 from factory.robots import load_catalogue
 
 
@@ -66,18 +69,28 @@ class Recording:
         return float(self.log.time[-1])
 
     @cached_property
-    def roles(self) -> tuple[str, ...]:
-        """What each robot is for, as its paint shows: output, carrier, fed or tool, else shared."""
-        m = self.motion.m
-        paints = {i: m.mat(i).name.removeprefix("role/") for i in range(m.nmat)}
-        found = []
-        for robot in self.factory.robots:
-            body = m.body(carriage(robot.name))
-            first = int(body.geomadr[0])
-            worn = (int(m.geom_matid[g]) for g in range(first, first + int(body.geomnum[0])))
-            roles = (paints[paint] for paint in worn if paints.get(paint) in ROLES)
-            found.append(next(roles, "shared"))
-        return tuple(found)
+    def stage(self) -> Stage:
+        """What there is to be drawn."""
+        m, seen = self.motion.m, self.motion
+        return Stage(
+            self.factory,
+            m,
+            seen.position[0],
+            seen.quaternion[0],
+            np.stack([seen.position.min(axis=0), seen.position.max(axis=0)]),
+            self.log.header.get("monitor", {}).get("places", {}),
+            stations(self.factory, m, self._ends()),
+        )
+
+    def _ends(self) -> Iterator[tuple[Operation, Array]]:
+        """The state as each operation ends for the first time, of those that do."""
+        log = self.log
+        ends = {int(t): n for n, t in reversed([*enumerate(log.fired.tolist())])}
+        for operation in self.factory.operations:
+            event = ends.get(operation.end)
+            if event is not None:
+                row = int(np.searchsorted(log.time, log.fired_t[event] - 1e-9))
+                yield operation, log.qpos[min(row, len(log) - 1)]
 
 
 def recording_of(path: Path, layout: Layout | None = None) -> Recording:

@@ -15,7 +15,7 @@ from factory.engine import mujoco
 from factory.geometry import rotation
 from factory.mjcf import names
 from factory.report.packing import Pack
-from factory.report.recording import Recording
+from factory.report.stage import Stage
 
 DRAWN = 3
 """Geoms of groups below this one are drawn."""
@@ -91,11 +91,11 @@ def look(m: mujoco.MjModel, geoms: Sequence[int]) -> Look:
     )
 
 
-def scene(recording: Recording, labels: dict[str, int], pack: Pack) -> dict[str, Any]:
+def scene(stage: Stage, labels: dict[str, int], pack: Pack) -> dict[str, Any]:
     """The geometry, into the pack, and the list of things: each a shape, the body it moves with,
     and what it stands for (`robot` or `label`, by number)."""
-    m = recording.motion.m
-    robots = {robot.name: robot.index for robot in recording.factory.robots}
+    m = stage.m
+    robots = {robot.name: robot.index for robot in stage.factory.robots}
     shapes: dict[bytes, int] = {}
     alphas: list[float] = []
     things = []
@@ -111,7 +111,7 @@ def scene(recording: Recording, labels: dict[str, int], pack: Pack) -> dict[str,
                 pack.add(f"{letter}{number}", values)
         name = m.geom(geoms[0]).name if body == 0 else m.body(body).name
         things.append({"shape": shapes[key], "body": body, **stands_for(name, robots, labels)})
-    return {"alphas": alphas, "things": things, "places": _places(recording, labels)}
+    return {"alphas": alphas, "things": things, "places": _places(stage, labels)}
 
 
 def _groups(m: mujoco.MjModel, robots: dict[str, int]) -> Iterator[tuple[int, list[int]]]:
@@ -139,7 +139,7 @@ def stands_for(name: str, robots: dict[str, int], labels: dict[str, int]) -> dic
     return {}
 
 
-def _places(recording: Recording, labels: dict[str, int]) -> dict[str, list[float]]:
+def _places(stage: Stage, labels: dict[str, int]) -> dict[str, list[float]]:
     """Where the body of each part, by its label's number, is in the finished product [m]."""
-    places = recording.log.header.get("monitor", {}).get("places", {})
-    return {str(labels[k]): [round(x, 6) for x in v] for k, v in places.items() if k in labels}
+    places = stage.places.items()
+    return {str(labels[k]): [round(x, 6) for x in v] for k, v in places if k in labels}

@@ -131,9 +131,9 @@ def _chain(
 
 def utilisation(recording: Recording, run: Measured, plan: Predicted | None) -> str:
     """A bar for each robot, the busiest first, with a mark where it was predicted."""
-    rows = []
+    rows, roles = [], recording.stage.roles
     for robot in sorted(recording.factory.robots, key=lambda r: -run.busy[r.index]):
-        share, role = 100 * run.busy[robot.index], escape(recording.roles[robot.index], quote=True)
+        share, role = 100 * run.busy[robot.index], escape(roles[robot.index], quote=True)
         mark, words = "", f"{share:.0f} % measured"
         if plan is not None:
             guess = min(100.0, 100 * plan.busy[robot.index])
