@@ -84,8 +84,9 @@ class Supervisor:
     ) -> None:
         self.factory, self.modes, self.world, self.tick = factory, modes, world, tick
         self.net = factory.net.threaded
-        self.limit(limits)
         self.axes = np.array([axis for axes in factory.axes for axis in axes], np.intp)
+        self.active = _Active((), None, np.empty(0, np.intp), np.empty(0))
+        self.limit(limits)
         marking = factory.net.initial_marking if start is None else start
         self.threads = dict(factory.net.marking_of(marking).threads)
         self.marked = bytearray(len(self.net.places))
@@ -100,13 +101,13 @@ class Supervisor:
         self.busy = [0.0] * len(factory.robots)
         self.since: dict[int, float] = {}
         self.last_event = world.time
-        self.active = _Active((), None, np.empty(0, np.intp), np.empty(0))
         self._activate(o.index for o in factory.operations if self.marked[o.place])
 
     def limit(self, limits: Limits) -> None:
-        """From the next operation on, axes have these limits."""
+        """From now on axes have these limits."""
         self.limits = limits
         self.all = Bundle.of(self.modes, [limits.of(axes) for axes in self.factory.axes])
+        self._activate(self.active.operations)
 
     def step(self) -> None:
         """Fire what is enabled as one detached set, then let the world go on for one tick."""

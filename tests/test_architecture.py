@@ -63,6 +63,7 @@ ROOMS = [
         "doctor",
         "export",
         "report",
+        "live",
     },
     {"cli", "__main__"},
 ]

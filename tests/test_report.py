@@ -25,6 +25,7 @@ from factory.report.fidelity import fidelity
 from factory.report.links import labels_of, links
 from factory.report.measured import measured
 from factory.report.packing import json_inside
+from factory.report.page import SCRIPTS
 from factory.report.tree import assembly_tree
 from factory.report.words import proof
 from factory.simulation import Simulation
@@ -81,7 +82,7 @@ def test_only_its_own_scripts_may_run(made: Page) -> None:
         for code in made.code
     }
     allowed = set(re.findall(r"'sha256-[^']+'", made.policy))
-    assert allowed == digests and len(digests) == 7
+    assert allowed == digests and len(digests) == len(SCRIPTS)
     assert "default-src 'none'" in made.policy and "unsafe-eval" not in made.policy
 
 

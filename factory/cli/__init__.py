@@ -24,6 +24,7 @@ from factory.cli.report import report
 from factory.cli.sweep import sweep
 from factory.cli.take import export
 from factory.cli.tell import doctor, templates
+from factory.cli.view import view
 from factory.cli.watch import monitor
 from factory.console import emit, fail, say
 from factory.errors import Diagnostic, FactoryError, InputError, MissingError, did_you_mean
@@ -167,6 +168,7 @@ for _command in (
     build,
     run,
     render,
+    view,
     fidelity,
     analyze,
     report,
@@ -178,7 +180,7 @@ for _command in (
     doctor,
 ):
     cli.add_command(_command)
-for _command in (check, build, run, render, fidelity, analyze, report, programs, export):
+for _command in (check, build, run, render, view, fidelity, analyze, report, programs, export):
     with_defaults(_command)
 
 __all__ = ["cli", "main", "run_command"]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from base64 import b64encode
+from collections.abc import Mapping, Sequence
 from html import escape
 from importlib.resources import files
 from typing import Any
@@ -30,15 +31,18 @@ from factory.report.tree import assembly_tree
 from factory.report.words import proof
 
 SCRIPTS = (
-    "three.min.js",
-    "data.js",
-    "selection.js",
-    "views.js",
-    "gantt.js",
-    "replay.js",
-    "report.js",
+    "report/three.min.js",
+    "report/data.js",
+    "report/selection.js",
+    "report/views.js",
+    "report/gantt.js",
+    "report/replay.js",
+    "report/wiring.js",
+    "report/report.js",
 )
 """In the order in which they run."""
+
+STYLES = ("report/report.css",)
 
 
 def page(recording: Recording) -> str:
@@ -71,9 +75,10 @@ def page(recording: Recording) -> str:
         "proof": proof_words(proved),
         "fidelity": fidelity_words(found),
         "how": made_how(recording),
-        "options": _options(document),
+        "options": options(document),
     }
-    return _filled(fields, document, pack.text(), proved.document)
+    fields["certificate"] = json_inside(proved.document)
+    return filled("report/report.html", fields, document, pack.text(), SCRIPTS, STYLES)
 
 
 def _counts(recording: Recording) -> str:
@@ -84,7 +89,7 @@ def _counts(recording: Recording) -> str:
     )
 
 
-def _options(document: dict[str, Any]) -> str:
+def options(document: dict[str, Any]) -> str:
     """What the field that finds things by name offers."""
     kinds = (("robot", "robots"), ("part", "labels"), ("transition", "transitions"))
     return "".join(
@@ -94,32 +99,43 @@ def _options(document: dict[str, Any]) -> str:
     )
 
 
-def _filled(fields: dict[str, str], document: object, packed: str, certificate: object) -> str:
-    """The template with everything in its place, in one pass: what is filled in is not looked
-    at again."""
-    scripts = [_asset(name) for name in SCRIPTS]
-    fields |= {
-        "policy": _policy(scripts),
-        "style": _asset("report.css"),
+def filled(
+    template: str,
+    fields: Mapping[str, str],
+    document: object,
+    packed: str,
+    scripts: Sequence[str],
+    styles: Sequence[str],
+    connects: str = "",
+) -> str:
+    """A template with everything in its place, in one pass: what is filled in is not looked at
+    again. Templates, scripts and styles are named like `report/report.css`; `connects`: what the
+    page may connect to, by its content security policy."""
+    texts = [_asset(name) for name in scripts]
+    every = {
+        **fields,
+        "policy": _policy(texts, connects),
+        "style": "".join(map(_asset, styles)),
         "data": json_inside(document),
-        "certificate": json_inside(certificate),
         "packed": packed,
-        "scripts": "\n".join(f"<script>{script}</script>" for script in scripts),
-        "licence": escape(_asset("three.LICENSE.txt")),
+        "scripts": "\n".join(f"<script>{script}</script>" for script in texts),
+        "licence": escape(_asset("report/three.LICENSE.txt")),
     }
-    pieces = _asset("report.html").split("%%")
-    return "".join(fields[piece] if n % 2 else piece for n, piece in enumerate(pieces))
+    pieces = _asset(template).split("%%")
+    return "".join(every[piece] if n % 2 else piece for n, piece in enumerate(pieces))
 
 
-def _policy(scripts: list[str]) -> str:
+def _policy(scripts: list[str], connects: str) -> str:
     """A content security policy under which only these scripts run, and nothing is fetched."""
     digests = (b64encode(hashlib.sha256(s.encode()).digest()).decode() for s in scripts)
     allowed = " ".join(f"'sha256-{digest}'" for digest in digests)
     return (
         f"default-src 'none'; script-src {allowed}; style-src 'unsafe-inline'; "
-        "img-src data: blob:; base-uri 'none'; form-action 'none'"
+        + (f"connect-src {connects}; " if connects else "")
+        + "img-src data: blob:; base-uri 'none'; form-action 'none'"
     )
 
 
 def _asset(name: str) -> str:
-    return (files("factory.report") / "assets" / name).read_text("utf-8")
+    room, _, file = name.partition("/")
+    return (files(f"factory.{room}") / "assets" / file).read_text("utf-8")

@@ -55,6 +55,15 @@ class Motion {
     return { low, next, share: span > 0 ? Math.min(1, Math.max(0, (time - this.time[low]) / span)) : 0 };
   }
 
+  // The least and the greatest [x, y, z] of a body; none of one that stands still.
+  reach(body) {
+    const path = this.place.get(body);
+    if (!path) return [];
+    const n = this.time.length;
+    const axes = [0, 1, 2].map((axis) => path.subarray(axis * n, (axis + 1) * n));
+    return [(a, b) => Math.min(a, b), (a, b) => Math.max(a, b)].map((most) => axes.map((values) => values.reduce(most)));
+  }
+
   // {x, y, z, shown} of a body. What appears, goes or jumps is not drawn on its way.
   position(body, { low, next, share }) {
     const found = this.place.get(body);

@@ -145,15 +145,10 @@ class Replay {
       if (mesh.userData.copy) continue;
       const box = new THREE.Box3().setFromObject(mesh);
       found.push(...corners(box));
-      const path = this.motion.place.get(mesh.userData.body);
-      if (!path || mesh.userData.robot === undefined) continue;
-      const n = this.motion.time.length;
+      if (mesh.userData.robot === undefined) continue;
       const here = this.bodies[mesh.userData.body].position;
-      const axes = [0, 1, 2].map((axis) => path.subarray(axis * n, (axis + 1) * n));
-      for (const most of [(a, b) => Math.min(a, b), (a, b) => Math.max(a, b)]) {
-        const end = new THREE.Vector3(...axes.map((values) => values.reduce(most)));
-        found.push(...corners(box.clone().translate(end.sub(here))));
-      }
+      for (const end of this.motion.reach(mesh.userData.body))
+        found.push(...corners(box.clone().translate(new THREE.Vector3(...end).sub(here))));
     }
     return found;
   }

@@ -1,5 +1,5 @@
 'use strict';
-// Puts the views together: one time and one selection for all of them.
+// The page of a run that is over: a slider for all views.
 
 class Clock {
   constructor() {
@@ -40,43 +40,6 @@ class Clock {
   }
 }
 
-function wireSelection(selection, clock, views) {
-  const chip = document.getElementById('chosen');
-  selection.listeners.push(({ lit, words }) => {
-    document.body.classList.toggle('selecting', Boolean(lit));
-    highlight(document, lit);
-    chip.hidden = !lit;
-    chip.textContent = `${words} ✕`;
-    ['tree', 'gantt', 'net'].forEach((id) => reveal(document.getElementById(id)));
-    if (views.replay) views.replay.select(lit);
-  });
-  chip.addEventListener('click', () => selection.clear());
-  document.querySelector('main').addEventListener('click', (event) => {
-    const found = meant(event.target);
-    if (found) selection.choose(...found);
-  });
-  document.getElementById('find').addEventListener('change', (event) => {
-    const [word, ...rest] = event.target.value.split(' ');
-    const kind = word === 'part' ? 'label' : word;
-    const number = kind in KINDS ? DATA[KINDS[kind]].indexOf(rest.join(' ')) : -1;
-    if (number < 0) return;
-    selection.clear();
-    selection.choose(kind, number);
-    event.target.value = '';
-  });
-}
-
-function wireKeys(clock, selection) {
-  document.addEventListener('keydown', (event) => {
-    if (event.key === 'Escape') selection.clear();
-    const typing = event.target.closest('button,input,select,summary');
-    if (event.key === ' ' && !typing) {
-      event.preventDefault();
-      clock.toggle();
-    }
-  });
-}
-
 function saveCertificate() {
   const text = document.getElementById('certificate').textContent;
   const link = document.createElement('a');
@@ -84,22 +47,6 @@ function saveCertificate() {
   link.download = `${DATA.name}.proof.json`;
   link.click();
   URL.revokeObjectURL(link.href);
-}
-
-// The 3-D view and the pictures; without WebGL everything else works all the same.
-async function threeD(views, motion, array, choose) {
-  const note = document.getElementById('stage-note');
-  try {
-    views.replay = new Replay(document.getElementById('stage'), motion, array, choose);
-  } catch (error) {
-    note.textContent = 'This browser shows no 3-D (WebGL); everything else works without.';
-    return;
-  }
-  note.remove();
-  document.querySelectorAll('[data-camera]').forEach((button) =>
-    button.addEventListener('click', () => views.replay.look(button.dataset.camera)),
-  );
-  await pictures(views.replay.shapes);
 }
 
 async function start() {
@@ -116,10 +63,10 @@ async function start() {
   const motion = new Motion(array);
   const choose = (kind, number) => selection.choose(kind, number);
   views.floor = new Floor(document.querySelector('svg.floor'), motion);
-  views.net = new Net(document.getElementById('net'));
+  views.net = new Net(document.getElementById('net'), new Game());
   const gantt = document.getElementById('gantt');
   views.gantt = new Gantt(gantt, (time) => clock.seek(time), (rows) => highlight(rows, selection.lit));
-  wireSelection(selection, clock, views);
+  wireSelection(selection, views);
   wireKeys(clock, selection);
   document.getElementById('save-certificate').addEventListener('click', saveCertificate);
   const painted = threeD(views, motion, array, choose);

@@ -18,13 +18,13 @@ class Floor {
 }
 
 class Net {
-  constructor(panel) {
+  constructor(panel, game) {
     this.panel = panel;
     this.svg = panel.querySelector('svg');
     this.width = Number(this.svg.dataset.width);
     this.height = Number(this.svg.dataset.height);
     this.tokens = [...this.svg.querySelectorAll('[data-token]')];
-    this.game = new Game();
+    this.game = game;
     this.scale = 1;
     document.getElementById('net-in').addEventListener('click', () => this.zoom(this.scale * 1.3));
     document.getElementById('net-out').addEventListener('click', () => this.zoom(this.scale / 1.3));

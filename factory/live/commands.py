@@ -1,0 +1,121 @@
+"""What a watcher may ask of a running factory: JSON messages, checked before anything acts."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Collection, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+SPEEDS = (0.1, 0.25, 0.5, 1.0, 2.0, 5.0, 10.0, 0.0)
+"""Of the run, against a clock on the wall; 0: as fast as it goes."""
+
+FACTORS = (0.1, 0.25, 0.5, 1.0)
+"""Of a robot's speed."""
+
+SHARES = (-1.0, -0.5, 0.5, 1.0)
+"""Of the greatest force of a robot's drive: what is more, it could not hold."""
+
+
+@dataclass(frozen=True, slots=True)
+class Pause:
+    """Stand still, at the end of a tick."""
+
+
+@dataclass(frozen=True, slots=True)
+class Play:
+    """Go on."""
+
+
+@dataclass(frozen=True, slots=True)
+class Step:
+    """Go on until the next transition fires."""
+
+
+@dataclass(frozen=True, slots=True)
+class Restart:
+    """Begin anew, from the initial marking, with nothing slowed or blocked."""
+
+
+@dataclass(frozen=True, slots=True)
+class Speed:
+    """One of SPEEDS."""
+
+    factor: float
+
+
+@dataclass(frozen=True, slots=True)
+class Push:
+    """Push a robot (index) for PUSH seconds with one of SHARES."""
+
+    robot: int
+    share: float
+
+
+@dataclass(frozen=True, slots=True)
+class Slow:
+    """Let a robot (index) go at one of FACTORS of its speed."""
+
+    robot: int
+    factor: float
+
+
+@dataclass(frozen=True, slots=True)
+class Block:
+    """Let the feeder of a part give nothing, or give again."""
+
+    part: str
+    blocked: bool
+
+
+Command = Pause | Play | Step | Restart | Speed | Push | Slow | Block
+
+PUSH = 0.3
+"""A push lasts so long [s]."""
+
+
+def command_of(message: str | bytes, robots: int, parts: Collection[str]) -> Command:
+    """The command in a message such as `{"do": "slow", "robot": 3, "factor": 0.5}`, to a factory of
+    so many robots and these parts. Raises ValueError, saying what is wrong and what would do."""
+    try:
+        told = json.loads(message)
+    except (ValueError, RecursionError):
+        raise ValueError("a command is a JSON object") from None
+    if not isinstance(told, dict):
+        raise ValueError("a command is a JSON object")
+    name = told.get("do")
+    if not isinstance(name, str) or name not in KINDS:
+        raise ValueError(f"'do' is {name!r}: there are {', '.join(KINDS)}")
+    kind, fields = KINDS[name]
+    valid: Mapping[str, tuple[Callable[[Any], bool], str]] = {
+        "robot": (lambda v: type(v) is int and 0 <= v < robots, f"a number from 0 to {robots - 1}"),
+        "part": (lambda v: isinstance(v, str) and v in parts, "the label of a part"),
+        "blocked": (lambda v: isinstance(v, bool), "true or false"),
+        "share": (lambda v: _is_one(v, SHARES), f"one of {SHARES}"),
+        "factor": (
+            lambda v: _is_one(v, SPEEDS if kind is Speed else FACTORS),
+            f"one of {SPEEDS if kind is Speed else FACTORS}",
+        ),
+    }
+    for key in fields:
+        holds, words = valid[key]
+        if not holds(told.get(key)):
+            raise ValueError(f"'{key}' of '{name}' is {told.get(key)!r}: {words} is needed")
+    return kind(*(told[key] for key in fields))
+
+
+def _is_one(value: object, of: Collection[float]) -> bool:
+    return type(value) in (int, float) and value in of
+
+
+KINDS: Mapping[str, tuple[Callable[..., Command], tuple[str, ...]]] = {
+    "pause": (Pause, ()),
+    "play": (Play, ()),
+    "step": (Step, ()),
+    "restart": (Restart, ()),
+    "speed": (Speed, ("factor",)),
+    "push": (Push, ("robot", "share")),
+    "slow": (Slow, ("robot", "factor")),
+    "block": (Block, ("part", "blocked")),
+}
+"""The commands by name, with their fields."""

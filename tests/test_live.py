@@ -1,0 +1,402 @@
+"""A running factory: what its watchers may ask, what then happens, and who may watch."""
+
+from __future__ import annotations
+
+import json
+import signal
+import socket
+from collections.abc import Iterator
+from http.client import HTTPConnection
+from subprocess import PIPE
+from threading import Thread
+from time import monotonic, sleep
+from typing import Any
+
+import numpy as np
+import pytest
+
+from factory.disturbance.hands import Hands
+from factory.errors import InputError
+from factory.live import Frame, Server, Session
+from factory.live.commands import (
+    KINDS,
+    Block,
+    Pause,
+    Play,
+    Push,
+    Restart,
+    Slow,
+    Speed,
+    Step,
+    command_of,
+)
+from factory.live.page import page
+from factory.monitor import beside
+from factory.nets.replay import replay
+from factory.simulation import Simulation
+from tests.command_line import PAPER, Terminal, started
+from tests.layout_values import paper_layout
+
+websockets = pytest.importorskip("websockets.sync.client", reason="pip install websockets")
+
+PARTS = ("part1", "part2", "part3")
+
+
+# --- commands ----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("message", "command"),
+    [
+        ('{"do": "pause"}', Pause()),
+        ('{"do": "step", "more": 1}', Step()),
+        ('{"do": "speed", "factor": 0}', Speed(0)),
+        ('{"do": "push", "robot": 5, "share": -1}', Push(5, -1)),
+        ('{"do": "slow", "robot": 0, "factor": 0.1}', Slow(0, 0.1)),
+        ('{"do": "block", "part": "part2", "blocked": false}', Block("part2", False)),
+    ],
+)
+def test_commands_are_read(message: str, command: object) -> None:
+    assert command_of(message, 6, PARTS) == command
+
+
+@pytest.mark.parametrize(
+    ("message", "words"),
+    [
+        ("no json", "JSON object"),
+        (b"\xff\xfe", "JSON object"),
+        ("[1]", "JSON object"),
+        ("[" * 2000, "JSON object"),
+        ("{}", "'do' is None: there are pause"),
+        ('{"do": ["pause"]}', "there are pause"),
+        ('{"do": "explode"}', "'do' is 'explode': there are pause"),
+        ('{"do": "push", "robot": 6, "share": 1}', "'robot' of 'push' is 6: a number from 0 to 5"),
+        ('{"do": "push", "robot": true, "share": 1}', "'robot' of 'push' is True"),
+        ('{"do": "push", "robot": 1.0, "share": 1}', "'robot' of 'push' is 1.0"),
+        ('{"do": "push", "robot": 1, "share": 1e9}', "'share' of 'push' is 1000000000.0: one of"),
+        ('{"do": "push", "robot": 1, "share": NaN}', "'share' of 'push' is nan"),
+        ('{"do": "slow", "robot": 1}', "'factor' of 'slow' is None: one of (0.1"),
+        ('{"do": "slow", "robot": 1, "factor": 0}', "'factor' of 'slow' is 0"),
+        ('{"do": "speed", "factor": "2"}', "'factor' of 'speed' is '2'"),
+        ('{"do": "block", "part": "sub1", "blocked": true}', "'part' of 'block' is 'sub1'"),
+        ('{"do": "block", "part": "part1", "blocked": 1}', "true or false"),
+    ],
+)
+def test_what_is_no_command_is_explained(message: str | bytes, words: str) -> None:
+    with pytest.raises(ValueError) as error:
+        command_of(message, 6, PARTS)
+    assert words in str(error.value)
+
+
+# --- hands -------------------------------------------------------------------------------------
+
+
+def moved(share: float) -> float:
+    """How far a waiting robot is moved along its guidepath by a push [m], at most."""
+    simulation = Simulation(paper_layout(), units=10)
+    hands, world = Hands(simulation), simulation.world
+    hands.block("part1")
+    start = float(world.d.qpos[world.qpos[0]])
+    found = [0.0]
+    for tick in range(100):
+        if tick == 10:
+            hands.push(0, share, 0.3)
+        simulation.supervisor.step()
+        hands.let_go()
+        found.append(float(world.d.qpos[world.qpos[0]]) - start)
+    assert abs(found[-1]) < 1e-4 < 5e-4 < abs(max(found, key=abs)), "it gives way and comes back"
+    return max(found, key=abs)
+
+
+def test_a_push_is_given_way_to_and_made_good() -> None:
+    """Robots wait at their B ends, and A, where they deliver, is 0."""
+    assert moved(1.0) < 2 * moved(0.5) < 0 < moved(-1.0)
+
+
+@pytest.mark.parametrize("pushed", [False, True])
+def test_hands_in_a_run_break_no_law(pushed: bool) -> None:
+    """Slowed and blocked at random, and in one of two runs pushed, the run still refines the net
+    and makes its products; the monitor agrees where nobody is pushed, which it could not tell from
+    a fault."""
+    simulation = Simulation(paper_layout(), units=12)
+    hands, watcher, draw = Hands(simulation), beside(simulation), np.random.default_rng(5)
+    ticks = 0
+
+    def act(world: Any, supervisor: Any) -> None:
+        nonlocal ticks
+        ticks += 1
+        hands.let_go()
+        watcher.observe(world, supervisor)
+        if ticks > 2500:
+            for part in PARTS:
+                hands.free(part)
+        elif ticks % 40 == 0:
+            robot, part = int(draw.integers(6)), PARTS[draw.integers(3)]
+            if pushed:
+                hands.push(robot, float(draw.choice([-0.5, 0.5])), 0.1)
+            hands.slow(robot, float(draw.choice([0.1, 0.5, 1.0])))
+            (hands.block if draw.random() < 0.5 else hands.free)(part)
+
+    run = simulation.run([act])
+    assert run.products == 12 and run.trouble is None and run.refines_net
+    assert pushed or watcher.report().refines_net, watcher.report().violations[:3]
+    assert run.physics is not None and run.physics.product_error_max_mm < 0.1
+
+
+def test_the_ideal_world_cannot_be_touched() -> None:
+    with pytest.raises(InputError, match="nothing to push"):
+        Hands(Simulation(paper_layout(), "ideal"))
+
+
+# --- a session ---------------------------------------------------------------------------------
+
+
+class Stopped(Exception):
+    """Ends a session."""
+
+
+class Running:
+    """A session that runs in a thread of its own."""
+
+    def __init__(self, playing: bool = True) -> None:
+        self.session = Session(lambda: Simulation(paper_layout(), units=10**9), playing)
+        self.over = False
+        self.thread = Thread(target=self._run, daemon=True)
+        self.thread.start()
+
+    def _run(self) -> None:
+        with pytest.raises(Stopped):
+            self.session.run(self._observe)
+
+    def _observe(self, world: Any, supervisor: Any) -> None:
+        if self.over:
+            raise Stopped
+
+    def until(self, holds: Any, seconds: float = 20.0) -> Frame:
+        """The first frame of which something holds."""
+        end = monotonic() + seconds
+        while not holds(frame := self.session.frame):
+            assert monotonic() < end, frame
+            sleep(0.01)
+        return frame
+
+    def close(self) -> None:
+        self.over = True
+        self.thread.join(10)
+        assert not self.thread.is_alive()
+
+
+@pytest.fixture
+def running() -> Iterator[Running]:
+    made = Running()
+    yield made
+    made.close()
+
+
+def test_pause_step_and_play(running: Running) -> None:
+    send = running.session.send
+    running.until(lambda f: f.time > 0.2)
+    send(Pause())
+    still = running.until(lambda f: not f.playing)
+    sleep(0.2)
+    assert running.session.frame.time == still.time
+    fired = still.fired
+    for _ in range(4):
+        send(Step())
+        after = running.until(lambda f, n=fired: f.fired > n and not f.playing)
+        fired = after.fired
+        (last,) = {t for t, _ in running.session.fired(after.run, fired - 1, fired)}
+        assert after.time - last < 0.011, "it stops within a tick of the firing"
+    assert after.time > still.time
+    names = [e.transition for e in running.session.simulation.supervisor.events]
+    assert replay(paper_layout().factory.net, names).refines
+    send(Play())
+    running.until(lambda f: f.time > after.time + 0.2)
+
+
+def test_it_keeps_in_step_with_the_clock(running: Running) -> None:
+    for speed in (1.0, 2.0, 0.25):
+        running.session.send(Speed(speed))
+        running.until(lambda f, s=speed: f.speed == s)
+        sleep(0.3)
+        before, begun = running.session.frame.time, monotonic()
+        sleep(1.0)
+        gone = (running.session.frame.time - before) / (monotonic() - begun)
+        assert gone == pytest.approx(speed, rel=0.25)
+
+
+def test_a_blocked_feeder_stops_the_net_and_frees_it_again(running: Running) -> None:
+    send = running.session.send
+    send(Speed(0.0))
+    running.until(lambda f: f.products > 0)
+    send(Block("part2", True))
+    quiet = running.until(lambda f: "feeder of part2" in f.note)
+    assert quiet.blocked == ("part2",)
+    factory = running.session.simulation.layout.factory
+    waits = {factory.net.threaded.places[p].mode for p in quiet.marked}
+    assert waits == {"wait"}, "every token waits"
+    sleep(0.2)
+    assert running.session.frame.fired == quiet.fired
+    send(Block("part2", False))
+    running.until(lambda f: f.products > quiet.products + 1 and not f.note)
+
+
+def test_begin_anew(running: Running) -> None:
+    send = running.session.send
+    send(Speed(0.0))
+    send(Slow(2, 0.5))
+    before = running.until(lambda f: f.fired > 20 and f.slowed == {2: 0.5})
+    send(Pause())
+    send(Restart())
+    fresh = running.until(lambda f: f.run == 1)
+    assert (fresh.time, fresh.fired, fresh.slowed, fresh.playing) == (0.0, 0, {}, False)
+    assert running.session.fired(before.run, 0, 5) == []
+
+
+def test_it_says_when_the_engine_gives_up(running: Running) -> None:
+    running.session.simulation.world.d.qvel[:] = np.nan
+    note = running.until(lambda f: bool(f.note)).note
+    assert "unstable" in note and "begin anew" in note
+    running.session.send(Restart())
+    running.until(lambda f: f.run == 1 and not f.note and f.time > 0.1)
+
+
+# --- a server ----------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def server(running: Running) -> Iterator[Server]:
+    with Server(running.session, b"<p>the page") as made:
+        yield made
+
+
+def asked(server: Server, path: str, **headers: str) -> tuple[int, str, dict[str, str]]:
+    """Status, body and headers of an answer."""
+    connection = HTTPConnection("127.0.0.1", server.port, timeout=10)
+    connection.putrequest("GET", path, skip_host="Host" in headers)
+    for name, value in headers.items():
+        connection.putheader(name, value)
+    connection.endheaders()
+    answer = connection.getresponse()
+    return answer.status, answer.read().decode(), dict(answer.getheaders())
+
+
+def path_of(server: Server) -> str:
+    return "/" + server.address.split("/", 3)[3]
+
+
+def socket_of(server: Server, **options: Any) -> Any:
+    address = server.address.replace("http", "ws") + "live"
+    return websockets.connect(address, proxy=None, **options)
+
+
+def unpacked(message: bytes) -> tuple[dict[str, Any], np.ndarray]:
+    length = int.from_bytes(message[:4], "little")
+    return json.loads(message[4 : 4 + length]), np.frombuffer(message[4 + length :], "<f4")
+
+
+def test_the_page_is_at_the_address_and_nowhere_else(server: Server) -> None:
+    status, body, headers = asked(server, path_of(server))
+    assert (status, body) == (200, "<p>the page")
+    assert headers["Cache-Control"] == "no-store" and headers["X-Frame-Options"] == "DENY"
+    for path in ("/", "/live", "/../etc/passwd", path_of(server)[:-2] + "x/", "/" + "x" * 500):
+        assert asked(server, path)[0] == 404
+    with Server(Running().session, b"") as other:
+        assert path_of(other) != path_of(server)
+
+
+def test_other_names_and_other_pages_are_refused(server: Server) -> None:
+    """A page elsewhere whose name is made to mean this machine, and one that knows the address."""
+    assert asked(server, path_of(server), Host="evil.example:80")[0] == 403
+    assert asked(server, path_of(server), Host="localhost:9000")[0] == 200
+    from websockets.exceptions import InvalidStatus
+
+    with pytest.raises(InvalidStatus, match="403"), socket_of(server, origin="http://evil.example"):
+        pass
+    with socket_of(server, origin=server.address.rsplit("/", 2)[0]) as watcher:
+        assert watcher.recv(10)
+
+
+def test_watchers_see_frames_and_are_obeyed(server: Server, running: Running) -> None:
+    running.until(lambda f: f.fired > 3)
+    with socket_of(server) as one, socket_of(server) as other:
+        frame, poses = unpacked(one.recv(10))
+        assert poses.size == 7 * len(running.session.bodies) and np.isfinite(poses).all()
+        assert len(frame["fired"]) == frame["count"] > 3
+        other.send('{"do": "slow", "robot": 1, "factor": 0.5}')
+        while not frame["slowed"]:
+            frame, _ = unpacked(one.recv(10))
+        assert frame["slowed"] == {"1": 0.5}
+        other.send('{"do": "fly"}')
+        while isinstance(message := other.recv(10), bytes):
+            pass
+        assert "'do' is 'fly'" in json.loads(message)["error"]
+        other.send("x" * 100_000)
+    running.until(lambda f, n=running.session.frame.number: f.number > n)
+
+
+def test_every_firing_is_told_once(server: Server, running: Running) -> None:
+    with socket_of(server) as watcher:
+        running.session.send(Speed(0.0))
+        told: list[tuple[float, int]] = []
+        while len(told) < 150:
+            frame, _ = unpacked(watcher.recv(10))
+            told += map(tuple, frame["fired"])
+            assert len(told) == frame["count"]
+    assert told == running.session.fired(0, 0, len(told))
+
+
+def test_it_listens_on_loopback_only(running: Running) -> None:
+    for host in ("0.0.0.0", "::", "192.0.2.1", "example.org"):
+        with pytest.raises(InputError, match="other machines"):
+            Server(running.session, b"", host)
+    with Server(running.session, b"") as server:
+        assert server._server.socket.getsockname()[0] == "127.0.0.1"
+    with Server(running.session, b"", "0.0.0.0", exposed=True) as server:
+        path = path_of(server)
+        assert asked(server, path, Host="factory.example:80")[0] == 200
+        assert asked(server, "/")[0] == 404
+
+
+def test_a_port_that_is_taken(running: Running) -> None:
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        taken.listen()
+        with pytest.raises(InputError, match=r"cannot listen on 127\.0\.0\.1, port"):
+            Server(running.session, b"", port=taken.getsockname()[1])
+
+
+def test_the_page_names_every_robot_and_part(running: Running) -> None:
+    made = page(Session(lambda: Simulation(paper_layout(), units=9))).decode()
+    data = json.loads(made.split('id="data">')[1].split("</script>")[0])
+    assert data["parts"] == [o.label for o in paper_layout().factory.leaves]
+    assert len(data["frames"]["reach"][0]) == len(data["frames"]["moving"])
+    assert "connect-src 'self'" in made and 'class="station"' in made
+
+
+# --- the command -------------------------------------------------------------------------------
+
+
+def test_the_command_serves_until_it_is_interrupted() -> None:
+    words = ("view", PAPER, "--port", 0, "--json", "--jitter", 0.2)
+    with started(*words, stdout=PIPE, text=True) as process:
+        told = json.loads(process.stdout.readline())
+        assert told["address"].startswith(f"http://127.0.0.1:{told['port']}/")
+        with websockets.connect(
+            told["address"].replace("http", "ws") + "live", proxy=None
+        ) as watcher:
+            assert unpacked(watcher.recv(10))[0]["playing"]
+            process.send_signal(signal.SIGINT)
+            assert process.wait(20) == 130
+
+
+def test_other_hosts_need_a_word(run: Terminal) -> None:
+    done = run("view", PAPER, "--host", "0.0.0.0", "--json")
+    assert done.status == 2 and done.codes == ["BadValue"]
+    assert "--expose" in done.json["errors"][0]["hint"]
+
+
+def test_every_kind_has_a_name() -> None:
+    assert {kind for kind, _ in KINDS.values()} == {
+        *(Pause, Play, Step, Restart, Speed, Push, Slow, Block)
+    }

@@ -1,0 +1,135 @@
+"""The live page in a real browser without a screen: it shows the run, and its buttons act on it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from time import monotonic
+from typing import Any
+
+import pytest
+
+from factory.live import Server
+from factory.live.page import page
+from tests.test_live import Running
+from tests.test_report_browser import CHROMIUM, browser  # noqa: F401
+
+pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="no chromium: apt-get install chromium")
+
+LONG = 20.0
+"""A browser that draws in software is given so long [s]."""
+
+
+class Watched:
+    """A running factory with a page open on it."""
+
+    def __init__(self, browser: Any, **options: Any) -> None:  # noqa: F811
+        self.running = Running()
+        self.server = Server(self.running.session, page(Running(False).session))
+        self.context = browser.new_context(viewport={"width": 1400, "height": 900}, **options)
+        self.page = self.context.new_page()
+        self.trouble: list[str] = []
+        self.page.on("console", lambda m: self.trouble.append(f"{m.type}: {m.text}"))
+        self.page.on("pageerror", lambda error: self.trouble.append(str(error)))
+        self.page.goto(self.server.address)
+        self.page.evaluate("factoryView.ready")
+
+    def until(self, words: str) -> None:
+        """Wait until something holds of the newest frame, `f`."""
+        self.seen(f"f => f && ({words})", "factoryView.frame")
+
+    def seen(self, holds: str, of: str) -> None:
+        """Wait until something holds; the page's policy lets it evaluate nothing by itself."""
+        end = monotonic() + LONG
+        while not self.page.evaluate(f"({holds})({of})"):
+            assert monotonic() < end, self.page.evaluate("factoryView.frame")
+            self.page.wait_for_timeout(30)
+
+    def press(self, name: str) -> None:
+        self.page.get_by_role("button", name=name, exact=True).click()
+
+    def close(self) -> None:
+        self.context.close()
+        self.server.close()
+        self.running.close()
+
+
+@pytest.fixture
+def watched(browser: Any) -> Iterator[Watched]:  # noqa: F811
+    made = Watched(browser)
+    yield made
+    made.close()
+
+
+def test_robots_tokens_and_bars_move(watched: Watched) -> None:
+    watched.until("f.count > 8")
+    look = """() => [
+        factoryView.robot(1),
+        [...document.querySelectorAll('.token.on')].map(t => t.dataset.token),
+        document.querySelectorAll('.rolling .op').length,
+    ]"""
+    first = watched.page.evaluate(look)
+    watched.until(f"f.count > {watched.page.evaluate('factoryView.frame.count') + 8}")
+    watched.press("Pause")
+    watched.until("!f.playing")
+    watched.page.wait_for_timeout(300)
+    robot, tokens, bars = watched.page.evaluate(look)
+    assert robot != first[0] and tokens != first[1] and bars > first[2]
+    frame = watched.page.evaluate("factoryView.frame")
+    assert sorted(map(int, tokens)) == sorted(frame["marked"]), "the drawing is the marking"
+    world = watched.running.session.simulation.world
+    assert robot == pytest.approx(world.d.xpos[world.m.body("r2/carriage").id], abs=1e-3)
+    assert watched.trouble == []
+
+
+def test_buttons_step_slow_push_and_block(watched: Watched) -> None:
+    watched.until("f.count > 2")
+    watched.press("Pause")
+    watched.until("!f.playing")
+    before = watched.page.evaluate("factoryView.frame.count")
+    watched.press("Next firing")
+    watched.until(f"f.count > {before} && !f.playing")
+    watched.press("Play")
+    watched.page.locator("#gantt button[data-robot='1']").click()
+    watched.press("25 %")
+    watched.until("f.slowed['1'] === 0.25")
+    slowed = "[...document.querySelectorAll('#gantt button.slowed')].map(b => b.textContent)"
+    watched.seen("names => names.join() === 'r2'", slowed)
+    button = watched.page.get_by_role("button", name="ahead ▸▸")
+    button.hover()
+    watched.page.mouse.down()
+    world = watched.running.session.simulation.world
+    body = world.m.body("r2/carriage").id
+    watched.running.until(lambda f: abs(world.d.xfrc_applied[body, :3]).max() > 1)
+    watched.page.mouse.up()
+    watched.running.until(lambda f: abs(world.d.xfrc_applied[body, :3]).max() == 0)
+    watched.press("r2 at 25 % ✕")
+    watched.until("!f.slowed['1']")
+    watched.page.locator("#tree [data-label] b", has_text="part1").click()
+    watched.press("is blocked")
+    watched.page.locator("#speed").select_option("10")
+    watched.until("f.note.includes('feeder of part1')")
+    watched.seen("note => !note.hidden", "document.getElementById('note')")
+    watched.press("gives parts")
+    watched.until("!f.note")
+    watched.press("Begin anew")
+    watched.until("f.run === 1")
+    assert watched.trouble == []
+
+
+def test_it_comes_back_when_the_socket_does(watched: Watched) -> None:
+    watched.until("f.count > 2")
+    (connection,) = watched.server._server.connections
+    connection.close()
+    said = "document.getElementById('socket').textContent"
+    watched.seen("words => words === 'closed'", said)
+    watched.seen("words => words === 'open'", said)
+
+
+def test_a_phone_shows_it_in_one_column(browser: Any) -> None:  # noqa: F811
+    watched = Watched(browser, device_scale_factor=2)
+    watched.page.set_viewport_size({"width": 390, "height": 800})
+    watched.until("f.count > 2")
+    wide = watched.page.evaluate("document.documentElement.scrollWidth")
+    assert wide <= 390
+    watched.close()
+    assert watched.trouble == []
