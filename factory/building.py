@@ -7,8 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from factory.errors import Diagnostic, RunError
-from factory.factory import Factory
+from factory.errors import RunError
 from factory.files import write_all
 from factory.layout.certificate import Certificate
 from factory.layout.plan import Layout
@@ -29,19 +28,6 @@ class Built:
     mjcf: Path | None
     files: tuple[Path, ...]
     clearance: dict[str, Any]
-
-
-def refuse_unproved(factory: Factory) -> Verdict:
-    """The verdict on the net. Raises RunError where some property is not proved."""
-    from factory.nets.verify import verify
-
-    verdict = verify(factory.net)
-    if not verdict.holds:
-        raise RunError(
-            Diagnostic("NotProved", str(witness), None, "see factory check")
-            for witness in verdict.witness
-        )
-    return verdict
 
 
 def build_all(

@@ -63,10 +63,10 @@ def run_file(
 ) -> Run:
     """One run, filmed, logged and watched by a monitor as asked. Raises MissingError where a film
     needs GL that is not there, before anything is written."""
-    from factory.building import refuse_unproved
+    from factory.nets.verify import proved
     from factory.progress import Progress
 
-    refuse_unproved(layout.factory)
+    proved(layout.factory.net)
     shown: Shown | None = None
     if options.get("world") == "ideal":
         for key, purpose in (

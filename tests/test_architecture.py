@@ -34,7 +34,7 @@ ROOMS = [
         "wholes",
     },
     {"layout"},
-    {"control", "prediction", "relaying"},
+    {"control", "prediction", "relaying", "planning"},
     {"mjcf"},
     {"trace"},
     {"supervisor", "distributed", "world"},

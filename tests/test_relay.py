@@ -5,6 +5,8 @@ from __future__ import annotations
 
 import json
 import random
+import sqlite3
+from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
 
@@ -254,3 +256,26 @@ def test_a_net_has_no_guidepaths(run: Terminal, tmp_path: Path) -> None:
     said = run("check", file, "--relay")
     assert said.status == 2
     assert "--relay is for a PAG: a net has no guidepaths" in said.err
+
+
+def test_sweeps_and_exports_with_relays_are_those_of_a_run(run: Terminal, out: Path) -> None:
+    file = out / "cube.pag"
+    file.write_text(cube(32))
+    words = ("--relay", "--world", "ideal")
+    database = out / "r.db"
+    swept = run("sweep", file, "--vary", "speed=0.3,0.6", *words, "-o", database, "--json")
+    assert (swept.status, swept.json["done"]) == (0, 2)
+    with closing(sqlite3.connect(database)) as opened:
+        rows = opened.execute("SELECT speed, robots, cycle_time_s FROM runs ORDER BY speed")
+        kept = {speed: (robots, seconds) for speed, robots, seconds in rows}
+    for speed, row in kept.items():
+        done = run("run", file, *words, "--units", 4, "--speed", speed, "--json").json
+        assert row == (done["robots"], done["cycle_time_s"])
+        assert done["robots"] > run("check", file, "--json").json["robots"]
+    dot = run("export", file, "--relay", "--format", "dot").out
+    plan = run("build", file, "--relay", "--speed", 0.3, "-o", out / "all", "--json").json
+    assert "relay" in dot and "relay" not in run("export", file, "--format", "dot").out
+    assert plan["robots"] == kept[0.3][0]
+    for more in ((), ("--no-fuse",)):
+        other = run("sweep", file, "--vary", "speed=0.3", *more, "-o", database, "--json")
+        assert other.status == 2 and "other" in other.json["errors"][0]["message"]

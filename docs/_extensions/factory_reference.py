@@ -43,7 +43,7 @@ ERRORS = ("FactoryError", "InputError", "MissingError", "RunError", "Diagnostic"
 
 def commands() -> str:
     """Every command with its options, as click knows them."""
-    top = click.Context(cli, info_name="factory")
+    top = click.Context(cli, info_name="factory", **cli.context_settings)
     shared = {p.name for p in cli.commands["doctor"].params}
     lines = [heading(1, "Commands"), prose(cli.help or "")]
     lines.append(

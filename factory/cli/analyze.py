@@ -117,15 +117,15 @@ def _analyze_pag(
     from factory.analysis import Timing, analyse
     from factory.analysis.document import document
     from factory.analysis.picture import check_picture, picture
-    from factory.building import refuse_unproved
     from factory.files import write_bytes
+    from factory.nets.verify import proved
 
     check_writable(file, output)
     check_picture(output)
     log = _log(options["measured"], options["on_the_spot"])
     made = _conditions(file, log, options)
     source, factory, layout = plan(file, folders, made.settings, options["floor"], options)
-    refuse_unproved(factory)
+    proved(factory.net)
     warn(layout.product.warnings, quiet)
     timing = Timing(layout, made.settings, made.world, made.seed, made.jitter)
     asked = _asked(factory, options)

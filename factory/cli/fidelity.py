@@ -69,12 +69,12 @@ def fidelity(
     **options: Any,
 ) -> int:
     """Compare FILE.pag in MuJoCo with the ideal world over the same seeds."""
-    from factory.building import refuse_unproved
     from factory.fidelity import measure, study
     from factory.fidelity.bar import Bar
     from factory.fidelity.comparing import Case
     from factory.fidelity.convergence import runs
     from factory.fidelity.report import check_report, document, write_report
+    from factory.nets.verify import proved
 
     check_report(output)
     if output is not None:
@@ -82,7 +82,7 @@ def fidelity(
         writable(file, output) if is_file else writable_folder(output)
     settings = settings_of(file, options)
     _, factory, layout = plan(file, folders, settings, floor, options)
-    refuse_unproved(factory)
+    proved(factory.net)
     warn(layout.product.warnings, quiet)
     jobs = jobs or os.cpu_count() or 1
     with Bar(seeds + (runs() if convergence else 0), quiet or as_json) as bar:

@@ -59,7 +59,8 @@ def build(
 ) -> int:
     """Compile, verify and lay out FILE.pag; write the MJCF model, the floor plan, the net."""
     from factory import receipt
-    from factory.building import build_all, refuse_unproved
+    from factory.building import build_all
+    from factory.nets.verify import proved
 
     begin = perf_counter()
     writable(file, mjcf)
@@ -70,7 +71,7 @@ def build(
     told = receipt.find(name)
     if told is None:
         source, factory, layout = plan(file, folders, settings, floor, options)
-        verdict = refuse_unproved(factory)
+        verdict = proved(factory.net)
         spent = perf_counter() - begin
         built = build_all(source, layout, settings, mjcf, output, units, wip, verdict)
         told = _told(layout, built, settings, spent)

@@ -7,12 +7,15 @@ from collections.abc import Callable, Mapping, Sequence
 from math import isfinite
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 from click.shell_completion import CompletionItem
 
 from factory.errors import Diagnostic, InputError
+
+if TYPE_CHECKING:
+    from factory.planning import Ground
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -183,20 +186,20 @@ def plan(
 ) -> tuple[Any, Any, Any]:
     """PAG to layout; warnings on stderr. Gives source, factory and layout. `options`: those of
     RELAY, where a command has them."""
-    from factory.layout.durations import Pace
-    from factory.layout.embedding import lay_out
     from factory.pipeline import read
 
     source = read(file, folders)
-    factory = source.compile()
-    product = source.product
-    room = pair(floor, "--floor", "4x3", float)
-    layout = lay_out(factory, product, settings.clearance, room, Pace.of(settings))
-    if options.get("relay") or options.get("cycle"):
-        from factory.relaying import relayed
-
-        layout = relayed(layout, settings, options.get("cycle"), room)
+    factory, product = source.compile(), source.product
+    layout = ground(floor, options).lay_out(factory, product, settings)
     return source, layout.factory, layout
+
+
+def ground(floor: str | None, options: Mapping[str, Any]) -> Ground:
+    """What FLOOR and RELAY ask for. Raises InputError (Usage)."""
+    from factory.planning import Ground
+
+    room = pair(floor, "--floor", "4x3", float)
+    return Ground(room, bool(options.get("relay")), options.get("cycle"))
 
 
 def writable(file: Path | None, *outputs: Path | None) -> None:

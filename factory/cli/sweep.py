@@ -13,8 +13,9 @@ from factory.cli.options import (
     MOTION,
     OUTPUT,
     PATH,
+    RELAY,
     Number,
-    pair,
+    ground,
     plan,
     settings_of,
     writable,
@@ -52,7 +53,9 @@ SHOWN = 8
 @click.option("--jitter", type=Number(0, 0.9), help="As of `run`; default: 0.")
 @click.option("--wip", type=click.IntRange(1, 10**9), help="Copies of each part let in at once.")
 @click.option("--max-time", type=Number(0, min_open=True), help="Stop a run after this time [s].")
+@click.option("--fuse/--no-fuse", default=None, help="As of `run`.")
 @FLOOR
+@RELAY
 @MOTION
 @OUTPUT
 def sweep(
@@ -103,7 +106,7 @@ def _carry_out(
     options: dict[str, Any],
 ) -> tuple[Tally, Path]:
     """Plan, prove and run. Raises InputError for what cannot be."""
-    from factory.building import refuse_unproved
+    from factory.nets.verify import proved
     from factory.pipeline import read
     from factory.sweep.grid import DEFAULTS, SETTINGS, read_axes
     from factory.sweep.local import cores
@@ -130,13 +133,13 @@ def _carry_out(
         source = read(file, options["folders"])
         factory = source.compile()
     else:  # a layout that cannot be is told before anything is run
-        source, factory, _ = plan(file, options["folders"], settings, options["floor"])
-    refuse_unproved(factory)
+        source, factory, _ = plan(file, options["folders"], settings, options["floor"], options)
+    proved(factory.net)
     warn(source.product.warnings, quiet)
     fixed = {name: getattr(settings, name) for name in SETTINGS}
     fixed |= {k: options[k] for k in DEFAULTS if options[k] is not None}
-    floor = pair(options["floor"], "--floor", "4x3", float)
-    recipe = Recipe(factory, source.product, fixed, options["max_time"], floor)
+    most, room = options["max_time"], ground(options["floor"], options)
+    recipe = Recipe(source.compile(), source.product, fixed, most, room, options["fuse"])
     jobs = options["jobs"] or cores()
     done = sweep(recipe, axes, database, jobs, options["on"], options["retry"], quiet)
     return done, database

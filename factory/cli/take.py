@@ -13,8 +13,9 @@ from factory.cli.options import (
     MOTION,
     OUTPUT,
     PATH,
+    RELAY,
     SOURCE,
-    pair,
+    ground,
     settings_of,
     writable,
     writable_folder,
@@ -42,6 +43,7 @@ class _Listing(click.Command):
 @click.option("-o", "--output", type=PATH, help="A file; stdout without, for texts.")
 @click.option("--of", default="", help="What to export of it, where a format offers a choice.")
 @FLOOR
+@RELAY
 @MOTION
 @OUTPUT
 def export(
@@ -67,7 +69,7 @@ def export(
         file,
         folders,
         settings_of(file, options),
-        pair(floor, "--floor", "4x3", float),
+        ground(floor, options),
         of,
         output.name if output else "",
         whole,

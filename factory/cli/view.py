@@ -56,15 +56,15 @@ def view(
     **options: Any,
 ) -> int:
     """Run FILE.pag for ever and show it in a browser: pause it, push robots, block feeders."""
-    from factory.building import refuse_unproved
     from factory.interruption import Interruption
     from factory.live import Server, Session
     from factory.live.page import page
+    from factory.nets.verify import proved
     from factory.running import simulation
 
     settings = settings_of(file, options)
     source, factory, layout = plan(file, folders, settings, floor, options)
-    refuse_unproved(factory)
+    proved(factory.net)
     warn(layout.product.warnings, quiet)
     options |= {"units": FOR_EVER, "fuse": False}
     session = Session(lambda: simulation(source, layout, settings, options), not paused)

@@ -17,6 +17,7 @@ from factory.log import Log, is_log, read_log
 from factory.nets.gears import GearNet
 from factory.nets.marked import MarkedNet
 from factory.pipeline import Source, read
+from factory.planning import Ground
 from factory.settings import Settings
 
 SOURCES = {"net": ("a PAG", "a net in PNML"), "pag": ("a PAG",), "log": ("a log",)}
@@ -28,13 +29,13 @@ class Subject:
     """A file to be exported, read and compiled only as far as an exporter asks.
 
     `of`: what is wanted of it, "" for the usual; `name`: of the file that is written; `whole`:
-    whether a folder with everything is wanted; `room`: width and depth of the floor there is [m].
+    whether a folder with everything is wanted; `ground`: what it is laid out for.
     """
 
     file: Path
     folders: tuple[Path, ...] = ()
     settings: Settings = field(default_factory=Settings)
-    room: tuple[float, float] | None = None
+    ground: Ground = Ground()  # noqa: RUF009
     of: str = ""
     name: str = ""
     whole: bool = False
@@ -68,8 +69,8 @@ class Subject:
 
     @cached_property
     def factory(self) -> Factory:
-        """What it compiles to."""
-        return self.source.compile()
+        """What it compiles to, with the relays of its layout if there are to be any."""
+        return self.layout.factory if self.ground.relay else self.source.compile()
 
     @property
     def product(self) -> Product:
@@ -88,10 +89,8 @@ class Subject:
 
     @cached_property
     def layout(self) -> Layout:
-        """The factory laid out. Raises InputError where there is no room."""
-        from factory.layout.embedding import lay_out
-
-        return lay_out(self.factory, self.product, self.settings.clearance, self.room)
+        """The factory laid out. Raises RunError where there is no room."""
+        return self.ground.lay_out(self.source.compile(), self.product, self.settings)
 
     @cached_property
     def log(self) -> Log:

@@ -11,7 +11,7 @@ from collections.abc import Iterator, Mapping
 from itertools import islice
 
 from factory.collector import collector_paused
-from factory.errors import Position
+from factory.errors import Diagnostic, Position, RunError
 from factory.nets.behaviour import behaviour
 from factory.nets.composition import MOST, Composition, compose
 from factory.nets.explore import LIMIT
@@ -20,6 +20,18 @@ from factory.nets.marked import MarkedNet, marked
 from factory.nets.verdict import Fault, Verdict, Witness, listing, testify
 
 __all__ = ["Verdict", "Witness", "verify"]
+
+
+def proved(net: GearNet) -> Verdict:
+    """The verdict on a net all of whose properties hold. Raises RunError (NotProved) with a witness
+    for each that does not."""
+    verdict = verify(net)
+    if not verdict.holds:
+        raise RunError(
+            Diagnostic("NotProved", str(witness), None, "see factory check")
+            for witness in verdict.witness
+        )
+    return verdict
 
 
 @collector_paused()

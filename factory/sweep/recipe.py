@@ -18,6 +18,7 @@ from factory.geometry import Product
 from factory.lang.pag_writer import write_pag
 from factory.lang.template_writer import write_template
 from factory.pickling import pickle_locked_mappings
+from factory.planning import Ground
 from factory.sweep.grid import DEFAULTS, SETTINGS, Axis, Point, Value
 
 pickle_locked_mappings()  # of which factories are full
@@ -26,14 +27,16 @@ pickle_locked_mappings()  # of which factories are full
 @dataclass(frozen=True)
 class Recipe:
     """A factory, the solids of its product, the values of keys that are the same in all runs, the
-    simulated time after which a run is given up [s], the floor's width and depth [m]. It holds all
-    that a worker needs: no file of the user's is read there."""
+    simulated time after which a run is given up [s], what it is laid out for, whether joined parts
+    become one body (None: where that pays). It holds all that a worker needs: no file of the user's
+    is read there."""
 
     factory: Factory
     product: Product
     fixed: Mapping[str, Value]
     max_time: float | None = None
-    floor: tuple[float, float] | None = None
+    ground: Ground = Ground()  # noqa: RUF009
+    fuse: bool | None = None
 
     def at(self, point: Point) -> dict[str, Value]:
         """The value of every key at a point."""
@@ -50,7 +53,10 @@ class Recipe:
             **versions(),
             "varied": varied,
             "max_time": self.max_time,
-            "floor": list(self.floor) if self.floor else None,
+            "floor": list(self.ground.floor) if self.ground.floor else None,
+            "relay": self.ground.relay,
+            "cycle": self.ground.cycle,
+            "fuse": self.fuse,
             **fixed,
         }
 

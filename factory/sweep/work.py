@@ -12,15 +12,15 @@ from time import perf_counter
 from typing import Any, Literal, TypeVar
 
 from factory.errors import FactoryError
-from factory.layout.durations import Pace
-from factory.layout.embedding import lay_out
 from factory.layout.plan import Layout
+from factory.nets.verify import proved
 from factory.robots import load_catalogue
 from factory.settings import Settings
 from factory.simulation import Compiled, Simulation, compiled
 from factory.sweep.grid import Point
 from factory.sweep.recipe import Recipe, settings_at
 from factory.trace import Run
+from factory.wholes import fusing_pays
 
 T = TypeVar("T")
 
@@ -109,14 +109,21 @@ class Runner:
             self.catalogue,
             wip=wip,
             compiled=shared,
+            fuse=self._fuse(layout),
         )
         return simulation.run(max_time=self.recipe.max_time)
+
+    def _fuse(self, layout: Layout) -> bool:
+        asked = self.recipe.fuse
+        return fusing_pays(layout.factory) if asked is None else asked
 
     def _lay_out(self, settings: Settings) -> Layout | FactoryError:
         recipe = self.recipe
         try:
-            pace = Pace.of(settings)
-            return lay_out(recipe.factory, recipe.product, settings.clearance, recipe.floor, pace)
+            layout = recipe.ground.lay_out(recipe.factory, recipe.product, settings)
+            if layout.plain is not None:  # relays, and their net, depend on the settings
+                proved(layout.factory.net)
+            return layout
         except FactoryError as error:
             return error
 
@@ -125,7 +132,7 @@ class Runner:
     ) -> Compiled | FactoryError:
         try:
             layout = _or_raise(self._layout(settings))
-            return compiled(layout, world, units, settings, self.catalogue, wip)
+            return compiled(layout, world, units, settings, self.catalogue, wip, self._fuse(layout))
         except FactoryError as error:
             return error
 

@@ -1,0 +1,33 @@
+"""How a factory is laid out for a run: at the pace of its settings, with relays if asked for."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from factory.factory import Factory
+from factory.geometry import Product
+from factory.layout.durations import Pace
+from factory.layout.embedding import lay_out
+from factory.layout.plan import Layout
+from factory.settings import Settings
+
+
+@dataclass(frozen=True, slots=True)
+class Ground:
+    """What a layout is made for, beside settings: width and depth of the floor [m], None for as
+    much as it takes; whether guidepaths are shared among `relay` robots, and the `cycle` time [s]
+    that those are to reach, None for the shortest."""
+
+    floor: tuple[float, float] | None = None
+    relay: bool = False
+    cycle: float | None = None
+
+    def lay_out(self, factory: Factory, product: Product, settings: Settings) -> Layout:
+        """The layout of a compiled factory. Raises RunError (Layout) where there is no room."""
+        pace = Pace.of(settings)
+        layout = lay_out(factory, product, settings.clearance, self.floor, pace)
+        if not (self.relay or self.cycle):
+            return layout
+        from factory.relaying import relayed
+
+        return relayed(layout, settings, self.cycle, self.floor)
