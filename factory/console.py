@@ -8,6 +8,7 @@ from __future__ import annotations
 import json
 import sys
 from collections.abc import Iterable, Mapping
+from contextlib import suppress
 from dataclasses import replace
 from math import isfinite
 from typing import Any
@@ -54,11 +55,13 @@ def warning(diagnostic: Diagnostic) -> str:
 
 
 def fail(error: FactoryError, as_json: bool) -> int:
-    """Report an error where the user looks for it; its exit status."""
-    if as_json:
-        emit({"errors": [d.as_json() for d in error.diagnostics]})
-    for diagnostic in error.diagnostics:
-        print(diagnostic, file=sys.stderr)
+    """Report an error where the user looks for it, if anybody does; its exit status."""
+    with suppress(BrokenPipeError):
+        if as_json:
+            emit({"errors": [d.as_json() for d in error.diagnostics]})
+    with suppress(BrokenPipeError):
+        for diagnostic in error.diagnostics:
+            print(diagnostic, file=sys.stderr)
     return error.exit_status
 
 

@@ -379,15 +379,17 @@ def test_the_page_names_every_robot_and_part(running: Running) -> None:
 
 def test_the_command_serves_until_it_is_interrupted() -> None:
     words = ("view", PAPER, "--port", 0, "--json", "--jitter", 0.2)
-    with started(*words, stdout=PIPE, text=True) as process:
+    with started(*words, stdout=PIPE, stderr=PIPE, text=True) as process:
         told = json.loads(process.stdout.readline())
         assert told["address"].startswith(f"http://127.0.0.1:{told['port']}/")
         with websockets.connect(
             told["address"].replace("http", "ws") + "live", proxy=None
         ) as watcher:
             assert unpacked(watcher.recv(10))[0]["playing"]
+            process.stdout.close()  # nobody reads any more
             process.send_signal(signal.SIGINT)
             assert process.wait(20) == 130
+        assert process.stderr.read().strip() == "Interrupted stopped by the user"
 
 
 def test_other_hosts_need_a_word(run: Terminal) -> None:

@@ -28,15 +28,13 @@ from factory.disturbance.values import (
 from factory.engine import mujoco
 from factory.errors import Diagnostic, InputError, did_you_mean
 from factory.mjcf import names
+from factory.world.stock import AWAKE, FRESH
 
 if TYPE_CHECKING:
     from factory.simulation import Simulation
 
 Measure = Callable[[Array, Array], tuple[Array, Array]]
 """True positions [m] and speeds [m/s] of the axes -> measured ones; called once a timestep."""
-
-AWAKE = -0.0
-"""Written over a speed of zero it wakes a sleeping body and changes nothing else."""
 
 HARD = 0.9999
 """Impedance of dry friction: at the engine's default of 0.9 a robot creeps under forces far below
@@ -150,7 +148,7 @@ class _Acting:
         """The engine lets sleep what stands still, whatever its drive says."""
         self.d.qvel[self.dof[self.d.qvel[self.dof] == 0.0]] = AWAKE
         asleep = self.d.tree_asleep[self.tree]
-        self.d.tree_asleep[self.tree[asleep < 0]] = -1 - mujoco.mjMINAWAKE
+        self.d.tree_asleep[self.tree[asleep < 0]] = FRESH
 
     def _weigh(self, mass: Mass) -> None:
         copies = self.simulation.model.copies  # type: ignore[union-attr]

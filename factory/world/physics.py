@@ -25,7 +25,7 @@ from factory.mjcf.binary import cached, keep
 from factory.mjcf.model import CARRIAGE_MASS, GRAVITY, HEAD_MASS, HOIST_MASS, Model
 from factory.mjcf.outfeed import TRAY_MASS
 from factory.world.inspection import Inspection
-from factory.world.stock import Stock
+from factory.world.stock import AWAKE, FRESH, Stock
 
 NEAR = 1e-3
 """The tray is somewhere when it is within this [m]."""
@@ -35,9 +35,6 @@ GIVEN_UP = tuple(
     for name in ("BADQPOS", "BADQVEL", "BADQACC", "BADCTRL")
 )
 """Warnings after which the engine has begun anew, or let go of the drives."""
-
-AWAKE = -0.0
-"""Written over a speed of zero it wakes a sleeping body and changes nothing else."""
 
 DOZE = int(mujoco.mjMINAWAKE) // 2
 """Steps of the engine between looks at who sleeps: it takes twice as many of a slow body to doze
@@ -206,33 +203,33 @@ class MujocoWorld:
         """Timesteps of the engine, with the setpoints of all moving robots kept up to date: of
         those in modes, and of those that `move` has set going or stopped."""
         m, d = self.m, self.d
-        table, ctrl, setpoints = self._course, self._ctrl, d.ctrl
+        rows = np.empty((substeps + 1, len(d.ctrl)))
+        rows[:] = d.ctrl
+        gone, self._gone = self._gone, self._gone + substeps
+        creeping = self._creeping
+        if self._course is None:
+            creeping = creeping[:0]
+        else:
+            rows[:, self._ctrl] = self._course[gone : gone + substeps + 1]
         axes = np.flatnonzero(self._due)
         if len(axes):
             begun, x, v, a = self._plan[:, axes]
             own, slow = self._setpoints(axes, x, v, a, d.time - begun)
-            inputs = self._inputs(axes)
-        gone, self._gone = self._gone, self._gone + substeps
-        for step in range(substeps):
-            dozing = (gone + step) % DOZE == 0
-            if table is not None:
-                setpoints[ctrl] = table[gone + step]
-                if dozing and len(self._creeping):
-                    self._rouse(self._creeping)
-            if len(axes):
-                setpoints[inputs] = own[step]
-                if dozing and len(slow):
-                    self._rouse(slow)
+            rows[:, self._inputs(axes)] = own[: substeps + 1]
+            creeping = np.concatenate([creeping, slow])
+            self._due[axes] = self._plan[2:, axes].any(axis=0)
+        setpoints, step, spent = d.ctrl, mujoco.mj_step, 0.0
+        for number in range(substeps):
+            setpoints[:] = rows[number]
+            if len(creeping) and (gone + number) % DOZE == 0:
+                self._rouse(creeping)
             begin = perf_counter()
-            mujoco.mj_step(m, d)
-            self.physics_time += perf_counter() - begin
+            step(m, d)
+            spent += perf_counter() - begin
             if d.ncon:
                 self.inspection.contacts()
-        if table is not None:
-            setpoints[ctrl] = table[gone + substeps]
-        if len(axes):
-            setpoints[inputs] = own[substeps]
-            self._due[axes] = self._plan[2:, axes].any(axis=0)
+        setpoints[:] = rows[substeps]
+        self.physics_time += spent
 
     def _inputs(self, axes: Index) -> Index:
         """Where in `ctrl` the setpoints of axes are (3 n,): positions, speeds, forces."""
@@ -260,7 +257,7 @@ class MujocoWorld:
         has been slow for a while, and a robot under way never comes to its goal then."""
         dof, tree = self.dof[axes], self.tree[axes]
         self.d.qvel[dof[self.d.qvel[dof] == 0.0]] = AWAKE
-        self.d.tree_asleep[tree[self.d.tree_asleep[tree] < 0]] = -1 - mujoco.mjMINAWAKE
+        self.d.tree_asleep[tree[self.d.tree_asleep[tree] < 0]] = FRESH
 
     def settle(self) -> None:
         """After a tick: look at welds, and move the outfeed's tray."""

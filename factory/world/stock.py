@@ -3,19 +3,27 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 
 from factory.engine import mujoco
 from factory.factory import Operation
+from factory.meshes import Array
 from factory.mjcf import names
 from factory.mjcf.model import Model
 from factory.mjcf.parts import parked_at, presented_at
 from factory.pag import NOPART
 from factory.world.contacts import NOBODY, Contacts
 from factory.world.fusing import RIGID, SETTLING, fuse, misfit
+
+AWAKE = -0.0
+"""Written over a speed of zero it wakes a sleeping body and changes nothing else."""
+
+FRESH = -1 - int(mujoco.mjMINAWAKE)
+"""What the engine has for a tree that has just begun to be slow."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,10 +64,12 @@ class Stock:
             label: np.array([m.body(names.part(label, n + 1)).id for n in range(count)])
             for label, count in model.copies.items()
         }
+        self._tree = np.where(m.body_dofnum > 0, m.body_treeid, -1).tolist()
         self.contacts = Contacts(m, self.body, model.excluded)
         self.tray = len(factory.robots) + 1
         self.feeder = {o.label: self.tray + 1 + n for n, o in enumerate(factory.leaves)}
         self.grip, self.park = self._grips(), self._parks()
+        self._nominal = cache(self._nominal_of)
         self.feed = {o.label: m.equality(names.feed(o.label)).id for o in factory.leaves}
         self.free: dict[str, deque[int]] = {
             label: deque(range(count)) for label, count in model.copies.items()
@@ -100,11 +110,11 @@ class Stock:
         self.shown[label] = unit
         self.next_unit[label] += 1
         body = int(self.body[label][copy])
-        self._place(body, presented_at(self.model.layout, label))
+        self._place([body], [presented_at(self.model.layout, label)])
         self.contacts.enter(label, unit, body)
         self.contacts.hold([body], self.feeder[label])
-        self._switch(self.park[label, copy], False)
-        self._switch(self.feed[label], True, body)
+        self._loose([self.park[label, copy]])
+        self._join([self.feed[label]], [body])
 
     # --- handing over --------------------------------------------------------------------------
 
@@ -128,10 +138,11 @@ class Stock:
         label = operation.label
         del self.shown[label]
         self.taken.add(label)
-        gap = self._gap([self.grip[operation.carrier, label]], [label], unit)
-        self._switch(self.feed[label], False)
-        self._switch(self.grip[operation.carrier, label], True, self.body_of(label, unit))
-        self.contacts.hold([self.body_of(label, unit)], operation.carrier + 1)
+        grip, body = [self.grip[operation.carrier, label]], [self.body_of(label, unit)]
+        gap = self._gap(grip, body)
+        self._loose([self.feed[label]])
+        self._join(grip, body)
+        self.contacts.hold(body, operation.carrier + 1)
         self.load[operation.carrier] = unit, [label]
         return Switched(1, gap)
 
@@ -147,11 +158,11 @@ class Stock:
             for label in self.load.pop(robot)[1]
         ]
         labels = [label for _, label in moved]
-        gap = self._gap([self.grip[carrier, label] for label in labels], labels, unit)
-        for robot, label in moved:
-            self._switch(self.grip[robot, label], False)
-            self._switch(self.grip[carrier, label], True, self.body_of(label, unit))
-        self.contacts.hold([self.body_of(label, unit) for label in labels], carrier + 1)
+        grips, bodies = [self.grip[carrier, label] for label in labels], self._bodies(labels, unit)
+        gap = self._gap(grips, bodies)
+        self._loose([self.grip[pair] for pair in moved])
+        self._join(grips, bodies)
+        self.contacts.hold(bodies, carrier + 1)
         self.load[carrier] = unit, kept + labels
         if operation.label in self.bodies.wholes:
             self.joining[carrier] = operation.label, float(self.d.time)
@@ -159,11 +170,11 @@ class Stock:
 
     def _release(self, operation: Operation, unit: int) -> Switched:
         del self.load[operation.carrier]
-        gap = self._gap([self.hold[part] for part in self.parts], self.parts, unit)
-        for part in self.parts:
-            self._switch(self.grip[operation.carrier, part], False)
-            self._switch(self.hold[part], True, self.body_of(part, unit))
-        self.contacts.hold(self.bodies_of(unit).tolist(), self.tray)
+        holds, bodies = [*map(self.hold.__getitem__, self.parts)], self._bodies(self.parts, unit)
+        gap = self._gap(holds, bodies)
+        self._loose([self.grip[operation.carrier, part] for part in self.parts])
+        self._join(holds, bodies)
+        self.contacts.hold(bodies, self.tray)
         self.on_tray = unit
         self.released += 1
         return Switched(len(self.parts), gap)
@@ -174,36 +185,41 @@ class Stock:
         """Let one body take the place of those that a robot has joined, once they have settled."""
         now = self.d.time
         for robot, (_, since) in list(self.joining.items()):
-            if now - since > SETTLING and robot in self.joining and self._misfit(robot) < RIGID:
-                self.fuse(robot)
+            if now - since > SETTLING and robot in self.joining:
+                apart = self._misfit(robot)
+                if apart < RIGID:
+                    self.fuse(robot, apart)
 
     def _misfit(self, robot: int) -> float:
         unit, labels = self.load[robot]
-        bodies = [self.body_of(label, unit) for label in labels]
-        places = np.array([self.bodies.centre[label] for label in labels])
-        return misfit(
-            self.d, bodies, places, np.array([self.bodies.radius[label] for label in labels])
-        )
+        places, radii = self._nominal(tuple(labels))
+        return misfit(self.d, self._bodies(labels, unit), places, radii)
 
-    def fuse(self, robot: int) -> None:
+    def _nominal_of(self, labels: tuple[str, ...]) -> tuple[Array, Array]:
+        """The centres of mass in the product, and the radii about them, of some bodies [m]."""
+        centre, radius = self.bodies.centre, self.bodies.radius
+        return np.array([centre[k] for k in labels]), np.array([radius[k] for k in labels])
+
+    def fuse(self, robot: int, apart: float | None = None) -> None:
         """Let one body take the place of those that a robot (index) has joined, if it has not yet.
-        Where no copy of that body is free, its holder's bodies become one first."""
+        Where no copy of that body is free, its holder's bodies become one first. `apart`: their
+        misfit, where it is known."""
         if robot not in self.joining:
             return
         label, _ = self.joining.pop(robot)
         if not self.free[label]:
             self.fuse(next(r for r in self.joining if label in self.load[r][1]))
         unit, labels = self.load[robot]
-        self.misfit[unit] = max(self.misfit.get(unit, 0.0), self._misfit(robot))
+        self.misfit[unit] = max(
+            self.misfit.get(unit, 0.0), self._misfit(robot) if apart is None else apart
+        )
         copy = self.free[label].popleft()
         whole = int(self.body[label][copy])
-        fuse(self.m, self.d, [self.body_of(each, unit) for each in labels], whole)
-        for each in labels:
-            self._switch(self.grip[robot, each], False)
-            self._retire(each, unit)
+        fuse(self.m, self.d, self._bodies(labels, unit), whole)
+        self._loose([*(self.grip[robot, each] for each in labels), self.park[label, copy]])
+        self._retire(labels, unit)
         self.copy_of[label, unit] = copy
-        self._switch(self.park[label, copy], False)
-        self._switch(self.grip[robot, label], True, whole)
+        self._join([self.grip[robot, label]], [whole])
         self.contacts.enter(label, unit, whole)
         self.contacts.hold([whole], robot + 1)
         self.load[robot] = unit, [label]
@@ -214,7 +230,10 @@ class Stock:
 
     def bodies_of(self, unit: int) -> np.ndarray:
         """The bodies of all parts of a unit, in the order of `parts`."""
-        return np.array([self.body_of(part, unit) for part in self.parts])
+        return np.array(self._bodies(self.parts, unit))
+
+    def _bodies(self, labels: Sequence[str], unit: int) -> list[int]:
+        return [self.body_of(label, unit) for label in labels]
 
     def finished(self, unit: int) -> tuple[np.ndarray, float]:
         """The bodies of a finished product, and its misfit [m]."""
@@ -236,18 +255,20 @@ class Stock:
         assert unit is not None
         self.left.append(float(self.d.time))
         self.misfit.pop(unit, None)
-        for part in self.parts:
-            self._switch(self.hold[part], False)
-            self._retire(part, unit)
+        self._loose([self.hold[part] for part in self.parts])
+        self._retire(self.parts, unit)
 
-    def _retire(self, label: str, unit: int) -> None:
-        """Return a body of a unit out of sight, and a part to its feeder where that is empty."""
-        copy = self.copy_of.pop((label, unit))
-        self.contacts.leave(label, unit)
-        self._put_away(label, copy)
-        self.free[label].append(copy)
-        if label in self.feed:
-            self.feed_next(label)
+    def _retire(self, labels: Sequence[str], unit: int) -> None:
+        """Return bodies of a unit out of sight, and parts to their feeders where those are
+        empty."""
+        copies = [self.copy_of.pop((label, unit)) for label in labels]
+        for label in labels:
+            self.contacts.leave(label, unit)
+        self._put_away(labels, copies)
+        for label, copy in zip(labels, copies, strict=True):
+            self.free[label].append(copy)
+            if label in self.feed:
+                self.feed_next(label)
 
     # --- welds and bodies ----------------------------------------------------------------------
 
@@ -258,45 +279,55 @@ class Stock:
                 found[robot.index, label] = self.m.equality(names.grip(robot.name, label)).id
         return found
 
-    def _gap(self, welds: list[int], parts: Sequence[str], unit: int) -> float:
-        """The largest distance between the frames that welds would join to these parts now [m]."""
+    def _gap(self, welds: list[int], bodies: Sequence[int]) -> float:
+        """The largest distance between the frames that welds would join to these bodies now [m]."""
         if not welds:
             return 0.0
-        bodies = [self.body_of(part, unit) for part in parts]
         holder = self.m.eq_obj1id[welds]
         turn = self.d.xmat[holder].reshape(-1, 3, 3)
-        wanted = self.d.xpos[holder] + np.einsum("nij,nj->ni", turn, self.m.eq_data[welds, 3:6])
-        return float(np.linalg.norm(self.d.xpos[bodies] - wanted, axis=1).max())
+        reach = (turn @ self.m.eq_data[welds, 3:6, None])[:, :, 0]
+        apart = self.d.xpos[bodies] - (self.d.xpos[holder] + reach)
+        return float(np.sqrt((apart * apart).sum(axis=1).max()))
 
-    def _switch(self, weld: int, on: bool, body: int | None = None) -> None:
-        """Switch a weld, aimed at `body` first; the bodies it joins are woken."""
-        if body is not None:
-            self.m.eq_obj2id[weld] = body
-        self.d.eq_active[weld] = on
-        for joined in (self.m.eq_obj1id[weld], self.m.eq_obj2id[weld]):
-            self._wake(int(joined))
+    def _loose(self, welds: Iterable[int]) -> None:
+        """Switch welds off; the bodies they joined are woken."""
+        one, other, active = self.m.eq_obj1id, self.m.eq_obj2id, self.d.eq_active
+        for weld in welds:
+            active[weld] = False
+            self._wake(one[weld])
+            self._wake(other[weld])
+
+    def _join(self, welds: Iterable[int], bodies: Iterable[int]) -> None:
+        """Switch welds on, each aimed at a body first; the bodies they join are woken."""
+        one, other, active = self.m.eq_obj1id, self.m.eq_obj2id, self.d.eq_active
+        for weld, body in zip(welds, bodies, strict=True):
+            other[weld], active[weld] = body, True
+            self._wake(one[weld])
+            self._wake(body)
 
     def _wake(self, body: int) -> None:
         """Wake a body that sleeps, and let one that is about to, being slow, wait as long again."""
-        dofs = slice(self.m.body_dofadr[body], self.m.body_dofadr[body] + self.m.body_dofnum[body])
-        if self.m.body_dofnum[body]:
-            speeds = self.d.qvel[dofs]
-            speeds[speeds == 0.0] = -0.0
-            tree = self.m.body_treeid[body]
-            if self.d.tree_asleep[tree] < 0:
-                self.d.tree_asleep[tree] = -1 - mujoco.mjMINAWAKE
+        tree, asleep = self._tree[body], self.d.tree_asleep
+        if tree >= 0 and asleep[tree] < 0:
+            asleep[tree] = FRESH
+        elif tree >= 0:
+            first = self.m.body_dofadr[body]
+            speeds = self.d.qvel[first : first + self.m.body_dofnum[body]]
+            speeds[speeds == 0.0] = AWAKE
 
-    def _place(self, body: int, at: tuple[float, float, float]) -> None:
-        joint = self.m.body_jntadr[body]
+    def _place(self, bodies: Sequence[int], at: Sequence[tuple[float, float, float]]) -> None:
+        """Put free bodies somewhere, upright and at rest."""
+        joint = self.m.body_jntadr[list(bodies)]
         q, v = self.m.jnt_qposadr[joint], self.m.jnt_dofadr[joint]
-        self.d.qpos[q : q + 7] = (*at, 1, 0, 0, 0)
-        self.d.qvel[v : v + 6] = 0
+        self.d.qpos[q[:, None] + np.arange(7)] = [(*place, 1, 0, 0, 0) for place in at]
+        self.d.qvel[v[:, None] + np.arange(6)] = 0
 
-    def _put_away(self, label: str, copy: int) -> None:
-        body = int(self.body[label][copy])
-        self._place(body, parked_at(self.model.layout, label, copy + 1))
-        self.contacts.hold([body], NOBODY)
-        self._switch(self.park[label, copy], True)
+    def _put_away(self, labels: Sequence[str], copies: Sequence[int]) -> None:
+        spares = list(zip(labels, copies, strict=True))
+        bodies = [int(self.body[label][copy]) for label, copy in spares]
+        self._place(bodies, [parked_at(self.model.layout, k, n + 1) for k, n in spares])
+        self.contacts.hold(bodies, NOBODY)
+        self._join([self.park[spare] for spare in spares], bodies)
 
     def _hand_out(self, counts: Mapping[int, int]) -> None:
         """Give the parts that are under way in a marking to the robots that carry them: that of the
@@ -324,19 +355,17 @@ class Stock:
         mujoco.mj_kinematics(self.m, self.d)
         holder = self.m.eq_obj1id[weld]
         at = self.d.xpos[holder] + self.d.xmat[holder].reshape(3, 3) @ self.m.eq_data[weld, 3:6]
-        self._place(body, (float(at[0]), float(at[1]), float(at[2])))
+        self._place([body], [(float(at[0]), float(at[1]), float(at[2]))])
         self.contacts.enter(label, unit, body)
         self.contacts.hold([body], robot + 1)
-        self._switch(self.park[label, copy], False)
-        self._switch(weld, True, body)
+        self._loose([self.park[label, copy]])
+        self._join([weld], [body])
         self.load.setdefault(robot, (unit, []))[1].append(label)
 
     def _hide_spares(self) -> None:
-        for weld in (*self.feed.values(), *self.hold.values()):
-            self._switch(weld, False)
-        for label, bodies in self.body.items():
-            for copy in range(len(bodies)):
-                self._put_away(label, copy)
+        self._loose([*self.feed.values(), *self.hold.values()])
+        spares = [(label, n) for label, bodies in self.body.items() for n in range(len(bodies))]
+        self._put_away([label for label, _ in spares], [n for _, n in spares])
 
     def _parks(self) -> dict[tuple[str, int], int]:
         return {
