@@ -14,6 +14,7 @@ from factory.cli.options import (
     MOTION,
     OUTPUT,
     PATH,
+    RELAY,
     SOURCE,
     Number,
     plan,
@@ -37,6 +38,7 @@ from factory.console import emit, say, warn
 @click.option("--wip", type=click.IntRange(1, 10**9), help="Copies of each part let in at once.")
 @click.option("--max-time", type=Number(0, min_open=True), help="Stop after this time [s].")
 @FLOOR
+@RELAY
 @MOTION
 @OUTPUT
 def report(
@@ -93,7 +95,7 @@ def _run(
     from factory.running import run_file
 
     settings = settings_of(file, options)
-    source, _, layout = plan(file, folders, settings, floor)
+    source, _, layout = plan(file, folders, settings, floor, options)
     warn(layout.product.warnings, quiet)
     with TemporaryDirectory(prefix="factory-") as folder:
         log = Path(folder) / "run.log"
