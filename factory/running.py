@@ -34,7 +34,7 @@ def simulation(
     source: Source, layout: Layout, settings: Settings, options: dict[str, Any]
 ) -> Simulation:
     """The simulation that the options of the command line ask for. Raises InputError."""
-    start = options.get("start")
+    start, fuse = options.get("start"), options.get("fuse")
     net = layout.factory.net
     return Simulation(
         layout,
@@ -47,7 +47,7 @@ def simulation(
         None if start is None else legal_marking(net, start),
         options.get("wip"),
         bool(options.get("distributed")),
-        fuse=fusing_pays(layout.factory) if options.get("fuse") is None else options["fuse"],
+        fuse=fusing_pays(layout.factory, layout.product) if fuse is None else fuse,
     )
 
 

@@ -13,12 +13,12 @@ from factory.geometry import Product
 from factory.meshes import Array
 from factory.pag import NOPART
 
-FUSE_FROM = 100
+FUSE_FROM = 40
 """From so many robots on, runs are fused unless told otherwise."""
 
 GEOMS = 40
-"""But not where that would give a part more places than this on average: a chain of n parts has
-n / 2."""
+"""But not where sub-assemblies would have more convex bodies than this for each part: each has
+those of all that it is made of, so that a chain of n parts has n / 2 for each."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -118,10 +118,12 @@ def bodies_of(factory: Factory, product: Product, fuse: bool = False) -> Bodies:
     return Bodies(carried, centre, mass, radius, wholes)
 
 
-def fusing_pays(factory: Factory) -> bool:
+def fusing_pays(factory: Factory, product: Product) -> bool:
     """Whether one body for each sub-assembly makes a run faster, as measured."""
-    sizes = [len(factory.contents[o.label]) for o in factory.operations[:-1] if len(o.inputs) > 1]
-    return len(factory.robots) >= FUSE_FROM and sum(sizes) <= GEOMS * len(factory.leaves)
+    pieces = {o.label: len(product.solids[o.label].pieces) for o in factory.leaves}
+    wholes = [factory.contents[o.label] for o in factory.operations[:-1] if len(o.inputs) > 1]
+    geoms = sum(pieces[part] for parts in wholes for part in parts)
+    return len(factory.robots) >= FUSE_FROM and geoms <= GEOMS * len(factory.leaves)
 
 
 def fused_copies(bodies: Bodies, factory: Factory, units: int | None) -> dict[str, int]:

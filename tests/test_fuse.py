@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 import factory
 from factory.engine import mujoco
+from factory.geometry import product_geometry
 from factory.layout.plan import Layout
 from factory.monitor import beside
 from factory.simulation import Simulation
@@ -169,14 +170,14 @@ def test_the_monitor_catches_a_body_made_of_another_unit() -> None:
     retire = stock._retire
     kept: list[str] = []
 
-    def faulty(label: str, unit: int) -> None:
-        retire(label, unit)
-        if label == "part1" and not kept:
-            kept.append(label)
-            park = stock.park[label, stock.free[label][0]]
+    def faulty(labels: list[str], unit: int) -> None:
+        retire(labels, unit)
+        if "part1" in labels and not kept:
+            kept.append("part1")
             robot = simulation.layout.factory.by_label["sub1"].carrier
-            stock._switch(park, False)
-            stock._switch(stock.grip[robot, label], True)
+            grip = stock.grip[robot, "part1"]
+            stock._loose([stock.park["part1", stock.free["part1"][0]]])
+            stock._join([grip], [stock.m.eq_obj2id[grip]])
 
     stock._retire = faulty
     monitor = beside(simulation)
@@ -184,18 +185,26 @@ def test_the_monitor_catches_a_body_made_of_another_unit() -> None:
     assert kept and not monitor.report().refines_net
 
 
+def fuses(folder: Path, text: str) -> bool:
+    file = folder / "product.pag"
+    file.write_text(text)
+    made = factory.compile(factory.load_pag(file))
+    return fusing_pays(made, product_geometry(made.pag))
+
+
 def test_large_factories_are_fused_by_themselves(tmp_path: Path) -> None:
-    small = layout_of("balanced").factory
-    assert len(small.robots) < FUSE_FROM and not fusing_pays(small)
-    text = "root = n1;\n" + "".join(f"n{k} = mate(n{2 * k}, n{2 * k + 1});\n" for k in range(1, 64))
-    text += ";\n".join(f"n{k} = atomic()" for k in range(64, 128))
-    (tmp_path / "tree.pag").write_text(text)
-    assert fusing_pays(factory.compile(factory.load_pag(tmp_path / "tree.pag")))
+    small, many = layout_of("balanced"), layout_of("gearbox")
+    assert len(small.factory.robots) < FUSE_FROM
+    assert not fusing_pays(small.factory, small.product)
+    tree = "root = n1;\n" + "".join(f"n{k} = mate(n{2 * k}, n{2 * k + 1});\n" for k in range(1, 64))
+    assert fuses(tmp_path, tree + ";\n".join(f"n{k} = atomic()" for k in range(64, 128)))
     chain = "root = n119;\nn1 = mate(q0, q1);\n"
     chain += "".join(f"n{k} = mate(n{k - 1}, q{k});\n" for k in range(2, 120))
-    chain += ";\n".join(f"q{n} = atomic()" for n in range(120))
-    (tmp_path / "chain.pag").write_text(chain)
-    assert not fusing_pays(factory.compile(factory.load_pag(tmp_path / "chain.pag")))
+    assert not fuses(tmp_path, chain + ";\n".join(f"q{n} = atomic()" for n in range(120)))
+    with pytest.MonkeyPatch.context() as patch:  # convex pieces count, not parts
+        patch.setattr("factory.wholes.FUSE_FROM", 1)
+        assert fusing_pays(small.factory, small.product)
+        assert not fusing_pays(many.factory, many.product)
 
 
 def test_run_says_that_it_fuses(run: Terminal, tmp_path: Path) -> None:

@@ -192,13 +192,12 @@ def address(simulation: Simulation, body: str) -> int:
 def test_a_weld_that_is_never_released(paper: Layout) -> None:
     simulation = Simulation(paper, units=1)
     stock, kept = simulation.world.stock, weld(simulation, "grip/r5/part1")
-    switch = stock._switch
+    loose = stock._loose
 
-    def sticky(number: int, on: bool, body: int | None = None) -> None:
-        if number != kept or on:
-            switch(number, on, body)
+    def sticky(welds: list[int]) -> None:
+        loose([number for number in welds if number != kept])
 
-    stock._switch = sticky
+    stock._loose = sticky
     run, report = watched(simulation, 3)
     t = next(e.t for e in run.events if e.transition == "sub1_e")
     assert_caught(report, "TwoHolders", "r5", "part1", 6, t)
@@ -510,13 +509,12 @@ def test_a_faulty_run_fails(run: Terminal, tmp_path: Path, monkeypatch: pytest.M
     """Two parts are never let go: status 1, beside the run and from its log."""
     from factory.world.stock import Stock
 
-    switch = Stock._switch
+    loose = Stock._loose
 
-    def sticky(self: Stock, number: int, on: bool, body: int | None = None) -> None:
-        if on or self.m.equality(number).name != "grip/r5/part1":
-            switch(self, number, on, body)
+    def sticky(self: Stock, welds: list[int]) -> None:
+        loose(self, [n for n in welds if self.m.equality(n).name != "grip/r5/part1"])
 
-    monkeypatch.setattr(Stock, "_switch", sticky)
+    monkeypatch.setattr(Stock, "_loose", sticky)
     log = tmp_path / "log"
     done = run("run", PAPER, "--monitor", "--max-time", 1, "--json", "--log", log)
     assert done.status == 1 and not done.json["refines_net"]

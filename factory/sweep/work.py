@@ -115,7 +115,7 @@ class Runner:
 
     def _fuse(self, layout: Layout) -> bool:
         asked = self.recipe.fuse
-        return fusing_pays(layout.factory) if asked is None else asked
+        return fusing_pays(layout.factory, layout.product) if asked is None else asked
 
     def _lay_out(self, settings: Settings) -> Layout | FactoryError:
         recipe = self.recipe
