@@ -14,6 +14,7 @@ from tests.tables import table
 
 AIMS: Sequence[tuple[Case, float, float]] = (
     (Case(40, 0.002), 20.0, 10.0),
+    (Case(40, 0.002, None, True), 20.0, 10.0),
     (Case(300, 0.004), 3.5, 5.0),
     (Case(300, 0.002, None, True), 6.0, 5.0),
     (Case(1000, 0.004, 2), 0.7, 5.0),
