@@ -30,6 +30,7 @@ from factory.report.tree import assembly_tree
 from factory.report.words import proof
 from factory.simulation import Simulation
 from tests.command_line import PAPER, files_in
+from tests.layout_values import paper_layout
 from tests.report_values import Page
 
 EVIL = """</script></title><img src=x onerror="alert(1)">'"&<!--"""
@@ -296,3 +297,15 @@ def test_a_log_that_was_cut_off_is_told_as_far_as_it_goes(log: Path, tmp_path: P
     assert not read_log(cut).complete
     found = Page(page(recording_of(cut)))
     assert any("cut off" in words for words in found.words)
+
+
+def test_bodies_that_replace_others_are_no_hand_overs(tmp_path: Path) -> None:
+    """In a fused run one body comes from out of sight into the place of those that were joined."""
+    path = tmp_path / "fused.log"
+    simulation = Simulation(paper_layout(), units=2, fuse=True)
+    with LogWriter(path, simulation) as writer:
+        run = simulation.run([writer.observe])
+    figures = {f.key: f.value for f in fidelity(recording_of(path)).figures}
+    assert run.physics is not None
+    assert figures["handoffs"] == run.physics.handoffs
+    assert figures["handoff_gap_max_mm"] == pytest.approx(run.physics.handoff_gap_max_mm, abs=0.02)

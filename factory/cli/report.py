@@ -95,6 +95,7 @@ def _run(
     from factory.running import run_file
 
     settings = settings_of(file, options)
+    options = {**options, "fuse": False}  # each part is told of by itself
     source, _, layout = plan(file, folders, settings, floor, options)
     warn(layout.product.warnings, quiet)
     with TemporaryDirectory(prefix="factory-") as folder:
