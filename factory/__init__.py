@@ -92,14 +92,10 @@ def lay_out(
     RunError where the factory does not fit the floor.
     """
     from factory.geometry import product_geometry
-    from factory.layout.embedding import lay_out as embed
+    from factory.planning import Ground
 
-    layout = embed(plan, product_geometry(plan.pag), clearance, floor)
-    if relay:
-        from factory.relaying import relayed
-
-        layout = relayed(layout, Settings(), cycle, floor)
-    return layout
+    ground = Ground(floor, relay, cycle if relay else None)
+    return ground.lay_out(plan, product_geometry(plan.pag), Settings(clearance=clearance))
 
 
 def run(

@@ -15,18 +15,23 @@ from factory.settings import Settings
 @dataclass(frozen=True, slots=True)
 class Ground:
     """What a layout is made for, beside settings: width and depth of the floor [m], None for as
-    much as it takes; whether guidepaths are shared among `relay` robots, and the `cycle` time [s]
+    much as it takes; whether guidepaths are shared among `relay` robots, or the `cycle` time [s]
     that those are to reach, None for the shortest."""
 
     floor: tuple[float, float] | None = None
     relay: bool = False
     cycle: float | None = None
 
+    @property
+    def relays(self) -> bool:
+        """Whether relays are asked for: a cycle time asks for them too."""
+        return self.relay or self.cycle is not None
+
     def lay_out(self, factory: Factory, product: Product, settings: Settings) -> Layout:
         """The layout of a compiled factory. Raises RunError (Layout) where there is no room."""
         pace = Pace.of(settings)
         layout = lay_out(factory, product, settings.clearance, self.floor, pace)
-        if not (self.relay or self.cycle):
+        if not self.relays:
             return layout
         from factory.relaying import relayed
 

@@ -121,14 +121,18 @@ class Supervisor:
         """The names of the marked places."""
         return tuple(p.name for p, m in zip(self.net.places, self.marked, strict=True) if m)
 
+    def awaited(self) -> list[Operation]:
+        """The operations all of whose robots wait for them."""
+        operations = (self.factory.operations[event // 2] for event in sorted(self.ready))
+        return [operation for operation in operations if not self.marked[operation.place]]
+
     def _startable(self) -> list[int]:
         """Operations X with X_s enabled: waits marked (their goals are everything), the robots in
         the domain of X's mode, and the world prepared."""
         possible = [
             operation
-            for event in sorted(self.ready)
-            if not self.marked[(operation := self.factory.operations[event // 2]).place]
-            and self.world.prepared(operation, self.fired[operation.start])
+            for operation in self.awaited()
+            if self.world.prepared(operation, self.fired[operation.start])
         ]
         if not possible:
             return []

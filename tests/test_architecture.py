@@ -14,7 +14,7 @@ PACKAGE = Path(__file__).resolve().parent.parent / "factory"
 ROOMS = [
     {
         *("errors", "explanations", "assets", "closing", "collector", "files", "engine", "gl"),
-        "pickling",
+        *("pickling", "extras"),
     },
     {"pag", "template", "robots", "settings", "defaults", "approach"},
     {"lang"},

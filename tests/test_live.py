@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import signal
 import socket
+import sys
 from collections.abc import Iterator
 from http.client import HTTPConnection
 from subprocess import PIPE
@@ -392,10 +393,20 @@ def test_the_command_serves_until_it_is_interrupted() -> None:
         assert process.stderr.read().strip() == "Interrupted stopped by the user"
 
 
-def test_other_hosts_need_a_word(run: Terminal) -> None:
+def test_other_hosts_need_a_word(run: Terminal, monkeypatch: pytest.MonkeyPatch) -> None:
+    """It is said before anything is laid out."""
+    monkeypatch.setattr(sys.modules["factory.cli.view"], "plan", None)
     done = run("view", PAPER, "--host", "0.0.0.0", "--json")
     assert done.status == 2 and done.codes == ["BadValue"]
     assert "--expose" in done.json["errors"][0]["hint"]
+
+
+def test_what_is_missing_is_said_first(run: Terminal, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sys.modules["factory.cli.view"], "plan", None)
+    monkeypatch.setitem(sys.modules, "websockets.sync.server", None)
+    done = run("view", PAPER, "--json")
+    assert done.status == 3 and done.codes == ["Missing"]
+    assert done.json["errors"][0]["hint"] == "pip install 'klavins-factory[live]'"
 
 
 def test_every_kind_has_a_name() -> None:

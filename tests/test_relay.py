@@ -273,6 +273,7 @@ def test_sweeps_and_exports_with_relays_are_those_of_a_run(run: Terminal, out: P
         assert row == (done["robots"], done["cycle_time_s"])
         assert done["robots"] > run("check", file, "--json").json["robots"]
     dot = run("export", file, "--relay", "--format", "dot").out
+    assert "relay" in run("export", file, "--cycle", "2.4", "--format", "dot").out
     plan = run("build", file, "--relay", "--speed", 0.3, "-o", out / "all", "--json").json
     assert "relay" in dot and "relay" not in run("export", file, "--format", "dot").out
     assert plan["robots"] == kept[0.3][0]

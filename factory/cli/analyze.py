@@ -10,13 +10,14 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from factory.cli.options import (
+    DRAW,
     FLOOR,
     MOTION,
     OUTPUT,
     PATH,
     RELAY,
     SOURCE,
-    Number,
+    WIP,
     plan,
     settings_of,
 )
@@ -40,14 +41,8 @@ if TYPE_CHECKING:
     default="mujoco",
     help="Whose times: MuJoCo's, or those of the paper's ideal world.",
 )
-@click.option("--seed", type=click.IntRange(0), default=0, help="Of what jitter draws.")
-@click.option(
-    "--jitter",
-    type=Number(0, 0.9),
-    default=0.0,
-    help="Draw each robot's speed and gain within ± this share.",
-)
-@click.option("--wip", type=click.IntRange(1, 10**9), help="Copies of each part let in at once.")
+@DRAW
+@WIP
 @click.option("--second", "seconds", multiple=True, help="What if: another such robot, as r4.")
 @click.option("--faster", multiple=True, help="What if: a robot faster by so many percent, r4=20.")
 @click.option("--shorter", multiple=True, help="What if: its ways shorter by percent, r4=20.")

@@ -16,6 +16,7 @@ from factory.cli.options import (
     PATH,
     RELAY,
     SOURCE,
+    WIP,
     plan,
     settings_of,
     writable,
@@ -38,7 +39,7 @@ if TYPE_CHECKING:
 @click.option(
     "--units", type=click.IntRange(1, 10**9), help="Size the pool of parts for so many products."
 )
-@click.option("--wip", type=click.IntRange(1, 10**9), help="Copies of each part let in at once.")
+@WIP
 @FLOOR
 @RELAY
 @MOTION

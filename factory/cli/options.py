@@ -104,6 +104,18 @@ RELAY = options(
         help="The cycle time that relays are to reach [s]; as short as they can by default.",
     ),
 )
+WIP = click.option(
+    "--wip", type=click.IntRange(1, 10**9), help="Copies of each part let in at once."
+)
+DRAW = options(
+    click.option("--seed", type=click.IntRange(0), default=0, help="Of what jitter draws."),
+    click.option(
+        "--jitter",
+        type=Number(0, 0.9),
+        default=0.0,
+        help="Draw each robot's speed and gain within ± this share.",
+    ),
+)
 RUN = options(
     click.option(
         "--world",
@@ -112,16 +124,8 @@ RUN = options(
         help="MuJoCo's physics, or the paper's ideal world.",
     ),
     click.option("--units", type=click.IntRange(1, 10**9), default=1, help="Products to make."),
-    click.option("--seed", type=click.IntRange(0), default=0, help="Of what jitter draws."),
-    click.option(
-        "--jitter",
-        type=Number(0, 0.9),
-        default=0.0,
-        help="Draw each robot's speed and gain within ± this share.",
-    ),
-    click.option(
-        "--wip", type=click.IntRange(1, 10**9), help="Copies of each part let in at once."
-    ),
+    DRAW,
+    WIP,
     click.option(
         "--from", "start", help="Start from a legal marking: place names, comma-separated."
     ),

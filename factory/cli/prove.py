@@ -13,6 +13,8 @@ from factory.cli.options import (
     PATH,
     RELAY,
     SOURCE,
+    WIP,
+    ground,
     plan,
     settings_of,
     writable,
@@ -29,7 +31,7 @@ if TYPE_CHECKING:
 @click.command()
 @SOURCE
 @click.option("--certificate", type=PATH, help="Write the proof here.")
-@click.option("--wip", type=click.IntRange(1, 10**9), help="Copies of each part let in at once.")
+@WIP
 @click.option("--clashes", type=PATH, help="Write a picture of each blocked operation in a folder.")
 @RELAY
 @OUTPUT
@@ -73,7 +75,7 @@ def _relayed(file: Path, folders: Sequence[Path], options: dict[str, Any]) -> Fa
     InputError (Usage) for a net, which has none."""
     from factory.checking import is_net
 
-    if not (options["relay"] or options["cycle"]):
+    if not ground(None, options).relays:
         return None
     if is_net(file):
         message = "--relay is for a PAG: a net has no guidepaths"

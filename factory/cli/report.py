@@ -10,12 +10,14 @@ from typing import Any
 import click
 
 from factory.cli.options import (
+    DRAW,
     FLOOR,
     MOTION,
     OUTPUT,
     PATH,
     RELAY,
     SOURCE,
+    WIP,
     Number,
     plan,
     settings_of,
@@ -28,14 +30,8 @@ from factory.console import emit, say, warn
 @SOURCE
 @click.option("-o", "--output", type=PATH, required=True, help="The page: OUT.html.")
 @click.option("--units", type=click.IntRange(1, 10_000), default=3, help="Products of the run.")
-@click.option("--seed", type=click.IntRange(0), default=0, help="Of what jitter draws.")
-@click.option(
-    "--jitter",
-    type=Number(0, 0.9),
-    default=0.0,
-    help="Draw each robot's speed and gain within ± this share.",
-)
-@click.option("--wip", type=click.IntRange(1, 10**9), help="Copies of each part let in at once.")
+@DRAW
+@WIP
 @click.option("--max-time", type=Number(0, min_open=True), help="Stop after this time [s].")
 @FLOOR
 @RELAY

@@ -14,6 +14,7 @@ from factory.cli.options import (
     OUTPUT,
     PATH,
     RELAY,
+    WIP,
     Number,
     ground,
     plan,
@@ -51,7 +52,7 @@ SHOWN = 8
 @click.option("--units", type=click.IntRange(1, 10**9), help="Products of each run; default: 4.")
 @click.option("--seed", type=click.IntRange(0), help="As of `run`.")
 @click.option("--jitter", type=Number(0, 0.9), help="As of `run`; default: 0.")
-@click.option("--wip", type=click.IntRange(1, 10**9), help="Copies of each part let in at once.")
+@WIP
 @click.option("--max-time", type=Number(0, min_open=True), help="Stop a run after this time [s].")
 @click.option("--fuse/--no-fuse", default=None, help="As of `run`.")
 @FLOOR

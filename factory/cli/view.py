@@ -9,12 +9,13 @@ from typing import Any
 import click
 
 from factory.cli.options import (
+    DRAW,
     FLOOR,
     MOTION,
     OUTPUT,
     RELAY,
     SOURCE,
-    Number,
+    WIP,
     plan,
     settings_of,
 )
@@ -30,14 +31,8 @@ FOR_EVER = 10**9
 @click.option("--host", default="127.0.0.1", help="Listen here; only this machine can come.")
 @click.option("--expose", is_flag=True, help="Let HOST be one that other machines can reach.")
 @click.option("--paused", is_flag=True, help="Wait for somebody to press Play.")
-@click.option("--seed", type=click.IntRange(0), default=0, help="Of what jitter draws.")
-@click.option(
-    "--jitter",
-    type=Number(0, 0.9),
-    default=0.0,
-    help="Draw each robot's speed and gain within ± this share.",
-)
-@click.option("--wip", type=click.IntRange(1, 10**9), help="Copies of each part let in at once.")
+@DRAW
+@WIP
 @FLOOR
 @RELAY
 @MOTION
@@ -59,9 +54,11 @@ def view(
     from factory.interruption import Interruption
     from factory.live import Server, Session
     from factory.live.page import page
+    from factory.live.server import check_server
     from factory.nets.verify import proved
     from factory.running import simulation
 
+    check_server(host, expose)
     settings = settings_of(file, options)
     source, factory, layout = plan(file, folders, settings, floor, options)
     proved(factory.net)

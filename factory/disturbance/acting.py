@@ -28,7 +28,6 @@ from factory.disturbance.values import (
 from factory.engine import mujoco
 from factory.errors import Diagnostic, InputError, did_you_mean
 from factory.mjcf import names
-from factory.world.stock import AWAKE, FRESH
 
 if TYPE_CHECKING:
     from factory.simulation import Simulation
@@ -68,7 +67,7 @@ class _Acting:
         self.m, self.d = m, world.d
         self.axes = np.arange(world.tray)
         self.qpos, self.dof = world.qpos[self.axes], world.dof[self.axes]
-        self.control, self.tree = world.control[self.axes], world.tree[self.axes]
+        self.control = world.control[self.axes]
         number = {int(adr): n for n, adr in enumerate(m.actuator_ctrladr)}
         self.actuator = np.array([number[int(adr)] for adr in self.control])
         self.gain = np.ones(len(self.axes))
@@ -133,7 +132,7 @@ class _Acting:
             q, v = self.measured
             kp, kv = self.m.actuator_biasprm[self.actuator, 1:3].T
             bias += kp * (q - self.d.qpos[self.qpos]) + kv * (v - self.d.qvel[self.dof])
-            self._keep_awake()
+            self.world.rouse(self.axes)  # or the engine lets sleep what stands
         self.m.actuator_biasprm[self.actuator, 0] = bias
 
     def _measure(self) -> None:
@@ -143,12 +142,6 @@ class _Acting:
         for measure in self.measures:
             q, v = measure(q, v)
         self.measured = q, v
-
-    def _keep_awake(self) -> None:
-        """The engine lets sleep what stands still, whatever its drive says."""
-        self.d.qvel[self.dof[self.d.qvel[self.dof] == 0.0]] = AWAKE
-        asleep = self.d.tree_asleep[self.tree]
-        self.d.tree_asleep[self.tree[asleep < 0]] = FRESH
 
     def _weigh(self, mass: Mass) -> None:
         copies = self.simulation.model.copies  # type: ignore[union-attr]
@@ -177,15 +170,14 @@ class _Acting:
 
     def _of(self, robots: Iterable[str]) -> Index:
         """The axes of some robots, of all for none."""
-        chosen = tuple(robots)
+        chosen = dict.fromkeys(robots)
         if not chosen:
             return self.axes
-        known = [robot.name for robot in self.simulation.layout.factory.robots]
+        known = {robot.name: robot.index for robot in self.simulation.layout.factory.robots}
         for name in chosen:
             _known(name, known, "robot")
-        joints = self.m.dof_jntid[self.dof]
-        owners = [self.m.joint(joint).name.partition("/")[0] for joint in joints]
-        return np.array([axis for axis, name in enumerate(owners) if name in chosen], np.intp)
+        axes = (axis for name in chosen for axis in self.world.axes_of(known[name]))
+        return np.array(sorted(axes), np.intp)
 
     def _body(self, name: str) -> int:
         known = [self.m.body(n).name for n in range(1, self.m.nbody)]

@@ -65,8 +65,7 @@ class Hands:
             del self._slowed[robot]
         speed = np.array(self._limits.speed)
         for number, share in self._slowed.items():
-            axes = [number, *([self._world.lift[number]] if number in self._world.lift else [])]
-            speed[axes] *= share
+            speed[self._world.axes_of(number)] *= share
         self._simulation.supervisor.limit(Limits(speed, self._limits.acceleration))
 
     def block(self, label: str) -> None:

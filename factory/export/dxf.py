@@ -8,7 +8,8 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any
 
-from factory.export.subject import Subject, optional
+from factory.export.subject import Subject
+from factory.extras import optional
 from factory.factory import Factory
 from factory.geometry import Solid
 from factory.layout.dimensions import ARM_WIDTH, CARRIAGE
@@ -45,7 +46,7 @@ def export(subject: Subject) -> str:
 
 def write_dxf(layout: Layout) -> str:
     """The floor plan of a layout, the same text for the same layout."""
-    ezdxf = optional("ezdxf", "ezdxf", "DXF")
+    ezdxf = optional("ezdxf", "ezdxf", "DXF", "export")
     with _undated(ezdxf):
         document = ezdxf.new(VERSION, units=MILLIMETRES)
         for name, colour in LAYERS.items():

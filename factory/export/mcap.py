@@ -15,7 +15,8 @@ import numpy as np
 from factory.control.mode import Truth
 from factory.export.events import Row, compiled, rows
 from factory.export.motion import Motion, motion_of
-from factory.export.subject import Subject, optional
+from factory.export.subject import Subject
+from factory.extras import optional
 from factory.log import Log
 from factory.meshes import Array
 
@@ -30,7 +31,7 @@ DRAWN = 3
 
 def export(subject: Subject) -> bytes:
     """The whole log. Raises MissingError where there is no foxglove-sdk."""
-    foxglove = optional("foxglove", "foxglove-sdk", "MCAP")
+    foxglove = optional("foxglove", "foxglove-sdk", "MCAP", "export")
     motion = motion_of(subject)
     events = list(rows(subject.log, compiled(subject)))
     content = io.BytesIO()
@@ -45,8 +46,8 @@ class _Recorder:
     """Writes a motion and events to the channels of a context, in the order of time."""
 
     def __init__(self, context: Any, motion: Motion, log: Log) -> None:
-        self.channels = optional("foxglove.channels", "foxglove-sdk", "MCAP")
-        self.schemas = optional("foxglove.messages", "foxglove-sdk", "MCAP")
+        self.channels = optional("foxglove.channels", "foxglove-sdk", "MCAP", "export")
+        self.schemas = optional("foxglove.messages", "foxglove-sdk", "MCAP", "export")
         self.motion, self.log = motion, log
         self.looks = Looks(motion.m, self.schemas)
         self.tf = self.channels.FrameTransformsChannel("/tf", context=context)

@@ -13,7 +13,7 @@ from factory.errors import Diagnostic, InputError
 from factory.export.subject import Subject
 from factory.log import Log
 from factory.meshes import Array, Indices
-from factory.mjcf.parts import PARKED
+from factory.mjcf.parts import HIDDEN
 
 if TYPE_CHECKING:
     from factory.engine import mujoco
@@ -56,7 +56,7 @@ class Motion:
 
     def parked(self) -> Truth:
         """For each frame and body whether it is a spare one, out of sight under the floor."""
-        return np.asarray(self.position[:, :, 2] < PARKED / 2)
+        return np.asarray(self.position[:, :, 2] < HIDDEN)
 
 
 def motion_of(subject: Subject) -> Motion:

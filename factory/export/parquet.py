@@ -6,15 +6,16 @@ import io
 from dataclasses import asdict
 
 from factory.export.events import COLUMNS, compiled, rows
-from factory.export.subject import Subject, optional
+from factory.export.subject import Subject
+from factory.extras import optional
 
 FORMAT, TAKES, BINARY = "parquet", "log", True
 
 
 def export(subject: Subject) -> bytes:
     """The table. Raises MissingError where there is no pyarrow."""
-    pyarrow = optional("pyarrow", "pyarrow", "Parquet")
-    parquet = optional("pyarrow.parquet", "pyarrow", "Parquet")
+    pyarrow = optional("pyarrow", "pyarrow", "Parquet", "export")
+    parquet = optional("pyarrow.parquet", "pyarrow", "Parquet", "export")
     types = {
         "time_s": pyarrow.float64(),
         "unit": pyarrow.int32(),

@@ -4,12 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from functools import cached_property
-from importlib import import_module
 from pathlib import Path
-from typing import Any
 
 from factory.checking import is_net
-from factory.errors import Diagnostic, InputError, MissingError, did_you_mean
+from factory.errors import Diagnostic, InputError, did_you_mean
 from factory.factory import Factory
 from factory.geometry import Product
 from factory.layout.plan import Layout
@@ -70,7 +68,7 @@ class Subject:
     @cached_property
     def factory(self) -> Factory:
         """What it compiles to, with the relays of its layout if there are to be any."""
-        return self.layout.factory if self.ground.relay else self.source.compile()
+        return self.layout.factory if self.ground.relays else self.source.compile()
 
     @property
     def product(self) -> Product:
@@ -104,13 +102,3 @@ class Subject:
             message = f"--of '{self.of}' is none of the {noun}"
             raise InputError(Diagnostic("Usage", message, None, hint))
         return self.of or valid[0]
-
-
-def optional(module: str, package: str, what: str, extra: str = "export") -> Any:
-    """A module of an optional package. Raises MissingError with the line that installs it."""
-    try:
-        return import_module(module)
-    except ImportError as error:
-        hint = f"pip install 'klavins-factory[{extra}]'"
-        message = f"{what} needs {package}: {error}"
-        raise MissingError(Diagnostic("Missing", message, None, hint)) from error

@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from factory.export.motion import Motion, motion_of
-from factory.export.subject import Subject, optional
+from factory.export.subject import Subject
+from factory.extras import optional
 from factory.log import Log
 
 if TYPE_CHECKING:

@@ -12,7 +12,7 @@ from factory.factory import Operation
 from factory.live.commands import FACTORS, SPEEDS
 from factory.live.session import Session
 from factory.mjcf import names
-from factory.mjcf.parts import PARKED
+from factory.mjcf.parts import HIDDEN
 from factory.monitor.subject import subject_of_run
 from factory.report.floor import floor_plan
 from factory.report.links import data, labels_of
@@ -54,7 +54,7 @@ def page(session: Session) -> bytes:
             "parents": {},
             "moving": session.bodies.tolist(),
             "turning": session.bodies.tolist(),
-            "hidden": PARKED / 2,
+            "hidden": HIDDEN,
             "position": np.round(stage.position, 5).tolist(),
             "quaternion": np.round(stage.quaternion, 6).tolist(),
             "reach": np.round(stage.reach[:, session.bodies], 4).tolist(),

@@ -9,10 +9,11 @@ from http import HTTPStatus
 from ipaddress import ip_address
 from secrets import token_urlsafe
 from threading import Thread
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from factory.closing import Closing
-from factory.errors import Diagnostic, InputError, MissingError
+from factory.errors import Diagnostic, InputError
+from factory.extras import optional
 from factory.live.commands import command_of
 from factory.live.session import Frame, Session
 
@@ -49,13 +50,23 @@ def is_loopback(host: str) -> bool:
         return host == "localhost"
 
 
+def check_server(host: str, exposed: bool) -> Any:
+    """What sockets are served with. Raises InputError (BadValue) for a host other than loopback
+    that is not to be exposed, MissingError without the package `websockets`."""
+    if not is_loopback(host) and not exposed:
+        message = f"'{host}' can be reached from other machines, who could then run this one"
+        hint = "give --expose if that is meant, or use `ssh -L` and the host 127.0.0.1"
+        raise InputError(Diagnostic("BadValue", message, None, hint))
+    return optional("websockets.sync.server", "websockets", "a page in the browser", "live")
+
+
 class Server(Closing):
     """Listens from when it is made until it is closed; `address` is what to open. `exposed`: other
     machines may come, by whatever name they know this one.
 
     Only who knows the address is let in, which has a secret in it that is new every time; a page
-    from elsewhere is refused. Raises InputError (BadValue) where it cannot listen, or for a host
-    other than loopback that is not to be exposed; MissingError without the package `websockets`.
+    from elsewhere is refused. Raises what `check_server` does, and InputError (BadValue) where it
+    cannot listen.
     """
 
     def __init__(
@@ -66,21 +77,12 @@ class Server(Closing):
         port: int = 0,
         exposed: bool = False,
     ) -> None:
-        if not is_loopback(host) and not exposed:
-            message = f"'{host}' can be reached from other machines, who could then run this one"
-            hint = "give --expose if that is meant, or use `ssh -L` and the host 127.0.0.1"
-            raise InputError(Diagnostic("BadValue", message, None, hint))
-        try:
-            from websockets.sync.server import serve
-        except ImportError:
-            message = "the package websockets is needed to serve a browser"
-            hint = "pip install 'klavins-factory[live]'"
-            raise MissingError(Diagnostic("Missing", message, None, hint)) from None
+        serving = check_server(host, exposed)
         self._session, self._page, self._exposed = session, page, exposed
         self._secret = token_urlsafe(16)
         self._watchers = 0
         try:
-            self._server = serve(
+            self._server = serving.serve(
                 self._watch,
                 host,
                 port,

@@ -211,22 +211,14 @@ class Session:
 
     def _waits(self) -> str:
         """Who waits for what, where nothing has fired for long."""
-        made: Any = self.simulation
-        supervisor = made.supervisor
-        silent = made.world.time - supervisor.last_event
+        supervisor: Any = self.simulation.supervisor
+        silent = self.simulation.world.time - supervisor.last_event
         if silent < self._quiet:
             return ""
-        factory = made.layout.factory
-        missing = [
-            factory.operations[event // 2]
-            for event in sorted(supervisor.ready)
-            if not supervisor.marked[factory.operations[event // 2].place]
-        ]
+        robots = self.simulation.layout.factory.robots
         words = [
-            f"{factory.robots[o.carrier].name} for the feeder of {o.label}"
-            if not o.inputs
-            else f"{factory.robots[o.carrier].name} at {o.label}"
-            for o in missing[:4]
+            f"{robots[o.carrier].name} {'at' if o.inputs else 'for the feeder of'} {o.label}"
+            for o in supervisor.awaited()[:4]
         ]
         who = "; ".join(words) or "no robot can start"
         return f"nothing has fired for {silent:.0f} s: waiting are {who}"

@@ -18,6 +18,9 @@ from factory.wholes import Bodies
 PARKED = -0.6
 """Height at which the first spare copy of a part is kept, under the floor [m]."""
 
+HIDDEN = PARKED / 2
+"""A body lower than this is a spare one, out of sight [m]."""
+
 
 def place_in(
     product: Product, centre: Array, middle: Point2, elevation: float = 0.0

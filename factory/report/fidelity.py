@@ -15,7 +15,7 @@ from factory.errors import InputError
 from factory.fidelity.causality import duration_differences, process
 from factory.fidelity.quantities import QUANTITIES
 from factory.fidelity.welds import GRIP, HOLD, Welds
-from factory.mjcf.parts import PARKED
+from factory.mjcf.parts import HIDDEN
 from factory.monitor.record import watch_log
 from factory.monitor.report import Report
 from factory.nets.replay import replay
@@ -96,7 +96,7 @@ def _welds(recording: Recording) -> dict[str, float | None]:
             _pose(recording, m, d, row - 1)
             _aim(recording, m, d, row)
             fresh = welds.scan()
-            fresh = fresh[d.xpos[m.eq_obj2id[fresh], 2] > PARKED / 2]  # none that replaces others
+            fresh = fresh[d.xpos[m.eq_obj2id[fresh], 2] > HIDDEN]  # none that replaces others
             handoffs += len(fresh)
             gap = max(gap, float(welds.gaps(fresh, d.xpos, d.xmat).max(initial=0.0)))
             continue

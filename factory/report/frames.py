@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from factory.export import motion
 from factory.mjcf import names
-from factory.mjcf.parts import PARKED
+from factory.mjcf.parts import HIDDEN
 from factory.report.packing import Pack, planes
 from factory.report.recording import Recording
 
@@ -48,7 +48,7 @@ def frames(recording: Recording, pack: Pack) -> dict[str, Any]:
     return {
         "count": len(kept),
         "units": UNITS,
-        "hidden": PARKED / 2,
+        "hidden": HIDDEN,
         "moving": moving,
         "turning": turning,
         "parents": {str(b): int(p) for b, p in enumerate(m.body_parentid) if p and b},

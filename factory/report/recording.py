@@ -18,8 +18,6 @@ from factory.export.motion import Motion, motion_of
 from factory.export.subject import Subject
 from factory.factory import Factory, Operation
 from factory.lang import read_pag, read_template
-from factory.layout.durations import Pace
-from factory.layout.embedding import lay_out
 from factory.layout.plan import Layout
 from factory.log import Log
 from factory.log.blocks import bad_log
@@ -27,6 +25,7 @@ from factory.meshes import Array
 from factory.monitor import subject_of
 from factory.pag import PAG
 from factory.pipeline import Source
+from factory.planning import Ground
 from factory.report.stage import Stage, stations
 from factory.robots import load_catalogue
 
@@ -136,8 +135,7 @@ def _laid_out(log: Log, name: str) -> Layout:
     pag = read_pag(header["pag"]["text"], templates, file, os.path.dirname(file) or ".")
     source = Source(pag, templates, load_catalogue())
     factory, product = source.compile(), source.product
-    pace = Pace.of(made.settings)
-    layout = lay_out(factory, product, made.settings.clearance, None, pace)
+    layout = Ground().lay_out(factory, product, made.settings)
     goals = subject_of(layout, made.settings, made.jitter, None, made.wip).as_json()["goals"]
     if goals != header["monitor"]["goals"]:
         raise ValueError("the run was in another layout than the one its PAG gets now")

@@ -10,6 +10,7 @@ from itertools import islice
 from typing import TYPE_CHECKING, Any
 
 from factory.errors import Diagnostic, InputError, MissingError, RunError
+from factory.extras import optional
 from factory.sweep.grid import Point
 from factory.sweep.recipe import Recipe, versions
 from factory.sweep.work import Outcome, Runner, failed
@@ -56,15 +57,11 @@ def run_dask(recipe: Recipe, points: Sequence[Point], place: str) -> Generator[O
 def connect(place: str) -> Client:
     """A client of the scheduler at a place. Raises InputError, MissingError."""
     address = address_of(place)
-    try:
-        from distributed import Client
-    except ImportError as error:
-        message, hint = f"a cluster needs Dask: {error}", "pip install 'klavins-factory[cluster]'"
-        raise MissingError(Diagnostic("Missing", message, None, hint)) from error
+    distributed = optional("distributed", "Dask", "a cluster", "cluster")
     for name in [n for n in logging.root.manager.loggerDict if n.startswith("distributed")]:
         logging.getLogger(name).setLevel(logging.CRITICAL)  # what matters, we say ourselves
     try:
-        return Client(address, timeout=PATIENCE, set_as_default=False)
+        return distributed.Client(address, timeout=PATIENCE, set_as_default=False)
     except (OSError, TimeoutError, ValueError) as error:
         message = f"no Dask scheduler answers at {place}: {error}"
         raise MissingError(Diagnostic("Missing", message, None, "dask scheduler")) from error

@@ -109,13 +109,8 @@ class Runner:
             self.catalogue,
             wip=wip,
             compiled=shared,
-            fuse=self._fuse(layout),
         )
         return simulation.run(max_time=self.recipe.max_time)
-
-    def _fuse(self, layout: Layout) -> bool:
-        asked = self.recipe.fuse
-        return fusing_pays(layout.factory, layout.product) if asked is None else asked
 
     def _lay_out(self, settings: Settings) -> Layout | FactoryError:
         recipe = self.recipe
@@ -131,8 +126,10 @@ class Runner:
         self, settings: Settings, world: Literal["mujoco", "ideal"], units: int, wip: int | None
     ) -> Compiled | FactoryError:
         try:
-            layout = _or_raise(self._layout(settings))
-            return compiled(layout, world, units, settings, self.catalogue, wip, self._fuse(layout))
+            layout, fuse = _or_raise(self._layout(settings)), self.recipe.fuse
+            if fuse is None:
+                fuse = fusing_pays(layout.factory, layout.product)
+            return compiled(layout, world, units, settings, self.catalogue, wip, fuse)
         except FactoryError as error:
             return error
 

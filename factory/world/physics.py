@@ -123,6 +123,10 @@ class MujocoWorld:
         """When each product left the outfeed [s]."""
         return self.stock.left
 
+    def axes_of(self, robot: int) -> list[int]:
+        """The axes of a robot (index): its carriage, and its lift if it has one."""
+        return [robot, self.lift[robot]] if robot in self.lift else [robot]
+
     def sense(self) -> tuple[Array, Array]:
         """Measured positions and speeds of all carriages, then of all lifts."""
         axes = slice(self.tray)
@@ -222,7 +226,7 @@ class MujocoWorld:
         for number in range(substeps):
             setpoints[:] = rows[number]
             if len(creeping) and (gone + number) % DOZE == 0:
-                self._rouse(creeping)
+                self.rouse(creeping)
             begin = perf_counter()
             step(m, d)
             spent += perf_counter() - begin
@@ -252,7 +256,7 @@ class MujocoWorld:
         terms[2, :n] = 0.5 * a
         return self._powers @ terms, axes[slow]
 
-    def _rouse(self, axes: Index) -> None:
+    def rouse(self, axes: Index) -> None:
         """Wake robots that sleep, and keep those awake that creep: the engine puts to sleep what
         has been slow for a while, and a robot under way never comes to its goal then."""
         dof, tree = self.dof[axes], self.tree[axes]

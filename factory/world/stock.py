@@ -5,13 +5,11 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cache
 
 import numpy as np
 
 from factory.engine import mujoco
 from factory.factory import Operation
-from factory.meshes import Array
 from factory.mjcf import names
 from factory.mjcf.model import Model
 from factory.mjcf.parts import parked_at, presented_at
@@ -69,7 +67,6 @@ class Stock:
         self.tray = len(factory.robots) + 1
         self.feeder = {o.label: self.tray + 1 + n for n, o in enumerate(factory.leaves)}
         self.grip, self.park = self._grips(), self._parks()
-        self._nominal = cache(self._nominal_of)
         self.feed = {o.label: m.equality(names.feed(o.label)).id for o in factory.leaves}
         self.free: dict[str, deque[int]] = {
             label: deque(range(count)) for label, count in model.copies.items()
@@ -192,13 +189,9 @@ class Stock:
 
     def _misfit(self, robot: int) -> float:
         unit, labels = self.load[robot]
-        places, radii = self._nominal(tuple(labels))
+        places = np.array([self.bodies.centre[label] for label in labels])
+        radii = np.array([self.bodies.radius[label] for label in labels])
         return misfit(self.d, self._bodies(labels, unit), places, radii)
-
-    def _nominal_of(self, labels: tuple[str, ...]) -> tuple[Array, Array]:
-        """The centres of mass in the product, and the radii about them, of some bodies [m]."""
-        centre, radius = self.bodies.centre, self.bodies.radius
-        return np.array([centre[k] for k in labels]), np.array([radius[k] for k in labels])
 
     def fuse(self, robot: int, apart: float | None = None) -> None:
         """Let one body take the place of those that a robot (index) has joined, if it has not yet.
