@@ -79,6 +79,7 @@ class _Acting:
         match disturbance:
             case Push():
                 self.pushes.append((self._body(disturbance.body), disturbance))
+                self.world.vicinity.everything()
             case Mass():
                 self._weigh(disturbance)
             case Gain():

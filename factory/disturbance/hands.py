@@ -55,6 +55,7 @@ class Hands:
         body = int(world.m.body(names.carriage(name)).id)
         newtons = share * float(world.m.actuator(names.drive(name)).forcerange[1])
         heading = np.array([*self._layout.guidepaths[robot].heading, 0.0])
+        world.vicinity.everything()
         world.d.xfrc_applied[body, :3] = newtons * heading
         self._pushed[body] = world.time + seconds
 

@@ -8,16 +8,15 @@ from __future__ import annotations
 
 import copy
 
+import numpy as np
+
 from factory.engine import mujoco
 
-COPIED = (
-    "geom_contype",
-    "geom_conaffinity",
-    "body_contype",
-    "body_conaffinity",
-    "exclude_signature",
-)
+COPIED = ("geom_contype", "geom_conaffinity", "exclude_signature")
 """What a run changes of its model: who may touch whom."""
+
+MASKS = (("body_contype", "geom_contype"), ("body_conaffinity", "geom_conaffinity"))
+"""The mask of a body is that of its geoms; a run leaves bodies out that have nothing near."""
 
 
 class Shadow:
@@ -31,6 +30,7 @@ class Shadow:
         self.m.geom_gap[:] = self.m.body_margin[:] = reach / 2  # of a pair they add up
         self.planes = self.m.geom_type == int(mujoco.mjtGeom.mjGEOM_PLANE)
         self.d = mujoco.MjData(self.m)
+        self._solid = np.flatnonzero(m.body_geomnum)
         self._pairs = [(getattr(self.m, name), getattr(m, name)) for name in COPIED]
         self.follow()
 
@@ -41,7 +41,11 @@ class Shadow:
 
     def collide(self) -> None:
         """Find what is near, by the masks of the run; the floor is near everything."""
+        m = self.m
         for own, other in self._pairs:
             own[...] = other
-        self.m.geom_contype[self.planes] = self.m.geom_conaffinity[self.planes] = 0
-        mujoco.mj_collision(self.m, self.d)
+        for body, geom in MASKS:
+            masks = np.bitwise_or.reduceat(getattr(m, geom), m.body_geomadr[self._solid])
+            getattr(m, body)[self._solid] = masks
+        m.geom_contype[self.planes] = m.geom_conaffinity[self.planes] = 0
+        mujoco.mj_collision(m, self.d)

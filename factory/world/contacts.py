@@ -4,7 +4,7 @@ Parts in the same hands are joined and ignore each other; everything else collid
 code; a part in its hands has the code for its contype and the code's complement for its
 conaffinity, so two parts collide exactly if their codes differ. The lowest bit is that of robots
 and stations, which collide with every part. Written on geoms *and* bodies: the broad phase looks at
-those of bodies.
+those of bodies, and `vicinity` takes bodies out of it.
 """
 
 from __future__ import annotations
@@ -30,7 +30,8 @@ class Contacts:
     """The masks and exclusions of a model, for parts whose bodies are given by label and copy.
 
     `code` and `unit` (nbody,): the holder of each part's body and the unit it belongs to, -1 for
-    none. `excluded`: pairs of labels whose parts of one unit do not collide.
+    none. `contype` and `conaffinity` (nbody,): the masks of bodies. `excluded`: pairs of labels
+    whose parts of one unit do not collide.
     """
 
     def __init__(
@@ -39,6 +40,7 @@ class Contacts:
         self.m = m
         self.code = np.zeros(m.nbody, np.int64)
         self.unit = np.full(m.nbody, -1)
+        self.contype, self.conaffinity = m.body_contype.copy(), m.body_conaffinity.copy()
         self.solid = {int(b): self._solid(int(b)) for ids in bodies.values() for b in ids}
         self.partners: dict[str, list[str]] = {}
         for one, other in excluded:
@@ -64,8 +66,13 @@ class Contacts:
         self.code[chosen] = holder
         self.m.geom_contype[geoms] = own
         self.m.geom_conaffinity[geoms] = others
-        self.m.body_contype[chosen] = own
-        self.m.body_conaffinity[chosen] = others
+        self.contype[chosen] = self.m.body_contype[chosen] = own
+        self.conaffinity[chosen] = self.m.body_conaffinity[chosen] = others
+
+    @property
+    def collides(self) -> NDArray[np.bool_]:
+        """Which bodies can collide with anything (nbody,)."""
+        return np.asarray((self.contype | self.conaffinity) != 0)
 
     def enter(self, label: str, unit: int, body: int) -> None:
         """A part's body comes into the factory, for a unit."""

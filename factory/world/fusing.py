@@ -46,7 +46,10 @@ def fuse(m: mujoco.MjModel, d: mujoco.MjData, bodies: Sequence[int], whole: int)
     place = d.qpos[q[:, None] + np.arange(3)]
     speed = d.qvel[v[:, None] + np.arange(3)]
     centre, common = share @ place, share @ speed
-    spin = np.cross(mass[:, None] * (place - centre), speed - common).sum(axis=0)
+    moment = (mass[:, None] * (place - centre)).T @ (speed - common)  # sum of m r vᵀ
+    spin = np.array(
+        [moment[1, 2] - moment[2, 1], moment[2, 0] - moment[0, 2], moment[0, 1] - moment[1, 0]]
+    )
     for body, at, dof in zip(chosen, q, v, strict=True):
         inertia = _inertia(m, body, d.qpos[at + 3 : at + 7])
         turn = _turn(d.qpos[at + 3 : at + 7])

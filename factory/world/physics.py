@@ -77,7 +77,8 @@ class MujocoWorld:
         self.tray = len(slides) - 1
         self.qpos = self.m.jnt_qposadr[joint]
         self.dof = self.m.jnt_dofadr[joint]
-        self.tree = self.m.body_treeid[self.m.jnt_bodyid[joint]]
+        self.body = self.m.jnt_bodyid[joint]
+        self.tree = self.m.body_treeid[self.body]
         self.control = self.m.actuator_ctrladr[actuator]
         self.m.actuator_biasprm[actuator[: self.tray], 1:3] *= np.asarray(gains)[:, None]
         start = np.append(start, 0.0)
@@ -103,6 +104,7 @@ class MujocoWorld:
         self.d.ctrl[self.control] = start
         self.d.ctrl[self.control + 2] = self.weight
         self.stock = Stock(self.m, self.d, model, units, counts or {}, wip)
+        self.vicinity = self.stock.vicinity
         self.inspection = Inspection(self.m, self.d, model, self.stock.contacts)
         for operation in factory.operations:
             begun, over = ((counts or {}).get(t, 0) for t in (operation.start, operation.end))
@@ -215,23 +217,27 @@ class MujocoWorld:
             creeping = creeping[:0]
         else:
             rows[:, self._ctrl] = self._course[gone : gone + substeps + 1]
-        axes = np.flatnonzero(self._due)
+        (axes,) = self._due.nonzero()
         if len(axes):
             begun, x, v, a = self._plan[:, axes]
             own, slow = self._setpoints(axes, x, v, a, d.time - begun)
             rows[:, self._inputs(axes)] = own[: substeps + 1]
             creeping = np.concatenate([creeping, slow])
             self._due[axes] = self._plan[2:, axes].any(axis=0)
-        setpoints, step, spent = d.ctrl, mujoco.mj_step, 0.0
+        setpoints, step, spent, vicinity = d.ctrl, mujoco.mj_step, 0.0, self.vicinity
+        vicinity.notice()
         for number in range(substeps):
             setpoints[:] = rows[number]
             if len(creeping) and (gone + number) % DOZE == 0:
                 self.rouse(creeping)
+            if vicinity.stale:
+                vicinity.look()
             begin = perf_counter()
             step(m, d)
             spent += perf_counter() - begin
             if d.ncon:
                 self.inspection.contacts()
+                vicinity.notice()
         setpoints[:] = rows[substeps]
         self.physics_time += spent
 
@@ -261,7 +267,10 @@ class MujocoWorld:
         has been slow for a while, and a robot under way never comes to its goal then."""
         dof, tree = self.dof[axes], self.tree[axes]
         self.d.qvel[dof[self.d.qvel[dof] == 0.0]] = AWAKE
-        self.d.tree_asleep[tree[self.d.tree_asleep[tree] < 0]] = FRESH
+        awake = self.d.tree_asleep[tree] < 0
+        self.d.tree_asleep[tree[awake]] = FRESH
+        for body in self.body[axes[~awake]].tolist():
+            self.vicinity.woken(body)
 
     def settle(self) -> None:
         """After a tick: look at welds, and move the outfeed's tray."""

@@ -16,6 +16,7 @@ from factory.mjcf.parts import parked_at, presented_at
 from factory.pag import NOPART
 from factory.world.contacts import NOBODY, Contacts
 from factory.world.fusing import RIGID, SETTLING, fuse, misfit
+from factory.world.vicinity import Vicinity
 
 AWAKE = -0.0
 """Written over a speed of zero it wakes a sleeping body and changes nothing else."""
@@ -67,6 +68,9 @@ class Stock:
         self.tray = len(factory.robots) + 1
         self.feeder = {o.label: self.tray + 1 + n for n, o in enumerate(factory.leaves)}
         self.grip, self.park = self._grips(), self._parks()
+        layout = model.layout
+        self.presented = {o.label: presented_at(layout, o.label) for o in factory.leaves}
+        self.parked = {(k, n): parked_at(layout, k, n + 1) for k, n in self.park}
         self.feed = {o.label: m.equality(names.feed(o.label)).id for o in factory.leaves}
         self.free: dict[str, deque[int]] = {
             label: deque(range(count)) for label, count in model.copies.items()
@@ -82,6 +86,7 @@ class Stock:
         self.hold = {label: m.equality(names.hold(label)).id for label in self.parts}
         self.on_tray: int | None = None
         self.left: list[float] = []
+        self.vicinity = Vicinity(m, d, self.contacts, self._trees(), self.tray + len(self.feeder))
         self._hide_spares()
         self._hand_out(counts)
         for label in self.feed:
@@ -107,7 +112,7 @@ class Stock:
         self.shown[label] = unit
         self.next_unit[label] += 1
         body = int(self.body[label][copy])
-        self._place([body], [presented_at(self.model.layout, label)])
+        self._place([body], [self.presented[label]])
         self.contacts.enter(label, unit, body)
         self.contacts.hold([body], self.feeder[label])
         self._loose([self.park[label, copy]])
@@ -209,6 +214,7 @@ class Stock:
         copy = self.free[label].popleft()
         whole = int(self.body[label][copy])
         fuse(self.m, self.d, self._bodies(labels, unit), whole)
+        self.vicinity.woken(whole)
         self._loose([*(self.grip[robot, each] for each in labels), self.park[label, copy]])
         self._retire(labels, unit)
         self.copy_of[label, unit] = copy
@@ -298,6 +304,12 @@ class Stock:
             self._wake(one[weld])
             self._wake(body)
 
+    def _trees(self) -> dict[int, int]:
+        """The code of the holder that each kinematic tree with a grip is."""
+        tree, one = self.m.body_treeid, self.m.eq_obj1id
+        found = {int(tree[one[weld]]): robot + 1 for (robot, _), weld in self.grip.items()}
+        return found | {int(tree[one[weld]]): self.tray for weld in self.hold.values()}
+
     def _wake(self, body: int) -> None:
         """Wake a body that sleeps, and let one that is about to, being slow, wait as long again."""
         tree, asleep = self._tree[body], self.d.tree_asleep
@@ -307,18 +319,22 @@ class Stock:
             first = self.m.body_dofadr[body]
             speeds = self.d.qvel[first : first + self.m.body_dofnum[body]]
             speeds[speeds == 0.0] = AWAKE
+            self.vicinity.woken(body)
 
     def _place(self, bodies: Sequence[int], at: Sequence[tuple[float, float, float]]) -> None:
         """Put free bodies somewhere, upright and at rest."""
         joint = self.m.body_jntadr[list(bodies)]
         q, v = self.m.jnt_qposadr[joint], self.m.jnt_dofadr[joint]
         self.d.qpos[q[:, None] + np.arange(7)] = [(*place, 1, 0, 0, 0) for place in at]
+        self.d.xpos[list(bodies)] = at
+        for body in bodies:
+            self.vicinity.woken(body)
         self.d.qvel[v[:, None] + np.arange(6)] = 0
 
     def _put_away(self, labels: Sequence[str], copies: Sequence[int]) -> None:
         spares = list(zip(labels, copies, strict=True))
         bodies = [int(self.body[label][copy]) for label, copy in spares]
-        self._place(bodies, [parked_at(self.model.layout, k, n + 1) for k, n in spares])
+        self._place(bodies, [self.parked[spare] for spare in spares])
         self.contacts.hold(bodies, NOBODY)
         self._join([self.park[spare] for spare in spares], bodies)
 

@@ -1,0 +1,144 @@
+"""Which bodies the engine's broad phase looks at: those that move, and all that they may reach.
+
+The engine boxes every body that can collide in every step, and drops pairs of sleepers afterwards.
+Most of a factory rests, far from what moves: it is left out of the broad phase until something
+comes near, or it moves itself. No pair that could touch is left out, so a run is the same to the
+last bit.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from factory.control.mode import Array
+from factory.engine import mujoco
+from factory.world.contacts import Contacts
+
+PERIOD = 0.02
+"""What moves is looked at again after this [s]."""
+
+SUDDEN = 40.0
+"""Nothing gains speed faster than this, but what is pushed [m/s²]."""
+
+CROWD = 0.25
+"""Where more than this share of all holders moves, there is little to leave out, and nothing is."""
+
+FEW = 250
+"""Where there are fewer holders, looking takes longer than it saves: up to some 100 robots."""
+
+AWAKE = int(mujoco.mjtSleepState.mjS_AWAKE)
+
+
+class Vicinity:
+    """The bodies that the broad phase of a model looks at: all, where there are few holders.
+
+    All that is in the same hands is looked at as one box, seen from above. `trees`: the holder (its
+    code, of 1 to `holders`) of each kinematic tree that is no part, a robot's or the tray's; what
+    is fixed to the floor is a holder of its own. `stale`: something has been woken since the last
+    look, or it was long ago.
+    """
+
+    def __init__(
+        self,
+        m: mujoco.MjModel,
+        d: mujoco.MjData,
+        contacts: Contacts,
+        trees: Mapping[int, int],
+        holders: int,
+    ) -> None:
+        self.m, self.d, self.contacts, self.holder = m, d, contacts, contacts.code
+        for body in range(1, m.nbody):
+            if body not in contacts.solid and contacts.collides[body]:
+                fixed = int(m.body_treeid[body]) not in trees
+                holders += fixed
+                self.holder[body] = holders if fixed else trees[int(m.body_treeid[body])]
+        planes = m.geom_bodyid[m.geom_type == int(mujoco.mjtGeom.mjGEOM_PLANE)]
+        self._always = np.isin(np.arange(m.nbody), planes)
+        self._moves = np.zeros(holders + 1, bool)
+        self._low = np.full((2, holders + 1), np.inf, np.float32)
+        self._high = np.full((2, holders + 1), -np.inf, np.float32)
+        self._middle, self._half = _boxes(m, d, contacts)
+        self._seen = np.zeros(m.ntree, bool)
+        self._woken = [*range(m.nbody)]
+        self._due, self._culls, self.stale = 0.0, holders >= FEW, True
+
+    def woken(self, body: int) -> None:
+        """A body is about to move."""
+        self._woken.append(body)
+        self.stale = True
+
+    def notice(self) -> None:
+        """It is stale where the engine has woken something by itself, or at the end of a period."""
+        if self._culls and (self.d.time >= self._due or (self._awake > self._seen).any()):
+            self.stale = True
+
+    def everything(self) -> None:
+        """From now on nothing is left out: somebody pushes."""
+        self._culls = False
+        self._show(np.ones(self.m.nbody, bool))
+
+    @property
+    def _awake(self) -> np.ndarray:
+        return np.asarray(self.d.tree_asleep < 0)
+
+    def look(self) -> None:
+        """Choose anew what the broad phase looks at."""
+        self.stale = False
+        if not self._culls:
+            return
+        self._due, self._seen = self.d.time + PERIOD, self._awake
+        moving = self.d.body_awake == AWAKE
+        moving[self._woken] = True
+        self._woken.clear()
+        self._moves[:] = False
+        self._moves[self.holder[moving]] = True
+        bodies = (self._moves[self.holder] & self.contacts.collides).nonzero()[0]
+        near = self._moves
+        if len(bodies):
+            near = self._reached(bodies[np.argsort(self.holder[bodies], kind="stable")])
+        self._show(near[self.holder] | self._always)
+
+    def _reached(self, bodies: np.ndarray) -> np.ndarray:
+        """The holders (holders + 1,) that moving bodies, sorted by holder, may reach within a
+        period; their own among them."""
+        holder = self.holder[bodies]
+        first = np.concatenate([[0], (holder[1:] != holder[:-1]).nonzero()[0] + 1])
+        who = holder[first]
+        middle, half = self.d.xpos[bodies, :2] + self._middle[bodies], self._half[bodies]
+        low = np.minimum.reduceat(middle - half, first).T
+        high = np.maximum.reduceat(middle + half, first).T
+        self._low[:, who], self._high[:, who] = low, high
+        if len(who) > CROWD * len(self._moves):
+            return np.ones_like(self._moves)
+        speed = float(np.abs(self.d.cvel[bodies, 3:]).max())
+        reach = (speed + SUDDEN * PERIOD / 2) * PERIOD
+        (x0, y0), (x1, y1) = self._low[:, who, None] - reach, self._high[:, who, None] + reach
+        meets = (x0 <= self._high[0]) & (self._low[0] <= x1)
+        meets &= (y0 <= self._high[1]) & (self._low[1] <= y1)
+        return np.asarray(meets.any(axis=0))
+
+    def _show(self, near: np.ndarray) -> None:
+        np.multiply(self.contacts.contype, near, out=self.m.body_contype)
+        np.multiply(self.contacts.conaffinity, near, out=self.m.body_conaffinity)
+
+
+def _boxes(m: mujoco.MjModel, d: mujoco.MjData, contacts: Contacts) -> tuple[Array, Array]:
+    """The middle of each body's box seen from above, relative to its origin, and half its sides
+    (nbody, 2) [m]. That of a part holds it whichever way it is turned; all else does not turn."""
+    mujoco.mj_kinematics(m, d)
+    turn, body = d.geom_xmat.reshape(-1, 3, 3), m.geom_bodyid
+    middle = d.geom_xpos + (turn @ m.geom_aabb[:, :3, None])[:, :, 0] - d.xpos[body]
+    half = (np.abs(turn) @ m.geom_aabb[:, 3:, None])[:, :, 0]
+    ball = np.linalg.norm(middle, axis=1) + np.linalg.norm(half, axis=1)
+    turns = np.isin(body, [*contacts.solid])
+    middle[turns], half[turns] = 0.0, ball[turns, None]
+    solid = contacts.collides[body]
+    solid[np.concatenate([*contacts.solid.values()])] = True
+    low, high = np.full((m.nbody, 3), np.inf), np.full((m.nbody, 3), -np.inf)
+    np.minimum.at(low, body[solid], (middle - half)[solid])
+    np.maximum.at(high, body[solid], (middle + half)[solid])
+    found = np.isfinite(low)
+    low[~found] = high[~found] = 0.0
+    return (low + high)[:, :2] / 2, (high - low)[:, :2] / 2
