@@ -16,10 +16,10 @@ from factory.control.mode import Array
 from factory.engine import mujoco
 from factory.world.contacts import Contacts
 
-PERIOD = 0.02
-"""What moves is looked at again after this [s]."""
+PERIOD = 0.04
+"""All that moves is looked at again after this [s]."""
 
-SUDDEN = 40.0
+SUDDEN = 20.0
 """Nothing gains speed faster than this, but what is pushed [m/s²]."""
 
 CROWD = 0.25
@@ -37,7 +37,7 @@ class Vicinity:
     All that is in the same hands is looked at as one box, seen from above. `trees`: the holder (its
     code, of 1 to `holders`) of each kinematic tree that is no part, a robot's or the tray's; what
     is fixed to the floor is a holder of its own. `stale`: something has been woken since the last
-    look, or it was long ago.
+    look, or the last at all that moves was long ago.
     """
 
     def __init__(
@@ -59,24 +59,27 @@ class Vicinity:
         self._moves = np.zeros(holders + 1, bool)
         self._low = np.full((2, holders + 1), np.inf, np.float32)
         self._high = np.full((2, holders + 1), -np.inf, np.float32)
-        self._middle, self._half = _boxes(m, d, contacts)
+        self._lowest, self._highest = _boxes(m, d, contacts)
+        self._near = np.ones(holders + 1, bool)
         self._seen = np.zeros(m.ntree, bool)
-        self._woken = [*range(m.nbody)]
-        self._due, self._culls, self.stale = 0.0, holders >= FEW, True
+        self._woken: list[int] = []
+        self._box(self.holder.nonzero()[0])
+        self._due, self._culls, self.stale = 0.0, holders >= FEW, False
 
     def woken(self, body: int) -> None:
         """A body is about to move."""
-        self._woken.append(body)
-        self.stale = True
+        if self._culls:
+            self._woken.append(body)
+            self.stale = True
 
     def notice(self) -> None:
         """It is stale where the engine has woken something by itself, or at the end of a period."""
         if self._culls and (self.d.time >= self._due or (self._awake > self._seen).any()):
-            self.stale = True
+            self._due, self.stale = self.d.time, True
 
     def everything(self) -> None:
         """From now on nothing is left out: somebody pushes."""
-        self._culls = False
+        self._culls = self.stale = False
         self._show(np.ones(self.m.nbody, bool))
 
     @property
@@ -84,40 +87,50 @@ class Vicinity:
         return np.asarray(self.d.tree_asleep < 0)
 
     def look(self) -> None:
-        """Choose anew what the broad phase looks at."""
+        """Choose what the broad phase looks at: anew where that is due, else what has been woken
+        besides."""
         self.stale = False
-        if not self._culls:
-            return
-        self._due, self._seen = self.d.time + PERIOD, self._awake
-        moving = self.d.body_awake == AWAKE
-        moving[self._woken] = True
-        self._woken.clear()
+        anew = self.d.time >= self._due
+        if anew:
+            self._due, self._seen = self.d.time + PERIOD, self._awake
         self._moves[:] = False
-        self._moves[self.holder[moving]] = True
+        self._moves[self.holder[self._woken]] = True
+        self._woken.clear()
+        if anew:
+            self._moves[self.holder[self.d.body_awake == AWAKE]] = True
         bodies = (self._moves[self.holder] & self.contacts.collides).nonzero()[0]
-        near = self._moves
+        near = np.zeros_like(self._near)
         if len(bodies):
-            near = self._reached(bodies[np.argsort(self.holder[bodies], kind="stable")])
-        self._show(near[self.holder] | self._always)
+            near = self._reached(bodies)
+            self._seen[self.m.body_treeid[bodies]] = True
+        self._near = near if anew else self._near | near
+        self._show(self._near[self.holder] | self._always)
 
     def _reached(self, bodies: np.ndarray) -> np.ndarray:
-        """The holders (holders + 1,) that moving bodies, sorted by holder, may reach within a
-        period; their own among them."""
-        holder = self.holder[bodies]
-        first = np.concatenate([[0], (holder[1:] != holder[:-1]).nonzero()[0] + 1])
-        who = holder[first]
-        middle, half = self.d.xpos[bodies, :2] + self._middle[bodies], self._half[bodies]
-        low = np.minimum.reduceat(middle - half, first).T
-        high = np.maximum.reduceat(middle + half, first).T
-        self._low[:, who], self._high[:, who] = low, high
+        """The holders (holders + 1,) that moving bodies may reach within a period; their own among
+        them."""
+        who = self._box(bodies)
         if len(who) > CROWD * len(self._moves):
             return np.ones_like(self._moves)
-        speed = float(np.abs(self.d.cvel[bodies, 3:]).max())
-        reach = (speed + SUDDEN * PERIOD / 2) * PERIOD
-        (x0, y0), (x1, y1) = self._low[:, who, None] - reach, self._high[:, who, None] + reach
-        meets = (x0 <= self._high[0]) & (self._low[0] <= x1)
-        meets &= (y0 <= self._high[1]) & (self._low[1] <= y1)
+        speed = np.abs(self.d.cvel.take(bodies, axis=0)[:, 3:]).max()
+        reach = float(speed + SUDDEN * PERIOD / 2) * PERIOD
+        low, high = self._low, self._high
+        (x0, y0), (x1, y1) = low[:, who, None] - reach, high[:, who, None] + reach
+        meets = (x0 <= high[0]) & (low[0] <= x1)
+        meets &= y0 <= high[1]
+        meets &= low[1] <= y1
         return np.asarray(meets.any(axis=0))
+
+    def _box(self, bodies: np.ndarray) -> np.ndarray:
+        """Box all that the holders of bodies have, which are these, and tell who they are."""
+        bodies = bodies[np.argsort(self.holder[bodies], kind="stable")]
+        holder = self.holder[bodies]
+        first = np.concatenate([[0], (holder[1:] != holder[:-1]).nonzero()[0] + 1])
+        who, at = holder[first], self.d.xpos.take(bodies, axis=0)
+        low, high = at + self._lowest.take(bodies, axis=0), at + self._highest.take(bodies, axis=0)
+        self._low[:, who] = np.minimum.reduceat(low, first)[:, :2].T
+        self._high[:, who] = np.maximum.reduceat(high, first)[:, :2].T
+        return np.asarray(who)
 
     def _show(self, near: np.ndarray) -> None:
         np.multiply(self.contacts.contype, near, out=self.m.body_contype)
@@ -125,8 +138,8 @@ class Vicinity:
 
 
 def _boxes(m: mujoco.MjModel, d: mujoco.MjData, contacts: Contacts) -> tuple[Array, Array]:
-    """The middle of each body's box seen from above, relative to its origin, and half its sides
-    (nbody, 2) [m]. That of a part holds it whichever way it is turned; all else does not turn."""
+    """The lowest and highest corner of each body's box from its origin, in the world's directions
+    (nbody, 3) [m]. That of a part holds it whichever way it is turned; all else does not turn."""
     mujoco.mj_kinematics(m, d)
     turn, body = d.geom_xmat.reshape(-1, 3, 3), m.geom_bodyid
     middle = d.geom_xpos + (turn @ m.geom_aabb[:, :3, None])[:, :, 0] - d.xpos[body]
@@ -139,6 +152,4 @@ def _boxes(m: mujoco.MjModel, d: mujoco.MjData, contacts: Contacts) -> tuple[Arr
     low, high = np.full((m.nbody, 3), np.inf), np.full((m.nbody, 3), -np.inf)
     np.minimum.at(low, body[solid], (middle - half)[solid])
     np.maximum.at(high, body[solid], (middle + half)[solid])
-    found = np.isfinite(low)
-    low[~found] = high[~found] = 0.0
-    return (low + high)[:, :2] / 2, (high - low)[:, :2] / 2
+    return low, high
