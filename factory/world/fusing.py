@@ -37,30 +37,28 @@ def misfit(d: mujoco.MjData, bodies: Sequence[int], places: Array, radii: Array)
 
 def fuse(m: mujoco.MjModel, d: mujoco.MjData, bodies: Sequence[int], whole: int) -> None:
     """Put the body `whole` in the place of free bodies: pose, momentum and angular momentum are
-    theirs. Its turn is that of the heaviest, and all origins are centres of mass."""
+    theirs. Its turn is that of the heaviest, and all origins are centres of mass; speeds of turning
+    are in a body's own frame, inertia is in that of its principal axes."""
     chosen = list(bodies)
     joint = m.body_jntadr[chosen]
     q, v = m.jnt_qposadr[joint], m.jnt_dofadr[joint]
     mass = m.body_mass[chosen]
     share = mass / mass.sum()
-    place = d.qpos[q[:, None] + np.arange(3)]
-    speed = d.qvel[v[:, None] + np.arange(3)]
-    centre, common = share @ place, share @ speed
-    moment = (mass[:, None] * (place - centre)).T @ (speed - common)  # sum of m r vᵀ
-    spin = np.array(
-        [moment[1, 2] - moment[2, 1], moment[2, 0] - moment[0, 2], moment[0, 1] - moment[1, 0]]
-    )
-    for body, at, dof in zip(chosen, q, v, strict=True):
-        inertia = _inertia(m, body, d.qpos[at + 3 : at + 7])
-        turn = _turn(d.qpos[at + 3 : at + 7])
-        spin += inertia @ (turn @ d.qvel[dof + 3 : dof + 6])
-    heaviest = int(np.argmax(mass))
-    pose = d.qpos[q[heaviest] + 3 : q[heaviest] + 7]
+    pose = d.qpos[q[:, None] + np.arange(7)]
+    speed = d.qvel[v[:, None] + np.arange(6)]
+    centre, common = share @ pose[:, :3], share @ speed[:, :3]
+    moment = (mass[:, None] * (pose[:, :3] - centre)).T @ (speed[:, :3] - common)  # sum of m r vᵀ
+    spin = np.array((moment - moment.T)[[1, 2, 0], [2, 0, 1]])
+    for body, quaternion, turning in zip(chosen, pose[:, 3:], speed[:, 3:], strict=True):
+        axes = _turn(m.body_iquat[body])
+        spin += _turn(quaternion) @ (axes @ (m.body_inertia[body] * (turning @ axes)))
+    heaviest = int(mass.argmax())
     at, dof = (int(a[m.body_jntadr[whole]]) for a in (m.jnt_qposadr, m.jnt_dofadr))
-    d.qpos[at : at + 3], d.qpos[at + 3 : at + 7] = centre, pose
+    d.qpos[at : at + 3], d.qpos[at + 3 : at + 7] = centre, pose[heaviest, 3:]
+    axes = _turn(m.body_iquat[whole])
+    local = spin @ _turn(pose[heaviest, 3:])
     d.qvel[dof : dof + 3] = common
-    turning = np.linalg.solve(_inertia(m, whole, pose), spin)
-    d.qvel[dof + 3 : dof + 6] = _turn(pose).T @ turning
+    d.qvel[dof + 3 : dof + 6] = axes @ (local @ axes / m.body_inertia[whole])
     d.xpos[whole] = share @ d.xpos[chosen]
     d.xmat[whole], d.xquat[whole] = d.xmat[chosen[heaviest]], d.xquat[chosen[heaviest]]
 
@@ -69,9 +67,3 @@ def _turn(quaternion: Array) -> Array:
     matrix = np.empty(9)
     mujoco.mju_quat2Mat(matrix, quaternion)
     return matrix.reshape(3, 3)
-
-
-def _inertia(m: mujoco.MjModel, body: int, quaternion: Array) -> Array:
-    """The inertia (3, 3) [kg m²] of a free body about its centre of mass, in the world's frame."""
-    axes = _turn(quaternion) @ _turn(m.body_iquat[body])
-    return np.asarray(axes * m.body_inertia[body] @ axes.T)
