@@ -28,13 +28,15 @@ def layout_of(name: str) -> Layout:
 
 
 def free_bodies(rng: np.random.Generator, count: int) -> tuple[mujoco.MjModel, mujoco.MjData, int]:
-    """`count` free boxes somewhere, and at the origin the body that they are together."""
+    """`count` free boxes somewhere, turned in their bodies' frames, and the body that they are
+    together."""
     mass, half = rng.uniform(0.1, 3, count), rng.uniform(0.02, 0.2, (count, 3))
+    turns = [" ".join(map(repr, turn.tolist())) for turn in rng.normal(size=(count, 4))]
     place = rng.uniform(-0.5, 0.5, (count, 3))
     centre = mass @ place / mass.sum()
     boxes = [
-        f'<geom type="box" size="{h[0]} {h[1]} {h[2]}" mass="{m}" pos="{{}} {{}} {{}}"/>'
-        for h, m in zip(half, mass, strict=True)
+        f'<geom type="box" size="{h[0]} {h[1]} {h[2]}" mass="{m}" quat="{t}" pos="{{}} {{}} {{}}"/>'
+        for h, m, t in zip(half, mass, turns, strict=True)
     ]
     parts = "".join(
         f'<body pos="{p[0]} {p[1]} {p[2]}"><freejoint/>{box.format(0, 0, 0)}</body>'

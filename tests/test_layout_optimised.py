@@ -28,9 +28,10 @@ from factory.layout.outline import Outline, Plan
 from factory.layout.plan import Layout
 from factory.layout.stretching import Shape
 from factory.pipeline import read
+from factory.planning import Ground
 from factory.prediction import operation_delays
 from factory.settings import Settings
-from tests.command_line import Terminal
+from tests.command_line import ROOT, Terminal
 
 PACE = Pace.of(Settings())
 EXAMPLES = Path(__file__).resolve().parent.parent / "examples"
@@ -217,3 +218,13 @@ def test_build_tells_what_was_gained(run: Terminal) -> None:
     assert found["first_feasible"]["predicted_cycle_time_s"] == pytest.approx(7.66, abs=1e-3)
     assert found["cycle_time_bound_s"] == pytest.approx(3.222, abs=1e-3)
     assert found["guidepath_length_m"] < found["first_feasible"]["guidepath_length_m"]
+
+
+def test_a_factory_is_laid_out_at_the_pace_of_its_settings() -> None:
+    """At a crawl, ways cost more than gates: the shelf's factory is another one then."""
+    source = read(ROOT / "examples" / "shelf.pag", ())
+    usual, slow = (
+        Ground().lay_out(source.compile(), source.product, Settings(speed=speed))
+        for speed in (0.5, 0.05)
+    )
+    assert slow.guidepath_length < usual.guidepath_length

@@ -318,6 +318,18 @@ def test_other_names_and_other_pages_are_refused(server: Server) -> None:
         assert watcher.recv(10)
 
 
+def test_no_more_may_watch_than_it_can_serve(
+    server: Server, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from websockets.exceptions import InvalidStatus
+
+    monkeypatch.setattr("factory.live.server.MOST", 2)
+    with socket_of(server) as one, socket_of(server) as other:
+        assert one.recv(10) and other.recv(10)
+        with pytest.raises(InvalidStatus, match="503"), socket_of(server):
+            pass
+
+
 def test_watchers_see_frames_and_are_obeyed(server: Server, running: Running) -> None:
     running.until(lambda f: f.fired > 3)
     with socket_of(server) as one, socket_of(server) as other:

@@ -4,18 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import cache
+from typing import Any
 
 import numpy as np
 import pytest
 
 from factory.disturbance import Push, disturb
 from factory.disturbance.hands import Hands
+from factory.engine import mujoco
+from factory.fidelity.shadow import Shadow
 from factory.layout.plan import Layout
 from factory.simulation import Simulation
 from factory.world import vicinity
 from factory.world.vicinity import Vicinity
 from tests.bench.factories import balanced
 from tests.bench.factories import laid_out as floor_of
+from tests.bench.replaying import stepping
 from tests.test_fuse import layout_of
 
 
@@ -97,7 +101,53 @@ def test_a_collision_is_the_same_to_the_last_bit(seed: int) -> None:
     assert crash(seed, True) == (whole, touched)
 
 
-def test_who_sees_only_what_moves_misses_collisions(monkeypatch: pytest.MonkeyPatch) -> None:
+def boxes(m: mujoco.MjModel, d: mujoco.MjData, bodies: np.ndarray) -> np.ndarray:
+    """The boxes (n, 2, 3) that the engine's broad phase has for bodies, in the world's axes."""
+    solid = (m.geom_contype | m.geom_conaffinity) != 0
+    turn = d.geom_xmat.reshape(-1, 3, 3)
+    middle = d.geom_xpos + (turn @ m.geom_aabb[:, :3, None])[:, :, 0]
+    half = (np.abs(turn) @ m.geom_aabb[:, 3:, None])[:, :, 0]
+    found = np.empty((m.nbody, 2, 3))
+    found[:, 0], found[:, 1] = np.inf, -np.inf
+    np.minimum.at(found[:, 0], m.geom_bodyid[solid], (middle - half)[solid])
+    np.maximum.at(found[:, 1], m.geom_bodyid[solid], (middle + half)[solid])
+    return np.asarray(found[bodies])
+
+
+def overlooked(m: mujoco.MjModel, d: mujoco.MjData, contacts: Any) -> set[str]:
+    """Whatever meets the box of something awake and was left out of the last step, and whatever is
+    awake and was left out."""
+    bodies = np.flatnonzero(contacts.collides)
+    seen = (m.body_contype[bodies] | m.body_conaffinity[bodies]) != 0
+    awake = d.body_awake[bodies] == vicinity.AWAKE
+    low, high = boxes(m, d, bodies).transpose(1, 0, 2)
+    meets = (low[awake, None] <= high) & (low <= high[awake, None])
+    near = meets.all(axis=2).any(axis=0)
+    return {m.body(body).name for body in bodies[(near | awake) & ~seen]}
+
+
+def all_overlooked(seed: int, ticks: int = 150) -> set[str]:
+    """In a run in which robots collide."""
+    simulation, found = ready("20", True), set[str]()
+    contacts = simulation.world.stock.contacts
+
+    def step(m: mujoco.MjModel, d: mujoco.MjData) -> None:
+        mujoco.mj_step(m, d)
+        found.update(overlooked(m, d, contacts))
+
+    with stepping(step):
+        tick = gone_wild(simulation, seed)
+        for _ in range(ticks):
+            tick()
+    return found
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_nothing_near_what_moves_is_overlooked(seed: int) -> None:
+    assert all_overlooked(seed) == set()
+
+
+def test_who_sees_only_what_moves_overlooks_what_is_near(monkeypatch: pytest.MonkeyPatch) -> None:
     reached = Vicinity._reached
 
     def short_sighted(self: Vicinity, bodies: np.ndarray) -> np.ndarray:
@@ -106,7 +156,45 @@ def test_who_sees_only_what_moves_misses_collisions(monkeypatch: pytest.MonkeyPa
         return near
 
     monkeypatch.setattr(Vicinity, "_reached", short_sighted)
+    assert all_overlooked(0)
     assert any(crash(seed, True) != crash(seed, False) for seed in range(4))
+
+
+def test_who_looks_too_short_ahead_overlooks_what_is_near(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(vicinity, "PERIOD", 2.0)
+    monkeypatch.setattr(vicinity, "SUDDEN", -0.5)
+    assert all_overlooked(0)
+
+
+def test_the_box_of_a_part_holds_it_whichever_way_it_is_turned() -> None:
+    simulation, rng = ready("gearbox", True), np.random.default_rng(4)
+    world = simulation.world
+    m, d, seen = world.m, world.d, world.vicinity
+    for _ in range(60):
+        simulation.supervisor.step()
+    parts = np.array([*world.stock.contacts.solid])
+    at = m.jnt_qposadr[m.body_jntadr[parts]]
+    for _ in range(5):
+        d.qpos[at[:, None] + np.arange(3, 7)] = rng.normal(size=(len(parts), 4))
+        mujoco.mj_normalizeQuat(m, d.qpos)
+        mujoco.mj_kinematics(m, d)
+        here = parts[world.stock.contacts.collides[parts]]
+        low, high = boxes(m, d, here).transpose(1, 0, 2)
+        assert (d.xpos[here] + seen._lowest[here] <= low + 1e-9).all()
+        assert (high <= d.xpos[here] + seen._highest[here] + 1e-9).all()
+
+
+def test_a_shadow_sees_what_is_left_out() -> None:
+    simulation = ready("20", True)
+    for _ in range(600):
+        simulation.supervisor.step()
+    world = simulation.world
+    assert looked_at(simulation) < 1.0
+    shadow = Shadow(world.m, world.d, 0.01)
+    shadow.collide()
+    parts = [*world.stock.contacts.solid]
+    assert np.array_equal(shadow.m.body_contype[parts], world.stock.contacts.contype[parts])
+    assert np.array_equal(shadow.m.body_conaffinity[parts], world.stock.contacts.conaffinity[parts])
 
 
 def test_a_small_factory_is_looked_at_as_a_whole(monkeypatch: pytest.MonkeyPatch) -> None:
