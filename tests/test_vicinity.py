@@ -166,6 +166,22 @@ def test_who_looks_too_short_ahead_overlooks_what_is_near(monkeypatch: pytest.Mo
     assert all_overlooked(0)
 
 
+def test_what_the_engine_wakes_by_itself_is_seen_a_tick_later() -> None:
+    simulation = ready("20", True)
+    for _ in range(600):
+        simulation.supervisor.step()
+    world = simulation.world
+    m, d, collides = world.m, world.d, world.stock.contacts.collides
+    sleeps = collides & (m.body_contype == 0) & (d.body_awake == 0)
+    body = int(np.flatnonzero(sleeps)[0])
+    world.vicinity._due = np.inf
+    d.xfrc_applied[body, 2] = 1e-6
+    world.advance(1)
+    assert d.body_awake[body] == vicinity.AWAKE
+    world.advance(1)
+    assert m.body_contype[body] | m.body_conaffinity[body]
+
+
 def test_the_box_of_a_part_holds_it_whichever_way_it_is_turned() -> None:
     simulation, rng = ready("gearbox", True), np.random.default_rng(4)
     world = simulation.world
