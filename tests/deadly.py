@@ -20,8 +20,10 @@ class Deadly(Recipe):
 
     def at(self, point: Point) -> dict[str, Value]:
         seed = dict(point).get("seed")
-        if seed == 1 or (seed == 2 and not self.mark.exists()):
+        first = seed == 2 and not self.mark.exists()
+        if first:
             self.mark.touch()
+        if seed == 1 or first:
             os.kill(os.getpid(), signal.SIGKILL)
         return super().at(point)
 
