@@ -123,8 +123,6 @@ class Supervisor:
 
     def awaited(self) -> list[Operation]:
         """The operations all of whose robots wait for them."""
-        if not self.ready:
-            return []
         operations = (self.factory.operations[event // 2] for event in sorted(self.ready))
         return [operation for operation in operations if not self.marked[operation.place]]
 

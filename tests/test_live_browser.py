@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterator
 from time import monotonic
 from typing import Any
@@ -67,13 +68,16 @@ def test_robots_tokens_and_bars_move(watched: Watched) -> None:
         [...document.querySelectorAll('.token.on')].map(t => t.dataset.token),
         document.querySelectorAll('.rolling .op').length,
     ]"""
-    _, _, before = watched.page.evaluate(look)
+    first = watched.page.evaluate(look)
     watched.until(f"f.count > {watched.page.evaluate('factoryView.frame.count') + 8}")
+    for number in (0, 1):  # where a cycle brings them back, a moment later
+        moved = f"drawn => `${{drawn[{number}]}}` != `${{{json.dumps(first[number])}}}`"
+        watched.seen(moved, f"({look})()")
     watched.press("Pause")
     watched.until("!f.playing")
     watched.page.wait_for_timeout(300)
     robot, tokens, bars = watched.page.evaluate(look)
-    assert bars > before
+    assert bars > first[2]
     frame = watched.page.evaluate("factoryView.frame")
     assert sorted(map(int, tokens)) == sorted(frame["marked"]), "the drawing is the marking"
     world = watched.running.session.simulation.world

@@ -119,7 +119,7 @@ def overlooked(m: mujoco.MjModel, d: mujoco.MjData, contacts: Any) -> set[str]:
     awake and was left out."""
     bodies = np.flatnonzero(contacts.collides)
     seen = (m.body_contype[bodies] | m.body_conaffinity[bodies]) != 0
-    awake = d.body_awake[bodies] == vicinity.AWAKE
+    awake = d.body_awake[bodies] == vicinity.IS_AWAKE
     low, high = boxes(m, d, bodies).transpose(1, 0, 2)
     meets = (low[awake, None] <= high) & (low <= high[awake, None])
     near = meets.all(axis=2).any(axis=0)
@@ -177,7 +177,7 @@ def test_what_the_engine_wakes_by_itself_is_seen_a_tick_later() -> None:
     world.vicinity._due = np.inf
     d.xfrc_applied[body, 2] = 1e-6
     world.advance(1)
-    assert d.body_awake[body] == vicinity.AWAKE
+    assert d.body_awake[body] == vicinity.IS_AWAKE
     world.advance(1)
     assert m.body_contype[body] | m.body_conaffinity[body]
 

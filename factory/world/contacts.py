@@ -29,9 +29,9 @@ ALL = (1 << 30) - 1
 class Contacts:
     """The masks and exclusions of a model, for parts whose bodies are given by label and copy.
 
-    `code` and `unit` (nbody,): the holder of each part's body and the unit it belongs to, -1 for
-    none. `contype` and `conaffinity` (nbody,): the masks of bodies. `excluded`: pairs of labels
-    whose parts of one unit do not collide.
+    `code` and `unit` (nbody,): the holder of each part's body, or who a holder is itself (`own`),
+    and the unit a part belongs to, -1 for none. `contype` and `conaffinity` (nbody,): the masks of
+    bodies. `excluded`: pairs of labels whose parts of one unit do not collide.
     """
 
     def __init__(
@@ -73,6 +73,17 @@ class Contacts:
     def collides(self) -> NDArray[np.bool_]:
         """Which bodies can collide with anything (nbody,)."""
         return np.asarray((self.contype | self.conaffinity) != 0)
+
+    def own(self, trees: Mapping[int, int], holders: int) -> int:
+        """Give what collides and is no part its own code, and tell how many codes there are then.
+        `trees`: the code, of 1 to `holders`, of each kinematic tree of a robot or the tray; what is
+        fixed to the floor gets one of its own."""
+        for body in self.collides.nonzero()[0].tolist():
+            if body not in self.solid:
+                fixed = (tree := int(self.m.body_treeid[body])) not in trees
+                holders += fixed
+                self.code[body] = holders if fixed else trees[tree]
+        return holders
 
     def enter(self, label: str, unit: int, body: int) -> None:
         """A part's body comes into the factory, for a unit."""

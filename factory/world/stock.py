@@ -86,7 +86,8 @@ class Stock:
         self.hold = {label: m.equality(names.hold(label)).id for label in self.parts}
         self.on_tray: int | None = None
         self.left: list[float] = []
-        self.vicinity = Vicinity(m, d, self.contacts, self._trees(), self.tray + len(self.feeder))
+        holders = self.contacts.own(self._trees(), self.tray + len(self.feeder))
+        self.vicinity = Vicinity(m, d, self.contacts, holders)
         self._hide_spares()
         self._hand_out(counts)
         for label in self.feed:
@@ -326,10 +327,10 @@ class Stock:
         joint = self.m.body_jntadr[list(bodies)]
         q, v = self.m.jnt_qposadr[joint], self.m.jnt_dofadr[joint]
         self.d.qpos[q[:, None] + np.arange(7)] = [(*place, 1, 0, 0, 0) for place in at]
+        self.d.qvel[v[:, None] + np.arange(6)] = 0
         self.d.xpos[list(bodies)] = at
         for body in bodies:
             self.vicinity.woken(body)
-        self.d.qvel[v[:, None] + np.arange(6)] = 0
 
     def _put_away(self, labels: Sequence[str], copies: Sequence[int]) -> None:
         spares = list(zip(labels, copies, strict=True))

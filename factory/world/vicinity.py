@@ -8,8 +8,6 @@ last bit.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
 import numpy as np
 
 from factory.control.mode import Array
@@ -28,43 +26,31 @@ CROWD = 0.25
 FEW = 250
 """Where there are fewer holders, looking takes longer than it saves: up to some 100 robots."""
 
-AWAKE = int(mujoco.mjtSleepState.mjS_AWAKE)
+IS_AWAKE = int(mujoco.mjtSleepState.mjS_AWAKE)
+"""What the engine says of a body that does not sleep."""
 
 
 class Vicinity:
     """The bodies that the broad phase of a model looks at: all, where there are few holders.
 
-    All that is in the same hands is looked at as one box, seen from above. `trees`: the holder (its
-    code, of 1 to `holders`) of each kinematic tree that is no part, a robot's or the tray's; what
-    is fixed to the floor is a holder of its own. `stale`: something has been woken since the last
-    look, or the last at all that moves was long ago.
+    All that is in the same hands is looked at as one box, seen from above; `holders` are the codes
+    that `contacts` has. `stale`: something has been woken since the last look, or the last at all
+    that moves was long ago.
     """
 
     def __init__(
-        self,
-        m: mujoco.MjModel,
-        d: mujoco.MjData,
-        contacts: Contacts,
-        trees: Mapping[int, int],
-        holders: int,
+        self, m: mujoco.MjModel, d: mujoco.MjData, contacts: Contacts, holders: int
     ) -> None:
         self.m, self.d, self.contacts, self.holder = m, d, contacts, contacts.code
-        for body in range(1, m.nbody):
-            if body not in contacts.solid and contacts.collides[body]:
-                fixed = int(m.body_treeid[body]) not in trees
-                holders += fixed
-                self.holder[body] = holders if fixed else trees[int(m.body_treeid[body])]
-        planes = m.geom_bodyid[m.geom_type == int(mujoco.mjtGeom.mjGEOM_PLANE)]
-        self._always = np.isin(np.arange(m.nbody), planes)
-        self._moves = np.zeros(holders + 1, bool)
-        self._low = np.full((2, holders + 1), np.inf, np.float32)
-        self._high = np.full((2, holders + 1), -np.inf, np.float32)
-        self._lowest, self._highest = _boxes(m, d, contacts)
-        self._near = np.ones(holders + 1, bool)
-        self._seen = np.zeros(m.ntree, bool)
+        self._culls, self.stale, self._due = holders >= FEW, False, 0.0
         self._woken: list[int] = []
-        self._box(self.holder.nonzero()[0])
-        self._due, self._culls, self.stale = 0.0, holders >= FEW, False
+        if self._culls:
+            self._seen = np.zeros(m.ntree, bool)
+            self._near = np.ones(holders + 1, bool)
+            self._low = np.full((2, holders + 1), np.inf, np.float32)
+            self._high = np.full((2, holders + 1), -np.inf, np.float32)
+            self._lowest, self._highest = _boxes(m, d, contacts)
+            self._box(self.holder.nonzero()[0])
 
     def woken(self, body: int) -> None:
         """A body is about to move."""
@@ -93,25 +79,25 @@ class Vicinity:
         anew = self.d.time >= self._due
         if anew:
             self._due, self._seen = self.d.time + PERIOD, self._awake
-        self._moves[:] = False
-        self._moves[self.holder[self._woken]] = True
+        near = np.zeros_like(self._near)
+        moves = np.zeros_like(near)
+        moves[self.holder[self._woken]] = True
         self._woken.clear()
         if anew:
-            self._moves[self.holder[self.d.body_awake == AWAKE]] = True
-        bodies = (self._moves[self.holder] & self.contacts.collides).nonzero()[0]
-        near = np.zeros_like(self._near)
+            moves[self.holder[self.d.body_awake == IS_AWAKE]] = True
+        bodies = (moves[self.holder] & self.contacts.collides).nonzero()[0]
         if len(bodies):
             near = self._reached(bodies)
             self._seen[self.m.body_treeid[bodies]] = True
         self._near = near if anew else self._near | near
-        self._show(self._near[self.holder] | self._always)
+        self._show(self._near[self.holder])
 
     def _reached(self, bodies: np.ndarray) -> np.ndarray:
         """The holders (holders + 1,) that moving bodies may reach within a period; their own among
         them."""
         who = self._box(bodies)
-        if len(who) > CROWD * len(self._moves):
-            return np.ones_like(self._moves)
+        if len(who) > CROWD * len(self._near):
+            return np.ones_like(self._near)
         speed = np.abs(self.d.cvel.take(bodies, axis=0)[:, 3:]).max()
         reach = float(speed + SUDDEN * PERIOD / 2) * PERIOD
         low, high = self._low, self._high
