@@ -172,6 +172,37 @@ def test_robots_come_before_parts(paper: Layout, tmp_path: Path) -> None:
     assert kinds == sorted(kinds, key=["robot", "outfeed", "part"].index)
 
 
+def principal_axis(m: mujoco.MjModel, seen: np.ndarray) -> np.ndarray:
+    """Along which the places of geoms vary most: the engine's broad phase sweeps along it, and
+    boxes bodies along it and those across."""
+    d = mujoco.MjData(m)
+    mujoco.mj_kinematics(m, d)
+    return np.asarray(np.linalg.eigh(np.cov(d.geom_xpos[seen & (m.geom_bodyid > 0)].T))[1][:, -1])
+
+
+@pytest.mark.parametrize("name", ["paper", "stool", "gearbox"])
+def test_the_broad_phase_sweeps_along_the_floor(name: str, tmp_path: Path) -> None:
+    layout = factory.lay_out(factory.compile(factory.load_pag(ROOT / f"examples/{name}.pag")))
+    m = compiled(physical_model(layout), tmp_path)
+    xlo, xhi, ylo, yhi = layout.floor
+    compass = m.geom_bodyid == m.body(names.COMPASS).id
+    axis = 0 if xhi - xlo >= yhi - ylo else 1
+    assert abs(principal_axis(m, ~compass)[axis]) < 0.999
+    assert abs(principal_axis(m, compass | ~compass)[axis]) > 1 - 1e-9
+    assert not m.geom_contype[compass].any() and not m.geom_conaffinity[compass].any()
+    assert (m.geom_rgba[compass, 3] == 0).all() and (m.geom_group[compass] > 2).all()
+
+
+def test_bodies_that_collide_have_no_geoms_that_are_only_shown(
+    paper: Layout, tmp_path: Path
+) -> None:
+    m = compiled(physical_model(paper, 1), tmp_path)
+    collides = (m.geom_contype | m.geom_conaffinity) != 0
+    boxed = ((m.body_contype | m.body_conaffinity) != 0)[m.geom_bodyid]
+    assert collides.sum() == 3 * 6 + 2 * 3 + 1 + 1 + 3  # robots, feeders, outfeed, floor, parts
+    assert (boxed == collides).all()
+
+
 @pytest.mark.parametrize("text", [PAPER.read_text(), KARY], ids=["paper", "kary"])
 def test_a_weld_for_every_pair_that_can_be_joined(tmp_path: Path, text: str) -> None:
     layout = laid_out(tmp_path / "p.pag", text)

@@ -69,6 +69,9 @@ def hold(label: str) -> str:
     return f"hold/{label}"
 
 
+COMPASS = "compass"
+"""The body that shows the engine's broad phase where the floor's longer side is."""
+
 OUTFEED_TRAY = "outfeed/tray"
 """The body that takes a finished product away; also the name of its geom."""
 

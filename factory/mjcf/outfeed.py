@@ -54,8 +54,8 @@ def add_outfeed(world: Element, layout: Layout) -> None:
     xlo, xhi, ylo, yhi = layout.outfeed
     top = PAYLOAD - BELT_GAP - TRAY
     thick = (top - FINGER_TOP) * 0.8
-    middle, half = ((xlo + xhi) / 2, (ylo + yhi) / 2), ((xhi - xlo) / 2, (yhi - ylo) / 2)
-    body = add(world, "body", name="outfeed", pos=(middle[0], middle[1], 0.0))
+    (x, y), half = ((xlo + xhi) / 2, (ylo + yhi) / 2), ((xhi - xlo) / 2, (yhi - ylo) / 2)
+    body = add(world, "body", name="outfeed", pos=(x, y, 0.0))
     add(
         body,
         "geom",
@@ -71,53 +71,53 @@ def add_outfeed(world: Element, layout: Layout) -> None:
     shed, wall = half[0] - length / 2, top + tall / 2 + 0.005
     for side in (-1, 1):
         add(
-            body,
+            world,
             "geom",
             name=f"outfeed/side{side}",
             class_="shown",
             type="box",
-            pos=(0, side * (half[1] + 0.006), top - 0.008),
+            pos=(x, y + side * (half[1] + 0.006), top - 0.008),
             size=(half[0], 0.0055, 0.012),
             material="frame",
         )
         for end in (-1, 1):
             add(
-                body,
+                world,
                 "geom",
                 name=f"outfeed/leg{side}{end}",
                 class_="shown",
                 type="box",
-                pos=(end * (half[0] - 0.03), side * (half[1] - 0.008), (top - thick) / 2),
+                pos=(x + end * (half[0] - 0.03), y + side * (half[1] - 0.008), (top - thick) / 2),
                 size=(0.006, 0.006, (top - thick) / 2),
                 material="frame",
             )
         add(
-            body,
+            world,
             "geom",
             name=f"outfeed/wall{side}",
             class_="shown",
             type="box",
-            pos=(shed, side * (half[1] + 0.0165), wall),
+            pos=(x + shed, y + side * (half[1] + 0.0165), wall),
             size=(length / 2, 0.004, tall / 2 + 0.025),
             rgba=SHED,
         )
     add(
-        body,
+        world,
         "geom",
         name="outfeed/roof",
         class_="shown",
         type="box",
-        pos=(shed + 0.002, 0, top + tall + 0.0335),
+        pos=(x + shed + 0.002, y, top + tall + 0.0335),
         size=(length / 2 + 0.008, half[1] + 0.024, 0.004),
         rgba=SHED,
     )
     add(
-        body,
+        world,
         "geom",
         name="outfeed/back",
         class_="shown",
         type="box",
-        pos=(half[0] + 0.0045, 0, wall),
+        pos=(x + half[0] + 0.0045, y, wall),
         size=(0.004, half[1] + 0.0205, tall / 2 + 0.025),
         rgba=SHED,
     )

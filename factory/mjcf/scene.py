@@ -15,13 +15,16 @@ from factory.layout.dimensions import (
 from factory.layout.embedding import project
 from factory.layout.plan import Layout
 from factory.mjcf.elements import add, numbers
-from factory.mjcf.names import feeder
+from factory.mjcf.names import COMPASS, feeder
 from factory.mjcf.outfeed import add_outfeed
 from factory.mjcf.parts import middle_at
 from factory.mjcf.robots import heading_quaternion
 
 VIEW = 32.0
 """Vertical field of view of the cameras [degrees]: narrow, for a calm perspective."""
+
+FAR = 1e5
+"""How far away the ends of the compass are [m]."""
 
 GROUND = 0.1
 """Half the thickness of the floor [m]: spare copies are kept below it."""
@@ -137,6 +140,7 @@ def _floor_and_light(world: Element, layout: Layout) -> None:
     ground = add(world, "body", name="ground", pos=(x, y, -GROUND))
     size = (radius * 20, radius * 20, GROUND)
     add(ground, "geom", name="ground", class_="station", type="box", size=size, group=3)
+    _compass(world, layout)
     for name, ray, shadow, diffuse, specular in (
         ("key", KEY, True, "0.50 0.49 0.47", "0.12 0.12 0.12"),
         ("fill", FILL, False, "0.14 0.145 0.16", "0 0 0"),
@@ -151,6 +155,28 @@ def _floor_and_light(world: Element, layout: Layout) -> None:
             pos=(x - ray[0] * 3 * radius, y - ray[1] * 3 * radius, -ray[2] * 3 * radius),
             diffuse=diffuse,
             specular=specular,
+        )
+
+
+def _compass(world: Element, layout: Layout) -> None:
+    """Two specks far away at either end of the floor's longer side, which nothing sees or touches.
+    The engine's broad phase boxes all bodies along the principal axes of the places of all geoms,
+    and sweeps along the first: these make it an edge of the floor, so that the boxes are tight."""
+    x, y = _centre(layout)
+    xlo, xhi, ylo, yhi = layout.floor
+    east, north = (FAR, 0.0) if xhi - xlo >= yhi - ylo else (0.0, FAR)
+    body = add(world, "body", name=COMPASS, pos=(x, y, 0.0))
+    for side in (-1, 1):
+        add(
+            body,
+            "geom",
+            name=f"{COMPASS}/{side}",
+            class_="shown",
+            type="sphere",
+            pos=(side * east, side * north, 0.0),
+            size=0.001,
+            rgba="0 0 0 0",
+            group=3,
         )
 
 
@@ -219,7 +245,7 @@ def _feeder(world: Element, layout: Layout, label: str) -> None:
     solid, product = layout.product.solids[label], layout.product
     x, y = middle_at(layout, label)
     body = add(world, "body", name=feeder(label), pos=(x, y, 0.0), quat=heading_quaternion(path))
-    across = path.offset * _handedness(path.heading, path.side)
+    u, across = path.heading, path.offset * _handedness(path.heading, path.side)
     rear, front, _, _ = project(layout.payloads[label], path.heading, path.side)
     back = -Clearance(layout.clearance).post(path.reach, rear)
     raised = layout.elevations[operation.carrier]
@@ -246,26 +272,23 @@ def _feeder(world: Element, layout: Layout, label: str) -> None:
         size=((ahead - back) / 2, 0.008, beam / 2),
         material="post",
     )
-    add(
-        body,
-        "geom",
-        name=f"{feeder(label)}/cap",
-        class_="shown",
-        type="box",
-        pos=(back, across, top + beam),
-        size=(POST / 2 + 0.001, POST / 2 + 0.001, 0.002),
-        rgba=solid.rgba,
-    )
-    add(
-        body,
-        "geom",
-        name=f"{feeder(label)}/head",
-        class_="shown",
-        type="cylinder",
-        pos=(ahead, across, top + beam / 2),
-        size=(0.012, beam / 2 + 0.002),
-        rgba=solid.rgba,
-    )
+    # The engine boxes all geoms of a body that collides, those that are only shown too: these are
+    # the world's.
+    for name, along, z, shape, size in (
+        ("cap", back, top + beam, "box", (POST / 2 + 0.001, POST / 2 + 0.001, 0.002)),
+        ("head", ahead, top + beam / 2, "cylinder", (0.012, beam / 2 + 0.002)),
+    ):
+        add(
+            world,
+            "geom",
+            name=f"{feeder(label)}/{name}",
+            class_="shown",
+            type=shape,
+            pos=(x + along * u[0] - across * u[1], y + along * u[1] + across * u[0], z),
+            quat=heading_quaternion(path),
+            size=size,
+            rgba=solid.rgba,
+        )
 
 
 def _handedness(u: tuple[float, float], t: tuple[float, float]) -> int:

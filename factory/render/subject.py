@@ -32,7 +32,7 @@ class Snapshot:
         return cls(d.qpos.copy(), active, m.eq_obj1id[active].copy(), m.eq_obj2id[active].copy())
 
 
-UNSEEN = ("part", "ground")
+UNSEEN = ("part", "ground", names.COMPASS)
 """Kinds of bodies that do not count for what a picture of the factory has to show."""
 
 
@@ -42,8 +42,7 @@ def extent(m: mujoco.MjModel, d: mujoco.MjData) -> Array:
     robots = {m.body(j.bodyid[0]).name: j for j in map(m.joint, range(m.njnt)) if j.type[0] == 2}
     found = []
     for g in range(m.ngeom):
-        body = int(m.geom_bodyid[g])
-        name = m.body(body).name
+        name = m.body(int(m.body_rootid[m.geom_bodyid[g]])).name
         if m.geom_type[g] == mujoco.mjtGeom.mjGEOM_PLANE or names.kind(name) in UNSEEN:
             continue
         points = corners(m, g) @ d.geom_xmat[g].reshape(3, 3).T + d.geom_xpos[g]

@@ -13,7 +13,7 @@ from factory.layout.plan import Point2
 from factory.layout.svg import clean, number, polygon, text
 from factory.mjcf import names
 from factory.report.links import about
-from factory.report.scene import drawn, stands_for, triangles
+from factory.report.scene import drawn, owner, stands_for, triangles
 from factory.report.stage import Stage
 
 MARGIN = 80.0
@@ -21,6 +21,9 @@ MARGIN = 80.0
 
 RULER = (0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0)
 """Lengths that a scale bar may have [m]."""
+
+STANDS = {"rail": "rail", "post": "post", "boom": "boom", "head": "boom"}
+"""The style of what stands still, by the last word of its name; what has none is not drawn."""
 
 Floats = NDArray[np.float64]
 
@@ -61,26 +64,25 @@ class _Plan:
 
     def _static(self) -> Iterator[str]:
         """Rails, feeders and the outfeed."""
-        for geom in drawn(self.m, 0):
+        shapes: dict[str, list[str]] = {}
+        for geom, points in self._rigid(0):
             name = self.m.geom(geom).name
-            yield self._group(name, [self._shape(geom, 0, "rail")])
-        for body in range(1, self.m.nbody):
-            name = self.m.body(body).name
-            if name.startswith("feeder/"):
-                kinds = {"post": "post", "boom": "boom", "head": "boom"}
-                geoms = [(g, self.m.geom(g).name.rpartition("/")[2]) for g in drawn(self.m, body)]
-                shapes = [self._shape(g, body, kinds[k]) for g, k in geoms if k in kinds]
-                yield self._group(name, shapes)
-            elif name == "outfeed":
-                yield "".join(self._shape(g, body, "belt") for g in drawn(self.m, body))
+            style = "belt" if owner(name) == "outfeed" else STANDS.get(name.rpartition("/")[2])
+            if style:
+                corners = outline(points)
+                self.reach += corners
+                shapes.setdefault(owner(name), []).append(polygon(corners, style))
+        for name, drawings in shapes.items():
+            yield self._group(name, drawings)
 
-    def _shape(self, geom: int, body: int, style: str) -> str:
-        """The outline of a geom of a body that stands still."""
-        place, turn = self.stage.position[body], self.stage.quaternion[body]
-        points = triangles(self.m, geom)[0] @ rotation(turn).T + place
-        corners = outline(points)
-        self.reach += corners
-        return polygon(corners, style)
+    def _rigid(self, body: int) -> Iterator[tuple[int, Floats]]:
+        """The geoms of a body, and of those that are fixed to it, with their vertices in its frame
+        [m]."""
+        for own in np.flatnonzero(self.m.body_weldid == body).tolist():
+            place, turn = self.stage.position[own], rotation(self.stage.quaternion[own])
+            for geom in drawn(self.m, own):
+                points = triangles(self.m, geom)[0]
+                yield geom, points if own == body else points @ turn.T + place
 
     def _group(self, name: str, shapes: list[str], extra: str = "") -> str:
         """Shapes that stand for a robot or a part."""
@@ -111,10 +113,10 @@ class _Plan:
         robot = name.partition("/")[0]
         role = self.stage.roles[self.robots[robot]]
         found = []
-        for geom in drawn(self.m, body):
+        for geom, points in self._rigid(body):
             kind = self.m.geom(geom).name.rpartition("/")[2]
             style = {"arm": "arm", "finger": "arm", "carriage": f"carriage {role}"}.get(kind)
-            corners = outline(triangles(self.m, geom)[0] @ turn.T)
+            corners = outline(points @ turn.T)
             for x, y in corners:
                 for far in self.stage.reach[:, body]:
                     self.reach.append((x + 1e3 * float(far[0]), y - 1e3 * float(far[1])))

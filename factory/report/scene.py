@@ -109,22 +109,26 @@ def scene(stage: Stage, labels: dict[str, int], pack: Pack) -> dict[str, Any]:
             alphas.append(round(made.alpha, 3))
             for letter, values in zip("vfc", parts, strict=True):
                 pack.add(f"{letter}{number}", values)
-        name = m.geom(geoms[0]).name if body == 0 else m.body(body).name
+        name = owner(m.geom(geoms[0]).name) if body == 0 else m.body(body).name
         things.append({"shape": shapes[key], "body": body, **stands_for(name, robots, labels)})
     return {"alphas": alphas, "things": things, "places": _places(stage, labels)}
 
 
 def _groups(m: mujoco.MjModel, robots: dict[str, int]) -> Iterator[tuple[int, list[int]]]:
-    """The geoms that make one thing: those of a body; of the world those of a robot."""
-    rails: dict[str, list[int]] = {}
+    """The geoms that make one thing: those of a body; of the world those of a robot or a feeder."""
+    owned: dict[str, list[int]] = {}
     for geom in drawn(m, 0):
-        owner = m.geom(geom).name.partition("/")[0]
-        rails.setdefault(owner if owner in robots else "", []).append(geom)
-    for geoms in rails.values():
+        owned.setdefault(owner(m.geom(geom).name), []).append(geom)
+    for geoms in owned.values():
         yield 0, geoms
     for body in range(1, m.nbody):
         if geoms := drawn(m, body):
             yield body, geoms
+
+
+def owner(geom: str) -> str:
+    """What a geom of the world belongs to, by its name: `feeder/part1` of `feeder/part1/cap`."""
+    return geom.rpartition("/")[0]
 
 
 def stands_for(name: str, robots: dict[str, int], labels: dict[str, int]) -> dict[str, int]:
