@@ -17,8 +17,9 @@ from typing import Any
 import numpy as np
 
 from factory.control.governor import govern
-from factory.control.mode import Array, Index, Limits, Mode
+from factory.control.mode import ROUNDING, Array, Index, Limits, Mode
 from factory.control.navigation import Bundle
+from factory.control.staging import Stage
 from factory.factory import Factory, Operation
 from factory.programs import Program, Step, program_of
 from factory.supervisor import REST
@@ -61,7 +62,8 @@ class _Active:
 @dataclass(slots=True)
 class Process:
     """One robot executing its program: the step it is at and its phase in it, `wait`, `run` or
-    `leave`; the `reference` and `speed` of each of its `axes`, its lift's after its carriage's."""
+    `leave`; the `reference` and `speed` of each of its `axes`, its lift's after its carriage's;
+    whether it `goes_ahead` while it waits."""
 
     program: Program
     period: int
@@ -73,6 +75,7 @@ class Process:
     stage: str = "wait"
     clock: float = 0.0
     turns: int = 0
+    goes_ahead: bool = False
 
     @property
     def step(self) -> Step:
@@ -103,7 +106,9 @@ class DistributedSupervisor:
         timestep: float,
         ticks: int,
         seed: int = 0,
+        stages: Sequence[Stage] = (),
     ) -> None:
+        self.stages = {(stage.robot, stage.operation): stage for stage in stages}
         self.factory, self.modes, self.limits = factory, modes, limits
         self.world, self.timestep, self.ticks = world, timestep, ticks
         self.random = np.random.default_rng([seed, 7])
@@ -130,6 +135,7 @@ class DistributedSupervisor:
             for position, number in enumerate(robot.operations)
         }
         self.bundles: dict[int, Bundle] = {}
+        self.alone: dict[int, Bundle] = {}
         self.record = Record()
         self.busy = [0.0] * len(factory.robots)
         self.last_event = world.time
@@ -150,6 +156,7 @@ class DistributedSupervisor:
         """From now on axes have these limits."""
         self.limits = limits
         self.bundles.clear()
+        self.alone.clear()
 
     def step(self) -> None:
         """As many timesteps of the world as a supervisor's tick has; robots tick in between."""
@@ -165,9 +172,12 @@ class DistributedSupervisor:
 
     def _tick(self, process: Process) -> None:
         step = process.step
-        if process.stage == "wait" and self._may_enter(process, step):
-            process.stage, process.clock = "run", 0.0
-            self._entered(step.operation, self._unit(process))
+        if process.stage == "wait":
+            if self._may_enter(process, step):
+                process.stage, process.clock, process.goes_ahead = "run", 0.0, False
+                self._entered(step.operation, self._unit(process))
+            else:
+                self._go_ahead(process, step)
         if process.stage == "run":
             self._run(process, step)
         elif process.stage == "leave" and self._followed(process, step):
@@ -216,6 +226,28 @@ class DistributedSupervisor:
         x1, v1, a = govern(at, speed, wanted, self.limits.acceleration[axes], dt)
         self.world.move(axes, at, speed, a)
         process.reference[mine], process.speed[mine] = x1, v1
+
+    def _go_ahead(self, process: Process, step: Step) -> None:
+        """While it waits, a robot may go where it is needed next; it reads nobody's state for
+        that."""
+        robot = process.program.robot
+        stage = self.stages.get((robot, step.operation.index))
+        if stage is None:
+            return
+        dt, own = process.period * self.timestep, slice(0, 1)
+        at, speed = process.reference[own].copy(), process.speed[own].copy()
+        if abs(at[0] - stage.goal) < ROUNDING and abs(speed[0]) < ROUNDING:
+            if process.goes_ahead:
+                self._stop(process)
+                process.goes_ahead = False
+            return
+        process.goes_ahead = True
+        if robot not in self.alone or self.alone[robot].modes[0] is not stage.mode:
+            self.alone[robot] = Bundle.of([stage.mode], [self.limits.of((robot,))])
+        wanted = self.alone[robot].field(at + speed * dt / 2, dt)
+        x1, v1, a = govern(at, speed, wanted, self.limits.acceleration[process.axes[own]], dt)
+        self.world.move(process.axes[own], at, speed, a)
+        process.reference[own], process.speed[own] = x1, v1
 
     def _stop(self, process: Process) -> None:
         """Stand where the reference is."""

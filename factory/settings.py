@@ -19,8 +19,12 @@ RANGES = {
     "force": (1e-3, 1e6),
     "settle": (0.0, 10.0),
     "outfeed": (1e-3, 10.0),
+    "stage": (0, 1),
 }
 """Least and greatest value of each setting: beyond lie nothing but overflows and endless runs."""
+
+WHOLE = ("substeps", "stage")
+"""Settings that are whole numbers."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,7 +32,8 @@ class Settings:
     """Speed [m/s] and acceleration [m/s²] of a robot; `eps`, radius of a goal ball [m]; `timestep`
     of the engine [s] and `substeps` of it in one tick of the supervisor; least `clearance` [m];
     `force`: the actuators' limit as a multiple of what the payload needs; `settle`: time to come to
-    rest within eps [s], used only to predict; `outfeed` speed [m/s].
+    rest within eps [s], used only to predict; `outfeed` speed [m/s]; `stage`: 1 where robots that
+    wait empty-handed go ahead to where their next operation needs them.
     """
 
     speed: float = 0.5
@@ -40,6 +45,7 @@ class Settings:
     force: float = 3.0
     settle: float = 0.0
     outfeed: float = 1.0
+    stage: int = 0
 
     @property
     def outfeed_acceleration(self) -> float:
@@ -72,7 +78,7 @@ def environment() -> dict[str, float]:
         text = os.environ.get(variable, "").strip()
         if not text:
             continue
-        value = _number(text, int if name == "substeps" else float)
+        value = _number(text, int if name in WHOLE else float)
         fault = _out_of_range(name, value) if value is not None else wrong_type(name, value)
         if fault is not None:
             faults.append(replace(fault, message=f"in the environment {variable}: {fault.message}"))
@@ -92,8 +98,8 @@ def _number(text: str, kind: type[int] | type[float]) -> float | None:
 
 def wrong_type(name: str, value: object) -> Diagnostic | None:
     """What is wrong with the value of a setting, if it is no number within its range."""
-    kind = "whole number" if name == "substeps" else "number"
-    if isinstance(value, bool) or not isinstance(value, int if name == "substeps" else int | float):
+    kind = "whole number" if name in WHOLE else "number"
+    if isinstance(value, bool) or not isinstance(value, int if name in WHOLE else int | float):
         return Diagnostic("BadValue", f"{name} must be a {kind}", None, _example(name))
     return _out_of_range(name, value)
 

@@ -11,6 +11,7 @@ import numpy as np
 
 from factory.control.mode import Mode
 from factory.control.plan import operation_modes, robot_limits
+from factory.control.staging import Stage, stages
 from factory.distributed import DistributedSupervisor
 from factory.errors import Diagnostic, InputError, RunError
 from factory.layout.plan import Layout
@@ -18,7 +19,7 @@ from factory.nets.history import firings
 from factory.nets.petri import Marking
 from factory.nets.pool import part_pool
 from factory.nets.replay import replay
-from factory.prediction import operation_delays, predict
+from factory.prediction import operation_delays, predict, ways_ahead
 from factory.robots import Catalogue, load_catalogue
 from factory.settings import Settings
 from factory.supervisor import Supervisor
@@ -82,7 +83,8 @@ class Simulation:
         factory = layout.factory
         self.modes = compiled.modes if compiled else operation_modes(layout, self.settings.eps)
         self.limits, gains = robot_limits(layout, self.settings, seed, jitter)
-        self.delays = operation_delays(layout, self.modes, self.limits, self.settings, world)
+        told = layout, self.modes, self.limits, self.settings, world
+        self.delays, self.ways = operation_delays(*told), ways_ahead(*told)
         self.start = factory.net.initial_marking if start is None else start
         self.counts = firings(factory.net, self.start)
         positions = start_positions(layout, self.start)
@@ -110,10 +112,20 @@ class Simulation:
         self.supervisor = self._distributed() if distributed else self._central()
 
     def _central(self) -> Supervisor:
-        tick = self.settings.tick
         return Supervisor(
-            self.layout.factory, self.modes, self.limits, self.world, tick, self.start, self.counts
+            self.layout.factory,
+            self.modes,
+            self.limits,
+            self.world,
+            self.settings.tick,
+            self.start,
+            self.counts,
+            self._stages(),
         )
+
+    def _stages(self) -> tuple[Stage, ...]:
+        """What robots do while they wait."""
+        return stages(self.layout, self.modes) if self.settings.stage else ()
 
     def _distributed(self) -> DistributedSupervisor:
         settings, factory = self.settings, self.layout.factory
@@ -128,6 +140,7 @@ class Simulation:
             settings.timestep,
             settings.substeps,
             self.seed,
+            self._stages(),
         )
 
     def under_way(self) -> dict[str, int]:
@@ -163,7 +176,7 @@ class Simulation:
     def _record(self, wall: float, trouble: Diagnostic | None) -> Run:
         supervisor, world, factory = self.supervisor, self.world, self.layout.factory
         physics = getattr(world, "physics_time", 0.0)
-        predicted = predict(self.layout, self.delays, self.settings, self.kind, self.wip)
+        predicted = predict(self.layout, self.delays, self.settings, self.kind, self.wip, self.ways)
         verdict = replay(factory.net, [e.transition for e in supervisor.events], self.start)
         figures: PhysicsFigures | None = None
         if self.model is not None:

@@ -16,6 +16,7 @@ import numpy as np
 from factory.control.mode import Array, Index, Limits, Mode
 from factory.control.navigation import Bundle
 from factory.control.obstacles import ranges
+from factory.control.staging import Stage
 from factory.factory import Factory, Operation
 from factory.nets.petri import Marking
 from factory.trace import Event
@@ -55,10 +56,12 @@ AHEAD = 0.005
 
 @dataclass(slots=True)
 class _Active:
-    """The modes under way: operations, their bundle, the axes of each slot, the clocks, and the
-    time [s] before which none of them can end."""
+    """The modes under way: of operations, then of robots that go ahead to the next one while they
+    wait, both by number; their bundle, the axes of each slot, the clocks, and the time [s] before
+    which none of them can end."""
 
     operations: tuple[int, ...]
+    ahead: tuple[int, ...]
     bundle: Bundle | None
     axes: Index
     clocks: Array
@@ -69,7 +72,8 @@ class Supervisor:
     """Runs the gear net of a factory from a legal marking over a world.
 
     `threads` is f_m: the robot in each slot of a marked place; every firing moves robots by the
-    redistribution functions and asserts that the marking stays legal.
+    redistribution functions and asserts that the marking stays legal. `stages`: what robots do
+    while they wait, where that is not to stand; nothing of it is in the net.
     """
 
     def __init__(
@@ -81,11 +85,14 @@ class Supervisor:
         tick: float,
         start: Marking | None = None,
         counts: dict[int, int] | None = None,
+        stages: Sequence[Stage] = (),
     ) -> None:
-        self.factory, self.modes, self.world, self.tick = factory, modes, world, tick
+        self.factory, self.world, self.tick = factory, world, tick
+        self.modes = [*modes, *(stage.mode for stage in stages)]
         self.net = factory.net.threaded
-        self.axes = np.array([axis for axes in factory.axes for axis in axes], np.intp)
-        self.active = _Active((), None, np.empty(0, np.intp), np.empty(0))
+        self.axes_of = [*factory.axes, *((stage.robot,) for stage in stages)]
+        self.axes = np.array([axis for axes in self.axes_of for axis in axes], np.intp)
+        self.active = _Active((), (), None, np.empty(0, np.intp), np.empty(0))
         self.limit(limits)
         marking = factory.net.initial_marking if start is None else start
         self.threads = dict(factory.net.marking_of(marking).threads)
@@ -101,20 +108,46 @@ class Supervisor:
         self.busy = [0.0] * len(factory.robots)
         self.since: dict[int, float] = {}
         self.last_event = world.time
-        self._activate(o.index for o in factory.operations if self.marked[o.place])
+        waits = self._stages(stages)
+        self._activate(
+            [o.index for o in factory.operations if self.marked[o.place]],
+            [number for number, place in waits.items() if self.marked[place]],
+        )
+
+    def _stages(self, stages: Sequence[Stage]) -> dict[int, int]:
+        """Number the stages after the operations, by the one that each is of and by the one that it
+        follows; gives the place in which each is."""
+        count = len(self.factory.operations)
+        self.stages_of: list[list[int]] = [[] for _ in range(count)]
+        self.stages_after: list[list[int]] = [[] for _ in range(count)]
+        waits = {}
+        for number, stage in enumerate(stages, start=count):
+            gear = self.factory.robots[stage.robot].operations
+            step = gear.index(stage.operation)
+            self.stages_of[stage.operation].append(number)
+            self.stages_after[gear[step - 1]].append(number)
+            waits[number] = self.factory.net.gears[stage.robot].places[2 * step]
+        return waits
 
     def limit(self, limits: Limits) -> None:
         """From now on axes have these limits."""
         self.limits = limits
-        self.all = Bundle.of(self.modes, [limits.of(axes) for axes in self.factory.axes])
-        self._activate(self.active.operations)
+        self.all = Bundle.of(self.modes, [limits.of(axes) for axes in self.axes_of])
+        self._activate(self.active.operations, self.active.ahead)
 
     def step(self) -> None:
         """Fire what is enabled as one detached set, then let the world go on for one tick."""
         started = self._startable()
-        ended = self._finished()
-        if started or ended:
-            self._fire(started, ended)
+        over = self._finished()
+        if started or over:
+            count = len(self.factory.operations)
+            ended = [number for number in over if number < count]
+            if started or ended:
+                self._fire(started, ended)
+            self._activate(
+                [o for o in self.active.operations if o not in ended] + started,
+                self._going_ahead(started, ended, over),
+            )
         self.world.step(self.active.bundle, self.active.axes)
 
     def marking(self) -> tuple[str, ...]:
@@ -141,8 +174,8 @@ class Supervisor:
         return [o.index for o, within in zip(possible, inside, strict=True) if within]
 
     def _finished(self) -> list[int]:
-        """Operations X with X_e enabled: robots in the goal ball, at rest, and the clock run
-        out."""
+        """Operations X with X_e enabled: robots in the goal ball, at rest, and the clock run out;
+        and robots that have come to where they went ahead."""
         active = self.active
         if active.bundle is None or self.world.time < active.earliest:
             return []
@@ -154,7 +187,8 @@ class Supervisor:
         if not done.any():
             return []
         still = np.logical_and.reduceat(np.abs(v) < REST, active.bundle.starts)
-        return [o for o, ends in zip(active.operations, done & still, strict=True) if ends]
+        numbers = (*active.operations, *active.ahead)
+        return [number for number, ends in zip(numbers, done & still, strict=True) if ends]
 
     def _fire(self, started: list[int], ended: list[int]) -> None:
         operations = self.factory.operations
@@ -168,7 +202,6 @@ class Supervisor:
             self.events.append(Event(self.world.time, self.net.transitions[event].name))
         self._account(started, ended)
         self.world.apply(starts, ends)
-        self._activate([o for o in self.active.operations if o not in ended] + started)
         self.last_event = self.world.time
 
     def _redistribute(self, event: int) -> None:
@@ -216,17 +249,27 @@ class Supervisor:
             for robot in self.factory.operations[number].robots:
                 self.busy[robot] += spent
 
-    def _activate(self, operations: Iterable[int]) -> None:
+    def _going_ahead(self, started: list[int], ended: list[int], over: list[int]) -> list[int]:
+        """The stages under way from now on: those that were, and have neither come to their goal
+        nor been overtaken by their operation, and those of robots that begin to wait."""
+        gone = {*over, *(number for o in started for number in self.stages_of[o])}
+        going = [number for number in self.active.ahead if number not in gone]
+        return going + [number for o in ended for number in self.stages_after[o]]
+
+    def _activate(self, operations: Iterable[int], ahead: Iterable[int]) -> None:
         """Rebuild the bundle of active modes; clocks of those that go on are kept."""
-        numbers = list(operations)
-        clocks = dict(zip(self.active.operations, self.active.clocks, strict=True))
+        active = self.active
+        operations, ahead = tuple(operations), tuple(ahead)
+        numbers = (*operations, *ahead)
+        clocks = dict(zip((*active.operations, *active.ahead), active.clocks, strict=True))
         bundle, axes = self._bundle(numbers)
         kept = np.array([clocks.get(o, 0.0) for o in numbers])
         if not numbers:
-            self.active = _Active((), None, axes, kept)
+            self.active = _Active((), (), None, axes, kept)
             return
         soonest = bundle.soonest(self.world.sense()[0][axes], AHEAD)
-        self.active = _Active(tuple(numbers), bundle, axes, kept, self.world.time + soonest)
+        earliest = self.world.time + soonest
+        self.active = _Active(operations, ahead, bundle, axes, kept, earliest)
 
     def _bundle(self, numbers: Sequence[int]) -> tuple[Bundle, Index]:
         """The modes of some operations, and their axes."""

@@ -81,4 +81,8 @@ def operation_slacks(timing: Timing, net: TimedNet) -> tuple[float, ...]:
         for place in circuit.places:
             if place < len(operations):
                 least[place] = min(least[place], net.slack(circuit))
+    for (robot, number), way in net.ways.items():
+        circuit = net.named[robot]
+        longer = max(net.seconds[way] - net.seconds[number], 0.0)
+        least[number] = min(least[number], net.slack(circuit) + longer)
     return tuple(least)

@@ -33,7 +33,7 @@ class Stock:
 class Share:
     """Where a robot's time goes, in seconds of each cycle: `moving`; `working`, a dwell; `standing`
     at its place in an operation while others move, the outfeed's tray too; `waiting` for the next
-    one. Of several copies of a robot, one's."""
+    one. To go ahead while it waits counts as moving. Of several copies of a robot, one's."""
 
     robot: str
     moving: float
@@ -77,7 +77,7 @@ class Flow:
 
 def flow(timing: Timing, net: TimedNet, units: int) -> Flow:
     """Fire the net as soon as possible, from the initial marking, for `units` products at least."""
-    found = net.firings(timing, units)
+    found = net.firings(units)
     products = found.dates[:, timing.factory.dropoff.end]
     return Flow(
         units,
@@ -143,19 +143,31 @@ def _share(timing: Timing, net: TimedNet, number: int) -> Share:
         operation = timing.factory.operations[index]
         moving += timing.travel(index, operation.robots.index(number))
         working += timing.modes[index].dwell
-        spent += net.seconds[index] - timing.settings.tick
+        way = net.ways.get((number, index), index)
+        spent += max(net.seconds[index], net.seconds[way]) - timing.settings.tick
     cycle = net.pace * circuit.tokens
     moving = min(moving, spent - working)
     return Share(robot.name, moving, working, max(0.0, spent - moving - working), cycle - spent)
 
 
-def busy_until(timing: Timing, net: TimedNet, found: Flow) -> Sequence[float]:
+def durations(timing: Timing, found: Flow) -> Floats:
+    """(units, operations): how long each operation lasts each time, from its start to its end
+    [s]."""
+    operations, dates = timing.factory.operations, found.firings.dates[: found.units]
+    ends, starts = [o.end for o in operations], [o.start for o in operations]
+    return np.asarray(dates[:, ends] - dates[:, starts] - timing.settings.tick)
+
+
+def lasting(timing: Timing, found: Flow) -> Floats:
+    """(operations,): how long each lasts on the average [s]. The first time is left out where there
+    are others: robots may come from elsewhere."""
+    each = durations(timing, found)
+    return np.asarray(each[min(1, len(each) - 1) :].mean(axis=0))
+
+
+def busy_until(timing: Timing, found: Flow) -> Sequence[float]:
     """For each robot the share of the time until the last of the units that it is in operations:
     what a run of so many units shows."""
-    times = [seconds - timing.settings.tick for seconds in net.seconds]
-    first = {n: seconds - timing.settings.tick for n, seconds in timing.first.items()}
-    return [
-        sum((found.units - 1) * times[n] + first.get(n, times[n]) for n in robot.operations)
-        / found.last
-        for robot in timing.factory.robots
-    ]
+    spent = durations(timing, found).sum(axis=0)
+    robots = timing.factory.robots
+    return [float(spent[list(robot.operations)].sum()) / found.last for robot in robots]

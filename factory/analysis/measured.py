@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from factory.analysis.flow import Flow, busy_until
+from factory.analysis.flow import durations as durations_of
 from factory.analysis.timed import TimedNet
 from factory.analysis.timing import Timing
 from factory.trace import Event
@@ -73,21 +74,20 @@ def compare(timing: Timing, net: TimedNet, found: Flow, record: Record) -> Compa
     for event in record.events:
         times.setdefault(event.transition, []).append(event.t)
     names = [transition.name for transition in factory.net.threaded.transitions]
+    each = durations_of(timing, found)
     durations, busy = [], [0.0] * len(factory.robots)
     for operation in factory.operations:
         begun = times.get(names[operation.start], [])
         ended = times.get(names[operation.end], [])
         spent = [end - start for start, end in zip(begun, ended, strict=False)]
-        delay = net.seconds[operation.place]
-        if len(spent) == 1:
-            delay = timing.first.get(operation.index, delay)
-        predicted = delay - timing.settings.tick
+        told = each[1:] if min(len(spent), len(each)) > 1 else each
+        predicted = float(told[:, operation.index].mean())
         durations.append(_duration(operation.label, predicted, spent))
         for robot in operation.robots:
             busy[robot] += sum(spent)
     left = record.dropoffs
     last = left[-1] if left else None
-    shares = busy_until(timing, net, found)
+    shares = busy_until(timing, found)
     return Comparison(
         record.source,
         len(left),

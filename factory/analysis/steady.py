@@ -22,7 +22,7 @@ def steady_units(timing: Timing, wip: int | None = None) -> int:
     Robots before the bottleneck fill first, and until then products come at the pace of others.
     """
     net = timed_net(timing, wip=wip)
-    dates = net.firings(timing, MOST).dates[:MOST, timing.factory.dropoff.end]
+    dates = net.firings(MOST).dates[:MOST, timing.factory.dropoff.end]
     return reached(dates, net.pace)
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from math import lcm
@@ -10,10 +10,11 @@ from math import lcm
 from factory.analysis.timing import AS_IT_IS, Change, Timing
 from factory.nets.cycle_ratio import CycleRatio, max_cycle_ratio
 from factory.nets.firing import Firings, settled_firings
-from factory.nets.marked import MarkedNet, marked
+from factory.nets.marked import NONE, MarkedNet, marked
 from factory.nets.petri import PetriNet, Place
 from factory.nets.pool import with_wip
 from factory.nets.slack import Slack, circuits
+from factory.nets.ways import with_ways
 
 SAME = 1e-9
 """Times that differ by no more than this share are equal."""
@@ -44,13 +45,19 @@ class TimedNet:
     Without a bound `wip` these are all its simple circuits: robots' gears, and places that go back
     over one operation alone. With copies of a robot its gear has so many tokens, and an operation
     that it does alone, which has one place on the floor, a place of one token back over it: one at
-    a time. The outfeed's place goes back over dropoff.
+    a time. The outfeed's place goes back over dropoff. Where robots go ahead while they wait, a
+    gear's slowest circuit goes by those of its `ways` (places by robot and operation) that take
+    longer than the operation. `first`: what a place takes for the first time [s], and `ready`: when
+    robots have gone ahead that set out at the beginning, where those are other times.
     """
 
     net: MarkedNet
     seconds: tuple[float, ...]
     named: tuple[Circuit, ...] = field(repr=False)
     bounds: tuple[int, ...] = ()
+    ways: Mapping[tuple[int, int], int] = field(default_factory=dict, repr=False)
+    first: Mapping[int, float] = field(default_factory=dict, repr=False)
+    ready: Mapping[int, float] = field(default_factory=dict, repr=False)
 
     @cached_property
     def ratio(self) -> CycleRatio:
@@ -89,11 +96,13 @@ class TimedNet:
         found = self.pace * circuit.tokens - circuit.seconds
         return found if found > SAME * self.pace else 0.0
 
-    def firings(self, timing: Timing, units: int) -> Firings:
+    def firings(self, units: int) -> Firings:
         """As soon as possible, from the initial marking, `units` of them at least."""
         period = lcm(*(c.tokens for c in self.critical))
         period = min(period, LONGEST_PERIOD)
-        return settled_firings(self.net, self.seconds, self.pace, period, units, timing.first)
+        return settled_firings(
+            self.net, self.seconds, self.pace, period, units, self.first, self.ready
+        )
 
 
 def timed_net(timing: Timing, change: Change = AS_IT_IS, wip: int | None = None) -> TimedNet:
@@ -103,16 +112,20 @@ def timed_net(timing: Timing, change: Change = AS_IT_IS, wip: int | None = None)
     """
     factory = timing.factory
     subject = marked(factory.net) if wip is None else with_wip(factory, wip)
-    tokens, places = list(subject.tokens), list(subject.net.places)
-    bounds = tuple(range(len(factory.net.threaded.places), len(places)))
-    seconds = [*timing.changed(change)]
-    seconds += [0.0] * (len(places) - len(seconds))
+    bounds = tuple(range(len(factory.net.threaded.places), len(subject.tokens)))
+    tokens = list(subject.tokens)
     for robot, copies in change.copies.items():
         tokens[factory.net.initial[robot]] += copies - 1
+    went = timing.ways(change)
+    ways = dict(zip(went, range(len(tokens), len(tokens) + len(went)), strict=True))
+    seconds = [*timing.changed(change)]
+    seconds += [*[0.0] * (len(tokens) - len(seconds)), *went.values()]
+    moving = with_ways(replace(subject, tokens=tuple(tokens)), factory, ways)
+    tokens, places = list(moving.tokens), list(moving.net.places)
     back = [(f"station {factory.operations[n].label}", n, 0.0) for n in _alone(timing, change)]
     if timing.outfeed:
         back.append(("outfeed", factory.dropoff.index, timing.outfeed))
-    named = _gears(timing, seconds, tokens)
+    named = _gears(timing, seconds, tokens, ways)
     for name, number, delay in back:
         operation = factory.operations[number]
         place = Place(name, (operation.end,), (operation.start,), "wait", operation.label)
@@ -126,19 +139,31 @@ def timed_net(timing: Timing, change: Change = AS_IT_IS, wip: int | None = None)
         tokens=tuple(tokens),
         slots=(),
     )
-    return TimedNet(net, tuple(seconds), tuple(named), bounds)
+    ready = {ways[key]: taken for key, taken in timing.first_ways.items()}
+    return TimedNet(net, tuple(seconds), tuple(named), bounds, ways, timing.first, ready)
 
 
-def _gears(timing: Timing, seconds: Sequence[float], tokens: Sequence[int]) -> list[Circuit]:
-    return [
-        Circuit(
-            gear.robot,
-            sum(seconds[p] for p in gear.places),
-            sum(tokens[p] for p in gear.places),
-            gear.places,
+def _gears(
+    timing: Timing,
+    seconds: Sequence[float],
+    tokens: Sequence[int],
+    ways: Mapping[tuple[int, int], int],
+) -> list[Circuit]:
+    """The slowest circuit in each gear."""
+    found = []
+    for robot, gear in zip(timing.factory.robots, timing.factory.net.gears, strict=True):
+        slowest = list(gear.places)
+        for step, number in enumerate(robot.operations):
+            way = ways.get((robot.index, number), number)
+            if seconds[way] > seconds[number]:
+                slowest[2 * step], slowest[2 * step + 1] = way, NONE
+        places = tuple(p for p in slowest if p != NONE)
+        found.append(
+            Circuit(
+                gear.robot, sum(seconds[p] for p in places), sum(tokens[p] for p in places), places
+            )
         )
-        for gear in timing.factory.net.gears
-    ]
+    return found
 
 
 def _alone(timing: Timing, change: Change) -> list[int]:

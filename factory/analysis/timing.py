@@ -12,8 +12,10 @@ import numpy as np
 from factory.control.mode import Array, Limits, Mode
 from factory.control.plan import operation_modes, operation_starts, robot_limits
 from factory.control.profile import World, ideal_time, mode_time, trapezoid_time
+from factory.control.staging import Stage, staged, stages
 from factory.factory import Factory
 from factory.layout.plan import Layout
+from factory.prediction import way_time
 from factory.settings import Settings
 from factory.simulation import start_positions
 
@@ -66,9 +68,49 @@ class Timing:
         return robot_limits(self.layout, self.settings, self.seed, self.jitter)[0]
 
     @cached_property
-    def starts(self) -> list[Array]:
-        """Where the axes of each operation are when it starts, in the long run."""
+    def stages(self) -> tuple[Stage, ...]:
+        """The ways that robots go ahead of operations while they wait, if they are to."""
+        return stages(self.layout, self.modes) if self.settings.stage else ()
+
+    @cached_property
+    def left(self) -> list[Array]:
+        """Where the axes of each operation were left by the ones before, in the long run."""
         return operation_starts(self.layout)
+
+    @cached_property
+    def starts(self) -> list[Array]:
+        """Where the axes of each operation are when it starts, in the long run, if those that go
+        ahead are there by then."""
+        return staged(self.left, self.stages)
+
+    def ways(self, change: Change = AS_IT_IS) -> dict[tuple[int, int], float]:
+        """What a robot (index) takes [s] to go ahead to an operation."""
+        return {
+            (stage.robot, stage.operation): self._way(stage, stage.start, change)
+            for stage in self.stages
+        }
+
+    @cached_property
+    def first_ways(self) -> Mapping[tuple[int, int], float]:
+        """The same from where robots stand at the beginning, for those that set out then [s]."""
+        positions = start_positions(self.layout, self.factory.net.initial_marking)
+        return MappingProxyType(
+            {
+                (stage.robot, stage.operation): self._way(stage, positions[stage.robot], AS_IT_IS)
+                for stage in self.stages
+                if self.factory.robots[stage.robot].operations[0] == stage.operation
+            }
+        )
+
+    def _way(self, stage: Stage, start: float, change: Change) -> float:
+        start = stage.goal + (start - stage.goal) * change.way.get(stage.robot, 1.0)
+        limits = self.limits
+        if stage.robot in change.speed or stage.robot in change.acceleration:
+            speed, gain = limits.speed.copy(), limits.acceleration.copy()
+            speed[stage.robot] *= change.speed.get(stage.robot, 1.0)
+            gain[stage.robot] *= change.acceleration.get(stage.robot, 1.0)
+            limits = Limits(speed, gain)
+        return way_time(stage, start, limits, self.settings, self.world)
 
     @cached_property
     def rest(self) -> float:
@@ -110,7 +152,10 @@ class Timing:
             ]
             if any(begins):
                 here = positions[list(self.factory.axes[operation.index])]
-                start = np.where(begins, here, self.starts[operation.index])
+                start = np.where(begins, here, self.left[operation.index])
+                for stage in self.stages:
+                    if stage.operation == operation.index:
+                        start[stage.slot] = stage.goal
                 found[operation.index] = self._delay(operation.index, start, AS_IT_IS)
         return MappingProxyType(found)
 
@@ -119,7 +164,7 @@ class Timing:
         mode = self.modes[number]
         axis = self.factory.axes[number][slot]
         v, a = float(self.limits.speed[axis]), float(self.limits.acceleration[axis])
-        way = 0.0 if mode.is_still else abs(float(self.starts[number][slot] - mode.goals[slot]))
+        way = 0.0 if mode.is_still else abs(float(self.left[number][slot] - mode.goals[slot]))
         if self.world == "mujoco":
             return float(trapezoid_time(way, v, a))
         return max(0.0, float(ideal_time(way, v, a) - ideal_time(mode.eps, v, a)))

@@ -89,6 +89,11 @@ MOTION = options(
     click.option("--force", type=float, help="Actuator limit, as a multiple of what is needed."),
     click.option("--timestep", type=float, help="The engine's timestep [s]."),
     click.option("--substeps", type=click.IntRange(1), help="Timesteps in a supervisor's tick."),
+    click.option(
+        "--stage/--no-stage",
+        default=None,
+        help="Robots that wait empty-handed go ahead to where they are needed next.",
+    ),
 )
 FLOOR = options(
     click.option("--clearance", type=float, help="Least distance between things [m]."),
@@ -161,8 +166,11 @@ def settings_of(file: Path, options: dict[str, Any]) -> Any:
     from factory.settings import environment
 
     names = ("speed", "acceleration", "force", "timestep", "substeps", "clearance")
+    given = {name: options.get(name) for name in names}
+    if (stage := options.get("stage")) is not None:
+        given["stage"] = int(stage)
     settings = defaults_for(file).settings().with_options(environment())
-    return settings.with_options({name: options.get(name) for name in names})
+    return settings.with_options(given)
 
 
 def pair(text: str | None, option: str, example: str, number: type) -> tuple[Any, Any] | None:

@@ -138,7 +138,7 @@ class Monitor:
 
     def _leaves(self, robot: int) -> None:
         """A robot leaves the place where it stood: the next operation that has its goal elsewhere
-        has started, and those before are over."""
+        has started, if it was not to go ahead, and those before are over."""
         anchor, ball = self.motion.anchor[robot], self.motion.ball[robot]
         size = len(self.factory.robots[robot].operations)
         first = self.turn[robot]
@@ -155,6 +155,8 @@ class Monitor:
         begun = self.motion.leave(robot, goal)
         self.changed = self.now
         self._over(robot, turn, begun)
+        if self.subject.goes_ahead(operation, robot):
+            return  # it need not wait until the operation starts
         name = self.factory.robots[robot].name
         shown = max(self.begun, begun - self.subject.settings.tick)
         self.explanation.saw(operation.start, unit, self.begun, begun, shown, name)

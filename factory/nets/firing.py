@@ -31,13 +31,14 @@ def earliest_firings(
     seconds: Sequence[float],
     count: int,
     first: Mapping[int, float] = MappingProxyType({}),
+    ready: Mapping[int, float] = MappingProxyType({}),
 ) -> Floats:
     """(count, T): the dates of the first `count` firings of every transition.
 
     The k-th firing takes the k-th token of each place before it: one of the initial ones, ready at
-    once, or what the producer's firing k - tokens put there, ready `seconds[p]` later; `first` says
-    how long the first such token of a place takes, where that differs. Raises ValueError where the
-    net is no live marked graph.
+    once, or when `ready` says so, or what the producer's firing k - tokens put there, ready
+    `seconds[p]` later; `first` says how long the first such token of a place takes, where that
+    differs. Raises ValueError where the net is no live marked graph.
     """
     free = token_free(net)
     if not net.is_marked_graph or free.stuck or dead_ends(net):
@@ -46,7 +47,13 @@ def earliest_firings(
         (
             event,
             [
-                (net.left[p], net.tokens[p], float(seconds[p]), float(first.get(p, seconds[p])))
+                (
+                    net.left[p],
+                    net.tokens[p],
+                    float(seconds[p]),
+                    float(first.get(p, seconds[p])),
+                    float(ready.get(p, 0.0)),
+                )
                 for p in net.net.preset[event]
             ],
         )
@@ -56,10 +63,13 @@ def earliest_firings(
     for k, row in enumerate(dates):
         for event, places in needs:
             latest = 0.0
-            for before, tokens, delay, start in places:
+            for before, tokens, delay, start, begun in places:
                 if k >= tokens:
-                    ready = dates[k - tokens][before] + (start if k == tokens else delay)
-                    latest = max(latest, ready)
+                    latest = max(
+                        latest, dates[k - tokens][before] + (start if k == tokens else delay)
+                    )
+                else:
+                    latest = max(latest, begun)
             row[event] = latest
     return np.array(dates).reshape(count, len(net.net.transitions))
 
@@ -71,6 +81,7 @@ def settled_firings(
     period: int,
     least: int,
     first: Mapping[int, float] = MappingProxyType({}),
+    ready: Mapping[int, float] = MappingProxyType({}),
     work: int = 4_000_000,
 ) -> Firings:
     """The firings until each repeats itself every `period` firings, `ratio` seconds apart each, but
@@ -78,7 +89,7 @@ def settled_firings(
     count = max(least, 8 * period, 16)
     most = max(count, work // max(1, len(net.tokens)))
     while True:
-        dates = earliest_firings(net, seconds, count, first)
+        dates = earliest_firings(net, seconds, count, first, ready)
         apart = dates[period:] - dates[:-period] - ratio * period
         restless = np.flatnonzero(np.abs(apart).max(axis=1) > 1e-9 * (1.0 + dates.max()))
         settled = int(restless[-1]) + 1 if len(restless) else 0

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from types import MappingProxyType
 
 from factory.errors import did_you_mean
 from factory.factory import Factory
@@ -32,15 +33,23 @@ class CriticalCircuit:
     places: tuple[int, ...]
 
 
-def cycle_time(subject: Factory | GearNet, delays: Delays) -> CycleTime:
-    """The maximum over robots of the summed delays of its gear, which carries one token.
+def cycle_time(
+    subject: Factory | GearNet,
+    delays: Delays,
+    ways: Mapping[tuple[int, int], float] = MappingProxyType({}),
+) -> CycleTime:
+    """The maximum over robots of the summed delays of its gear, which carries one token. `ways`:
+    what a robot (index) takes to a place [s] while it waits for it (`factory.nets.ways`).
 
     Holds since the simple circuits of a gear net are its gears. The first robot that attains it is
     the bottleneck. Raises ValueError where a delay is negative or names no place.
     """
     net = subject.net if isinstance(subject, Factory) else subject
     seconds = _seconds(marked(net), delays)
-    sums = [sum(seconds[p] for p in gear.places) for gear in net.gears]
+    sums = [
+        sum(max(seconds[p], ways.get((robot, p), 0.0)) for p in gear.places)
+        for robot, gear in enumerate(net.gears)
+    ]
     slowest = max(range(len(sums)), key=sums.__getitem__)
     return CycleTime(sums[slowest], net.gears[slowest].robot)
 

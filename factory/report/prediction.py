@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from factory.analysis import Timing
-from factory.analysis.flow import busy_until, flow
+from factory.analysis.flow import busy_until, flow, lasting
 from factory.analysis.recorded import conditions
 from factory.analysis.timed import timed_net
 from factory.report.recording import Recording
@@ -42,7 +42,7 @@ def predicted(recording: Recording) -> Predicted | None:
         found.first if begun else None,
         found.last if begun else None,
         tuple(circuit.name for circuit in net.critical),
-        tuple(net.seconds[o.place] for o in recording.factory.operations),
-        tuple(busy_until(timing, net, found)),
+        tuple((lasting(timing, found) + made.settings.tick).tolist()),
+        tuple(busy_until(timing, found)),
         tuple(own[robot.name] for robot in recording.factory.robots),
     )

@@ -26,6 +26,7 @@ WHOLE: Mapping[str, tuple[int, int]] = {
     "units": (1, 10**9),
     "wip": (1, 10**9),
     "substeps": (1, 100),
+    "stage": (0, 1),
 }
 """Keys whose values are whole numbers, with the least and the greatest."""
 

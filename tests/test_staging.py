@@ -1,0 +1,328 @@
+"""Staging: what waits empty-handed goes ahead; the net is the same, the pace is the predicted one,
+and nothing comes near what it should not."""
+
+from __future__ import annotations
+
+import random
+import sqlite3
+from contextlib import closing
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from layout_values import STYLES, random_layout
+from pag_values import SHAPES
+
+import factory
+from factory import simulation as simulations
+from factory.analysis import Timing
+from factory.analysis.flow import flow
+from factory.analysis.timed import timed_net
+from factory.analysis.timing import Change
+from factory.control import staging
+from factory.control.plan import operation_modes
+from factory.control.staging import stages
+from factory.layout.plan import Layout
+from factory.monitor import beside
+from factory.nets.cycle_ratio import max_cycle_ratio
+from factory.pag import NOPART
+from factory.prediction import operation_delays, predict, ways_ahead
+from factory.settings import Settings
+from factory.simulation import Simulation
+from tests.command_line import PAPER, ROOT, Terminal
+
+STAGED, STILL = Settings(stage=1), Settings()
+CHEST = ROOT / "examples" / "chest.pag"
+
+sizes, seeds = st.integers(2, 20), st.integers(0, 10_000)
+shapes, styles = st.sampled_from(SHAPES), st.sampled_from(STYLES)
+worlds: Any = st.sampled_from(["ideal", "mujoco"])
+
+
+def laid_out(file: Path) -> Layout:
+    return factory.lay_out(factory.compile(factory.load_pag(file)))
+
+
+@pytest.fixture(scope="module")
+def paper() -> Layout:
+    return laid_out(PAPER)
+
+
+def test_who_goes_ahead_in_the_papers_example(paper: Layout) -> None:
+    """r1 and r3 go back with nothing, and wait there for what they are to carry; r2, r5 and r6 wait
+    for nobody at their feeders; r4 is a tool, and stays at its station."""
+    modes = operation_modes(paper, STAGED.eps)
+    operations = paper.factory.operations
+    found = {(s.robot + 1, operations[s.operation].label) for s in stages(paper, modes)}
+    assert found == {(1, "sub3"), (3, "sub1")}
+
+
+@given(sizes, seeds, shapes, styles)
+@settings(max_examples=40)
+def test_only_empty_hands_go_ahead_and_only_to_others(
+    size: int, seed: int, shape: str, style: str
+) -> None:
+    layout = random_layout(size, seed, shape, style)
+    for stage in stages(layout, operation_modes(layout, STAGED.eps)):
+        operation = layout.factory.operations[stage.operation]
+        assert operation.robots[stage.slot] == stage.robot
+        assert operation.before[stage.slot] == NOPART
+        assert len(operation.robots) > 1
+        assert stage.goal == layout.goal(operation.index, stage.slot) != stage.start
+
+
+# --- the pace -------------------------------------------------------------------------------------
+
+
+@given(sizes, seeds, shapes, styles, worlds, st.sampled_from([None, 1, 2]))
+@settings(max_examples=40)
+def test_the_slowest_gear_sets_the_pace(
+    size: int, seed: int, shape: str, style: str, world: Any, wip: int | None
+) -> None:
+    """Though the ways make circuits of their own; and analysis and prediction are one."""
+    layout = random_layout(size, seed, shape, style)
+    timing = Timing(layout, STAGED, world, seed, 0.3)
+    net = timed_net(timing, wip=wip)
+    assert net.pace == pytest.approx(max_cycle_ratio(net.net, net.seconds).seconds)
+    assert net.pace <= timed_net(Timing(layout, STILL, world, seed, 0.3), wip=wip).pace + 1e-9
+    told = layout, timing.modes, timing.limits, STAGED, world
+    delays, ways = operation_delays(*told), ways_ahead(*told)
+    assert predict(layout, delays, STAGED, world, wip, ways).seconds == pytest.approx(net.pace)
+    found = flow(timing, net, 6)
+    assert all(share.waiting > -1e-9 for share in found.shares)
+
+
+@given(seeds, shapes)
+@settings(max_examples=15)
+def test_changes_of_a_robot_change_its_ways(seed: int, shape: str) -> None:
+    rng = random.Random(seed)
+    timing = Timing(random_layout(8, seed, shape, "medium"), STAGED)
+    robot = rng.randrange(len(timing.factory.robots))
+    for change in (Change(speed={robot: 2.0}), Change(way={robot: 0.5}), Change(copies={robot: 2})):
+        net = timed_net(timing, change)
+        assert net.pace == pytest.approx(max_cycle_ratio(net.net, net.seconds).seconds)
+        assert net.pace <= timed_net(timing).pace + 1e-9
+
+
+@pytest.mark.parametrize("distributed", [False, True])
+@given(st.integers(2, 12), seeds, shapes, styles)
+@settings(max_examples=12)
+def test_it_runs_at_that_pace(
+    distributed: bool, size: int, seed: int, shape: str, style: str
+) -> None:
+    layout = random_layout(size, seed, shape, style)
+    record = Simulation(layout, "ideal", 12, seed, 0.2, STAGED, distributed=distributed).run()
+    assert record.trouble is None and record.refines_net
+    if not distributed:
+        assert record.cycle_time_s is not None
+        ticks = 2 * STAGED.tick * max(len(r.operations) for r in layout.factory.robots)
+        assert abs(record.cycle_time_s - record.predicted_cycle_time_s) < ticks
+    else:
+        still = Simulation(layout, "ideal", 12, seed, 0.2, STILL, distributed=True).run()
+        assert record.sim_time_s < still.sim_time_s + 12 * 0.1
+
+
+@pytest.mark.parametrize("distributed", [False, True])
+@pytest.mark.parametrize("file", [PAPER, CHEST], ids=["paper", "chest"])
+def test_it_pays_in_mujoco(file: Path, distributed: bool) -> None:
+    layout = laid_out(file)
+    found = {}
+    for chosen in (STILL, STAGED):
+        made = Simulation(layout, "mujoco", 8, settings=chosen, distributed=distributed)
+        watcher = beside(made)
+        record = found[chosen] = made.run([watcher.observe])
+        assert watcher.report().refines_net and not watcher.report().violations
+        assert record.refines_net and record.physics is not None
+        assert record.physics.unintended_contacts == 0
+        assert record.physics.handoff_gap_max_mm < 0.1
+    cycles = [found[s].cycle_time_s or 0.0 for s in (STILL, STAGED)]
+    assert cycles[1] < 0.96 * cycles[0]
+    if not distributed:
+        assert cycles[1] == pytest.approx(found[STAGED].predicted_cycle_time_s, rel=0.01)
+
+
+def test_it_does_not_change_a_run_without_it(paper: Layout) -> None:
+    made = Simulation(paper, "mujoco", 2)
+    record = made.run()
+    assert [e.transition for e in record.events[:6]] == [
+        e.transition for e in Simulation(paper, "mujoco", 2, settings=STILL).run().events[:6]
+    ]
+    assert made.supervisor.active.ahead == () and made.ways == {}
+
+
+# --- robots on their way --------------------------------------------------------------------------
+
+
+def test_who_has_come_there_costs_nothing_more(paper: Layout) -> None:
+    """r3 is at its station long before its parts are; nothing moves it there."""
+    made = Simulation(paper, "mujoco", 1, settings=STAGED)
+    numbers = [s.robot for s in stages(paper, made.modes)]
+    count, seen = len(paper.factory.operations), []
+    while made.world.delivered() < 1:
+        made.supervisor.step()
+        active = made.supervisor.active
+        seen.append({numbers[n - count] for n in active.ahead})
+        slots = sum(len(paper.factory.axes[o]) for o in active.operations) + len(active.ahead)
+        assert len(active.axes) == slots == len(set(active.axes.tolist()))
+    assert {0} in seen or {0, 2} in seen or {2} in seen
+    assert set() in seen
+
+
+def test_it_goes_on_without_a_stop_where_its_operation_begins(paper: Layout) -> None:
+    """A robot under way keeps its speed when the mode of its operation takes it over."""
+    made = Simulation(paper, "mujoco", 6, settings=STAGED)
+    world, taken = made.world, []
+    before: set[int] = set()
+    while made.world.delivered() < made.before + 6:
+        speeds = world.speed.copy()
+        made.supervisor.step()
+        active = made.supervisor.active
+        started = set(active.operations) - before
+        for number in started:
+            for robot in paper.factory.operations[number].robots:
+                if abs(speeds[robot]) > 0.1:
+                    taken.append(abs(world.speed[robot] - speeds[robot]))
+        before = set(active.operations)
+    most = STAGED.acceleration * STAGED.tick
+    assert all(change < most + 1e-9 for change in taken)
+
+
+def test_limits_may_change_on_the_way(paper: Layout) -> None:
+    made = Simulation(paper, "mujoco", 3, settings=STAGED)
+    for _ in range(15):
+        made.supervisor.step()
+    slower = replace(made.limits, speed=made.limits.speed * 0.5)
+    ahead = made.supervisor.active.ahead
+    made.supervisor.limit(slower)
+    assert made.supervisor.active.ahead == ahead
+    assert made.run().refines_net
+
+
+@pytest.mark.parametrize("marking", ["r1:sub3,r2:nopart,r3:nopart,r4:nopart,r5:nopart,r6:nopart"])
+def test_from_a_marking_robots_set_out_at_once(paper: Layout, marking: str) -> None:
+    net = paper.factory.net
+    chosen = frozenset(net.threaded.net.place_index[name] for name in marking.split(","))
+    made = Simulation(paper, "mujoco", 2, settings=STAGED, start=chosen)
+    modes = operation_modes(paper, STAGED.eps)
+    waiting = [s.robot for s in stages(paper, modes)]
+    count = len(paper.factory.operations)
+    assert [waiting[n - count] for n in made.supervisor.active.ahead] == [2]
+    assert made.run().refines_net
+
+
+# --- planted faults -------------------------------------------------------------------------------
+
+
+def loaded_too(layout: Layout, modes: Any) -> Any:
+    """Stages of robots that bring something, too: what the certificate does not allow."""
+    found = list(stages(layout, modes))
+    known = {(s.robot, s.operation) for s in found}
+    for operation, mode in zip(layout.factory.operations, modes, strict=True):
+        for slot, robot in enumerate(operation.robots):
+            if (robot, operation.index) not in known and len(operation.robots) > 1:
+                own = slice(slot, slot + 1)
+                alone = type(mode)(mode.goals[own], mode.lower[own], mode.upper[own], mode.eps)
+                found.append(staging.Stage(robot, operation.index, slot, alone, 0.0))
+    return tuple(found)
+
+
+def test_the_monitor_blames_who_goes_ahead_with_a_part(
+    paper: Layout, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(simulations, "stages", loaded_too)
+    made = Simulation(paper, "mujoco", 3, settings=STAGED)
+    watcher = beside(made)
+    made.run([watcher.observe], max_time=20.0)
+    assert {violation.code for violation in watcher.report().violations} & {"Order", "Early"}
+
+
+def test_the_monitor_blames_who_goes_ahead_though_it_should_wait(
+    paper: Layout, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The monitor goes by the settings of the run, not by what its supervisor does."""
+    monkeypatch.setattr(Simulation, "_stages", lambda self: stages(self.layout, self.modes))
+    made = Simulation(paper, "mujoco", 3, settings=STILL)
+    watcher = beside(made)
+    made.run([watcher.observe])
+    assert any(violation.code == "Order" for violation in watcher.report().violations)
+
+
+# --- the command line -----------------------------------------------------------------------------
+
+
+def test_run_and_its_log(run: Terminal, tmp_path: Path) -> None:
+    log = tmp_path / "run.npz"
+    still = run("run", PAPER, "--units", 6, "--json").json
+    done = run("run", PAPER, "--units", 6, "--stage", "--monitor", "--log", log, "--json").json
+    assert done["cycle_time_s"] < 0.96 * still["cycle_time_s"]
+    assert done["predicted_cycle_time_s"] < 0.96 * still["predicted_cycle_time_s"]
+    assert done["refines_net"]
+    assert run("monitor", log, "--json").json["refines_net"]
+
+
+def test_analyze_against_a_run(run: Terminal, tmp_path: Path) -> None:
+    found = run("analyze", CHEST, "--stage", "--units", 10, "--run", "--json").json
+    critical = found["circuits"][0]
+    assert critical["pace_s"] == found["cycle_time_s"]
+    assert all(operation["slack_s"] < 10 for operation in found["operations"])
+    measured = found["measured"]
+    assert measured["cycle_time_s"]["error"] == pytest.approx(0, abs=0.01)
+    slow = [d for d in measured["durations"] if d["measured"] > 0.1]
+    assert len(slow) > 20
+    for duration in slow:
+        assert duration["predicted"] == pytest.approx(duration["measured"], rel=0.05)
+
+
+def test_sweeps_vary_it(run: Terminal, tmp_path: Path) -> None:
+    out = tmp_path / "sweep.db"
+    done = run("sweep", PAPER, "--vary", "stage=0,1", "--world", "ideal", "-o", out, "--json")
+    assert done.status == 0
+    with closing(sqlite3.connect(out)) as base:
+        rows = base.execute("select stage, cycle_time_s from runs order by stage").fetchall()
+    assert [stage for stage, _ in rows] == [0, 1]
+    assert rows[1][1] < 0.95 * rows[0][1]
+
+
+def test_it_is_0_or_1(run: Terminal, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "p.pag").write_text(PAPER.read_text())
+    (tmp_path / "factory.toml").write_text("stage = 2\n")
+    done = run("run", tmp_path / "p.pag")
+    assert done.status == 2 and "stage = 2 is not between 0 and 1" in done.err
+    (tmp_path / "factory.toml").write_text("stage = 1\n")
+    staged = run("run", tmp_path / "p.pag", "--world", "ideal", "--units", 6, "--json").json
+    still = ["run", tmp_path / "p.pag", "--world", "ideal", "--units", 6, "--no-stage", "--json"]
+    assert staged["cycle_time_s"] < run(*still).json["cycle_time_s"]
+    monkeypatch.setenv("FACTORY_STAGE", "0")
+    assert np.isclose(
+        run(*[a for a in still if a != "--no-stage"]).json["cycle_time_s"],
+        run(*still).json["cycle_time_s"],
+    )
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("number", range(40))
+def test_random_factories_in_mujoco(number: int) -> None:
+    """At jitter 0.3, every third of them distributed, half of them fused, under the monitor's
+    eyes."""
+    shape, style = SHAPES[number % len(SHAPES)], STYLES[number % len(STYLES)]
+    layout = random_layout(4 + number % 9, number, shape, style)
+    made = Simulation(
+        layout,
+        "mujoco",
+        3,
+        number,
+        0.3,
+        STAGED,
+        distributed=number % 3 == 0,
+        fuse=number % 2 == 0,
+    )
+    watcher = beside(made)
+    record = made.run([watcher.observe])
+    assert record.trouble is None and record.refines_net
+    assert watcher.report().refines_net and not watcher.report().violations
+    assert record.physics is not None and record.physics.unintended_contacts == 0
+    assert record.physics.handoff_gap_max_mm < 0.1
