@@ -26,6 +26,10 @@ ALL = (1 << 30) - 1
 """All bits of a code."""
 
 
+LAST = 2**32 - 1
+"""The greatest of all signatures, which no pair has."""
+
+
 class Contacts:
     """The masks and exclusions of a model, for parts whose bodies are given by label and copy.
 
@@ -99,7 +103,8 @@ class Contacts:
 
     def _exclude(self, label: str, unit: int, body: int, now: bool) -> None:
         """Leave out, or no longer, the pairs of a part with those of its unit that are there. The
-        engine reads the exclusions as one sorted list."""
+        engine reads the exclusions as one sorted list of unsigned numbers, from its beginning for
+        every pair that is near: what is free of it is behind."""
         changed = False
         for partner in self.partners.get(label, ()):
             other = self._present.get((partner, unit))
@@ -108,6 +113,6 @@ class Contacts:
                 (self._signatures.add if now else self._signatures.discard)((low << 16) + high)
                 changed = True
         if changed:
-            listed = self.m.exclude_signature
-            listed[:] = 0
-            listed[len(listed) - len(self._signatures) :] = sorted(self._signatures)
+            listed = self.m.exclude_signature.view(np.uint32)
+            listed[: len(self._signatures)] = sorted(self._signatures)
+            listed[len(self._signatures) :] = LAST
