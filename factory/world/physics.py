@@ -209,25 +209,25 @@ class MujocoWorld:
         """Timesteps of the engine, with the setpoints of all moving robots kept up to date: of
         those in modes, and of those that `move` has set going or stopped."""
         m, d = self.m, self.d
-        rows = np.empty((substeps + 1, len(d.ctrl)))
-        rows[:] = d.ctrl
         gone, self._gone = self._gone, self._gone + substeps
-        creeping = self._creeping
+        creeping, inputs = self._creeping, self._ctrl
         if self._course is None:
-            creeping = creeping[:0]
+            creeping, inputs = creeping[:0], inputs[:0]
+            rows = np.empty((substeps + 1, 0))
         else:
-            rows[:, self._ctrl] = self._course[gone : gone + substeps + 1]
+            rows = self._course[gone : gone + substeps + 1]
         (axes,) = self._due.nonzero()
         if len(axes):
             begun, x, v, a = self._plan[:, axes]
             own, slow = self._setpoints(axes, x, v, a, d.time - begun)
-            rows[:, self._inputs(axes)] = own[: substeps + 1]
+            rows = np.concatenate([rows, own[: substeps + 1]], axis=1)
+            inputs = np.concatenate([inputs, self._inputs(axes)])
             creeping = np.concatenate([creeping, slow])
             self._due[axes] = self._plan[2:, axes].any(axis=0)
         setpoints, step, spent, vicinity = d.ctrl, mujoco.mj_step, 0.0, self.vicinity
         vicinity.notice()
         for number in range(substeps):
-            setpoints[:] = rows[number]
+            setpoints[inputs] = rows[number]
             if len(creeping) and (gone + number) % DOZE == 0:
                 self.rouse(creeping)
             if vicinity.stale:
@@ -238,7 +238,7 @@ class MujocoWorld:
             if d.ncon:
                 self.inspection.contacts()
                 vicinity.notice()
-        setpoints[:] = rows[substeps]
+        setpoints[inputs] = rows[substeps]
         self.physics_time += spent
 
     def _inputs(self, axes: Index) -> Index:
