@@ -52,6 +52,10 @@ class Operation:
         """The labels brought, in the order of the robots."""
         return tuple(label for label in self.before if label != NOPART)
 
+    def awaits_empty(self, slot: int) -> bool:
+        """Whether the robot in a slot waits for others, with nothing in its hands."""
+        return len(self.robots) > 1 and self.before[slot] == NOPART
+
     @property
     def lowered(self) -> int:
         """The slot of the robot that lowers what it brings, -1 for none."""

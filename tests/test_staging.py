@@ -24,11 +24,17 @@ from factory.analysis.flow import flow
 from factory.analysis.timed import timed_net
 from factory.analysis.timing import Change
 from factory.control import staging
-from factory.control.plan import operation_modes
+from factory.control.plan import operation_modes, robot_limits
 from factory.control.staging import stages
+from factory.layout.bounds import cycle_time_bound
+from factory.layout.clearance import certify
+from factory.layout.dimensions import Clearance
+from factory.layout.durations import Pace, gear_times, operation_times
+from factory.layout.optimising import first_feasible, optimised
 from factory.layout.plan import Layout
 from factory.monitor import beside
 from factory.nets.cycle_ratio import max_cycle_ratio
+from factory.nets.timing import cycle_time
 from factory.pag import NOPART
 from factory.prediction import operation_delays, predict, ways_ahead
 from factory.settings import Settings
@@ -94,6 +100,27 @@ def test_the_slowest_gear_sets_the_pace(
     assert predict(layout, delays, STAGED, world, wip, ways).seconds == pytest.approx(net.pace)
     found = flow(timing, net, 6)
     assert all(share.waiting > -1e-9 for share in found.shares)
+
+
+@given(sizes, seeds, shapes, styles)
+@settings(max_examples=25)
+def test_the_layout_is_made_for_that_pace(size: int, seed: int, shape: str, style: str) -> None:
+    layout = random_layout(size, seed, shape, style)
+    net = timed_net(Timing(layout, STAGED, "ideal"))
+    still, staged = Pace.of(STILL), Pace.of(STAGED)
+    modes, (limits, _) = operation_modes(layout, STAGED.eps), robot_limits(layout, STAGED)
+    told = layout, modes, limits, STAGED, "mujoco"
+    delays, ways = operation_delays(*told), ways_ahead(*told)
+    assert operation_times(layout, staged) == pytest.approx(delays, abs=1e-6)
+    cycle = max(gear_times(layout, staged))
+    assert cycle == pytest.approx(cycle_time(layout.factory, delays, ways).seconds, abs=1e-6)
+    assert net.pace < cycle <= max(gear_times(layout, still)) + 1e-9
+    bound = cycle_time_bound(layout.factory, layout.product, layout.clearance, staged)
+    made = optimised(layout.factory, layout.product, Clearance(layout.clearance), staged)
+    assert 0 < bound <= max(gear_times(made, staged)) + 1e-9
+    assert certify(made).holds
+    first = first_feasible(layout.factory, layout.product, Clearance(layout.clearance))
+    assert max(gear_times(made, staged)) <= max(gear_times(first, staged)) + 1e-9
 
 
 @given(seeds, shapes)

@@ -17,7 +17,6 @@ import numpy as np
 from factory.control.mode import ROUNDING, Array, Mode
 from factory.control.plan import operation_starts
 from factory.layout.plan import Layout
-from factory.pag import NOPART
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,11 +44,11 @@ def stages(layout: Layout, modes: Sequence[Mode]) -> tuple[Stage, ...]:
     for operation, mode, start in zip(layout.factory.operations, modes, starts, strict=True):
         homes = start.copy()
         homes[: len(operation.robots)] = [layout.home(r, operation.index) for r in operation.robots]
-        if len(operation.robots) < 2 or not all(map(mode.clear_from, (start, homes))):
+        if not all(map(mode.clear_from, (start, homes))):
             continue
         for slot, robot in enumerate(operation.robots):
             way = abs(float(start[slot] - mode.goals[slot]))
-            if operation.before[slot] == NOPART and mode.gate[slot] < 0 and way > ROUNDING:
+            if operation.awaits_empty(slot) and mode.gate[slot] < 0 and way > ROUNDING:
                 own = slice(slot, slot + 1)
                 alone = Mode(mode.goals[own], mode.lower[own], mode.upper[own], mode.eps)
                 found.append(Stage(robot, operation.index, slot, alone, float(start[slot])))

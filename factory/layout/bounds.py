@@ -74,13 +74,17 @@ class _Bound:
         """The least sum of delays [s] along the gear of a robot."""
         gear = self.factory.robots[robot].operations
         fixed = sum(self.factory.operations[number].dwell + self.pace.lost for number in gear)
+        first = self.moving[gear[0]]
         if len(gear) == 1:
-            return fixed + self.moving[gear[0]]
+            return fixed + first
+        if self.pace.ahead is not None:
+            lost = self.factory.operations[gear[0]].dwell + self.pace.lost
+            first = max(first, self._back(robot) + self.pace.ahead - lost)
         between = gear[1:-1]
         moves = sum(self.moving[number] for number in between)
         waits = sum(self.waiting[number] for number in between)
         along = max(moves, self.pace.rest(self.spans[robot]) + waits)
-        return fixed + self.moving[gear[0]] + along + self.moving[gear[-1]]
+        return fixed + first + along + self.moving[gear[-1]]
 
     def _box(self, label: str, axis: int) -> _Interval:
         box = self.payloads[label]
@@ -114,14 +118,19 @@ class _Bound:
         number = gear[max(len(gear) - 2, 0)]
         return self._box(self.factory.operations[number].label, axis).middle
 
+    def _back(self, robot: int) -> float:
+        """The least time of the way back of a robot."""
+        return self.pace.rest(self.spans[robot] + self.legs[robot])
+
     def _moving(self, operation: Operation) -> float:
         """The least time of an operation by the legs that end in it, and by the way back of a robot
-        that begins its gear with it."""
+        that begins its gear with it, unless it goes ahead."""
         pace, found = self.pace, [0.0]
         for slot, robot in enumerate(operation.robots):
             gear = self.factory.robots[robot].operations
-            if len(gear) > 1 and gear[0] == operation.index:
-                found.append(pace.rest(self.spans[robot] + self.legs[robot]))
+            ahead = pace.ahead is not None and operation.awaits_empty(slot)
+            if len(gear) > 1 and gear[0] == operation.index and not ahead:
+                found.append(self._back(robot))
             if len(gear) > 1 and gear[-1] == operation.index:
                 found.append(pace.rest(self.legs[robot]) + self._lowering(operation, slot))
         return max(*found, self._waiting(operation))

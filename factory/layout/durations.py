@@ -18,18 +18,20 @@ from factory.settings import Settings
 @dataclass(frozen=True, slots=True)
 class Pace:
     """Speed [m/s] and acceleration [m/s²] of the robots, radius eps of a goal ball [m], and the
-    time [s] lost between two operations."""
+    time [s] lost between two operations; `ahead`: that lost on the way of a robot that goes ahead
+    while it waits (`control/staging.py`), None where none does."""
 
     speed: float = 0.5
     acceleration: float = 2.0
     eps: float = 2e-4
     lost: float = 0.01
+    ahead: float | None = None
 
     @classmethod
     def of(cls, settings: Settings) -> Pace:
         """That of a run with these settings."""
-        lost = settings.tick + settings.settle
-        return cls(settings.speed, settings.acceleration, settings.eps, lost)
+        lost, ahead = settings.tick + settings.settle, settings.settle if settings.stage else None
+        return cls(settings.speed, settings.acceleration, settings.eps, lost, ahead)
 
     def rest(self, distance: float, start: float = 0.0) -> float:
         """The least time [s] to come to rest `distance` [m] ahead from the speed `start`."""
@@ -73,13 +75,26 @@ class Pace:
 
 
 def gear_times(layout: Layout, pace: Pace) -> list[float]:
-    """For each robot the summed delays [s] of its gear: the greatest is the cycle time."""
-    delays = operation_times(layout, pace)
-    return [sum(delays[n] for n in robot.operations) for robot in layout.factory.robots]
+    """For each robot the summed delays [s] of its gear: the greatest is the cycle time. Where a
+    robot goes ahead while it waits, it takes the longer of that and the operation."""
+    ways = _ways(layout)
+    delays, factory = _operation_times(layout, ways, pace), layout.factory
+
+    def taken(number: int, robot: int) -> float:
+        if not _goes_ahead(factory.operations[number], robot, pace):
+            return delays[number]
+        return max(delays[number], pace.rest(ways[number, robot]) + (pace.ahead or 0.0))
+
+    return [sum(taken(n, robot.index) for n in robot.operations) for robot in factory.robots]
 
 
 def operation_times(layout: Layout, pace: Pace) -> list[float]:
     """The delay [s] of each operation from rest, dwell included."""
+    return _operation_times(layout, _ways(layout), pace)
+
+
+def _ways(layout: Layout) -> dict[tuple[int, int], float]:
+    """How far a robot goes in an operation, by both [m]."""
     factory = layout.factory
     stops: dict[tuple[int, int], float] = {}
     ways: dict[tuple[int, int], float] = {}
@@ -90,7 +105,20 @@ def operation_times(layout: Layout, pace: Pace) -> list[float]:
         for step, number in enumerate(robot.operations):
             before = stops[robot.operations[step - 1], robot.index]
             ways[number, robot.index] = abs(stops[number, robot.index] - before)
-    return [_operation_time(layout, operation, ways, pace) for operation in factory.operations]
+    return ways
+
+
+def _goes_ahead(operation: Operation, robot: int, pace: Pace) -> bool:
+    """Whether a robot need not go its way within an operation."""
+    return pace.ahead is not None and operation.awaits_empty(operation.robots.index(robot))
+
+
+def _operation_times(layout: Layout, ways: dict[tuple[int, int], float], pace: Pace) -> list[float]:
+    operations = layout.factory.operations
+    within = {
+        (n, r): 0.0 if _goes_ahead(operations[n], r, pace) else way for (n, r), way in ways.items()
+    }
+    return [_operation_time(layout, operation, within, pace) for operation in operations]
 
 
 def _operation_time(

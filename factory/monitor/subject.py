@@ -12,7 +12,6 @@ from factory.factory import Factory, Operation
 from factory.layout.plan import Layout
 from factory.nets.history import firings
 from factory.nets.petri import Marking
-from factory.pag import NOPART
 from factory.settings import Settings
 from factory.wholes import Bodies, bodies_of
 
@@ -73,10 +72,9 @@ class Subject:
         return self.goals[operation.index][self.slots[operation.index, robot]]
 
     def goes_ahead(self, operation: Operation, robot: int) -> bool:
-        """Whether a robot may go to its goal in an operation before that starts: empty-handed, and
-        if there are others to wait for."""
-        brings = operation.before[self.slots[operation.index, robot]] != NOPART
-        return bool(self.settings.stage) and not brings and len(operation.robots) > 1
+        """Whether a robot may go to its goal in an operation before that starts."""
+        slot = self.slots[operation.index, robot]
+        return bool(self.settings.stage) and operation.awaits_empty(slot)
 
     def name(self, operation: Operation) -> str:
         """An operation for people: `mate(sub1)`."""
