@@ -135,7 +135,7 @@ class DistributedSupervisor:
             for position, number in enumerate(robot.operations)
         }
         self.bundles: dict[int, Bundle] = {}
-        self.alone: dict[int, Bundle] = {}
+        self.alone: dict[tuple[int, int], Bundle] = {}
         self.record = Record()
         self.busy = [0.0] * len(factory.robots)
         self.last_event = world.time
@@ -230,23 +230,27 @@ class DistributedSupervisor:
     def _go_ahead(self, process: Process, step: Step) -> None:
         """While it waits, a robot may go where it is needed next; it reads nobody's state for
         that."""
-        robot = process.program.robot
-        stage = self.stages.get((robot, step.operation.index))
+        key = process.program.robot, step.operation.index
+        stage = self.stages.get(key)
         if stage is None:
             return
         dt, own = process.period * self.timestep, slice(0, 1)
-        at, speed = process.reference[own].copy(), process.speed[own].copy()
+        axes, at, speed = (
+            process.axes[own],
+            process.reference[own].copy(),
+            process.speed[own].copy(),
+        )
         if abs(at[0] - stage.goal) < ROUNDING and abs(speed[0]) < ROUNDING:
             if process.goes_ahead:
                 self._stop(process)
                 process.goes_ahead = False
             return
         process.goes_ahead = True
-        if robot not in self.alone or self.alone[robot].modes[0] is not stage.mode:
-            self.alone[robot] = Bundle.of([stage.mode], [self.limits.of((robot,))])
-        wanted = self.alone[robot].field(at + speed * dt / 2, dt)
-        x1, v1, a = govern(at, speed, wanted, self.limits.acceleration[process.axes[own]], dt)
-        self.world.move(process.axes[own], at, speed, a)
+        if key not in self.alone:
+            self.alone[key] = Bundle.of([stage.mode], [self.limits.of(axes.tolist())])
+        wanted = self.alone[key].field(at + speed * dt / 2, dt)
+        x1, v1, a = govern(at, speed, wanted, self.limits.acceleration[axes], dt)
+        self.world.move(axes, at, speed, a)
         process.reference[own], process.speed[own] = x1, v1
 
     def _stop(self, process: Process) -> None:

@@ -48,16 +48,17 @@ def ways_ahead(
     if not settings.stage:
         return {}
     return {
-        (stage.robot, stage.operation): way_time(stage, stage.start, limits, settings, world)
+        (stage.robot, stage.operation): way_time(
+            stage, stage.start, limits.of((stage.robot,)), settings, world
+        )
         for stage in stages(layout, modes)
     }
 
 
 def way_time(stage: Stage, start: float, limits: Limits, settings: Settings, world: World) -> float:
-    """How long a robot goes ahead from `start` [m], and settles [s]."""
-    own = limits.of((stage.robot,))
+    """How long a robot with these limits goes ahead from `start` [m], and settles [s]."""
     settle = settings.settle if world == "mujoco" else 0.0
-    return mode_time(stage.mode, np.array([start]), own, world) + settle
+    return mode_time(stage.mode, np.array([start]), limits, world) + settle
 
 
 def predict(

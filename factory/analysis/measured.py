@@ -80,7 +80,7 @@ def compare(timing: Timing, net: TimedNet, found: Flow, record: Record) -> Compa
         begun = times.get(names[operation.start], [])
         ended = times.get(names[operation.end], [])
         spent = [end - start for start, end in zip(begun, ended, strict=False)]
-        told = each[1:] if min(len(spent), len(each)) > 1 else each
+        told = each[1:] if min(len(spent), len(each)) > 1 else each[:1]
         predicted = float(told[:, operation.index].mean())
         durations.append(_duration(operation.label, predicted, spent))
         for robot in operation.robots:

@@ -104,13 +104,17 @@ class Timing:
 
     def _way(self, stage: Stage, start: float, change: Change) -> float:
         start = stage.goal + (start - stage.goal) * change.way.get(stage.robot, 1.0)
-        limits = self.limits
-        if stage.robot in change.speed or stage.robot in change.acceleration:
-            speed, gain = limits.speed.copy(), limits.acceleration.copy()
-            speed[stage.robot] *= change.speed.get(stage.robot, 1.0)
-            gain[stage.robot] *= change.acceleration.get(stage.robot, 1.0)
-            limits = Limits(speed, gain)
-        return way_time(stage, start, limits, self.settings, self.world)
+        own = (stage.robot,)
+        return way_time(stage, start, self._limits(own, own, change), self.settings, self.world)
+
+    def _limits(self, axes: Sequence[int], robots: Sequence[int], change: Change) -> Limits:
+        """The limits of axes, which are those of robots, with a change."""
+        limits = self.limits.of(axes)
+        if (change.speed.keys() | change.acceleration.keys()).isdisjoint(robots):
+            return limits
+        speed = [change.speed.get(robot, 1.0) for robot in robots]
+        gain = [change.acceleration.get(robot, 1.0) for robot in robots]
+        return Limits(limits.speed * speed, limits.acceleration * gain)
 
     @cached_property
     def rest(self) -> float:
@@ -191,11 +195,7 @@ class Timing:
 
     def _delay(self, number: int, start: Array, change: Change) -> float:
         mode, robots = self.modes[number], self._of(number)
-        limits = self.limits.of(self.factory.axes[number])
-        if not (change.speed.keys() | change.acceleration.keys()).isdisjoint(robots):
-            speed = [change.speed.get(robot, 1.0) for robot in robots]
-            gain = [change.acceleration.get(robot, 1.0) for robot in robots]
-            limits = Limits(limits.speed * speed, limits.acceleration * gain)
+        limits = self._limits(self.factory.axes[number], robots, change)
         if not change.way.keys().isdisjoint(robots):
             carriages = len(self.factory.operations[number].robots)
             shares = [change.way.get(robot, 1.0) for robot in robots[:carriages]]
