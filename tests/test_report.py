@@ -125,6 +125,20 @@ def test_every_view_has_every_robot_label_transition_and_place(made: Page, recor
     assert {t["label"] for t in things if t.get("copy")} == parts
 
 
+def test_what_is_only_shown_is_drawn_and_linked_too(made: Page, recording) -> None:
+    """Fingers on the floor plan and in 3-D with their robots; caps of feeders with their parts."""
+    robots, leaves = recording.factory.robots, recording.factory.leaves
+    styles = [a.get("class") for tag, a in made.tags if tag == "polygon"]
+    assert styles.count("arm") == 2 * len(robots)
+    assert styles.count("boom") == 2 * len(leaves) and styles.count("post") == len(leaves)
+    things = made.data["scene"]["things"]
+    seen = [t["robot"] for t in things if "robot" in t]
+    assert all(seen.count(robot.index) >= 3 for robot in robots)  # rail, carriage, shell
+    labels = labels_of(recording.factory)
+    still = [t["label"] for t in things if t["body"] == 0 and "label" in t]
+    assert sorted(still) == sorted(labels[leaf.label] for leaf in leaves)
+
+
 def test_what_is_linked_is_linked_both_ways(recording) -> None:
     found = links(recording.factory)
     for number, link in enumerate(found["robot"]):

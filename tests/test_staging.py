@@ -167,6 +167,19 @@ def test_the_bound_is_one_for_staged_robots(paper: Layout) -> None:
         assert cycle - 0.02 < bound <= cycle
 
 
+def test_ways_in_the_timed_net(paper: Layout) -> None:
+    """As many robots are on a way as wait beside it, and no operation ends before they have come
+    that set out at the beginning."""
+    timing = Timing(paper, STAGED)
+    net = timed_net(timing, Change(copies={2: 3}))
+    assert {key[0]: net.net.tokens[place] for key, place in net.ways.items()} == {0: 1, 2: 3}
+    assert set(net.ready) == set(net.ways.values())
+    late = replace(net, ready=dict.fromkeys(net.ready, 50.0))
+    for _, number in net.ways:
+        end = timing.factory.operations[number].end
+        assert net.firings(1).dates[0, end] < 50.0 <= late.firings(1).dates[0, end]
+
+
 @given(seeds, shapes)
 @settings(max_examples=15)
 def test_changes_of_a_robot_change_its_ways(seed: int, shape: str) -> None:
