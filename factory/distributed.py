@@ -220,12 +220,8 @@ class DistributedSupervisor:
         dt = process.period * self.timestep
         x = self.link.read(operation, me)[0].copy()
         slots, mine = np.nonzero(np.equal.outer(self.factory.axes[operation.index], process.axes))
-        axes, at, speed = process.axes[mine], process.reference[mine], process.speed[mine]
-        x[slots] = at + speed * dt / 2
-        wanted = self._bundle(operation).field(x, dt)[slots]
-        x1, v1, a = govern(at, speed, wanted, self.limits.acceleration[axes], dt)
-        self.world.move(axes, at, speed, a)
-        process.reference[mine], process.speed[mine] = x1, v1
+        x[slots] = process.reference[mine] + process.speed[mine] * dt / 2
+        self._drive(process, mine, self._bundle(operation).field(x, dt)[slots])
 
     def _go_ahead(self, process: Process, step: Step) -> None:
         """While it waits, a robot may go where it is needed next; it reads nobody's state for
@@ -234,12 +230,8 @@ class DistributedSupervisor:
         stage = self.stages.get(key)
         if stage is None:
             return
-        dt, own = process.period * self.timestep, slice(0, 1)
-        axes, at, speed = (
-            process.axes[own],
-            process.reference[own].copy(),
-            process.speed[own].copy(),
-        )
+        dt, mine = process.period * self.timestep, np.zeros(1, np.intp)
+        at, speed = process.reference[mine], process.speed[mine]
         if abs(at[0] - stage.goal) < ROUNDING and abs(speed[0]) < ROUNDING:
             if process.goes_ahead:
                 self._stop(process)
@@ -247,11 +239,16 @@ class DistributedSupervisor:
             return
         process.goes_ahead = True
         if key not in self.alone:
-            self.alone[key] = Bundle.of([stage.mode], [self.limits.of(axes.tolist())])
-        wanted = self.alone[key].field(at + speed * dt / 2, dt)
+            self.alone[key] = Bundle.of([stage.mode], [self.limits.of((stage.robot,))])
+        self._drive(process, mine, self.alone[key].field(at + speed * dt / 2, dt))
+
+    def _drive(self, process: Process, mine: Index, wanted: Array) -> None:
+        """One tick of a robot's own axes towards the `wanted` speeds [m/s]."""
+        axes, at, speed = process.axes[mine], process.reference[mine], process.speed[mine]
+        dt = process.period * self.timestep
         x1, v1, a = govern(at, speed, wanted, self.limits.acceleration[axes], dt)
         self.world.move(axes, at, speed, a)
-        process.reference[own], process.speed[own] = x1, v1
+        process.reference[mine], process.speed[mine] = x1, v1
 
     def _stop(self, process: Process) -> None:
         """Stand where the reference is."""

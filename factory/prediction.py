@@ -15,7 +15,7 @@ import numpy as np
 from factory.control.mode import Limits, Mode
 from factory.control.plan import operation_starts
 from factory.control.profile import World, mode_time, trapezoid_time
-from factory.control.staging import Stage, staged, stages
+from factory.control.staging import Stage, staged
 from factory.layout.plan import Layout
 from factory.nets.pool import with_wip
 from factory.nets.timing import CycleTime, cycle_time, marked_graph_cycle_time
@@ -24,15 +24,19 @@ from factory.settings import Settings
 
 
 def operation_delays(
-    layout: Layout, modes: Sequence[Mode], limits: Limits, settings: Settings, world: World
+    layout: Layout,
+    modes: Sequence[Mode],
+    limits: Limits,
+    settings: Settings,
+    world: World,
+    ahead: Sequence[Stage] = (),
 ) -> list[float]:
-    """The time [s] from X_s to X_e of every operation, and the tick until what follows can fire."""
+    """The time [s] from X_s to X_e of every operation, and the tick until what follows can fire.
+    `ahead`: the ways that robots go while they wait."""
     factory = layout.factory
     settle = settings.settle if world == "mujoco" else 0.0
     delays = []
-    starts = operation_starts(layout)
-    if settings.stage:
-        starts = staged(starts, stages(layout, modes))
+    starts = staged(operation_starts(layout), ahead)
     for operation, mode, start in zip(factory.operations, modes, starts, strict=True):
         time = mode_time(mode, start, limits.of(factory.axes[operation.index]), world)
         delays.append(time + settle + settings.tick)
@@ -40,18 +44,16 @@ def operation_delays(
 
 
 def ways_ahead(
-    layout: Layout, modes: Sequence[Mode], limits: Limits, settings: Settings, world: World
+    ahead: Sequence[Stage], limits: Limits, settings: Settings, world: World
 ) -> dict[tuple[int, int], float]:
     """The time [s] from the end of a robot's operation until it is where it has gone ahead to, by
     the robot and the operation to come. It sets out at once, and stands where it is when all others
     do."""
-    if not settings.stage:
-        return {}
     return {
         (stage.robot, stage.operation): way_time(
             stage, stage.start, limits.of((stage.robot,)), settings, world
         )
-        for stage in stages(layout, modes)
+        for stage in ahead
     }
 
 

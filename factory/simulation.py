@@ -11,7 +11,7 @@ import numpy as np
 
 from factory.control.mode import Mode
 from factory.control.plan import operation_modes, robot_limits
-from factory.control.staging import Stage, stages
+from factory.control.staging import stages_of
 from factory.distributed import DistributedSupervisor
 from factory.errors import Diagnostic, InputError, RunError
 from factory.layout.plan import Layout
@@ -83,8 +83,11 @@ class Simulation:
         factory = layout.factory
         self.modes = compiled.modes if compiled else operation_modes(layout, self.settings.eps)
         self.limits, gains = robot_limits(layout, self.settings, seed, jitter)
-        told = layout, self.modes, self.limits, self.settings, world
-        self.delays, self.ways = operation_delays(*told), ways_ahead(*told)
+        self.stages = stages_of(layout, self.modes, self.settings)
+        self.delays = operation_delays(
+            layout, self.modes, self.limits, self.settings, world, self.stages
+        )
+        self.ways = ways_ahead(self.stages, self.limits, self.settings, world)
         self.start = factory.net.initial_marking if start is None else start
         self.counts = firings(factory.net, self.start)
         positions = start_positions(layout, self.start)
@@ -120,12 +123,8 @@ class Simulation:
             self.settings.tick,
             self.start,
             self.counts,
-            self._stages(),
+            self.stages,
         )
-
-    def _stages(self) -> tuple[Stage, ...]:
-        """What robots do while they wait."""
-        return stages(self.layout, self.modes) if self.settings.stage else ()
 
     def _distributed(self) -> DistributedSupervisor:
         settings, factory = self.settings, self.layout.factory
@@ -140,7 +139,7 @@ class Simulation:
             settings.timestep,
             settings.substeps,
             self.seed,
-            self._stages(),
+            self.stages,
         )
 
     def under_way(self) -> dict[str, int]:

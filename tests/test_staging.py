@@ -109,7 +109,8 @@ def test_the_slowest_gear_sets_the_pace(
     assert net.pace == pytest.approx(max_cycle_ratio(net.net, net.seconds).seconds)
     assert net.pace <= timed_net(Timing(layout, STILL, world, seed, 0.3), wip=wip).pace + 1e-9
     told = layout, timing.modes, timing.limits, STAGED, world
-    delays, ways = operation_delays(*told), ways_ahead(*told)
+    delays = operation_delays(*told, timing.stages)
+    ways = ways_ahead(timing.stages, timing.limits, STAGED, world)
     assert predict(layout, delays, STAGED, world, wip, ways).seconds == pytest.approx(net.pace)
     shares = flow(timing, net, 6).shares
     for robot, share in zip(layout.factory.robots, shares, strict=True):
@@ -145,7 +146,9 @@ def test_the_layout_is_made_for_that_pace(size: int, seed: int, shape: str, styl
     still, staged = Pace.of(STILL), Pace.of(STAGED)
     modes, (limits, _) = operation_modes(layout, STAGED.eps), robot_limits(layout, STAGED)
     told = layout, modes, limits, STAGED, "mujoco"
-    delays, ways = operation_delays(*told), ways_ahead(*told)
+    ahead = stages(layout, modes)
+    delays = operation_delays(*told, ahead)
+    ways = ways_ahead(ahead, limits, STAGED, "mujoco")
     assert operation_times(layout, staged) == pytest.approx(delays, abs=1e-6)
     cycle = max(gear_times(layout, staged))
     assert cycle == pytest.approx(cycle_time(layout.factory, delays, ways).seconds, abs=1e-6)
@@ -343,7 +346,9 @@ def loaded_too(layout: Layout, modes: Any) -> Any:
 def test_the_monitor_blames_who_goes_ahead_with_a_part(
     paper: Layout, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(simulations, "stages", loaded_too)
+    monkeypatch.setattr(
+        simulations, "stages_of", lambda layout, modes, settings: loaded_too(layout, modes)
+    )
     made = Simulation(paper, "mujoco", 3, settings=STAGED)
     watcher = beside(made)
     made.run([watcher.observe], max_time=20.0)
@@ -354,7 +359,9 @@ def test_the_monitor_blames_who_goes_ahead_though_it_should_wait(
     paper: Layout, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The monitor goes by the settings of the run, not by what its supervisor does."""
-    monkeypatch.setattr(Simulation, "_stages", lambda self: stages(self.layout, self.modes))
+    monkeypatch.setattr(
+        simulations, "stages_of", lambda layout, modes, settings: stages(layout, modes)
+    )
     made = Simulation(paper, "mujoco", 3, settings=STILL)
     watcher = beside(made)
     made.run([watcher.observe])

@@ -7,8 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from factory.analysis.flow import Flow, busy_until
-from factory.analysis.flow import durations as durations_of
+from factory.analysis.flow import Flow, busy_until, durations, lasting
 from factory.analysis.timed import TimedNet
 from factory.analysis.timing import Timing
 from factory.trace import Event
@@ -74,15 +73,14 @@ def compare(timing: Timing, net: TimedNet, found: Flow, record: Record) -> Compa
     for event in record.events:
         times.setdefault(event.transition, []).append(event.t)
     names = [transition.name for transition in factory.net.threaded.transitions]
-    each = durations_of(timing, found)
-    durations, busy = [], [0.0] * len(factory.robots)
+    first, usual = durations(timing, found)[0], lasting(timing, found)
+    compared, busy = [], [0.0] * len(factory.robots)
     for operation in factory.operations:
         begun = times.get(names[operation.start], [])
         ended = times.get(names[operation.end], [])
         spent = [end - start for start, end in zip(begun, ended, strict=False)]
-        told = each[1:] if min(len(spent), len(each)) > 1 else each[:1]
-        predicted = float(told[:, operation.index].mean())
-        durations.append(_duration(operation.label, predicted, spent))
+        predicted = float((usual if len(spent) > 1 else first)[operation.index])
+        compared.append(_duration(operation.label, predicted, spent))
         for robot in operation.robots:
             busy[robot] += sum(spent)
     left = record.dropoffs
@@ -94,7 +92,7 @@ def compare(timing: Timing, net: TimedNet, found: Flow, record: Record) -> Compa
         Pair(net.pace, _interval(left)),
         Pair(found.first, left[0] if left else None),
         Pair(found.last, last),
-        tuple(durations),
+        tuple(compared),
         tuple(Pair(p, b / last if last else None) for p, b in zip(shares, busy, strict=True)),
     )
 

@@ -12,7 +12,7 @@ import numpy as np
 from factory.control.mode import Array, Limits, Mode
 from factory.control.plan import operation_modes, operation_starts, robot_limits
 from factory.control.profile import World, ideal_time, mode_time, trapezoid_time
-from factory.control.staging import Stage, staged, stages
+from factory.control.staging import Stage, staged, stages_of
 from factory.factory import Factory
 from factory.layout.plan import Layout
 from factory.prediction import way_time
@@ -70,7 +70,7 @@ class Timing:
     @cached_property
     def stages(self) -> tuple[Stage, ...]:
         """The ways that robots go ahead of operations while they wait, if they are to."""
-        return stages(self.layout, self.modes) if self.settings.stage else ()
+        return stages_of(self.layout, self.modes, self.settings)
 
     @cached_property
     def left(self) -> list[Array]:
@@ -148,20 +148,15 @@ class Timing:
         """The delays of operations that take another time when first done [s]: the robots stand at
         their B ends then."""
         positions = start_positions(self.layout, self.factory.net.initial_marking)
-        found = {}
-        for operation in self.factory.operations:
-            begins = [
-                self.factory.robots[r].operations[0] == operation.index
-                for r in self._of(operation.index)
-            ]
-            if any(begins):
-                here = positions[list(self.factory.axes[operation.index])]
-                start = np.where(begins, here, self.left[operation.index])
-                for stage in self.stages:
-                    if stage.operation == operation.index:
-                        start[stage.slot] = stage.goal
-                found[operation.index] = self._delay(operation.index, start, AS_IT_IS)
-        return MappingProxyType(found)
+        begins = [
+            [self.factory.robots[r].operations[0] == o.index for r in self._of(o.index)]
+            for o in self.factory.operations
+        ]
+        here = (positions[list(axes)] for axes in self.factory.axes)
+        starts = staged([*map(np.where, begins, here, self.left)], self.stages)
+        return MappingProxyType(
+            {n: self._delay(n, start, AS_IT_IS) for n, start in enumerate(starts) if any(begins[n])}
+        )
 
     def travel(self, number: int, slot: int) -> float:
         """How long one robot moves in an operation, if it need not wait on its way [s]."""

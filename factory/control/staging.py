@@ -17,6 +17,7 @@ import numpy as np
 from factory.control.mode import ROUNDING, Array, Mode
 from factory.control.plan import operation_starts
 from factory.layout.plan import Layout
+from factory.settings import Settings
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,6 +54,11 @@ def stages(layout: Layout, modes: Sequence[Mode]) -> tuple[Stage, ...]:
                 alone = Mode(mode.goals[own], mode.lower[own], mode.upper[own], mode.eps)
                 found.append(Stage(robot, operation.index, slot, alone, float(start[slot])))
     return tuple(found)
+
+
+def stages_of(layout: Layout, modes: Sequence[Mode], settings: Settings) -> tuple[Stage, ...]:
+    """Those, where the settings ask for them."""
+    return stages(layout, modes) if settings.stage else ()
 
 
 def staged(starts: Sequence[Array], ahead: Sequence[Stage]) -> list[Array]:

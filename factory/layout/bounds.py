@@ -128,8 +128,8 @@ class _Bound:
         pace, found = self.pace, [0.0]
         for slot, robot in enumerate(operation.robots):
             gear = self.factory.robots[robot].operations
-            ahead = pace.ahead is not None and operation.awaits_empty(slot)
-            if len(gear) > 1 and gear[0] == operation.index and not ahead:
+            begins = len(gear) > 1 and gear[0] == operation.index
+            if begins and not pace.goes_ahead(operation, slot):
                 found.append(self._back(robot))
             if len(gear) > 1 and gear[-1] == operation.index:
                 found.append(pace.rest(self.legs[robot]) + self._lowering(operation, slot))

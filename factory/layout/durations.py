@@ -33,6 +33,10 @@ class Pace:
         lost, ahead = settings.tick + settings.settle, settings.settle if settings.stage else None
         return cls(settings.speed, settings.acceleration, settings.eps, lost, ahead)
 
+    def goes_ahead(self, operation: Operation, slot: int) -> bool:
+        """Whether the robot in a slot need not go its way within an operation."""
+        return self.ahead is not None and operation.awaits_empty(slot)
+
     def rest(self, distance: float, start: float = 0.0) -> float:
         """The least time [s] to come to rest `distance` [m] ahead from the speed `start`."""
         v, a = self.speed, self.acceleration
@@ -77,20 +81,22 @@ class Pace:
 def gear_times(layout: Layout, pace: Pace) -> list[float]:
     """For each robot the summed delays [s] of its gear: the greatest is the cycle time. Where a
     robot goes ahead while it waits, it takes the longer of that and the operation."""
-    ways = _ways(layout)
-    delays, factory = _operation_times(layout, ways, pace), layout.factory
+    ways, operations = _ways(layout), layout.factory.operations
+    delays = [_operation_time(layout, operation, ways, pace) for operation in operations]
 
     def taken(number: int, robot: int) -> float:
-        if not _goes_ahead(factory.operations[number], robot, pace):
+        operation = operations[number]
+        if pace.ahead is None or not operation.awaits_empty(operation.robots.index(robot)):
             return delays[number]
-        return max(delays[number], pace.rest(ways[number, robot]) + (pace.ahead or 0.0))
+        return max(delays[number], pace.rest(ways[number, robot]) + pace.ahead)
 
-    return [sum(taken(n, robot.index) for n in robot.operations) for robot in factory.robots]
+    return [sum(taken(n, robot.index) for n in robot.operations) for robot in layout.factory.robots]
 
 
 def operation_times(layout: Layout, pace: Pace) -> list[float]:
     """The delay [s] of each operation from rest, dwell included."""
-    return _operation_times(layout, _ways(layout), pace)
+    ways = _ways(layout)
+    return [_operation_time(layout, o, ways, pace) for o in layout.factory.operations]
 
 
 def _ways(layout: Layout) -> dict[tuple[int, int], float]:
@@ -108,24 +114,14 @@ def _ways(layout: Layout) -> dict[tuple[int, int], float]:
     return ways
 
 
-def _goes_ahead(operation: Operation, robot: int, pace: Pace) -> bool:
-    """Whether a robot need not go its way within an operation."""
-    return pace.ahead is not None and operation.awaits_empty(operation.robots.index(robot))
-
-
-def _operation_times(layout: Layout, ways: dict[tuple[int, int], float], pace: Pace) -> list[float]:
-    operations = layout.factory.operations
-    within = {
-        (n, r): 0.0 if _goes_ahead(operations[n], r, pace) else way for (n, r), way in ways.items()
-    }
-    return [_operation_time(layout, operation, within, pace) for operation in operations]
-
-
 def _operation_time(
     layout: Layout, operation: Operation, ways: dict[tuple[int, int], float], pace: Pace
 ) -> float:
     carrier = operation.template.carrier - 1
-    rested = [pace.rest(ways[operation.index, robot]) for robot in operation.robots]
+    rested = [
+        0.0 if pace.goes_ahead(operation, slot) else pace.rest(ways[operation.index, robot])
+        for slot, robot in enumerate(operation.robots)
+    ]
     lowered = operation.lowered
     gate = carrier
     if operation.before[carrier] == NOPART:

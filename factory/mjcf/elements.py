@@ -42,6 +42,12 @@ def add(parent: Element, tag: str, **attributes: object) -> Element:
     return child
 
 
+def add_shown(parent: Element, name: str, shape: str, **attributes: object) -> Element:
+    """A geom that is only shown. Of a body that collides the engine boxes every geom
+    in every step, so what is only shown of one that stands still is not in it."""
+    return add(parent, "geom", name=name, class_="shown", type=shape, **attributes)
+
+
 def _text(value: object) -> str:
     if isinstance(value, bool):
         return "true" if value else "false"

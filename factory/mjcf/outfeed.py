@@ -11,7 +11,7 @@ from xml.etree.ElementTree import Element
 from factory.layout.dimensions import BELT_GAP, FINGER_TOP, PAYLOAD, TRAY
 from factory.layout.plan import Layout
 from factory.mjcf import names
-from factory.mjcf.elements import add
+from factory.mjcf.elements import add, add_shown
 from factory.mjcf.robots import Drive
 
 TRAY_MASS = 4.0
@@ -70,53 +70,43 @@ def add_outfeed(world: Element, layout: Layout) -> None:
     length = layout.product_length + 0.1
     shed, wall = half[0] - length / 2, top + tall / 2 + 0.005
     for side in (-1, 1):
-        add(
+        add_shown(
             world,
-            "geom",
-            name=f"outfeed/side{side}",
-            class_="shown",
-            type="box",
+            f"outfeed/side{side}",
+            "box",
             pos=(x, y + side * (half[1] + 0.006), top - 0.008),
             size=(half[0], 0.0055, 0.012),
             material="frame",
         )
         for end in (-1, 1):
-            add(
+            add_shown(
                 world,
-                "geom",
-                name=f"outfeed/leg{side}{end}",
-                class_="shown",
-                type="box",
+                f"outfeed/leg{side}{end}",
+                "box",
                 pos=(x + end * (half[0] - 0.03), y + side * (half[1] - 0.008), (top - thick) / 2),
                 size=(0.006, 0.006, (top - thick) / 2),
                 material="frame",
             )
-        add(
+        add_shown(
             world,
-            "geom",
-            name=f"outfeed/wall{side}",
-            class_="shown",
-            type="box",
+            f"outfeed/wall{side}",
+            "box",
             pos=(x + shed, y + side * (half[1] + 0.0165), wall),
             size=(length / 2, 0.004, tall / 2 + 0.025),
             rgba=SHED,
         )
-    add(
+    add_shown(
         world,
-        "geom",
-        name="outfeed/roof",
-        class_="shown",
-        type="box",
+        "outfeed/roof",
+        "box",
         pos=(x + shed + 0.002, y, top + tall + 0.0335),
         size=(length / 2 + 0.008, half[1] + 0.024, 0.004),
         rgba=SHED,
     )
-    add(
+    add_shown(
         world,
-        "geom",
-        name="outfeed/back",
-        class_="shown",
-        type="box",
+        "outfeed/back",
+        "box",
         pos=(x + half[0] + 0.0045, y, wall),
         size=(0.004, half[1] + 0.0205, tall / 2 + 0.025),
         rgba=SHED,

@@ -14,7 +14,7 @@ from factory.layout.dimensions import (
 )
 from factory.layout.embedding import project
 from factory.layout.plan import Layout
-from factory.mjcf.elements import add, numbers
+from factory.mjcf.elements import add, add_shown, numbers
 from factory.mjcf.names import COMPASS, feeder
 from factory.mjcf.outfeed import add_outfeed
 from factory.mjcf.parts import middle_at
@@ -95,12 +95,10 @@ def add_scene(world: Element, layout: Layout) -> None:
         a, b = path.carriage(path.reach), path.carriage(path.length)
         middle = ((a[0] + b[0]) / 2, (a[1] + b[1]) / 2, 0.004)
         half = path.travel / 2 + CARRIAGE / 2
-        add(
+        add_shown(
             world,
-            "geom",
-            name=f"{robot.name}/rail",
-            class_="shown",
-            type="box",
+            f"{robot.name}/rail",
+            "box",
             pos=middle,
             quat=heading_quaternion(path),
             size=(half, 0.010, 0.004),
@@ -167,12 +165,10 @@ def _compass(world: Element, layout: Layout) -> None:
     east, north = (FAR, 0.0) if xhi - xlo >= yhi - ylo else (0.0, FAR)
     body = add(world, "body", name=COMPASS, pos=(x, y, 0.0))
     for side in (-1, 1):
-        add(
+        add_shown(
             body,
-            "geom",
-            name=f"{COMPASS}/{side}",
-            class_="shown",
-            type="sphere",
+            f"{COMPASS}/{side}",
+            "sphere",
             pos=(side * east, side * north, 0.0),
             size=0.001,
             rgba="0 0 0 0",
@@ -272,18 +268,14 @@ def _feeder(world: Element, layout: Layout, label: str) -> None:
         size=((ahead - back) / 2, 0.008, beam / 2),
         material="post",
     )
-    # The engine boxes all geoms of a body that collides, those that are only shown too: these are
-    # the world's.
     for name, along, z, shape, size in (
         ("cap", back, top + beam, "box", (POST / 2 + 0.001, POST / 2 + 0.001, 0.002)),
         ("head", ahead, top + beam / 2, "cylinder", (0.012, beam / 2 + 0.002)),
     ):
-        add(
+        add_shown(
             world,
-            "geom",
-            name=f"{feeder(label)}/{name}",
-            class_="shown",
-            type=shape,
+            f"{feeder(label)}/{name}",
+            shape,
             pos=(x + along * u[0] - across * u[1], y + along * u[1] + across * u[0], z),
             quat=heading_quaternion(path),
             size=size,

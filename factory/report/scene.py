@@ -99,7 +99,7 @@ def scene(stage: Stage, labels: dict[str, int], pack: Pack) -> dict[str, Any]:
     shapes: dict[bytes, int] = {}
     alphas: list[float] = []
     things = []
-    for body, geoms in _groups(m, robots):
+    for body, geoms in _groups(m):
         made = look(m, geoms)
         vertices, faces = made.vertices.astype(np.float32), made.faces.astype(np.uint32)
         parts: tuple[NDArray[Any], ...] = vertices, faces, made.colours
@@ -114,7 +114,7 @@ def scene(stage: Stage, labels: dict[str, int], pack: Pack) -> dict[str, Any]:
     return {"alphas": alphas, "things": things, "places": _places(stage, labels)}
 
 
-def _groups(m: mujoco.MjModel, robots: dict[str, int]) -> Iterator[tuple[int, list[int]]]:
+def _groups(m: mujoco.MjModel) -> Iterator[tuple[int, list[int]]]:
     """The geoms that make one thing: those of a body; of the world those of a robot or a feeder."""
     owned: dict[str, list[int]] = {}
     for geom in drawn(m, 0):

@@ -12,7 +12,8 @@ from itertools import product
 from math import ceil, isfinite, prod
 
 from factory.errors import Diagnostic, InputError, did_you_mean
-from factory.settings import Settings
+from factory.settings import RANGES, Settings
+from factory.settings import WHOLE as WHOLE_SETTINGS
 
 Value = float | int | str | None
 
@@ -25,8 +26,7 @@ WHOLE: Mapping[str, tuple[int, int]] = {
     "seed": (0, 2**63 - 1),
     "units": (1, 10**9),
     "wip": (1, 10**9),
-    "substeps": (1, 100),
-    "stage": (0, 1),
+    **{name: (int(RANGES[name][0]), int(RANGES[name][1])) for name in WHOLE_SETTINGS},
 }
 """Keys whose values are whole numbers, with the least and the greatest."""
 
