@@ -43,29 +43,28 @@ class World(Protocol):
     ) -> None:
         """Operations that start or end now, each with the number of the unit it works on."""
 
-    def step(self, bundle: Bundle | None, axes: Index) -> None:
-        """One tick: the axes of the active modes follow their field, all others stand."""
+    def step(self, bundle: Bundle | None, axes: Index) -> bool:
+        """One tick: the axes of the active modes follow their field, all others stand. Whether any
+        mode may have come to its goal."""
 
     def delivered(self) -> int:
         """Products that have left the factory."""
 
 
-AHEAD = 0.005
-"""How far ahead of its reference a robot may be [m], before its goal is looked at too late."""
+KEPT = 500
+"""So many bundles are kept."""
 
 
 @dataclass(slots=True)
 class _Active:
     """The modes under way: of operations, then of robots that go ahead to the next one while they
-    wait, both by number; their bundle, the axes of each slot, the clocks, and the time [s] before
-    which none of them can end."""
+    wait, both by number; their bundle, the axes of each slot, and the clocks."""
 
     operations: tuple[int, ...]
     ahead: tuple[int, ...]
     bundle: Bundle | None
     axes: Index
     clocks: Array
-    earliest: float = 0.0
 
 
 class Supervisor:
@@ -93,6 +92,7 @@ class Supervisor:
         self.axes_of = [*factory.axes, *((stage.robot,) for stage in stages)]
         self.axes = np.array([axis for axes in self.axes_of for axis in axes], np.intp)
         self.active = _Active((), (), None, np.empty(0, np.intp), np.empty(0))
+        self.near = True
         self.limit(limits)
         marking = factory.net.initial_marking if start is None else start
         self.threads = dict(factory.net.marking_of(marking).threads)
@@ -133,6 +133,7 @@ class Supervisor:
         """From now on axes have these limits."""
         self.limits = limits
         self.all = Bundle.of(self.modes, [limits.of(axes) for axes in self.axes_of])
+        self.bundles: dict[tuple[int, ...], tuple[Bundle, Index]] = {}
         self._activate(self.active.operations, self.active.ahead)
 
     def step(self) -> None:
@@ -148,7 +149,7 @@ class Supervisor:
                 [o for o in self.active.operations if o not in ended] + started,
                 self._going_ahead(started, ended, over),
             )
-        self.world.step(self.active.bundle, self.active.axes)
+        self.near = self.world.step(self.active.bundle, self.active.axes)
 
     def marking(self) -> tuple[str, ...]:
         """The names of the marked places."""
@@ -162,6 +163,8 @@ class Supervisor:
     def _startable(self) -> list[int]:
         """Operations X with X_s enabled: waits marked (their goals are everything), the robots in
         the domain of X's mode, and the world prepared."""
+        if not self.ready:
+            return []
         possible = [
             operation
             for operation in self.awaited()
@@ -169,7 +172,7 @@ class Supervisor:
         ]
         if not possible:
             return []
-        bundle, axes = self._bundle([operation.index for operation in possible])
+        bundle, axes = self._bundle(tuple(operation.index for operation in possible))
         inside = bundle.in_domain(self.world.sense()[0][axes])
         return [o.index for o, within in zip(possible, inside, strict=True) if within]
 
@@ -177,7 +180,7 @@ class Supervisor:
         """Operations X with X_e enabled: robots in the goal ball, at rest, and the clock run out;
         and robots that have come to where they went ahead."""
         active = self.active
-        if active.bundle is None or self.world.time < active.earliest:
+        if active.bundle is None or not self.near:
             return []
         x, v = self.world.sense()
         x, v = x[active.axes], v[active.axes]
@@ -264,15 +267,15 @@ class Supervisor:
         clocks = dict(zip((*active.operations, *active.ahead), active.clocks, strict=True))
         bundle, axes = self._bundle(numbers)
         kept = np.array([clocks.get(o, 0.0) for o in numbers])
-        if not numbers:
-            self.active = _Active((), (), None, axes, kept)
-            return
-        soonest = bundle.soonest(self.world.sense()[0][axes], AHEAD)
-        earliest = self.world.time + soonest
-        self.active = _Active(operations, ahead, bundle, axes, kept, earliest)
+        self.active = _Active(operations, ahead, bundle if numbers else None, axes, kept)
 
-    def _bundle(self, numbers: Sequence[int]) -> tuple[Bundle, Index]:
-        """The modes of some operations, and their axes."""
-        chosen = np.array(numbers, np.intp)
-        robots = ranges(self.all.starts[chosen], self.all.sizes[chosen])
-        return self.all.select(numbers), self.axes[robots]
+    def _bundle(self, numbers: tuple[int, ...]) -> tuple[Bundle, Index]:
+        """The modes of some operations, and their axes. In steady production the same come together
+        again and again."""
+        if numbers not in self.bundles:
+            if len(self.bundles) == KEPT:
+                self.bundles.clear()
+            chosen = np.array(numbers, np.intp)
+            robots = ranges(self.all.starts[chosen], self.all.sizes[chosen])
+            self.bundles[numbers] = self.all.select(numbers), self.axes[robots]
+        return self.bundles[numbers]

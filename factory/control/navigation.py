@@ -185,11 +185,10 @@ class Bundle:
         """How far (modes,) [m] each mode's farthest robot is from its goal."""
         return np.maximum.reduceat(np.abs(x - self.goal), self.starts)
 
-    def soonest(self, x: Array, ahead: float) -> float:
-        """A time [s] before which no mode is in its goal ball: each takes as long as its farthest
-        robot at its speed limit, `ahead` [m] left out."""
-        way = np.abs(x - self.goal) - self.eps - ahead
-        return float(np.maximum.reduceat(way / self.speed, self.starts).min())
+    def near_goal(self, x: Array, within: float) -> bool:
+        """Whether any mode's robots are all that near to its goal ball [m]."""
+        near = np.abs(x - self.goal) < self.eps + within
+        return bool(np.logical_and.reduceat(near, self.starts).any())
 
     def finished(self, there: Truth, clock: Array) -> Truth:
         """Whether each mode's (x, clock) is in its goal G_p (modes,): x is `there`, in the goal

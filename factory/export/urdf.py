@@ -64,9 +64,10 @@ class _Writer:
         root = Element("robot", {"name": name})
         extension = add(root, "mujoco")
         add(extension, "compiler", strippath="false", fusestatic="false", meshdir=".")
-        for body in range(self.m.nbody):
+        world, *bodies = (n for n in range(self.m.nbody) if self.m.body(n).name != names.COMPASS)
+        self._link(root, world)
+        for body in bodies:
             self._link(root, body)
-        for body in range(1, self.m.nbody):
             self._joint(root, body)
         ElementTree.indent(root)
         return '<?xml version="1.0"?>\n' + ElementTree.tostring(root, encoding="unicode") + "\n"

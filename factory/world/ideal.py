@@ -54,15 +54,18 @@ class IdealWorld:
                 self.count += 1
                 self.dropoffs.append(self.time)
 
-    def step(self, bundle: Bundle | None, axes: Index) -> None:
-        """ẋ = F_p(x) for one tick."""
+    def step(self, bundle: Bundle | None, axes: Index) -> bool:
+        """ẋ = F_p(x) for one tick. Whether any mode has come to its goal."""
+        near = False
         if bundle is not None:
             x = self.x[axes]
             x = x + bundle.field(x, self.tick) * self.tick
             if not bundle.in_domain(x).all():
                 raise AssertionError("a configuration in Δ: two robots touch")
             self.x[axes] = x
+            near = bundle.near_goal(x, 0.0)
         self.time += self.tick
+        return near
 
     def move(self, axes: Index, x: Array, v: Array, a: Array) -> None:
         """From now on `axes` run from x [m] at speed v under acceleration a [m/s²]."""

@@ -24,8 +24,12 @@ from factory.mjcf import names
 from factory.mjcf.binary import cached, keep
 from factory.mjcf.model import CARRIAGE_MASS, GRAVITY, HEAD_MASS, HOIST_MASS, Model
 from factory.mjcf.outfeed import TRAY_MASS
+from factory.world.courses import Course, Courses
 from factory.world.inspection import Inspection
 from factory.world.stock import AWAKE, FRESH, Stock
+
+AHEAD = 0.005
+"""No robot is further ahead of its reference than this [m]."""
 
 NEAR = 1e-3
 """The tray is somewhere when it is within this [m]."""
@@ -90,9 +94,9 @@ class MujocoWorld:
         self._due = np.zeros(len(start), bool)
         self._active = np.empty(0, np.intp)
         self._ctrl = self._inputs(self._active)
-        self._course: Array | None = None
+        self.courses = Courses()
+        self._course: Course | None = None
         self._gone = 0
-        self._creeping = self._active
         ahead = self.settings.timestep * np.arange(self.settings.substeps + 1.0)
         self._powers = ahead[:, None] ** np.arange(3)
         self.mass = np.full(len(start), CARRIAGE_MASS)
@@ -165,20 +169,29 @@ class MujocoWorld:
             self.weight[axis] = (HEAD_MASS + load) * GRAVITY
             self.d.ctrl[self.control[axis] + 2] = self.weight[axis]
 
-    def step(self, bundle: Bundle | None, axes: Index) -> None:
+    def step(self, bundle: Bundle | None, axes: Index) -> bool:
         """One tick of the engine, the drives following a reference that obeys F_p under the
-        limits."""
+        limits. Whether any mode may have come to its goal: no robot is far ahead of its
+        reference."""
+        near = False
         self._halt(axes)
         if bundle is not None:
             x, v = self.reference[axes], self.speed[axes]
-            x1, v1, a = follow(bundle, x, v, self.tick)
-            self.reference[axes], self.speed[axes] = x1, v1
-            self._course, self._creeping = self._setpoints(axes, x, v, a, 0.0)
-            self._course[-1, : len(axes)] = x1  # to the last bit, so that who stands is seen to
-            self._gone, self._due[axes] = 0, False
+            course = self.courses.of(bundle, x, v, lambda: self._course_of(bundle, axes, x, v))
+            self.reference[axes], self.speed[axes] = course.x, course.v
+            self._course, self._gone, self._due[axes] = course, 0, False
+            near = course.near
         self.advance(self.settings.substeps)
         self._course = None
         self.settle()
+        return near
+
+    def _course_of(self, bundle: Bundle, axes: Index, x: Array, v: Array) -> Course:
+        """A tick of the active modes. The load of each robot is that of its operation."""
+        x1, v1, a = follow(bundle, x, v, self.tick)
+        setpoints, slow = self._setpoints(axes, x, v, a, 0.0)
+        setpoints[-1, : len(axes)] = x1  # to the last bit, so that who stands is seen to
+        return Course(x1, v1, setpoints, slow, bundle.near_goal(x1, AHEAD))
 
     def _halt(self, active: Index) -> None:
         """Robots whose operation has ended stop where their reference is. They may hand over at a
@@ -210,12 +223,12 @@ class MujocoWorld:
         those in modes, and of those that `move` has set going or stopped."""
         m, d = self.m, self.d
         gone, self._gone = self._gone, self._gone + substeps
-        creeping, inputs = self._creeping, self._ctrl
         if self._course is None:
-            creeping, inputs = creeping[:0], inputs[:0]
+            creeping, inputs = self._ctrl[:0], self._ctrl[:0]
             rows = np.empty((substeps + 1, 0))
         else:
-            rows = self._course[gone : gone + substeps + 1]
+            creeping, inputs = self._course.slow, self._ctrl
+            rows = self._course.setpoints[gone : gone + substeps + 1]
         (axes,) = self._due.nonzero()
         if len(axes):
             begun, x, v, a = self._plan[:, axes]
