@@ -18,6 +18,7 @@ from factory.disturbance import (
 )
 from factory.errors import InputError
 from factory.simulation import Simulation
+from factory.world.courses import Courses
 from tests.fidelity import attraction, disturbances
 from tests.fidelity.products import PAPER, layout
 
@@ -67,7 +68,10 @@ def test_what_they_write_into_the_model() -> None:
 def test_a_weak_drive_scales_its_whole_force() -> None:
     simulation = simulated(Gain(0.5, ("r2",)))
     world = simulation.world
-    world.d.ctrl[world.control[1] : world.control[1] + 3] = world.reference[1] + 1e-4, 0.0, 2.0
+    still, weight = np.zeros(1), world.setpoints.weight
+    weight[1] = 2.0
+    world.move(np.array([1]), world.reference[[1]] + 1e-4, still, still)
+    world.setpoints.update(1)
     world.advance(1)
     kp = -world.m.actuator_biasprm[world.m.actuator("r2/drive").id, 1]
     assert world.d.actuator_force[world.m.actuator("r2/drive").id] == pytest.approx(
@@ -222,6 +226,7 @@ def test_a_law_that_does_not_come_to_its_goal_is_a_defect(monkeypatch) -> None:
     start = bench.mode.upper.copy()
     assert bench.reach(start).result == "reached"
     monkeypatch.setattr(type(bench.bundle), "field", lambda self, x, dt: np.zeros_like(x))
+    bench.world.courses = Courses()
     assert bench.reach(start).result == "missed"
     said = attraction.summary(PAPER, "mate", "sub1", [bench.reach(start)])
     assert said["share_reached"] == 0 and said["defects_by_kind"] == {"inside": 1}

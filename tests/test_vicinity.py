@@ -131,9 +131,10 @@ def all_overlooked(seed: int, ticks: int = 150) -> set[str]:
     simulation, found = ready("20", True), set[str]()
     contacts = simulation.world.stock.contacts
 
-    def step(m: mujoco.MjModel, d: mujoco.MjData) -> None:
-        mujoco.mj_step(m, d)
-        found.update(overlooked(m, d, contacts))
+    def step(m: mujoco.MjModel, d: mujoco.MjData, steps: int = 1) -> None:
+        for _ in range(steps):
+            mujoco.mj_step(m, d)
+            found.update(overlooked(m, d, contacts))
 
     with stepping(step):
         tick = gone_wild(simulation, seed)

@@ -23,8 +23,8 @@ class Steps:
         self._qvel, self._force = d.qvel, d.actuator_force
         self._v = np.zeros((room + 1, m.nv))
         self._f = np.zeros((room + 1, len(self._force)))
+        self._t = np.zeros(room + 1)
         self._count = 0
-        self._time = -1.0
 
     def __enter__(self) -> Self:
         mujoco.set_mjcb_control(self._step)
@@ -39,11 +39,9 @@ class Steps:
         mujoco.set_mjcb_control(None)
 
     def _step(self, m: Any, d: Any) -> None:
-        if d.time == self._time:  # a step begins anew when it has woken a body
-            return
-        at, self._time = self._count, d.time
-        self._v[at] = self._qvel
-        self._f[at] = self._force
+        at = int(np.searchsorted(self._t[: self._count], d.time))
+        if at == self._count:  # else it is done again: it has woken a body, or something touched
+            self._t[at], self._v[at], self._f[at] = d.time, self._qvel, self._force
         self._count = at + 1
 
     def take(self) -> tuple[Array, Array]:

@@ -42,10 +42,8 @@ def add_tray(world: Element, actuator: Element, layout: Layout, drive: Drive) ->
         "pid",
         name=names.OUTFEED_DRIVE,
         joint=names.OUTFEED_SLIDE,
-        kp=drive.kp,
-        kv=drive.kv,
         input="pos vel ff",
-        forcerange=(-drive.force, drive.force),
+        **drive.attributes(),
     )
 
 

@@ -31,11 +31,22 @@ class RobotModel:
 
 @dataclass(frozen=True, slots=True)
 class Drive:
-    """Gains and limit of an actuator: kp [N/m], kv [N s/m], force [N]."""
+    """Gains and limit of an actuator: kp [N/m], kv [N s/m], force [N]; and its buffer, of
+    `samples` setpoints."""
 
     kp: float
     kv: float
     force: float
+    samples: int
+
+    def attributes(self) -> dict[str, str]:
+        """As attributes of an actuator."""
+        return {
+            "kp": number(self.kp),
+            "kv": number(self.kv),
+            "forcerange": numbers((-self.force, self.force)),
+            "nsample": str(self.samples),
+        }
 
 
 def load_robot_model(robot: RobotType) -> RobotModel:
@@ -134,9 +145,7 @@ def instantiate(
         chosen = {"drive": drive, "hoist": hoist.drive if hoist else None}
         gains = chosen.get(actuator.get("name") or "")
         if gains is not None:
-            copy.set("kp", number(gains.kp))
-            copy.set("kv", number(gains.kv))
-            copy.set("forcerange", numbers((-gains.force, gains.force)))
+            copy.attrib.update(gains.attributes())
         actuators.append(copy)
     return body, actuators
 

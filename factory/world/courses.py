@@ -6,49 +6,45 @@ bit: after some cycles every tick has been there before.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Hashable
 from dataclasses import dataclass
 
-from factory.control.mode import Array, Index
-from factory.control.navigation import Bundle
+from factory.world.setpoints import Told
 
-ROOM = 8_000_000
+ROOM = 5_000_000
 """So many numbers are kept, of 8 bytes each: those of a cycle with 1,000 robots."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Course:
-    """A tick of n axes: positions `x` [m] and speeds `v` [m/s] (n,) at its end, the `setpoints` at
-    each of its steps and at its end (steps + 1, 3 n), the axes that are `slow` in it, and whether
-    any mode is `near` its goal then."""
+    """A tick of n axes: what their drives are `told`, with positions and speeds `after` it, which
+    of them `moves` (the bytes of n truths), and whether any mode is `near` its goal then."""
 
-    x: Array
-    v: Array
-    setpoints: Array
-    slow: Index
+    told: Told
+    moves: bytes
     near: bool
 
 
 class Courses:
-    """The courses of the modes of bundles; all are forgotten when there is no room for more."""
+    """Courses by where they begin; all are forgotten when there is no room for more."""
 
     def __init__(self, room: int = ROOM) -> None:
         self.room, self._left = room, room
-        self._kept: dict[tuple[Bundle, bytes, bytes], Course] = {}
+        self._kept: dict[Hashable, Course] = {}
 
     def __len__(self) -> int:
         return len(self._kept)
 
-    def of(self, bundle: Bundle, x: Array, v: Array, made: Callable[[], Course]) -> Course:
-        """The course of a bundle's modes from x [m] at speeds v [m/s]: that of before, or what is
-        `made` now."""
-        key = bundle, x.tobytes(), v.tobytes()
-        course = self._kept.get(key)
+    def of(self, begin: Hashable, made: Callable[[], Course]) -> Course:
+        """The course from a beginning, which says all that it depends on: that of before, or what
+        is `made` now."""
+        course = self._kept.get(begin)
         if course is None:
             course = made()
-            self._left -= course.setpoints.size
-            if self._left < 0:
+            size = course.told.terms.size + course.told.after.size
+            if size > self._left:
                 self._kept.clear()
-                self._left = self.room - course.setpoints.size
-            self._kept[key] = course
+                self._left = self.room
+            self._left -= size
+            self._kept[begin] = course
         return course

@@ -14,7 +14,7 @@ from time import perf_counter
 import numpy as np
 
 from factory.control.governor import follow, govern
-from factory.control.mode import ROUNDING, Array, Index
+from factory.control.mode import ROUNDING, Array, Index, Truth
 from factory.control.navigation import Bundle
 from factory.control.profile import landing_speed
 from factory.engine import mujoco
@@ -26,6 +26,8 @@ from factory.mjcf.model import CARRIAGE_MASS, GRAVITY, HEAD_MASS, HOIST_MASS, Mo
 from factory.mjcf.outfeed import TRAY_MASS
 from factory.world.courses import Course, Courses
 from factory.world.inspection import Inspection
+from factory.world.rewind import Rewind
+from factory.world.setpoints import Setpoints
 from factory.world.stock import AWAKE, FRESH, Stock
 
 AHEAD = 0.005
@@ -40,12 +42,10 @@ GIVEN_UP = tuple(
 )
 """Warnings after which the engine has begun anew, or let go of the drives."""
 
-DOZE = int(mujoco.mjMINAWAKE) // 2
-"""Steps of the engine between looks at who sleeps: it takes twice as many of a slow body to doze
-off."""
-
-SLOW = 0.02
-"""A robot under way that is slower than this might fall asleep [m/s]."""
+MAY_SLEEP, STAYS_AWAKE = (
+    int(getattr(mujoco.mjtSleepPolicy, f"mjSLEEP_{name}")) for name in ("ALLOWED", "NEVER")
+)
+"""What the engine is told of a robot that stands, and of one under way."""
 
 
 class MujocoWorld:
@@ -83,30 +83,29 @@ class MujocoWorld:
         self.dof = self.m.jnt_dofadr[joint]
         self.body = self.m.jnt_bodyid[joint]
         self.tree = self.m.body_treeid[self.body]
-        self.control = self.m.actuator_ctrladr[actuator]
         self.m.actuator_biasprm[actuator[: self.tray], 1:3] *= np.asarray(gains)[:, None]
-        start = np.append(start, 0.0)
-        self.reference = np.array(start, float)
+        self.reference = np.append(np.asarray(start, float), 0.0)
         self.speed = np.zeros_like(self.reference)
         self.tick = self.settings.tick
-        self._plan = np.zeros((4, len(start)))
-        self._plan[1] = start
-        self._due = np.zeros(len(start), bool)
-        self._active = np.empty(0, np.intp)
-        self._ctrl = self._inputs(self._active)
         self.courses = Courses()
-        self._course: Course | None = None
-        self._gone = 0
-        ahead = self.settings.timestep * np.arange(self.settings.substeps + 1.0)
-        self._powers = ahead[:, None] ** np.arange(3)
-        self.mass = np.full(len(start), CARRIAGE_MASS)
-        self.mass[self.tray] = TRAY_MASS
-        self.mass[list(self.lift.values())] = HOIST_MASS
-        self.weight = np.zeros(len(start))
-        self.weight[list(self.lift.values())] = HEAD_MASS * GRAVITY
-        self.d.qpos[self.qpos] = start
-        self.d.ctrl[self.control] = start
-        self.d.ctrl[self.control + 2] = self.weight
+        self._tray = np.array([self.tray])
+        self._tray_course: Course | None = None
+        self._active = np.empty(0, np.intp)
+        self._moves = b""
+        self._under_way = np.zeros(len(slides), bool)
+        mass, weight = np.full(len(slides), CARRIAGE_MASS), np.zeros(len(slides))
+        mass[self.tray] = TRAY_MASS
+        mass[list(self.lift.values())] = HOIST_MASS
+        weight[list(self.lift.values())] = HEAD_MASS * GRAVITY
+        self.setpoints = Setpoints(self.m, self.d, np.array(actuator), mass, weight)
+        self.control = self.setpoints.control
+        self._where = self.setpoints.where(self._active)
+        self._at_tray = self.setpoints.where(self._tray)
+        self.control = self.setpoints.control
+        self._where = self.setpoints.where(self._active)
+        self._at_tray = self.setpoints.where(self._tray)
+        self.d.qpos[self.qpos] = self.reference
+        self.move(np.arange(len(slides)), self.reference, self.speed, self.speed)
         self.stock = Stock(self.m, self.d, model, units, counts or {}, wip)
         self.vicinity = self.stock.vicinity
         self.inspection = Inspection(self.m, self.d, model, self.stock.contacts)
@@ -114,8 +113,10 @@ class MujocoWorld:
             begun, over = ((counts or {}).get(t, 0) for t in (operation.start, operation.end))
             if begun > over:
                 self.inspection.started(operation, over)
-        for robot, mass in self.stock.loads().items():
-            self._load(robot, mass)
+        for robot, carried in self.stock.loads().items():
+            self._load(robot, carried)
+        self.setpoints.update(0)
+        self._begin = Rewind(self.m, self.d)
         self.physics_time = 0.0
         mujoco.mj_forward(self.m, self.d)
 
@@ -162,12 +163,9 @@ class MujocoWorld:
 
     def _load(self, robot: int, load: float) -> None:
         """A robot carries so much from now on [kg]: its drives push accordingly."""
-        self.mass[robot] = CARRIAGE_MASS + load
+        self.setpoints.weigh(robot, CARRIAGE_MASS + load, 0.0)
         if robot in self.lift:
-            axis = self.lift[robot]
-            self.mass[axis] = HOIST_MASS + load
-            self.weight[axis] = (HEAD_MASS + load) * GRAVITY
-            self.d.ctrl[self.control[axis] + 2] = self.weight[axis]
+            self.setpoints.weigh(self.lift[robot], HOIST_MASS + load, (HEAD_MASS + load) * GRAVITY)
 
     def step(self, bundle: Bundle | None, axes: Index) -> bool:
         """One tick of the engine, the drives following a reference that obeys F_p under the
@@ -177,21 +175,24 @@ class MujocoWorld:
         self._halt(axes)
         if bundle is not None:
             x, v = self.reference[axes], self.speed[axes]
-            course = self.courses.of(bundle, x, v, lambda: self._course_of(bundle, axes, x, v))
-            self.reference[axes], self.speed[axes] = course.x, course.v
-            self._course, self._gone, self._due[axes] = course, 0, False
+            begin = bundle, x.tobytes(), v.tobytes()
+            course = self.courses.of(begin, lambda: self._course(bundle, axes, x, v))
+            self.reference[axes], self.speed[axes] = course.told.after[:, :2].T
+            self.setpoints.follow(axes, self._where, course.told)
+            if course.moves != self._moves:
+                self._moves = course.moves
+                self._attend(axes, np.frombuffer(course.moves, bool))
             near = course.near
         self.advance(self.settings.substeps)
-        self._course = None
         self.settle()
         return near
 
-    def _course_of(self, bundle: Bundle, axes: Index, x: Array, v: Array) -> Course:
+    def _course(self, bundle: Bundle, axes: Index, x: Array, v: Array) -> Course:
         """A tick of the active modes. The load of each robot is that of its operation."""
         x1, v1, a = follow(bundle, x, v, self.tick)
-        setpoints, slow = self._setpoints(axes, x, v, a, 0.0)
-        setpoints[-1, : len(axes)] = x1  # to the last bit, so that who stands is seen to
-        return Course(x1, v1, setpoints, slow, bundle.near_goal(x1, AHEAD))
+        told = self.setpoints.of(axes, x, v, a, x1, v1)
+        moves = (v != 0.0) | (a != 0.0)
+        return Course(told, moves.tobytes(), bundle.near_goal(x1, AHEAD))
 
     def _halt(self, active: Index) -> None:
         """Robots whose operation has ended stop where their reference is. They may hand over at a
@@ -203,81 +204,64 @@ class MujocoWorld:
         left[self._active] = True
         left[active] = False
         axes = np.flatnonzero(left)
-        still = np.zeros(len(axes))
         self.speed[axes] = 0.0
-        self.d.ctrl[self._inputs(axes)] = np.concatenate(
-            [self.reference[axes], still, self.weight[axes]]
-        )
-        self._active, self._ctrl = active, self._inputs(active)
+        still = self.speed[axes]
+        self.move(axes, self.reference[axes], still, still)
+        self._active, self._where, self._moves = active, self.setpoints.where(active), b""
 
     def move(self, axes: Index, x: Array, v: Array, a: Array) -> None:
         """From now on the references of `axes` run from x [m] at speed v under acceleration a, in
-        steps that have not been set otherwise."""
-        plan = self._plan
-        plan[0, axes] = self.d.time
-        plan[1, axes], plan[2, axes], plan[3, axes] = x, v, a
-        self._due[axes] = True
+        ticks that have not been set otherwise."""
+        self.setpoints.move(axes, x, v, a)
 
-    def advance(self, substeps: int) -> None:
-        """Timesteps of the engine, with the setpoints of all moving robots kept up to date: of
-        those in modes, and of those that `move` has set going or stopped."""
-        m, d = self.m, self.d
-        gone, self._gone = self._gone, self._gone + substeps
-        if self._course is None:
-            creeping, inputs = self._ctrl[:0], self._ctrl[:0]
-            rows = np.empty((substeps + 1, 0))
-        else:
-            creeping, inputs = self._course.slow, self._ctrl
-            rows = self._course.setpoints[gone : gone + substeps + 1]
-        (axes,) = self._due.nonzero()
-        if len(axes):
-            begun, x, v, a = self._plan[:, axes]
-            own, slow = self._setpoints(axes, x, v, a, d.time - begun)
-            rows = np.concatenate([rows, own[: substeps + 1]], axis=1)
-            inputs = np.concatenate([inputs, self._inputs(axes)])
-            creeping = np.concatenate([creeping, slow])
-            self._due[axes] = self._plan[2:, axes].any(axis=0)
-        setpoints, step, spent, vicinity = d.ctrl, mujoco.mj_step, 0.0, self.vicinity
+    def advance(self, steps: int) -> None:
+        """Steps of the engine, the setpoints of those kept up to date that `move` has set going or
+        stopped: all at once, and one by one again where anything has touched, since contacts are
+        looked at in every step."""
+        m, d, step, vicinity = self.m, self.d, mujoco.mj_step, self.vicinity
+        told, moves = self.setpoints.update(steps)
+        if len(told):
+            self._attend(told, moves)
+        if self._tray_course is not None:
+            self.setpoints.follow(self._tray, self._at_tray, self._tray_course.told)
+            self._attend(self._tray, np.frombuffer(self._tray_course.moves, bool))
+            self._tray_course = None
         vicinity.notice()
-        for number in range(substeps):
-            setpoints[inputs] = rows[number]
-            if len(creeping) and (gone + number) % DOZE == 0:
-                self.rouse(creeping)
+        if vicinity.stale:
+            vicinity.look()
+        if not d.ncon:
+            self._begin.save()
+            d.maxuse_con = 0
+            begin = perf_counter()
+            step(m, d, steps)
+            self.physics_time += perf_counter() - begin
+            if not d.maxuse_con:
+                return
+            self._begin.restore()
+            self.setpoints.again()
+        for _ in range(steps):
             if vicinity.stale:
                 vicinity.look()
             begin = perf_counter()
             step(m, d)
-            spent += perf_counter() - begin
+            self.physics_time += perf_counter() - begin
             if d.ncon:
                 self.inspection.contacts()
                 vicinity.notice()
-        setpoints[inputs] = rows[substeps]
-        self.physics_time += spent
 
-    def _inputs(self, axes: Index) -> Index:
-        """Where in `ctrl` the setpoints of axes are (3 n,): positions, speeds, forces."""
-        ctrl = self.control[axes]
-        return np.concatenate([ctrl, ctrl + 1, ctrl + 2])
-
-    def _setpoints(
-        self, axes: Index, x: Array, v: Array, a: Array, since: Array | float
-    ) -> tuple[Array, Index]:
-        """The setpoints of axes at the next steps (k, 3 n), which have gone `since` [s] from x at
-        speed v under acceleration a; and those of the axes that are slow."""
-        n = len(axes)
-        if np.ndim(since):
-            x, v = x + since * (v + 0.5 * since * a), v + a * since
-        slow = (np.abs(v) < SLOW) & ((v != 0.0) | (a != 0.0))
-        terms = np.zeros((3, 3 * n))
-        terms[0, :n], terms[0, n : 2 * n] = x, v
-        terms[0, 2 * n :] = self.mass[axes] * a + self.weight[axes]
-        terms[1, :n], terms[1, n : 2 * n] = v, a
-        terms[2, :n] = 0.5 * a
-        return self._powers @ terms, axes[slow]
+    def _attend(self, axes: Index, moves: Truth) -> None:
+        """The engine puts to sleep what has been slow for a while, and a robot under way would
+        never come to its goal: what moves stays awake, what stands may sleep."""
+        if (self._under_way[axes] == moves).all():
+            return
+        self._under_way[axes] = moves
+        policy = self.m.tree_sleep_policy
+        policy[self.tree[axes]] = MAY_SLEEP
+        policy[self.tree[self._under_way]] = STAYS_AWAKE
+        self.rouse(axes[moves])
 
     def rouse(self, axes: Index) -> None:
-        """Wake robots that sleep, and keep those awake that creep: the engine puts to sleep what
-        has been slow for a while, and a robot under way never comes to its goal then."""
+        """Wake robots that sleep, and let those that are about to wait as long again."""
         dof, tree = self.dof[axes], self.tree[axes]
         self.d.qvel[dof[self.d.qvel[dof] == 0.0]] = AWAKE
         awake = self.d.tree_asleep[tree] < 0
@@ -306,20 +290,25 @@ class MujocoWorld:
 
     def _send_tray(self, place: float) -> None:
         """One tick of the tray's way to a place, as fast as its limits allow."""
-        tray, dt = np.array([self.tray]), self.tick
+        tray, loaded = self._tray, self.stock.on_tray is not None
         x, v = self.reference[tray], self.speed[tray]
-        loaded = self.stock.on_tray is not None
-        self.mass[self.tray] = TRAY_MASS + loaded * self.model.masses[self.model.factory.pag.root]
-        limit = np.array([self.settings.outfeed_acceleration])
+        begin = place, loaded, x.tobytes(), v.tobytes()
+        course = self.courses.of(begin, lambda: self._course_of_tray(x, v, place, loaded))
+        self.reference[tray], self.speed[tray] = course.told.after[:, :2].T
+        self._tray_course = course
+
+    def _course_of_tray(self, x: Array, v: Array, place: float, loaded: bool) -> Course:
+        dt, limit = self.tick, np.array([self.settings.outfeed_acceleration])
+        load = loaded * self.model.masses[self.model.factory.pag.root]
+        self.setpoints.weigh(self.tray, TRAY_MASS + load, 0.0)
         left = place - (x + v * (dt / 2))
         wanted = np.minimum(landing_speed(np.abs(left), limit, dt), self.settings.outfeed)
         x1, v1, a = govern(x, v, np.copysign(wanted, left), limit, dt)
         if abs(x1[0] - place) < ROUNDING and abs(v1[0]) < ROUNDING:
-            x1, v1 = np.array([place]), np.zeros(1)
-            self.move(tray, x1, v1, v1)
-        else:
-            self.move(tray, x, v, a)
-        self.reference[tray], self.speed[tray] = x1, v1
+            x1, v1, a = np.array([place]), np.zeros(1), np.zeros(1)
+            x, v = x1, v1
+        told = self.setpoints.of(self._tray, x, v, a, x1, v1)
+        return Course(told, ((v != 0.0) | (a != 0.0)).tobytes(), False)
 
     def unstable(self) -> str:
         """What made the engine give up, "" while it has not."""

@@ -1,9 +1,9 @@
 """The floor: the bare engine stepping the same model through the same motion.
 
-While a factory runs, everything that is written into the engine between two of its steps is
+While a factory runs, everything that is written into the engine between two calls of it is
 recorded: setpoints, welds, contact masks, bodies put somewhere, sleepers woken. The replay writes
-the same and steps, with nothing else in the loop; it ends in the same state to the last bit, which
-is asserted, so both did the same physics.
+the same and steps as often, with nothing else in the loop; it ends in the same state to the last
+bit, which is asserted, so both did the same physics.
 """
 
 from __future__ import annotations
@@ -21,8 +21,9 @@ from factory.engine import mujoco
 from factory.world import physics
 from tests.bench.factories import run_until
 
-DATA = ("ctrl", "qpos", "qvel", "eq_active", "tree_asleep", "xpos", "xmat", "xquat")
+DATA = ("ctrl", "history", "qpos", "qvel", "eq_active", "tree_asleep", "xpos", "xmat", "xquat")
 MODEL = (
+    "tree_sleep_policy",
     "eq_obj2id",
     "geom_contype",
     "geom_conaffinity",
@@ -36,26 +37,26 @@ Write = tuple[int, Any, Any]
 
 @dataclass
 class Recorder:
-    """What was written before each step of the engine, from a state on."""
+    """What was written before the engine's steps, and how many there were, from a state on."""
 
     m: mujoco.MjModel
     d: mujoco.MjData
     begin: tuple[mujoco.MjModel, mujoco.MjData] = field(init=False)
-    writes: list[list[Write]] = field(default_factory=list)
+    writes: list[tuple[list[Write], int]] = field(default_factory=list)
 
     def __post_init__(self) -> None:
         self.begin = copy.copy(self.m), copy.copy(self.d)
         self.seen = [array.copy() for array in arrays(self.m, self.d)]
 
-    def step(self, m: mujoco.MjModel, d: mujoco.MjData) -> None:
+    def step(self, m: mujoco.MjModel, d: mujoco.MjData, steps: int = 1) -> None:
         """Takes the place of the engine's step."""
         written: list[Write] = []
         for number, (now, before) in enumerate(zip(arrays(m, d), self.seen, strict=True)):
             at = np.flatnonzero(bits(now) != bits(before))
             if len(at):
                 written.append((number, at, now.reshape(-1)[at]))
-        self.writes.append(written)
-        mujoco.mj_step(m, d)
+        self.writes.append((written, steps))
+        mujoco.mj_step(m, d, steps)
         for now, before in zip(arrays(m, d), self.seen, strict=True):
             before[...] = now
 
@@ -123,13 +124,13 @@ def measure_floor(make: Any, warm: float, window: float) -> Floor:
     return Floor(window, run, timed.world.physics_time - before, bare)
 
 
-def replay(m: mujoco.MjModel, d: mujoco.MjData, writes: list[list[Write]]) -> float:
+def replay(m: mujoco.MjModel, d: mujoco.MjData, writes: list[tuple[list[Write], int]]) -> float:
     """Seconds to write and step."""
     flat = [array.reshape(-1) for array in arrays(m, d)]
     step = mujoco.mj_step
     begin = perf_counter()
-    for written in writes:
+    for written, steps in writes:
         for number, at, values in written:
             flat[number][at] = values
-        step(m, d)
+        step(m, d, steps)
     return perf_counter() - begin

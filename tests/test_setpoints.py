@@ -1,0 +1,196 @@
+"""A tick is one call of the engine: what the drives are told ahead, and what is gone back for."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import numpy as np
+import pytest
+
+from factory.control.governor import follow
+from factory.engine import mujoco
+from factory.settings import Settings
+from factory.simulation import Simulation
+from factory.world import physics
+from factory.world.courses import Course, Courses
+from factory.world.rewind import Rewind
+from factory.world.setpoints import INPUTS, Told
+from tests.bench.replaying import stepping
+from tests.test_fuse import layout_of
+from tests.test_vicinity import gone_wild, ready, states
+
+
+def one_by_one(m: mujoco.MjModel, d: mujoco.MjData, steps: int = 0) -> None:
+    """Whatever is done at once is taken for contacts that came and went: the world goes back, and
+    takes its steps one by one."""
+    mujoco.mj_step(m, d, steps or 1)
+    if steps:
+        d.maxuse_con = 1
+
+
+@pytest.mark.parametrize(
+    ("name", "given"),
+    [
+        ("paper", {}),
+        ("chest", {}),
+        ("gearbox", {"fuse": True}),
+        ("20", {"fuse": True}),
+        ("paper", {"settings": Settings(timestep=0.001, substeps=12, stage=1)}),
+        ("paper", {"distributed": True}),
+    ],
+)
+def test_who_goes_back_comes_to_the_same_state(name: str, given: dict[str, Any]) -> None:
+    """To the last bit: all steps at once, and all of them twice, the second time one by one."""
+    at_once, twice = ready(name, True, **given), ready(name, True, **given)
+    expected = states(at_once, at_once.supervisor.step, 400)
+    with stepping(one_by_one):
+        assert states(twice, twice.supervisor.step, 400) == expected
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_all_contacts_are_seen_that_are_seen_one_by_one(seed: int) -> None:
+    at_once, twice = ready("20", True), ready("20", True)
+    expected = states(at_once, gone_wild(at_once, seed), 150)
+    with stepping(one_by_one):
+        assert states(twice, gone_wild(twice, seed), 150) == expected
+    touched = [simulation.world.inspection.unintended for simulation in (at_once, twice)]
+    assert touched[0] and touched[0] == touched[1]
+
+
+@contextmanager
+def forgetful(what: Callable[[Rewind], None]) -> Iterator[None]:
+    """Going back forgets something."""
+    restore = Rewind.restore
+
+    def planted(self: Rewind) -> None:
+        restore(self)
+        what(self)
+
+    Rewind.restore = planted  # type: ignore[method-assign]
+    try:
+        yield
+    finally:
+        Rewind.restore = restore  # type: ignore[method-assign]
+
+
+def _warmstart(self: Rewind) -> None:
+    self.d.qacc_warmstart[:] = 0.0
+
+
+def _time(self: Rewind) -> None:
+    self.d.time += self.m.opt.timestep
+
+
+@pytest.mark.parametrize("what", [_warmstart, _time])
+def test_who_forgets_something_does_not(what: Callable[[Rewind], None]) -> None:
+    at_once, twice = ready("paper", True), ready("paper", True)
+    expected = states(at_once, at_once.supervisor.step, 100)
+    with stepping(one_by_one), forgetful(what):
+        assert states(twice, twice.supervisor.step, 100) != expected
+
+
+def test_each_step_has_its_own_setpoints() -> None:
+    """What a drive reads in a step is where its axis is then, under the acceleration of the
+    tick."""
+    simulation = Simulation(layout_of("paper"), units=2)
+    world, supervisor = simulation.world, simulation.supervisor
+    seen: dict[float, np.ndarray] = {}
+    m, d = world.m, world.d
+
+    def read(_: Any, data: Any) -> None:
+        drives = np.zeros((m.nactuator, INPUTS))
+        for number, inputs in enumerate(drives):
+            inputs[:] = mujoco.mj_readCtrl(m, d, number, d.time, np.zeros((INPUTS, 1)), -1)
+        seen[float(d.time)] = drives
+
+    mujoco.set_mjcb_control(read)
+    try:
+        for _ in range(150):
+            before, speed, active = world.reference.copy(), world.speed.copy(), supervisor.active
+            begun = world.time
+            seen.clear()
+            supervisor.step()
+            axes = supervisor.active.axes
+            if supervisor.active.bundle is None or supervisor.active is not active:
+                continue
+            x, v = before[axes], speed[axes]
+            _, _, a = follow(supervisor.active.bundle, x, v, world.tick)
+            assert len(seen) == simulation.settings.substeps
+            for time, drives in seen.items():
+                t = time - begun
+                assert np.allclose(drives[axes, 0], x + v * t + a * t * t / 2, atol=1e-12)
+                assert np.allclose(drives[axes, 1], v + a * t, atol=1e-12)
+                assert np.allclose(drives[axes, 2], a * world.setpoints.mass[axes], atol=1e-12)
+    finally:
+        mujoco.set_mjcb_control(None)
+
+
+# --- courses ---------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("name", "given"), [("paper", {}), ("chest", {"settings": Settings(stage=1)}), ("lamp", {})]
+)
+def test_a_course_is_the_same_when_it_is_kept(name: str, given: dict[str, Any]) -> None:
+    kept, made = ready(name, True, **given), ready(name, True, **given)
+    made.world.courses = Courses(0)
+    expected = states(made, made.supervisor.step, 1500)
+    assert states(kept, kept.supervisor.step, 1500) == expected
+    assert len(made.world.courses) <= 1 < len(kept.world.courses)
+
+
+def test_steady_production_repeats_itself() -> None:
+    simulation = Simulation(layout_of("paper"), units=20)
+    world = simulation.world
+    while world.delivered() < 5:
+        simulation.supervisor.step()
+    known = len(world.courses)
+    while world.delivered() < 9:
+        simulation.supervisor.step()
+    assert len(world.courses) == known
+
+
+def test_there_is_room_for_so_many_numbers() -> None:
+    courses, told = Courses(35), Told(np.zeros((2, 4)), np.zeros((2, 1)))
+    for number in range(100):
+        course = courses.of(number % 7, lambda: Course(told, b"", False))
+        assert courses.of(number % 7, lambda: pytest.fail("was forgotten")) is course
+        assert 1 <= len(courses) <= 3
+
+
+# --- sleep -----------------------------------------------------------------------------------
+
+
+def crept(seconds: float = 2.0) -> float:
+    """How far the first robot under way gets behind its reference [m] at 0.5 mm/s, which the engine
+    takes for rest."""
+    settings = Settings(speed=0.0005)
+    simulation = Simulation(layout_of("paper"), settings=settings)
+    world, behind = simulation.world, 0.0
+    while world.time < seconds:
+        simulation.supervisor.step()
+        x, _ = world.sense()
+        behind = max(behind, float(np.abs(x - world.reference[: world.tray]).max()))
+    assert world.speed.any()
+    return behind
+
+
+def test_who_creeps_stays_awake(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert crept() < 1e-4
+    monkeypatch.setattr(physics, "STAYS_AWAKE", physics.MAY_SLEEP)
+    assert crept() > 5e-4
+
+
+def test_who_waits_sleeps() -> None:
+    simulation = Simulation(layout_of("chest"), units=2)
+    world, supervisor = simulation.world, simulation.supervisor
+    asleep = 0
+    for _ in range(600):
+        supervisor.step()
+        stays = world.m.tree_sleep_policy[world.tree] == physics.STAYS_AWAKE
+        moves = np.isin(world.tree, world.tree[world._under_way])
+        assert (stays == moves).all()
+        asleep += int((world.d.tree_asleep[world.tree] >= 0).sum())
+    assert asleep > 600
