@@ -15,7 +15,7 @@ from factory.settings import Settings
 from factory.simulation import Simulation
 from factory.world import physics
 from factory.world.courses import Course, Courses
-from factory.world.rewind import Rewind
+from factory.world.rewind import Rewind, tell_who_is_awake
 from factory.world.setpoints import INPUTS, Told
 from tests.bench.replaying import stepping
 from tests.test_fuse import layout_of
@@ -28,6 +28,14 @@ def one_by_one(m: mujoco.MjModel, d: mujoco.MjData, steps: int = 0) -> None:
     mujoco.mj_step(m, d, steps or 1)
     if steps:
         d.maxuse_con = 1
+
+
+def never_at_once(m: mujoco.MjModel, d: mujoco.MjData, steps: int = 0) -> None:
+    """Nothing is done at once to begin with."""
+    if steps:
+        d.maxuse_con = 1
+    else:
+        mujoco.mj_step(m, d)
 
 
 @pytest.mark.parametrize(
@@ -49,14 +57,40 @@ def test_who_goes_back_comes_to_the_same_state(name: str, given: dict[str, Any])
         assert states(twice, twice.supervisor.step, 400) == expected
 
 
-@pytest.mark.parametrize("seed", range(3))
-def test_all_contacts_are_seen_that_are_seen_one_by_one(seed: int) -> None:
-    at_once, twice = ready("20", True), ready("20", True)
+@pytest.mark.parametrize("step", [one_by_one, never_at_once])
+@pytest.mark.parametrize("seed", range(5))
+def test_all_contacts_are_seen_that_are_seen_one_by_one(
+    seed: int, step: Callable[..., None]
+) -> None:
+    at_once, singly = ready("20", True), ready("20", True)
     expected = states(at_once, gone_wild(at_once, seed), 150)
-    with stepping(one_by_one):
-        assert states(twice, gone_wild(twice, seed), 150) == expected
-    touched = [simulation.world.inspection.unintended for simulation in (at_once, twice)]
+    with stepping(step):
+        assert states(singly, gone_wild(singly, seed), 150) == expected
+    touched = [simulation.world.inspection.unintended for simulation in (at_once, singly)]
     assert touched[0] and touched[0] == touched[1]
+
+
+LISTS = ("tree_awake", "body_awake", "body_awake_ind", "parent_awake_ind", "dof_awake_ind")
+COUNTS = ("ntree_awake", "nbody_awake", "nparent_awake", "nv_awake")
+
+
+def test_who_is_awake_is_told_as_the_engine_does() -> None:
+    simulation = ready("20", True)
+    m, d = simulation.world.m, simulation.world.d
+    tick = gone_wild(simulation, 0)
+    for _ in range(100):
+        tick()
+        counts = [getattr(d, name) for name in COUNTS]
+        lists = [getattr(d, name).copy() for name in LISTS]
+        awake = dict(zip(LISTS[2:], counts[1:], strict=True))
+        for name in LISTS:
+            getattr(d, name)[:] = getattr(d, name) if name == "body_awake" else 0
+        d.body_awake[m.body_treeid >= 0] = 0
+        tell_who_is_awake(m, d)
+        assert [getattr(d, name) for name in COUNTS] == counts
+        for name, expected in zip(LISTS, lists, strict=True):
+            length = awake.get(name, len(expected))
+            assert (getattr(d, name)[:length] == expected[:length]).all(), name
 
 
 @contextmanager
