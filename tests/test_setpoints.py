@@ -161,6 +161,29 @@ def test_each_step_has_its_own_setpoints() -> None:
         mujoco.set_mjcb_control(None)
 
 
+def test_what_has_been_written_over_can_be_told_again() -> None:
+    """The engine goes back by a tick and nearly two: their samples are gone by then."""
+    simulation = Simulation(layout_of("paper"), units=2)
+    world, axes = simulation.world, np.array([1, 4])
+    m, d, told = world.m, world.d, world.setpoints
+    begin, x, v = Rewind(m, d), world.reference[axes], np.array([-0.2, -0.1])
+    for _ in range(3):
+        simulation.supervisor.step()
+    begin.save()
+    now, a = world.time, np.array([0.5, -0.3])
+    told.tell(told.where(axes), told.of(axes, x, v, a, x, v))
+    mujoco.mj_step(m, d, 9)
+    begin.restore()
+    told.again()
+    for number in range(simulation.settings.substeps):
+        t = d.time - now
+        mujoco.mj_step(m, d)
+        for n, axis in enumerate(axes):
+            read = mujoco.mj_readCtrl(m, d, axis, now + t, np.zeros((INPUTS, 1)), -1)
+            assert read[:2] == pytest.approx([x[n] + v[n] * t + a[n] * t**2 / 2, v[n] + a[n] * t])
+        assert number * m.opt.timestep == pytest.approx(t)
+
+
 # --- courses ---------------------------------------------------------------------------------
 
 
@@ -228,3 +251,15 @@ def test_who_waits_sleeps() -> None:
         assert (stays == moves).all()
         asleep += int((world.d.tree_asleep[world.tree] >= 0).sum())
     assert asleep > 600
+
+
+def test_a_lift_that_stands_does_not_put_its_carriage_to_sleep() -> None:
+    simulation = Simulation(layout_of("gearbox"), units=1)
+    world = simulation.world
+    carriage, lift = world.axes_of(next(iter(world.lift)))
+    on, off = np.array([True]), np.array([False])
+    for axis, moves in ((carriage, on), (lift, on), (lift, off)):
+        world._attend(np.array([axis]), moves)
+    assert world.m.tree_sleep_policy[world.tree[carriage]] == physics.STAYS_AWAKE
+    world._attend(np.array([carriage]), off)
+    assert world.m.tree_sleep_policy[world.tree[carriage]] == physics.MAY_SLEEP

@@ -290,16 +290,17 @@ class MujocoWorld:
 
     def _send_tray(self, place: float) -> None:
         """One tick of the tray's way to a place, as fast as its limits allow."""
-        tray, loaded = self._tray, self.stock.on_tray is not None
+        tray = self._tray
         x, v = self.reference[tray], self.speed[tray]
-        begin = place, loaded, x.tobytes(), v.tobytes()
-        course = self.courses.of(begin, lambda: self._course_of_tray(x, v, place, loaded))
+        begin = place, x.tobytes(), v.tobytes()
+        course = self.courses.of(begin, lambda: self._course_of_tray(x, v, place))
         self.reference[tray], self.speed[tray] = course.told.after[:, :2].T
         self._tray_course = course
 
-    def _course_of_tray(self, x: Array, v: Array, place: float, loaded: bool) -> Course:
+    def _course_of_tray(self, x: Array, v: Array, place: float) -> Course:
+        """It goes to the end of its way with a product and comes back without."""
         dt, limit = self.tick, np.array([self.settings.outfeed_acceleration])
-        load = loaded * self.model.masses[self.model.factory.pag.root]
+        load = (place > 0.0) * self.model.masses[self.model.factory.pag.root]
         self.setpoints.weigh(self.tray, TRAY_MASS + load, 0.0)
         left = place - (x + v * (dt / 2))
         wanted = np.minimum(landing_speed(np.abs(left), limit, dt), self.settings.outfeed)
