@@ -183,13 +183,14 @@ class Supervisor:
         if active.bundle is None or not self.near:
             return []
         x, v = self.world.sense()
-        x, v = x[active.axes], v[active.axes]
-        there = active.bundle.at_goal(x)
+        there = active.bundle.at_goal(x[active.axes])
+        if not there.any():
+            return []
         active.clocks += self.tick * there
         done = active.bundle.finished(there, active.clocks)
         if not done.any():
             return []
-        still = np.logical_and.reduceat(np.abs(v) < REST, active.bundle.starts)
+        still = np.logical_and.reduceat(np.abs(v[active.axes]) < REST, active.bundle.starts)
         numbers = (*active.operations, *active.ahead)
         return [number for number, ends in zip(numbers, done & still, strict=True) if ends]
 

@@ -47,7 +47,7 @@ class Inspection:
         if rows:
             position = self.d.efc_pos[:rows].reshape(-1, 6)[:, :3]
             self.residual = max(self.residual, float(np.abs(position).max()))
-        if not self.d.ncon:
+        if self._touching and not self.d.ncon:
             self._touching = frozenset()
 
     def started(self, operation: Operation, unit: int) -> None:

@@ -81,6 +81,7 @@ class MujocoWorld:
         self.tray = len(slides) - 1
         self.qpos = self.m.jnt_qposadr[joint]
         self.dof = self.m.jnt_dofadr[joint]
+        self._sensed = self.qpos[: self.tray], self.dof[: self.tray]
         self.body = self.m.jnt_bodyid[joint]
         self.tree = self.m.body_treeid[self.body]
         self.m.actuator_biasprm[actuator[: self.tray], 1:3] *= np.asarray(gains)[:, None]
@@ -89,6 +90,7 @@ class MujocoWorld:
         self.tick = self.settings.tick
         self.courses = Courses()
         self._tray = np.array([self.tray])
+        self._way = model.layout.outfeed_way
         self._tray_course: Course | None = None
         self._active = np.empty(0, np.intp)
         self._moves = b""
@@ -136,8 +138,7 @@ class MujocoWorld:
 
     def sense(self) -> tuple[Array, Array]:
         """Measured positions and speeds of all carriages, then of all lifts."""
-        axes = slice(self.tray)
-        return self.d.qpos[self.qpos[axes]], self.d.qvel[self.dof[axes]]
+        return self.d.qpos[self._sensed[0]], self.d.qvel[self._sensed[1]]
 
     def prepared(self, operation: Operation, unit: int) -> bool:
         """A feeder presents the part of that unit; the outfeed has room for a product."""
@@ -172,12 +173,13 @@ class MujocoWorld:
         limits. Whether any mode may have come to its goal: no robot is far ahead of its
         reference."""
         near = False
-        self._halt(axes)
+        if axes is not self._active:
+            self._halt(axes)
         if bundle is not None:
             x, v = self.reference[axes], self.speed[axes]
             begin = bundle, x.tobytes(), v.tobytes()
             course = self.courses.of(begin, lambda: self._course(bundle, axes, x, v))
-            self.reference[axes], self.speed[axes] = course.told.after[:, :2].T
+            self.reference[axes], self.speed[axes], _ = course.told.after.T
             self.setpoints.follow(axes, self._where, course.told)
             if course.moves != self._moves:
                 self._moves = course.moves
@@ -198,8 +200,6 @@ class MujocoWorld:
         """Robots whose operation has ended stop where their reference is. They may hand over at a
         low speed: left as a setpoint it would carry them out of the goal, and of the next
         domain."""
-        if active is self._active:
-            return
         left = np.zeros(len(self.speed), bool)
         left[self._active] = True
         left[active] = False
@@ -274,7 +274,7 @@ class MujocoWorld:
         self.inspection.tick()
         if self.stock.joining:
             self.stock.settle()
-        unit, way = self.stock.on_tray, self.model.layout.outfeed_way
+        unit, way = self.stock.on_tray, self._way
         if unit is not None and self._tray_is_at(way):
             self.inspection.measured(*self.stock.finished(unit))
             self.stock.recycle()
@@ -294,7 +294,7 @@ class MujocoWorld:
         x, v = self.reference[tray], self.speed[tray]
         begin = place, x.tobytes(), v.tobytes()
         course = self.courses.of(begin, lambda: self._course_of_tray(x, v, place))
-        self.reference[tray], self.speed[tray] = course.told.after[:, :2].T
+        self.reference[tray], self.speed[tray], _ = course.told.after.T
         self._tray_course = course
 
     def _course_of_tray(self, x: Array, v: Array, place: float) -> Course:

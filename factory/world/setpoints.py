@@ -24,6 +24,8 @@ from factory.mjcf.model import SAMPLES
 INPUTS = 3
 """A drive follows a position [m] and a speed [m/s], and pushes with a force besides [N]."""
 
+NOBODY = np.empty(0, np.intp)
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Told:
@@ -68,7 +70,7 @@ class Setpoints:
         self._early = self._times.copy()
         self._latest: list[tuple[float, Index, Array]] = []
         self._plan = np.zeros((4, len(actuators)))
-        self._due = np.zeros(len(actuators), bool)
+        self._due, self._any_due = np.zeros(len(actuators), bool), False
 
     def where(self, axes: Index) -> Where:
         """Where the drives of axes are told."""
@@ -77,9 +79,11 @@ class Setpoints:
     def of(self, axes: Index, x: Array, v: Array, a: Array, x1: Array, v1: Array) -> Told:
         """What axes are told that run from x [m] at speed v under acceleration a, and are at x1
         with the speed v1 when the engine comes back."""
-        force = self.mass[axes] * a + self.weight[axes]
-        terms = np.stack([x, v, a, force, np.ones(len(axes))], axis=-1)
-        return Told(terms, np.stack([x1, v1, force], axis=-1))
+        terms, after = np.empty((5, len(axes))), np.empty((INPUTS, len(axes)))
+        terms[0], terms[1], terms[2], terms[4] = x, v, a, 1.0
+        terms[3] = self.mass[axes] * a + self.weight[axes]
+        after[0], after[1], after[2] = x1, v1, terms[3]
+        return Told(terms.T, after.T)
 
     def tell(self, where: Where, told: Told) -> None:
         """Tell drives; the tick begins now."""
@@ -110,25 +114,27 @@ class Setpoints:
         plan = self._plan
         plan[0, axes] = self.d.time
         plan[1, axes], plan[2, axes], plan[3, axes] = x, v, a
-        self._due[axes] = True
+        self._due[axes] = self._any_due = True
 
     def weigh(self, axis: int, mass: float, weight: float) -> None:
         """From now on an axis moves a mass [kg] and carries a weight [N]."""
         self.mass[axis], self.weight[axis] = mass, weight
-        self._due[axis] = True
+        self._due[axis] = self._any_due = True
 
     def update(self, steps: int) -> tuple[Index, Truth]:
         """Tell those what comes that `move` has set going or stopped, before so many steps of the
         engine; gives who they are, and which of them are under way."""
-        (axes,) = self._due.nonzero()
-        if not len(axes):
-            return axes, self._due[axes]
+        (axes,) = self._due.nonzero() if self._any_due else (NOBODY,)
+        self._any_due = len(axes) > 0
+        if not self._any_due:
+            return NOBODY, NOBODY != 0
         begun, x, v, a = self._plan[:, axes]
         since, ahead = self.d.time - begun, steps * self._timestep
         x, v = x + since * (v + 0.5 * since * a), v + since * a
         x1, v1 = x + ahead * (v + 0.5 * ahead * a), v + ahead * a
         self.tell(self.where(axes), self.of(axes, x, v, a, x1, v1))
         self._due[axes] = moves = np.asarray(self._plan[2:, axes].any(axis=0))
+        self._any_due = bool(moves.any())
         return axes, moves
 
 
