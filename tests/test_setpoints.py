@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from factory import supervisor
 from factory.control.governor import follow
 from factory.engine import mujoco
 from factory.settings import Settings
@@ -162,26 +163,29 @@ def test_each_step_has_its_own_setpoints() -> None:
 
 
 def test_what_has_been_written_over_can_be_told_again() -> None:
-    """The engine goes back by a tick and nearly two: their samples are gone by then."""
+    """The engine goes back in the middle of a tick that one axis has been told at its beginning,
+    and another since. The samples of both are gone by then."""
     simulation = Simulation(layout_of("paper"), units=2)
-    world, axes = simulation.world, np.array([1, 4])
+    world, h = simulation.world, simulation.settings.timestep
     m, d, told = world.m, world.d, world.setpoints
-    begin, x, v = Rewind(m, d), world.reference[axes], np.array([-0.2, -0.1])
     for _ in range(3):
         simulation.supervisor.step()
-    begin.save()
-    now, a = world.time, np.array([0.5, -0.3])
-    told.tell(told.where(axes), told.of(axes, x, v, a, x, v))
-    mujoco.mj_step(m, d, 9)
+    begin, now, runs = Rewind(m, d), world.time, {}
+    for axis, v, a in ((1, -0.2, 0.5), (4, -0.1, -0.3)):
+        axes, x = np.array([axis]), world.reference[[axis]]
+        begin.save()
+        told.tell(told.where(axes), told.of(axes, x, *np.array([[v], [a]]), x, x))
+        runs[axis] = world.time, float(x[0]), v, a
+        mujoco.mj_step(m, d, 3 if axis == 1 else 9)
     begin.restore()
     told.again()
-    for number in range(simulation.settings.substeps):
-        t = d.time - now
+    assert d.time == pytest.approx(now + 3 * h)
+    for _ in range(2):
+        for axis, (since, x0, v, a) in runs.items():
+            t = d.time - since
+            read = mujoco.mj_readCtrl(m, d, axis, d.time, np.zeros((INPUTS, 1)), -1)
+            assert read[:2] == pytest.approx([x0 + v * t + a * t**2 / 2, v + a * t], abs=1e-12)
         mujoco.mj_step(m, d)
-        for n, axis in enumerate(axes):
-            read = mujoco.mj_readCtrl(m, d, axis, now + t, np.zeros((INPUTS, 1)), -1)
-            assert read[:2] == pytest.approx([x[n] + v[n] * t + a[n] * t**2 / 2, v[n] + a[n] * t])
-        assert number * m.opt.timestep == pytest.approx(t)
 
 
 # --- courses ---------------------------------------------------------------------------------
@@ -207,6 +211,16 @@ def test_steady_production_repeats_itself() -> None:
     while world.delivered() < 9:
         simulation.supervisor.step()
     assert len(world.courses) == known
+
+
+def test_bundles_are_forgotten_too(monkeypatch: pytest.MonkeyPatch) -> None:
+    usual, forgetful_one = ready("chest", True), ready("chest", True)
+    expected = states(usual, usual.supervisor.step, 800)
+    monkeypatch.setattr(supervisor, "KEPT", 3)
+    for state in expected:
+        assert states(forgetful_one, forgetful_one.supervisor.step, 1) == [state]
+        assert len(forgetful_one.supervisor.bundles) <= 3
+    assert len(usual.supervisor.bundles) > 3
 
 
 def test_there_is_room_for_so_many_numbers() -> None:

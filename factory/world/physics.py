@@ -27,7 +27,7 @@ from factory.mjcf.outfeed import TRAY_MASS
 from factory.world.courses import Course, Courses
 from factory.world.inspection import Inspection
 from factory.world.rewind import Rewind
-from factory.world.setpoints import Setpoints
+from factory.world.setpoints import Setpoints, under_way
 from factory.world.stock import AWAKE, FRESH, Stock
 
 AHEAD = 0.005
@@ -100,9 +100,6 @@ class MujocoWorld:
         mass[list(self.lift.values())] = HOIST_MASS
         weight[list(self.lift.values())] = HEAD_MASS * GRAVITY
         self.setpoints = Setpoints(self.m, self.d, np.array(actuator), mass, weight)
-        self.control = self.setpoints.control
-        self._where = self.setpoints.where(self._active)
-        self._at_tray = self.setpoints.where(self._tray)
         self.control = self.setpoints.control
         self._where = self.setpoints.where(self._active)
         self._at_tray = self.setpoints.where(self._tray)
@@ -193,8 +190,7 @@ class MujocoWorld:
         """A tick of the active modes. The load of each robot is that of its operation."""
         x1, v1, a = follow(bundle, x, v, self.tick)
         told = self.setpoints.of(axes, x, v, a, x1, v1)
-        moves = (v != 0.0) | (a != 0.0)
-        return Course(told, moves.tobytes(), bundle.near_goal(x1, AHEAD))
+        return Course(told, under_way(v, a).tobytes(), bundle.near_goal(x1, AHEAD))
 
     def _halt(self, active: Index) -> None:
         """Robots whose operation has ended stop where their reference is. They may hand over at a
@@ -219,13 +215,13 @@ class MujocoWorld:
         stopped: all at once, and one by one again where anything has touched, since contacts are
         looked at in every step."""
         m, d, step, vicinity = self.m, self.d, mujoco.mj_step, self.vicinity
-        told, moves = self.setpoints.update(steps)
-        if len(told):
-            self._attend(told, moves)
         if self._tray_course is not None:
             self.setpoints.follow(self._tray, self._at_tray, self._tray_course.told)
             self._attend(self._tray, np.frombuffer(self._tray_course.moves, bool))
             self._tray_course = None
+        told, moves = self.setpoints.update(steps)
+        if len(told):
+            self._attend(told, moves)
         vicinity.notice()
         if vicinity.stale:
             vicinity.look()
@@ -309,7 +305,7 @@ class MujocoWorld:
             x1, v1, a = np.array([place]), np.zeros(1), np.zeros(1)
             x, v = x1, v1
         told = self.setpoints.of(self._tray, x, v, a, x1, v1)
-        return Course(told, ((v != 0.0) | (a != 0.0)).tobytes(), False)
+        return Course(told, under_way(v, a).tobytes(), False)
 
     def unstable(self) -> str:
         """What made the engine give up, "" while it has not."""

@@ -133,9 +133,14 @@ class Setpoints:
         x, v = x + since * (v + 0.5 * since * a), v + since * a
         x1, v1 = x + ahead * (v + 0.5 * ahead * a), v + ahead * a
         self.tell(self.where(axes), self.of(axes, x, v, a, x1, v1))
-        self._due[axes] = moves = np.asarray(self._plan[2:, axes].any(axis=0))
+        self._due[axes] = moves = under_way(*self._plan[2:, axes])
         self._any_due = bool(moves.any())
         return axes, moves
+
+
+def under_way(v: Array, a: Array) -> Truth:
+    """Which axes do not stand: they have a speed [m/s], or get one by an acceleration [m/s²]."""
+    return np.asarray((v != 0.0) | (a != 0.0))
 
 
 def _samples(steps: int, timestep: float) -> Array:
