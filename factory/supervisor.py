@@ -26,9 +26,11 @@ REST = 0.01
 
 
 class World(Protocol):
-    """Where a factory runs: the ideal one or MuJoCo."""
+    """Where a factory runs: the ideal one or MuJoCo. `supplied`: whether an operation may have become
+    prepared that was not; whoever has asked again says that it is not so."""
 
     time: float
+    supplied: bool
 
     def sense(self) -> tuple[Array, Array]:
         """Positions x [m] and speeds [m/s] of all axes: in arc length of all carriages, then the
@@ -92,7 +94,7 @@ class Supervisor:
         self.axes_of = [*factory.axes, *((stage.robot,) for stage in stages)]
         self.axes = np.array([axis for axes in self.axes_of for axis in axes], np.intp)
         self.active = _Active((), (), None, np.empty(0, np.intp), np.empty(0))
-        self.near = True
+        self.near = self.enabled = True
         self.limit(limits)
         marking = factory.net.initial_marking if start is None else start
         self.threads = dict(factory.net.marking_of(marking).threads)
@@ -162,9 +164,11 @@ class Supervisor:
 
     def _startable(self) -> list[int]:
         """Operations X with X_s enabled: waits marked (their goals are everything), the robots in
-        the domain of X's mode, and the world prepared."""
-        if not self.ready:
+        the domain of X's mode, and the world prepared. Nobody is asked twice where nothing has
+        changed."""
+        if not (self.enabled or self.world.supplied):
             return []
+        self.enabled = self.world.supplied = False
         possible = [
             operation
             for operation in self.awaited()
@@ -174,6 +178,7 @@ class Supervisor:
             return []
         bundle, axes = self._bundle(tuple(operation.index for operation in possible))
         inside = bundle.in_domain(self.world.sense()[0][axes])
+        self.enabled = not inside.all()
         return [o.index for o, within in zip(possible, inside, strict=True) if within]
 
     def _finished(self) -> list[int]:
@@ -237,6 +242,7 @@ class Supervisor:
             self.missing[event] -= 1
             if self.missing[event] == 0 and event % 2 == 0:
                 self.ready.add(event)
+                self.enabled = True
 
     def _unmark(self, place: int) -> None:
         self.marked[place] = 0

@@ -76,6 +76,7 @@ class Hands:
     def free(self, label: str) -> None:
         """Let it give parts again."""
         self._blocked.discard(label)
+        self._world.supplied = True
 
     def let_go(self) -> None:
         """End the pushes whose time is over."""

@@ -26,7 +26,7 @@ class IdealWorld:
         wip: int | None = None,
         timestep: float = 0.002,
     ) -> None:
-        self.time = 0.0
+        self.time, self.supplied = 0.0, True
         self.x = np.array(start, float)
         self.v = np.zeros_like(self.x)
         self.dropoff, self.units, self.tick = dropoff, units, tick
@@ -51,6 +51,7 @@ class IdealWorld:
         """Parts follow labels; only finished products are counted."""
         for operation, _ in ended:
             if operation.index == self.dropoff:
+                self.supplied = True
                 self.count += 1
                 self.dropoffs.append(self.time)
 

@@ -92,6 +92,7 @@ class MujocoWorld:
         self._tray = np.array([self.tray])
         self._way = model.layout.outfeed_way
         self._tray_course: Course | None = None
+        self.supplied = self._is_home = True
         self._active = np.empty(0, np.intp)
         self._moves = b""
         self._under_way = np.zeros(len(slides), bool)
@@ -140,7 +141,8 @@ class MujocoWorld:
     def prepared(self, operation: Operation, unit: int) -> bool:
         """A feeder presents the part of that unit; the outfeed has room for a product."""
         if operation.index == self.model.factory.dropoff.index:
-            return self.stock.on_tray is None and self._tray_is_at(0.0)
+            self._is_home = self.stock.on_tray is None and self._tray_is_at(0.0)
+            return self._is_home
         return bool(operation.inputs) or self.stock.presents(operation.label, unit)
 
     def apply(
@@ -158,6 +160,7 @@ class MujocoWorld:
             self.inspection.handed_over(switched)
             for slot, robot in enumerate(operation.robots):
                 self._load(robot, self.model.masses.get(operation.after[slot], 0.0))
+            self.supplied = True
 
     def _load(self, robot: int, load: float) -> None:
         """A robot carries so much from now on [kg]: its drives push accordingly."""
@@ -274,7 +277,10 @@ class MujocoWorld:
         if unit is not None and self._tray_is_at(way):
             self.inspection.measured(*self.stock.finished(unit))
             self.stock.recycle()
-            unit = None
+            unit, self.supplied = None, True
+        elif unit is None and not self._is_home:
+            self._is_home = self._tray_is_at(0.0)
+            self.supplied |= self._is_home
         place = 0.0 if unit is None else way
         if self.reference[self.tray] != place or self.speed[self.tray]:
             self._send_tray(place)

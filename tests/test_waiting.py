@@ -1,0 +1,52 @@
+"""Who waits is asked again only where something has changed that it may wait for."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from factory.settings import Settings
+from factory.simulation import Simulation
+from tests.test_vicinity import layout
+
+RUNS: list[tuple[str, dict[str, Any]]] = [
+    ("paper", {}),
+    ("chest", {"settings": Settings(stage=1)}),
+    ("gearbox", {"fuse": True}),
+    ("20", {"wip": 2}),
+    ("20", {"wip": 1, "fuse": True}),
+    ("paper", {"world": "ideal", "wip": 1}),
+    ("20", {"world": "ideal", "wip": 2}),
+]
+
+
+@pytest.mark.parametrize(("name", "given"), RUNS)
+def test_nobody_need_be_asked_twice(name: str, given: dict[str, Any]) -> None:
+    """A run is the same where everybody is asked in every tick."""
+    runs = [Simulation(layout(name), units=6, seed=3, jitter=0.3, **given) for _ in range(2)]
+    for supervisor in (simulation.supervisor for simulation in runs):
+        while supervisor.world.delivered() < 4:
+            supervisor.enabled |= supervisor is runs[0].supervisor
+            supervisor.step()
+    asked, told = (simulation.supervisor.events for simulation in runs)
+    assert asked == told
+
+
+@pytest.mark.parametrize(("name", "given"), RUNS)
+def test_nobody_is_asked_while_nothing_changes(name: str, given: dict[str, Any]) -> None:
+    """But when something has fired, or the outfeed's tray has gone or come home."""
+    simulation = Simulation(layout(name), units=6, **given)
+    supervisor, world = simulation.supervisor, simulation.world
+    prepared, asked, ticks = world.prepared, set(), 0
+
+    def counted(*about: Any) -> bool:
+        asked.add(ticks)
+        return bool(prepared(*about))
+
+    world.prepared = counted
+    while world.delivered() < 4:
+        supervisor.step()
+        ticks += 1
+    changes = len({event.t for event in supervisor.events}) + 2 * world.delivered()
+    assert len(asked) <= changes + 1 < ticks / 2
