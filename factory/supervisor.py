@@ -26,8 +26,10 @@ REST = 0.01
 
 
 class World(Protocol):
-    """Where a factory runs: the ideal one or MuJoCo. `supplied`: whether an operation may have become
-    prepared that was not; whoever has asked again says that it is not so."""
+    """Where a factory runs: the ideal one or MuJoCo.
+
+    `supplied`: whether an operation may have become prepared since somebody asked, who then sets it
+    back."""
 
     time: float
     supplied: bool

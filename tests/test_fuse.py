@@ -16,7 +16,7 @@ from factory.layout.plan import Layout
 from factory.monitor import beside
 from factory.simulation import Simulation
 from factory.wholes import FUSE_FROM, bodies_of, fused_copies, fusing_pays
-from factory.world.fusing import fuse, misfit
+from factory.world.fusing import Groups, fuse, misfit, turns
 from tests.command_line import PAPER, ROOT, Terminal
 from tests.test_simulation import laid_out
 
@@ -69,7 +69,7 @@ def test_momentum_goes_over_to_the_one_body(count: int, seed: int) -> None:
     d.qvel[: 6 * count] = rng.normal(0, 1, 6 * count)
     bodies = list(range(1, whole))
     before = momentum(m, d, bodies)
-    fuse(m, d, bodies, whole)
+    fuse(m, d, Groups.of([bodies]), np.array([whole]))
     after = momentum(m, d, [whole])
     assert np.allclose(after, before, atol=1e-9)
     assert np.allclose(d.xipos[whole], m.body_mass[bodies] @ d.xipos[bodies] / m.body_mass[whole])
@@ -84,7 +84,7 @@ def test_a_rigid_motion_goes_over_unchanged() -> None:
         d.qvel[v + 3 : v + 6] = turning
     mujoco.mj_forward(m, d)
     before = d.energy.copy()
-    fuse(m, d, [1, 2, 3], whole)
+    fuse(m, d, Groups.of([[1, 2, 3]]), np.array([whole]))
     assert np.allclose(d.qvel[-3:], turning)
     assert np.array_equal(before, d.energy)
 
@@ -92,15 +92,43 @@ def test_a_rigid_motion_goes_over_unchanged() -> None:
 def test_misfit_sees_a_shift_and_a_turn() -> None:
     m, d, _ = free_bodies(np.random.default_rng(1), 2)
     mujoco.mj_forward(m, d)
-    places, radii = d.xpos[1:3].copy(), np.array([0.1, 0.1])
-    assert misfit(d, [1, 2], places, radii) < 1e-12
+    places, radii, both = d.xpos[1:3].copy(), np.array([0.1, 0.1]), Groups.of([[1, 2]])
+    assert misfit(d, both, places, radii) < 1e-12
     d.qpos[7] += 1e-5
     mujoco.mj_forward(m, d)
-    assert misfit(d, [1, 2], places, radii) == pytest.approx(1e-5)
+    assert misfit(d, both, places, radii) == pytest.approx(1e-5)
     d.qpos[7] -= 1e-5
     d.qpos[10:14] = np.cos(5e-4), 0, 0, np.sin(5e-4)
     mujoco.mj_forward(m, d)
-    assert misfit(d, [1, 2], places, radii) > 1e-3 * 0.1
+    assert misfit(d, both, places, radii) > 1e-3 * 0.1
+
+
+def test_groups_are_treated_as_each_would_be_alone() -> None:
+    rng = np.random.default_rng(5)
+    m, d, _ = free_bodies(rng, 9)
+    d.qvel[:] = rng.normal(0, 1, m.nv)
+    mujoco.mj_forward(m, d)
+    groups, wholes = [[1, 2, 3], [4], [6, 5]], [8, 9, 7]
+    alone = mujoco.MjData(m)
+    mujoco.mj_copyData(alone, m, d)
+    places, radii = d.xpos + rng.normal(0, 0.1, d.xpos.shape), rng.uniform(0, 0.1, m.nbody)
+    far = [misfit(alone, Groups.of([group]), places[group], radii[group])[0] for group in groups]
+    for group, whole in zip(groups, wholes, strict=True):
+        fuse(m, alone, Groups.of([group]), np.array([whole]))
+    every = [body for group in groups for body in group]
+    assert misfit(d, Groups.of(groups), places[every], radii[every]) == pytest.approx(far)
+    fuse(m, d, Groups.of(groups), np.array(wholes))
+    for name in ("qpos", "qvel", "xpos", "xmat", "xquat"):
+        assert np.allclose(getattr(d, name), getattr(alone, name), rtol=0, atol=1e-12), name
+
+
+def test_turns_are_those_of_the_engine() -> None:
+    quaternions = np.random.default_rng(6).normal(size=(20, 4))
+    quaternions /= np.linalg.norm(quaternions, axis=1)[:, None]
+    matrix = np.empty(9)
+    for quaternion, turn in zip(quaternions, turns(quaternions), strict=True):
+        mujoco.mju_quat2Mat(matrix, quaternion)
+        assert np.allclose(turn.reshape(9), matrix, rtol=0, atol=1e-15)
 
 
 @pytest.mark.parametrize("name", ["paper", "lamp", "gearbox"])
@@ -178,8 +206,8 @@ def test_the_monitor_catches_a_body_made_of_another_unit() -> None:
             kept.append("part1")
             robot = simulation.layout.factory.by_label["sub1"].carrier
             grip = stock.grip[robot, "part1"]
-            stock._loose([stock.park["part1", stock.free["part1"][0]]])
-            stock._join([grip], [stock.m.eq_obj2id[grip]])
+            stock.board.loose([stock.park["part1", stock.free["part1"][0]]])
+            stock.board.join([grip], [stock.m.eq_obj2id[grip]])
 
     stock._retire = faulty
     monitor = beside(simulation)

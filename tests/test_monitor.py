@@ -191,13 +191,13 @@ def address(simulation: Simulation, body: str) -> int:
 
 def test_a_weld_that_is_never_released(paper: Layout) -> None:
     simulation = Simulation(paper, units=1)
-    stock, kept = simulation.world.stock, weld(simulation, "grip/r5/part1")
-    loose = stock._loose
+    board, kept = simulation.world.stock.board, weld(simulation, "grip/r5/part1")
+    loose = board.loose
 
     def sticky(welds: list[int]) -> None:
         loose([number for number in welds if number != kept])
 
-    stock._loose = sticky
+    board.loose = sticky
     run, report = watched(simulation, 3)
     t = next(e.t for e in run.events if e.transition == "sub1_e")
     assert_caught(report, "TwoHolders", "r5", "part1", 6, t)
@@ -507,14 +507,14 @@ def test_run_with_a_monitor(run: Terminal) -> None:
 
 def test_a_faulty_run_fails(run: Terminal, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Two parts are never let go: status 1, beside the run and from its log."""
-    from factory.world.stock import Stock
+    from factory.world.switchboard import Switchboard
 
-    loose = Stock._loose
+    loose = Switchboard.loose
 
-    def sticky(self: Stock, welds: list[int]) -> None:
+    def sticky(self: Switchboard, welds: list[int]) -> None:
         loose(self, [n for n in welds if self.m.equality(n).name != "grip/r5/part1"])
 
-    monkeypatch.setattr(Stock, "_loose", sticky)
+    monkeypatch.setattr(Switchboard, "loose", sticky)
     log = tmp_path / "log"
     done = run("run", PAPER, "--monitor", "--max-time", 1, "--json", "--log", log)
     assert done.status == 1 and not done.json["refines_net"]

@@ -8,6 +8,7 @@ from factory.control.mode import Array, Index
 from factory.engine import mujoco
 from factory.fidelity.record import HandOff
 from factory.fidelity.welds import Velocities, Welds
+from factory.world.fusing import turns
 
 WINDOW = 0.05
 """So long after the switch [s] its consequences are looked for; a weld settles in a fifth of it."""
@@ -22,7 +23,7 @@ class HandOffs:
 
     def __init__(self, m: mujoco.MjModel, welds: Welds, velocities: Velocities) -> None:
         self.m, self.welds, self.velocities = m, welds, velocities
-        self.turn = _turns(m.body_iquat)
+        self.turn = turns(m.body_iquat)
         self.done: list[HandOff] = []
         self._watched: list[_Watched] = []
         self._join()
@@ -111,11 +112,3 @@ class _Watched:
     def result(self) -> HandOff:
         energy = max(0.0, self.peak - (self.first or 0.0))
         return self.made.after(1e3 * self.impulse, 1e3 * energy / self.made.mass_kg)
-
-
-def _turns(quaternions: Array) -> Array:
-    """Rotation matrices (n, 3, 3)."""
-    found = np.zeros((len(quaternions), 9))
-    for matrix, quaternion in zip(found, quaternions, strict=True):
-        mujoco.mju_quat2Mat(matrix, quaternion)
-    return found.reshape(-1, 3, 3)

@@ -15,9 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from factory.approach import Pair
+from factory.control.mode import Index
+from factory.control.obstacles import ranges
 from factory.engine import mujoco
-
-Index = NDArray[np.intp]
 
 NOBODY = 0
 """The code of no holder: such a part, a spare one out of sight, touches nothing."""
@@ -46,6 +46,12 @@ class Contacts:
         self.unit = np.full(m.nbody, -1)
         self.contype, self.conaffinity = m.body_contype.copy(), m.body_conaffinity.copy()
         self.solid = {int(b): self._solid(int(b)) for ids in bodies.values() for b in ids}
+        self._geoms = np.concatenate([*self.solid.values()])
+        self._count = np.zeros(m.nbody, np.intp)
+        self._count[[*self.solid]] = [len(geoms) for geoms in self.solid.values()]
+        self._first = np.zeros(m.nbody, np.intp)
+        self._first[[*self.solid]] = np.cumsum(self._count[[*self.solid]])
+        self._first -= self._count
         self.partners: dict[str, list[str]] = {}
         for one, other in excluded:
             self.partners.setdefault(one, []).append(other)
@@ -59,19 +65,17 @@ class Contacts:
         geoms = self.m.body_geomadr[body] + np.arange(self.m.body_geomnum[body])
         return np.asarray(geoms[self.m.geom_group[geoms] != 1])
 
-    def hold(self, bodies: Sequence[int], holder: int) -> None:
-        """From now on parts are in the hands of a holder (its code)."""
-        if not len(bodies):
-            return
-        own = holder << 1
-        others = ((~holder & ALL) << 1) | 1 if holder else 0
-        geoms = np.concatenate([self.solid[int(body)] for body in bodies])
-        chosen = np.asarray(bodies)
-        self.code[chosen] = holder
-        self.m.geom_contype[geoms] = own
-        self.m.geom_conaffinity[geoms] = others
-        self.contype[chosen] = self.m.body_contype[chosen] = own
-        self.conaffinity[chosen] = self.m.body_conaffinity[chosen] = others
+    def hold(self, bodies: Index, holders: Index) -> None:
+        """From now on parts are each in the hands of a holder (its code)."""
+        own = holders << 1
+        others = np.where(holders == NOBODY, 0, ((~holders & ALL) << 1) | 1)
+        count = self._count[bodies]
+        geoms = self._geoms[ranges(self._first[bodies], count)]
+        self.code[bodies] = holders
+        self.m.geom_contype[geoms] = np.repeat(own, count)
+        self.m.geom_conaffinity[geoms] = np.repeat(others, count)
+        self.contype[bodies] = self.m.body_contype[bodies] = own
+        self.conaffinity[bodies] = self.m.body_conaffinity[bodies] = others
 
     @property
     def collides(self) -> NDArray[np.bool_]:

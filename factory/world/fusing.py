@@ -8,9 +8,11 @@ against each other, which the welds that join them have brought to rest before.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
+from factory.control.mode import Index
 from factory.engine import mujoco
 from factory.meshes import Array
 
@@ -22,48 +24,87 @@ RIGID = 1e-6
 the others [m]."""
 
 
-def misfit(d: mujoco.MjData, bodies: Sequence[int], places: Array, radii: Array) -> float:
-    """How far at most any vertex of some bodies is from its place beside the first [m].
+@dataclass(frozen=True, slots=True, eq=False)
+class Groups:
+    """Bodies in groups: all `bodies` (n,) one group after another, the number of each group's first
+    in `starts`, and of each body's group in `owner` (n,)."""
+
+    bodies: Index
+    starts: Index
+    owner: Index
+
+    @classmethod
+    def of(cls, groups: Sequence[Sequence[int]]) -> Groups:
+        """From lists of bodies, none of them empty."""
+        sizes = np.array([len(group) for group in groups], np.intp)
+        bodies = np.array([body for group in groups for body in group], np.intp)
+        return cls(bodies, np.cumsum(sizes) - sizes, np.repeat(np.arange(len(sizes)), sizes))
+
+    def sum(self, values: Array) -> Array:
+        """The sum of values (n, ...) over each group (groups, ...)."""
+        return np.asarray(np.add.reduceat(values, self.starts))
+
+    def first(self, values: Array) -> Array:
+        """For each body (n, ...) the value that the first of its group has."""
+        return np.asarray(values[self.starts][self.owner])
+
+
+def misfit(d: mujoco.MjData, groups: Groups, places: Array, radii: Array) -> Array:
+    """How far at most any vertex of each group (groups,) is from its place beside the first
+    body [m].
 
     `places` (n, 3): their centres of mass in the frame of the product; `radii` (n,): how far their
     vertices are from those. Bodies never turn but by what their welds yield.
     """
-    chosen = list(bodies)
-    here, turn = d.xpos[chosen], d.xmat[chosen].reshape(-1, 3, 3)
-    apart = (here - here[0]) @ turn[0] - (places - places[0])
-    tilt = np.linalg.norm(turn - turn[0], axis=(1, 2))
-    return float((np.linalg.norm(apart, axis=1) + tilt * radii).max())
+    here, turn = d.xpos[groups.bodies], d.xmat[groups.bodies].reshape(-1, 3, 3)
+    against, straight = groups.first(turn), places - groups.first(places)
+    apart = ((here - groups.first(here))[:, None] @ against)[:, 0] - straight
+    tilt = np.linalg.norm(turn - against, axis=(1, 2))
+    return np.asarray(
+        np.maximum.reduceat(np.linalg.norm(apart, axis=1) + tilt * radii, groups.starts)
+    )
 
 
-def fuse(m: mujoco.MjModel, d: mujoco.MjData, bodies: Sequence[int], whole: int) -> None:
-    """Put the body `whole` in the place of free bodies: pose, momentum and angular momentum are
-    theirs. Its turn is that of the heaviest, and all origins are centres of mass; speeds of turning
-    are in a body's own frame, inertia is in that of its principal axes."""
-    chosen = list(bodies)
-    joint = m.body_jntadr[chosen]
+def fuse(m: mujoco.MjModel, d: mujoco.MjData, groups: Groups, wholes: Index) -> None:
+    """Put each of the bodies `wholes` (groups,) in the place of a group of free bodies: pose,
+    momentum and angular momentum are theirs. Its turn is that of the heaviest, and all origins are
+    centres of mass; speeds of turning are in a body's own frame, inertia is in that of its
+    principal axes."""
+    bodies, owner = groups.bodies, groups.owner
+    joint = m.body_jntadr[bodies]
     q, v = m.jnt_qposadr[joint], m.jnt_dofadr[joint]
-    mass = m.body_mass[chosen]
-    share = mass / mass.sum()
+    mass = m.body_mass[bodies]
+    share = (mass / groups.sum(mass)[owner])[:, None]
     pose = d.qpos[q[:, None] + np.arange(7)]
     speed = d.qvel[v[:, None] + np.arange(6)]
-    centre, common = share @ pose[:, :3], share @ speed[:, :3]
-    moment = (mass[:, None] * (pose[:, :3] - centre)).T @ (speed[:, :3] - common)  # sum of m r vᵀ
-    spin = np.array((moment - moment.T)[[1, 2, 0], [2, 0, 1]])
-    for body, quaternion, turning in zip(chosen, pose[:, 3:], speed[:, 3:], strict=True):
-        axes = _turn(m.body_iquat[body])
-        spin += _turn(quaternion) @ (axes @ (m.body_inertia[body] * (turning @ axes)))
-    heaviest = int(mass.argmax())
-    at, dof = (int(a[m.body_jntadr[whole]]) for a in (m.jnt_qposadr, m.jnt_dofadr))
-    d.qpos[at : at + 3], d.qpos[at + 3 : at + 7] = centre, pose[heaviest, 3:]
-    axes = _turn(m.body_iquat[whole])
-    local = spin @ _turn(pose[heaviest, 3:])
-    d.qvel[dof : dof + 3] = common
-    d.qvel[dof + 3 : dof + 6] = axes @ (local @ axes / m.body_inertia[whole])
-    d.xpos[whole] = share @ d.xpos[chosen]
-    d.xmat[whole], d.xquat[whole] = d.xmat[chosen[heaviest]], d.xquat[chosen[heaviest]]
+    turn, axes = turns(pose[:, 3:]), turns(m.body_iquat[bodies])
+    centre, common = groups.sum(share * pose[:, :3]), groups.sum(share * speed[:, :3])
+    arm, drift = pose[:, :3] - centre[owner], speed[:, :3] - common[owner]
+    own = _times(axes, m.body_inertia[bodies] * _times(axes.transpose(0, 2, 1), speed[:, 3:]))
+    spin = groups.sum(_times(turn, own) + np.cross(mass[:, None] * arm, drift))
+    heaviest = np.lexsort((-mass, owner))[groups.starts]
+    joint = m.body_jntadr[wholes]
+    q, v = m.jnt_qposadr[joint][:, None], m.jnt_dofadr[joint][:, None]
+    d.qpos[q + np.arange(3)], d.qpos[q + np.arange(3, 7)] = centre, pose[heaviest, 3:]
+    axes = turns(m.body_iquat[wholes])
+    back = axes.transpose(0, 2, 1) @ turn[heaviest].transpose(0, 2, 1)
+    d.qvel[v + np.arange(3)] = common
+    d.qvel[v + np.arange(3, 6)] = _times(axes, _times(back, spin) / m.body_inertia[wholes])
+    d.xpos[wholes] = groups.sum(share * d.xpos[bodies])
+    d.xmat[wholes], d.xquat[wholes] = d.xmat[bodies[heaviest]], d.xquat[bodies[heaviest]]
 
 
-def _turn(quaternion: Array) -> Array:
-    matrix = np.empty(9)
-    mujoco.mju_quat2Mat(matrix, quaternion)
-    return matrix.reshape(3, 3)
+def turns(quaternions: Array) -> Array:
+    """Rotation matrices (n, 3, 3) of unit quaternions (n, 4)."""
+    w, x, y, z = quaternions.T
+    rows = [
+        [w * w + x * x - y * y - z * z, 2 * (x * y - w * z), 2 * (x * z + w * y)],
+        [2 * (x * y + w * z), w * w - x * x + y * y - z * z, 2 * (y * z - w * x)],
+        [2 * (x * z - w * y), 2 * (y * z + w * x), w * w - x * x - y * y + z * z],
+    ]
+    return np.array(rows).transpose(2, 0, 1)
+
+
+def _times(matrices: Array, vectors: Array) -> Array:
+    """Each matrix (n, 3, 3) times its vector (n, 3)."""
+    return np.asarray((matrices @ vectors[:, :, None])[:, :, 0])

@@ -10,7 +10,7 @@ from factory.factory import Operation
 from factory.mjcf.model import Model
 from factory.trace import PhysicsFigures
 from factory.world.contacts import Contacts
-from factory.world.stock import Switched
+from factory.world.switchboard import Switched
 
 
 class Inspection:
@@ -37,7 +37,7 @@ class Inspection:
         self._local = np.concatenate(corners) - places[self._owner]
 
     def handed_over(self, switched: Switched) -> None:
-        """Count a hand-off and keep the largest gap."""
+        """Count hand-offs and keep the largest gap."""
         self.handoffs += switched.count
         self.gap = max(self.gap, switched.gap)
 

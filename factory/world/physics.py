@@ -28,7 +28,8 @@ from factory.world.courses import Course, Courses
 from factory.world.inspection import Inspection
 from factory.world.rewind import Rewind
 from factory.world.setpoints import Setpoints, under_way
-from factory.world.stock import AWAKE, FRESH, Stock
+from factory.world.stock import Stock
+from factory.world.switchboard import AWAKE, FRESH
 
 AHEAD = 0.005
 """No robot is further ahead of its reference than this [m]."""
@@ -151,16 +152,17 @@ class MujocoWorld:
         """Hand the parts of ended operations over: welds off and on in one tick."""
         for operation, unit in started:
             self.inspection.started(operation, unit)
+        if not ended:
+            return
+        self.stock.fuse([robot for operation, _ in ended for robot in operation.robots])
         for operation, unit in ended:
             self.inspection.ended(operation)
             if operation.index == self.model.factory.dropoff.index:
-                self.stock.fuse(operation.carrier)
                 self.inspection.measured(*self.stock.finished(unit))
-            switched = self.stock.hand_over(operation, unit)
-            self.inspection.handed_over(switched)
             for slot, robot in enumerate(operation.robots):
                 self._load(robot, self.model.masses.get(operation.after[slot], 0.0))
-            self.supplied = True
+        self.inspection.handed_over(self.stock.hand_over(ended))
+        self.supplied = True
 
     def _load(self, robot: int, load: float) -> None:
         """A robot carries so much from now on [kg]: its drives push accordingly."""
@@ -265,8 +267,7 @@ class MujocoWorld:
         self.d.qvel[dof[self.d.qvel[dof] == 0.0]] = AWAKE
         awake = self.d.tree_asleep[tree] < 0
         self.d.tree_asleep[tree[awake]] = FRESH
-        for body in self.body[axes[~awake]].tolist():
-            self.vicinity.woken(body)
+        self.vicinity.woken(self.body[axes[~awake]])
 
     def settle(self) -> None:
         """After a tick: look at welds, and move the outfeed's tray."""

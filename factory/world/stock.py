@@ -4,34 +4,20 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from factory.engine import mujoco
 from factory.factory import Operation
+from factory.meshes import Array
 from factory.mjcf import names
 from factory.mjcf.model import Model
 from factory.mjcf.parts import parked_at, presented_at
 from factory.pag import NOPART
 from factory.world.contacts import NOBODY, Contacts
-from factory.world.fusing import RIGID, SETTLING, fuse, misfit
+from factory.world.fusing import RIGID, SETTLING, Groups, fuse, misfit
+from factory.world.switchboard import Switchboard, Switched
 from factory.world.vicinity import Vicinity
-
-AWAKE = -0.0
-"""Written over a speed of zero it wakes a sleeping body and changes nothing else."""
-
-FRESH = -1 - int(mujoco.mjMINAWAKE)
-"""What the engine has for a tree that has just begun to be slow."""
-
-
-@dataclass(frozen=True, slots=True)
-class Switched:
-    """Grips switched by one operation: how many, and the largest gap between the joined frames
-    [m]."""
-
-    count: int
-    gap: float
 
 
 class Stock:
@@ -63,7 +49,6 @@ class Stock:
             label: np.array([m.body(names.part(label, n + 1)).id for n in range(count)])
             for label, count in model.copies.items()
         }
-        self._tree = np.where(m.body_dofnum > 0, m.body_treeid, -1).tolist()
         self.contacts = Contacts(m, self.body, model.excluded)
         self.tray = len(factory.robots) + 1
         self.feeder = {o.label: self.tray + 1 + n for n, o in enumerate(factory.leaves)}
@@ -88,10 +73,12 @@ class Stock:
         self.left: list[float] = []
         holders = self.contacts.own(self._trees(), self.tray + len(self.feeder))
         self.vicinity = Vicinity(m, d, self.contacts, holders)
+        self.board = Switchboard(m, d, self.contacts, self.vicinity)
         self._hide_spares()
         self._hand_out(counts)
         for label in self.feed:
             self.feed_next(label)
+        self.board.write()
 
     # --- feeding -------------------------------------------------------------------------------
 
@@ -113,46 +100,48 @@ class Stock:
         self.shown[label] = unit
         self.next_unit[label] += 1
         body = int(self.body[label][copy])
-        self._place([body], [self.presented[label]])
         self.contacts.enter(label, unit, body)
-        self.contacts.hold([body], self.feeder[label])
-        self._loose([self.park[label, copy]])
-        self._join([self.feed[label]], [body])
+        self.board.place([body], [self.presented[label]])
+        self.board.hold([body], self.feeder[label])
+        self.board.loose([self.park[label, copy]])
+        self.board.join([self.feed[label]], [body])
 
     # --- handing over --------------------------------------------------------------------------
 
-    def hand_over(self, operation: Operation, unit: int) -> Switched:
-        """Switch the grips that an operation's end asks for; a feeder's too, and at dropoff all of
-        the output robot's against those of the outfeed's tray."""
+    def hand_over(self, ended: Sequence[tuple[Operation, int]]) -> Switched:
+        """Switch the grips that the ends of operations ask for, each with the number of its
+        unit."""
+        for operation, unit in ended:
+            self._hand_over(operation, unit)
+        return self.board.write()
+
+    def _hand_over(self, operation: Operation, unit: int) -> None:
+        """A feeder's grip too, and at dropoff all of the output robot's against those of the
+        outfeed's tray."""
         if not operation.inputs:
-            switched = self._take(operation, unit)
+            self._take(operation, unit)
         elif operation.index == self.model.factory.dropoff.index:
-            switched = self._release(operation, unit)
+            self._release(operation, unit)
         else:
-            switched = self._pass_on(operation, unit)
+            self._pass_on(operation, unit)
         for robot in operation.robots:
             label = self.feeds_robot.get(robot)
             if label and operation.after[operation.robots.index(robot)] == NOPART:
                 self.taken.discard(label)
                 self.feed_next(label)
-        return switched
 
-    def _take(self, operation: Operation, unit: int) -> Switched:
+    def _take(self, operation: Operation, unit: int) -> None:
         label = operation.label
         del self.shown[label]
         self.taken.add(label)
-        grip, body = [self.grip[operation.carrier, label]], [self.body_of(label, unit)]
-        gap = self._gap(grip, body)
-        self._loose([self.feed[label]])
-        self._join(grip, body)
-        self.contacts.hold(body, operation.carrier + 1)
+        body = [self.body_of(label, unit)]
+        self.board.loose([self.feed[label]])
+        self.board.grip([self.grip[operation.carrier, label]], body)
+        self.board.hold(body, operation.carrier + 1)
         self.load[operation.carrier] = unit, [label]
-        return Switched(1, gap)
 
-    def _pass_on(self, operation: Operation, unit: int) -> Switched:
+    def _pass_on(self, operation: Operation, unit: int) -> None:
         carrier = operation.carrier
-        for robot in operation.robots:
-            self.fuse(robot)
         _, kept = self.load.setdefault(carrier, (unit, []))
         moved = [
             (robot, label)
@@ -161,68 +150,85 @@ class Stock:
             for label in self.load.pop(robot)[1]
         ]
         labels = [label for _, label in moved]
-        grips, bodies = [self.grip[carrier, label] for label in labels], self._bodies(labels, unit)
-        gap = self._gap(grips, bodies)
-        self._loose([self.grip[pair] for pair in moved])
-        self._join(grips, bodies)
-        self.contacts.hold(bodies, carrier + 1)
+        bodies = self._bodies(labels, unit)
+        self.board.loose([self.grip[pair] for pair in moved])
+        self.board.grip([self.grip[carrier, label] for label in labels], bodies)
+        self.board.hold(bodies, carrier + 1)
         self.load[carrier] = unit, kept + labels
         if operation.label in self.bodies.wholes:
             self.joining[carrier] = operation.label, float(self.d.time)
-        return Switched(len(moved), gap)
 
-    def _release(self, operation: Operation, unit: int) -> Switched:
+    def _release(self, operation: Operation, unit: int) -> None:
         del self.load[operation.carrier]
-        holds, bodies = [*map(self.hold.__getitem__, self.parts)], self._bodies(self.parts, unit)
-        gap = self._gap(holds, bodies)
-        self._loose([self.grip[operation.carrier, part] for part in self.parts])
-        self._join(holds, bodies)
-        self.contacts.hold(bodies, self.tray)
+        bodies = self._bodies(self.parts, unit)
+        self.board.loose([self.grip[operation.carrier, part] for part in self.parts])
+        self.board.grip([self.hold[part] for part in self.parts], bodies)
+        self.board.hold(bodies, self.tray)
         self.on_tray = unit
         self.released += 1
-        return Switched(len(self.parts), gap)
 
     # --- joined for good -----------------------------------------------------------------------
 
     def settle(self) -> None:
         """Let one body take the place of those that a robot has joined, once they have settled."""
         now = self.d.time
-        for robot, (_, since) in list(self.joining.items()):
-            if now - since > SETTLING and robot in self.joining:
-                apart = self._misfit(robot)
-                if apart < RIGID:
-                    self.fuse(robot, apart)
+        waiting = [robot for robot, (_, since) in self.joining.items() if now - since > SETTLING]
+        if waiting:
+            apart = self._misfits(waiting)
+            self.fuse([r for r, far in zip(waiting, apart, strict=True) if far < RIGID])
 
-    def _misfit(self, robot: int) -> float:
-        unit, labels = self.load[robot]
+    def _held(self, robots: Iterable[int]) -> Groups:
+        """The bodies that robots hold, those of each together."""
+        loads = (self.load[robot] for robot in robots)
+        return Groups.of([self._bodies(labels, unit) for unit, labels in loads])
+
+    def _misfits(self, robots: Iterable[int]) -> Array:
+        """How far out of place anything of what robots hold is [m]."""
+        labels = [label for robot in robots for label in self.load[robot][1]]
         places = np.array([self.bodies.centre[label] for label in labels])
         radii = np.array([self.bodies.radius[label] for label in labels])
-        return misfit(self.d, self._bodies(labels, unit), places, radii)
+        return misfit(self.d, self._held(robots), places, radii)
 
-    def fuse(self, robot: int, apart: float | None = None) -> None:
-        """Let one body take the place of those that a robot (index) has joined, if it has not yet.
-        Where no copy of that body is free, its holder's bodies become one first. `apart`: their
-        misfit, where it is known."""
-        if robot not in self.joining:
+    def fuse(self, robots: Iterable[int]) -> None:
+        """Let one body each take the place of those that robots (index) have joined, if it has not
+        yet. Where no copy of that body is free, its holder's bodies become one first."""
+        made: dict[int, str] = {}
+        for robot in robots:
+            if robot in self.joining:
+                label, _ = self.joining.pop(robot)
+                if not self._spare(label, made):
+                    self._become_one(made)
+                    made = {}
+                if not self.free[label]:
+                    self.fuse([next(r for r in self.joining if label in self.load[r][1])])
+                made[robot] = label
+        self._become_one(made)
+
+    def _spare(self, label: str, made: Mapping[int, str]) -> bool:
+        """Whether there is a copy of a body beside those that are about to be `made`."""
+        return len(self.free[label]) > sum(each == label for each in made.values())
+
+    def _become_one(self, made: Mapping[int, str]) -> None:
+        """Robots get a body each, of this label, for all that they hold."""
+        if not made:
             return
-        label, _ = self.joining.pop(robot)
-        if not self.free[label]:
-            self.fuse(next(r for r in self.joining if label in self.load[r][1]))
-        unit, labels = self.load[robot]
-        self.misfit[unit] = max(
-            self.misfit.get(unit, 0.0), self._misfit(robot) if apart is None else apart
-        )
-        copy = self.free[label].popleft()
-        whole = int(self.body[label][copy])
-        fuse(self.m, self.d, self._bodies(labels, unit), whole)
-        self.vicinity.woken(whole)
-        self._loose([*(self.grip[robot, each] for each in labels), self.park[label, copy]])
-        self._retire(labels, unit)
-        self.copy_of[label, unit] = copy
-        self._join([self.grip[robot, label]], [whole])
-        self.contacts.enter(label, unit, whole)
-        self.contacts.hold([whole], robot + 1)
-        self.load[robot] = unit, [label]
+        for robot, apart in zip(made, self._misfits(made), strict=True):
+            unit, _ = self.load[robot]
+            self.misfit[unit] = max(self.misfit.get(unit, 0.0), float(apart))
+        copies = [self.free[label].popleft() for label in made.values()]
+        wholes = [int(self.body[k][n]) for k, n in zip(made.values(), copies, strict=True)]
+        fuse(self.m, self.d, self._held(made), np.array(wholes))
+        self.vicinity.woken(np.array(wholes))
+        for (robot, label), copy, whole in zip(made.items(), copies, wholes, strict=True):
+            unit, labels = self.load[robot]
+            self.board.loose([*(self.grip[robot, k] for k in labels), self.park[label, copy]])
+            self._retire(labels, unit)
+            self.copy_of[label, unit] = copy
+            self.contacts.enter(label, unit, whole)
+            self.board.join([self.grip[robot, label]], [whole])
+            self.board.hold([whole], robot + 1)
+            self.load[robot] = unit, [label]
+        self.board.write()
 
     def body_of(self, label: str, unit: int) -> int:
         """The body of the part `label` in a unit."""
@@ -255,8 +261,9 @@ class Stock:
         assert unit is not None
         self.left.append(float(self.d.time))
         self.misfit.pop(unit, None)
-        self._loose([self.hold[part] for part in self.parts])
+        self.board.loose([self.hold[part] for part in self.parts])
         self._retire(self.parts, unit)
+        self.board.write()
 
     def _retire(self, labels: Sequence[str], unit: int) -> None:
         """Return bodies of a unit out of sight, and parts to their feeders where those are
@@ -279,65 +286,18 @@ class Stock:
                 found[robot.index, label] = self.m.equality(names.grip(robot.name, label)).id
         return found
 
-    def _gap(self, welds: list[int], bodies: Sequence[int]) -> float:
-        """The largest distance between the frames that welds would join to these bodies now [m]."""
-        if not welds:
-            return 0.0
-        holder = self.m.eq_obj1id[welds]
-        turn = self.d.xmat[holder].reshape(-1, 3, 3)
-        reach = (turn @ self.m.eq_data[welds, 3:6, None])[:, :, 0]
-        apart = self.d.xpos[bodies] - (self.d.xpos[holder] + reach)
-        return float(np.sqrt((apart * apart).sum(axis=1).max()))
-
-    def _loose(self, welds: Iterable[int]) -> None:
-        """Switch welds off; the bodies they joined are woken."""
-        one, other, active = self.m.eq_obj1id, self.m.eq_obj2id, self.d.eq_active
-        for weld in welds:
-            active[weld] = False
-            self._wake(one[weld])
-            self._wake(other[weld])
-
-    def _join(self, welds: Iterable[int], bodies: Iterable[int]) -> None:
-        """Switch welds on, each aimed at a body first; the bodies they join are woken."""
-        one, other, active = self.m.eq_obj1id, self.m.eq_obj2id, self.d.eq_active
-        for weld, body in zip(welds, bodies, strict=True):
-            other[weld], active[weld] = body, True
-            self._wake(one[weld])
-            self._wake(body)
-
     def _trees(self) -> dict[int, int]:
         """The code of the holder that each kinematic tree with a grip is."""
         tree, one = self.m.body_treeid, self.m.eq_obj1id
         found = {int(tree[one[weld]]): robot + 1 for (robot, _), weld in self.grip.items()}
         return found | {int(tree[one[weld]]): self.tray for weld in self.hold.values()}
 
-    def _wake(self, body: int) -> None:
-        """Wake a body that sleeps, and let one that is about to, being slow, wait as long again."""
-        tree, asleep = self._tree[body], self.d.tree_asleep
-        if tree >= 0 and asleep[tree] < 0:
-            asleep[tree] = FRESH
-        elif tree >= 0:
-            first = self.m.body_dofadr[body]
-            speeds = self.d.qvel[first : first + self.m.body_dofnum[body]]
-            speeds[speeds == 0.0] = AWAKE
-            self.vicinity.woken(body)
-
-    def _place(self, bodies: Sequence[int], at: Sequence[tuple[float, float, float]]) -> None:
-        """Put free bodies somewhere, upright and at rest."""
-        joint = self.m.body_jntadr[list(bodies)]
-        q, v = self.m.jnt_qposadr[joint], self.m.jnt_dofadr[joint]
-        self.d.qpos[q[:, None] + np.arange(7)] = [(*place, 1, 0, 0, 0) for place in at]
-        self.d.qvel[v[:, None] + np.arange(6)] = 0
-        self.d.xpos[list(bodies)] = at
-        for body in bodies:
-            self.vicinity.woken(body)
-
     def _put_away(self, labels: Sequence[str], copies: Sequence[int]) -> None:
         spares = list(zip(labels, copies, strict=True))
         bodies = [int(self.body[label][copy]) for label, copy in spares]
-        self._place(bodies, [self.parked[spare] for spare in spares])
-        self.contacts.hold(bodies, NOBODY)
-        self._join([self.park[spare] for spare in spares], bodies)
+        self.board.place(bodies, [self.parked[spare] for spare in spares])
+        self.board.hold(bodies, NOBODY)
+        self.board.join([self.park[spare] for spare in spares], bodies)
 
     def _hand_out(self, counts: Mapping[int, int]) -> None:
         """Give the parts that are under way in a marking to the robots that carry them: that of the
@@ -365,15 +325,15 @@ class Stock:
         mujoco.mj_kinematics(self.m, self.d)
         holder = self.m.eq_obj1id[weld]
         at = self.d.xpos[holder] + self.d.xmat[holder].reshape(3, 3) @ self.m.eq_data[weld, 3:6]
-        self._place([body], [(float(at[0]), float(at[1]), float(at[2]))])
         self.contacts.enter(label, unit, body)
-        self.contacts.hold([body], robot + 1)
-        self._loose([self.park[label, copy]])
-        self._join([weld], [body])
+        self.board.place([body], [(float(at[0]), float(at[1]), float(at[2]))])
+        self.board.hold([body], robot + 1)
+        self.board.loose([self.park[label, copy]])
+        self.board.join([weld], [body])
         self.load.setdefault(robot, (unit, []))[1].append(label)
 
     def _hide_spares(self) -> None:
-        self._loose([*self.feed.values(), *self.hold.values()])
+        self.board.loose([*self.feed.values(), *self.hold.values()])
         spares = [(label, n) for label, bodies in self.body.items() for n in range(len(bodies))]
         self._put_away([label for label, _ in spares], [n for _, n in spares])
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from factory.control.mode import Array
+from factory.control.mode import Array, Index
 from factory.engine import mujoco
 from factory.world.contacts import Contacts
 
@@ -43,7 +43,7 @@ class Vicinity:
     ) -> None:
         self.m, self.d, self.contacts, self.holder = m, d, contacts, contacts.code
         self._culls, self.stale, self._due = holders >= FEW, False, 0.0
-        self._woken: list[int] = []
+        self._woken = [np.empty(0, np.intp)]
         if self._culls:
             self._seen = np.zeros(m.ntree, bool)
             self._near = np.ones(holders + 1, bool)
@@ -52,10 +52,10 @@ class Vicinity:
             self._lowest, self._highest = _boxes(m, d, contacts)
             self._box(self.holder.nonzero()[0])
 
-    def woken(self, body: int) -> None:
-        """A body is about to move."""
-        if self._culls:
-            self._woken.append(body)
+    def woken(self, bodies: Index) -> None:
+        """Bodies are about to move."""
+        if self._culls and len(bodies):
+            self._woken.append(bodies)
             self.stale = True
 
     def notice(self) -> None:
@@ -81,8 +81,8 @@ class Vicinity:
             self._due, self._seen = self.d.time + PERIOD, self._awake
         near = np.zeros_like(self._near)
         moves = np.zeros_like(near)
-        moves[self.holder[self._woken]] = True
-        self._woken.clear()
+        moves[self.holder[np.concatenate(self._woken)]] = True
+        del self._woken[1:]
         if anew:
             moves[self.holder[self.d.body_awake == IS_AWAKE]] = True
         bodies = (moves[self.holder] & self.contacts.collides).nonzero()[0]

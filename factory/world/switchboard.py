@@ -1,0 +1,127 @@
+"""What is switched between two steps of the engine: welds, who holds what, and bodies put
+somewhere; all at once."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from factory.control.mode import Index
+from factory.control.obstacles import ranges
+from factory.engine import mujoco
+from factory.world.contacts import Contacts
+from factory.world.vicinity import Vicinity
+
+AWAKE = -0.0
+"""Written over a speed of zero it wakes a sleeping body and changes nothing else."""
+
+FRESH = -1 - int(mujoco.mjMINAWAKE)
+"""What the engine has for a tree that has just begun to be slow."""
+
+Place = tuple[float, float, float]
+
+
+@dataclass(frozen=True, slots=True)
+class Switched:
+    """Grips switched by operations: how many, and the largest gap between the joined frames [m]."""
+
+    count: int
+    gap: float
+
+
+class Switchboard:
+    """Gathers what is to be switched until `write`; what is said last of a weld or a body holds."""
+
+    def __init__(
+        self, m: mujoco.MjModel, d: mujoco.MjData, contacts: Contacts, vicinity: Vicinity
+    ) -> None:
+        self.m, self.d, self.contacts, self.vicinity = m, d, contacts, vicinity
+        self._tree = np.where(m.body_dofnum > 0, m.body_treeid, -1)
+        self._on: dict[int, int] = {}
+        self._off: set[int] = set()
+        self._gripped: list[int] = []
+        self._held: dict[int, int] = {}
+        self._placed: dict[int, Place] = {}
+
+    def loose(self, welds: Iterable[int]) -> None:
+        """Switch welds off; the bodies they joined are woken."""
+        for weld in welds:
+            self._on.pop(weld, None)
+            self._off.add(weld)
+
+    def join(self, welds: Iterable[int], bodies: Iterable[int]) -> None:
+        """Switch welds on, each aimed at a body first; the bodies they join are woken."""
+        self._on.update(zip(welds, bodies, strict=True))
+
+    def grip(self, welds: Sequence[int], bodies: Sequence[int]) -> None:
+        """Switch welds on that take bodies over: their gaps are measured."""
+        self.join(welds, bodies)
+        self._gripped += welds
+
+    def hold(self, bodies: Iterable[int], holder: int) -> None:
+        """From now on parts are in the hands of a holder (its code)."""
+        self._held.update(dict.fromkeys(bodies, holder))
+
+    def place(self, bodies: Iterable[int], at: Iterable[Place]) -> None:
+        """Put free bodies somewhere [m], upright and at rest."""
+        self._placed.update(zip(bodies, at, strict=True))
+
+    def write(self) -> Switched:
+        """Let the engine know. Gives what has been taken over."""
+        m, d, on, off = self.m, self.d, _listed(self._on), _listed(self._off)
+        aims = _listed(self._on.values())
+        self._put()
+        switched = self._measure()
+        welds = np.concatenate([on, off])
+        touched = np.concatenate([m.eq_obj1id[welds], aims, m.eq_obj2id[off]])
+        m.eq_obj2id[on] = aims
+        d.eq_active[off] = False
+        d.eq_active[on] = True
+        self._wake(touched)
+        if self._held:
+            self.contacts.hold(_listed(self._held), _listed(self._held.values()))
+        for gathered in (self._on, self._off, self._gripped, self._held, self._placed):
+            gathered.clear()
+        return switched
+
+    def _put(self) -> None:
+        """Put bodies where they belong."""
+        if not self._placed:
+            return
+        m, d, bodies = self.m, self.d, _listed(self._placed)
+        joint, at = m.body_jntadr[bodies], np.array(list(self._placed.values()))
+        q, v = m.jnt_qposadr[joint], m.jnt_dofadr[joint]
+        d.qpos[q[:, None] + np.arange(3)] = d.xpos[bodies] = at
+        d.qpos[q[:, None] + np.arange(3, 7)] = 1.0, 0.0, 0.0, 0.0
+        d.qvel[v[:, None] + np.arange(6)] = 0.0
+        self.vicinity.woken(bodies)
+
+    def _measure(self) -> Switched:
+        """The largest distance between the frames that grips are about to join [m]."""
+        if not self._gripped:
+            return Switched(0, 0.0)
+        m, d, welds = self.m, self.d, _listed(self._gripped)
+        holder = m.eq_obj1id[welds]
+        reach = d.xmat[holder].reshape(-1, 3, 3) @ m.eq_data[welds, 3:6, None]
+        bodies = [self._on[weld] for weld in self._gripped]
+        apart = d.xpos[bodies] - (d.xpos[holder] + reach[:, :, 0])
+        return Switched(len(welds), float(np.sqrt((apart * apart).sum(axis=1).max())))
+
+    def _wake(self, bodies: Index) -> None:
+        """Wake bodies that sleep, and let those that are about to, being slow, wait as long
+        again."""
+        m, d, tree = self.m, self.d, self._tree[bodies]
+        bodies, tree = bodies[tree >= 0], tree[tree >= 0]
+        awake = d.tree_asleep[tree] < 0
+        d.tree_asleep[tree[awake]] = FRESH
+        bodies = bodies[~awake]
+        if len(bodies):
+            dofs = ranges(m.body_dofadr[bodies], m.body_dofnum[bodies])
+            d.qvel[dofs[d.qvel[dofs] == 0.0]] = AWAKE
+            self.vicinity.woken(bodies)
+
+
+def _listed(numbers: Iterable[int]) -> Index:
+    return np.array([*numbers], np.intp)

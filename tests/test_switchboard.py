@@ -1,0 +1,104 @@
+"""What is switched in a tick is switched at once: what is said last holds, and nothing else differs
+from switching it one after the other."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import pytest
+
+from factory.factory import Operation
+from factory.simulation import Simulation
+from factory.world.stock import Stock
+from factory.world.switchboard import AWAKE, FRESH, Switchboard, Switched
+from tests.test_vicinity import layout, states
+
+
+def a_board() -> tuple[Switchboard, Stock]:
+    simulation = Simulation(layout("paper"), units=2)
+    for _ in range(40):
+        simulation.supervisor.step()
+    return simulation.world.stock.board, simulation.world.stock
+
+
+def test_what_is_said_last_of_a_weld_holds() -> None:
+    board, stock = a_board()
+    m, d = board.m, board.d
+    one, other, third, fourth = [*stock.grip.values()][:4]
+    before = int(m.eq_obj2id[other])
+    board.join([one], [5])
+    board.join([other], [6])
+    board.join([third], [5])
+    board.loose([other])
+    board.loose([third])
+    board.join([third], [7])
+    board.loose([fourth])
+    board.write()
+    assert d.eq_active[[one, other, third, fourth]].tolist() == [1, 0, 1, 0]
+    assert m.eq_obj2id[[one, other, third]].tolist() == [5, before, 7]
+    d.eq_active[one] = 0
+    board.write()
+    assert not d.eq_active[one], "it is written once"
+
+
+def test_what_is_said_last_of_a_body_holds() -> None:
+    board, stock = a_board()
+    m, d = board.m, board.d
+    body, other = (int(stock.body[label][0]) for label in ("part1", "part2"))
+    board.place([body], [(1.0, 2.0, 3.0)])
+    board.place([body, other], [(4.0, 5.0, 6.0), (7.0, 8.0, 9.0)])
+    board.hold([body, other], 3)
+    board.hold([other], 0)
+    board.write()
+    at = m.jnt_qposadr[m.body_jntadr[body]]
+    assert d.qpos[at : at + 7].tolist() == [4, 5, 6, 1, 0, 0, 0]
+    assert d.xpos[[body, other]].tolist() == [[4, 5, 6], [7, 8, 9]]
+    assert stock.contacts.code[[body, other]].tolist() == [3, 0]
+    for each, own, others in ((body, 6, ~6 & (2**31 - 1)), (other, 0, 0)):
+        for geom in stock.contacts.solid[each]:
+            assert (m.geom_contype[geom], m.geom_conaffinity[geom]) == (own, others)
+        assert (m.body_contype[each], m.body_conaffinity[each]) == (own, others)
+
+
+def test_what_a_weld_joins_and_joined_is_woken() -> None:
+    board, stock = a_board()
+    m, d = board.m, board.d
+    tree = {label: m.body_treeid[ids[0]] for label, ids in stock.body.items()}
+    first = {label: m.body_dofadr[ids[0]] for label, ids in stock.body.items()}
+    for label in ("part1", "part2"):
+        d.tree_asleep[tree[label]] = tree[label]
+        d.qvel[first[label] : first[label] + 6] = 0.0
+    d.tree_asleep[tree["part3"]] = -1
+    weld = stock.grip[0, "part1"]
+    m.eq_obj2id[weld] = stock.body["part2"][0]
+    board.loose([weld])
+    board.join([weld], [int(stock.body["part1"][0])])
+    board.join([stock.feed["part3"]], [int(stock.body["part3"][0])])
+    board.write()
+    for label in ("part1", "part2"):
+        speeds = d.qvel[first[label] : first[label] + 6]
+        assert (speeds == 0.0).all() and (np.signbit(speeds) == np.signbit(AWAKE)).all()
+    assert d.tree_asleep[tree["part3"]] == FRESH
+
+
+@pytest.mark.parametrize(
+    ("name", "given"), [("paper", {}), ("gearbox", {}), ("20", {}), ("20", {"fuse": True})]
+)
+def test_one_after_the_other_is_the_same(
+    name: str, given: dict[str, Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """To the last bit."""
+    at_once, singly = (Simulation(layout(name), units=4, **given) for _ in range(2))
+    expected = states(at_once, at_once.supervisor.step, 700)
+    hand_over = Stock.hand_over
+
+    def one_by_one(self: Stock, ended: Sequence[tuple[Operation, int]]) -> Switched:
+        done = [hand_over(self, [each]) for each in ended]
+        return Switched(sum(d.count for d in done), max(d.gap for d in done))
+
+    monkeypatch.setattr(Stock, "hand_over", one_by_one)
+    assert states(singly, singly.supervisor.step, 700) == expected
+    one, other = at_once.world.inspection, singly.world.inspection
+    assert one.handoffs == other.handoffs > 0 and one.gap == other.gap > 0.0
