@@ -24,6 +24,24 @@ RIGID = 1e-6
 the others [m]."""
 
 
+TURN = np.array(
+    [  # ww wx wy wz  xw xx xy xz  yw yx yy yz  zw zx zy zz
+        [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, -1, 0, 0, 0, 0, -1],
+        [0, 0, 0, -1, 0, 0, 1, 0, 0, 1, 0, 0, -1, 0, 0, 0],
+        [0, 0, 1, 0, 0, 0, 0, 1, 1, 0, 0, 0, 0, 1, 0, 0],
+        [0, 0, 0, 1, 0, 0, 1, 0, 0, 1, 0, 0, 1, 0, 0, 0],
+        [1, 0, 0, 0, 0, -1, 0, 0, 0, 0, 1, 0, 0, 0, 0, -1],
+        [0, -1, 0, 0, -1, 0, 0, 0, 0, 0, 0, 1, 0, 0, 1, 0],
+        [0, 0, -1, 0, 0, 0, 0, 1, -1, 0, 0, 0, 0, 1, 0, 0],
+        [0, 1, 0, 0, 1, 0, 0, 0, 0, 0, 0, 1, 0, 0, 1, 0],
+        [1, 0, 0, 0, 0, -1, 0, 0, 0, 0, -1, 0, 0, 0, 0, 1],
+    ],
+    float,
+).T
+"""The rotation matrix, row by row, of the quaternion (w, x, y, z), by the products of its
+components."""
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Groups:
     """Bodies in groups: all `bodies` (n,) one group after another, the number of each group's first
@@ -59,10 +77,9 @@ def misfit(d: mujoco.MjData, groups: Groups, places: Array, radii: Array) -> Arr
     here, turn = d.xpos[groups.bodies], d.xmat[groups.bodies].reshape(-1, 3, 3)
     against, straight = groups.first(turn), places - groups.first(places)
     apart = ((here - groups.first(here))[:, None] @ against)[:, 0] - straight
-    tilt = np.linalg.norm(turn - against, axis=(1, 2))
-    return np.asarray(
-        np.maximum.reduceat(np.linalg.norm(apart, axis=1) + tilt * radii, groups.starts)
-    )
+    tilt = (turn - against).reshape(-1, 9)
+    far = np.sqrt((apart * apart).sum(axis=1)) + np.sqrt((tilt * tilt).sum(axis=1)) * radii
+    return np.asarray(np.maximum.reduceat(far, groups.starts))
 
 
 def fuse(m: mujoco.MjModel, d: mujoco.MjData, groups: Groups, wholes: Index) -> None:
@@ -77,16 +94,20 @@ def fuse(m: mujoco.MjModel, d: mujoco.MjData, groups: Groups, wholes: Index) -> 
     share = (mass / groups.sum(mass)[owner])[:, None]
     pose = d.qpos[q[:, None] + np.arange(7)]
     speed = d.qvel[v[:, None] + np.arange(6)]
-    turn, axes = turns(pose[:, 3:]), turns(m.body_iquat[bodies])
+    count = len(bodies)
+    principal = turns(m.body_iquat[np.concatenate([bodies, wholes])])
+    turn, axes = turns(pose[:, 3:]), principal[:count]
     centre, common = groups.sum(share * pose[:, :3]), groups.sum(share * speed[:, :3])
-    arm, drift = pose[:, :3] - centre[owner], speed[:, :3] - common[owner]
+    arm, drift = mass[:, None] * (pose[:, :3] - centre[owner]), speed[:, :3] - common[owner]
+    moment = groups.sum(arm[:, :, None] * drift[:, None])  # m r vᵀ
+    spin = (moment - moment.transpose(0, 2, 1))[:, [1, 2, 0], [2, 0, 1]]
     own = _times(axes, m.body_inertia[bodies] * _times(axes.transpose(0, 2, 1), speed[:, 3:]))
-    spin = groups.sum(_times(turn, own) + np.cross(mass[:, None] * arm, drift))
+    spin += groups.sum(_times(turn, own))
     heaviest = np.lexsort((-mass, owner))[groups.starts]
     joint = m.body_jntadr[wholes]
     q, v = m.jnt_qposadr[joint][:, None], m.jnt_dofadr[joint][:, None]
     d.qpos[q + np.arange(3)], d.qpos[q + np.arange(3, 7)] = centre, pose[heaviest, 3:]
-    axes = turns(m.body_iquat[wholes])
+    axes = principal[count:]
     back = axes.transpose(0, 2, 1) @ turn[heaviest].transpose(0, 2, 1)
     d.qvel[v + np.arange(3)] = common
     d.qvel[v + np.arange(3, 6)] = _times(axes, _times(back, spin) / m.body_inertia[wholes])
@@ -96,13 +117,8 @@ def fuse(m: mujoco.MjModel, d: mujoco.MjData, groups: Groups, wholes: Index) -> 
 
 def turns(quaternions: Array) -> Array:
     """Rotation matrices (n, 3, 3) of unit quaternions (n, 4)."""
-    w, x, y, z = quaternions.T
-    rows = [
-        [w * w + x * x - y * y - z * z, 2 * (x * y - w * z), 2 * (x * z + w * y)],
-        [2 * (x * y + w * z), w * w - x * x + y * y - z * z, 2 * (y * z - w * x)],
-        [2 * (x * z - w * y), 2 * (y * z + w * x), w * w - x * x - y * y + z * z],
-    ]
-    return np.array(rows).transpose(2, 0, 1)
+    products = (quaternions[:, :, None] * quaternions[:, None]).reshape(-1, 16)
+    return np.asarray((products @ TURN).reshape(-1, 3, 3))
 
 
 def _times(matrices: Array, vectors: Array) -> Array:

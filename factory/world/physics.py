@@ -31,7 +31,7 @@ from factory.world.setpoints import Setpoints, under_way
 from factory.world.stock import Stock
 from factory.world.switchboard import AWAKE, FRESH
 
-AHEAD = 0.005
+AHEAD = 0.0005
 """No robot is further ahead of its reference than this [m]."""
 
 NEAR = 1e-3

@@ -39,8 +39,8 @@ class Told:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Where:
-    """Where the drives of n axes are told: in `history` (n, 1 + 4 samples), and in `ctrl`
-    (n, 3)."""
+    """Where the drives of n axes are told: the numbers of their `buffers` (n,), and their `inputs`
+    in `ctrl` (n, 3)."""
 
     buffers: Index
     inputs: Index
@@ -64,7 +64,8 @@ class Setpoints:
         self._tick = steps * self._timestep
         m.actuator_delay[actuators] = self._tick
         size = 2 + (1 + INPUTS) * samples
-        self._buffers = m.actuator_historyadr[actuators][:, None] + np.arange(1, size)
+        self._buffer = m.actuator_historyadr[actuators] // size
+        self._buffers = d.history.reshape(-1, size)[:, 1:]
         self._samples = _samples(steps, self._timestep)
         self._times = self._samples[4, 1 : 1 + samples]
         self._early = self._times.copy()
@@ -74,7 +75,7 @@ class Setpoints:
 
     def where(self, axes: Index) -> Where:
         """Where the drives of axes are told."""
-        return Where(self._buffers[axes], self.control[axes][:, None] + np.arange(INPUTS))
+        return Where(self._buffer[axes], self.control[axes][:, None] + np.arange(INPUTS))
 
     def of(self, axes: Index, x: Array, v: Array, a: Array, x1: Array, v1: Array) -> Told:
         """What axes are told that run from x [m] at speed v under acceleration a, and are at x1
@@ -101,7 +102,7 @@ class Setpoints:
 
     def _write(self, begin: float, buffers: Index, terms: Array) -> None:
         np.add(self._early, begin, out=self._times)
-        self.d.history[buffers] = terms @ self._samples
+        self._buffers[buffers] = terms @ self._samples
 
     def follow(self, axes: Index, where: Where, told: Told) -> None:
         """Tell axes what comes, whatever `move` has told them."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Iterable, Mapping, Sequence
+from types import MappingProxyType
 
 import numpy as np
 
@@ -18,6 +19,8 @@ from factory.world.contacts import NOBODY, Contacts
 from factory.world.fusing import RIGID, SETTLING, Groups, fuse, misfit
 from factory.world.switchboard import Switchboard, Switched
 from factory.world.vicinity import Vicinity
+
+NOTHING: Mapping[int, float] = MappingProxyType({})
 
 
 class Stock:
@@ -174,8 +177,9 @@ class Stock:
         now = self.d.time
         waiting = [robot for robot, (_, since) in self.joining.items() if now - since > SETTLING]
         if waiting:
-            apart = self._misfits(waiting)
-            self.fuse([r for r, far in zip(waiting, apart, strict=True) if far < RIGID])
+            apart = dict(zip(waiting, self._misfits(waiting).tolist(), strict=True))
+            self.fuse([robot for robot in waiting if apart[robot] < RIGID], apart)
+            self.board.write()
 
     def _held(self, robots: Iterable[int]) -> Groups:
         """The bodies that robots hold, those of each together."""
@@ -189,32 +193,36 @@ class Stock:
         radii = np.array([self.bodies.radius[label] for label in labels])
         return misfit(self.d, self._held(robots), places, radii)
 
-    def fuse(self, robots: Iterable[int]) -> None:
+    def fuse(self, robots: Iterable[int], apart: Mapping[int, float] = NOTHING) -> None:
         """Let one body each take the place of those that robots (index) have joined, if it has not
-        yet. Where no copy of that body is free, its holder's bodies become one first."""
+        yet. Where no copy of that body is free, its holder's bodies become one first. `apart`:
+        misfits that are known [m]."""
         made: dict[int, str] = {}
         for robot in robots:
             if robot in self.joining:
                 label, _ = self.joining.pop(robot)
                 if not self._spare(label, made):
-                    self._become_one(made)
+                    self._become_one(made, apart)
                     made = {}
                 if not self.free[label]:
                     self.fuse([next(r for r in self.joining if label in self.load[r][1])])
+                    self.board.write()
                 made[robot] = label
-        self._become_one(made)
+        self._become_one(made, apart)
 
     def _spare(self, label: str, made: Mapping[int, str]) -> bool:
         """Whether there is a copy of a body beside those that are about to be `made`."""
         return len(self.free[label]) > sum(each == label for each in made.values())
 
-    def _become_one(self, made: Mapping[int, str]) -> None:
+    def _become_one(self, made: Mapping[int, str], apart: Mapping[int, float]) -> None:
         """Robots get a body each, of this label, for all that they hold."""
         if not made:
             return
-        for robot, apart in zip(made, self._misfits(made), strict=True):
+        if not made.keys() <= apart.keys():
+            apart = dict(zip(made, self._misfits(made).tolist(), strict=True))
+        for robot in made:
             unit, _ = self.load[robot]
-            self.misfit[unit] = max(self.misfit.get(unit, 0.0), float(apart))
+            self.misfit[unit] = max(self.misfit.get(unit, 0.0), apart[robot])
         copies = [self.free[label].popleft() for label in made.values()]
         wholes = [int(self.body[k][n]) for k, n in zip(made.values(), copies, strict=True)]
         fuse(self.m, self.d, self._held(made), np.array(wholes))
@@ -228,7 +236,6 @@ class Stock:
             self.board.join([self.grip[robot, label]], [whole])
             self.board.hold([whole], robot + 1)
             self.load[robot] = unit, [label]
-        self.board.write()
 
     def body_of(self, label: str, unit: int) -> int:
         """The body of the part `label` in a unit."""
