@@ -47,6 +47,7 @@ class Vicinity:
         if self._culls:
             self._seen = np.zeros(m.ntree, bool)
             self._near = np.ones(holders + 1, bool)
+            self._meets = np.empty((2, int(CROWD * len(self._near)) + 1, len(self._near)), bool)
             self._low = np.full((2, holders + 1), np.inf, np.float32)
             self._high = np.full((2, holders + 1), -np.inf, np.float32)
             self._lowest, self._highest = _boxes(m, d, contacts)
@@ -102,9 +103,10 @@ class Vicinity:
         reach = float(speed + SUDDEN * PERIOD / 2) * PERIOD
         low, high = self._low, self._high
         (x0, y0), (x1, y1) = low[:, who, None] - reach, high[:, who, None] + reach
-        meets = (x0 <= high[0]) & (low[0] <= x1)
-        meets &= y0 <= high[1]
-        meets &= low[1] <= y1
+        meets, also = self._meets[:, : len(who)]
+        np.less_equal(x0, high[0], out=meets)
+        for one, other in ((low[0], x1), (y0, high[1]), (low[1], y1)):
+            meets &= np.less_equal(one, other, out=also)
         return np.asarray(meets.any(axis=0))
 
     def _box(self, bodies: np.ndarray) -> np.ndarray:
