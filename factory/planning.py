@@ -36,3 +36,7 @@ class Ground:
         from factory.relaying import relayed
 
         return relayed(layout, settings, self.cycle, self.floor)
+
+
+PLAIN = Ground()
+"""As much floor as it takes, and no relays."""

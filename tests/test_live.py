@@ -156,11 +156,16 @@ class Stopped(Exception):
     """Ends a session."""
 
 
+def a_session(playing: bool) -> Session:
+    """Of the paper's example, for ever; it does not run yet."""
+    return Session(lambda: Simulation(paper_layout(), units=10**9), playing)
+
+
 class Running:
     """A session that runs in a thread of its own."""
 
     def __init__(self, playing: bool = True) -> None:
-        self.session = Session(lambda: Simulation(paper_layout(), units=10**9), playing)
+        self.session = a_session(playing)
         self.over = False
         self.thread = Thread(target=self._run, daemon=True)
         self.thread.start()
@@ -302,7 +307,7 @@ def test_the_page_is_at_the_address_and_nowhere_else(server: Server) -> None:
     assert headers["Cache-Control"] == "no-store" and headers["X-Frame-Options"] == "DENY"
     for path in ("/", "/live", "/../etc/passwd", path_of(server)[:-2] + "x/", "/" + "x" * 500):
         assert asked(server, path)[0] == 404
-    with Server(Running().session, b"") as other:
+    with Server(a_session(True), b"") as other:
         assert path_of(other) != path_of(server)
 
 

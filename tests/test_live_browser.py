@@ -11,7 +11,7 @@ import pytest
 
 from factory.live import Server
 from factory.live.page import page
-from tests.test_live import Running
+from tests.test_live import Running, a_session
 from tests.test_report_browser import CHROMIUM, browser  # noqa: F401
 
 pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="no chromium: apt-get install chromium")
@@ -25,7 +25,7 @@ class Watched:
 
     def __init__(self, browser: Any, **options: Any) -> None:  # noqa: F811
         self.running = Running()
-        self.server = Server(self.running.session, page(Running(False).session))
+        self.server = Server(self.running.session, page(a_session(False)))
         self.context = browser.new_context(viewport={"width": 1400, "height": 900}, **options)
         self.page = self.context.new_page()
         self.trouble: list[str] = []

@@ -33,6 +33,7 @@ from factory.relaying import relayed
 from factory.relaying.naming import named
 from factory.relaying.splitting import split
 from factory.relaying.ways import Way, ways
+from factory.report import recording_of
 from factory.robots import load_catalogue
 from factory.settings import Settings
 from factory.simulation import Simulation
@@ -247,6 +248,10 @@ def test_by_the_command_line(run: Terminal, tmp_path: Path) -> None:
     assert built["layout"]["predicted_cycle_time_s"] < 2.5
     assert run("run", file, "--cycle", "2.4", "--log", log, "-q").status == 0
     assert run("monitor", log).status == 0
+    told = recording_of(log)
+    assert told.layout and told.layout.plain, told.missing
+    assert [r.name for r in told.layout.factory.robots] == told.log.header["robots"]
+    assert run("report", log, "-o", tmp_path / "told.html", "--json").json["predicted"]
     assert "relay" in run("programs", file, "--relay").out
 
 

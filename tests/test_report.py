@@ -29,7 +29,7 @@ from factory.report.page import SCRIPTS
 from factory.report.tree import assembly_tree
 from factory.report.words import proof
 from factory.simulation import Simulation
-from tests.command_line import PAPER, files_in
+from tests.command_line import PAPER, Terminal, files_in
 from tests.layout_values import paper_layout
 from tests.report_values import Page
 
@@ -303,6 +303,20 @@ def test_what_cannot_be_told_is_refused(run, log: Path, out: Path, tmp_path: Pat
     assert run("report", log).status == 2
     assert run("report", PAPER, "-o", out / "none" / "x.html").status == 2
     assert not files_in(out)
+
+
+def test_a_log_says_which_floor_its_layout_was_made_for(run: Terminal, tmp_path: Path) -> None:
+    log = tmp_path / "run.log"
+    assert run("run", PAPER, "--floor", "3x2.5", "--log", log, "-q").status == 0
+    told = recording_of(log)
+    assert told.layout, told.missing
+    assert told.log.header["ground"]["floor"] == [3.0, 2.5]
+
+    def shrunk(header) -> None:
+        header["ground"]["floor"] = [0.3, 0.3]
+
+    told = recording_of(altered(log, tmp_path / "small.log", shrunk))
+    assert told.layout is None and "too wide" in told.missing
 
 
 def test_a_log_that_was_cut_off_is_told_as_far_as_it_goes(log: Path, tmp_path: Path) -> None:

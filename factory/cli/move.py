@@ -17,6 +17,7 @@ from factory.cli.options import (
     RELAY,
     RUN,
     SOURCE,
+    ground,
     pair,
     plan,
     settings_of,
@@ -60,7 +61,8 @@ def run(
     source, factory, layout = plan(file, folders, settings, floor, options)
     warn(layout.product.warnings, quiet)
     size = pair(options["size"], "--size", "1280x720", int)
-    record = run_file(source, layout, settings, video, log, size, quiet or as_json, options)
+    quiet_run, on = quiet or as_json, ground(floor, options)
+    record = run_file(source, layout, settings, video, log, size, quiet_run, options, on)
     if as_json:
         document = record.as_json()
         document.pop("schema")

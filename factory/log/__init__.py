@@ -4,8 +4,10 @@ appended to.
     factory-log 1\\n          magic
     <I length>{...}          header, JSON: versions, command line, world, seed, jitter, units,
                              wip, numbers of the places marked at the start, settings, names of
-                             robots, places and transitions, the PAG's name, text and SHA-256, the
-                             templates that it uses, what a monitor knows of the layout, nq, nv
+                             robots, places and transitions, the PAG's name, text and SHA-256 (of
+                             one with relays the text without too), the templates that it uses,
+                             the floor and relays that the layout was made for, what a monitor
+                             knows of the layout, nq, nv
     blocks                   see factory.log.blocks: a letter, length, CRC-32, compressed arrays
 
     M  the model, once: `xml`, and `mesh/NAME` for each mesh file, bytes (mujoco only)

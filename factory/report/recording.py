@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from factory.analysis.recorded import conditions
-from factory.errors import InputError
+from factory.errors import InputError, RunError
 from factory.export.events import compiled
 from factory.export.motion import Motion, motion_of
 from factory.export.subject import Subject
@@ -102,7 +102,7 @@ def recording_of(path: Path, layout: Layout | None = None) -> Recording:
         return Recording(str(path), subject.log, motion, layout.factory, layout)
     try:
         layout = _laid_out(subject.log, str(path))
-    except InputError as error:
+    except (InputError, RunError) as error:
         why = error.diagnostics[0].message
         return Recording(str(path), subject.log, motion, factory, None, why)
     except (KeyError, TypeError, ValueError, AttributeError) as error:
@@ -127,15 +127,18 @@ def _check(name: str, log: Log) -> None:
 
 
 def _laid_out(log: Log, name: str) -> Layout:
-    """The layout of a log, made again. Raises InputError where meshes are gone, ValueError where it
-    is not the one that the run was in."""
+    """The layout of a log, made again. Raises InputError where meshes are gone, RunError where the
+    floor is too small for it, ValueError where it is not the one that the run was in."""
     header, made = log.header, conditions(name, log.header)
     templates = {word: read_template(text, word) for word, text in header["templates"].items()}
     file = str(header["pag"]["file"])
-    pag = read_pag(header["pag"]["text"], templates, file, os.path.dirname(file) or ".")
+    text = header["pag"].get("plain") or header["pag"]["text"]
+    pag = read_pag(text, templates, file, os.path.dirname(file) or ".")
     source = Source(pag, templates, load_catalogue())
     factory, product = source.compile(), source.product
-    layout = Ground().lay_out(factory, product, made.settings)
+    ground = header.get("ground", {})
+    floor = ground.get("floor") and tuple(map(float, ground["floor"]))
+    layout = Ground(**{**ground, "floor": floor}).lay_out(factory, product, made.settings)
     goals = subject_of(layout, made.settings, made.jitter, None, made.wip).as_json()["goals"]
     if goals != header["monitor"]["goals"]:
         raise ValueError("the run was in another layout than the one its PAG gets now")
