@@ -116,5 +116,6 @@ def run(
     """
     from factory.simulation import Simulation, require
 
+    options = {"shown": False, **options}
     simulation = Simulation(layout, world, units, seed, jitter, settings, **options)
     return require(simulation.run(max_time=max_time))

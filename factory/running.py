@@ -32,9 +32,14 @@ SIZE = 1280, 720
 
 
 def simulation(
-    source: Source, layout: Layout, settings: Settings, options: dict[str, Any]
+    source: Source,
+    layout: Layout,
+    settings: Settings,
+    options: dict[str, Any],
+    shown: bool = True,
 ) -> Simulation:
-    """The simulation that the options of the command line ask for. Raises InputError."""
+    """The simulation that the options of the command line ask for; whether it is to be `shown`.
+    Raises InputError."""
     start, fuse = options.get("start"), options.get("fuse")
     net = layout.factory.net
     return Simulation(
@@ -49,6 +54,7 @@ def simulation(
         options.get("wip"),
         bool(options.get("distributed")),
         fuse=fusing_pays(layout.factory, layout.product) if fuse is None else fuse,
+        shown=shown,
     )
 
 
@@ -91,7 +97,8 @@ def run_file(
     elif options.get("poster") is not None:
         message = "--poster is of a film, and there is none"
         raise InputError(Diagnostic("Usage", message, None, "give --video OUT.mp4 as well"))
-    made = simulation(source, layout, settings, options)
+    seen = video is not None or log is not None or bool(options.get("monitor"))
+    made = simulation(source, layout, settings, options, seen)
     with ExitStack() as stack:
         observers: list[Observer] = [stack.enter_context(Interruption()).observe]
         watcher = None

@@ -59,7 +59,8 @@ class Simulation:
     run that stalls or takes too long is a Run with its trouble; `require` makes that an error.
     `compiled`: what it shares with earlier runs, made by `compiled` for the same layout, world,
     units, settings, wip and `fuse`, from the beginning. `fuse`: parts that are joined
-    for good become one rigid body.
+    for good become one rigid body. `shown`: somebody will look at it, in a film, a log or live; if
+    not, the model has nothing that is only shown, and the run is the same and faster.
     """
 
     def __init__(
@@ -76,6 +77,7 @@ class Simulation:
         distributed: bool = False,
         compiled: Compiled | None = None,
         fuse: bool = False,
+        shown: bool = True,
     ) -> None:
         self.layout, self.kind, self.units = layout, world, units
         self.seed, self.jitter, self.wip = seed, jitter, wip
@@ -108,7 +110,7 @@ class Simulation:
             loaded = compiled.loaded if compiled else None
             self.model = compiled.model if compiled else None
             self.model = self.model or physical_model(
-                layout, units, self.settings, catalogue, wip, self.under_way(), fuse
+                layout, units, self.settings, catalogue, wip, self.under_way(), fuse, shown
             )
             self.world = _mujoco(self.model, positions, gains, units, self.counts, wip, loaded)
         self.before = self.world.delivered()
@@ -227,13 +229,13 @@ def compiled(
     wip: int | None = None,
     fuse: bool = False,
 ) -> Compiled:
-    """What many runs share. Raises InputError as `Simulation` does."""
+    """What many runs that nobody looks at share. Raises InputError as `Simulation` does."""
     modes = operation_modes(layout, settings.eps)
     if world == "ideal":
         return Compiled(modes)
     from factory.world.physics import load
 
-    model = physical_model(layout, units, settings, catalogue, wip, fuse=fuse)
+    model = physical_model(layout, units, settings, catalogue, wip, fuse=fuse, shown=False)
     return Compiled(modes, model, load(model))
 
 
@@ -245,9 +247,11 @@ def physical_model(
     wip: int | None = None,
     under_way: Mapping[str, int] | None = None,
     fuse: bool = False,
+    shown: bool = True,
 ) -> Model:
     """The MJCF model of a layout with the bodies it needs for `units` (None: for ever): the pool of
-    parts, or with `fuse` bodies of sub-assemblies too, and then few parts."""
+    parts, or with `fuse` bodies of sub-assemblies too, and then few parts. `shown`: with what is
+    only shown, too."""
     from factory.mjcf.model import build_model, part_copies
 
     factory = layout.factory
@@ -257,7 +261,7 @@ def physical_model(
     else:
         copies = part_copies(part_pool(factory), units, wip, under_way)
     catalogue, settings = catalogue or load_catalogue(), settings or Settings()
-    return build_model(layout, catalogue, copies, settings, bodies)
+    return build_model(layout, catalogue, copies, settings, bodies, shown)
 
 
 def start_positions(layout: Layout, marking: Marking) -> np.ndarray:

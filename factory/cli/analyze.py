@@ -204,6 +204,7 @@ def _run(
         timing.settings,
         source.catalogue,
         wip=wip,
+        shown=False,
     )
     with ExitStack() as stack:
         stop, bar = Interruption(), Progress(units, quiet)

@@ -31,6 +31,7 @@ from factory.mjcf.robots import (
     load_robot_model,
 )
 from factory.mjcf.scene import add_assets, add_follower, add_scene, add_visuals
+from factory.mjcf.unseen import leave_out_what_is_shown
 from factory.mjcf.welds import add_welds, exclusions, held_at
 from factory.robots import Catalogue
 from factory.settings import Settings
@@ -120,9 +121,11 @@ def build_model(
     copies: Mapping[str, int],
     settings: Settings,
     bodies: Bodies | None = None,
+    shown: bool = True,
 ) -> Model:
-    """The model of a laid-out factory, of one body a part unless other `bodies` are given. Raises
-    InputError where the MJCF of a robot type is unusable."""
+    """The model of a laid-out factory, of one body a part unless other `bodies` are given; without
+    what is only there to be `shown`, if it is not. Raises InputError where the MJCF of a robot type
+    is unusable."""
     factory, product = layout.factory, layout.product
     bodies = bodies or bodies_of(factory, product)
     masses = {
@@ -151,6 +154,8 @@ def build_model(
     contact = exclusions(layout, bodies, copies)
     root.extend([*([contact] if len(contact) else []), equality, actuator])
     _home(add(root, "keyframe"), layout, actuator)
+    if not shown:
+        leave_out_what_is_shown(root)
     ElementTree.indent(root)
     xml = ElementTree.tostring(root, encoding="unicode") + "\n"
     joints = len(factory.robots) + len(hoists) + 1 + sum(copies.values())

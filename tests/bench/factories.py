@@ -86,7 +86,13 @@ class Case:
         """A run of it, ready to go."""
         settings = Settings(timestep=self.timestep)
         return Simulation(
-            layout, units=ENDLESS, settings=settings, wip=self.wip, fuse=self.fuse, **given
+            layout,
+            units=ENDLESS,
+            settings=settings,
+            wip=self.wip,
+            fuse=self.fuse,
+            shown=False,
+            **given,
         )
 
 

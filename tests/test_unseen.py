@@ -1,0 +1,82 @@
+"""A run that nobody looks at has nothing that is only shown, and is the same to the last bit."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
+
+import pytest
+
+from factory.layout.plan import Layout
+from factory.log import read_log
+from factory.mjcf.unseen import leave_out_what_is_shown
+from factory.simulation import Simulation, physical_model
+from factory.world import physics
+from tests.command_line import PAPER, Terminal
+from tests.test_lift import FENCE
+from tests.test_simulation import laid_out
+from tests.test_vicinity import gone_wild, layout, states
+
+
+def the_layout(name: str) -> Layout:
+    return laid_out(FENCE) if name == "fence" else layout(name)
+
+
+@pytest.mark.parametrize(
+    ("name", "given"),
+    [("paper", {}), ("gearbox", {}), ("20", {"fuse": True}), ("fence", {"distributed": True})],
+)
+def test_an_unseen_run_is_the_same_to_the_last_bit(name: str, given: dict[str, Any]) -> None:
+    seen, unseen = (
+        Simulation(the_layout(name), units=2, seed=3, jitter=0.3, shown=shown, **given)
+        for shown in (True, False)
+    )
+    assert unseen.world.m.ngeom < seen.world.m.ngeom
+    assert unseen.world.m.nbody < seen.world.m.nbody
+    expected = states(seen, seen.supervisor.step, 500)
+    assert states(unseen, unseen.supervisor.step, 500) == expected
+    one, other = seen.world.inspection.figures(), unseen.world.inspection.figures()
+    assert one == other
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_all_that_collides_is_there(seed: int) -> None:
+    seen, unseen = (Simulation(layout("20"), units=2, shown=shown) for shown in (True, False))
+    expected = states(seen, gone_wild(seen, seed), 150)
+    assert states(unseen, gone_wild(unseen, seed), 150) == expected
+    touched = [simulation.world.inspection.unintended for simulation in (seen, unseen)]
+    assert touched[0] and touched[0] == touched[1]
+
+
+def test_nothing_that_weighs_or_touches_is_left_out() -> None:
+    """Whatever a robot type calls its classes."""
+    text = """<mujoco>
+      <default>
+        <default class="shown"><geom contype="0" conaffinity="0" mass="0" group="1"/></default>
+        <default class="x/shown"><geom contype="1" conaffinity="0" mass="0" group="1"/></default>
+      </default>
+      <worldbody>
+        <geom name="gone" class="shown"/><geom name="heavy" class="shown" mass="1"/>
+        <geom name="touches" class="shown" contype="1"/><geom name="theirs" class="x/shown"/>
+        <body name="shell"><body name="inner"><geom name="gone too" class="shown"/></body></body>
+        <body name="kept"><site name="there"/><geom name="none" class="shown"/></body>
+      </worldbody>
+    </mujoco>"""
+    root = ElementTree.fromstring(text)
+    leave_out_what_is_shown(root)
+    left = {element.get("name") for tag in ("geom", "body", "site") for element in root.iter(tag)}
+    assert left - {None} == {"heavy", "touches", "theirs", "kept", "there"}
+
+
+def test_only_meshes_that_are_drawn_are_left_out() -> None:
+    full, bare = (physical_model(layout("gearbox"), 1, shown=shown) for shown in (True, False))
+    assert physics.load(bare).nmesh < physics.load(full).nmesh
+
+
+def test_what_is_logged_can_be_looked_at(run: Terminal, tmp_path: Path) -> None:
+    log = tmp_path / "run.log"
+    assert run("run", PAPER, "--log", log, "-q").status == 0
+    assert "r1/rail" in read_log(log).xml
+    assert "r1/rail" in Simulation(layout("paper")).model.xml  # type: ignore[union-attr]
+    assert "r1/rail" not in physical_model(layout("paper"), 1, shown=False).xml
