@@ -74,8 +74,9 @@ def laid_out(text: str) -> Layout:
 
 @dataclass(frozen=True)
 class Case:
-    """A factory in MuJoCo: so many robots or one more, the engine's timestep [s], copies of each
-    part let in at once (None: the whole pool), whether parts that are joined become one body."""
+    """A factory in MuJoCo that nobody looks at: so many robots or one more, the engine's timestep
+    [s], copies of each part let in at once (None: the whole pool), whether parts that are joined
+    become one body."""
 
     robots: int
     timestep: float
@@ -91,8 +92,7 @@ class Case:
             settings=settings,
             wip=self.wip,
             fuse=self.fuse,
-            shown=False,
-            **given,
+            **{"shown": False, **given},
         )
 
 

@@ -115,7 +115,7 @@ def section(results: dict[str, Any]) -> str:
         [
             "## Steady production",
             "A balanced tree of mates of parts without geometry, contact between payloads on,"
-            " jitter 0. Each figure is the median (least–greatest) of"
+            " jitter 0, neither filmed nor logged. Each figure is the median (least–greatest) of"
             f" {results['runs']} processes, which took turns. The window begins when the ideal"
             " world, under the same net, has delivered its second product, and lasts one cycle of"
             f" it and at least {LEAST:g} s (`--quick`: 1 s). Memory is the process's largest"

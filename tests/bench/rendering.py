@@ -33,7 +33,7 @@ def work(robots: int, frames: int) -> dict[str, Any]:
         layout = laid_out((ROOT / "examples" / "paper.pag").read_text())
     else:
         layout = laid_out(robots_at_least(robots))
-    simulation = Case(robots, 0.002).simulation(layout)
+    simulation = Case(robots, 0.002).simulation(layout, shown=True)
     run_until(simulation, Steady.of(layout, None).since)
     moments = recorded(simulation, frames)
     take = Take(simulation.world.m, "product", 1, SIZE, camera_named("overview"), True)
