@@ -245,3 +245,37 @@ def test_run_says_that_it_fuses(run: Terminal, tmp_path: Path) -> None:
     assert "parts joined for good are one rigid body" in said
     assert "they explain the run" in said
     assert "they explain the run" in run("monitor", log).out
+
+
+@pytest.mark.parametrize("first", ["consumer", "maker"])
+def test_a_body_that_has_just_become_free_can_take_the_place_of_others(
+    first: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The only copy of a sub-assembly is still joined to something else when the next one is
+    made; both become one in the same tick, in either order."""
+    monkeypatch.setattr("factory.world.stock.SETTLING", np.inf)
+    simulation = Simulation(layout_of("chest"), units=4, fuse=True)
+    world, stock = simulation.world, simulation.world.stock
+    found: list[tuple[int, int]] = []
+    while not found:
+        simulation.supervisor.step()
+        assert world.time < 60
+        made = {robot: label for robot, (label, _) in stock.joining.items()}
+        found = [
+            (consumer, maker)
+            for maker, label in made.items()
+            if not stock.free[label]
+            for consumer in made
+            if label in stock.load[consumer][1]
+        ]
+    consumer, maker = found[0]
+    unit, labels = stock.load[maker]
+    held = [stock.body_of(label, unit) for label in labels]
+    centre = world.m.body_mass[held] @ world.d.xpos[held] / world.m.body_mass[held].sum()
+    stock.fuse([consumer, maker] if first == "consumer" else [maker, consumer])
+    stock.board.write()
+    (label,) = stock.load[maker][1]
+    at = world.m.jnt_qposadr[world.m.body_jntadr[stock.body_of(label, unit)]]
+    assert np.linalg.norm(world.d.qpos[at : at + 3] - centre) < 0.005
+    done = simulation.run()
+    assert done.products == 4 and done.physics and done.physics.unintended_contacts == 0

@@ -29,7 +29,6 @@ from factory.world.inspection import Inspection
 from factory.world.rewind import Rewind
 from factory.world.setpoints import Setpoints, under_way
 from factory.world.stock import Stock
-from factory.world.switchboard import AWAKE, FRESH
 
 AHEAD = 0.0005
 """No robot is further ahead of its reference than this [m]."""
@@ -263,11 +262,7 @@ class MujocoWorld:
 
     def rouse(self, axes: Index) -> None:
         """Wake robots that sleep, and let those that are about to wait as long again."""
-        dof, tree = self.dof[axes], self.tree[axes]
-        self.d.qvel[dof[self.d.qvel[dof] == 0.0]] = AWAKE
-        awake = self.d.tree_asleep[tree] < 0
-        self.d.tree_asleep[tree[awake]] = FRESH
-        self.vicinity.woken(self.body[axes[~awake]])
+        self.stock.board.wake(self.body[axes])
 
     def settle(self) -> None:
         """After a tick: look at welds, and move the outfeed's tray."""

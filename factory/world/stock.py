@@ -201,23 +201,20 @@ class Stock:
         for robot in robots:
             if robot in self.joining:
                 label, _ = self.joining.pop(robot)
-                if not self._spare(label, made):
+                if not self.free[label]:
                     self._become_one(made, apart)
                     made = {}
                 if not self.free[label]:
                     self.fuse([next(r for r in self.joining if label in self.load[r][1])])
-                    self.board.write()
                 made[robot] = label
         self._become_one(made, apart)
 
-    def _spare(self, label: str, made: Mapping[int, str]) -> bool:
-        """Whether there is a copy of a body beside those that are about to be `made`."""
-        return len(self.free[label]) > sum(each == label for each in made.values())
-
     def _become_one(self, made: Mapping[int, str], apart: Mapping[int, float]) -> None:
-        """Robots get a body each, of this label, for all that they hold."""
+        """Robots get a body each, of this label, for all that they hold. Bodies that have just
+        become free may be among those, so they are put away first."""
         if not made:
             return
+        self.board.write()
         if not made.keys() <= apart.keys():
             apart = dict(zip(made, self._misfits(made).tolist(), strict=True))
         for robot in made:

@@ -70,6 +70,8 @@ class Switchboard:
 
     def write(self) -> Switched:
         """Let the engine know. Gives what has been taken over."""
+        if not (self._on or self._off or self._held or self._placed):
+            return Switched(0, 0.0)
         m, d, on, off = self.m, self.d, _listed(self._on), _listed(self._off)
         aims = _listed(self._on.values())
         self._put()
@@ -79,7 +81,7 @@ class Switchboard:
         m.eq_obj2id[on] = aims
         d.eq_active[off] = False
         d.eq_active[on] = True
-        self._wake(touched)
+        self.wake(touched)
         if self._held:
             self.contacts.hold(_listed(self._held), _listed(self._held.values()))
         for gathered in (self._on, self._off, self._gripped, self._held, self._placed):
@@ -109,7 +111,7 @@ class Switchboard:
         apart = d.xpos[bodies] - (d.xpos[holder] + reach[:, :, 0])
         return Switched(len(welds), float(np.sqrt((apart * apart).sum(axis=1).max())))
 
-    def _wake(self, bodies: Index) -> None:
+    def wake(self, bodies: Index) -> None:
         """Wake bodies that sleep, and let those that are about to, being slow, wait as long
         again."""
         m, d, tree = self.m, self.d, self._tree[bodies]
