@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass, replace
 
 from factory.factory import Factory
 from factory.geometry import Product
@@ -31,12 +31,8 @@ class Ground:
         """The layout of a compiled factory. Raises RunError (Layout) where there is no room."""
         pace = Pace.of(settings)
         layout = lay_out(factory, product, settings.clearance, self.floor, pace)
-        if not self.relays:
-            return layout
-        from factory.relaying import relayed
+        if self.relays:
+            from factory.relaying import relayed
 
-        return relayed(layout, settings, self.cycle, self.floor)
-
-
-PLAIN = Ground()
-"""As much floor as it takes, and no relays."""
+            layout = relayed(layout, settings, self.cycle, self.floor)
+        return replace(layout, ground=asdict(self))

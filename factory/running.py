@@ -16,7 +16,6 @@ from factory.interruption import Interruption
 from factory.layout.plan import Layout
 from factory.nets.history import legal_marking
 from factory.pipeline import Source
-from factory.planning import PLAIN, Ground
 from factory.settings import Settings
 from factory.simulation import Observer, Simulation
 from factory.trace import Run
@@ -67,7 +66,6 @@ def run_file(
     size: Size | None,
     quiet: bool,
     options: dict[str, Any],
-    ground: Ground = PLAIN,
 ) -> Run:
     """One run, filmed, logged and watched by a monitor as asked. Raises MissingError where a film
     needs GL that is not there, before anything is written."""
@@ -110,9 +108,7 @@ def run_file(
         if log is not None:
             from factory.log import LogWriter
 
-            observers.append(
-                stack.enter_context(LogWriter(log, made, source, sys.argv, ground)).observe
-            )
+            observers.append(stack.enter_context(LogWriter(log, made, source, sys.argv)).observe)
         if video is not None:
             from factory.render import Film
 

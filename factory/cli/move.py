@@ -17,7 +17,6 @@ from factory.cli.options import (
     RELAY,
     RUN,
     SOURCE,
-    ground,
     pair,
     plan,
     settings_of,
@@ -61,8 +60,7 @@ def run(
     source, factory, layout = plan(file, folders, settings, floor, options)
     warn(layout.product.warnings, quiet)
     size = pair(options["size"], "--size", "1280x720", int)
-    quiet_run, on = quiet or as_json, ground(floor, options)
-    record = run_file(source, layout, settings, video, log, size, quiet_run, options, on)
+    record = run_file(source, layout, settings, video, log, size, quiet or as_json, options)
     if as_json:
         document = record.as_json()
         document.pop("schema")

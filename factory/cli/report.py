@@ -19,7 +19,6 @@ from factory.cli.options import (
     SOURCE,
     WIP,
     Number,
-    ground,
     plan,
     settings_of,
     writable,
@@ -97,8 +96,7 @@ def _run(
     warn(layout.product.warnings, quiet)
     with TemporaryDirectory(prefix="factory-") as folder:
         log = Path(folder) / "run.log"
-        on = ground(floor, options)
-        run = run_file(source, layout, settings, None, log, None, quiet or as_json, options, on)
+        run = run_file(source, layout, settings, None, log, None, quiet or as_json, options)
         recording = recording_of(log, layout)
     if run.trouble is not None:
         print(run.trouble, file=sys.stderr)

@@ -116,7 +116,8 @@ class Layout:
 
     `stations[i]`: distance [m] of operation i from its carrier's B end; `payloads[label]`: the box
     of a sub-assembly about the product's middle; `outfeed`: the box of the conveyor in the world;
-    `plain`: the layout without relays, None where this is one.
+    `plain`: the layout without relays, None where this is one; `ground`: what it was made for, by
+    the names that `planning.Ground` has.
     """
 
     factory: Factory
@@ -129,9 +130,11 @@ class Layout:
     floor: Box = (0.0, 0.0, 0.0, 0.0)
     certificate: Certificate | None = field(default=None, repr=False, compare=False)
     plain: Layout | None = field(default=None, repr=False, compare=False)
+    ground: Mapping[str, object] = field(default_factory=dict, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "payloads", MappingProxyType(dict(self.payloads)))
+        object.__setattr__(self, "ground", MappingProxyType(dict(self.ground)))
 
     @cached_property
     def guidepath_length(self) -> float:

@@ -19,7 +19,6 @@ from factory.errors import InputError
 from factory.lang import write_pag, write_template
 from factory.log.blocks import LENGTH, MAGIC, Arrays, bad_log, block, pack_rows
 from factory.monitor.subject import subject_of_run
-from factory.planning import PLAIN, Ground
 
 if TYPE_CHECKING:
     from factory.pipeline import Source
@@ -30,8 +29,8 @@ class LogWriter(Closing):
     """An observer that writes a log; close it, or use it as a context manager.
 
     `source`: the PAG with its templates, if there is more to it than the factory knows; `command`:
-    the command line, this process's unless given; `ground`: what the layout was made for. Raises
-    InputError (BadLog) where the file cannot be written."""
+    the command line, this process's unless given. Raises InputError (BadLog) where the file cannot
+    be written."""
 
     def __init__(
         self,
@@ -39,7 +38,6 @@ class LogWriter(Closing):
         simulation: Simulation,
         source: Source | None = None,
         command: Sequence[str] | None = None,
-        ground: Ground = PLAIN,
     ) -> None:
         self.path, self.world = Path(path), simulation.world
         self.physical = simulation.model is not None
@@ -59,7 +57,7 @@ class LogWriter(Closing):
             self.file = self.path.open("wb")
         except OSError as error:
             raise InputError(bad_log(self.path, f"cannot be written: {error.strerror}")) from error
-        header = json.dumps(_header(simulation, source, command, ground, nq, nv)).encode()
+        header = json.dumps(_header(simulation, source, command, nq, nv)).encode()
         self.file.write(MAGIC + LENGTH.pack(len(header)) + header)
         if simulation.model is not None:
             files = {f"mesh/{name}": content for name, content in simulation.model.files.items()}
@@ -160,12 +158,7 @@ def _ragged(name: str, rows: Sequence[tuple[int, Any]], shape: tuple[int, ...]) 
 
 
 def _header(
-    simulation: Simulation,
-    source: Source | None,
-    command: Sequence[str] | None,
-    ground: Ground,
-    nq: int,
-    nv: int,
+    simulation: Simulation, source: Source | None, command: Sequence[str] | None, nq: int, nv: int
 ) -> dict[str, Any]:
     layout, net = simulation.layout, simulation.supervisor.net
     factory, plain = layout.factory, layout.plain or layout
@@ -192,7 +185,7 @@ def _header(
             "sha256": hashlib.sha256(text.encode()).hexdigest(),
             "plain": None if layout.plain is None else said,
         },
-        "ground": asdict(ground),
+        "ground": dict(layout.ground),
         "templates": {
             name: write_template(template)
             for name, template in sorted(
