@@ -11,6 +11,7 @@ import pytest
 
 from factory.factory import Operation
 from factory.simulation import Simulation
+from factory.world import vicinity as vicinity_of_what_moves
 from factory.world.stock import Stock
 from factory.world.switchboard import AWAKE, FRESH, Switchboard, Switched
 from tests.test_vicinity import layout, states
@@ -62,6 +63,24 @@ def test_what_is_said_last_of_a_body_holds() -> None:
         assert (m.body_contype[each], m.body_conaffinity[each]) == (own, others)
 
 
+def test_what_is_put_somewhere_is_looked_at_there(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(vicinity_of_what_moves, "FEW", 0)
+    simulation = Simulation(layout("20"), units=2)
+    for _ in range(40):
+        simulation.supervisor.step()
+    world = simulation.world
+    board, vicinity, stock = world.stock.board, world.vicinity, world.stock
+    holder, label = next(pair for pair in stock.grip if pair[1] in stock.feed)
+    body = int(stock.body[label][-1])
+    vicinity.look()
+    board.place([body], [tuple(world.d.xpos[world.body[holder]])])
+    board.hold([body], holder + 1)
+    board.write()
+    assert vicinity.stale
+    vicinity.look()
+    assert world.m.body_contype[body]
+
+
 def test_what_a_weld_joins_and_joined_is_woken() -> None:
     board, stock = a_board()
     m, d = board.m, board.d
@@ -73,13 +92,17 @@ def test_what_a_weld_joins_and_joined_is_woken() -> None:
     d.tree_asleep[tree["part3"]] = -1
     weld = stock.grip[0, "part1"]
     m.eq_obj2id[weld] = stock.body["part2"][0]
+    holder = m.eq_obj1id[weld]
+    tree["holder"], first["holder"] = m.body_treeid[holder], m.body_dofadr[holder]
+    d.tree_asleep[tree["holder"]] = tree["holder"]
+    d.qvel[first["holder"]] = 0.0
     board.loose([weld])
     board.join([weld], [int(stock.body["part1"][0])])
     board.join([stock.feed["part3"]], [int(stock.body["part3"][0])])
     board.write()
-    for label in ("part1", "part2"):
-        speeds = d.qvel[first[label] : first[label] + 6]
-        assert (speeds == 0.0).all() and (np.signbit(speeds) == np.signbit(AWAKE)).all()
+    for label, dofs in (("part1", 6), ("part2", 6), ("holder", int(m.body_dofnum[holder]))):
+        speeds = d.qvel[first[label] : first[label] + dofs]
+        assert dofs and (speeds == 0.0).all() and (np.signbit(speeds) == np.signbit(AWAKE)).all()
     assert d.tree_asleep[tree["part3"]] == FRESH
 
 
