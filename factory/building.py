@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from factory.errors import RunError
-from factory.files import write_all
+from factory.files import own_names, write_all
 from factory.layout.certificate import Certificate
 from factory.layout.plan import Layout
 from factory.mjcf.binary import beside, kept, key_of, packed, seal_of, sealed
@@ -43,7 +43,8 @@ def build_all(
     """Build the model and write what is asked for, with the proof of the net's `verdict`.
 
     Raises RunError where the layout is not certified, InputError where the engine refuses the
-    model; nothing is written then."""
+    model, and where a file whose name is our choice would be written through a link, or over what
+    was read; nothing is written then."""
     from factory.layout.clearance import certify
 
     certificate = layout.certificate or certify(layout)
@@ -51,18 +52,29 @@ def build_all(
         raise RunError(fault.diagnostic() for fault in certificate.faults)
     model = physical_model(layout, units, settings, source.catalogue, wip)
     files: dict[Path, bytes] = {}
+    typed, read = mjcf, files_read(source)
     if output is not None:
         mjcf = mjcf or output / f"{_stem(source)}.xml"
     path = beside(mjcf) if mjcf else None
     binary = _binary(model, path)
     if mjcf is not None:
         files |= model_files(model, mjcf)
+        own_names(mjcf.parent, (files.keys() | binary.keys()) - {typed}, read)
     if output is not None:
         texts = _documents(layout, certificate, verdict)
-        files |= {output / f"{_stem(source)}.{end}": t.encode() for end, t in texts.items()}
+        documents = {output / f"{_stem(source)}.{end}": t.encode() for end, t in texts.items()}
+        own_names(output, documents, read)
+        files |= documents
     write_all(files | binary)
     named = (*files, path, seal_of(path)) if path else tuple(files)
     return Built(model, mjcf, named, certificate.summary())
+
+
+def files_read(source: Source) -> tuple[Path, ...]:
+    """The PAG's file, and those of its meshes."""
+    named = (node.parameter("mesh") for node in source.pag.parts())
+    meshes = (Path(source.pag.folder) / str(mesh) for mesh in named if mesh)
+    return (Path(source.pag.file), *meshes)
 
 
 def _binary(model: Model, path: Path | None) -> dict[Path, bytes]:

@@ -55,11 +55,11 @@ def warning(diagnostic: Diagnostic) -> str:
 
 
 def fail(error: FactoryError, as_json: bool) -> int:
-    """Report an error where the user looks for it, if anybody does; its exit status."""
-    with suppress(BrokenPipeError):
+    """Report an error where the user looks for it, if it can be written there; its exit status."""
+    with suppress(OSError):
         if as_json:
             emit({"errors": [d.as_json() for d in error.diagnostics]})
-    with suppress(BrokenPipeError):
+    with suppress(OSError):
         for diagnostic in error.diagnostics:
             print(diagnostic, file=sys.stderr)
     return error.exit_status

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import os
 from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from importlib.metadata import PackageNotFoundError, version
@@ -25,14 +26,22 @@ ENGINES = ("klavins-factory", "mujoco", "numpy", "scipy", "shapely", "trimesh")
 
 
 def request(file: Path, wanted: Mapping[str, Any]) -> str:
-    """The name of a receipt: the PAG and all that was asked for, and by which program."""
+    """The name of a receipt: the PAG and all that was asked for, and by which program. Paths are
+    named as they are given, and from where."""
     own = Path(__file__).parent
     program = sorted(
         (str(path.relative_to(own)), path.stat().st_size, path.stat().st_mtime_ns)
         for path in own.rglob("*.py")
     )
-    parts = [str(file.resolve()), _versions(), program, {k: str(v) for k, v in wanted.items()}]
+    given = {key: _named(value) for key, value in wanted.items()}
+    parts = [_named(file), _versions(), program, given]
     return hashlib.sha256(json.dumps(parts).encode()).hexdigest()
+
+
+def _named(value: object) -> object:
+    if isinstance(value, tuple):
+        return [_named(item) for item in value]
+    return [str(value), os.path.abspath(value)] if isinstance(value, Path) else str(value)
 
 
 def find(name: str) -> dict[str, Any] | None:
@@ -56,12 +65,12 @@ def keep(
     if not written or not all(path.is_file() for path in written):
         return
     receipt = {
-        "inputs": {str(path.resolve()): _digest(path) for path in inputs},
-        "outputs": {str(path.resolve()): _digest(path) for path in written},
+        "inputs": {os.path.abspath(path): _digest(path) for path in inputs},
+        "outputs": {os.path.abspath(path): _digest(path) for path in written},
         "document": dict(document),
     }
     with suppress(OSError):
-        write_text(_place(name), json.dumps(receipt, ensure_ascii=False) + "\n")
+        write_text(_place(name), json.dumps(receipt) + "\n")
         _trim(_place(name).parent)
 
 

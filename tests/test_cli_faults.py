@@ -8,6 +8,7 @@ import random
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -252,6 +253,100 @@ def test_a_link_leads_to_the_file(run: Terminal, out: Path) -> None:
     assert run("export", PAPER, "--format", "dot", "-o", out / "link.dot").status == 0
     assert (out / "link.dot").is_symlink()
     assert (out / "real" / "net.dot").read_text().startswith("digraph")
+
+
+def test_links_to_themselves(run: Terminal, out: Path) -> None:
+    one, other = out / "one", out / "other"
+    one.symlink_to(other)
+    other.symlink_to(one)
+    for command, *options in commands(out):
+        assert run(command, one, *options, "--json").codes == ["BadFile"]
+    for command, *options in OUTPUTS:
+        assert run(command, PAPER, *options, one, "--json").status == 2
+    assert one.is_symlink() and other.is_symlink()
+
+
+@pytest.mark.parametrize(
+    "name", ["p.xml", "p.mjb", "p.mjb.seal", "p.svg", "p.dot", "p.proof.json", "p_meshes"]
+)
+def test_what_build_names_itself_is_no_link(run: Terminal, out: Path, name: str) -> None:
+    """It would be written elsewhere."""
+    (out / "part.obj").write_bytes((ROOT / "tests/broken/bricks/3001.obj").read_bytes())
+    (out / "p.pag").write_text('root = p; p = atomic(mesh = "part.obj")')
+    (out / "elsewhere").mkdir()
+    (out / "x").mkdir()
+    link = out / "x" / name
+    link.symlink_to(out / "elsewhere" / ("" if name == "p_meshes" else "victim"))
+    before = files_in(out)
+    assert run("build", out / "p.pag", "-o", out / "x", "--json").codes == ["BadFile"]
+    assert files_in(out) == before
+    link.unlink()
+    assert run("build", out / "p.pag", "-o", out / "x", "--json").status == 0
+
+
+@pytest.mark.parametrize(
+    ("name", "words"), [("p.xml", ["-o", "."]), ("p.mjb", ["--mjcf", "p.xml"])]
+)
+def test_what_build_names_itself_is_not_the_input(
+    run: Terminal, out: Path, monkeypatch: pytest.MonkeyPatch, name: str, words: list[str]
+) -> None:
+    monkeypatch.chdir(out)
+    (out / name).write_bytes(PAPER.read_bytes())
+    assert run("build", name, *words, "--json").codes == ["BadFile"]
+    assert files_in(out) == {name: PAPER.read_bytes()}
+
+
+def test_meshes_are_not_written_over(run: Terminal, out: Path) -> None:
+    brick = (ROOT / "tests/broken/bricks/3001.obj").read_bytes()
+    (out / "p_meshes").mkdir()
+    (out / "p.pag").write_text('root = p; p = atomic(mesh = "part.obj")')
+    (out / "part.obj").write_bytes(brick)
+    assert run("build", out / "p.pag", "-o", out / "x").status == 0
+    (made,) = (out / "x" / "p_meshes").iterdir()
+    (out / "p.pag").write_text(f'root = p; p = atomic(mesh = "p_meshes/{made.name}")')
+    (out / "p_meshes" / made.name).write_bytes(made.read_bytes())
+    before = files_in(out)
+    assert run("build", out / "p.pag", "-o", out, "--json").codes == ["BadFile"]
+    assert files_in(out) == before
+
+
+@pytest.mark.parametrize("name", ["x" * 210, "é" * 122])
+def test_long_names_are_built(run: Terminal, out: Path, name: str) -> None:
+    """Those that begin alike are different files."""
+    file = out / f"{name}.pag"
+    file.write_bytes(PAPER.read_bytes())
+    done = run("build", file, "-o", out / "x", "--json")
+    if done.status == 0:
+        written = files_in(out / "x")
+        assert b"<mujoco" in written[f"{name}.xml"] and b"<svg" in written[f"{name}.svg"]
+    else:  # a name of ours is longer than a name may be
+        assert done.codes == ["BadFile"]
+        assert files_in(out) == {file.name: PAPER.read_bytes()}
+
+
+def test_folders_that_could_not_all_be_made_are_none(run: Terminal, out: Path) -> None:
+    assert run("build", PAPER, "-o", out / "one" / ("x" * 300), "--json").codes == ["BadFile"]
+    assert not (out / "one").exists()
+
+
+def test_who_may_read_a_file_stays(run: Terminal, out: Path) -> None:
+    file = out / "net.dot"
+    file.touch(0o600)
+    assert run("export", PAPER, "--format", "dot", "-o", file).status == 0
+    assert file.stat().st_mode & 0o777 == 0o600
+
+
+@pytest.mark.parametrize("unbuffered", ["", "1"])
+def test_what_nobody_can_be_told(out: Path, unbuffered: str) -> None:
+    """The status says it: no traceback, on a full disk."""
+    broken = [sys.executable, "-m", "factory", "check", str(out / "nope.pag"), "--json"]
+    variables = {**os.environ, "PYTHONUNBUFFERED": unbuffered}
+    with open("/dev/full", "w") as full:
+        for said, told in (("stdout", "stderr"), ("stderr", "stdout")):
+            streams: dict[str, Any] = {said: full, told: subprocess.PIPE}
+            done = subprocess.run(broken, cwd=ROOT, env=variables, text=True, **streams)
+            assert done.returncode == 2
+            assert "Traceback" not in (getattr(done, told) or "")
 
 
 def test_a_build_is_written_whole_or_not_at_all(run: Terminal, out: Path) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import pytest
@@ -112,3 +113,49 @@ def test_warnings_are_given_again(run: Terminal, out: Path, tmp_path: Path) -> N
     assert again(second.out)
     assert first.err == second.err
     assert "warning" in first.err
+
+
+def test_names_count_from_where_they_are_given(
+    run: Terminal, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The same words elsewhere mean other files, and other templates."""
+    (tmp_path / "p.pag").write_bytes(PAPER.read_bytes())
+    weld = (ROOT / "templates" / "weld.op").read_text()
+    cycles = []
+    for name, dwell in (("one", "1"), ("other", "9")):
+        (tmp_path / name / "ops").mkdir(parents=True)
+        text, count = re.subn(r"dwell = [0-9.]+", f"dwell = {dwell}", weld)
+        assert count == 1
+        (tmp_path / name / "ops" / "weld.op").write_text(text)
+        monkeypatch.chdir(tmp_path / name)
+        for words in (["-o", "out"], ["--templates", "ops", "-o", tmp_path / "same"]):
+            assert not again(lines(run, "../p.pag", *words))
+            assert again(lines(run, "../p.pag", *words))
+        assert {"p.xml", "p.mjb", "p.svg"} <= files_in(tmp_path / name / "out").keys()
+        done = run("build", "../p.pag", "--templates", "ops", "-o", tmp_path / "same", "--json")
+        cycles.append(done.json["layout"]["predicted_cycle_time_s"])
+    assert cycles[1] > cycles[0] + 7
+
+
+def test_a_link_that_leads_elsewhere_is_another_product(run: Terminal, out: Path) -> None:
+    for name, file in (("a", "paper"), ("b", "lamp")):
+        (out / f"{name}.pag").write_bytes((ROOT / "examples" / f"{file}.pag").read_bytes())
+    link = out / "link.pag"
+    for name in ("a", "b"):
+        link.unlink(missing_ok=True)
+        link.symlink_to(out / f"{name}.pag")
+        assert not again(lines(run, link, "-o", out / "x"))
+        assert again(lines(run, link, "-o", out / "x"))
+    link.with_name("c.pag").symlink_to(out / "b.pag")
+    assert not again(lines(run, out / "c.pag", "-o", out / "x"))
+    assert (out / "x" / "c.xml").exists()
+
+
+def test_a_name_that_is_no_text_has_a_receipt(run: Terminal, out: Path) -> None:
+    file = out / "n\udcff.pag"
+    file.write_bytes(PAPER.read_bytes())
+    times = []
+    for _ in range(2):
+        assert run("build", file, "-o", out / "x", "--json").status == 0
+        times.append([path.stat().st_mtime_ns for path in sorted((out / "x").iterdir())])
+    assert times[0] == times[1]

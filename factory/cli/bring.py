@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from pathlib import Path
 from typing import cast
 
@@ -53,7 +52,7 @@ def import_(
 ) -> int:
     """Make a PAG of SOURCE: an LDraw model (.ldr, .mpd), a tree of meshes (.json, .yaml), a bill of
     materials with levels (.csv), or a folder with one of these."""
-    from factory.files import write_all
+    from factory.files import own_names, write_all
     from factory.importing import Options, import_product
     from factory.importing.assembling import Mates
     from factory.pipeline import all_templates
@@ -65,7 +64,7 @@ def import_(
     folder = output or Path(product.name)
     writable_folder(folder)
     files = {folder / name: content for name, content in product.files.items()}
-    _no_links(folder, product.files)
+    own_names(folder, files)
     write_all(files)
     warn(product.warnings, quiet)
     parts = sum(1 for _ in product.pag.parts())
@@ -92,16 +91,6 @@ def _require_folder(folder: Path | None, option: str) -> None:
     if folder is not None and not folder.is_dir():
         message = f"{option}: there is no folder '{folder}'"
         raise InputError(Diagnostic("BadFile", message, None, "give the name of a folder"))
-
-
-def _no_links(folder: Path, names: Iterable[str]) -> None:
-    """Names of files come from what is imported, so no link is followed out of the folder. Raises
-    InputError (BadFile)."""
-    inside = {folder / part for name in names for part in (name, Path(name).parent)} - {folder}
-    links = sorted(path for path in inside if path.is_symlink())
-    if links:
-        hint = "remove it, or choose another folder"
-        raise InputError(Diagnostic("BadFile", f"'{path}' is a link", None, hint) for path in links)
 
 
 @click.command()

@@ -76,7 +76,7 @@ def build(
         spent = perf_counter() - begin
         built = build_all(source, layout, settings, mjcf, output, units, wip, verdict)
         told = _told(layout, built, settings, spent)
-        receipt.keep(name, _inputs(source, file, folders), built.files, told)
+        receipt.keep(name, _inputs(source, folders), built.files, told)
     else:
         told["document"]["compile_s"] = perf_counter() - begin
         told["lines"].append("nothing has changed since: these files are up to date")
@@ -124,12 +124,11 @@ def _told(layout: Layout, built: Built, settings: Settings, spent: float) -> dic
     return {"document": document, "lines": lines, "warnings": warnings}
 
 
-def _inputs(source: Source, file: Path, folders: tuple[Path, ...]) -> tuple[Path, ...]:
+def _inputs(source: Source, folders: tuple[Path, ...]) -> tuple[Path, ...]:
     """Every file and folder a build reads: if one changes, the receipt no longer holds."""
     from factory.assets import mjcf_folder, templates_folder
+    from factory.building import files_read
 
     given = (*folders, templates_folder(), mjcf_folder())
     inside = (path for folder in given for path in folder.iterdir() if path.is_file())
-    named = (node.parameter("mesh") for node in source.pag.parts())
-    meshes = (Path(source.pag.folder) / str(mesh) for mesh in named if mesh)
-    return (file, *given, *inside, *meshes)
+    return (*files_read(source), *given, *inside)

@@ -218,19 +218,20 @@ def writable(file: Path | None, *outputs: Path | None) -> None:
     """Output files must be such that they can be written: their folder there and writable,
     themselves no folder, all different, and none the input. Raises InputError (BadFile) with every
     fault."""
-    taken = {} if file is None else {file.resolve(): "the input"}
+    taken = {} if file is None else {os.path.realpath(file): "the input"}
     faults = []
     for path in outputs:
         if path is None:
             continue
         trouble = _unwritable(path)
-        if trouble is None and path.resolve() in taken:
-            trouble = f"'{path}' is {taken[path.resolve()]}", "give another name"
+        place = os.path.realpath(path)
+        if trouble is None and place in taken:
+            trouble = f"'{path}' is {taken[place]}", "give another name"
         if trouble is not None:
             faults.append(Diagnostic("BadFile", trouble[0], None, trouble[1]))
         elif path.exists() and not path.is_file():
             continue
-        taken[path.resolve()] = "given twice"
+        taken[place] = "given twice"
     if faults:
         raise InputError(faults)
 

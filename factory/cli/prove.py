@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -54,10 +54,10 @@ def check(
     writable_folder(clashes)
     checked = check_file(file, folders, wip, _relayed(file, folders, options))
     if clashes is not None:
-        from factory.files import write_all
+        from factory.files import own_names, write_all
 
         files = checked.pictures(clashes)
-        _no_links(files)
+        own_names(clashes, files, [file])
         write_all(files)
     if certificate is not None:
         from factory.files import write_text
@@ -82,15 +82,6 @@ def _relayed(file: Path, folders: Sequence[Path], options: dict[str, Any]) -> Fa
         raise InputError(Diagnostic("Usage", message, None, "leave it out"))
     factory: Factory = plan(file, folders, settings_of(file, {}), None, options)[1]
     return factory
-
-
-def _no_links(files: Iterable[Path]) -> None:
-    """Pictures have names of our choice, so no link that happens to have one is followed. Raises
-    InputError (BadFile)."""
-    hint = "remove it, or choose another folder"
-    links = [path for path in files if path.is_symlink()]
-    if links:
-        raise InputError(Diagnostic("BadFile", f"'{path}' is a link", None, hint) for path in links)
 
 
 @click.command()
