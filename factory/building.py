@@ -42,11 +42,13 @@ def build_all(
 ) -> Built:
     """Build the model and write what is asked for, with the proof of the net's `verdict`.
 
-    Raises RunError where the layout is not certified, InputError where the engine refuses the
-    model, and where a file whose name is our choice would be written through a link, or over what
-    was read; nothing is written then."""
+    Raises RunError where the layout is not certified; InputError where an operation cannot reach
+    its goal in it, where the engine refuses the model, and where a file whose name is our choice
+    would be written through a link, or over what was read. Nothing is written then."""
+    from factory.control.plan import operation_modes
     from factory.layout.clearance import certify
 
+    operation_modes(layout, settings.eps)
     certificate = layout.certificate or certify(layout)
     if not certificate.holds:
         raise RunError(fault.diagnostic() for fault in certificate.faults)

@@ -47,8 +47,12 @@ class Source:
         return matings(self.pag, self.templates, self.product) if shaped(self.pag) else None
 
     def compile(self) -> Factory:
-        """Compile(P)."""
-        return compile_pag(self.pag, self.templates, self.catalogue, self.approaches)
+        """Compile(P). Raises InputError where there is no such factory."""
+        from factory.control.preparing import check_modes
+
+        factory = compile_pag(self.pag, self.templates, self.catalogue, self.approaches)
+        check_modes(factory, lambda: self.product)
+        return factory
 
 
 def all_templates(folders: Sequence[Path] = ()) -> Mapping[str, Template]:

@@ -41,6 +41,7 @@ class Law:
     goals: tuple[Point, ...]
     eps: float | str = "eps"
     dwell: float | str | None = None
+    position: Position | None = field(default=None, compare=False)
 
 
 @dataclass(frozen=True, slots=True)

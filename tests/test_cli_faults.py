@@ -61,6 +61,46 @@ def test_broken_templates_write_nothing(run: Terminal, out: Path, file: Path) ->
     assert files_in(out) == {}
 
 
+OWN = """op = (R, j, ~, <a; b>, F) where
+  R = < dot, dot, dot >;
+  j = 3;
+  ~ = { A1 = A2 = B3 };
+  <a; b> = < LAB1, LAB2, nopart; nopart, nopart, LAB3 >;
+  F = navigation on W to ( A1 + 2r, A2 + 2r, B3 ) within eps;
+"""
+
+
+@pytest.mark.parametrize(
+    ("right", "wrong", "code"),
+    [
+        ("navigation", "navigatoin", "BadTemplate"),
+        ("navigation", "hold", "NotPrepared"),
+        ("navigation", "wait", "NotPrepared"),
+        ("within eps", "within 1e9", "NotPrepared"),
+        ("within eps", "within 0.02", "NotPrepared"),
+        ("A1 = A2 = B3", "A1 = B1 = A2 = B3", "NotPrepared"),
+        ("A1 = A2 = B3", "A1 = A2, B3 = B1", "NotPrepared"),
+    ],
+)
+def test_operations_without_a_mode_are_refused_when_compiled(
+    run: Terminal, out: Path, right: str, wrong: str, code: str
+) -> None:
+    (out / "op.op").write_text(OWN)
+    (out / "p.pag").write_text("root = c; c = op(a, b); a = atomic(); b = atomic();")
+    for command, *options in commands(out / "x"):
+        (out / "x").mkdir(exist_ok=True)
+        assert run(command, out / "p.pag", "--templates", out, *options).status == 0
+    assert right in OWN
+    (out / "op.op").write_text(OWN.replace(right, wrong))
+    for command, *options in commands(out / "y"):
+        (out / "y").mkdir(exist_ok=True)
+        done = run(command, out / "p.pag", "--templates", out, *options, "--json")
+        assert done.status == 2 and done.codes == [code], command
+        (error,) = done.json["errors"]
+        assert (Path(error["file"]).name, error["line"]) == ("op.op", 6)
+    assert files_in(out / "y") == {}
+
+
 def garbage() -> dict[str, bytes]:
     """Files that nobody would write."""
     draw = random.Random(7)

@@ -82,7 +82,7 @@ def test_goals_that_touch_are_not_prepared() -> None:
     with pytest.raises(InputError) as caught:
         mode_of(replace(MATE, law=law), SETTING)
     assert caught.value.diagnostics[0].code == "NotPrepared"
-    assert "mate: robots 0 and 1 at their goals touch" in str(caught.value)
+    assert "mate: robots 1 and 2 at their goals touch" in str(caught.value)
 
 
 def test_an_unknown_law_is_named_with_the_nearest() -> None:

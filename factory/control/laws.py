@@ -87,7 +87,8 @@ def navigation(template: Template, setting: Setting) -> Mode:
         )
     except ValueError as error:
         message = f"{template.name}: {error}"
-        raise InputError(Diagnostic("NotPrepared", message, template.position)) from error
+        position = template.law.position or template.position
+        raise InputError(Diagnostic("NotPrepared", message, position)) from error
 
 
 def hold(template: Template, setting: Setting) -> Mode:
@@ -99,17 +100,24 @@ LAWS: Mapping[str, Law] = MappingProxyType({"navigation": navigation, "hold": ho
 """Every control law, by name."""
 
 
+def law_of(template: Template) -> Law:
+    """The control law that a template's F names. Raises InputError (BadTemplate) for one that is
+    not in the table."""
+    name = template.law.name
+    if name not in LAWS:
+        hint = did_you_mean(name, sorted(LAWS), "control laws")
+        message = f"{template.name}: unknown control law '{name}'"
+        position = template.law.position or template.position
+        raise InputError(Diagnostic("BadTemplate", message, position, hint))
+    return LAWS[name]
+
+
 def mode_of(template: Template, setting: Setting) -> Mode:
     """The mode a template's F gives on the guidepaths of `setting`.
 
     Raises InputError: BadTemplate for a law that is not in the table, NotPrepared for no mode.
     """
-    name = template.law.name
-    if name not in LAWS:
-        hint = did_you_mean(name, sorted(LAWS), "control laws")
-        message = f"{template.name}: unknown control law '{name}'"
-        raise InputError(Diagnostic("BadTemplate", message, template.position, hint))
-    return LAWS[name](template, setting)
+    return law_of(template)(template, setting)
 
 
 def _meetings(

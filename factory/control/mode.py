@@ -220,8 +220,8 @@ def _check_robots(mode: Mode) -> None:
     if outside.any():
         i = int(np.argmax(outside))
         raise ValueError(
-            f"robot {i}: goal {mode.goals[i]:g} with standoff {mode.standoff[i]:g} is not inside"
-            f" [{mode.lower[i]:g}, {mode.upper[i]:g}]"
+            f"robot {i + 1}: goal {mode.goals[i]:g} with standoff {mode.standoff[i]:g} is not"
+            f" inside [{mode.lower[i]:g}, {mode.upper[i]:g}]"
         )
     for name, robots, least in (("gate", mode.gate, -1), ("pairs", mode.pairs, 0)):
         if ((robots < least) | (robots >= mode.size)).any():
@@ -237,7 +237,8 @@ def _ordered(gate: Index) -> tuple[int, ...]:
     while waiting:
         free = [i for i in waiting if gate[i] < 0 or int(gate[i]) in ready]
         if not free:
-            raise ValueError(f"robots {waiting} wait for each other: gate {gate.tolist()}")
+            robots = [i + 1 for i in waiting]
+            raise ValueError(f"robots {robots} wait for each other: gate {gate.tolist()}")
         ready += free
         waiting = [i for i in waiting if i not in free]
     return tuple(ready)
@@ -249,10 +250,10 @@ def _check_pairs(mode: Mode) -> None:
     for (i, j), gap in zip(mode.pairs.tolist(), (apart - mode.touch).tolist(), strict=True):
         if i == j or gap <= 2 * mode.eps:
             raise ValueError(
-                f"robots {i} and {j} at their goals touch: {gap:g} m apart, the goal ball needs"
-                f" more than {2 * mode.eps:g}"
+                f"robots {i + 1} and {j + 1} at their goals touch: {gap:g} m apart, the goal ball"
+                f" needs more than {2 * mode.eps:g}"
             )
     unsafe = (mode.gate[mode.pairs] >= 0) & (mode.meet > mode.lower[mode.pairs])
     if unsafe.any():
         i = int(mode.pairs[unsafe][0])
-        raise ValueError(f"robot {i} waits for a gate, so others may meet it at its A end only")
+        raise ValueError(f"robot {i + 1} waits for a gate, so others may meet it at its A end only")

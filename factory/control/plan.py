@@ -69,7 +69,8 @@ def _unprepared(operation: Operation, inside: bool) -> Diagnostic:
         else "the operations before leave its robots outside its domain"
     )
     message = f"{operation.template.name}: '{operation.label}' cannot reach its goal; {what}"
-    position = operation.template.position or operation.position
+    template = operation.template
+    position = template.law.position or template.position or operation.position
     return Diagnostic("NotPrepared", message, position, "let ~ join A ends to a B end or a station")
 
 

@@ -138,7 +138,8 @@ class TemplateMaker:
             self._bad(f"F has {goals} for {robots}", at, hint)
         eps = self._radius(raw.eps)
         dwell = self._dwell(raw.dwell, parameters) if raw.dwell else None
-        return Law(str(raw.name), tuple(point for point in points if point), eps, dwell)
+        reached = tuple(point for point in points if point)
+        return Law(str(raw.name), reached, eps, dwell, self.source.at(raw.name))
 
     def _radius(self, found: Token) -> float | str:
         """eps: a positive number, or the word."""
