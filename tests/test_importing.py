@@ -550,6 +550,7 @@ def test_a_bill_with_numbers(bring: Importer) -> None:
             ["3:1 BadLevel level 2 comes after level 0", "5:1 BadLevel 'x' is no level"],
         ),
         ("level,name\n1,a\n0,b", ["3:1 BadLevel level 0 is above that of the first row"]),
+        ("level,name\nx,p\n0,a\n1,b", ["2:1 BadLevel 'x' is no level"]),
         (
             "name,item\na,1\nb,1.1\nc,1.1\nd,2.1\ne,3-1",
             [

@@ -107,6 +107,10 @@ def test_labels(label: str) -> None:
     assert pag.root == label
 
 
+def test_zeros_before_the_number_of_parts_do_not_matter() -> None:
+    assert read(f"{'0' * 5000}1 parts; root = a; a = atomic()").count == 1
+
+
 def test_labels_that_look_like_keywords_of_templates() -> None:
     assert read("root = R; R = mate ( where, within ); where = atomic(); within = atomic()")
 

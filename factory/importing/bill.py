@@ -48,6 +48,7 @@ class BillReader:
     def _level_parents(self, rows: list[Row]) -> None:
         """Levels 0, 1, 2: a row goes into the last one above it that is one level higher."""
         above: list[tuple[int, int]] = []
+        top: int | None = None
         for index, row in enumerate(rows):
             text = _level(row)
             if not re.fullmatch(r"[0-9]{1,9}", text):
@@ -55,13 +56,14 @@ class BillReader:
                 self._bad_level(row, f"{quoted(text)} is no level", hint)
                 continue
             level = int(text)
+            top = level if top is None else top
             before = above[-1][0] if above else level
             while above and above[-1][0] >= level:
                 above.pop()
             if level > before + 1:
                 hint = "a row is at most one level below the row before it"
                 self._bad_level(row, f"level {level} comes after level {before}", hint)
-            elif not above and index and level < int(_level(rows[0]) or 0):
+            elif not above and level < top:
                 hint = "the product, or its first part, comes first"
                 self._bad_level(row, f"level {level} is above that of the first row", hint)
             row.parent = above[-1][1] if above else -1

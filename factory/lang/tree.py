@@ -233,4 +233,4 @@ def root_of(draft: Draft) -> str:
 def count_of(draft: Draft) -> int | None:
     """The number in `N parts` of a draft without errors."""
     token: Token | None = next(iter(draft.counts), None)
-    return None if token is None else int(token)
+    return None if token is None else int(token.lstrip("0") or 0)
