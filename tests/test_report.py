@@ -245,8 +245,8 @@ def test_hostile_labels_are_text() -> None:
     [
         (lambda h: h.pop("product"), "'product'"),
         (lambda h: h.update(start=[0, 99]), "out of range"),
-        (lambda h: h["pag"].update(file=3), "no text"),
-        (lambda h: h.update(seed="x"), "does not say how it was made"),
+        (lambda h: h["pag"].update(file=3), "'pag.file' must be a text"),
+        (lambda h: h.update(seed="x"), "'seed' must be a whole number"),
     ],
     ids=["product", "start", "file", "seed"],
 )

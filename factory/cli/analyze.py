@@ -170,7 +170,7 @@ def _conditions(file: Path, log: Any, options: dict[str, Any]) -> Conditions:
     from factory.analysis.recorded import Conditions, conditions
 
     if log is not None:
-        return conditions(str(options["measured"]), log.header)
+        return conditions(log.header)
     settings = settings_of(file, options)
     return Conditions(
         settings, options["world"], options["seed"], options["jitter"], options["wip"]

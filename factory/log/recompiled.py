@@ -8,19 +8,22 @@ from typing import Any
 from factory.compiler import compile_pag
 from factory.factory import Factory
 from factory.lang import read_pag, read_template
+from factory.nets.history import firings
 from factory.robots import load_catalogue
 
 
 def factory_of(header: Mapping[str, Any]) -> Factory:
     """The factory that a log's PAG and templates compile to; its meshes need not be there.
 
-    Raises ValueError where it is another than the header says, KeyError, TypeError or
-    AttributeError where the header is none.
+    Raises ValueError where it is another than the header says, or the run began in none of its
+    markings; KeyError where the header is of an older version.
     """
     templates = {name: read_template(text, name) for name, text in header["templates"].items()}
     pag = read_pag(header["pag"]["text"], templates, header["pag"]["file"], None)
     factory = compile_pag(pag, templates, load_catalogue())
-    made = [t.name for t in factory.net.threaded.transitions]
-    if made != list(header["transitions"]) or [r.name for r in factory.robots] != header["robots"]:
+    net = factory.net.threaded
+    made = [[x.name for x in found] for found in (net.transitions, net.places, factory.robots)]
+    if made != [header["transitions"], header["places"], header["robots"]]:
         raise ValueError("its net is not that of its PAG")
+    firings(factory.net, frozenset(header["start"]))
     return factory

@@ -67,14 +67,7 @@ def recorded_subject(header: Mapping[str, Any]) -> Subject:
     factory = factory_of(header)
     known = {f.name for f in fields(Settings)}
     settings = Settings(**{k: v for k, v in header["settings"].items() if k in known})
-    wip = header["wip"]
-    return subject_from(
-        factory,
-        header["monitor"],
-        settings,
-        [int(place) for place in header["start"]],
-        None if wip is None else int(wip),
-    )
+    return subject_from(factory, header["monitor"], settings, header["start"], header["wip"])
 
 
 def _bad(words: str) -> Diagnostic:

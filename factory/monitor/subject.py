@@ -145,7 +145,8 @@ def subject_from(
     """The inverse of `as_json`. Raises ValueError where what was kept is not of that factory."""
     goals = tuple(tuple(float(x) for x in row) for row in kept["goals"])
     radii = tuple(float(x) for x in kept["radii"])
-    if [len(row) for row in goals] != [len(o.robots) for o in factory.operations]:
+    slots = [len(o.robots) for o in factory.operations]
+    if [len(row) for row in goals] != slots or len(radii) != len(slots):
         raise ValueError("its goals are not those of its PAG")
     places = {str(k): (float(x), float(y), float(z)) for k, (x, y, z) in kept["places"].items()}
     patience = float(kept["patience"])

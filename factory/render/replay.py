@@ -42,8 +42,7 @@ def render_log(
     shared(size, panels)
     m, subject = _model(log), _subject(log)
     camera = camera_named(camera, [part.label for part in subject.factory.leaves])
-    units = int(log.header["units"])
-    product = str(log.header["product"])
+    product, units = log.header["product"], log.header["units"]
     take = Take(m, product, units, size, camera, caption, subject, panels, title)
     history = History(subject)
     firings = list(zip(log.fired_t.tolist(), log.fired.tolist(), strict=True))

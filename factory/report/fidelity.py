@@ -143,7 +143,7 @@ def _ideal(recording: Recording) -> dict[str, float | None]:
     if recording.layout is None:
         return {}
     log, net = recording.log, recording.factory.net
-    made = conditions(recording.file, log.header)
+    made = conditions(log.header)
     if not recording.from_start or not log.delivered[-1]:
         return {}
     units = int(log.delivered[-1])

@@ -30,7 +30,7 @@ def predicted(recording: Recording) -> Predicted | None:
     """The prediction; None where there is no layout to predict from."""
     if recording.layout is None:
         return None
-    made = conditions(recording.file, recording.log.header)
+    made = conditions(recording.log.header)
     timing = Timing(recording.layout, made.settings, made.world, made.seed, made.jitter)
     net = timed_net(timing, wip=made.wip)
     units = max(1, int(recording.log.delivered[-1]))
