@@ -153,28 +153,31 @@ class Simulation:
 
     def run(self, observers: Sequence[Observer] = (), max_time: float | None = None) -> Run:
         """Tick until `units` products have been dropped off, the run stalls or `max_time` [s]
-        passes."""
+        passes. Where the engine gives up it begins anew by itself, at time 0: nobody is shown
+        that, and the run has lasted until then."""
         patience = PATIENCE * max(self.delays)
         begin, watched, trouble = perf_counter(), 0.0, None
         supervisor, world, goal = self.supervisor, self.world, self.before + self.units
         while world.delivered() < goal and trouble is None:
+            before = world.time
             supervisor.step()
+            if self.model is not None and (reason := world.unstable()):
+                trouble = self._trouble("Unstable", f"{reason}, after {before:.2f} s", SMALLER)
+                return self._record(perf_counter() - begin - watched, before, trouble)
             if observers:
                 pause = perf_counter()
                 for observe in observers:
                     observe(world, supervisor)
                 watched += perf_counter() - pause
-            if self.model is not None and (reason := world.unstable()):
-                trouble = self._trouble("Unstable", reason, SMALLER)
-            elif world.time - supervisor.last_event > patience:
+            if world.time - supervisor.last_event > patience:
                 what = f"nothing fired for {patience:.2f} s of simulated time"
                 trouble = self._trouble("Stalled", what, LOOK)
             elif max_time is not None and world.time >= max_time:
                 what = f"not finished after {max_time:.2f} s of simulated time"
                 trouble = self._trouble("Timeout", what, LOOK)
-        return self._record(perf_counter() - begin - watched, trouble)
+        return self._record(perf_counter() - begin - watched, world.time, trouble)
 
-    def _record(self, wall: float, trouble: Diagnostic | None) -> Run:
+    def _record(self, wall: float, time: float, trouble: Diagnostic | None) -> Run:
         supervisor, world, factory = self.supervisor, self.world, self.layout.factory
         physics = getattr(world, "physics_time", 0.0)
         predicted = predict(self.layout, self.delays, self.settings, self.kind, self.wip, self.ways)
@@ -187,7 +190,7 @@ class Simulation:
             self.units,
             world.delivered() - self.before,
             len(factory.robots),
-            world.time,
+            time,
             wall,
             physics,
             wall - physics,

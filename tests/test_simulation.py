@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import random
 from dataclasses import replace
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -223,6 +225,28 @@ def test_a_time_limit_names_robot_mode_and_line(paper: Layout) -> None:
     assert "sub2 = weld ( sub1 )" in text
 
 
+HEAVY = {
+    "lowered": """root = w; w = mate ( base, block );
+        base = atomic ( box = (0.6, 0.6, 0.05), pos = (0, 0, 0.025), mass = 20 );
+        block = atomic ( box = (0.2, 0.2, 0.2), pos = (0.2, 0, 0.15), mass = 60 )""",
+    "wall": """root = w; w = mate ( floor, wall );
+        floor = atomic ( box = (2.25, 1.5, 0.075), pos = (0, 0, 0.0375), density = 500 );
+        wall = atomic ( box = (0.075, 1.5, 1.5), pos = (-1.0875, 0, 0.825), density = 500 )""",
+}
+
+
+@pytest.mark.parametrize("force", [3.0, 6.0])
+@pytest.mark.parametrize("text", HEAVY.values(), ids=HEAVY)
+def test_heavy_parts_do_not_swing(text: str, force: float, tmp_path: Path) -> None:
+    """Forty times what a robot weighs: its motor's inertia keeps the weld stiff that holds them."""
+    (tmp_path / "w.pag").write_text(text)
+    layout = factory.lay_out(factory.compile(factory.load_pag(tmp_path / "w.pag")))
+    run = factory.run(layout, units=4, settings=Settings(force=force))
+    assert run.products == 4 and run.cycle_time_s is not None
+    assert run.cycle_time_s == pytest.approx(run.predicted_cycle_time_s, rel=0.02)
+    assert_good(run)
+
+
 def test_a_stuck_robot_is_a_stall(paper: Layout) -> None:
     """Planted fault: robot r5's drive does nothing."""
     simulation = Simulation(paper, units=1)
@@ -237,13 +261,23 @@ def test_a_stuck_robot_is_a_stall(paper: Layout) -> None:
 
 
 def test_an_unstable_engine_ends_the_run(paper: Layout) -> None:
-    """Planted fault: a speed that is no number. The engine would begin anew, and again."""
+    """Planted fault: a speed that is no number. The engine begins anew then, at time 0, which is
+    nothing to be seen."""
     simulation = Simulation(paper, units=1)
-    simulation.world.d.qvel[simulation.world.dof[2]] = float("nan")
-    run = simulation.run()
+    seen = []
+
+    def plant(world: Any, _: object) -> None:
+        seen.append(world.time)
+        if world.time > 1.0:
+            world.d.qvel[world.dof[2]] = float("nan")
+
+    run = simulation.run([plant])
     assert run.trouble is not None
     assert run.trouble.code == "Unstable"
-    assert "r5 in" in run.trouble.message
+    assert "r3 in" in run.trouble.message and "after 1.00 s" in run.trouble.message
+    assert run.sim_time_s == seen[-1] == pytest.approx(1.0)
+    assert all(0.0 <= share <= 1.0 for share in run.utilisation)
+    assert seen == sorted(seen)
 
 
 def test_short_steps_and_slow_starts_do_not_send_robots_to_sleep(paper: Layout) -> None:

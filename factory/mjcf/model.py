@@ -38,7 +38,7 @@ from factory.settings import Settings
 from factory.wholes import Bodies, bodies_of
 
 CARRIAGE_MASS = 1.9
-"""What a `dot` weighs without payload [kg]; only used to size gains and forces."""
+"""What a `dot` weighs without payload [kg]."""
 
 HEAD_MASS = 0.4
 """What the head of a `lift` weighs without payload [kg]."""
@@ -55,6 +55,11 @@ SAMPLES = 2
 HOIST_STIFFNESS = 200.0
 """The same of a lift's, which holds a weight: half a payload unaccounted for lets it sag by 0.1
 mm [rad/s]."""
+
+LEAST = 0.5
+"""What moves a payload weighs at least this share of it: a weld is as stiff as the lighter of its
+bodies is heavy, and a heavy payload would swing on it. A motor's inertia makes up for what is
+missing."""
 
 GRAVITY = 9.81
 """[m/s²]; the engine's own."""
@@ -146,8 +151,9 @@ def build_model(
     equality, actuator = Element("equality"), Element("actuator")
     hoists = _hoists(factory, masses, settings)
     _robots(layout, catalogue, drives, hoists, defaults, asset, world, actuator)
-    load = masses[factory.pag.root] + TRAY_MASS
-    add_tray(world, actuator, layout, drive_for(load, settings.outfeed_acceleration, settings))
+    load = masses[factory.pag.root]
+    drive = drive_for(TRAY_MASS, load, settings.outfeed_acceleration, settings)
+    add_tray(world, actuator, layout, drive)
     add_parts(world, layout, copies)
     add_wholes(world, layout, bodies, copies)
     add_welds(equality, layout, bodies, copies)
@@ -185,24 +191,31 @@ def _drive(factory: Factory, robot: int, masses: Mapping[str, float], settings: 
         masses.get(operations[o].after[operations[o].robots.index(robot)], 0.0)
         for o in factory.robots[robot].operations
     )
-    return drive_for(CARRIAGE_MASS + load, settings.acceleration, settings)
+    return drive_for(CARRIAGE_MASS, load, settings.acceleration, settings)
 
 
 def drive_for(
-    mass: float, acceleration: float, settings: Settings, stiffness: float = STIFFNESS
+    own: float,
+    load: float,
+    acceleration: float,
+    settings: Settings,
+    stiffness: float = STIFFNESS,
 ) -> Drive:
-    """Critically damped gains for a mass [kg], and the force that its acceleration [m/s²] takes."""
+    """Critically damped gains for what moves a load, and the load [kg]; the force that their
+    acceleration [m/s²] takes; the inertia that the motor adds."""
+    inertia = max(0.0, LEAST * load - own)
+    mass = own + inertia + load
     kp, kv = mass * stiffness**2, 2 * mass * stiffness
-    force = settings.force * mass * acceleration + 5
-    return Drive(round(kp, 3), round(kv, 3), round(force, 3), SAMPLES * settings.substeps)
+    force, samples = settings.force * mass * acceleration + 5, SAMPLES * settings.substeps
+    return Drive(round(kp, 3), round(kv, 3), round(force, 3), samples, round(inertia, 3))
 
 
 def _hoists(factory: Factory, masses: Mapping[str, float], settings: Settings) -> dict[int, Hoist]:
     """The lifts, for the heaviest load of each: what it delivers."""
     found = {}
     for robot, stroke in factory.strokes.items():
-        mass = HOIST_MASS + masses[factory.delivered(robot)]
-        drive = drive_for(mass, settings.acceleration + GRAVITY, settings, HOIST_STIFFNESS)
+        load, most = masses[factory.delivered(robot)], settings.acceleration + GRAVITY
+        drive = drive_for(HOIST_MASS, load, most, settings, HOIST_STIFFNESS)
         found[robot] = Hoist(stroke, drive)
     return found
 

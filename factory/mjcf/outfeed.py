@@ -12,7 +12,7 @@ from factory.layout.dimensions import BELT_GAP, FINGER_TOP, PAYLOAD, TRAY
 from factory.layout.plan import Layout
 from factory.mjcf import names
 from factory.mjcf.elements import add, add_shown
-from factory.mjcf.robots import Drive
+from factory.mjcf.robots import Drive, add_inertia
 
 TRAY_MASS = 4.0
 """Mass of the empty tray [kg]."""
@@ -25,7 +25,9 @@ def add_tray(world: Element, actuator: Element, layout: Layout, drive: Drive) ->
     x, y = layout.guidepaths[0].a
     xlo, xhi, ylo, yhi = layout.payloads[layout.factory.pag.root]
     body = add(world, "body", name=names.OUTFEED_TRAY, pos=(x, y, 0), sleep="allowed")
-    add(body, "joint", name=names.OUTFEED_SLIDE, type="slide", axis="1 0 0", frictionloss=0.2)
+    slide = names.OUTFEED_SLIDE
+    joint = add(body, "joint", name=slide, type="slide", axis="1 0 0", frictionloss=0.2)
+    add_inertia(joint, drive)
     add(
         body,
         "geom",
@@ -41,7 +43,7 @@ def add_tray(world: Element, actuator: Element, layout: Layout, drive: Drive) ->
         actuator,
         "pid",
         name=names.OUTFEED_DRIVE,
-        joint=names.OUTFEED_SLIDE,
+        joint=slide,
         input="pos vel ff",
         **drive.attributes(),
     )

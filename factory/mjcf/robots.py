@@ -31,13 +31,14 @@ class RobotModel:
 
 @dataclass(frozen=True, slots=True)
 class Drive:
-    """Gains and limit of an actuator: kp [N/m], kv [N s/m], force [N]; and its buffer, of
-    `samples` setpoints."""
+    """Gains and limit of an actuator: kp [N/m], kv [N s/m], force [N]; its buffer, of `samples`
+    setpoints; and the `inertia` that its motor has besides what its robot type says [kg]."""
 
     kp: float
     kv: float
     force: float
     samples: int
+    inertia: float = 0.0
 
     def attributes(self) -> dict[str, str]:
         """As attributes of an actuator."""
@@ -47,6 +48,12 @@ class Drive:
             "forcerange": numbers((-self.force, self.force)),
             "nsample": str(self.samples),
         }
+
+
+def add_inertia(joint: Element, drive: Drive) -> None:
+    """What the motor of a joint's drive has besides."""
+    if drive.inertia:
+        joint.set("armature", number(float(joint.get("armature", 0.0)) + drive.inertia))
 
 
 def load_robot_model(robot: RobotType) -> RobotModel:
@@ -135,17 +142,19 @@ def instantiate(
     body.set("quat", numbers(heading_quaternion(path)))
     body.set("sleep", "allowed")
     _stretch(body, path, top, hoist.stroke if hoist else 0.0)
-    joint = next(j for j in body.iter("joint") if j.get("name") == f"{robot}/slide")
-    joint.set("ref", number(path.length))
+    slide = next(j for j in body.iter("joint") if j.get("name") == f"{robot}/slide")
+    slide.set("ref", number(path.length))
     actuators = []
     for actuator in model.actuators:
         copy = _prefixed(actuator, model.name, names=False)
         copy.set("name", f"{robot}/{actuator.get('name')}")
-        copy.set("joint", f"{robot}/{actuator.get('joint')}")
+        joint = f"{robot}/{actuator.get('joint')}"
+        copy.set("joint", joint)
         chosen = {"drive": drive, "hoist": hoist.drive if hoist else None}
         gains = chosen.get(actuator.get("name") or "")
         if gains is not None:
             copy.attrib.update(gains.attributes())
+            add_inertia(next(j for j in body.iter("joint") if j.get("name") == joint), gains)
         actuators.append(copy)
     return body, actuators
 

@@ -22,8 +22,7 @@ from factory.errors import Diagnostic, InputError
 from factory.factory import Operation
 from factory.mjcf import names
 from factory.mjcf.binary import cached, keep
-from factory.mjcf.model import CARRIAGE_MASS, GRAVITY, HEAD_MASS, HOIST_MASS, Model
-from factory.mjcf.outfeed import TRAY_MASS
+from factory.mjcf.model import GRAVITY, HEAD_MASS, Model
 from factory.world.courses import Course, Courses
 from factory.world.inspection import Inspection
 from factory.world.rewind import Rewind
@@ -96,11 +95,10 @@ class MujocoWorld:
         self._active = np.empty(0, np.intp)
         self._moves = b""
         self._under_way = np.zeros(len(slides), bool)
-        mass, weight = np.full(len(slides), CARRIAGE_MASS), np.zeros(len(slides))
-        mass[self.tray] = TRAY_MASS
-        mass[list(self.lift.values())] = HOIST_MASS
+        own = self.m.body_subtreemass[self.body] + self.m.dof_armature[self.dof]
+        self.mass, weight = own.round(9), np.zeros(len(slides))
         weight[list(self.lift.values())] = HEAD_MASS * GRAVITY
-        self.setpoints = Setpoints(self.m, self.d, np.array(actuator), mass, weight)
+        self.setpoints = Setpoints(self.m, self.d, np.array(actuator), self.mass.copy(), weight)
         self.control = self.setpoints.control
         self._where = self.setpoints.where(self._active)
         self._at_tray = self.setpoints.where(self._tray)
@@ -165,9 +163,11 @@ class MujocoWorld:
 
     def _load(self, robot: int, load: float) -> None:
         """A robot carries so much from now on [kg]: its drives push accordingly."""
-        self.setpoints.weigh(robot, CARRIAGE_MASS + load, 0.0)
+        self.setpoints.weigh(robot, float(self.mass[robot]) + load, 0.0)
         if robot in self.lift:
-            self.setpoints.weigh(self.lift[robot], HOIST_MASS + load, (HEAD_MASS + load) * GRAVITY)
+            lift = self.lift[robot]
+            weight = (HEAD_MASS + load) * GRAVITY
+            self.setpoints.weigh(lift, float(self.mass[lift]) + load, weight)
 
     def step(self, bundle: Bundle | None, axes: Index) -> bool:
         """One tick of the engine, the drives following a reference that obeys F_p under the
@@ -299,7 +299,7 @@ class MujocoWorld:
         """It goes to the end of its way with a product and comes back without."""
         dt, limit = self.tick, np.array([self.settings.outfeed_acceleration])
         load = (place > 0.0) * self.model.masses[self.model.factory.pag.root]
-        self.setpoints.weigh(self.tray, TRAY_MASS + load, 0.0)
+        self.setpoints.weigh(self.tray, float(self.mass[self.tray]) + load, 0.0)
         left = place - (x + v * (dt / 2))
         wanted = np.minimum(landing_speed(np.abs(left), limit, dt), self.settings.outfeed)
         x1, v1, a = govern(x, v, np.copysign(wanted, left), limit, dt)
