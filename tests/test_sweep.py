@@ -109,7 +109,8 @@ def test_axes_are_lists_and_ranges(text: str, values: tuple[Value, ...]) -> None
         ("seed", "'seed' gives no values", "--vary seed=0:100"),
         ("seed=", "seed takes a whole number, not ''", "--vary seed=0:100"),
         ("seed=1.5", "seed takes a whole number, not '1.5'", "--vary seed=0:100"),
-        ("seed=-1", "seed = -1 is not between 0 and 9.22337e+18", "--vary seed=0:100"),
+        ("seed=-1", f"seed = -1 is not between 0 and {2**63 - 1}", "--vary seed=0:100"),
+        (f"seed={2**63}", f"seed = {2**63} is not between 0 and {2**63 - 1}", "seed=0:100"),
         ("seed=4:4", "the range '4:4' of seed is empty", "START less than END"),
         ("seed=0:4:-1", "the range '0:4:-1' of seed is empty", "START less than END"),
         ("seed=0:1:1:1", "'0:1:1:1' of seed has no step", "seed=START:END:STEP"),
@@ -121,6 +122,7 @@ def test_axes_are_lists_and_ranges(text: str, values: tuple[Value, ...]) -> None
         ("jitter=0.95", "jitter = 0.95 is not between 0 and 0.9", "--vary jitter=0.1,0.3"),
         ("world=mujoko", "there is no world 'mujoko'", "did you mean 'mujoco'?"),
         ("seed=0:10000000", "10000000 values of seed are more than 1000000", "take fewer"),
+        ("speed=1:1e308:1e-9", "inf values of speed are more than 1000000", "take fewer"),
     ],
 )
 def test_a_bad_axis_is_told(text: str, message: str, hint: str) -> None:
@@ -295,6 +297,10 @@ def test_files_of_others_are_left_alone(tmp_path: Path, run: Terminal, here: Non
         ([PAPER, "-o", "r.db", "--vary", "seed=1", "--on", "dask://x"], "--on takes `local`"),
         ([PAPER, "-o", "nowhere/r.db", "--vary", "seed=1"], "'nowhere' does not exist"),
         (["no.pag", "-o", "r.db", "--vary", "seed=1"], "no.pag"),
+        (
+            [PAPER, "-o", "r.db", "--vary", "speed=0.5", "--seed", 10**400],
+            f"BadValue seed = {10**400} is not between 0 and {2**63 - 1}",
+        ),
     ],
 )
 def test_bad_command_lines_write_nothing(

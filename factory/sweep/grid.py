@@ -99,9 +99,9 @@ def check_value(key: str, value: Value) -> Diagnostic | None:
         hint = did_you_mean(str(value), WORLDS, "worlds")
         return Diagnostic("BadValue", f"there is no world '{value}'", None, hint)
     if isinstance(value, int | float):
-        low, high = (0.0, 0.9) if key == "jitter" else WHOLE[key]
+        low, high = (0, 0.9) if key == "jitter" else WHOLE[key]
         if not low <= value <= high:
-            message = f"{key} = {value:g} is not between {low:g} and {high:g}"
+            message = f"{key} = {value} is not between {low} and {high}"
             return Diagnostic("BadValue", message, None, f"for example {_example(key)}")
     return None
 
@@ -143,10 +143,10 @@ def _read_range(key: str, item: str) -> Iterator[Value]:
     if step <= 0 or end <= start:
         message = f"the range '{item}' of {key} is empty"
         raise InputError(_usage(message, f"{key}=START:END:STEP, START less than END"))
-    count = ceil((end - start) / step - 1e-9)
+    count = (end - start) / step - 1e-9
     if count > MOST:
-        raise InputError(_usage(f"{count} values of {key} are more than {MOST}", "take fewer"))
-    for n in range(count):
+        raise InputError(_usage(f"{count:.0f} values of {key} are more than {MOST}", "take fewer"))
+    for n in range(ceil(count)):
         value = start + n * step
         yield value if key in WHOLE else float(f"{value:.12g}")
 

@@ -9,9 +9,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from time import perf_counter
 
+from factory.errors import InputError
 from factory.interruption import Interruption
 from factory.sweep.bar import Bar
-from factory.sweep.grid import Axis, Point, points
+from factory.sweep.grid import Axis, Point, check_value, points
 from factory.sweep.local import run_local
 from factory.sweep.recipe import Recipe, name_of
 from factory.sweep.store import Store
@@ -68,8 +69,13 @@ def sweep(
     failed too. `on` is `local`, in `jobs` processes, or dask://HOST:PORT.
 
     After KeyboardInterrupt, or when this process is killed, all rows written stay, and the same
-    call goes on. Raises InputError (BadFile) where the database holds another sweep.
+    call goes on. Raises InputError where a fixed value is out of range (BadValue), where the
+    database holds another sweep or is damaged (BadFile).
     """
+    fixed = recipe.at(()).items()
+    faults = [fault for key, value in fixed if (fault := check_value(key, value))]
+    if faults:
+        raise InputError(faults)
     grid = list(points(axes))
     with Store(database, recipe.identity(axes)) as store:
         there = store.points(("done",) if retry else ("done", "failed"))
