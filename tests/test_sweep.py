@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import random
 import signal
 import socket
 import sqlite3
@@ -28,8 +29,9 @@ from factory.settings import Settings
 from factory.simulation import Simulation
 from factory.sweep import Recipe, local, points, read_axes, summarise, sweeping
 from factory.sweep.grid import Point, Value
+from factory.sweep.kept import COLUMNS
 from factory.sweep.local import run_local
-from factory.sweep.store import COLUMNS, Store
+from factory.sweep.store import Store
 from factory.sweep.sweeping import sweep
 from factory.sweep.work import FIGURES, Outcome, Runner
 from tests.command_line import PAPER, ROOT, Terminal, files_in
@@ -261,6 +263,10 @@ def test_another_sweep_is_refused(tmp_path: Path, run: Terminal, here: None) -> 
     assert database.read_bytes() == before
     product.write_text("// the same\n" + PAPER.read_text())
     assert run(*words, product).status == 0
+    with sqlite3.connect(database) as connection:
+        connection.execute("DELETE FROM sweep WHERE key = 'fuse'")
+    connection.close()
+    assert "it holds another sweep: fuse is missing there\n" in run(*words, PAPER).err
 
 
 def test_files_of_others_are_left_alone(tmp_path: Path, run: Terminal, here: None) -> None:
@@ -281,6 +287,59 @@ def test_files_of_others_are_left_alone(tmp_path: Path, run: Terminal, here: Non
                 f"BadFile {path}: {message}",
             )
     assert files_in(tmp_path) == before
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ("ALTER TABLE runs DROP COLUMN handoffs", "no such column: handoffs"),
+        ("DROP TABLE runs", "no such table: runs"),
+        ("DELETE FROM sweep", "it does not say what varies"),
+        ("UPDATE sweep SET value = '3' WHERE key = 'varied'", "it does not say what varies"),
+        ("UPDATE sweep SET value = '[\"x\"]' WHERE key = 'varied'", "it does not say what varies"),
+        ("DELETE FROM sweep WHERE key = 'product'", "it does not say what it is of"),
+        ("UPDATE sweep SET value = '{x' WHERE key = 'wip'", "its 'wip' cannot be read"),
+        ("UPDATE sweep SET value = x'ff' WHERE key = 'wip'", "its 'wip' cannot be read"),
+        (f"UPDATE sweep SET value = '{'[' * 50_000}'", "its 'product' cannot be read"),
+        ("UPDATE runs SET cycle_time_s = 'abc'", "row 1 of its runs is none that a sweep writes"),
+        ("UPDATE runs SET speed = NULL WHERE seed = 1", "row 2 of its runs is none that a sweep"),
+        ("UPDATE runs SET status = 'lost'", "row 1 of its runs is none that a sweep writes"),
+        ("UPDATE runs SET point = CAST(x'ff' AS TEXT) WHERE seed = 1", "Could not decode to UTF-8"),
+    ],
+)
+def test_a_damaged_database_is_told(
+    run: Terminal, tmp_path: Path, here: None, change: str, message: str
+) -> None:
+    """By the summary, and by a sweep that would go on with it."""
+    database = tmp_path / "r.db"
+    words = [PAPER, "--world", "ideal", "--units", "1", "-o", database]
+    words += ["--vary", "seed=0:2", "--vary", "speed=0.5"]
+    assert run("sweep", *words, "-q").status == 0
+    with sqlite3.connect(database) as connection:
+        connection.execute(change)
+    connection.close()
+    for asked in ([database, "--summary"], words):
+        refused = run("sweep", *asked)
+        assert refused.status == 2
+        told = f"BadFile {database}: it is damaged, or of another version of factory: {message}"
+        assert refused.err.startswith(told)
+
+
+def test_bytes_that_are_not_what_they_were(run: Terminal, tmp_path: Path, here: None) -> None:
+    database, draw = tmp_path / "r.db", random.Random(5)
+    words = [PAPER, "--world", "ideal", "--units", "1", "-o", database, "--vary", "seed=0:2"]
+    assert run("sweep", *words, "-q").status == 0
+    right = database.read_bytes()
+    statuses = []
+    for _ in range(150):
+        wrong = bytearray(right)
+        for _ in range(30):
+            wrong[draw.randrange(len(wrong))] = draw.randrange(256)
+        database.write_bytes(wrong)
+        done = run("sweep", database, "--summary", "--json")
+        assert done.status == 0 or done.codes == ["BadFile"]
+        statuses.append(done.status)
+    assert statuses.count(2) > 50
 
 
 @pytest.mark.parametrize(

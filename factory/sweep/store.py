@@ -16,9 +16,10 @@ from typing import Any
 
 from factory.closing import Closing
 from factory.errors import Diagnostic, InputError
-from factory.sweep.grid import KEYS, WHOLE, Value
+from factory.sweep.grid import Value
+from factory.sweep.kept import COLUMNS, kept_identity
 from factory.sweep.recipe import name_of
-from factory.sweep.work import FIGURES, Outcome
+from factory.sweep.work import Outcome
 
 APPLICATION = 0x4B4C4156
 """SQLite's application_id of such a database."""
@@ -26,27 +27,27 @@ APPLICATION = 0x4B4C4156
 PATIENCE = 30.0
 """Wait so long for another writer [s]."""
 
-COLUMNS: Mapping[str, str] = {
-    "point": "TEXT PRIMARY KEY",
-    "status": "TEXT NOT NULL",
-    "reason": "TEXT",
-    **{key: "INTEGER" if key in WHOLE else "REAL" for key in KEYS},
-    "world": "TEXT",
-    **FIGURES,
-    "row_time_s": "REAL",
-    "worker": "TEXT",
-    "tries": "INTEGER",
-    "finished": "TEXT",
-}
-"""Of the table `runs`. `point`: the values of the keys that vary, as JSON; `status`: done or
-failed; then every key and figure; `row_time_s`: what the run took its worker in all [s]."""
+DISK = "check the path, its permissions and the space on the disk"
+"""A hint, where a database cannot be used that may be all right."""
+
+CIRCUMSTANCES = (
+    sqlite3.SQLITE_PERM,
+    sqlite3.SQLITE_BUSY,
+    sqlite3.SQLITE_READONLY,
+    sqlite3.SQLITE_IOERR,
+    sqlite3.SQLITE_FULL,
+    sqlite3.SQLITE_CANTOPEN,
+    sqlite3.SQLITE_PROTOCOL,
+    sqlite3.SQLITE_NOTADB,
+)
+"""SQLite's codes that do not speak of what a sweep's database holds."""
 
 
 class Store(Closing):
     """An open database of a sweep, made if need be.
 
     `identity` is what `Recipe.identity` gives. Raises InputError (BadFile) where the file is
-    something else, holds another sweep, or cannot be read or written.
+    something else, holds another sweep, is damaged, or cannot be read or written.
     """
 
     def __init__(self, path: Path, identity: Mapping[str, Any]) -> None:
@@ -59,7 +60,7 @@ class Store(Closing):
                     _compare(path, kept, identity)
                 mode = self.connection.execute("PRAGMA journal_mode=WAL").fetchone()[0]
                 if mode != "wal":
-                    raise sqlite3.OperationalError(f"there is no WAL on this drive ({mode})")
+                    raise InputError(_bad(path, f"there is no WAL on this drive ({mode})", DISK))
                 self.connection.execute("PRAGMA synchronous=NORMAL")
                 if kept is None:
                     self._create(identity)
@@ -128,7 +129,7 @@ def reading(path: Path) -> Iterator[tuple[dict[str, Any], Iterator[Mapping[str, 
         if identity is None:
             raise InputError(_bad(path, "no sweep has written it", "give the -o of a sweep"))
         connection.row_factory = sqlite3.Row
-        yield identity, connection.execute("SELECT * FROM runs ORDER BY rowid")
+        yield identity, connection.execute(f"SELECT {','.join(COLUMNS)} FROM runs ORDER BY rowid")
 
 
 def _connect(path: Path, mode: str = "rwc") -> sqlite3.Connection:
@@ -138,10 +139,9 @@ def _connect(path: Path, mode: str = "rwc") -> sqlite3.Connection:
 
 def _identity(connection: sqlite3.Connection, path: Path) -> dict[str, Any] | None:
     """The identity kept in a database, None for an empty one. Raises InputError (BadFile) for one
-    of another program."""
+    of another program, sqlite3.Error for one that is not sound."""
     if connection.execute("PRAGMA application_id").fetchone()[0] == APPLICATION:
-        rows = connection.execute("SELECT key, value FROM sweep")
-        return {key: json.loads(value) for key, value in rows}
+        return kept_identity(connection)
     if connection.execute("SELECT count(*) FROM sqlite_master").fetchone()[0]:
         raise InputError(_bad(path, "it is the database of another program", "choose another -o"))
     return None
@@ -156,6 +156,8 @@ def _compare(path: Path, kept: Mapping[str, Any], asked: Mapping[str, Any]) -> N
         for key in asked
         if key in kept and kept[key] != asked[key] and key != "digest"
     ]
+    if not differing:
+        differing = [f"{key} is missing there" for key in asked if key not in kept]
     if not differing:
         differing = ["the product, a mesh, a template or a robot type has changed"]
     message = f"it holds another sweep: {'; '.join(differing)}"
@@ -174,9 +176,14 @@ def _bad(path: Path, message: str, hint: str) -> Diagnostic:
 
 @contextmanager
 def _told(path: Path) -> Iterator[None]:
-    """Whatever SQLite refuses, as an error for the user."""
+    """Whatever SQLite refuses, as an error for the user; what makes no sense is damaged, or of
+    another version."""
     try:
         yield
-    except sqlite3.Error as error:
-        hint = "check the path, its permissions and the space on the disk"
-        raise InputError(_bad(path, str(error), hint)) from error
+    except (sqlite3.Error, UnicodeDecodeError) as error:
+        code = getattr(error, "sqlite_errorcode", sqlite3.SQLITE_CORRUPT) & 0xFF
+        message, hint = str(error), DISK
+        if code not in CIRCUMSTANCES:
+            message = f"it is damaged, or of another version of factory: {error}"
+            hint = "run the sweep again, into another file"
+        raise InputError(_bad(path, message, hint)) from error
