@@ -269,6 +269,37 @@ def test_another_sweep_is_refused(tmp_path: Path, run: Terminal, here: None) -> 
     assert "it holds another sweep: fuse is missing there\n" in run(*words, PAPER).err
 
 
+@pytest.mark.parametrize("seeds", ["seed=0:3", "units=1"])
+@pytest.mark.parametrize(
+    "statement",
+    ["SELECT count(*)", "PRAGMA application_id", "PRAGMA journal_mode", "BEGIN IMMEDIATE"],
+)
+def test_two_sweeps_may_begin_at_once(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, statement: str, seeds: str
+) -> None:
+    """Whatever one has just asked the new database when the other makes it its own."""
+    database, recipe = tmp_path / "r.db", recipe_of()
+    other = recipe.identity(read_axes([seeds]))
+    begun = []
+
+    class Late(sqlite3.Connection):
+        def execute(self, sql: str, *values: Any) -> sqlite3.Cursor:
+            if sql.startswith(statement) and not begun:
+                begun.append(sql)
+                Store(database, other).close()
+            return super().execute(sql, *values)
+
+    monkeypatch.setattr(sqlite3, "connect", partial(sqlite3.connect, factory=Late))
+    mine = recipe.identity(read_axes(["seed=0:2"]))
+    if mine == other:
+        with Store(database, mine) as kept:
+            assert kept.points() == set()
+    else:
+        with pytest.raises(InputError, match="it holds another sweep: varied units there, seed"):
+            Store(database, mine)
+    assert begun
+
+
 def test_files_of_others_are_left_alone(tmp_path: Path, run: Terminal, here: None) -> None:
     text, other = tmp_path / "text", tmp_path / "other.db"
     text.write_text("no database at all, but long enough to be taken for one " * 20)

@@ -103,11 +103,16 @@ class Store(Closing):
             )
 
     def _create(self, identity: Mapping[str, Any]) -> None:
-        """Make the tables, in one transaction."""
+        """Make the tables, in one transaction, unless another sweep has made them meanwhile."""
+        self.connection.execute("BEGIN IMMEDIATE")
+        kept = _identity(self.connection, self.path)
+        if kept is not None:
+            self.connection.execute("ROLLBACK")
+            _compare(self.path, kept, identity)
+            return
         columns = ", ".join(f"{name} {kind}" for name, kind in COLUMNS.items())
         rows = [(key, json.dumps(value)) for key, value in identity.items()]
         for statement in (
-            "BEGIN IMMEDIATE",
             f"PRAGMA application_id={APPLICATION}",
             "CREATE TABLE sweep (key TEXT PRIMARY KEY, value TEXT NOT NULL)",
             f"CREATE TABLE runs ({columns})",
@@ -140,9 +145,11 @@ def _connect(path: Path, mode: str = "rwc") -> sqlite3.Connection:
 def _identity(connection: sqlite3.Connection, path: Path) -> dict[str, Any] | None:
     """The identity kept in a database, None for an empty one. Raises InputError (BadFile) for one
     of another program, sqlite3.Error for one that is not sound."""
+    tables = connection.execute("SELECT count(*) FROM sqlite_master").fetchone()[0]
+    # they and the id come at once: whoever asks for the id last has it where there are tables
     if connection.execute("PRAGMA application_id").fetchone()[0] == APPLICATION:
         return kept_identity(connection)
-    if connection.execute("SELECT count(*) FROM sqlite_master").fetchone()[0]:
+    if tables:
         raise InputError(_bad(path, "it is the database of another program", "choose another -o"))
     return None
 
