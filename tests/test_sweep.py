@@ -240,7 +240,27 @@ def test_a_run_that_fails_is_a_row_with_its_reason(
     for row in rows_of(database, "status, reason, sim_time_s"):
         assert row[0] == "failed" and row[1].startswith(reason) and row[2] == 1.0
     assert run(*words, "seed=0:3", "--max-time", "1", "--json").json["there"] == 2
-    assert run(*words, "seed=0:3", "--max-time", "1", "--json", "--retry").json["failed"] == 3
+    retried = run(*words, "seed=0:3", "--max-time", "1", "--json", "--retry").json
+    assert (retried["there"], retried["there_failed"], retried["failed"]) == (0, 0, 3)
+
+
+def test_runs_that_failed_before_are_not_forgotten(
+    run: Terminal, tmp_path: Path, here: None
+) -> None:
+    """Only those of the grid count, in the exit status too."""
+    database = tmp_path / "r.db"
+    words = ["sweep", PAPER, "--world", "ideal", "-o", database, "--floor", "4x4", "--vary"]
+    assert run(*words, "clearance=0.02,5,6").status == 1
+    again = run(*words, "clearance=0.02,5,6")
+    assert again.status == 1
+    failed = "3 of 3 were there, of which 2 failed; --retry runs them again"
+    assert again.out == f"0 runs, 0 failed ({failed}): {database}\n"
+    part = run(*words, "clearance=0.02,5,0.03", "--json")
+    assert part.status == 1
+    assert [part.json[key] for key in ("there", "there_failed", "done", "failed")] == [2, 1, 1, 0]
+    good = run(*words, "clearance=0.02,0.03")
+    assert good.status == 0
+    assert good.out == f"0 runs, 0 failed (2 of 2 were there): {database}\n"
 
 
 def test_another_sweep_is_refused(tmp_path: Path, run: Terminal, here: None) -> None:
@@ -293,7 +313,7 @@ def test_two_sweeps_may_begin_at_once(
     mine = recipe.identity(read_axes(["seed=0:2"]))
     if mine == other:
         with Store(database, mine) as kept:
-            assert kept.points() == set()
+            assert kept.points("done") == set()
     else:
         with pytest.raises(InputError, match="it holds another sweep: varied units there, seed"):
             Store(database, mine)

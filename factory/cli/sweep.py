@@ -85,7 +85,7 @@ def sweep(
     failed = False
     if vary:
         tally, database = _carry_out(file, database, vary, quiet or as_json, options)
-        failed = tally.failed > 0
+        failed = tally.failed + tally.there_failed > 0
         document = _document(tally, database, options)
         if not (as_json or quiet):
             _tell(tally, database)
@@ -153,6 +153,7 @@ def _document(tally: Tally, database: Path, options: dict[str, Any]) -> dict[str
         "on": options["on"],
         "runs": tally.runs,
         "there": tally.there,
+        "there_failed": tally.there_failed,
         "done": tally.done,
         "failed": tally.failed,
         "wall_time_s": tally.wall_time_s,
@@ -165,7 +166,10 @@ def _document(tally: Tally, database: Path, options: dict[str, Any]) -> dict[str
 
 def _tell(tally: Tally, database: Path) -> None:
     """What a sweep did, for people."""
-    there = f" ({tally.there} of {tally.runs} were there)" if tally.there else ""
+    there = f"{tally.there} of {tally.runs} were there"
+    if tally.there_failed:
+        there += f", of which {tally.there_failed} failed; --retry runs them again"
+    there = f" ({there})" if tally.there else ""
     say(f"{tally.done + tally.failed} runs, {tally.failed} failed{there}: {database}")
     if tally.overhead is not None:
         say(

@@ -9,7 +9,7 @@ from __future__ import annotations
 import json
 import os
 import sqlite3
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from contextlib import closing, contextmanager
 from pathlib import Path
 from typing import Any
@@ -73,13 +73,10 @@ class Store(Closing):
         with _told(self.path):
             self.connection.close()
 
-    def points(self, statuses: Sequence[str] = ("done", "failed")) -> set[str]:
-        """The names of the points that have a row with one of these statuses."""
-        marks = ",".join("?" * len(statuses))
+    def points(self, status: str) -> set[str]:
+        """The names of the points that have a row with this status, done or failed."""
         with _told(self.path):
-            rows = self.connection.execute(
-                f"SELECT point FROM runs WHERE status IN ({marks})", statuses
-            )
+            rows = self.connection.execute("SELECT point FROM runs WHERE status = ?", (status,))
             return {row[0] for row in rows}
 
     def add(self, outcome: Outcome, values: Mapping[str, Value]) -> None:

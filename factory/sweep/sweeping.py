@@ -25,11 +25,13 @@ Outcomes = Generator[Outcome, None, None]
 
 @dataclass(slots=True)
 class Tally:
-    """What a sweep did: runs in its grid, rows that were there, runs done and failed now; the time
-    it took, and the sums of what its runs took their workers, and of their run loops [s]."""
+    """What a sweep did: runs in its grid, rows that were there, how many of these had failed, runs
+    done and failed now; the time it took, and the sums of what its runs took their workers, and of
+    their run loops [s]."""
 
     runs: int
     there: int
+    there_failed: int = 0
     done: int = 0
     failed: int = 0
     wall_time_s: float = 0.0
@@ -76,11 +78,12 @@ def sweep(
     faults = [fault for key, value in fixed if (fault := check_value(key, value))]
     if faults:
         raise InputError(faults)
-    grid = list(points(axes))
+    grid = {name_of(point): point for point in points(axes)}
     with Store(database, recipe.identity(axes)) as store:
-        there = store.points(("done",) if retry else ("done", "failed"))
-        wanted = [point for point in grid if name_of(point) not in there]
-        tally = Tally(len(grid), len(grid) - len(wanted))
+        failed = set() if retry else store.points("failed")
+        there = store.points("done") | failed
+        wanted = [point for name, point in grid.items() if name not in there]
+        tally = Tally(len(grid), len(grid) - len(wanted), len(grid.keys() & failed))
         if not wanted:
             return tally
         begin = perf_counter()
