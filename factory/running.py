@@ -75,13 +75,7 @@ def run_file(
     proved(layout.factory.net)
     shown: Shown | None = None
     if options.get("world") == "ideal":
-        for key, purpose in (
-            ("monitor", "for a monitor to observe"),
-            ("fuse", "that could become one"),
-        ):
-            if options.get(key):
-                message = f"the ideal world has no bodies {purpose}"
-                raise InputError(Diagnostic("Usage", message, None, "leave out --world ideal"))
+        check_ideal(options)
     if video is not None:
         if options.get("world") == "ideal":
             message = "the ideal world has no bodies to film"
@@ -121,6 +115,17 @@ def run_file(
         return record
     report = watcher.report()
     return replace(record, monitor=report, refines_net=record.refines_net and report.refines_net)
+
+
+def check_ideal(options: dict[str, Any]) -> None:
+    """Raises InputError (Usage) for options that the ideal world has no bodies for."""
+    for key, purpose in (
+        ("monitor", "for a monitor to observe"),
+        ("fuse", "that could become one"),
+    ):
+        if options.get(key):
+            message = f"the ideal world has no bodies {purpose}"
+            raise InputError(Diagnostic("Usage", message, None, "leave out --world ideal"))
 
 
 def render_file(

@@ -314,6 +314,41 @@ def test_a_net_that_fails_has_a_witness(run: Terminal, tmp_path: Path, ending: s
     assert "NO" in run("check", file).out
 
 
+def test_what_a_net_has_not_is_refused(run: Terminal, out: Path) -> None:
+    net = out / "net.pnml"
+    net.write_text(run("export", PAPER, "--format", "pnml").out)
+    words = ["--wip", 2, "--relay", "--cycle", 3, "--clashes", out / "no", "--templates", out]
+    refused = run("check", net, "--certificate", out / "proof.json", *words, "--json")
+    assert refused.codes == ["Usage"] * 5
+    for word in words[::2]:
+        if isinstance(word, str):
+            assert f"{word} is for a PAG; '{net}' is a net in PNML" in refused.out
+    assert files_in(out).keys() == {"net.pnml"}
+    assert run("check", net, "--certificate", out / "proof.json", "-v").status == 0
+
+
+def test_what_a_log_has_not_is_refused(
+    run: Terminal, out: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Unless it was set beforehand, and not for this log alone."""
+    log = out / "run.log"
+    assert run("run", PAPER, "--log", log, "-q").status == 0
+    page, picture = ["report", log, "-o", out / "page.html"], ["render", log, "-o", out / "a.png"]
+    words = ["--units", "1", "--relay", "--no-stage", "--seed", "0", "--floor", "4x4", "--wip", "1"]
+    for command, more in ((page, []), (picture, ["--world", "mujoco", "--fuse", "--from", "x"])):
+        refused = run(*command, *words, *more)
+        given = [word for word in (*words, *more) if word.startswith("--")]
+        assert refused.status == 2
+        assert refused.err.count(f" is for a PAG; '{log}' is a log\n") == len(given)
+    assert files_in(out).keys() == {"run.log"}
+    (out / "factory.toml").write_text('units = 2\nwip = 2\nfloor = "9x9"\nspeed = 0.3')
+    monkeypatch.setenv("FACTORY_SEED", "3")
+    assert run(*page).status == 0
+    shown = ["--size", "640x360", "--fps", 5, "--camera", "top", "--with", "net", "--title", "A"]
+    assert run(*picture, *shown, "--at", 1, "--quiet").status == 0
+    assert "--poster is of a film; this is a still" in run(*picture, "--poster", "b.png").err
+
+
 # --- factory.toml and templates -------------------------------------------------------------------
 
 

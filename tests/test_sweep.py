@@ -408,6 +408,11 @@ def test_bytes_that_are_not_what_they_were(run: Terminal, tmp_path: Path, here: 
         ([PAPER, "-o", "nowhere/r.db", "--vary", "seed=1"], "'nowhere' does not exist"),
         (["no.pag", "-o", "r.db", "--vary", "seed=1"], "no.pag"),
         (
+            [PAPER, "-o", "r.db", "--vary", "seed=1", "--world", "ideal", "--fuse"],
+            "Usage the ideal world has no bodies that could become one",
+        ),
+        ([PAPER, "-o", "r.db", "--vary", "world=ideal", "--fuse"], "has no bodies that could"),
+        (
             [PAPER, "-o", "r.db", "--vary", "speed=0.5", "--seed", 10**400],
             f"BadValue seed = {10**400} is not between 0 and {2**63 - 1}",
         ),

@@ -18,6 +18,7 @@ from factory.cli.options import (
     RELAY,
     SOURCE,
     WIP,
+    for_a_pag,
     plan,
     settings_of,
 )
@@ -68,6 +69,7 @@ def analyze(
     from factory.checking import is_net
 
     if is_net(file):
+        for_a_pag(file, "a net in PNML", "delays", "output")
         return _analyze_net(file, delays, output, as_json, quiet, verbose)
     if delays is not None:
         message = "--delays is for a net in PNML; of a PAG, delays follow from its layout"

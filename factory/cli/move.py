@@ -11,12 +11,14 @@ import click
 from factory.cli.options import (
     FLOOR,
     MOTION,
+    OF_A_PICTURE,
     OUTPUT,
     PATH,
     PICTURE,
     RELAY,
     RUN,
     SOURCE,
+    for_a_pag,
     pair,
     plan,
     settings_of,
@@ -104,8 +106,11 @@ def render(
     **options: Any,
 ) -> int:
     """Film FILE.pag, or a LOG that `run --log` has kept, headless through EGL."""
+    from factory.log import is_log
     from factory.running import render_file, simulation
 
+    if is_log(file):
+        for_a_pag(file, "a log", "output", "at", *OF_A_PICTURE)
     writable(file, output, options["poster"])
     size = pair(options["size"], "--size", "1280x720", int) or (1280, 720)
 

@@ -10,6 +10,7 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
+from click.core import ParameterSource
 from click.shell_completion import CompletionItem
 
 from factory.errors import Diagnostic, InputError
@@ -157,6 +158,8 @@ PICTURE = options(
     click.option("--title", default="", help="Shown at the beginning of a film."),
     click.option("--poster", type=PATH, help="A still of a film's best moment (.png)."),
 )
+OF_A_PICTURE = ("size", "fps", "camera", "panels", "title", "poster")
+"""The parameters of PICTURE."""
 
 
 def settings_of(file: Path, options: dict[str, Any]) -> Any:
@@ -171,6 +174,23 @@ def settings_of(file: Path, options: dict[str, Any]) -> Any:
         given["stage"] = int(stage)
     settings = defaults_for(file).settings().with_options(environment())
     return settings.with_options(given)
+
+
+def for_a_pag(file: Path, kind: str, *but: str) -> None:
+    """Options of a command that mean nothing for a FILE that is no PAG but, say, a log: all that
+    are given `but` these, and those of OUTPUT. Raises InputError (Usage) with every one; what a
+    user has set beforehand is not meant for this file alone."""
+    context = click.get_current_context()
+    given = [
+        max(option.opts, key=len)
+        for option in context.command.params
+        if option.name is not None
+        and option.name not in (*but, "file", "as_json", "quiet", "verbose")
+        and context.get_parameter_source(option.name) is ParameterSource.COMMANDLINE
+    ]
+    if given:
+        messages = [f"{option} is for a PAG; '{file}' is {kind}" for option in given]
+        raise InputError(Diagnostic("Usage", told, None, "leave it out") for told in messages)
 
 
 def pair(text: str | None, option: str, example: str, number: type) -> tuple[Any, Any] | None:

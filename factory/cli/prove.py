@@ -14,6 +14,7 @@ from factory.cli.options import (
     RELAY,
     SOURCE,
     WIP,
+    for_a_pag,
     ground,
     plan,
     settings_of,
@@ -48,8 +49,10 @@ def check(
     **options: Any,
 ) -> int:
     """Parse, compile and prove FILE.pag (or a net in FILE.pnml)."""
-    from factory.checking import check_file, describe
+    from factory.checking import check_file, describe, is_net
 
+    if is_net(file):
+        for_a_pag(file, "a net in PNML", "certificate")
     writable(file, certificate)
     writable_folder(clashes)
     checked = check_file(file, folders, wip, _relayed(file, folders, options))
@@ -71,15 +74,9 @@ def check(
 
 
 def _relayed(file: Path, folders: Sequence[Path], options: dict[str, Any]) -> Factory | None:
-    """The factory with relays, where they are asked for: they depend on the layout. Raises
-    InputError (Usage) for a net, which has none."""
-    from factory.checking import is_net
-
+    """The factory with relays, where they are asked for: they depend on the layout."""
     if not ground(None, options).relays:
         return None
-    if is_net(file):
-        message = "--relay is for a PAG: a net has no guidepaths"
-        raise InputError(Diagnostic("Usage", message, None, "leave it out"))
     factory: Factory = plan(file, folders, settings_of(file, {}), None, options)[1]
     return factory
 

@@ -19,6 +19,7 @@ from factory.cli.options import (
     SOURCE,
     WIP,
     Number,
+    for_a_pag,
     plan,
     settings_of,
     writable,
@@ -55,6 +56,7 @@ def report(
     writable(file, output)
     status = 0
     if is_log(file):
+        for_a_pag(file, "a log", "output")
         recording = recording_of(file)
     else:
         recording, status = _run(file, folders, floor, quiet, as_json, options)

@@ -109,6 +109,7 @@ def _carry_out(
     """Plan, prove and run. Raises InputError for what cannot be."""
     from factory.nets.verify import proved
     from factory.pipeline import read
+    from factory.running import check_ideal
     from factory.sweep.grid import DEFAULTS, SETTINGS, read_axes
     from factory.sweep.local import cores
     from factory.sweep.recipe import Recipe
@@ -129,6 +130,9 @@ def _carry_out(
         if options.get(axis.key) is not None:
             message = f"{axis.key} is both given and varied"
             raise InputError(Diagnostic("Usage", message, None, "leave one of them out"))
+    worlds = next((axis.values for axis in axes if axis.key == "world"), (options["world"],))
+    if set(worlds) == {"ideal"}:
+        check_ideal(options)
     settings = settings_of(file, options)
     if any(axis.key == "clearance" for axis in axes):
         source = read(file, options["folders"])
