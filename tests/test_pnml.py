@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import random
 import re
+import tracemalloc
 from dataclasses import replace
 from xml.etree import ElementTree
 
@@ -213,6 +214,18 @@ def test_what_is_broken_is_diagnosed(text: str, code: str, line: int, message: s
 def test_notes_that_contradict_the_net_are_refused(old: str, new: str, message: str) -> None:
     with pytest.raises(InputError, match=message):
         read_pnml(edited(old, new))
+
+
+def test_a_size_that_is_not_that_of_the_slots_is_a_fault_of_the_net() -> None:
+    text = edited('size="3"', 'size="999999"')
+    tracemalloc.start()
+    net = read_pnml(text, "large.pnml")
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert peak < 10_000_000
+    first = analyse(net).witness[0]
+    assert (first.property, first.kind) == ("gear_net", "slots")
+    assert "acts on 999999 robots with slots for r3, r2, r1" in first.reason
 
 
 def test_several_faults_are_reported_at_once() -> None:

@@ -41,9 +41,9 @@ class Document:
 def claimed(document: Document, faults: Faults) -> GearNet | MarkedNet:
     """The net with the gears that the document claims.
 
-    A GearNet where each is marked once and every event has a redistribution function; a MarkedNet
-    where arcs, tokens or notes are missing. Raises InputError where notes contradict a net that is
-    whole.
+    A GearNet where each is marked once, every event has a redistribution function and every place
+    a slot for each robot that its size speaks of; a MarkedNet where arcs, tokens or notes are
+    missing. Raises InputError where notes contradict a net that is whole.
     """
     if not document.gears:
         return MarkedNet(document.net, document.tokens)
@@ -58,7 +58,9 @@ def claimed(document: Document, faults: Faults) -> GearNet | MarkedNet:
     loose = MarkedNet(document.net, document.tokens, gears, slots)
     initial = _initial(loose)
     redistribution = _redistribution(document)
-    if initial is None or redistribution is None:
+    pairs = zip(document.net.places, slots, strict=True)
+    sized = all(place.size == len(own) for place, own in pairs)
+    if initial is None or redistribution is None or not sized:
         return loose
     try:
         threaded = ThreadedNet(document.net, redistribution)
