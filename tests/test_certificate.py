@@ -6,7 +6,9 @@ import ast
 import copy
 import json
 import random
+import re
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -15,12 +17,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import factory.nets
+from factory.errors import InputError
+from factory.export.pnml import read_pnml, write_pnml
 from factory.factory import Factory
 from factory.nets.certificate import certificate, check_certificate
 from factory.nets.certificate_net import digest
 from factory.nets.gears import GearNet
 from factory.nets.general import analyse
 from factory.nets.marked import MarkedNet, marked
+from factory.nets.petri import Place
 from tests.net_values import (
     net_from,
     planted,
@@ -96,6 +101,57 @@ def test_a_bare_net_is_certified_by_the_gears_found() -> None:
     assert check_certificate(document) == []
 
 
+_NOTES = ("size", "slots", "places", "transitions", "from", "to", "source", "target")
+"""What a PNML document says of a net, its gears and their robots, word by word."""
+
+_PARTS = (r"<initialMarking>.*?</initialMarking>", r"<redistribution>.*?</redistribution>")
+
+_ONE = "<initialMarking><text>1</text></initialMarking>"
+
+
+def altered(text: str, rng: random.Random) -> str:
+    """A PNML document with a word left out, replaced or put in, with a part less, or with a token
+    more."""
+    pattern = rng.choice([rf'(?<= {note}=")[^"]*(?=")' for note in _NOTES] + [*_PARTS, "</place>"])
+    found = [*re.finditer(pattern, text)]
+    if not found:
+        return text
+    chosen, new = rng.choice(found), ""
+    if pattern == "</place>":
+        new = f"{_ONE}</place>"
+    elif pattern not in _PARTS:
+        words = chosen[0].split()
+        at = rng.randrange(len(words) + 1)
+        others = ["0", "1", "2", "7", "p0", "p1", "t0", "r1", "r2", "zz", *words]
+        words[at : at + rng.randint(0, 1)] = rng.choice([[], [rng.choice(others)]])
+        new = " ".join(words)
+    return text[: chosen.start()] + new + text[chosen.end() :]
+
+
+@given(factories(4), st.randoms(use_true_random=False), st.integers(1, 4))
+@settings(max_examples=300)
+def test_certificates_of_altered_documents_pass(
+    factory: Factory, rng: random.Random, times: int
+) -> None:
+    text = write_pnml(factory.net)
+    for _ in range(times):
+        text = altered(text, rng)
+    try:
+        net = read_pnml(text)
+    except InputError:
+        return
+    verdict = analyse(net)
+    document = json.loads(json.dumps(certificate(net, verdict)))
+    assert check_certificate(document) == []
+    for claim in _CLAIMS:
+        found = document[claim]["holds"]
+        undecided = found is None and claim not in ("gear_net", "legal")
+        assert undecided or found == getattr(verdict, claim)
+    marked = [robot["initial"] for robot in document["robots"]]
+    turned = {"holds": not verdict.legal, "reason": "said so", "marked": marked}
+    assert check_certificate(seal({**document, "legal": turned})) != []
+
+
 def seal(document: Json) -> Json:
     """The document with the digest that belongs to it: what a forger would do."""
     return {**document, "digest": digest(document)}
@@ -155,7 +211,7 @@ def test_leaving_anything_out_is_caught() -> None:
         del node[path[-1]]
         if path != ("digest",):
             changed = seal(changed)
-        if not {"mode", "label", "type"} & set(path) and path[:2] != ("gear_net", "meets"):
+        if not {"mode", "label", "type", "size"} & set(path) and path[:2] != ("gear_net", "meets"):
             assert check_certificate(changed) != [], path
 
 
@@ -163,14 +219,37 @@ def test_leaving_anything_out_is_caught() -> None:
 def test_a_false_refutation_is_caught(claim: str) -> None:
     document = certified(factory_of(paper()).net)
     for evidence in (
-        {"circuit": [0, 1], "firing": None, "stray": []},
-        {"circuit": None, "firing": [6], "place": 0, "stray": []},
-        {"circuit": [7], "firing": None, "transition": 6, "stray": []},
+        {"circuit": [0, 1], "firing": None},
+        {"circuit": None, "firing": [6], "place": 0},
+        {"circuit": [7], "firing": None, "transition": 6},
     ):
         forged = {**document, claim: {"holds": False, "reason": "said so", **evidence}}
         assert check_certificate(seal(forged)) != []
     undecided = {**document, claim: {"holds": None, "reason": ""}}
     assert check_certificate(seal(undecided)) != []
+
+
+def test_gears_without_slots_are_certified() -> None:
+    document = certified(replace(marked(factory_of(paper()).net), slots=()))
+    assert check_certificate(document) == []
+    assert all(document[claim]["holds"] is True for claim in _CLAIMS)
+
+
+def test_a_marked_place_of_nobody_is_not_legal() -> None:
+    subject = marked(factory_of(paper()).net)
+    places = (*subject.net.places, Place("spare", (), (), size=0))
+    net = replace(subject.net, places=places)
+    document = certified(MarkedNet(net, (*subject.tokens, 1), subject.gears, (*subject.slots, ())))
+    assert check_certificate(document) == []
+    whole = certified(subject)
+    assert check_certificate(seal({**document, "legal": whole["legal"]})) != []
+
+
+def test_a_place_without_size_has_that_of_its_slots() -> None:
+    document = certified(factory_of(paper()).net)
+    for place in document["net"]["places"]:
+        assert place.pop("size") == len(place["slots"])
+    assert check_certificate(seal(document)) == []
 
 
 @pytest.mark.parametrize("junk", [None, 3, [], {}, {"schema": 1}, {"schema": 2, "digest": ""}, "x"])

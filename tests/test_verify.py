@@ -261,6 +261,27 @@ def test_a_robot_in_another_robots_slot() -> None:
     assert "acts on 3 robots" in witness(verify(replace(net, slots=tuple(slots))), "slots").reason
 
 
+@pytest.mark.parametrize("slots", [(), (-1,), (1,), (2, 2), (2, -1)])
+def test_slots_of_a_marked_place_that_are_not_of_who_starts_there(slots: tuple[int, ...]) -> None:
+    net = factory_of(paper()).net
+    place = net.initial[2]
+    changed = (*net.slots[:place], slots, *net.slots[place + 1 :])
+    for subject in (replace(net, slots=changed), replace(marked(net), slots=changed)):
+        verdict = verify(subject)
+        assert verdict.legal is False
+        last = verdict.witness[-1]
+        assert (last.property, last.kind) == ("legal", "slots")
+        assert "who starts there is r3" in last.reason
+
+
+def test_a_marked_place_of_another_size() -> None:
+    subject = marked(factory_of(paper()).net)
+    places = tuple(replace(p, size=2) if "nopart" in p.name else p for p in subject.net.places)
+    verdict = verify(replace(subject, net=replace(subject.net, places=places)))
+    assert verdict.legal is False
+    assert "acts on 2 robots with slots for r1" in witness(verdict, "slots").reason
+
+
 def test_the_verdict_as_json() -> None:
     verdict = verify(lost_token(factory_of(paper()).net, 4))
     document = verdict.as_json()

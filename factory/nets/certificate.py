@@ -1,9 +1,11 @@
 """The certificate of a verdict: a JSON document that another program can check.
 
 Keys: `schema` 1; `net` with `transitions` (name, `moves`: its redistribution function as quadruples
-place, slot, place, slot, or null) and `places` (name, mode, label, `left`, `right`, `tokens`, and
-`slots`: the robots it acts on); `robots` with name, type and gear (`places`, `transitions`) and
-`initial` place. Everything is by number, from 0. Then one section for each property with `holds`:
+place, slot, place, slot, or null) and `places` (name, mode, label, `left`, `right`, `tokens`,
+`size`, the number of robots it acts on, and `slots`: these robots, -1 for one without a gear; a
+place without `size` has that of its slots); `robots` with name, type and gear (`places`,
+`transitions`) and `initial` place. Everything is by number, from 0. Then one section for each
+property with `holds`:
 
 * `gear_net`: the `order` in which the gears are added, each with the `place` [a; b] it shares, the
   gears it `meets` there and `c`, or why condition (b) is `exempt`;
@@ -12,7 +14,7 @@ place, slot, place, slot, or null) and `places` (name, mode, label, `left`, `rig
 * `live`: an `order` of the places without token in which each comes after those it waits for;
 * `reversible`: trees of ways from a `root` to every transition, `there` and `back`; `root` is null
   where the net falls into parts, of which each lives or lies still;
-* `legal`: the marked place of each robot.
+* `legal`: the marked place of each robot, whose slots are those of the robots that start there.
 
 A section that does not hold has a `reason` and what shows it (a firing sequence, a circuit). One
 that holds by exploration only has `holds` null, with the reason: it is not certified. `digest` is
@@ -43,7 +45,7 @@ def certificate(net: GearNet | MarkedNet, verdict: Verdict) -> Json:
     Raises ValueError where two places or transitions of the net have one name.
     """
     subject = marked(net)
-    if verdict.gears and not subject.gears:
+    if verdict.gears and not subject.slots:
         subject = with_gears(subject, verdict.gears)
     if len(subject.net.place_index) < len(subject.tokens):
         raise ValueError("two places have one name")
@@ -80,6 +82,7 @@ def _listing(net: GearNet | MarkedNet, subject: MarkedNet) -> Json:
                 "left": list(place.left),
                 "right": list(place.right),
                 "tokens": tokens,
+                "size": place.size,
                 "slots": list(own),
             }
             for place, tokens, own in zip(subject.net.places, subject.tokens, slots, strict=True)
@@ -228,8 +231,7 @@ def _failure(claim: str, net: MarkedNet, witness: Witness) -> Json:
         structural = net.is_marked_graph
         event = events[0] if structural else None
         return {**section, "transition": event, "firing": None if structural else events}
-    stray = [p for p in places if not net.slots or not net.slots[p]]
-    return {**section, "places": places, "transitions": events, "stray": stray}
+    return {**section, "places": places, "transitions": events}
 
 
 def _lasting(net: MarkedNet, witness: Witness) -> bool:

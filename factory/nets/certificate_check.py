@@ -65,7 +65,7 @@ def _prove_gear_net(net: Net, section: Section, document: Section) -> Iterator[s
             passing[e] += 1
     if not all(at_place) or not all(passing):
         yield "gear_net: some place or transition is in no gear"
-    if any(sorted(own) != sorted(row) for own, row in zip(at_place, net.slots, strict=True)):
+    if not all(net.fits(p, sorted(own)) for p, own in enumerate(at_place)):
         yield "gear_net: the slots of some place are not its gears'"
     yield from _prove_moves(net)
 
@@ -185,12 +185,10 @@ def _prove_legal(net: Net, section: Section, document: Section) -> Iterator[str]
     if len(marked) != len(net.gears):
         yield "legal: not every robot has its place"
         return
-    for robot, gear in enumerate(net.gears):
-        on = [p for p in gear if net.tokens[p]]
-        if on != [marked[robot]] or net.tokens[on[0]] != 1 or net.initial[robot] != on[0]:
-            yield f"legal: {net.robots[robot]} is not marked exactly once, where it says"
-    threads = [r for p, tokens in enumerate(net.tokens) if tokens for r in net.slots[p]]
-    if sorted(threads) != list(range(len(net.robots))):
+    lost = [r for r, p in enumerate(marked) if net.initial[r] != p or not net.marked_once(r)]
+    for robot in lost:
+        yield f"legal: {net.robots[robot]} is not marked exactly once, where it says"
+    if not lost and not net.threaded():
         yield "legal: f_m is no bijection"
 
 

@@ -27,6 +27,7 @@ class Net:
         self.right = [[number(e) for e in p["right"]] for p in listing["places"]]
         self.tokens = [number(p["tokens"]) for p in listing["places"]]
         self.slots = [[number(r) for r in p["slots"]] for p in listing["places"]]
+        self.sizes = [number(p.get("size", len(p["slots"]))) for p in listing["places"]]
         self.robots = [str(r["name"]) for r in robots]
         self.gears = [[number(p) for p in r["places"]] for r in robots]
         self.turns = [[number(e) for e in r["transitions"]] for r in robots]
@@ -62,6 +63,23 @@ class Net:
     def marked_graph(self) -> bool:
         """Whether each place has at most one producer and one consumer."""
         return all(len(row) <= 1 for row in self.left + self.right)
+
+    def fits(self, place: int, robots: list[int]) -> bool:
+        """Whether a place acts on these robots, which are sorted: each has one slot there."""
+        return self.sizes[place] == len(robots) and sorted(self.slots[place]) == robots
+
+    def marked_once(self, robot: int) -> bool:
+        """Whether a robot's gear carries one token, where the robot starts."""
+        on = {p for p in self.gears[robot] if self.tokens[p]}
+        return on == {self.initial[robot]} and self.tokens[self.initial[robot]] == 1
+
+    def threaded(self) -> bool:
+        """Whether f_m is a bijection, each robot being marked once: each marked place acts on the
+        robots that start there."""
+        starting: dict[int, list[int]] = {p: [] for p, tokens in enumerate(self.tokens) if tokens}
+        for robot, place in enumerate(self.initial):
+            starting[place].append(robot)
+        return all(robots and self.fits(p, robots) for p, robots in starting.items())
 
     def edge(self, place: int) -> tuple[int, int] | None:
         """(a, b) of a place [a; b]."""

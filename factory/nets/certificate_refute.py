@@ -44,7 +44,7 @@ def composes(net: Net) -> bool:
 
 def _robots_fit(net: Net, owners: list[list[int]]) -> bool:
     """Whether slots are the gears', and no event moves a robot into another's slot."""
-    if any(sorted(row) != own for row, own in zip(net.slots, owners, strict=True)):
+    if not all(net.fits(p, own) for p, own in enumerate(owners)):
         return False
     for event, moves in enumerate(net.moves):
         if moves is None:
@@ -145,13 +145,8 @@ def _series(nodes: set[int], edges: list[tuple[int, int]]) -> bool:
 
 
 def _not_legal(net: Net, section: Section) -> bool:
-    """Whether some gear is not marked once, or a robot does not start where its gear is marked."""
-    for gear, initial in zip(net.gears, net.initial, strict=True):
-        on = [p for p in gear if net.tokens[p]]
-        if len(on) != 1 or net.tokens[on[0]] != 1 or initial != on[0]:
-            return True
-    threads = [r for p, tokens in enumerate(net.tokens) if tokens for r in net.slots[p]]
-    return sorted(threads) != list(range(len(net.robots))) or bool(section["stray"])
+    """Whether some gear is not marked once, or a marked place acts on others than start there."""
+    return not (all(map(net.marked_once, range(len(net.gears)))) and net.threaded())
 
 
 def _not_safe(net: Net, section: Section) -> bool:

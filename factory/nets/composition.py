@@ -182,13 +182,14 @@ def _misplaced(net: MarkedNet, owners: list[list[int]]) -> Iterator[Fault]:
         at = net.net.places[place]
         if at.size != len(own) or (list(slots) != own and sorted(slots) != own):
             text = (
-                f"place {at.name} acts on {at.size} robots with slots for {_robots(net, slots)},"
-                f" but the gears through it are those of {_robots(net, own)}"
+                f"place {at.name} acts on {at.size} robots with slots for {named(net, slots)},"
+                f" but the gears through it are those of {named(net, own)}"
             )
             yield fault("slots", text, own, places=[place])
 
 
-def _robots(net: MarkedNet, gears: Iterable[int]) -> str:
+def named(net: MarkedNet, gears: Iterable[int]) -> str:
+    """The robots of gears, ? for one that has no gear."""
     names = (net.gears[g].robot if 0 <= g < len(net.gears) else "?" for g in gears)
     return listing(names) or "none"
 
@@ -215,11 +216,11 @@ def _clash(net: MarkedNet, event: int, owners: list[list[int]], many: bool) -> F
     if many:
         both = [p for p in places if len(owners[p]) > 1]
         text = (
-            f"gears {_robots(net, gears)} cross twice: they share the place before {called} and the"
+            f"gears {named(net, gears)} cross twice: they share the place before {called} and the"
             " one after it"
         )
         return fault("two gears cross twice", text, gears, places=both, transitions=[event])
-    text = f"gears {_robots(net, gears)} meet at {called} but share no one place [a; b] there"
+    text = f"gears {named(net, gears)} meet at {called} but share no one place [a; b] there"
     return fault("no shared place", text, gears, places=places, transitions=[event])
 
 
@@ -264,14 +265,14 @@ def _ring(
     places = [number for kind, number in nodes if kind == "place"]
     names = listing(net.net.places[p].name for p in places)
     if len(gears) == 2:
-        text = f"gears {_robots(net, gears)} cross twice: they share {names}"
+        text = f"gears {named(net, gears)} cross twice: they share {names}"
     else:
-        text = f"gears {_robots(net, gears)} form a ring through {names}: some circuit is no gear"
+        text = f"gears {named(net, gears)} form a ring through {names}: some circuit is no gear"
     return fault("two gears cross twice", text, gears, places=places)
 
 
 def _apart(net: MarkedNet, others: list[int]) -> Fault:
-    text = f"gears {_robots(net, others)} share no place with the rest, directly or not"
+    text = f"gears {named(net, others)} share no place with the rest, directly or not"
     return fault("gears apart", text, others)
 
 

@@ -13,7 +13,7 @@ from itertools import islice
 from factory.collector import collector_paused
 from factory.errors import Diagnostic, Position, RunError
 from factory.nets.behaviour import behaviour
-from factory.nets.composition import MOST, Composition, compose
+from factory.nets.composition import MOST, Composition, compose, named
 from factory.nets.explore import LIMIT
 from factory.nets.gears import GearNet
 from factory.nets.marked import MarkedNet, marked
@@ -80,7 +80,19 @@ def _redistribution(net: GearNet) -> Iterator[Fault]:
 def _illegal(
     net: GearNet | MarkedNet, subject: MarkedNet, composition: Composition
 ) -> Iterator[Fault]:
-    """Gears that are not marked exactly once, and robots that f_m leaves out."""
+    """Gears that are not marked exactly once, and what keeps f_m from being a bijection."""
+    miscounted = tuple(_miscounted(subject, composition))
+    yield from miscounted
+    if isinstance(net, GearNet) and len(net.initial) != len(net.gears):
+        text = f"{len(net.initial)} initial places are given for {len(net.gears)} robots"
+        kind = "lost token" if len(net.initial) < len(net.gears) else "doubled token"
+        yield Fault("legal", kind, text)
+    elif subject.slots and not miscounted:
+        yield from _unthreaded(subject, _initial(net))
+
+
+def _miscounted(subject: MarkedNet, composition: Composition) -> Iterator[Fault]:
+    """Gears that are not marked exactly once, and marked places in none."""
     tokens, names = subject.tokens, subject.net.places
     for number, gear in enumerate(subject.gears):
         on = [p for p in dict.fromkeys(gear.places) if tokens[p]]
@@ -96,18 +108,25 @@ def _illegal(
         if tokens[place] and not own:
             text = f"place {names[place].name} is marked and in no gear"
             yield Fault("legal", "place in no gear", text, (), (place,))
+
+
+def _initial(net: GearNet | MarkedNet) -> tuple[int, ...]:
+    """The place where each robot starts, in a net with each gear marked once."""
     if isinstance(net, GearNet):
-        yield from _unthreaded(net)
+        return net.initial
+    return tuple(next(p for p in gear.places if net.tokens[p]) for gear in net.gears)
 
 
-def _unthreaded(net: GearNet) -> Iterator[Fault]:
-    """Robots whose initial place is not theirs: f_m is no bijection."""
-    if len(net.initial) != len(net.gears):
-        text = f"{len(net.initial)} initial places are given for {len(net.gears)} robots"
-        kind = "lost token" if len(net.initial) < len(net.gears) else "doubled token"
-        yield Fault("legal", kind, text)
-    for number, (gear, place) in enumerate(zip(net.gears, net.initial, strict=False)):
-        if number not in net.slots[place] and len(net.initial) == len(net.gears):
-            name = net.threaded.places[place].name
-            text = f"{gear.robot} starts at {name}, which has no slot for it"
-            yield Fault("legal", "slots", text, (number,), (place,))
+def _unthreaded(net: MarkedNet, initial: tuple[int, ...]) -> Iterator[Fault]:
+    """Marked places whose slots are not those of the robots that start there."""
+    starting: dict[int, list[int]] = {}
+    for robot, place in enumerate(initial):
+        starting.setdefault(place, []).append(robot)
+    for place, robots in sorted(starting.items()):
+        slots, at = net.slots[place], net.net.places[place]
+        if at.size != len(robots) or sorted(slots) != robots:
+            text = (
+                f"place {at.name} acts on {at.size} robots with slots for"
+                f" {named(net, slots)}, but who starts there is {named(net, robots)}"
+            )
+            yield Fault("legal", "slots", text, tuple(robots), (place,))
