@@ -252,6 +252,16 @@ def test_a_place_without_size_has_that_of_its_slots() -> None:
     assert check_certificate(seal(document)) == []
 
 
+def test_trees_of_ways_show_no_reversibility_where_something_stops() -> None:
+    net = net_from([("a", "b", 0), ("b", "c", 0), ("c", "b", 0), ("c", "a", 1)])
+    document = certified(net)
+    assert document["live"]["holds"] is document["reversible"]["holds"] is False
+    there = {"place": [None, 0, 1], "depth": [0, 1, 2]}
+    back = {"place": [None, 1, 3], "depth": [0, 2, 1]}
+    document["reversible"] = {"holds": True, "root": 0, "there": there, "back": back}
+    assert any("for live nets only" in fault for fault in check_certificate(seal(document)))
+
+
 @pytest.mark.parametrize("junk", [None, 3, [], {}, {"schema": 1}, {"schema": 2, "digest": ""}, "x"])
 def test_junk_is_no_certificate(junk: object) -> None:
     assert len(check_certificate(junk)) >= 1
