@@ -7,6 +7,7 @@ from dataclasses import replace
 from itertools import combinations
 from typing import Any
 
+import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -25,6 +26,7 @@ from pag_values import SHAPES
 
 from factory.layout.certificate import Certificate
 from factory.layout.clearance import certify, separation
+from factory.layout.crossings import touching
 from factory.layout.plan import Layout
 from factory.layout.sweeps import ALWAYS, KINDS, STATIONS
 
@@ -241,6 +243,19 @@ def test_guidepaths_that_cross_or_leave_the_grid() -> None:
     broken(with_path(layout, 5, a=(x - 0.2, y)), "the guidepaths of r5 and r6 cross at")
     across = with_path(layout, 3, travel=-0.4)
     broken(across, "the guidepaths of r3 and r4 cross at")
+
+
+def test_boxes_that_touch_are_found_chunk_by_chunk(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("factory.layout.crossings.CHUNK", 7)
+    rng = np.random.default_rng(1)
+    low = rng.integers(0, 40, (50, 2))
+    high = low + rng.integers(0, 12, (50, 2))
+    pairs = [
+        (i, j)
+        for i, j in combinations(range(50), 2)
+        if (low[i] <= high[j]).all() and (low[j] <= high[i]).all()
+    ]
+    assert list(touching(low, high)) == pairs
 
 
 def test_faults_are_listed_up_to_a_limit() -> None:

@@ -11,11 +11,12 @@ from hypothesis import strategies as st
 
 from factory.errors import InputError
 from factory.factory import Factory
-from factory.nets.gears import GearNet
+from factory.nets.gears import Gear, GearNet
 from factory.nets.history import firings, legal_marking
 from factory.nets.marked import marked, play
 from factory.nets.replay import replay
-from tests.net_values import fair_run, legal_markings, random_legal_marking
+from factory.nets.threaded import ThreadedNet
+from tests.net_values import fair_run, legal_markings, net_from, random_legal_marking
 from tests.pag_values import factories, factory_of, paper
 
 
@@ -72,6 +73,22 @@ def test_a_contact_is_a_fault() -> None:
     found = replay(net, ["part1_s", "part1_e", "part1_s"])
     assert (found.index, found.refines) == (2, False)
     assert "r5:nopart is not marked" in found.reason
+
+
+def test_a_gear_of_one_place_never_fires() -> None:
+    bare = net_from([("a", "a", 1)]).net
+    net = GearNet(
+        ThreadedNet(bare, ((((0, 0), (0, 0)),),)), (Gear("r1", "", (0,), (0,)),), (0,), ((0,),)
+    )
+    assert replay(net, ["a"]).reason == "a is not enabled: p0 is marked already"
+
+
+def test_a_robot_that_is_left_behind() -> None:
+    bare = net_from([("b", "a", 1), ("a", "b", 0)]).net
+    moves = ((((0, 0), (1, 0)),), (((1, 0), (0, 0)),))
+    gears = tuple(Gear(robot, "", (0, 1), (1, 0)) for robot in ("r1", "r2"))
+    net = GearNet(ThreadedNet(bare, moves), gears, (0, 0), ((0, 1), (0,)))
+    assert replay(net, ["a"]).reason == "after a the marking is not legal at p0"
 
 
 def test_named_markings() -> None:
