@@ -213,9 +213,9 @@ class DistributedSupervisor:
             self._finish(process, step)
             process.stage = "leave"
             return
-        self._move(process, step, operation, me)
+        self._move(process, operation, me)
 
-    def _move(self, process: Process, step: Step, operation: Operation, me: int) -> None:
+    def _move(self, process: Process, operation: Operation, me: int) -> None:
         """ẋ_i = π_i ∘ F_p, governed by the robot's own limits at its own rate; its lift's too."""
         dt = process.period * self.timestep
         x = self.link.read(operation, me)[0].copy()

@@ -18,6 +18,7 @@ import factory
 from factory.engine import mujoco
 from factory.fidelity import QUANTITIES, SeedRecord, measure, measure_seed, study
 from factory.fidelity.causality import (
+    Orders,
     Process,
     compare,
     differences,
@@ -358,10 +359,10 @@ def test_other_causes_are_counted() -> None:
     assert compare(one, wrong).causes == 1
 
 
-def test_a_record_of_one_world_only_is_unmatched() -> None:
-    one = record_of(("part1_s", 0.0), ("part1_e", 0.5))
-    other = record_of(("part1_s", 0.0))
-    assert compare(one, other).unmatched == 1
+def test_a_firing_of_one_world_only_is_left_out() -> None:
+    one = record_of(("part1_s", 0.0), ("part1_e", 0.5), ("part2_s", 0.7))
+    other = record_of(("part1_s", 0.0), ("part2_s", 0.7))
+    assert compare(one, other) == compare(other, one) == Orders(0, 1, 0)
 
 
 def test_a_stalled_run_is_told_and_fails() -> None:

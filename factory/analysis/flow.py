@@ -85,7 +85,7 @@ def flow(timing: Timing, net: TimedNet, units: int) -> Flow:
         float(products[units - 1]) + timing.leaving,
         _full_pace(products, found),
         found.settled is not None,
-        _stocks(timing, found, net.pace),
+        _stocks(timing, found),
         tuple(_share(timing, net, robot) for robot in range(len(timing.factory.robots))),
         found,
     )
@@ -100,7 +100,7 @@ def _full_pace(products: Floats, found: Firings) -> int | None:
     return int(late[-1]) + 2 if len(late) else 1
 
 
-def _stocks(timing: Timing, found: Firings, pace: float) -> tuple[Stock, ...]:
+def _stocks(timing: Timing, found: Firings) -> tuple[Stock, ...]:
     """Over as many whole periods as lie before the first transition runs out of firings."""
     factory, dates = timing.factory, found.dates
     end = float(dates[-1].min())

@@ -15,7 +15,6 @@ class Element:
     where its start tag stands (line and column from 1)."""
 
     name: str
-    namespace: str
     attributes: dict[str, str]
     line: int
     column: int
@@ -47,12 +46,12 @@ class _Builder:
         self.parser.StartDoctypeDeclHandler = self.doctype
 
     def start(self, name: str, attributes: dict[str, str]) -> None:
-        namespace, _, local = name.rpartition(" ")
+        local = name.rpartition(" ")[2]
         if self.depth or (self.stack and local in self.ignored):
             self.depth += 1
             return
         line, column = self.parser.CurrentLineNumber, self.parser.CurrentColumnNumber + 1
-        element = Element(local, namespace, attributes, line, column)
+        element = Element(local, attributes, line, column)
         if self.stack:
             self.stack[-1].children.append(element)
         else:

@@ -35,12 +35,11 @@ class Process:
 @dataclass(frozen=True, slots=True)
 class Orders:
     """How two records relate: `swapped` of `unrelated` pairs that are causally unrelated and apart
-    in time in both; how many firings' `causes` differ; firings of one record only."""
+    in time in both; how many firings' `causes` differ."""
 
     swapped: int
     unrelated: int
     causes: int
-    unmatched: int
 
     @property
     def percent(self) -> float:
@@ -71,14 +70,13 @@ def process(net: GearNet, events: Iterable[Event], start: Marking | None = None)
 def compare(one: Process, other: Process) -> Orders:
     """Order and causes of two records, on the firings that both have."""
     shared = [firing for firing in one.times if firing in other.times]
-    unmatched = len(one.times) + len(other.times) - 2 * len(shared)
     differing = sum(one.causes[f] != other.causes[f] for f in shared)
     chosen = shared[:MOST]
     related: Truth = _related(chosen, one)
     first, second = _signs(chosen, one), _signs(chosen, other)
     apart = (first != 0) & (second != 0) & ~related
     upper = np.triu(apart, 1)
-    return Orders(int((upper & (first != second)).sum()), int(upper.sum()), differing, unmatched)
+    return Orders(int((upper & (first != second)).sum()), int(upper.sum()), differing)
 
 
 def differences(one: Process, other: Process) -> Array:

@@ -6,19 +6,6 @@ from dataclasses import dataclass, field
 
 from factory.errors import Diagnostic, Position
 
-CODES = {
-    "TwoHolders": "two welds hold one part",
-    "Dropped": "nobody holds a part, or it is not where its holder's weld keeps it",
-    "Exchanged": "a part is in the wrong hands, or in the wrong product",
-    "Early": "an operation ended before its robots were at their goals, or before its dwell",
-    "Order": "no legal firing sequence has the firings seen in their order",
-    "Stuck": "a robot does not follow its setpoint",
-    "Stalled": "nothing has happened for a long time",
-    "Frame": "a weld would put a part elsewhere than where it is in the product",
-    "Start": "the parts at the beginning are not those of the marking",
-}
-"""The codes of violations."""
-
 
 @dataclass(frozen=True, slots=True)
 class Violation:

@@ -16,8 +16,6 @@ from factory.nets.gears import Gear
 from factory.nets.marked import MANY, NONE, MarkedNet
 from factory.nets.verdict import Fault, listing
 
-Edge = tuple[int, int]
-
 
 def discover(net: MarkedNet) -> tuple[tuple[Gear, ...], tuple[Fault, ...]]:
     """The gears of a gear net, named g1, g2, ..., or the exact reasons why it is none."""

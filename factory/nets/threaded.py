@@ -76,10 +76,6 @@ class ThreadedMarking:
             and sorted(self.threads.values()) == list(range(robots))
         )
 
-    def robots_in(self, net: ThreadedNet, place: int) -> tuple[int, ...]:
-        """f_m(p, 0), ..., f_m(p, l_p - 1): the robots a marked place acts on, in its order."""
-        return tuple(self.threads[place, i] for i in range(net.places[place].size))
-
     def follower(self, net: ThreadedNet, events: Iterable[int]) -> ThreadedMarking:
         """The follower marking with respect to a detached set G of enabled events.
 

@@ -82,7 +82,7 @@ def _row(log: Log, take: Take, at: When) -> int:
 def moment_of(log: Log, row: int) -> Moment:
     """The state in a row of a log."""
     active = log.active[row]
-    shown = Snapshot(log.qpos[row], active[:, 0], active[:, 1], active[:, 2])
+    shown = Snapshot(log.qpos[row], active[:, 0], active[:, 2])
     return Moment(float(log.time[row]), int(log.delivered[row]), shown)
 
 

@@ -22,14 +22,13 @@ class Snapshot:
 
     qpos: Array
     active: NDArray[np.int32]
-    body1: NDArray[np.int32]
     body2: NDArray[np.int32]
 
     @classmethod
     def of(cls, m: mujoco.MjModel, d: mujoco.MjData) -> Snapshot:
         """The present state of a running model."""
         active = np.flatnonzero(d.eq_active).astype(np.int32)
-        return cls(d.qpos.copy(), active, m.eq_obj1id[active].copy(), m.eq_obj2id[active].copy())
+        return cls(d.qpos.copy(), active, m.eq_obj2id[active].copy())
 
 
 UNSEEN = ("part", "ground", names.COMPASS)

@@ -27,11 +27,6 @@ class Measured:
         """The robot (index) whose operations together take longest: the critical gear."""
         return int(np.argmax(self.gears))
 
-    @property
-    def busiest(self) -> int:
-        """The robot (index) that is in operations the most."""
-        return int(np.argmax(self.busy))
-
 
 def measured(recording: Recording) -> Measured:
     """What the log's events say."""
