@@ -78,6 +78,14 @@ def test_equal_names_give_way_to_ids() -> None:
     assert [p.name for p in found.net.places] == ["p", "x", "n", "y"]
 
 
+def test_an_id_that_is_the_name_of_another() -> None:
+    names = {"a": "b", "b": "c", "c": "c", "d": "#a"}
+    places = (f'<place id="{i}"><name><text>{n}</text></name></place>' for i, n in names.items())
+    found = read_pnml(minimal("".join(places)))
+    assert isinstance(found, MarkedNet)
+    assert [p.name for p in found.net.places] == ["p", "a", "b", "c", "d"]
+
+
 @given(factories(20), st.randoms(use_true_random=False), st.integers(0, 4))
 def test_broken_nets_are_read_and_judged_alike(
     factory: Factory, rng: random.Random, which: int

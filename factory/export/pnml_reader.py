@@ -215,12 +215,12 @@ class _Reader:
         return int(content)
 
     def _names(self, ids: Iterable[str]) -> dict[str, str]:
-        """A name for each id: its own name where that is not another's, too; else the id."""
+        """A name for each id: its own name where that is not another's, too; else the id. Where
+        an id is the name of another, every name is an id."""
         wanted = {key: _content(self.nodes[key].first("name"), "") or key for key in ids}
         count = Counter(wanted.values())
         names = {key: name if count[name] == 1 else key for key, name in wanted.items()}
-        again = Counter(names.values())
-        return {key: name if again[name] == 1 else f"#{key}" for key, name in names.items()}
+        return names if len(set(names.values())) == len(names) else {key: key for key in names}
 
     def _source(self, element: Element) -> Position:
         """The user's line that the document names for a node, else the node's own."""
