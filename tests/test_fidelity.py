@@ -96,7 +96,7 @@ def test_figures_agree_with_those_the_run_keeps(name: str) -> None:
     found = measurement.figures()
     assert run.physics is not None
     assert found["handoffs"] == run.physics.handoffs
-    assert found["handoff_gap_max_mm"] == pytest.approx(run.physics.handoff_gap_max_mm, abs=0.02)
+    assert found["handoff_gap_max_mm"] == pytest.approx(run.physics.handoff_gap_max_mm, abs=1e-9)
     assert found["product_vertex_max_mm"] == pytest.approx(
         run.physics.product_error_max_mm, abs=1e-4
     )

@@ -11,6 +11,7 @@ import numpy as np
 from factory.control.mode import Index
 from factory.control.obstacles import ranges
 from factory.engine import mujoco
+from factory.meshes import Array
 from factory.world.contacts import Contacts
 from factory.world.vicinity import Vicinity
 
@@ -39,6 +40,7 @@ class Switchboard:
     ) -> None:
         self.m, self.d, self.contacts, self.vicinity = m, d, contacts, vicinity
         self._tree = np.where(m.body_dofnum > 0, m.body_treeid, -1)
+        self._slides = _slides(m)
         self._on: dict[int, int] = {}
         self._off: set[int] = set()
         self._gripped: list[int] = []
@@ -107,9 +109,16 @@ class Switchboard:
         m, d, welds = self.m, self.d, _listed(self._gripped)
         holder = m.eq_obj1id[welds]
         reach = d.xmat[holder].reshape(-1, 3, 3) @ m.eq_data[welds, 3:6, None]
-        bodies = [self._on[weld] for weld in self._gripped]
-        apart = d.xpos[bodies] - (d.xpos[holder] + reach[:, :, 0])
+        free = m.jnt_qposadr[m.body_jntadr[[self._on[weld] for weld in self._gripped]]]
+        apart = d.qpos[free[:, None] + np.arange(3)] - (self._at(holder) + reach[:, :, 0])
         return Switched(len(welds), float(np.sqrt((apart * apart).sum(axis=1).max())))
+
+    def _at(self, bodies: Index) -> Array:
+        """Where bodies are that only slide (n, 3) [m]: the engine has them where its last step
+        began."""
+        m, d, slides = self.m, self.d, self._slides[bodies]
+        gone = m.opt.timestep * np.where(slides < 0, 0.0, d.qvel[m.jnt_dofadr[slides]])
+        return np.asarray(d.xpos[bodies] + (gone[:, :, None] * d.xaxis[slides]).sum(axis=1))
 
     def wake(self, bodies: Index) -> None:
         """Wake bodies that sleep, and let those that are about to, being slow, wait as long
@@ -123,6 +132,17 @@ class Switchboard:
             dofs = ranges(m.body_dofadr[bodies], m.body_dofnum[bodies])
             d.qvel[dofs[d.qvel[dofs] == 0.0]] = AWAKE
             self.vicinity.woken(bodies)
+
+
+def _slides(m: mujoco.MjModel) -> Index:
+    """For each body the slides that carry it (nbody, n), its own first, -1 for no more."""
+    own = np.where(m.body_jntnum > 0, m.body_jntadr, -1)
+    own[m.jnt_type[own] != int(mujoco.mjtJoint.mjJNT_SLIDE)] = -1
+    found, body = [own], m.body_parentid
+    while body.any():
+        found.append(own[body])
+        body = m.body_parentid[body]
+    return np.stack(found, axis=1)
 
 
 def _listed(numbers: Iterable[int]) -> Index:
