@@ -14,6 +14,7 @@ from factory.disturbance.hands import Hands
 from factory.engine import mujoco
 from factory.fidelity.shadow import Shadow
 from factory.layout.plan import Layout
+from factory.settings import Settings
 from factory.simulation import Simulation
 from factory.world import vicinity
 from factory.world.vicinity import Vicinity
@@ -99,6 +100,22 @@ def test_a_collision_is_the_same_to_the_last_bit(seed: int) -> None:
     whole, touched = crash(seed, False)
     assert touched
     assert crash(seed, True) == (whole, touched)
+
+
+@pytest.mark.parametrize("seed", [3, 4, 7])
+def test_a_sudden_collision_is_the_same_to_the_last_bit(seed: int) -> None:
+    """At four hundred metres a second squared, if the settings ask for that."""
+    found = []
+    for culls in (True, False):
+        simulation = ready("20", culls, settings=Settings(acceleration=400.0, speed=10.0))
+        rng, world = np.random.default_rng(seed), simulation.world
+        for _ in range(60):
+            simulation.supervisor.step()
+        axes = rng.choice(world.tray, 6, replace=False)
+        world.move(axes, world.reference[axes], np.zeros(6), rng.choice([-1, 1], 6) * 360.0)
+        seen = states(simulation, lambda world=world: world.advance(5), 30)
+        found.append((seen, len(world.inspection.unintended)))
+    assert found[0] == found[1]
 
 
 def boxes(m: mujoco.MjModel, d: mujoco.MjData, bodies: np.ndarray) -> np.ndarray:

@@ -75,7 +75,9 @@ class Stock:
         self.on_tray: int | None = None
         self.left: list[float] = []
         holders = self.contacts.own(self._trees(), self.tray + len(self.feeder))
-        self.vicinity = Vicinity(m, d, self.contacts, holders)
+        settings = model.settings
+        asked = max(settings.acceleration, settings.outfeed_acceleration)
+        self.vicinity = Vicinity(m, d, self.contacts, holders, asked)
         self.board = Switchboard(m, d, self.contacts, self.vicinity)
         self._hide_spares()
         self._hand_out(counts)

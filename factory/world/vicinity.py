@@ -18,7 +18,8 @@ PERIOD = 0.04
 """All that moves is looked at again after this [s]."""
 
 SUDDEN = 20.0
-"""Nothing gains speed faster than this, but what is pushed [m/s²]."""
+"""Nothing gains speed faster than this [m/s²], or than twice what the settings ask for, but what is
+pushed."""
 
 CROWD = 0.25
 """Where more than this share of all holders moves, there is little to leave out, and nothing is."""
@@ -39,9 +40,15 @@ class Vicinity:
     """
 
     def __init__(
-        self, m: mujoco.MjModel, d: mujoco.MjData, contacts: Contacts, holders: int
+        self,
+        m: mujoco.MjModel,
+        d: mujoco.MjData,
+        contacts: Contacts,
+        holders: int,
+        asked: float = 0.0,
     ) -> None:
         self.m, self.d, self.contacts, self.holder = m, d, contacts, contacts.code
+        self._sudden = max(SUDDEN, 2 * asked)
         self._culls, self.stale, self._due = holders >= FEW, False, 0.0
         self._woken = [np.empty(0, np.intp)]
         if self._culls:
@@ -100,7 +107,7 @@ class Vicinity:
         if len(who) > CROWD * len(self._near):
             return np.ones_like(self._near)
         speed = np.abs(self.d.cvel.take(bodies, axis=0)[:, 3:]).max()
-        reach = float(speed + SUDDEN * PERIOD / 2) * PERIOD
+        reach = float(speed + self._sudden * PERIOD / 2) * PERIOD
         low, high = self._low, self._high
         (x0, y0), (x1, y1) = low[:, who, None] - reach, high[:, who, None] + reach
         meets, also = self._meets[:, : len(who)]
