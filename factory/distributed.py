@@ -4,8 +4,8 @@ Robots share a cell each, for the label they carry, and the continuous state of 
 in; nothing else. Each has its own control rate and phase. Reads of labels alone would race: a
 tool's label never changes, and a slow robot may see a label of the next unit. So a cell counts,
 beside its label, the operations its robot has finished, and a condition asks for a count; the
-carrier alone ends an operation, and goes on when all others have followed. That is the least that
-makes the record refine the net; see docs/design.md.
+carrier alone ends an operation, and goes on when all others have followed. Why, is in
+docs/design.md.
 """
 
 from __future__ import annotations

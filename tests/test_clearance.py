@@ -25,10 +25,17 @@ from layout_values import (
 from pag_values import SHAPES
 
 from factory.layout.certificate import Certificate
-from factory.layout.clearance import certify, separation
+from factory.layout.clearance import _Search, certify, separation
 from factory.layout.crossings import touching
 from factory.layout.plan import Layout
-from factory.layout.sweeps import ALWAYS, KINDS, STATIONS
+from factory.layout.sweeps import (
+    ALWAYS,
+    KINDS,
+    PAYLOAD_BODY,
+    PAYLOADS,
+    STATIONS,
+    Region,
+)
 
 
 def broken(layout: Layout, *words: str) -> Certificate:
@@ -284,3 +291,19 @@ def test_work_grows_with_the_number_of_robots() -> None:
         assert len(large.regions) <= 1.3 * robots * len(small.regions)
         assert large.pairs <= 1.3 * robots * small.pairs
         assert len(large.shared) <= 1.5 * robots * len(small.shared) + 10
+
+
+def test_only_who_is_coupled_may_share_room() -> None:
+    """Two payloads in one place: of robots in one mode, or of strangers, coupled or not."""
+    layout = paper_layout()
+    mate, alone = (layout.factory.by_label[label].index for label in ("sub3", "part1"))
+
+    def faults(*found: tuple[int, str, int]) -> int:
+        box, height = (0.0, 1.0, 0.0, 1.0), (0.1, 0.2)
+        regions = [Region(r, PAYLOADS, PAYLOAD_BODY, box, height, k, o) for r, k, o in found]
+        return len(list(_Search(layout, regions).faults()))
+
+    assert faults((1, "part3", mate), (2, "sub2", mate)) == 0
+    assert faults((1, "part3", mate), (2, "sub2", ALWAYS)) == 0
+    assert faults((1, "part3", mate), (4, "part1", ALWAYS)) == 1
+    assert faults((1, "part3", mate), (4, "part1", alone)) == 1

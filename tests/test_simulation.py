@@ -225,6 +225,42 @@ def test_a_time_limit_names_robot_mode_and_line(paper: Layout) -> None:
     assert "sub2 = weld ( sub1 )" in text
 
 
+def test_a_carrier_goes_on_when_all_others_have_followed() -> None:
+    """Whoever is in an operation, and looks seldom, finds that its carrier has not gone on."""
+    layout = laid_out(PRODUCTS["kary"])
+    simulation = Simulation(layout, "ideal", units=3, seed=3, jitter=0.5, distributed=True)
+    supervisor, inside = simulation.supervisor, 0
+    for process in supervisor.processes:
+        process.period = 11 if process.program.robot in layout.factory.by_label["t"].robots else 3
+    while simulation.world.delivered() < 3:
+        supervisor.step()
+        for process in supervisor.processes:
+            operation, unit = process.step.operation, supervisor._unit(process)
+            carrier = supervisor.processes[operation.carrier]
+            if process.stage == "run" and process is not carrier:
+                assert carrier.turns <= supervisor._turn(operation.carrier, operation, unit)
+                inside += carrier.stage == "leave"
+    assert inside, "some carrier has waited for others"
+
+
+def test_a_contact_that_lasts_is_one(paper: Layout) -> None:
+    """Robots driven into each other, looked at step by step."""
+    simulation = Simulation(paper, units=1)
+    world, onsets, before, lasted = simulation.world, 0, set(), 0
+    for _ in range(50):
+        simulation.supervisor.step()
+    axes = np.arange(world.tray)
+    world.move(axes, world.reference[axes], np.where(axes % 2, 0.3, -0.3), np.zeros(len(axes)))
+    for _ in range(800):
+        world.advance(1)
+        world.inspection.tick()
+        contact = world.d.contact
+        now = {tuple(pair) for pair in contact.geom[contact.dist < 0].tolist()}
+        onsets, lasted, before = onsets + len(now - before), lasted + len(now & before), now
+    assert onsets and lasted > 10 * onsets
+    assert len(world.inspection.unintended) == onsets
+
+
 HEAVY = {
     "lowered": """root = w; w = mate ( base, block );
         base = atomic ( box = (0.6, 0.6, 0.05), pos = (0, 0, 0.025), mass = 20 );
