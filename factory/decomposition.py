@@ -40,10 +40,9 @@ def in_pieces(mesh: Mesh, as_written: Callable[[], tuple[Array, Indices]]) -> Me
     again with vertices that lie in the same place kept apart, as bodies that touch need."""
     if not is_closed(mesh.faces) or _share_of_hull(mesh) >= 1 - FLATNESS:
         return mesh
-    for vertices, faces in ((mesh.vertices, mesh.faces), as_written()):
-        bodies = convex_bodies(vertices, faces)
-        if bodies:
-            return _of_bodies(mesh.name, bodies)
+    bodies = convex_bodies(mesh.vertices, mesh.faces) or convex_bodies(*as_written())
+    if bodies:
+        return _of_bodies(mesh.name, bodies)
     if _share_of_hull(mesh) >= FULL:
         return mesh
     return Mesh(mesh.name, mesh.vertices, mesh.faces, _decomposed(mesh))

@@ -3,8 +3,8 @@
 A box has its eight corners. A cylinder and a sphere have a polytope *around* them, so that what is
 clear of the polytope is clear of the body; it reaches at most ROUND [m] too far, or, where that
 would take too many corners, 0.0075 % of the radius of a cylinder and 0.46 % of that of a sphere. A
-mesh has its convex hull, unless it is found to be made of several bodies: see `components` here and
-`factory.decomposition`.
+mesh has its convex hull, unless it is found to be made of several bodies: see `convex_bodies` here
+and `factory.decomposition`.
 """
 
 from __future__ import annotations
@@ -103,30 +103,37 @@ def is_closed(faces: Indices) -> bool:
     return bool((np.bincount(inverse.ravel(), way) == 0).all())
 
 
-def components(vertices: Array, faces: Indices) -> list[tuple[Array, Indices]]:
-    """The connected parts of a mesh, as vertices (n, 3) and faces (m, 3) each, in the order of
-    their first triangle: triangles that use a vertex in common are connected."""
+def components(count: int, faces: Indices) -> Indices:
+    """The number of the connected part that each face (m, 3) of `count` vertices is of, in the
+    order of their first triangle: triangles that use a vertex in common are connected."""
     from scipy.sparse import csr_matrix
     from scipy.sparse.csgraph import connected_components
 
-    count = len(vertices)
     rows, columns = faces[:, [0, 1]].T.ravel(), faces[:, [1, 2]].T.ravel()
     graph = csr_matrix((np.ones(len(rows)), (rows, columns)), shape=(count, count))
-    _, label = connected_components(graph, directed=False)
-    _, first = np.unique(label[faces[:, 0]], return_index=True)
+    label = connected_components(graph, directed=False)[1][faces[:, 0]]
+    _, first, inverse = np.unique(label, return_index=True, return_inverse=True)
+    return np.asarray(np.argsort(np.argsort(first))[inverse])
+
+
+def _split(vertices: Array, faces: Indices, number: Indices) -> list[tuple[Array, Indices]]:
+    """The parts that the faces of a mesh are numbered by, as vertices (n, 3) and faces (m, 3)
+    each."""
+    order, ends = np.argsort(number, kind="stable"), np.cumsum(np.bincount(number))
     found = []
-    for start in sorted(first):
-        mine = faces[label[faces[:, 0]] == label[faces[start, 0]]]
+    for mine in np.split(faces[order], ends[:-1]):
         used, inverse = np.unique(mine, return_inverse=True)
         found.append((vertices[used], inverse.reshape(-1, 3)))
     return found
 
 
 def convex_bodies(vertices: Array, faces: Indices) -> list[tuple[Array, Indices]]:
-    """The components of a mesh if there are several and all are closed and convex, else none."""
-    found = components(vertices, faces)
-    if not 2 <= len(found) <= MOST_PIECES:
+    """The components of a mesh if there are several, no more than MOST_PIECES, and all are closed
+    and convex, else none."""
+    number = components(len(vertices), faces)
+    if not 1 <= number.max() < MOST_PIECES:
         return []
+    found = _split(vertices, faces, number)
     return found if all(is_convex(*body) for body in found) else []
 
 

@@ -7,6 +7,7 @@ import sys
 from collections.abc import Iterator
 from itertools import pairwise
 from pathlib import Path
+from time import process_time
 from types import SimpleNamespace
 
 import mujoco
@@ -19,8 +20,9 @@ from layout_values import table_pag
 
 import factory
 from factory import decomposition
+from factory.decomposition import in_pieces
 from factory.geometry import Solid, product_geometry
-from factory.meshes import Array
+from factory.meshes import Array, Mesh
 from factory.mjcf import names
 from factory.mjcf.model import model_files
 from factory.pag import PAG
@@ -29,6 +31,7 @@ from factory.pieces import (
     ROUND,
     box_piece,
     components,
+    convex_bodies,
     cylinder_piece,
     is_closed,
     sphere_piece,
@@ -162,9 +165,34 @@ def test_closed_is_every_edge_to_and_fro() -> None:
     box = trimesh.creation.box()
     assert is_closed(box.faces) and not is_closed(box.faces[1:])
     assert is_closed(np.concatenate([box.faces, box.faces + 8]))
-    assert (
-        len(components(np.tile(box.vertices, (2, 1)), np.vstack([box.faces, box.faces + 8]))) == 2
-    )
+
+
+def test_components_are_numbered_as_their_triangles_come() -> None:
+    """Whatever lies between the triangles of one, and in whatever order vertices are."""
+    box = trimesh.creation.box()
+    faces = np.stack([box.faces + 8, box.faces, box.faces + 20], axis=1).reshape(-1, 3)
+    assert components(30, faces).tolist() == [0, 1, 2] * 12
+    vertices = np.random.default_rng(0).normal(size=(30, 3))
+    vertices[8:16], vertices[:8], vertices[20:28] = box.vertices, box.vertices + 3, box.vertices + 6
+    bodies = convex_bodies(vertices, faces)
+    assert [body[0].min() for body in bodies] == [-0.5, 2.5, 5.5]
+    assert all(np.array_equal(body[1], box.faces) for body in bodies)
+
+
+def test_very_many_bodies_are_only_counted() -> None:
+    corners = np.random.default_rng(0).normal(size=(40_000, 4, 3)).reshape(-1, 3)
+    tetrahedron = np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])
+    faces = (tetrahedron + 4 * np.arange(40_000)[:, None, None]).reshape(-1, 3)
+    begin = process_time()
+    assert convex_bodies(corners, faces) == []
+    assert process_time() - begin < 2
+
+
+def test_a_file_is_read_again_only_where_it_has_to_be(tmp_path: Path) -> None:
+    boxes = [trimesh.creation.box((0.1, 0.1, 0.1)).apply_translation((x, 0, 0)) for x in (0, 0.2)]
+    apart = trimesh.util.concatenate(boxes)
+    mesh = Mesh("m", np.asarray(apart.vertices), np.asarray(apart.faces))
+    assert len(in_pieces(mesh, lambda: pytest.fail("read again")).pieces) == 2
 
 
 # --- decomposition --------------------------------------------------------------------------------
