@@ -30,9 +30,9 @@ LATTICE = 0.2
 CELL = 0.06
 """Largest cell of that lattice [m]."""
 
-SMALLEST, FURTHEST, HEAVIEST = 5e-9, 1e5, 1e12
-"""A part of a smaller half length, or beyond this distance [m] or mass [kg], is refused: nothing
-can be computed with it."""
+SMALLEST, FURTHEST, HEAVIEST = 5e-9, 1e4, 1e12
+"""A part of a smaller half length, or beyond this distance [m] or mass [kg], is refused: the engine
+cannot compute with it."""
 
 LONGEST, SHORTEST = 5.0, 0.005
 """A product outside these lengths [m] gets a warning."""

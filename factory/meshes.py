@@ -19,6 +19,10 @@ LEAST_BOX = 1e-12
 LEAST_MASS, LEAST_INERTIA = 1e-9, 1e-12
 """Bodies have at least this mass [kg] and principal moments [kg m²], or the engine refuses them."""
 
+MARGIN = 1e-8
+"""Any two principal moments exceed the third by this share of it, or digits that an MJCF leaves out
+may turn a sheet or a rod into what cannot be a body."""
+
 
 @dataclass(frozen=True, slots=True)
 class Mesh:
@@ -118,7 +122,11 @@ def is_inertia(matrix: Array) -> bool:
 
 
 def sound(inertia: Array) -> Array:
-    """An inertia (3, 3) with moments that the engine accepts: too small ones are made larger, all
-    by the same, so that it remains one of a body."""
-    lacking = LEAST_INERTIA - float(np.linalg.eigvalsh(inertia)[0])
-    return inertia + np.eye(3) * max(0.0, lacking)
+    """An inertia (3, 3) with moments that the engine accepts. Where one is too small, or as large
+    as the others together, all are made larger by the same, so that it remains one of a body. What
+    is not finite stays as it is."""
+    if not np.isfinite(inertia).all():
+        return inertia
+    low, middle, high = np.linalg.eigvalsh(inertia)
+    lacking = max(LEAST_INERTIA - low, high * (1 + MARGIN) - low - middle)
+    return inertia + np.eye(3) * max(0.0, float(lacking))

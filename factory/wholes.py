@@ -10,7 +10,7 @@ import numpy as np
 
 from factory.factory import Factory
 from factory.geometry import Product
-from factory.meshes import Array
+from factory.meshes import Array, sound
 from factory.pag import NOPART
 
 FUSE_FROM = 40
@@ -114,7 +114,7 @@ def bodies_of(factory: Factory, product: Product, fuse: bool = False) -> Bodies:
         reach = (float(np.linalg.norm(r)) for _, r in away)
         radius[label] = max(radius[i] + r for i, r in zip(inputs, reach, strict=True))
         parts = factory.contents[label]
-        wholes[label] = Whole(label, parts, mass[label], centre[label], inertia[label])
+        wholes[label] = Whole(label, parts, mass[label], centre[label], sound(inertia[label]))
     return Bodies(carried, centre, mass, radius, wholes)
 
 

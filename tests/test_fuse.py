@@ -14,7 +14,7 @@ from factory.engine import mujoco
 from factory.geometry import product_geometry
 from factory.layout.plan import Layout
 from factory.monitor import beside
-from factory.simulation import Simulation
+from factory.simulation import Simulation, physical_model
 from factory.wholes import FUSE_FROM, bodies_of, fused_copies, fusing_pays
 from factory.world.fusing import Groups, fuse, misfit, turns
 from tests.command_line import PAPER, ROOT, Terminal
@@ -167,6 +167,18 @@ def test_mass_and_inertia_add_up() -> None:
     for label, radius in bodies.radius.items():
         corners = np.concatenate([layout.product.solids[p].corners for p in bodies.parts(label)])
         assert np.linalg.norm(corners - bodies.centre[label], axis=1).max() <= radius + 1e-12
+
+
+def test_specks_far_apart_are_a_body_that_the_engine_takes() -> None:
+    """Alone they are round; together they are a thread, or a sheet if there are three."""
+    layout = laid_out(
+        "root = d; d = mate(a, b, c); a = atomic(sphere = 1e-4);"
+        "b = atomic(sphere = 1e-4, pos = (900, 50, 0));"
+        "c = atomic(sphere = 1e-4, pos = (0, 800, 0))"
+    )
+    model = physical_model(layout, 1, fuse=True)
+    assert len(model.carried.wholes) == 2
+    mujoco.MjModel.from_xml_string(model.xml)
 
 
 def test_what_is_only_worked_upon_stays_the_body_that_it_is() -> None:

@@ -13,7 +13,15 @@ from layout_values import table_pag
 
 from factory.errors import InputError
 from factory.geometry import Product, Solid, product_geometry, rotation
-from factory.meshes import LEAST_INERTIA, LEAST_MASS, MOST_FACES, is_inertia, measured, usable
+from factory.meshes import (
+    LEAST_INERTIA,
+    LEAST_MASS,
+    MOST_FACES,
+    is_inertia,
+    measured,
+    sound,
+    usable,
+)
 from factory.pag import PAG, Value
 
 lengths = st.floats(0.001, 1.0)
@@ -75,6 +83,23 @@ def test_primitives_are_as_trimesh_has_them(
         assert solid.inertia == pytest.approx(wanted, abs=0.02 * moments[2])
     assert moments[0] >= LEAST_INERTIA * 0.999 and is_inertia(solid.inertia)
     assert np.linalg.norm(solid.centre - body.center_mass) <= 1e-9 + 1e-3 * size
+
+
+@given(st.tuples(*[st.floats(-9, 4)] * 3), st.floats(-9, 12), turns)
+def test_a_sound_inertia_is_that_of_a_body_in_nine_digits(
+    extents: tuple[float, ...], mass: float, quat: tuple[float, ...]
+) -> None:
+    x, y, z = (10**extent for extent in extents)
+    turn = rotation(np.array(quat) / np.linalg.norm(quat))
+    box = np.diag([y * y + z * z, x * x + z * z, x * x + y * y]) * 10**mass / 12
+    written = np.vectorize(lambda v: float(f"{v:.9g}"))(sound(turn @ box @ turn.T))
+    low, middle, high = np.linalg.eigvalsh(written)
+    assert low > 0 and low + middle > high
+
+
+def test_an_inertia_that_is_sound_stays_as_it_is() -> None:
+    thin = np.diag([2.0, 3.0, 5.0 - 1e-6])
+    assert np.array_equal(sound(thin), thin)
 
 
 @given(turns, places, st.floats(0.1, 10))

@@ -9,13 +9,17 @@ from __future__ import annotations
 from xml.etree.ElementTree import Element
 
 from factory.layout.dimensions import BELT_GAP, FINGER_TOP, PAYLOAD, TRAY
-from factory.layout.plan import Layout
+from factory.layout.plan import Layout, Point2
 from factory.mjcf import names
 from factory.mjcf.elements import add, add_shown
 from factory.mjcf.robots import Drive, add_inertia
 
 TRAY_MASS = 4.0
 """Mass of the empty tray [kg]."""
+
+LEAST_WIDTH, SLENDEREST = 1e-5, 1e-7
+"""Half the least width of tray and belt [m], and in half their length: of what is thinner the
+engine cannot make out the inertia."""
 
 SHED = (0.87, 0.88, 0.89, 1.0)
 
@@ -36,7 +40,7 @@ def add_tray(world: Element, actuator: Element, layout: Layout, drive: Drive) ->
         type="box",
         mass=TRAY_MASS,
         pos=((xlo + xhi) / 2, (ylo + yhi) / 2, PAYLOAD - BELT_GAP - TRAY / 2),
-        size=((xhi - xlo) / 2, (yhi - ylo) / 2, TRAY / 2 - 1e-4),
+        size=(*_plate((xhi - xlo) / 2, (yhi - ylo) / 2), TRAY / 2 - 1e-4),
         material="tray",
     )
     add(
@@ -63,7 +67,7 @@ def add_outfeed(world: Element, layout: Layout) -> None:
         class_="station",
         type="box",
         pos=(0, 0, top - thick / 2),
-        size=(half[0], half[1], thick / 2),
+        size=(*_plate(*half), thick / 2),
         material="belt",
     )
     tall = float(layout.product.high[2] - layout.product.low[2])
@@ -111,3 +115,10 @@ def add_outfeed(world: Element, layout: Layout) -> None:
         size=(0.004, half[1] + 0.0205, tall / 2 + 0.025),
         rgba=SHED,
     )
+
+
+def _plate(x: float, y: float) -> Point2:
+    """Half the length and width of a plate under a product of these: the same, but of what is thin
+    as dust or a thread."""
+    least = max(LEAST_WIDTH, SLENDEREST * max(x, y))
+    return max(x, least), max(y, least)

@@ -324,7 +324,7 @@ class MujocoWorld:
 
 def load(model: Model) -> mujoco.MjModel:
     """The engine's model of what `model_files` gives; from the user's cache if it is there. Raises
-    InputError (BadMesh) where the engine refuses it."""
+    InputError (BadMesh, BadValue, Engine) where the engine refuses it."""
     m = cached(model)
     if m is None:
         m = _compiled(model)
@@ -349,5 +349,7 @@ def _explained(model: Model, words: str) -> Diagnostic:
         mesh = f"mesh/{solid.mesh.name}" if solid.mesh else ""
         if f"part/{solid.label}#" in words or (mesh and mesh in words):
             position = model.factory.pag[solid.label].position
-            return Diagnostic("BadMesh", words.strip(), position, "repair the mesh of this part")
+            hint = "repair the mesh of this part" if solid.mesh else "give it another shape or mass"
+            code = "BadMesh" if solid.mesh else "BadValue"
+            return Diagnostic(code, words.strip(), position, hint)
     return Diagnostic("Engine", words.strip(), None, "please report this as a bug of factory")
