@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -17,6 +17,7 @@ from factory.nets.petri import Place
 from factory.nets.verdict import Verdict
 
 if TYPE_CHECKING:
+    from factory.errors import Diagnostic
     from factory.geometry import Product
     from factory.mating import Matings
 
@@ -26,8 +27,9 @@ SHOWN = 24
 
 @dataclass(frozen=True)
 class Checked:
-    """A net with its verdict; `factory` is None where the net was read from PNML. `matings` and
-    `product`: how its inputs come together, None where no part has a shape of its own."""
+    """A net with its verdict; `factory` is None where the net was read from PNML. `matings`: how
+    its inputs come together, None where no part has a shape of its own; `product`: None where none
+    says more of itself than its colour."""
 
     name: str
     labels: int
@@ -61,7 +63,13 @@ class Checked:
             "part_pool": self.pool,
             "approaches": approaches_json(self.matings),
             "clashes": clashes_json(self.matings),
+            "warnings": [d.as_json() for d in self.warnings],
         }
+
+    @property
+    def warnings(self) -> tuple[Diagnostic, ...]:
+        """What there is to warn about in the product's geometry."""
+        return self.product.warnings if self.product else ()
 
     def pictures(self, folder: Path) -> dict[Path, bytes]:
         """The files that `check --clashes` writes, one for each blocked operation."""
@@ -94,6 +102,7 @@ def check_file(
     are wanted. Raises InputError."""
     if is_net(file):
         return check_net(file)
+    from factory.limits import is_plain
     from factory.nets.pool import part_pool
     from factory.nets.verify import verify
     from factory.pipeline import read
@@ -103,10 +112,17 @@ def check_file(
     sources = {r.name: r.position for r in factory.robots if r.position}
     verdict = verify(factory.net, sources)
     pool = dict(part_pool(factory, wip))
-    checked = Checked(source.pag.root, len(factory.pag), factory.net, verdict, factory, pool)
-    if source.matings is None:
-        return checked
-    return replace(checked, matings=source.matings, product=source.product)
+    product = None if is_plain(source.pag) else source.product
+    return Checked(
+        source.pag.root,
+        len(factory.pag),
+        factory.net,
+        verdict,
+        factory,
+        pool,
+        source.matings,
+        product,
+    )
 
 
 def is_net(file: Path) -> bool:

@@ -16,7 +16,16 @@ from types import MappingProxyType
 import numpy as np
 
 from factory.decomposition import in_pieces
-from factory.errors import Diagnostic, InputError, Position
+from factory.errors import Diagnostic, InputError
+from factory.limits import (
+    FURTHEST,
+    SHAPES,
+    SMALLEST,
+    beyond,
+    size_warnings,
+    too_far,
+    value_position,
+)
 from factory.meshes import LEAST_MASS, Array, Indices, Measured, Mesh, measured, sound, usable
 from factory.pag import PAG, Assembly
 from factory.pieces import box_piece, cylinder_piece, sphere_piece
@@ -29,13 +38,6 @@ LATTICE = 0.2
 
 CELL = 0.06
 """Largest cell of that lattice [m]."""
-
-SMALLEST, FURTHEST, HEAVIEST = 5e-9, 1e4, 1e12
-"""A part of a smaller half length, or beyond this distance [m] or mass [kg], is refused: the engine
-cannot compute with it."""
-
-LONGEST, SHORTEST = 5.0, 0.005
-"""A product outside these lengths [m] gets a warning."""
 
 PALETTE = (
     (0.035, 0.58, 0.88),
@@ -121,31 +123,17 @@ def product_geometry(pag: PAG) -> Product:
     lift = 0.0 if base == -np.inf else float(base)
     for number, node in enumerate(plain):
         solids[node.label] = _box_in_lattice(node, number, cells, lift)
-    faults = [_beyond(node, solids[node.label]) for node in leaves if node.label in solids]
+    faults = [beyond(node, solids[node.label]) for node in leaves if node.label in solids]
     if reader.errors or any(faults):
         raise InputError([*reader.errors, *(fault for fault in faults if fault)])
     low = np.min([s.low for s in solids.values()], axis=0)
     high = np.max([s.high for s in solids.values()], axis=0)
-    warnings = (*reader.warnings, *_size_warnings(pag, low, high))
+    warnings = (*reader.warnings, *size_warnings(pag, low, high))
     return Product(solids, low, high, warnings)
 
 
-def _beyond(node: Assembly, solid: Solid) -> Diagnostic | None:
-    """What is wrong with a part whose numbers, each fine in itself, lead too far."""
-    reach = float(np.max(np.abs([solid.low, solid.high])))
-    if not reach <= FURTHEST:
-        message = f"'{node.label}' reaches further than {FURTHEST:g} m from the origin"
-        hint = "lengths are in metres: check pos, scale and the shape"
-        return Diagnostic("BadValue", message, node.position, hint)
-    if not (0 < solid.mass <= HEAVIEST and np.isfinite(solid.inertia).all()):
-        message = f"'{node.label}' weighs {solid.mass:g} kg"
-        hint = f"more than 0 and at most {HEAVIEST:g} kg: check mass, density and shape"
-        return Diagnostic("BadValue", message, node.position, hint)
-    return None
-
-
 def _has_shape(node: Assembly) -> bool:
-    return any(p.name in ("mesh", "box", "cylinder", "sphere") for p in node.parameters)
+    return any(p.name in SHAPES for p in node.parameters)
 
 
 def _lattice(count: int) -> tuple[int, float]:
@@ -193,7 +181,7 @@ class _Reader:
             if given is not None:
                 size = _half(kind, np.atleast_1d(np.array(given, float)))
                 if not SMALLEST <= size.min() <= size.max() <= FURTHEST:
-                    position = _value_position(node, kind)
+                    position = value_position(node, kind)
                     message = f"the {kind} of '{node.label}' is out of range"
                     hint = f"from {2 * SMALLEST:g} to {FURTHEST:g} m; lengths are in metres"
                     self.errors.append(Diagnostic("BadValue", message, position, hint))
@@ -207,33 +195,39 @@ class _Reader:
         path = str(node.parameter("mesh"))
         scale = float(node.parameter("scale", 1.0))  # type: ignore[arg-type]
         key = (path, scale)
-        first = key not in self._meshes
-        if first:
+        if key not in self._meshes:
             self._meshes[key] = self._read(node, path, scale)
+            self._warn(node, path, self._meshes[key])
         found = self._meshes[key]
         if found is None:
             return None
-        if found.trouble and first:
-            position = _value_position(node, "mesh")
-            hint = "repair the mesh to have it used as it is"
-            self.warnings.append(Diagnostic("BadMesh", f"{path} {found.trouble}", position, hint))
         return _from_mesh(node, found, place, quaternion, number)
+
+    def _warn(self, node: Assembly, path: str, found: Measured | None) -> None:
+        """Takes note of a mesh that is not used as it is."""
+        position = value_position(node, "mesh")
+        hint = "repair the mesh to have it used as it is"
+        if found is not None and found.trouble:
+            self.warnings.append(Diagnostic("BadMesh", f"{path} {found.trouble}", position, hint))
 
     def _read(self, node: Assembly, path: str, scale: float) -> Measured | None:
         import trimesh
 
         try:
             loaded = trimesh.load(self.folder / path, force="mesh", process=True)
-            vertices = np.asarray(loaded.vertices, float) * scale
-            faces = np.asarray(loaded.faces, np.int64)
+            vertices, faces = np.asarray(loaded.vertices, float), np.asarray(loaded.faces, np.int64)
             if len(faces) == 0 or not np.isfinite(vertices).all():
                 raise ValueError("it has no triangles, or vertices that are not finite")
+            vertices = vertices * scale
+            if not np.abs(vertices).max() <= FURTHEST:
+                self.errors.append(too_far(node, "scale", "mesh"))
+                return None
             mesh, trouble = usable(f"m{len(self._meshes)}", vertices, faces)
             if not trouble:
                 mesh = in_pieces(mesh, lambda: self._as_written(path, scale))
             return measured(mesh, trouble)
         except Exception as error:  # trimesh's readers raise anything on a broken file
-            position = _value_position(node, "mesh")
+            position = value_position(node, "mesh")
             hint = "export it again as .obj, .stl, .ply or .glb with triangles"
             why = "its content is no mesh" if isinstance(error, ImportError) else str(error)
             self.errors.append(
@@ -247,10 +241,6 @@ class _Reader:
 
         loaded = trimesh.load(self.folder / path, force="mesh", process=False)
         return np.asarray(loaded.vertices, float) * scale, np.asarray(loaded.faces, np.int64)
-
-
-def _value_position(node: Assembly, name: str) -> Position | None:
-    return next((p.position for p in node.parameters if p.name == name), node.position)
 
 
 def _half(kind: str, given: Array) -> Array:
@@ -371,15 +361,6 @@ def rotation(quaternion: Array) -> Array:
             [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
         ]
     )
-
-
-def _size_warnings(pag: PAG, low: Array, high: Array) -> list[Diagnostic]:
-    longest = float((high - low).max())
-    if SHORTEST <= longest <= LONGEST:
-        return []
-    hint = "is a mesh in millimetres? then write scale = 0.001"
-    message = f"the product is {longest:g} m long"
-    return [Diagnostic("Size", message, pag[pag.root].position, hint)]
 
 
 __all__ = ["Array", "Mesh", "Product", "Solid", "colour", "product_geometry", "rotation"]

@@ -25,6 +25,7 @@ ROOMS = [
         "compiler",
         "programs",
         "geometry",
+        "limits",
         "meshes",
         "pieces",
         "decomposition",

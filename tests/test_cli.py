@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+import trimesh
 
 from factory.nets.certificate_check import check_certificate
 from tests.command_line import PAPER, ROOT, Terminal, files_in, spawn
@@ -24,6 +25,7 @@ CHECK: dict[str, Any] = {
     "gears": list,
     "part_pool": dict,
     "witness": list,
+    "warnings": list,
 }
 BUILD: dict[str, Any] = {
     "mjcf": (str, type(None)),
@@ -252,6 +254,47 @@ def test_warnings_have_the_form_of_diagnostics(run: Terminal, tmp_path: Path) ->
     assert re.match(rf"{re.escape(str(file))}:\d+:\d+: \w+ warning: ", done.err)
     assert run("build", file, "-q").err == ""
     assert run("build", file, "--json").json["warnings"]
+
+
+def test_check_warns_as_build_does(run: Terminal, tmp_path: Path) -> None:
+    file = tmp_path / "big.pag"
+    file.write_text("root = p; p = atomic ( box = (9, 1, 1) );")
+    built, done = (run(word, file) for word in ("build", "check"))
+    assert done.status == 0 and done.err == built.err and "Size warning: " in done.err
+    assert run("check", file, "-q").err == ""
+    found = run("check", file, "--json").json["warnings"]
+    assert found == run("build", file, "--json").json["warnings"] and len(found) == 1
+    assert run("check", PAPER, "--json").json["warnings"] == []
+
+
+@pytest.mark.parametrize(
+    "geometry",
+    [
+        "mass = @1e300",
+        "mass = @5e12, density = 1",
+        "density = @1e300",
+        "pos = @(1e9, 0, 0)",
+        "sphere = 1, pos = @(1e300, 0, 0)",
+        "sphere = @9e3, pos = (2e3, 0, 0)",
+        "sphere = 1, mass = @1e308",
+        "sphere = 1, density = @1e300",
+        "sphere = @900",
+        'mesh = "box.stl", scale = @1e300',
+        'mesh = "box.stl", scale = @900',
+        'mesh = "box.stl", pos = @(9.9995e3, 0, 0)',
+        'mesh = "box.stl", pos = @(2e4, 0, 0), scale = 2',
+    ],
+)
+def test_check_finds_values_that_lead_too_far(run: Terminal, tmp_path: Path, geometry: str) -> None:
+    """Where they are written, marked here by @."""
+    file = tmp_path / "far.pag"
+    trimesh.creation.box((20, 20, 20)).export(tmp_path / "box.stl")
+    line = f"root = a; a = atomic ( {geometry} )"
+    file.write_text(line.replace("@", ""))
+    for command in ("check", "build"):
+        done = run(command, file, "--json")
+        assert (done.status, done.codes) == (2, ["BadValue"])
+        assert done.json["errors"][0]["col"] == line.index("@") + 1
 
 
 @pytest.mark.parametrize(

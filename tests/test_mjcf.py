@@ -9,6 +9,8 @@ import shutil
 import subprocess
 import sys
 from collections.abc import Callable, Mapping
+from dataclasses import replace
+from itertools import combinations_with_replacement, cycle
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -18,12 +20,14 @@ import pytest
 import trimesh
 
 import factory
+from factory.errors import InputError
 from factory.files import write_all
 from factory.layout.plan import Layout
 from factory.mjcf import names
 from factory.mjcf.model import Model, model_files
 from factory.settings import Settings
 from factory.simulation import physical_model
+from factory.world.physics import load
 from tests.command_line import PAPER, ROOT, Terminal, files_in
 
 KARY = """root = s; s = mate(a, b, c, t); t = mate(e, f); c = inspect(d, dwell = 0.2);
@@ -284,6 +288,43 @@ def test_settings_reach_the_model(paper: Layout) -> None:
     strong = physical_model(paper, 1, Settings(force=9.0))
     assert all(a.force < b.force for a, b in zip(weak.drives, strong.drives, strict=True))
     assert 'timestep="0.004"' in weak.xml
+
+
+LENGTHS = (1e-9, 2e-8, 1e-5, 1e-3, 1.0, 1e3, 15e3)
+SIZES = [
+    *(f"sphere = {a}" for a in LENGTHS),
+    *(f"cylinder = ({a}, {b})" for a in LENGTHS for b in LENGTHS),
+    *(f"box = {box}" for box in combinations_with_replacement(LENGTHS[::2], 3)),
+    *(f"box = {box[::-1]}" for box in combinations_with_replacement(LENGTHS[1::2], 3)),
+]
+TURNS = ["", ", quat = (1, 0, 1, 0)", ", quat = (4, -3, 2, 1)", ", mass = 1", ", mass = 1e-12"]
+
+
+def test_the_engine_takes_every_size_that_is_accepted(tmp_path: Path) -> None:
+    """Dust, sheets, threads and towers: what is refused is refused at the shape or the mass."""
+    refused = 0
+    for size, turn in zip(SIZES, cycle(TURNS), strict=False):
+        try:
+            layout = laid_out(tmp_path / "p.pag", f"root = a; a = atomic({size}{turn})")
+        except InputError as error:
+            (found,) = error.diagnostics
+            assert found.code == "BadValue" and found.position
+            assert found.position.column == 24 + size.index("=")
+            refused += 1
+            continue
+        model = physical_model(layout, 1)
+        m = mujoco.MjModel.from_xml_string(model.xml)
+        assert m.body(names.part("a", 1)).inertia.min() > 0
+    assert 0 < refused < len(SIZES) / 2
+
+
+def test_what_the_engine_refuses_is_named(tmp_path: Path) -> None:
+    model = physical_model(laid_out(tmp_path / "p.pag", "root = a; a = atomic(sphere = 0.01)"), 1)
+    with pytest.raises(InputError) as caught:
+        load(replace(model, xml=model.xml.replace('fullinertia="', 'fullinertia="-')))
+    (found,) = caught.value.diagnostics
+    assert (found.code, found.hint) == ("BadValue", "give it another shape or mass")
+    assert found.position and found.position.column == 11
 
 
 # --- how it behaves -------------------------------------------------------------------------------

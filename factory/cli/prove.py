@@ -22,7 +22,7 @@ from factory.cli.options import (
     writable_folder,
 )
 from factory.collector import collector_paused
-from factory.console import emit, say
+from factory.console import emit, say, warn
 from factory.errors import Diagnostic, InputError, did_you_mean
 
 if TYPE_CHECKING:
@@ -56,6 +56,7 @@ def check(
     writable(file, certificate)
     writable_folder(clashes)
     checked = check_file(file, folders, wip, _relayed(file, folders, options))
+    warn(checked.warnings, quiet)
     if clashes is not None:
         from factory.files import own_names, write_all
 
