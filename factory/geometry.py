@@ -1,15 +1,15 @@
 """The geometry of a product: a solid for each part, in the frame of the finished product.
 
 Shapes written in the PAG are taken as they are; meshes are read with trimesh; parts with no
-geometry get a box in a cubic lattice of at most 0.2 m. A mesh that the engine cannot use falls back
-to its convex hull or its box, with a warning that names it.
+geometry get a box in a cubic lattice of at most 0.2 m. A mesh that the engine cannot use, or that
+is open, falls back to its convex hull or its box, with a warning that names it.
 """
 
 from __future__ import annotations
 
 import colorsys
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from types import MappingProxyType
 
@@ -38,6 +38,9 @@ LATTICE = 0.2
 
 CELL = 0.06
 """Largest cell of that lattice [m]."""
+
+NAMED = 3
+"""So many meshes are named that are open or inside out."""
 
 PALETTE = (
     (0.035, 0.58, 0.88),
@@ -128,7 +131,8 @@ def product_geometry(pag: PAG) -> Product:
         raise InputError([*reader.errors, *(fault for fault in faults if fault)])
     low = np.min([s.low for s in solids.values()], axis=0)
     high = np.max([s.high for s in solids.values()], axis=0)
-    warnings = (*reader.warnings, *size_warnings(pag, low, high))
+    leaks = _first_few(list(reader.leaks.values()))
+    warnings = (*reader.warnings, *leaks, *size_warnings(pag, low, high))
     return Product(solids, low, high, warnings)
 
 
@@ -163,12 +167,14 @@ def _box_in_lattice(node: Assembly, number: int, cells: tuple[int, float], lift:
 
 
 class _Reader:
-    """Reads shapes, collecting errors and warnings; a mesh file is read once."""
+    """Reads shapes, collecting errors and warnings, those of meshes that are open or inside out in
+    `leaks`, by file; a mesh file is read once."""
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
         self.errors: list[Diagnostic] = []
         self.warnings: list[Diagnostic] = []
+        self.leaks: dict[str, Diagnostic] = {}
         self._meshes: dict[tuple[str, float], Measured | None] = {}
 
     def solid(self, node: Assembly, number: int) -> Solid | None:
@@ -209,6 +215,9 @@ class _Reader:
         hint = "repair the mesh to have it used as it is"
         if found is not None and found.trouble:
             self.warnings.append(Diagnostic("BadMesh", f"{path} {found.trouble}", position, hint))
+        elif found is not None and found.leak:
+            leak = Diagnostic("BadMesh", f"{path} {found.leak}", position, hint)
+            self.leaks.setdefault(path, leak)
 
     def _read(self, node: Assembly, path: str, scale: float) -> Measured | None:
         import trimesh
@@ -361,6 +370,15 @@ def rotation(quaternion: Array) -> Array:
             [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
         ]
     )
+
+
+def _first_few(leaks: list[Diagnostic]) -> list[Diagnostic]:
+    """At most NAMED of these warnings, and one for all the others: most meshes of bricks are
+    open."""
+    if len(leaks) <= NAMED + 1:
+        return leaks
+    message = f"and {len(leaks) - NAMED} more meshes are open or inside out"
+    return [*leaks[:NAMED], replace(leaks[NAMED], message=message)]
 
 
 __all__ = ["Array", "Mesh", "Product", "Solid", "colour", "product_geometry", "rotation"]

@@ -37,10 +37,12 @@ class Mesh:
 
 @dataclass(frozen=True, slots=True)
 class Measured:
-    """A mesh, what was wrong with it, and its mass properties for unit density."""
+    """A mesh, what was wrong with it, and its mass properties for unit density. `leak`: why they
+    are those of its hull, "" where they are its own."""
 
     mesh: Mesh
     trouble: str
+    leak: str
     volume: float
     centre: Array
     inertia: Array
@@ -109,9 +111,11 @@ def measured(mesh: Mesh, trouble: str = "") -> Measured:
         inertia = np.asarray(properties.inertia) / float(properties.density)
         if is_inertia(inertia):
             break
+    wrong = "is inside out" if body.is_watertight else "is open (not watertight)"
+    leak = "" if solid is body else f"{wrong}; its convex hull is used instead"
     centre = np.asarray(properties.center_mass)
     volume, corners = float(properties.volume), np.asarray(hull.vertices)
-    return Measured(mesh, trouble, volume, centre, inertia, corners)
+    return Measured(mesh, trouble, leak, volume, centre, inertia, corners)
 
 
 def is_inertia(matrix: Array) -> bool:

@@ -182,10 +182,34 @@ def test_an_open_or_inverted_mesh_has_the_mass_of_its_hull(tmp_path: Path) -> No
     opened.update_faces(np.arange(len(opened.faces)) < 10)
     inverted = box.copy()
     inverted.invert()
-    for body in (opened, inverted):
+    for body, trouble in ((opened, "open (not watertight)"), (inverted, "inside out")):
         found = from_mesh(tmp_path, body)
+        (warning,) = found.warnings
+        assert warning.message == f"m.obj is {trouble}; its convex hull is used instead"
         assert found.mass == pytest.approx(1.0)
         assert found.solids["p"].centre == pytest.approx([0, 0, 0], abs=1e-9)
+
+
+@pytest.mark.parametrize(("files", "lines"), [(1, 1), (4, 4), (5, 4), (40, 4)])
+def test_open_meshes_are_named_once_a_file_and_then_counted(
+    tmp_path: Path, files: int, lines: int
+) -> None:
+    opened = trimesh.creation.box((0.1, 0.1, 0.1))
+    opened.update_faces(np.arange(len(opened.faces)) < 10)
+    for n in range(files):
+        opened.export(tmp_path / f"{n}.obj")
+    rows = [
+        (f"p{n}-{scale}", "atomic", "", {"mesh": f"{n}.obj", "scale": scale})
+        for n in range(files)
+        for scale in (1, 2)
+    ]
+    pag = table_pag("x", ("x", "mate", " ".join(row[0] for row in rows), {}), *rows)  # type: ignore[arg-type]
+    found = product_geometry(PAG(pag.root, pag.nodes, folder=str(tmp_path))).warnings
+    assert len(found) == lines
+    named = 4 if files == 4 else min(files, 3)
+    assert [w.message[:10] for w in found[:named]] == [f"{n}.obj is o" for n in range(named)]
+    if files > named:
+        assert found[-1].message == f"and {files - 3} more meshes are open or inside out"
 
 
 def test_a_huge_mesh_becomes_its_hull() -> None:
