@@ -13,6 +13,7 @@ from layout_values import table_pag
 
 from factory.errors import InputError
 from factory.geometry import Product, Solid, product_geometry, rotation
+from factory.lang import read_pag
 from factory.meshes import (
     LEAST_INERTIA,
     LEAST_MASS,
@@ -23,6 +24,7 @@ from factory.meshes import (
     usable,
 )
 from factory.pag import PAG, Value
+from factory.pipeline import all_templates
 
 lengths = st.floats(0.001, 1.0)
 turns = st.tuples(*[st.floats(-1, 1)] * 4).filter(lambda q: sum(v * v for v in q) > 0.01)
@@ -54,6 +56,13 @@ def real(solid: Solid) -> trimesh.Trimesh:
     turn = np.eye(4)
     turn[:3, :3], turn[:3, 3] = rotation(solid.quaternion), solid.position
     return body.apply_transform(turn)
+
+
+@pytest.mark.parametrize("size", [1e308, 1e-320])
+def test_a_quaternion_is_normalised_however_long(size: float) -> None:
+    text = f"root = p; p = atomic ( sphere = 0.1, quat = ({size}, {size}, 0, 0) )"
+    solid = product_geometry(read_pag(text, all_templates())).solids["p"]
+    assert np.allclose(solid.quaternion, [0.5**0.5, 0.5**0.5, 0, 0])
 
 
 @given(

@@ -238,6 +238,7 @@ def test_errors_come_in_the_order_of_the_text() -> None:
         ("root = a; root = a; a = atomic()", ["Root"]),
         ("root = a;", ["UndefinedLabel"]),
         ("a = weld ( a )", ["Root", "PagNotTree"]),
+        ("root = a; a = mate ( a, a )", ["PagNotTree"]),
         ("root = a; a = weld ( dropoff )", ["ReservedLabel"]),
         ("root = nopart; a = atomic()", ["ReservedLabel"]),
         ("root = a; a = weld ( b+c )", ["Syntax"]),

@@ -61,7 +61,8 @@ class TreeCheck:
         for node in self.nodes:
             for index, label in enumerate(node.inputs):
                 if label == node.label:
-                    self._report_cycle([label])
+                    if node.inputs.index(label) == index:
+                        self._report_cycle([label])
                 elif label not in self.defined:
                     self._use_undefined(label, node.input_positions[index])
                 elif label in self.users:

@@ -136,9 +136,8 @@ class ValueReader:
         numbers = tuple(value for value in values if value is not None)
         if len(numbers) < len(values):
             return None
-        if not kind.zero and not 0 < math.hypot(*numbers) < math.inf:
-            size = "all zero" if not any(numbers) else "too long to normalise"
-            self._refuse(name, kind, raw.opening, f"is {size}")
+        if not kind.zero and not any(numbers):
+            self._refuse(name, kind, raw.opening, "is all zero")
             return None
         return numbers
 
