@@ -12,6 +12,7 @@ from subprocess import PIPE
 from threading import Thread
 from time import monotonic, sleep
 from typing import Any
+from xml.etree import ElementTree
 
 import numpy as np
 import pytest
@@ -31,9 +32,11 @@ from factory.live.commands import (
     Step,
     command_of,
 )
-from factory.live.page import page
+from factory.live.page import page, stage_of
 from factory.monitor import beside
 from factory.nets.replay import replay
+from factory.report.floor import floor_plan
+from factory.report.links import labels_of
 from factory.simulation import Simulation
 from tests.command_line import PAPER, Terminal, started
 from tests.layout_values import paper_layout
@@ -390,6 +393,18 @@ def test_the_page_names_every_robot_and_part(running: Running) -> None:
     assert data["parts"] == [o.label for o in paper_layout().factory.leaves]
     assert len(data["frames"]["reach"][0]) == len(data["frames"]["moving"])
     assert "connect-src 'self'" in made and 'class="station"' in made
+
+
+def test_robots_are_drawn_in_one_piece() -> None:
+    """A carriage is 60 mm wide; the finger is on its arm."""
+    layout = paper_layout()
+    drawn = floor_plan(stage_of(Simulation(layout)), labels_of(layout.factory))
+    groups = next(g for g in ElementTree.fromstring(drawn) if g.get("class") == "robots")
+    for path, group in zip(layout.guidepaths, groups, strict=True):
+        for shape in group:
+            corners = [tuple(map(float, p.split(","))) for p in shape.get("points", "").split()]
+            assert len(corners) > 4
+            assert max(np.hypot(x, y) for x, y in corners) <= 1e3 * path.reach + 31
 
 
 # --- the command -------------------------------------------------------------------------------

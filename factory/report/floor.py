@@ -79,7 +79,7 @@ class _Plan:
         """The geoms of a body, and of those that are fixed to it, with their vertices in its frame
         [m]."""
         for own in np.flatnonzero(self.m.body_weldid == body).tolist():
-            place, turn = self.stage.position[own], rotation(self.stage.quaternion[own])
+            place, turn = self.m.body_pos[own], rotation(self.m.body_quat[own])
             for geom in drawn(self.m, own):
                 points = triangles(self.m, geom)[0]
                 yield geom, points if own == body else points @ turn.T + place

@@ -20,10 +20,10 @@ Floats = NDArray[np.float64]
 @dataclass(frozen=True)
 class Stage:
     """A factory and the engine's model `m` of it. `position` (bodies, 3) [m] and `quaternion`
-    (bodies, 4) of each body at the start, relative to its parent or to the world; `reach` (2,
-    bodies, 3): the least and the greatest position; `places`: where the body of each part is in the
-    finished product [m]; `stations`: where the payload is held as operations of several robots end
-    (x, y) [m], each with the labels they make.
+    (bodies, 4) of each body at the start, of one that has a parent relative to that or, of a run
+    that is not over, to the world; `reach` (2, bodies, 3): the least and the greatest position;
+    `places`: where the body of each part is in the finished product [m]; `stations`: where the
+    payload is held as operations of several robots end (x, y) [m], each with the labels they make.
     """
 
     factory: Factory
