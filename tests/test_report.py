@@ -22,6 +22,7 @@ from factory.log.blocks import LENGTH, MAGIC
 from factory.pag import PAG, Assembly
 from factory.report import page, recording_of
 from factory.report.fidelity import fidelity
+from factory.report.floor import floor_plan
 from factory.report.links import labels_of, links
 from factory.report.measured import measured
 from factory.report.packing import json_inside
@@ -137,6 +138,17 @@ def test_what_is_only_shown_is_drawn_and_linked_too(made: Page, recording) -> No
     labels = labels_of(recording.factory)
     still = [t["label"] for t in things if t["body"] == 0 and "label" in t]
     assert sorted(still) == sorted(labels[leaf.label] for leaf in leaves)
+
+
+def test_the_scale_bar_is_beneath_the_robots(recording) -> None:
+    """On a floor of 3 m, too, where its letters are larger than the margin."""
+    stage = replace(recording.stage, reach=4 * recording.stage.reach)
+    svg = floor_plan(stage, labels_of(recording.factory))
+    bodies = [stage.m.body(f"{r.name}/carriage").id for r in recording.factory.robots]
+    lowest = -1e3 * stage.reach[0, bodies, 1].min()
+    found = re.search(r'y="([\d.]+)" font-size="([\d.]+)"[^>]* class="measure"', svg)
+    height, size = map(float, found.groups())
+    assert height - size > lowest + 30
 
 
 def test_what_is_linked_is_linked_both_ways(recording) -> None:

@@ -22,6 +22,9 @@ MARGIN = 80.0
 RULER = (0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0)
 """Lengths that a scale bar may have [m]."""
 
+RULER_ROOM = 2.5
+"""What the scale bar takes beneath everything, in sizes of its letters."""
+
 STANDS = {"rail": "rail", "post": "post", "boom": "boom", "head": "boom"}
 """The style of what stands still, by the last word of its name; what has none is not drawn."""
 
@@ -52,8 +55,9 @@ class _Plan:
         }
         points = np.array(self.reach or [(0.0, 0.0)])
         low, high = points.min(axis=0) - MARGIN, points.max(axis=0) + MARGIN
+        size = max(float(high[0] - low[0]), float(high[1] - low[1])) / 45
+        high[1] += RULER_ROOM * size
         width, height = high - low
-        size = max(float(width), float(height)) / 45
         box = " ".join(number(v) for v in (*low, width, height))
         drawn_layers = "".join(f'<g class="{k}">{"".join(v)}</g>' for k, v in layers.items())
         ruler = _ruler((float(low[0]), float(high[1])), float(width), size)
