@@ -120,6 +120,17 @@ def test_buttons_step_slow_push_and_block(watched: Watched) -> None:
     assert watched.trouble == []
 
 
+def test_things_are_found_by_name(watched: Watched) -> None:
+    field = watched.page.locator("#find")
+    field.fill("r9")
+    watched.page.keyboard.press("Enter")
+    assert watched.page.get_by_text("Nothing is called r9").is_visible()
+    field.fill("r3")
+    watched.page.keyboard.press("Enter")
+    assert watched.page.locator("#chosen").inner_text() == "robot r3 ✕"
+    assert watched.trouble == []
+
+
 def test_it_comes_back_when_the_socket_does(watched: Watched) -> None:
     watched.until("f.count > 2")
     (connection,) = watched.server._server.connections

@@ -175,12 +175,35 @@ def test_a_click_in_3d_selects(tab: Tab) -> None:
     tab.page.keyboard.press("Escape")
 
 
-def test_things_are_found_by_name(tab: Tab) -> None:
-    tab.page.locator("#find").fill("transition sub2_s")
+NAMED = {
+    "transition sub2_s": {"kind": "transition", "number": 4},
+    "sub2_s": {"kind": "transition", "number": 4},
+    "part part1": {"kind": "label", "number": 0},
+    "part1": {"kind": "label", "number": 0},
+    " r3 ": {"kind": "robot", "number": 2},
+}
+
+
+@pytest.mark.parametrize("words", NAMED)
+def test_things_are_found_by_name(tab: Tab, words: str) -> None:
+    tab.page.locator("#find").fill(words)
     tab.page.keyboard.press("Enter")
-    assert tab.ask("selected") == {"kind": "transition", "number": 4}
+    assert tab.ask("selected") == NAMED[words]
+    assert tab.page.locator("#find").input_value() == ""
     tab.page.locator("#chosen").click()
     assert tab.ask("selected") is None
+
+
+def test_what_has_no_such_name_is_said(tab: Tab) -> None:
+    field, missing = tab.page.locator("#find"), tab.page.get_by_role("status")
+    for words in ("part9", "robot part1", "constructor"):
+        field.fill(words)
+        tab.page.keyboard.press("Enter")
+        assert missing.filter(has_text=f"Nothing is called {words}").is_visible()
+        assert tab.ask("selected") is None
+    field.fill("part")
+    assert not missing.filter(has_text="Nothing").count()
+    field.fill("")
 
 
 def test_the_certificate_can_be_saved(tab: Tab) -> None:

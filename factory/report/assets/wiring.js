@@ -16,15 +16,28 @@ function wireSelection(selection, views) {
     const found = meant(event.target);
     if (found) selection.choose(...found);
   });
-  document.getElementById('find').addEventListener('change', (event) => {
-    const [word, ...rest] = event.target.value.split(' ');
-    const kind = word === 'part' ? 'label' : word;
-    const number = kind in KINDS ? DATA[KINDS[kind]].indexOf(rest.join(' ')) : -1;
-    if (number < 0) return;
+  const field = document.getElementById('find');
+  const missing = document.getElementById('missing');
+  field.addEventListener('input', () => missing.replaceChildren());
+  field.addEventListener('change', () => {
+    const words = field.value.trim();
+    const found = called(words);
+    missing.textContent = found || !words ? '' : `Nothing is called ${words}`;
+    if (!found) return;
     selection.clear();
-    selection.choose(kind, number);
-    event.target.value = '';
+    selection.choose(...found);
+    field.value = '';
   });
+}
+
+// The kind and number of what is called so, as `part sub2` or just `sub2`; undefined for nothing.
+function called(words) {
+  const [word, ...rest] = words.split(' ');
+  const kind = word === 'part' ? 'label' : word;
+  const said = Object.hasOwn(KINDS, kind) ? [[kind, rest.join(' ')]] : [];
+  return [...said, ...['robot', 'label', 'transition'].map((every) => [every, words])]
+    .map(([every, name]) => [every, DATA[KINDS[every]].indexOf(name)])
+    .find(([, number]) => number >= 0);
 }
 
 function wireKeys(clock, selection) {
