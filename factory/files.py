@@ -12,6 +12,9 @@ from pathlib import Path
 
 from factory.errors import Diagnostic, InputError
 
+LOG = b"factory-log "
+"""How a log of a run begins, whatever its version."""
+
 
 def write_bytes(path: Path, content: bytes) -> None:
     """Write a file so that no half of it is ever seen under its name. Raises OSError."""

@@ -136,6 +136,21 @@ def test_garbage(run: Terminal, out: Path, name: str) -> None:
     assert files_in(out) == {}
 
 
+def test_a_log_is_no_pag(run: Terminal, out: Path) -> None:
+    """Who gives one is told which commands take it."""
+    log = out.parent / "run.log"
+    assert run("run", PAPER, "--world", "ideal", "--log", log, "-q").status == 0
+    takers = {"render", "export"}
+    others = [c for c in commands(out) if c[0] not in takers]
+    for command, *options in [*others, ["analyze"], ["fidelity"], ["view"]]:
+        done = run(command, log, *options, "--json")
+        assert (done.status, done.codes) == (2, ["Usage"])
+        (error,) = done.json["errors"]
+        assert "is a log of a run" in error["message"]
+        assert all(f"`{name}`" in error["hint"] for name in {"monitor", "report", *takers})
+    assert files_in(out) == {}
+
+
 def test_what_is_no_file(run: Terminal, out: Path) -> None:
     for file in (out, out / "missing.pag", "", "/dev/null", "x" * 300, "a\udcff.pag", PAPER / "x"):
         for command, *options in commands(out):

@@ -311,6 +311,7 @@ def test_files_that_are_no_text(
     assert found.code == code
     assert str(found.position) == f"{tmp_path / name}:{place}"
     assert "UTF" in found.hint
+    assert bool(found.position.text) == (name in ("latin.pag", "mark.pag")), "binary is not shown"
 
 
 def test_files_that_cannot_be_read(tmp_path: Path) -> None:

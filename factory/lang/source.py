@@ -9,6 +9,7 @@ from pathlib import Path
 from lark import Token
 
 from factory.errors import Diagnostic, InputError, Position, did_you_mean
+from factory.files import LOG
 
 FILES = 1000  # at most so many names of a folder are compared with a missing one
 
@@ -64,12 +65,15 @@ def _place(diagnostic: Diagnostic) -> tuple[int, int]:
 
 
 def read_text(path: str | os.PathLike[str]) -> str:
-    """The text of a UTF-8 file. Raises InputError (BadFile, or Syntax where it is not UTF-8)."""
+    """The text of a UTF-8 file. Raises InputError (BadFile, Syntax where it is not UTF-8, or Usage
+    for a log)."""
     name = os.fspath(path)
     try:
         data = Path(name).read_bytes()
     except (OSError, ValueError) as error:
         raise InputError(_unreadable(name, error)) from None
+    if data.startswith(LOG):
+        raise InputError(_log(name))
     try:
         return data.decode("utf-8")
     except UnicodeDecodeError as error:
@@ -88,6 +92,12 @@ def _unreadable(name: str, error: Exception) -> Diagnostic:
         return Diagnostic("BadFile", message, at, "name a file in it")
     why = getattr(error, "strerror", None) or str(error)
     return Diagnostic("BadFile", f"{quoted(name)} cannot be read: {why}", at, hint)
+
+
+def _log(name: str) -> Diagnostic:
+    message = f"{quoted(name)} is a log of a run, not the PAG of a product"
+    hint = "logs are for `monitor`, `report`, `render`, `export` and `analyze --measured`"
+    return Diagnostic("Usage", message, None, hint)
 
 
 def near_file(folder: str, path: str) -> str:
@@ -111,7 +121,9 @@ def _not_utf8(name: str, data: bytes, offset: int) -> Diagnostic:
     end = data.find(b"\n", offset)
     shown = data[start : end if end >= 0 else len(data)].decode("utf-8", "replace")
     column = len(before) - (before.rfind("\n") + 1) + 1
-    at = Position(name, line, column, shown.removeprefix("\ufeff").rstrip("\r"))
+    shown = shown.removeprefix("\ufeff").rstrip("\r")
+    binary = any(c < " " and c != "\t" for c in shown)
+    at = Position(name, line, column, "" if binary else shown)
     wide = data[:2] in (b"\xff\xfe", b"\xfe\xff")
     hint = "this is UTF-16: save the file as UTF-8" if wide else "save the file as UTF-8"
     return Diagnostic("Syntax", f"byte 0x{data[offset]:02x} is not UTF-8 text", at, hint)

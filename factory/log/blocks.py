@@ -17,10 +17,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from factory.errors import Diagnostic
+from factory.files import LOG
 
 Arrays = dict[str, NDArray[Any]]
 
-MAGIC = b"factory-log 1\n"
+MAGIC = LOG + b"1\n"
 
 HEAD = struct.Struct("<cII")
 LENGTH = struct.Struct("<I")
