@@ -294,6 +294,19 @@ def test_a_log_is_enough_where_meshes_are_gone(run, tmp_path: Path, out: Path) -
     )
 
 
+def test_meshes_beside_the_log_are_found_from_elsewhere(
+    run, tmp_path: Path, out: Path, monkeypatch
+) -> None:
+    (tmp_path / "pair.pag").write_text(MESHED)
+    (tmp_path / "cube.obj").write_text(CUBE)
+    monkeypatch.chdir(tmp_path)
+    assert run("run", "pair.pag", "--units", 1, "--log", "pair.log", "--quiet").status == 0
+    assert read_log(Path("pair.log")).header["pag"]["file"] == "pair.pag"
+    monkeypatch.chdir(out)
+    done = run("report", tmp_path / "pair.log", "-o", "pair.html", "--json")
+    assert done.status == 0 and done.json["predicted"]
+
+
 def test_a_pag_is_run_first_and_leaves_nothing_but_the_page(run, out: Path, monkeypatch) -> None:
     temporary = out.parent / "temporary"
     temporary.mkdir()

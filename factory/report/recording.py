@@ -4,7 +4,8 @@ the layout that it ran in."""
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -27,6 +28,7 @@ from factory.pipeline import Source
 from factory.planning import Ground
 from factory.report.stage import Stage, stations
 from factory.robots import load_catalogue
+from factory.template import Template
 
 
 @dataclass(frozen=True)
@@ -99,7 +101,7 @@ def recording_of(path: Path, layout: Layout | None = None) -> Recording:
     if layout is not None:
         return Recording(str(path), subject.log, motion, layout.factory, layout)
     try:
-        layout = _laid_out(subject.log)
+        layout = _laid_out(subject.log, path.parent)
     except (InputError, RunError) as error:
         why = error.diagnostics[0].message
         return Recording(str(path), subject.log, motion, factory, None, why)
@@ -108,15 +110,13 @@ def recording_of(path: Path, layout: Layout | None = None) -> Recording:
     return Recording(str(path), subject.log, motion, layout.factory, layout)
 
 
-def _laid_out(log: Log) -> Layout:
-    """The layout of a log, made again. Raises InputError where meshes are gone, RunError where the
-    floor is too small for it, ValueError where it is not the one that the run was in."""
+def _laid_out(log: Log, beside: Path) -> Layout:
+    """The layout of a log in the folder `beside`, made again. Raises InputError where meshes are
+    gone, RunError where the floor is too small for it, ValueError where it is not the one that the
+    run was in."""
     header, made = log.header, conditions(log.header)
     templates = {word: read_template(text, word) for word, text in header["templates"].items()}
-    file = header["pag"]["file"]
-    text = header["pag"].get("plain") or header["pag"]["text"]
-    pag = read_pag(text, templates, file, os.path.dirname(file) or ".")
-    source = Source(pag, templates, load_catalogue())
+    source = Source(_pag(header["pag"], templates, beside), templates, load_catalogue())
     factory, product = source.compile(), source.product
     ground = header.get("ground", {})
     floor = ground.get("floor") and tuple(map(float, ground["floor"]))
@@ -125,6 +125,18 @@ def _laid_out(log: Log) -> Layout:
     if goals != header["monitor"]["goals"]:
         raise ValueError("the run was in another layout than the one its PAG gets now")
     return layout
+
+
+def _pag(kept: Mapping[str, str], templates: Mapping[str, Template], beside: Path) -> PAG:
+    """The PAG that a log keeps, with its meshes from where it was or, where they are not there from
+    here, from beside the log. Raises InputError where they are gone."""
+    file, text = kept["file"], kept.get("plain") or kept["text"]
+    try:
+        return read_pag(text, templates, file, os.path.dirname(file) or ".")
+    except InputError:
+        with suppress(InputError):
+            return read_pag(text, templates, file, str(beside))
+        raise
 
 
 __all__ = ["Recording", "recording_of"]
