@@ -421,6 +421,15 @@ def test_the_document(run: Terminal) -> None:
     assert found["measured"] is None and found["picture"] is None
 
 
+def test_what_is_asked_is_told_once(run: Terminal) -> None:
+    """The robot that sets the pace would be doubled unasked."""
+    told = run("analyze", PAPER, "--second", "r3", "--json").json["scenarios"]
+    changes = [scenario["change"] for scenario in told]
+    assert changes[0] == "2 × r3" and changes.count("2 × r3") == 1
+    unasked = run("analyze", PAPER, "--json").json["scenarios"]
+    assert sorted(changes) == sorted(scenario["change"] for scenario in unasked)
+
+
 def test_what_people_read(run: Terminal, golden: Callable[[str, str], None]) -> None:
     """Numbers left out: they follow the layout."""
     done = run("analyze", PAPER, "--shorter", "r3=20")

@@ -55,7 +55,8 @@ def analyse(
     found = flow(timing, net, units)
     made = scenarios(timing, net, wip)
     if asked is not None:
-        made = (scenario(timing, *asked, wip), *made)
+        first = scenario(timing, *asked, wip)
+        made = (first, *(s for s in made if s.change != first.change))
     return Analysis(
         timing,
         wip,

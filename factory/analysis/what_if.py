@@ -11,8 +11,9 @@ from factory.analysis.timing import Change, Timing
 
 @dataclass(frozen=True, slots=True)
 class Scenario:
-    """A change in words, the cycle time with it [s], and what sets the pace then."""
+    """A change, in words, the cycle time with it [s], and what sets the pace then."""
 
+    change: Change
     words: str
     pace: float
     then: tuple[str, ...]
@@ -21,7 +22,7 @@ class Scenario:
 def scenario(timing: Timing, words: str, change: Change, wip: int | None) -> Scenario:
     """What becomes of the cycle time with a change."""
     net = timed_net(timing, change, wip)
-    return Scenario(words, net.pace, tuple(c.name for c in net.critical))
+    return Scenario(change, words, net.pace, tuple(c.name for c in net.critical))
 
 
 def scenarios(timing: Timing, net: TimedNet, wip: int | None) -> tuple[Scenario, ...]:
