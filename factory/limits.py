@@ -62,6 +62,6 @@ def size_warnings(pag: PAG, low: Array, high: Array) -> list[Diagnostic]:
     longest = float((high - low).max())
     if SHORTEST <= longest <= LONGEST:
         return []
-    hint = "is a mesh in millimetres? then write scale = 0.001"
+    hint = "is a mesh in millimetres? then write scale = 0.001, or import with --unit mm"
     message = f"the product is {longest:g} m long"
     return [Diagnostic("Size", message, pag[pag.root].position, hint)]

@@ -306,7 +306,7 @@ def test_planted_obstacle_on_the_goal_is_caught(monkeypatch: pytest.MonkeyPatch)
     lengths = np.array([1.0, 1.2, 0.8])
     sound = mate(lengths)
     blocked = (sound.goals, sound.lower, sound.upper, EPS, sound.pairs, sound.meet, 5 * sound.touch)
-    with pytest.raises(ValueError, match="robots 0 and 1 at their goals touch"):
+    with pytest.raises(ValueError, match="robots 1 and 2 at their goals touch"):
         Mode(*blocked)
     monkeypatch.setattr(mode_module, "_check_pairs", lambda mode: None)
     monkeypatch.setattr(mode_module, "_reach", lambda mode: 1.5 * mode.touch)

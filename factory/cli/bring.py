@@ -66,9 +66,10 @@ def import_(
     files = {folder / name: content for name, content in product.files.items()}
     own_names(folder, files)
     write_all(files)
-    warn(product.warnings, quiet)
-    parts = sum(1 for _ in product.pag.parts())
     pag, meshes_made = next(iter(files)), len(files) - 1
+    warnings = (*product.warnings, *_shape_warnings(pag, folders))
+    warn(warnings, quiet)
+    parts = sum(1 for _ in product.pag.parts())
     if as_json:
         emit(
             {
@@ -78,13 +79,23 @@ def import_(
                 "parts": parts,
                 "meshes": meshes_made,
                 "files": [str(path) for path in files],
-                "warnings": [d.as_json() for d in product.warnings],
+                "warnings": [d.as_json() for d in warnings],
             }
         )
     elif not quiet:
         operations = len(product.pag) - parts
         say(f"{pag}: parts {parts}, operations {operations}, meshes {meshes_made}")
     return 0
+
+
+def _shape_warnings(pag: Path, folders: tuple[Path, ...]) -> tuple[Diagnostic, ...]:
+    """What `build` will say of the shapes in a PAG that has been written."""
+    from factory.pipeline import read
+
+    try:
+        return read(pag, folders).product.warnings
+    except InputError as error:
+        return error.diagnostics
 
 
 def _require_folder(folder: Path | None, option: str) -> None:
