@@ -181,6 +181,7 @@ def test_who_sees_only_what_moves_overlooks_what_is_near(monkeypatch: pytest.Mon
 def test_who_looks_too_short_ahead_overlooks_what_is_near(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(vicinity, "PERIOD", 2.0)
     monkeypatch.setattr(vicinity, "SUDDEN", -0.5)
+    monkeypatch.setattr(vicinity, "TIMES", -1.0)
     assert all_overlooked(0)
 
 

@@ -18,8 +18,10 @@ PERIOD = 0.04
 """All that moves is looked at again after this [s]."""
 
 SUDDEN = 20.0
-"""Nothing gains speed faster than this [m/s²], or than twice what the settings ask for, but what is
+"""Nothing gains speed faster than this [m/s²], or than TIMES what the settings ask for, but what is
 pushed."""
+
+TIMES = 2.0
 
 CROWD = 0.25
 """Where more than this share of all holders moves, there is little to leave out, and nothing is."""
@@ -48,7 +50,7 @@ class Vicinity:
         asked: float = 0.0,
     ) -> None:
         self.m, self.d, self.contacts, self.holder = m, d, contacts, contacts.code
-        self._sudden = max(SUDDEN, 2 * asked)
+        self._sudden = max(SUDDEN, TIMES * asked)
         self._culls, self.stale, self._due = holders >= FEW, False, 0.0
         self._woken = [np.empty(0, np.intp)]
         if self._culls:
