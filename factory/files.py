@@ -74,7 +74,7 @@ def make_folder(folder: Path) -> list[Path]:
 def own_names(folder: Path, paths: Iterable[Path], inputs: Iterable[Path] = ()) -> None:
     """Files in a folder whose names are our choice: no link that happens to have such a name is
     followed, and no file that is read is written over. Raises InputError (BadFile)."""
-    paths, read = list(paths), {os.path.realpath(path): path for path in inputs}
+    paths, read = list(paths), set(map(os.path.realpath, inputs))
     below = {f for path in paths for f in (path, *path.parents) if folder in f.parents}
     hint = "remove it, or choose another folder"
     faults = [

@@ -48,11 +48,20 @@ class Source:
 
     def compile(self) -> Factory:
         """Compile(P). Raises InputError where there is no such factory."""
-        from factory.control.preparing import check_modes
-
         factory = compile_pag(self.pag, self.templates, self.catalogue, self.approaches)
-        check_modes(factory, lambda: self.product)
+        own = {name for name, template in self.templates.items() if not _is_shipped(template)}
+        tried = own and own & {operation.template.name for operation in factory.operations}
+        if tried:
+            from factory.control.preparing import check_modes
+
+            check_modes(factory, [self.templates[name] for name in sorted(tried)], self.product)
         return factory
+
+
+def _is_shipped(template: Template) -> bool:
+    """Whether a template is known to have a mode in every layout."""
+    at = template.position
+    return at is not None and Path(at.file).parent == templates_folder()
 
 
 def all_templates(folders: Sequence[Path] = ()) -> Mapping[str, Template]:

@@ -19,6 +19,10 @@ TOUCH = 1.0
 """Two robots of width r touch when their centres are no more than this apart [r]."""
 
 
+EXAMPLE = "mate, for comparison: F = navigation on W to ( A1 + 2r, A2 + 2r, B3 ) within eps"
+"""A hint, where something is wrong with an F."""
+
+
 def check_prepared(
     robots: Sequence[Robot], operations: Sequence[Operation]
 ) -> Iterator[Diagnostic]:
@@ -99,5 +103,5 @@ def _fault(template: Template, message: str, point: Point) -> Diagnostic:
         "NotPrepared",
         f"{template.name}: {message}",
         point.position or template.position,
-        "mate, for comparison: F = navigation on W to ( A1 + 2r, A2 + 2r, B3 ) within eps",
+        EXAMPLE,
     )

@@ -74,6 +74,11 @@ class Template:
         return tuple(dict.fromkeys(label for label in self.before if label != NOPART))
 
     @property
+    def law_position(self) -> Position | None:
+        """Where F is written; else the template."""
+        return self.law.position or self.position
+
+    @property
     def result(self) -> str:
         """b_j, the label the carrier holds afterwards; NOPART for dropoff."""
         return self.after[self.carrier - 1]

@@ -13,6 +13,7 @@ from typing import Any
 import pytest
 
 from tests.command_line import PAPER, ROOT, Terminal, files_in
+from tests.test_template_language import MATE
 
 BROKEN = sorted((ROOT / "tests" / "broken").glob("*.pag"))
 TEMPLATES = sorted((ROOT / "tests" / "broken").glob("*.op"))
@@ -61,13 +62,7 @@ def test_broken_templates_write_nothing(run: Terminal, out: Path, file: Path) ->
     assert files_in(out) == {}
 
 
-OWN = """op = (R, j, ~, <a; b>, F) where
-  R = < dot, dot, dot >;
-  j = 3;
-  ~ = { A1 = A2 = B3 };
-  <a; b> = < LAB1, LAB2, nopart; nopart, nopart, LAB3 >;
-  F = navigation on W to ( A1 + 2r, A2 + 2r, B3 ) within eps;
-"""
+OWN = MATE.replace("mate =", "op =")
 
 
 @pytest.mark.parametrize(

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import random
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -19,6 +18,7 @@ from factory.pipeline import all_templates
 from factory.programs import program_of, write_program
 from factory.settings import Settings
 from factory.simulation import Simulation
+from tests.bench.factories import laid_out as floor_of
 from tests.test_compiler import PAPER, compiled
 
 UNARY = """root = c; c = glue(b, dwell = 0.1); b = weld(a, dwell = 0.2);
@@ -273,11 +273,9 @@ HEAVY = {
 
 @pytest.mark.parametrize("force", [3.0, 6.0])
 @pytest.mark.parametrize("text", HEAVY.values(), ids=HEAVY)
-def test_heavy_parts_do_not_swing(text: str, force: float, tmp_path: Path) -> None:
+def test_heavy_parts_do_not_swing(text: str, force: float) -> None:
     """Forty times what a robot weighs: its motor's inertia keeps the weld stiff that holds them."""
-    (tmp_path / "w.pag").write_text(text)
-    layout = factory.lay_out(factory.compile(factory.load_pag(tmp_path / "w.pag")))
-    run = factory.run(layout, units=4, settings=Settings(force=force))
+    run = factory.run(floor_of(text), units=4, settings=Settings(force=force))
     assert run.products == 4 and run.cycle_time_s is not None
     assert run.cycle_time_s == pytest.approx(run.predicted_cycle_time_s, rel=0.02)
     assert_good(run)

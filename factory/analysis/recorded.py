@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -13,6 +13,7 @@ from factory.analysis.measured import Record
 from factory.control.profile import World
 from factory.errors import Diagnostic, InputError
 from factory.factory import Factory
+from factory.log.header import settings_of
 from factory.settings import Settings
 from factory.trace import Event, Run
 
@@ -47,9 +48,7 @@ def logged_record(
 
 def conditions(header: Mapping[str, Any]) -> Conditions:
     """How the run in a log was made."""
-    known = {field.name for field in fields(Settings)}
-    settings = Settings(**{k: v for k, v in header["settings"].items() if k in known})
-    jitter = float(header["jitter"])
+    settings, jitter = settings_of(header), float(header["jitter"])
     return Conditions(settings, header["world"], header["seed"], jitter, header.get("wip"))
 
 

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
-from typing import cast
+from typing import TYPE_CHECKING, cast
 
 import click
 
 from factory.cli.options import OUTPUT, PATH, writable_folder
 from factory.console import emit, say, warn
 from factory.errors import Diagnostic, InputError
+
+if TYPE_CHECKING:
+    from factory.template import Template
 
 UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254}
 
@@ -60,14 +64,15 @@ def import_(
     for folder, option in ((library, "--library"), (meshes, "--meshes")):
         _require_folder(folder, option)
     options = Options(library, boxes, meshes, UNITS[unit], cast("Mates", mates))
-    product = import_product(source, all_templates(folders), options)
+    templates = all_templates(folders)
+    product = import_product(source, templates, options)
     folder = output or Path(product.name)
     writable_folder(folder)
     files = {folder / name: content for name, content in product.files.items()}
     own_names(folder, files)
     write_all(files)
     pag, meshes_made = next(iter(files)), len(files) - 1
-    warnings = (*product.warnings, *_shape_warnings(pag, folders))
+    warnings = (*product.warnings, *_shape_warnings(pag, templates))
     warn(warnings, quiet)
     parts = sum(1 for _ in product.pag.parts())
     if as_json:
@@ -88,12 +93,13 @@ def import_(
     return 0
 
 
-def _shape_warnings(pag: Path, folders: tuple[Path, ...]) -> tuple[Diagnostic, ...]:
+def _shape_warnings(pag: Path, templates: Mapping[str, Template]) -> tuple[Diagnostic, ...]:
     """What `build` will say of the shapes in a PAG that has been written."""
-    from factory.pipeline import read
+    from factory.geometry import product_geometry
+    from factory.lang.pag_reader import load_pag
 
     try:
-        return read(pag, folders).product.warnings
+        return product_geometry(load_pag(pag, templates)).warnings
     except InputError as error:
         return error.diagnostics
 

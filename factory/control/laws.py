@@ -87,8 +87,7 @@ def navigation(template: Template, setting: Setting) -> Mode:
         )
     except ValueError as error:
         message = f"{template.name}: {error}"
-        position = template.law.position or template.position
-        raise InputError(Diagnostic("NotPrepared", message, position)) from error
+        raise InputError(Diagnostic("NotPrepared", message, template.law_position)) from error
 
 
 def hold(template: Template, setting: Setting) -> Mode:
@@ -107,8 +106,7 @@ def law_of(template: Template) -> Law:
     if name not in LAWS:
         hint = did_you_mean(name, sorted(LAWS), "control laws")
         message = f"{template.name}: unknown control law '{name}'"
-        position = template.law.position or template.position
-        raise InputError(Diagnostic("BadTemplate", message, position, hint))
+        raise InputError(Diagnostic("BadTemplate", message, template.law_position, hint))
     return LAWS[name]
 
 

@@ -69,8 +69,7 @@ def _unprepared(operation: Operation, inside: bool) -> Diagnostic:
         else "the operations before leave its robots outside its domain"
     )
     message = f"{operation.template.name}: '{operation.label}' cannot reach its goal; {what}"
-    template = operation.template
-    position = template.law.position or template.position or operation.position
+    position = operation.template.law_position or operation.position
     return Diagnostic("NotPrepared", message, position, "let ~ join A ends to a B end or a station")
 
 

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from typing import Any, get_args
 
 from factory.control.profile import World
-from factory.settings import RANGES, wrong_type
+from factory.settings import RANGES, Settings, wrong_type
 
 LARGE = 10**9
 """No length [m], time [s] or count in a header is greater."""
@@ -51,6 +51,12 @@ def check_header(header: Any) -> None:
             raise ValueError(f"in its header {fault.message}")
     if any(place >= len(header["places"]) for place in header.get("start", ())):
         raise ValueError("in its header 'start' is out of range")
+
+
+def settings_of(header: Mapping[str, Any]) -> Settings:
+    """The settings of the run: those that this version knows."""
+    known = {field.name for field in fields(Settings)}
+    return Settings(**{k: v for k, v in header["settings"].items() if k in known})
 
 
 def is_table(value: Any) -> bool:

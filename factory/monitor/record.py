@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import fields
 from typing import Any
 
 import numpy as np
 
 from factory.errors import Diagnostic, InputError
+from factory.log.header import settings_of
 from factory.log.model import model_of
 from factory.log.reader import Log
 from factory.log.recompiled import factory_of
@@ -17,7 +17,6 @@ from factory.monitor.monitor import Monitor
 from factory.monitor.report import Report
 from factory.monitor.sight import Sight
 from factory.monitor.subject import Subject, subject_from
-from factory.settings import Settings
 
 AGAIN = "record it again: `factory run FILE.pag --log OUT`"
 
@@ -65,9 +64,8 @@ def recorded_subject(header: Mapping[str, Any]) -> Subject:
     """The factory that a log is of. Raises ValueError, KeyError, TypeError or AttributeError where
     the header is of none."""
     factory = factory_of(header)
-    known = {f.name for f in fields(Settings)}
-    settings = Settings(**{k: v for k, v in header["settings"].items() if k in known})
-    return subject_from(factory, header["monitor"], settings, header["start"], header["wip"])
+    kept, start, wip = header["monitor"], header["start"], header["wip"]
+    return subject_from(factory, kept, settings_of(header), start, wip)
 
 
 def _bad(words: str) -> Diagnostic:

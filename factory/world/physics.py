@@ -96,9 +96,9 @@ class MujocoWorld:
         self._moves = b""
         self._under_way = np.zeros(len(slides), bool)
         own = self.m.body_subtreemass[self.body] + self.m.dof_armature[self.dof]
-        self.mass, weight = own.round(9), np.zeros(len(slides))
+        weight = np.zeros(len(slides))
         weight[list(self.lift.values())] = HEAD_MASS * GRAVITY
-        self.setpoints = Setpoints(self.m, self.d, np.array(actuator), self.mass.copy(), weight)
+        self.setpoints = Setpoints(self.m, self.d, np.array(actuator), own.round(9), weight)
         self.control = self.setpoints.control
         self._where = self.setpoints.where(self._active)
         self._at_tray = self.setpoints.where(self._tray)
@@ -163,11 +163,9 @@ class MujocoWorld:
 
     def _load(self, robot: int, load: float) -> None:
         """A robot carries so much from now on [kg]: its drives push accordingly."""
-        self.setpoints.weigh(robot, float(self.mass[robot]) + load, 0.0)
+        self.setpoints.load(robot, load, 0.0)
         if robot in self.lift:
-            lift = self.lift[robot]
-            weight = (HEAD_MASS + load) * GRAVITY
-            self.setpoints.weigh(lift, float(self.mass[lift]) + load, weight)
+            self.setpoints.load(self.lift[robot], load, (HEAD_MASS + load) * GRAVITY)
 
     def step(self, bundle: Bundle | None, axes: Index) -> bool:
         """One tick of the engine, the drives following a reference that obeys F_p under the
@@ -299,7 +297,7 @@ class MujocoWorld:
         """It goes to the end of its way with a product and comes back without."""
         dt, limit = self.tick, np.array([self.settings.outfeed_acceleration])
         load = (place > 0.0) * self.model.masses[self.model.factory.pag.root]
-        self.setpoints.weigh(self.tray, float(self.mass[self.tray]) + load, 0.0)
+        self.setpoints.load(self.tray, load, 0.0)
         left = place - (x + v * (dt / 2))
         wanted = np.minimum(landing_speed(np.abs(left), limit, dt), self.settings.outfeed)
         x1, v1, a = govern(x, v, np.copysign(wanted, left), limit, dt)

@@ -48,7 +48,7 @@ class Where:
 
 class Setpoints:
     """The setpoints of axes, whose drives are `actuators`; each feeds forward what accelerates its
-    `mass` [kg] and carries its `weight` [N].
+    `mass` [kg], of its own at first, and carries its `weight` [N].
 
     `control` (axes,): where in `ctrl` an axis's setpoints begin.
     """
@@ -56,7 +56,7 @@ class Setpoints:
     def __init__(
         self, m: mujoco.MjModel, d: mujoco.MjData, actuators: Index, mass: Array, weight: Array
     ) -> None:
-        self.d, self.mass, self.weight = d, mass, weight
+        self.d, self.own, self.mass, self.weight = d, mass, mass.copy(), weight
         self.control = m.actuator_ctrladr[actuators]
         self._timestep = float(m.opt.timestep)
         samples = int(m.actuator_history[actuators[0], 0])
@@ -117,9 +117,9 @@ class Setpoints:
         plan[1, axes], plan[2, axes], plan[3, axes] = x, v, a
         self._due[axes] = self._any_due = True
 
-    def weigh(self, axis: int, mass: float, weight: float) -> None:
-        """From now on an axis moves a mass [kg] and carries a weight [N]."""
-        self.mass[axis], self.weight[axis] = mass, weight
+    def load(self, axis: int, mass: float, weight: float) -> None:
+        """From now on an axis moves a mass [kg] beside its own, and carries a weight [N]."""
+        self.mass[axis], self.weight[axis] = self.own[axis] + mass, weight
         self._due[axis] = self._any_due = True
 
     def update(self, steps: int) -> tuple[Index, Truth]:

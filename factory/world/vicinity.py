@@ -17,11 +17,9 @@ from factory.world.contacts import Contacts
 PERIOD = 0.04
 """All that moves is looked at again after this [s]."""
 
-SUDDEN = 20.0
-"""Nothing gains speed faster than this [m/s²], or than TIMES what the settings ask for, but what is
-pushed."""
-
-TIMES = 2.0
+SUDDEN, TIMES = 20.0, 2.0
+"""Nothing gains speed faster than this [m/s²], or than so many times what the settings ask for, but
+what is pushed."""
 
 CROWD = 0.25
 """Where more than this share of all holders moves, there is little to leave out, and nothing is."""
