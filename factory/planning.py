@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import asdict, dataclass, replace
+from typing import TYPE_CHECKING
 
 from factory.factory import Factory
-from factory.geometry import Product
-from factory.layout.durations import Pace
-from factory.layout.embedding import lay_out
-from factory.layout.plan import Layout
 from factory.settings import Settings
+
+if TYPE_CHECKING:
+    from factory.geometry import Product
+    from factory.layout.plan import Layout
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,6 +30,9 @@ class Ground:
 
     def lay_out(self, factory: Factory, product: Product, settings: Settings) -> Layout:
         """The layout of a compiled factory. Raises RunError (Layout) where there is no room."""
+        from factory.layout.durations import Pace
+        from factory.layout.embedding import lay_out
+
         pace = Pace.of(settings)
         layout = lay_out(factory, product, settings.clearance, self.floor, pace)
         if self.relays:
