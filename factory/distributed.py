@@ -158,7 +158,7 @@ class DistributedSupervisor:
         self.bundles.clear()
         self.alone.clear()
 
-    def step(self) -> None:
+    def step(self, ticks: int = 1) -> None:
         """As many timesteps of the world as a supervisor's tick has; robots tick in between."""
         for _ in range(self.ticks):
             due = [p for p in self.processes if (self.count - p.phase) % p.period == 0]

@@ -23,6 +23,12 @@ RANGES = {
 }
 """Least and greatest value of each setting: beyond lie nothing but overflows and endless runs."""
 
+LOOK = 0.04
+"""What need not be looked at in every tick is looked at again within this [s], or in the next."""
+
+MOST = 8
+"""Ticks, and no more, that go to the engine at once."""
+
 WHOLE = ("substeps", "stage")
 """Settings that are whole numbers."""
 
@@ -56,6 +62,18 @@ class Settings:
     def tick(self) -> float:
         """Period of the supervisor [s]."""
         return self.timestep * self.substeps
+
+    @property
+    def stride(self) -> int:
+        """Ticks from one look at what need not be looked at in each to the next; so many go to the
+        engine at once, at most."""
+        return min(max(1, int(LOOK / self.tick * (1 + 1e-9))), MOST)
+
+    @property
+    def samples(self) -> int:
+        """Setpoints that a drive's buffer holds: for the steps of a stride, and as many as a tick
+        has to spare."""
+        return (self.stride + 1) * self.substeps
 
     def with_options(self, options: Mapping[str, float | int | None]) -> Settings:
         """These settings with every option that is not None put in place.

@@ -21,7 +21,7 @@ from factory.nets.pool import part_pool
 from factory.nets.replay import replay
 from factory.prediction import operation_delays, predict, ways_ahead
 from factory.robots import Catalogue, load_catalogue
-from factory.settings import Settings
+from factory.settings import MOST, Settings
 from factory.supervisor import Supervisor
 from factory.trace import PhysicsFigures, Run
 from factory.wholes import bodies_of, fused_copies
@@ -160,7 +160,7 @@ class Simulation:
         supervisor, world, goal = self.supervisor, self.world, self.before + self.units
         while world.delivered() < goal and trouble is None:
             before = world.time
-            supervisor.step()
+            supervisor.step(1 if observers else self._unseen(max_time))
             if self.model is not None and (reason := world.unstable()):
                 trouble = self._trouble("Unstable", f"{reason}, after {before:.2f} s", SMALLER)
                 return self._record(perf_counter() - begin - watched, before, trouble)
@@ -176,6 +176,12 @@ class Simulation:
                 what = f"not finished after {max_time:.2f} s of simulated time"
                 trouble = self._trouble("Timeout", what, LOOK)
         return self._record(perf_counter() - begin - watched, world.time, trouble)
+
+    def _unseen(self, max_time: float | None) -> int:
+        """So many ticks may go by at once where nobody looks."""
+        if max_time is None:
+            return MOST
+        return max(1, min(MOST, round((max_time - self.world.time) / self.settings.tick)))
 
     def _record(self, wall: float, time: float, trouble: Diagnostic | None) -> Run:
         supervisor, world, factory = self.supervisor, self.world, self.layout.factory

@@ -47,9 +47,10 @@ class World(Protocol):
     ) -> None:
         """Operations that start or end now, each with the number of the unit it works on."""
 
-    def step(self, bundle: Bundle | None, axes: Index) -> bool:
-        """One tick: the axes of the active modes follow their field, all others stand. Whether any
-        mode may have come to its goal."""
+    def step(self, bundle: Bundle | None, axes: Index, ticks: int = 1) -> bool:
+        """A tick, or some as long as nothing can come of them that asks for the supervisor: the
+        axes of the active modes follow their field, all others stand. Whether any mode may have
+        come to its goal."""
 
     def delivered(self) -> int:
         """Products that have left the factory."""
@@ -140,8 +141,9 @@ class Supervisor:
         self.bundles: dict[tuple[int, ...], tuple[Bundle, Index]] = {}
         self._activate(self.active.operations, self.active.ahead)
 
-    def step(self) -> None:
-        """Fire what is enabled as one detached set, then let the world go on for one tick."""
+    def step(self, ticks: int = 1) -> None:
+        """Fire what is enabled as one detached set, then let the world go on for a tick, or for as
+        many as `ticks` where nothing can fire in between."""
         started = self._startable()
         over = self._finished()
         if started or over:
@@ -153,7 +155,9 @@ class Supervisor:
                 [o for o in self.active.operations if o not in ended] + started,
                 self._going_ahead(started, ended, over),
             )
-        self.near = self.world.step(self.active.bundle, self.active.axes)
+        if self.enabled or self.world.supplied:
+            ticks = 1
+        self.near = self.world.step(self.active.bundle, self.active.axes, ticks)
 
     def marking(self) -> tuple[str, ...]:
         """The names of the marked places."""
@@ -217,8 +221,8 @@ class Supervisor:
 
     def _redistribute(self, event: int) -> None:
         """m' = (m - •e) ∪ e•, f_m' = f_m ∘ d_e^-1; asserts that it is legal again."""
-        net = self.net.net
-        if not net.is_enabled(event, self._near(event)):
+        net, marked = self.net.net, self.marked.__getitem__
+        if not all(map(marked, net.preset[event])) or any(map(marked, net.postset[event])):
             raise AssertionError(f"{self.net.transitions[event].name} fires but is not enabled")
         for place in net.preset[event]:
             self._unmark(place)
@@ -232,11 +236,6 @@ class Supervisor:
         self.fired[event] += 1
         if len(self.threads) != len(self.factory.robots):
             raise AssertionError("the marking is not legal: some robot is in no mode")
-
-    def _near(self, event: int) -> frozenset[int]:
-        """The marked places among the pre- and postset of an event."""
-        net = self.net.net
-        return frozenset(p for p in (*net.preset[event], *net.postset[event]) if self.marked[p])
 
     def _mark(self, place: int) -> None:
         self.marked[place] = 1

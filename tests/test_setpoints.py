@@ -180,7 +180,7 @@ def test_what_has_been_written_over_can_be_told_again() -> None:
     for axis, v, a in ((1, -0.2, 0.5), (4, -0.1, -0.3)):
         axes, x = np.array([axis]), world.reference[[axis]]
         begin.save()
-        told.tell(told.where(axes), told.of(axes, x, *np.array([[v], [a]]), x, x))
+        told.tell(told.of(axes, [(x, *np.array([[v], [a]]))], x, x))
         runs[axis] = world.time, float(x[0]), v, a
         mujoco.mj_step(m, d, 3 if axis == 1 else 9)
     begin.restore()
@@ -230,9 +230,9 @@ def test_bundles_are_forgotten_too(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_there_is_room_for_so_many_numbers() -> None:
-    courses, told = Courses(35), Told(np.zeros((2, 4)), np.zeros((2, 1)))
+    courses, told = Courses(35), Told(np.zeros((2, 4)), np.zeros((2, 1)), *np.zeros((2, 2)))
     for number in range(100):
-        course = courses.of(number % 7, lambda: Course(told, b"", False))
+        course = courses.of(number % 7, lambda: Course(1, told, b"", False))
         assert courses.of(number % 7, lambda: pytest.fail("was forgotten")) is course
         assert 1 <= len(courses) <= 3
 

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from factory import settings
 from factory.disturbance import Push, disturb
 from factory.disturbance.hands import Hands
 from factory.engine import mujoco
@@ -22,6 +23,9 @@ from tests.bench.factories import balanced
 from tests.bench.factories import laid_out as floor_of
 from tests.bench.replaying import stepping
 from tests.test_fuse import layout_of
+
+
+IS_AWAKE = int(mujoco.mjtSleepState.mjS_AWAKE)
 
 
 @pytest.fixture(autouse=True)
@@ -136,7 +140,7 @@ def overlooked(m: mujoco.MjModel, d: mujoco.MjData, contacts: Any) -> set[str]:
     awake and was left out."""
     bodies = np.flatnonzero(contacts.collides)
     seen = (m.body_contype[bodies] | m.body_conaffinity[bodies]) != 0
-    awake = d.body_awake[bodies] == vicinity.IS_AWAKE
+    awake = d.body_awake[bodies] == IS_AWAKE
     low, high = boxes(m, d, bodies).transpose(1, 0, 2)
     meets = (low[awake, None] <= high) & (low <= high[awake, None])
     near = meets.all(axis=2).any(axis=0)
@@ -168,9 +172,9 @@ def test_nothing_near_what_moves_is_overlooked(seed: int) -> None:
 def test_who_sees_only_what_moves_overlooks_what_is_near(monkeypatch: pytest.MonkeyPatch) -> None:
     reached = Vicinity._reached
 
-    def short_sighted(self: Vicinity, bodies: np.ndarray) -> np.ndarray:
-        near = np.zeros_like(reached(self, bodies))
-        near[self.holder[bodies]] = True
+    def short_sighted(self: Vicinity, who: np.ndarray, bodies: np.ndarray) -> np.ndarray:
+        near = np.zeros_like(reached(self, who, bodies))
+        near[who] = True
         return near
 
     monkeypatch.setattr(Vicinity, "_reached", short_sighted)
@@ -179,7 +183,8 @@ def test_who_sees_only_what_moves_overlooks_what_is_near(monkeypatch: pytest.Mon
 
 
 def test_who_looks_too_short_ahead_overlooks_what_is_near(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(vicinity, "PERIOD", 2.0)
+    monkeypatch.setattr(settings, "LOOK", 2.0)
+    monkeypatch.setattr(settings, "MOST", 200)
     monkeypatch.setattr(vicinity, "SUDDEN", -0.5)
     monkeypatch.setattr(vicinity, "TIMES", -1.0)
     assert all_overlooked(0)
@@ -196,7 +201,7 @@ def test_what_the_engine_wakes_by_itself_is_seen_a_tick_later() -> None:
     world.vicinity._due = np.inf
     d.xfrc_applied[body, 2] = 1e-6
     world.advance(1)
-    assert d.body_awake[body] == vicinity.IS_AWAKE
+    assert d.body_awake[body] == IS_AWAKE
     world.advance(1)
     assert m.body_contype[body] | m.body_conaffinity[body]
 

@@ -49,9 +49,6 @@ HOIST_MASS = 2.0
 STIFFNESS = 70.0
 """Natural frequency of a robot's position loop at full payload [rad/s]."""
 
-SAMPLES = 2
-"""So many setpoints a drive's buffer holds for each timestep of a tick."""
-
 HOIST_STIFFNESS = 200.0
 """The same of a lift's, which holds a weight: half a payload unaccounted for lets it sag by 0.1
 mm [rad/s]."""
@@ -206,8 +203,8 @@ def drive_for(
     inertia = max(0.0, LEAST * load - own)
     mass = own + inertia + load
     kp, kv = mass * stiffness**2, 2 * mass * stiffness
-    force, samples = settings.force * mass * acceleration + 5, SAMPLES * settings.substeps
-    return Drive(round(kp, 3), round(kv, 3), round(force, 3), samples, round(inertia, 3))
+    force = settings.force * mass * acceleration + 5
+    return Drive(round(kp, 3), round(kv, 3), round(force, 3), settings.samples, round(inertia, 3))
 
 
 def _hoists(factory: Factory, masses: Mapping[str, float], settings: Settings) -> dict[int, Hoist]:

@@ -67,8 +67,7 @@ class Contacts:
 
     def hold(self, bodies: Index, holders: Index) -> None:
         """From now on parts are each in the hands of a holder (its code)."""
-        own = holders << 1
-        others = np.where(holders == NOBODY, 0, ((~holders & ALL) << 1) | 1)
+        own, others = self._masks[:, holders]
         count = self._count[bodies]
         geoms = self._geoms[ranges(self._first[bodies], count)]
         self.code[bodies] = holders
@@ -91,6 +90,9 @@ class Contacts:
                 fixed = (tree := int(self.m.body_treeid[body])) not in trees
                 holders += fixed
                 self.code[body] = holders if fixed else trees[tree]
+        codes = np.arange(holders + 1)
+        self._masks = np.stack([codes << 1, ((~codes & ALL) << 1) | 1])
+        self._masks[:, NOBODY] = 0
         return holders
 
     def enter(self, label: str, unit: int, body: int) -> None:

@@ -1,4 +1,4 @@
-"""What references do in a tick, kept by where they begin it.
+"""What references do in some ticks, kept by where they begin them.
 
 A reference depends on nothing that is measured, and steady production repeats itself to the last
 bit: after some cycles every tick has been there before.
@@ -11,15 +11,17 @@ from dataclasses import dataclass
 
 from factory.world.setpoints import Told
 
-ROOM = 5_000_000
+ROOM = 15_000_000
 """So many numbers are kept, of 8 bytes each: those of a cycle with 1,000 robots."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Course:
-    """A tick of n axes: what their drives are `told`, with positions and speeds `after` it, which
-    of them `moves` (the bytes of n truths), and whether any mode is `near` its goal then."""
+    """Some `ticks` of n axes: what their drives are `told`, with positions and speeds `after` it,
+    which of them `moves` (the bytes of n truths), and whether any mode is `near` its goal then, as
+    none is before."""
 
+    ticks: int
     told: Told
     moves: bytes
     near: bool
@@ -41,7 +43,7 @@ class Courses:
         course = self._kept.get(begin)
         if course is None:
             course = made()
-            size = course.told.terms.size + course.told.after.size
+            size = course.told.setpoints.size + course.told.after.size
             if size > self._left:
                 self._kept.clear()
                 self._left = self.room

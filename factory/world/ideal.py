@@ -55,7 +55,7 @@ class IdealWorld:
                 self.count += 1
                 self.dropoffs.append(self.time)
 
-    def step(self, bundle: Bundle | None, axes: Index) -> bool:
+    def step(self, bundle: Bundle | None, axes: Index, ticks: int = 1) -> bool:
         """ẋ = F_p(x) for one tick. Whether any mode has come to its goal."""
         near = False
         if bundle is not None:

@@ -10,18 +10,20 @@ from factory.factory import Operation
 from factory.mjcf.model import Model
 from factory.trace import PhysicsFigures
 from factory.world.contacts import Contacts
-from factory.world.switchboard import Switched
+from factory.world.gaps import Gaps
 
 
 class Inspection:
     """Keeps the worst figures of a run. Contacts are looked at after every step of the engine."""
 
-    def __init__(self, m: mujoco.MjModel, d: mujoco.MjData, model: Model, held: Contacts) -> None:
-        self.m, self.d, self.model, self.held = m, d, model, held
+    def __init__(
+        self, m: mujoco.MjModel, d: mujoco.MjData, model: Model, held: Contacts, gaps: Gaps
+    ) -> None:
+        self.m, self.d, self.model, self.held, self.gaps = m, d, model, held, gaps
         self.joining: dict[int, tuple[int, frozenset[int]]] = {}
         self.force: dict[str, float] = {}
         self.handoffs = 0
-        self.gap = self.residual = 0.0
+        self.residual = 0.0
         self.error: float | None = None
         self.unintended: list[tuple[str, str]] = []
         self._touching: frozenset[tuple[int, int]] = frozenset()
@@ -36,18 +38,16 @@ class Inspection:
         places = np.array([bodies.centre[body] for body in found])
         self._local = np.concatenate(corners) - places[self._owner]
 
-    def handed_over(self, switched: Switched) -> None:
-        """Count hand-offs and keep the largest gap."""
-        self.handoffs += switched.count
-        self.gap = max(self.gap, switched.gap)
-
-    def tick(self) -> None:
+    def welds(self) -> None:
         """Keep the largest residual of the active welds' positions."""
         rows = self.d.ne
         if rows:
             position = self.d.efc_pos[:rows].reshape(-1, 6)[:, :3]
             self.residual = max(self.residual, float(np.abs(position).max()))
-        if self._touching and not self.d.ncon:
+
+    def apart(self) -> None:
+        """Nothing touches any more."""
+        if self._touching:
             self._touching = frozenset()
 
     def started(self, operation: Operation, unit: int) -> None:
@@ -112,7 +112,7 @@ class Inspection:
         pairs = dict.fromkeys(f"{a} - {b}" for a, b in self.unintended)
         return PhysicsFigures(
             self.handoffs,
-            1e3 * self.gap,
+            1e3 * self.gaps.largest(),
             1e3 * self.residual,
             None if self.error is None else 1e3 * self.error,
             len(self.unintended),

@@ -26,7 +26,7 @@ from factory.mjcf.model import GRAVITY, HEAD_MASS, Model
 from factory.world.courses import Course, Courses
 from factory.world.inspection import Inspection
 from factory.world.rewind import Rewind
-from factory.world.setpoints import Setpoints, under_way
+from factory.world.setpoints import Leg, Setpoints, under_way
 from factory.world.stock import Stock
 
 AHEAD = 0.0005
@@ -86,11 +86,13 @@ class MujocoWorld:
         self.m.actuator_biasprm[actuator[: self.tray], 1:3] *= np.asarray(gains)[:, None]
         self.reference = np.append(np.asarray(start, float), 0.0)
         self.speed = np.zeros_like(self.reference)
-        self.tick = self.settings.tick
+        self.tick, self.steps = self.settings.tick, self.settings.substeps
+        self.stride, self.ticks = self.settings.stride, 0
         self.courses = Courses()
         self._tray = np.array([self.tray])
         self._way = model.layout.outfeed_way
-        self._tray_course: Course | None = None
+        self._tray_goes_to: float | None = None
+        self._tray_settles = False
         self.supplied = self._is_home = True
         self._active = np.empty(0, np.intp)
         self._moves = b""
@@ -98,15 +100,15 @@ class MujocoWorld:
         own = self.m.body_subtreemass[self.body] + self.m.dof_armature[self.dof]
         weight = np.zeros(len(slides))
         weight[list(self.lift.values())] = HEAD_MASS * GRAVITY
-        self.setpoints = Setpoints(self.m, self.d, np.array(actuator), own.round(9), weight)
+        drives = np.array(actuator)
+        self.setpoints = Setpoints(self.m, self.d, drives, self.steps, own.round(9), weight)
         self.control = self.setpoints.control
-        self._where = self.setpoints.where(self._active)
-        self._at_tray = self.setpoints.where(self._tray)
         self.d.qpos[self.qpos] = self.reference
         self.move(np.arange(len(slides)), self.reference, self.speed, self.speed)
         self.stock = Stock(self.m, self.d, model, units, counts or {}, wip)
         self.vicinity = self.stock.vicinity
-        self.inspection = Inspection(self.m, self.d, model, self.stock.contacts)
+        gaps = self.stock.board.gaps
+        self.inspection = Inspection(self.m, self.d, model, self.stock.contacts, gaps)
         for operation in factory.operations:
             begun, over = ((counts or {}).get(t, 0) for t in (operation.start, operation.end))
             if begun > over:
@@ -158,7 +160,7 @@ class MujocoWorld:
                 self.inspection.measured(*self.stock.finished(unit))
             for slot, robot in enumerate(operation.robots):
                 self._load(robot, self.model.masses.get(operation.after[slot], 0.0))
-        self.inspection.handed_over(self.stock.hand_over(ended))
+        self.inspection.handoffs += self.stock.hand_over(ended)
         self.supplied = True
 
     def _load(self, robot: int, load: float) -> None:
@@ -167,32 +169,53 @@ class MujocoWorld:
         if robot in self.lift:
             self.setpoints.load(self.lift[robot], load, (HEAD_MASS + load) * GRAVITY)
 
-    def step(self, bundle: Bundle | None, axes: Index) -> bool:
-        """One tick of the engine, the drives following a reference that obeys F_p under the
-        limits. Whether any mode may have come to its goal: no robot is far ahead of its
+    def step(self, bundle: Bundle | None, axes: Index, ticks: int = 1) -> bool:
+        """Some ticks of the engine, the drives following a reference that obeys F_p under the
+        limits: as many as are asked for, or fewer, but never past one that somebody has to see the
+        end of. Whether any mode may have come to its goal: no robot is far ahead of its
         reference."""
-        near = False
+        near, ticks = False, self._at_most(ticks)
         if axes is not self._active:
             self._halt(axes)
+        tray = self._tray_course(ticks)
+        if tray is not None:
+            ticks = tray.ticks
         if bundle is not None:
             x, v = self.reference[axes], self.speed[axes]
-            begin = bundle, x.tobytes(), v.tobytes()
-            course = self.courses.of(begin, lambda: self._course(bundle, axes, x, v))
+            begin = bundle, ticks, x.tobytes(), v.tobytes()
+            course = self.courses.of(begin, lambda: self._course(bundle, axes, x, v, ticks))
             self.reference[axes], self.speed[axes], _ = course.told.after.T
-            self.setpoints.follow(axes, self._where, course.told)
+            self.setpoints.follow(axes, course.told)
             if course.moves != self._moves:
                 self._moves = course.moves
                 self._attend(axes, np.frombuffer(course.moves, bool))
-            near = course.near
-        self.advance(self.settings.substeps)
-        self.settle()
+            near, ticks = course.near, course.ticks
+        if tray is not None:
+            self._send_tray(tray if tray.ticks == ticks else self._tray_course(ticks))
+        self.advance(ticks * self.steps)
+        self.settle(ticks)
         return near
 
-    def _course(self, bundle: Bundle, axes: Index, x: Array, v: Array) -> Course:
-        """A tick of the active modes. The load of each robot is that of its operation."""
-        x1, v1, a = follow(bundle, x, v, self.tick)
-        told = self.setpoints.of(axes, x, v, a, x1, v1)
-        return Course(told, under_way(v, a).tobytes(), bundle.near_goal(x1, AHEAD))
+    def _at_most(self, ticks: int) -> int:
+        """So many ticks may go to the engine at once: none but the last of a stride is seen, and
+        contacts and a tray that is about to be there ask to be."""
+        if ticks == 1 or self.d.ncon or self._tray_settles:
+            return 1
+        return min(ticks, self.stride - self.ticks % self.stride)
+
+    def _course(self, bundle: Bundle, axes: Index, x: Array, v: Array, ticks: int) -> Course:
+        """Ticks of the active modes, until one comes near its goal or another robot moves. The load
+        of each robot is that of its operation."""
+        legs: list[Leg] = []
+        moves, near = b"", False
+        while len(legs) < ticks and not near:
+            x1, v1, a = follow(bundle, x, v, self.tick)
+            going = under_way(v, a).tobytes()
+            if legs and going != moves:
+                break
+            legs.append((x, v, a))
+            x, v, moves, near = x1, v1, going, bundle.near_goal(x1, AHEAD)
+        return Course(len(legs), self.setpoints.of(axes, legs, x, v), moves, near)
 
     def _halt(self, active: Index) -> None:
         """Robots whose operation has ended stop where their reference is. They may hand over at a
@@ -201,11 +224,10 @@ class MujocoWorld:
         left = np.zeros(len(self.speed), bool)
         left[self._active] = True
         left[active] = False
-        axes = np.flatnonzero(left)
+        (axes,) = left.nonzero()
         self.speed[axes] = 0.0
-        still = self.speed[axes]
-        self.move(axes, self.reference[axes], still, still)
-        self._active, self._where, self._moves = active, self.setpoints.where(active), b""
+        self.setpoints.stand(axes, self.reference[axes], self._under_way[axes])
+        self._active, self._moves = active, b""
 
     def move(self, axes: Index, x: Array, v: Array, a: Array) -> None:
         """From now on the references of `axes` run from x [m] at speed v under acceleration a, in
@@ -217,10 +239,7 @@ class MujocoWorld:
         stopped: all at once, and one by one again where anything has touched, since contacts are
         looked at in every step."""
         m, d, step, vicinity = self.m, self.d, mujoco.mj_step, self.vicinity
-        if self._tray_course is not None:
-            self.setpoints.follow(self._tray, self._at_tray, self._tray_course.told)
-            self._attend(self._tray, np.frombuffer(self._tray_course.moves, bool))
-            self._tray_course = None
+        self._send_tray(self._tray_course(1))
         told, moves = self.setpoints.update(steps)
         if len(told):
             self._attend(told, moves)
@@ -237,7 +256,9 @@ class MujocoWorld:
                 return
             self._begin.restore()
             self.setpoints.again()
-        for _ in range(steps):
+        for number in range(steps):
+            if number and number % self.steps == 0:
+                self._next_tick()
             if vicinity.stale:
                 vicinity.look()
             begin = perf_counter()
@@ -246,6 +267,12 @@ class MujocoWorld:
             if d.ncon:
                 self.inspection.contacts()
                 vicinity.notice()
+
+    def _next_tick(self) -> None:
+        """Another tick begins of those that went to the engine at once."""
+        self.setpoints.again()
+        if not self.d.ncon:
+            self.inspection.apart()
 
     def _attend(self, axes: Index, moves: Truth) -> None:
         """The engine puts to sleep what has been slow for a while, and a robot under way would
@@ -262,11 +289,16 @@ class MujocoWorld:
         """Wake robots that sleep, and let those that are about to wait as long again."""
         self.stock.board.wake(self.body[axes])
 
-    def settle(self) -> None:
-        """After a tick: look at welds, and move the outfeed's tray."""
-        self.inspection.tick()
-        if self.stock.joining:
-            self.stock.settle()
+    def settle(self, ticks: int = 1) -> None:
+        """After some ticks: look at what is looked at once in a stride, and at the outfeed's
+        tray."""
+        self.ticks += ticks
+        if not self.d.ncon:
+            self.inspection.apart()
+        if self.ticks % self.stride == 0:
+            self.inspection.welds()
+            if self.stock.joining:
+                self.stock.settle()
         unit, way = self.stock.on_tray, self._way
         if unit is not None and self._tray_is_at(way):
             self.inspection.measured(*self.stock.finished(unit))
@@ -276,36 +308,52 @@ class MujocoWorld:
             self._is_home = self._tray_is_at(0.0)
             self.supplied |= self._is_home
         place = 0.0 if unit is None else way
-        if self.reference[self.tray] != place or self.speed[self.tray]:
-            self._send_tray(place)
+        x, v = self.reference[self.tray], self.speed[self.tray]
+        self._tray_goes_to = place if x != place or v else None
+        self._tray_settles = abs(x - place) < NEAR + AHEAD and not (unit is None and self._is_home)
 
     def _tray_is_at(self, place: float) -> bool:
         """Whether the outfeed's tray rests at a place of its way [m]."""
         x, v = self.d.qpos[self.qpos[self.tray]], self.d.qvel[self.dof[self.tray]]
         return bool(abs(x - place) < NEAR and abs(v) < NEAR / self.tick)
 
-    def _send_tray(self, place: float) -> None:
-        """One tick of the tray's way to a place, as fast as its limits allow."""
-        tray = self._tray
-        x, v = self.reference[tray], self.speed[tray]
-        begin = place, x.tobytes(), v.tobytes()
-        course = self.courses.of(begin, lambda: self._course_of_tray(x, v, place))
-        self.reference[tray], self.speed[tray], _ = course.told.after.T
-        self._tray_course = course
+    def _tray_course(self, ticks: int) -> Course | None:
+        """Some ticks of the tray's way to where it goes, as fast as its limits allow, until it is
+        nearly there; None where it goes nowhere."""
+        place = self._tray_goes_to
+        if place is None:
+            return None
+        x, v = self.reference[self._tray], self.speed[self._tray]
+        begin = place, ticks, x.tobytes(), v.tobytes()
+        return self.courses.of(begin, lambda: self._course_of_tray(x, v, place, ticks))
 
-    def _course_of_tray(self, x: Array, v: Array, place: float) -> Course:
+    def _send_tray(self, course: Course | None) -> None:
+        if course is not None:
+            self.reference[self._tray], self.speed[self._tray], _ = course.told.after.T
+            self.setpoints.follow(self._tray, course.told)
+            self._attend(self._tray, np.frombuffer(course.moves, bool))
+            self._tray_goes_to = None
+
+    def _course_of_tray(self, x: Array, v: Array, place: float, ticks: int) -> Course:
         """It goes to the end of its way with a product and comes back without."""
         dt, limit = self.tick, np.array([self.settings.outfeed_acceleration])
         load = (place > 0.0) * self.model.masses[self.model.factory.pag.root]
         self.setpoints.load(self.tray, load, 0.0)
-        left = place - (x + v * (dt / 2))
-        wanted = np.minimum(landing_speed(np.abs(left), limit, dt), self.settings.outfeed)
-        x1, v1, a = govern(x, v, np.copysign(wanted, left), limit, dt)
-        if abs(x1[0] - place) < ROUNDING and abs(v1[0]) < ROUNDING:
-            x1, v1, a = np.array([place]), np.zeros(1), np.zeros(1)
-            x, v = x1, v1
-        told = self.setpoints.of(self._tray, x, v, a, x1, v1)
-        return Course(told, under_way(v, a).tobytes(), False)
+        legs: list[Leg] = []
+        moves, near = b"", False
+        while len(legs) < ticks and not near:
+            left = place - (x + v * (dt / 2))
+            wanted = np.minimum(landing_speed(np.abs(left), limit, dt), self.settings.outfeed)
+            x1, v1, a = govern(x, v, np.copysign(wanted, left), limit, dt)
+            if abs(x1[0] - place) < ROUNDING and abs(v1[0]) < ROUNDING:
+                x1, v1, a = np.array([place]), np.zeros(1), np.zeros(1)
+                x, v = x1, v1
+            going = under_way(v, a).tobytes()
+            if legs and going != moves:
+                break
+            legs.append((x, v, a))
+            x, v, moves, near = x1, v1, going, abs(float(x1[0]) - place) < NEAR + AHEAD
+        return Course(len(legs), self.setpoints.of(self._tray, legs, x, v), moves, near)
 
     def unstable(self) -> str:
         """What made the engine give up, "" while it has not."""

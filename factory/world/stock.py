@@ -17,7 +17,7 @@ from factory.mjcf.parts import parked_at, presented_at
 from factory.pag import NOPART
 from factory.world.contacts import NOBODY, Contacts
 from factory.world.fusing import RIGID, SETTLING, Groups, fuse, misfit
-from factory.world.switchboard import Switchboard, Switched
+from factory.world.switchboard import Switchboard
 from factory.world.vicinity import Vicinity
 
 NOTHING: Mapping[int, float] = MappingProxyType({})
@@ -77,7 +77,8 @@ class Stock:
         holders = self.contacts.own(self._trees(), self.tray + len(self.feeder))
         settings = model.settings
         asked = max(settings.acceleration, settings.outfeed_acceleration)
-        self.vicinity = Vicinity(m, d, self.contacts, holders, asked)
+        period = settings.stride * settings.tick
+        self.vicinity = Vicinity(m, d, self.contacts, holders, period, asked)
         self.board = Switchboard(m, d, self.contacts, self.vicinity)
         self._hide_spares()
         self._hand_out(counts)
@@ -113,9 +114,9 @@ class Stock:
 
     # --- handing over --------------------------------------------------------------------------
 
-    def hand_over(self, ended: Sequence[tuple[Operation, int]]) -> Switched:
-        """Switch the grips that the ends of operations ask for, each with the number of its
-        unit."""
+    def hand_over(self, ended: Sequence[tuple[Operation, int]]) -> int:
+        """Switch the grips that the ends of operations ask for, each with the number of its unit.
+        Gives how many bodies have been taken over."""
         for operation, unit in ended:
             self._hand_over(operation, unit)
         return self.board.write()

@@ -4,15 +4,14 @@ somewhere; all at once."""
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from factory.control.mode import Index
 from factory.control.obstacles import ranges
 from factory.engine import mujoco
-from factory.meshes import Array
 from factory.world.contacts import Contacts
+from factory.world.gaps import Gaps
 from factory.world.vicinity import Vicinity
 
 AWAKE = -0.0
@@ -24,14 +23,6 @@ FRESH = -1 - int(mujoco.mjMINAWAKE)
 Place = tuple[float, float, float]
 
 
-@dataclass(frozen=True, slots=True)
-class Switched:
-    """Grips switched by operations: how many, and the largest gap between the joined frames [m]."""
-
-    count: int
-    gap: float
-
-
 class Switchboard:
     """Gathers what is to be switched until `write`; what is said last of a weld or a body holds."""
 
@@ -40,7 +31,7 @@ class Switchboard:
     ) -> None:
         self.m, self.d, self.contacts, self.vicinity = m, d, contacts, vicinity
         self._tree = np.where(m.body_dofnum > 0, m.body_treeid, -1)
-        self._slides = _slides(m)
+        self.gaps = Gaps(m, d)
         self._on: dict[int, int] = {}
         self._off: set[int] = set()
         self._gripped: list[int] = []
@@ -70,14 +61,16 @@ class Switchboard:
         """Put free bodies somewhere [m], upright and at rest."""
         self._placed.update(zip(bodies, at, strict=True))
 
-    def write(self) -> Switched:
-        """Let the engine know. Gives what has been taken over."""
+    def write(self) -> int:
+        """Let the engine know. Gives how many bodies have been taken over."""
         if not (self._on or self._off or self._held or self._placed):
-            return Switched(0, 0.0)
+            return 0
         m, d, on, off = self.m, self.d, _listed(self._on), _listed(self._off)
         aims = _listed(self._on.values())
         self._put()
-        switched = self._measure()
+        gripped = len(self._gripped)
+        if gripped:
+            self.gaps.note(self._gripped, [self._on[weld] for weld in self._gripped])
         welds = np.concatenate([on, off])
         touched = np.concatenate([m.eq_obj1id[welds], aims, m.eq_obj2id[off]])
         m.eq_obj2id[on] = aims
@@ -85,10 +78,16 @@ class Switchboard:
         d.eq_active[on] = True
         self.wake(touched)
         if self._held:
-            self.contacts.hold(_listed(self._held), _listed(self._held.values()))
+            self._take(_listed(self._held), _listed(self._held.values()))
         for gathered in (self._on, self._off, self._gripped, self._held, self._placed):
             gathered.clear()
-        return switched
+        return gripped
+
+    def _take(self, bodies: Index, holders: Index) -> None:
+        """Parts change hands."""
+        self.vicinity.changed(self.contacts.code[bodies])
+        self.vicinity.changed(holders)
+        self.contacts.hold(bodies, holders)
 
     def _put(self) -> None:
         """Put bodies where they belong."""
@@ -102,24 +101,6 @@ class Switchboard:
         d.qvel[v[:, None] + np.arange(6)] = 0.0
         self.vicinity.woken(bodies)
 
-    def _measure(self) -> Switched:
-        """The largest distance between the frames that grips are about to join [m]."""
-        if not self._gripped:
-            return Switched(0, 0.0)
-        m, d, welds = self.m, self.d, _listed(self._gripped)
-        holder = m.eq_obj1id[welds]
-        reach = d.xmat[holder].reshape(-1, 3, 3) @ m.eq_data[welds, 3:6, None]
-        free = m.jnt_qposadr[m.body_jntadr[[self._on[weld] for weld in self._gripped]]]
-        apart = d.qpos[free[:, None] + np.arange(3)] - (self._at(holder) + reach[:, :, 0])
-        return Switched(len(welds), float(np.sqrt((apart * apart).sum(axis=1).max())))
-
-    def _at(self, bodies: Index) -> Array:
-        """Where bodies are that only slide (n, 3) [m]: the engine has them where its last step
-        began."""
-        m, d, slides = self.m, self.d, self._slides[bodies]
-        gone = m.opt.timestep * np.where(slides < 0, 0.0, d.qvel[m.jnt_dofadr[slides]])
-        return np.asarray(d.xpos[bodies] + (gone[:, :, None] * d.xaxis[slides]).sum(axis=1))
-
     def wake(self, bodies: Index) -> None:
         """Wake bodies that sleep, and let those that are about to, being slow, wait as long
         again."""
@@ -132,17 +113,6 @@ class Switchboard:
             dofs = ranges(m.body_dofadr[bodies], m.body_dofnum[bodies])
             d.qvel[dofs[d.qvel[dofs] == 0.0]] = AWAKE
             self.vicinity.woken(bodies)
-
-
-def _slides(m: mujoco.MjModel) -> Index:
-    """For each body the slides that carry it (nbody, n), its own first, -1 for no more."""
-    own = np.where(m.body_jntnum > 0, m.body_jntadr, -1)
-    own[m.jnt_type[own] != int(mujoco.mjtJoint.mjJNT_SLIDE)] = -1
-    found, body = [own], m.body_parentid
-    while body.any():
-        found.append(own[body])
-        body = m.body_parentid[body]
-    return np.stack(found, axis=1)
 
 
 def _listed(numbers: Iterable[int]) -> Index:

@@ -12,10 +12,7 @@ import numpy as np
 
 from factory.control.mode import Array, Index
 from factory.engine import mujoco
-from factory.world.contacts import Contacts
-
-PERIOD = 0.04
-"""All that moves is looked at again after this [s]."""
+from factory.world.contacts import NOBODY, Contacts
 
 SUDDEN, TIMES = 20.0, 2.0
 """Nothing gains speed faster than this [m/s²], or than so many times what the settings ask for, but
@@ -27,16 +24,17 @@ CROWD = 0.25
 FEW = 250
 """Where there are fewer holders, looking takes longer than it saves: up to some 100 robots."""
 
-IS_AWAKE = int(mujoco.mjtSleepState.mjS_AWAKE)
-"""What the engine says of a body that does not sleep."""
+SWAY = 1e-3
+"""What is held is not further than this from where it was when it was taken [m], unless something
+touches."""
 
 
 class Vicinity:
     """The bodies that the broad phase of a model looks at: all, where there are few holders.
 
-    All that is in the same hands is looked at as one box, seen from above; `holders` are the codes
-    that `contacts` has. `stale`: something has been woken since the last look, or the last at all
-    that moves was long ago.
+    All that is in the same hands is looked at as one box, seen from above, that goes where its
+    holder goes; `holders` are the codes that `contacts` has. All that moves is looked at every
+    `period` [s]. `stale`: something has been woken since the last look, or that is due.
     """
 
     def __init__(
@@ -45,20 +43,36 @@ class Vicinity:
         d: mujoco.MjData,
         contacts: Contacts,
         holders: int,
+        period: float,
         asked: float = 0.0,
     ) -> None:
         self.m, self.d, self.contacts, self.holder = m, d, contacts, contacts.code
         self._sudden = max(SUDDEN, TIMES * asked)
-        self._culls, self.stale, self._due = holders >= FEW, False, 0.0
+        self._period, self._early = period, float(m.opt.timestep) / 2
+        self._culls, self._due = holders >= FEW, 0.0
+        self.stale = self._anew = self._bent = False
         self._woken = [np.empty(0, np.intp)]
         if self._culls:
             self._seen = np.zeros(m.ntree, bool)
             self._near = np.ones(holders + 1, bool)
             self._meets = np.empty((2, int(CROWD * len(self._near)) + 1, len(self._near)), bool)
-            self._low = np.full((2, holders + 1), np.inf, np.float32)
-            self._high = np.full((2, holders + 1), -np.inf, np.float32)
             self._lowest, self._highest = _boxes(m, d, contacts)
-            self._box(self.holder.nonzero()[0])
+            self._of_tree, self._anchor = self._whose(holders)
+            self._extent = np.full((4, holders + 1), -np.inf)
+            self._rest = np.full((4, holders + 1), np.inf, np.float32)
+            self._changed = np.ones(holders + 1, bool)
+            self._place(np.unique(self.holder[contacts.collides]))
+
+    def _whose(self, holders: int) -> tuple[Index, Index]:
+        """A body of each tree that says whose it is, and the body that each holder goes with: the
+        world's for those that stand."""
+        own = self.holder.nonzero()[0]
+        trees, first = np.unique(self.m.body_treeid, return_index=True)
+        of_tree, anchor = first[trees >= 0], np.zeros(holders + 1, np.intp)
+        own = own[self.m.body_treeid[own] >= 0]
+        anchor[self.holder[own]] = of_tree[self.m.body_treeid[own]]
+        of_tree[self.m.body_treeid[own]] = own
+        return of_tree, anchor
 
     def woken(self, bodies: Index) -> None:
         """Bodies are about to move."""
@@ -66,10 +80,15 @@ class Vicinity:
             self._woken.append(bodies)
             self.stale = True
 
+    def changed(self, holders: Index) -> None:
+        """Holders have something else in their hands."""
+        if self._culls:
+            self._changed[holders] = True
+
     def notice(self) -> None:
         """It is stale where the engine has woken something by itself, or at the end of a period."""
         if self._culls and (self.d.time >= self._due or (self._awake > self._seen).any()):
-            self._due, self.stale = self.d.time, True
+            self._anew = self.stale = True
 
     def everything(self) -> None:
         """From now on nothing is left out: somebody pushes."""
@@ -83,49 +102,68 @@ class Vicinity:
     def look(self) -> None:
         """Choose what the broad phase looks at: anew where that is due, else what has been woken
         besides."""
-        self.stale = False
-        anew = self.d.time >= self._due
-        if anew:
-            self._due, self._seen = self.d.time + PERIOD, self._awake
-        near = np.zeros_like(self._near)
-        moves = np.zeros_like(near)
-        moves[self.holder[np.concatenate(self._woken)]] = True
+        anew, self._anew, self.stale = self._anew, False, False
+        bodies = np.concatenate(self._woken)
         del self._woken[1:]
         if anew:
-            moves[self.holder[self.d.body_awake == IS_AWAKE]] = True
-        bodies = (moves[self.holder] & self.contacts.collides).nonzero()[0]
-        if len(bodies):
-            near = self._reached(bodies)
-            self._seen[self.m.body_treeid[bodies]] = True
-        self._near = near if anew else self._near | near
-        self._show(self._near[self.holder])
+            self._seen = self._awake
+            bodies = np.concatenate([bodies, self._of_tree[self._seen]])
+            if self.d.time >= self._due:
+                self._due = self.d.time + self._period - self._early
+        moves = np.zeros_like(self._near)
+        moves[self.holder[bodies]] = True
+        moves[NOBODY] = False
+        near = self._reached(moves.nonzero()[0], bodies)
+        if not anew:
+            near |= self._near
+        self._seen |= moves[self.holder[self._of_tree]]
+        self._near = near
+        self._show(near[self.holder])
 
-    def _reached(self, bodies: np.ndarray) -> np.ndarray:
-        """The holders (holders + 1,) that moving bodies may reach within a period; their own among
-        them."""
-        who = self._box(bodies)
+    def _reached(self, who: Index, bodies: Index) -> np.ndarray:
+        """The holders (holders + 1,) that moving ones, with bodies that move, may reach within a
+        period; themselves among them."""
+        if not len(who):
+            return np.zeros_like(self._near)
+        extent = self._place(who)
         if len(who) > CROWD * len(self._near):
             return np.ones_like(self._near)
-        speed = np.abs(self.d.cvel.take(bodies, axis=0)[:, 3:]).max()
-        reach = float(speed + self._sudden * PERIOD / 2) * PERIOD
-        low, high = self._low, self._high
-        (x0, y0), (x1, y1) = low[:, who, None] - reach, high[:, who, None] + reach
+        moving = np.concatenate([bodies, self._anchor[who]])
+        speed = np.abs(self.d.cvel.take(moving, axis=0)[:, 3:]).max()
+        reach = float(speed + self._sudden * self._period / 2) * self._period + SWAY
+        east, north, west, south = (extent + reach).astype(np.float32)[:, :, None]
         meets, also = self._meets[:, : len(who)]
-        np.less_equal(x0, high[0], out=meets)
-        for one, other in ((low[0], x1), (y0, high[1]), (low[1], y1)):
-            meets &= np.less_equal(one, other, out=also)
+        np.less_equal(self._rest[0], west, out=meets)
+        for side, other in zip(self._rest[1:], (south, east, north), strict=True):
+            meets &= np.less_equal(side, other, out=also)
         return np.asarray(meets.any(axis=0))
 
-    def _box(self, bodies: np.ndarray) -> np.ndarray:
-        """Box all that the holders of bodies have, which are these, and tell who they are."""
+    def _place(self, who: Index) -> Array:
+        """Where holders extend to now, to the east, north, west and south (4, n) [m]."""
+        bent, self._bent = self._bent, bool(self.d.ncon)
+        changed = who if bent or self._bent else who[self._changed[who]]
+        if len(changed):
+            self._changed[changed] = False
+            self._measure(changed)
+        at = self.d.xpos.take(self._anchor[who], axis=0)[:, :2].T
+        extent = self._extent.take(who, axis=1) + np.concatenate([at, -at])
+        self._rest[:, who] = -extent
+        return np.asarray(extent)
+
+    def _measure(self, who: Index) -> None:
+        """Measure how far what holders have extends from the body that they go with."""
+        chosen = np.zeros_like(self._near)
+        chosen[who] = True
+        bodies = (chosen[self.holder] & self.contacts.collides).nonzero()[0]
+        self._extent[:, who] = -np.inf
+        if not len(bodies):
+            return
         bodies = bodies[np.argsort(self.holder[bodies], kind="stable")]
-        holder = self.holder[bodies]
+        holder, place = self.holder[bodies], self.d.xpos
         first = np.concatenate([[0], (holder[1:] != holder[:-1]).nonzero()[0] + 1])
-        who, at = holder[first], self.d.xpos.take(bodies, axis=0)
-        low, high = at + self._lowest.take(bodies, axis=0), at + self._highest.take(bodies, axis=0)
-        self._low[:, who] = np.minimum.reduceat(low, first)[:, :2].T
-        self._high[:, who] = np.maximum.reduceat(high, first)[:, :2].T
-        return np.asarray(who)
+        at = (place[bodies] - place[self._anchor[holder]])[:, :2]
+        sides = [at + self._highest[bodies, :2], -at - self._lowest[bodies, :2]]
+        self._extent[:, holder[first]] = np.maximum.reduceat(np.hstack(sides), first).T
 
     def _show(self, near: np.ndarray) -> None:
         np.multiply(self.contacts.contype, near, out=self.m.body_contype)

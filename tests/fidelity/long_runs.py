@@ -59,9 +59,10 @@ class Diary:
         self.seen = len(world.dropoffs)
         inspection = world.inspection
         self.error_mm.append(1e3 * (inspection.error or 0.0))
-        self.gap_mm.append(1e3 * inspection.gap)
+        self.gap_mm.append(1e3 * inspection.gaps.largest())
         self.residual_mm.append(1e3 * inspection.residual)
-        inspection.error, inspection.gap, inspection.residual = None, 0.0, 0.0
+        inspection.error, inspection.residual = None, 0.0
+        inspection.gaps.forget()
         self.memory_kib.append(resident_kib())
         self.lost += misplaced(world)
 
