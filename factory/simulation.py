@@ -181,7 +181,8 @@ class Simulation:
         """So many ticks may go by at once where nobody looks."""
         if max_time is None:
             return MOST
-        return max(1, min(MOST, round((max_time - self.world.time) / self.settings.tick)))
+        left = (max_time - float(self.world.time)) / self.settings.tick
+        return max(1, min(MOST, round(left)))
 
     def _record(self, wall: float, time: float, trouble: Diagnostic | None) -> Run:
         supervisor, world, factory = self.supervisor, self.world, self.layout.factory

@@ -24,7 +24,6 @@ from tests.bench.factories import laid_out as floor_of
 from tests.bench.replaying import stepping
 from tests.test_fuse import layout_of
 
-
 IS_AWAKE = int(mujoco.mjtSleepState.mjS_AWAKE)
 
 

@@ -7,7 +7,7 @@ bit: after some cycles every tick has been there before.
 from __future__ import annotations
 
 from collections.abc import Callable, Hashable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from factory.world.setpoints import Told
 
@@ -19,12 +19,13 @@ ROOM = 15_000_000
 class Course:
     """Some `ticks` of n axes: what their drives are `told`, with positions and speeds `after` it,
     which of them `moves` (the bytes of n truths), and whether any mode is `near` its goal then, as
-    none is before."""
+    none is before; and the courses that come `then`, of at most so many ticks, if known."""
 
     ticks: int
     told: Told
     moves: bytes
     near: bool
+    then: dict[int, Course] = field(default_factory=dict)
 
 
 class Courses:

@@ -76,7 +76,7 @@ class MujocoWorld:
         slides = [*map(names.slide, carriages), *map(names.lift, lifts), names.OUTFEED_SLIDE]
         drives = [*map(names.drive, carriages), *map(names.hoist, lifts), names.OUTFEED_DRIVE]
         joint = [self.m.joint(name).id for name in slides]
-        actuator = [self.m.actuator(name).id for name in drives]
+        actuator = np.array([self.m.actuator(name).id for name in drives])
         self.tray = len(slides) - 1
         self.qpos = self.m.jnt_qposadr[joint]
         self.dof = self.m.jnt_dofadr[joint]
@@ -96,12 +96,12 @@ class MujocoWorld:
         self.supplied = self._is_home = True
         self._active = np.empty(0, np.intp)
         self._moves = b""
+        self._last: Course | None = None
         self._under_way = np.zeros(len(slides), bool)
         own = self.m.body_subtreemass[self.body] + self.m.dof_armature[self.dof]
         weight = np.zeros(len(slides))
         weight[list(self.lift.values())] = HEAD_MASS * GRAVITY
-        drives = np.array(actuator)
-        self.setpoints = Setpoints(self.m, self.d, drives, self.steps, own.round(9), weight)
+        self.setpoints = Setpoints(self.m, self.d, actuator, self.steps, own.round(9), weight)
         self.control = self.setpoints.control
         self.d.qpos[self.qpos] = self.reference
         self.move(np.arange(len(slides)), self.reference, self.speed, self.speed)
@@ -181,9 +181,7 @@ class MujocoWorld:
         if tray is not None:
             ticks = tray.ticks
         if bundle is not None:
-            x, v = self.reference[axes], self.speed[axes]
-            begin = bundle, ticks, x.tobytes(), v.tobytes()
-            course = self.courses.of(begin, lambda: self._course(bundle, axes, x, v, ticks))
+            course = self._next(bundle, axes, ticks)
             self.reference[axes], self.speed[axes], _ = course.told.after.T
             self.setpoints.follow(axes, course.told)
             if course.moves != self._moves:
@@ -202,6 +200,19 @@ class MujocoWorld:
         if ticks == 1 or self.d.ncon or self._tray_settles:
             return 1
         return min(ticks, self.stride - self.ticks % self.stride)
+
+    def _next(self, bundle: Bundle, axes: Index, ticks: int) -> Course:
+        """What comes after the last course, of so many ticks at most."""
+        before = self._last
+        course = None if before is None else before.then.get(ticks)
+        if course is None:
+            x, v = self.reference[axes], self.speed[axes]
+            begin = bundle, ticks, x.tobytes(), v.tobytes()
+            course = self.courses.of(begin, lambda: self._course(bundle, axes, x, v, ticks))
+            if before is not None:
+                before.then[ticks] = course
+        self._last = course
+        return course
 
     def _course(self, bundle: Bundle, axes: Index, x: Array, v: Array, ticks: int) -> Course:
         """Ticks of the active modes, until one comes near its goal or another robot moves. The load
@@ -227,11 +238,12 @@ class MujocoWorld:
         (axes,) = left.nonzero()
         self.speed[axes] = 0.0
         self.setpoints.stand(axes, self.reference[axes], self._under_way[axes])
-        self._active, self._moves = active, b""
+        self._active, self._moves, self._last = active, b"", None
 
     def move(self, axes: Index, x: Array, v: Array, a: Array) -> None:
         """From now on the references of `axes` run from x [m] at speed v under acceleration a, in
         ticks that have not been set otherwise."""
+        self._last = None
         self.setpoints.move(axes, x, v, a)
 
     def advance(self, steps: int) -> None:

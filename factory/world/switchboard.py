@@ -8,7 +8,6 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 
 from factory.control.mode import Index
-from factory.control.obstacles import ranges
 from factory.engine import mujoco
 from factory.world.contacts import Contacts
 from factory.world.gaps import Gaps
@@ -31,6 +30,8 @@ class Switchboard:
     ) -> None:
         self.m, self.d, self.contacts, self.vicinity = m, d, contacts, vicinity
         self._tree = np.where(m.body_dofnum > 0, m.body_treeid, -1)
+        self._dof = m.body_dofadr.copy()
+        self._holder = m.eq_obj1id.tolist()
         self.gaps = Gaps(m, d)
         self._on: dict[int, int] = {}
         self._off: set[int] = set()
@@ -65,18 +66,18 @@ class Switchboard:
         """Let the engine know. Gives how many bodies have been taken over."""
         if not (self._on or self._off or self._held or self._placed):
             return 0
-        m, d, on, off = self.m, self.d, _listed(self._on), _listed(self._off)
-        aims = _listed(self._on.values())
+        m, d, on, off = self.m, self.d, [*self._on], [*self._off]
         self._put()
         gripped = len(self._gripped)
         if gripped:
             self.gaps.note(self._gripped, [self._on[weld] for weld in self._gripped])
-        welds = np.concatenate([on, off])
-        touched = np.concatenate([m.eq_obj1id[welds], aims, m.eq_obj2id[off]])
-        m.eq_obj2id[on] = aims
-        d.eq_active[off] = False
-        d.eq_active[on] = True
-        self.wake(touched)
+        if on or off:
+            touched = [*self._on.values(), *m.eq_obj2id[off].tolist()]
+            touched += [self._holder[weld] for weld in (*on, *off)]
+            m.eq_obj2id[on] = touched[: len(on)]
+            d.eq_active[off] = False
+            d.eq_active[on] = True
+            self.wake(np.array(touched))
         if self._held:
             self._take(_listed(self._held), _listed(self._held.values()))
         for gathered in (self._on, self._off, self._gripped, self._held, self._placed):
@@ -104,14 +105,15 @@ class Switchboard:
     def wake(self, bodies: Index) -> None:
         """Wake bodies that sleep, and let those that are about to, being slow, wait as long
         again."""
-        m, d, tree = self.m, self.d, self._tree[bodies]
-        bodies, tree = bodies[tree >= 0], tree[tree >= 0]
-        awake = d.tree_asleep[tree] < 0
-        d.tree_asleep[tree[awake]] = FRESH
-        bodies = bodies[~awake]
+        tree, asleep, speed = self._tree[bodies], self.d.tree_asleep, self.d.qvel
+        movable = tree >= 0
+        bodies, tree = bodies[movable], tree[movable]
+        sleeps = asleep[tree] >= 0
+        asleep[tree[~sleeps]] = FRESH
+        bodies = bodies[sleeps]
         if len(bodies):
-            dofs = ranges(m.body_dofadr[bodies], m.body_dofnum[bodies])
-            d.qvel[dofs[d.qvel[dofs] == 0.0]] = AWAKE
+            dof = self._dof[bodies]
+            speed[dof[speed[dof] == 0.0]] = AWAKE
             self.vicinity.woken(bodies)
 
 
