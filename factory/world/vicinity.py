@@ -14,9 +14,12 @@ from factory.control.mode import Array, Index
 from factory.engine import mujoco
 from factory.world.contacts import NOBODY, Contacts
 
-SUDDEN, TIMES = 20.0, 2.0
-"""Nothing gains speed faster than this [m/s²], or than so many times what the settings ask for, but
-what is pushed."""
+TIMES = 2.0
+"""Nothing gains speed faster than so many times what the settings ask for, unless it touches
+something or is pushed."""
+
+SUDDEN = 20.0
+"""What touches something does not gain speed faster than this [m/s²], or than the above."""
 
 CROWD = 0.25
 """Where more than this share of all holders moves, there is little to leave out, and nothing is."""
@@ -47,10 +50,10 @@ class Vicinity:
         asked: float = 0.0,
     ) -> None:
         self.m, self.d, self.contacts, self.holder = m, d, contacts, contacts.code
-        self._sudden = max(SUDDEN, TIMES * asked)
+        self._gains = TIMES * asked
         self._period, self._early = period, float(m.opt.timestep) / 2
         self._culls, self._due = holders >= FEW, 0.0
-        self.stale = self._anew = self._bent = False
+        self.stale = self._anew = self._touches = False
         self._woken = [np.empty(0, np.intp)]
         if self._culls:
             self._seen = np.zeros(m.ntree, bool)
@@ -61,7 +64,9 @@ class Vicinity:
             self._extent = np.full((4, holders + 1), -np.inf)
             self._rest = np.full((4, holders + 1), np.inf, np.float32)
             self._changed = np.ones(holders + 1, bool)
-            self._place(np.unique(self.holder[contacts.collides]))
+            everybody = np.unique(self.holder[contacts.collides])
+            self._measure(everybody)
+            self._place(everybody)
 
     def _whose(self, holders: int) -> tuple[Index, Index]:
         """A body of each tree that says whose it is, and the body that each holder goes with: the
@@ -86,8 +91,13 @@ class Vicinity:
             self._changed[holders] = True
 
     def notice(self) -> None:
-        """It is stale where the engine has woken something by itself, or at the end of a period."""
-        if self._culls and (self.d.time >= self._due or (self._awake > self._seen).any()):
+        """It is stale at the end of a period, and where something has begun to touch or the engine
+        has woken something by itself."""
+        if self._culls and (
+            self.d.time >= self._due
+            or (self.d.ncon and not self._touches)
+            or (self._awake > self._seen).any()
+        ):
             self._anew = self.stale = True
 
     def everything(self) -> None:
@@ -103,8 +113,11 @@ class Vicinity:
         """Choose what the broad phase looks at: anew where that is due, else what has been woken
         besides."""
         anew, self._anew, self.stale = self._anew, False, False
-        bodies = np.concatenate(self._woken)
-        del self._woken[1:]
+        touched, self._touches = self._touches, bool(self.d.ncon)
+        bodies, woken = self._woken[0], len(self._woken) > 1
+        if woken:
+            bodies = np.concatenate(self._woken)
+            del self._woken[1:]
         if anew:
             self._seen = self._awake
             bodies = np.concatenate([bodies, self._of_tree[self._seen]])
@@ -113,24 +126,41 @@ class Vicinity:
         moves = np.zeros_like(self._near)
         moves[self.holder[bodies]] = True
         moves[NOBODY] = False
-        near = self._reached(moves.nonzero()[0], bodies)
+        who = moves.nonzero()[0]
+        reach = self._reach_of_any(who, bodies) if touched or self._touches else self._reach(who)
+        near = self._reached(who, reach)
         if not anew:
             near |= self._near
-        self._seen |= moves[self.holder[self._of_tree]]
+        if woken:
+            self._seen |= moves[self.holder[self._of_tree]]
         self._near = near
         self._show(near[self.holder])
 
-    def _reached(self, who: Index, bodies: Index) -> np.ndarray:
-        """The holders (holders + 1,) that moving ones, with bodies that move, may reach within a
-        period; themselves among them."""
-        if not len(who):
-            return np.zeros_like(self._near)
+    def _reach(self, who: Index) -> Array:
+        """How far holders that move come within a period, to the east, north, west and south
+        (4, n) [m]: as fast as they are they go on, or somewhat faster or slower."""
+        changed = who[self._changed[who]]
+        if len(changed):
+            self._measure(changed)
+        ahead = self.d.cvel.take(self._anchor[who], axis=0)[:, 3:5].T * self._period
+        ahead = np.maximum(np.concatenate([ahead, -ahead]), 0.0)
+        return np.asarray(ahead + (self._gains * self._period**2 / 2 + SWAY))
+
+    def _reach_of_any(self, who: Index, bodies: Index) -> Array:
+        """The same of holders with bodies that move, where something touches: whichever way, and
+        with what they have wherever it is."""
+        if len(who):
+            self._measure(who)
+        speed = np.abs(self.d.cvel[[*self._anchor[who], *bodies], 3:]).max(initial=0.0)
+        gain = max(SUDDEN, self._gains) * self._period
+        return np.full((4, len(who)), (speed + gain / 2) * self._period + SWAY)
+
+    def _reached(self, who: Index, reach: Array) -> np.ndarray:
+        """The holders (holders + 1,) that moving ones may reach within a period; themselves among
+        them."""
         extent = self._place(who)
         if len(who) > CROWD * len(self._near):
             return np.ones_like(self._near)
-        moving = np.concatenate([bodies, self._anchor[who]])
-        speed = np.abs(self.d.cvel.take(moving, axis=0)[:, 3:]).max()
-        reach = float(speed + self._sudden * self._period / 2) * self._period + SWAY
         east, north, west, south = (extent + reach).astype(np.float32)[:, :, None]
         meets, also = self._meets[:, : len(who)]
         np.less_equal(self._rest[0], west, out=meets)
@@ -140,11 +170,6 @@ class Vicinity:
 
     def _place(self, who: Index) -> Array:
         """Where holders extend to now, to the east, north, west and south (4, n) [m]."""
-        bent, self._bent = self._bent, bool(self.d.ncon)
-        changed = who if bent or self._bent else who[self._changed[who]]
-        if len(changed):
-            self._changed[changed] = False
-            self._measure(changed)
         at = self.d.xpos.take(self._anchor[who], axis=0)[:, :2].T
         extent = self._extent.take(who, axis=1) + np.concatenate([at, -at])
         self._rest[:, who] = -extent
@@ -152,6 +177,7 @@ class Vicinity:
 
     def _measure(self, who: Index) -> None:
         """Measure how far what holders have extends from the body that they go with."""
+        self._changed[who] = False
         chosen = np.zeros_like(self._near)
         chosen[who] = True
         bodies = (chosen[self.holder] & self.contacts.collides).nonzero()[0]
