@@ -84,8 +84,8 @@ class MujocoWorld:
         self.body = self.m.jnt_bodyid[joint]
         self.tree = self.m.body_treeid[self.body]
         self.m.actuator_biasprm[actuator[: self.tray], 1:3] *= np.asarray(gains)[:, None]
-        self.reference = np.append(np.asarray(start, float), 0.0)
-        self.speed = np.zeros_like(self.reference)
+        self._x = np.append(np.asarray(start, float), 0.0)
+        self._v = np.zeros_like(self._x)
         self.tick, self.steps = self.settings.tick, self.settings.substeps
         self.stride, self.ticks = self.settings.stride, 0
         self.courses = Courses()
@@ -97,14 +97,15 @@ class MujocoWorld:
         self._active = np.empty(0, np.intp)
         self._moves = b""
         self._last: Course | None = None
+        self._lags = False
         self._under_way = np.zeros(len(slides), bool)
         own = self.m.body_subtreemass[self.body] + self.m.dof_armature[self.dof]
         weight = np.zeros(len(slides))
         weight[list(self.lift.values())] = HEAD_MASS * GRAVITY
         self.setpoints = Setpoints(self.m, self.d, actuator, self.steps, own.round(9), weight)
         self.control = self.setpoints.control
-        self.d.qpos[self.qpos] = self.reference
-        self.move(np.arange(len(slides)), self.reference, self.speed, self.speed)
+        self.d.qpos[self.qpos] = self._x
+        self.move(np.arange(len(slides)), self._x, self._v, self._v)
         self.stock = Stock(self.m, self.d, model, units, counts or {}, wip)
         self.vicinity = self.stock.vicinity
         gaps = self.stock.board.gaps
@@ -129,6 +130,24 @@ class MujocoWorld:
     def dropoffs(self) -> list[float]:
         """When each product left the outfeed [s]."""
         return self.stock.left
+
+    @property
+    def reference(self) -> Array:
+        """Where each axis ought to be [m]."""
+        self._catch_up()
+        return self._x
+
+    @property
+    def speed(self) -> Array:
+        """How fast each ought to be [m/s]."""
+        self._catch_up()
+        return self._v
+
+    def _catch_up(self) -> None:
+        """Where the last course has led to is not written down until somebody asks."""
+        if self._lags and self._last is not None:
+            self._x[self._active], self._v[self._active], _ = self._last.told.after.T
+        self._lags = False
 
     def axes_of(self, robot: int) -> list[int]:
         """The axes of a robot (index): its carriage, and its lift if it has one."""
@@ -177,12 +196,12 @@ class MujocoWorld:
         near, ticks = False, self._at_most(ticks)
         if axes is not self._active:
             self._halt(axes)
-        tray = self._tray_course(ticks)
-        if tray is not None:
+        tray = None
+        if self._tray_goes_to is not None:
+            tray = self._tray_course(ticks)
             ticks = tray.ticks
         if bundle is not None:
             course = self._next(bundle, axes, ticks)
-            self.reference[axes], self.speed[axes], _ = course.told.after.T
             self.setpoints.follow(axes, course.told)
             if course.moves != self._moves:
                 self._moves = course.moves
@@ -206,12 +225,12 @@ class MujocoWorld:
         before = self._last
         course = None if before is None else before.then.get(ticks)
         if course is None:
-            x, v = self.reference[axes], self.speed[axes]
+            x, v = self.reference[axes], self._v[axes]
             begin = bundle, ticks, x.tobytes(), v.tobytes()
             course = self.courses.of(begin, lambda: self._course(bundle, axes, x, v, ticks))
             if before is not None:
                 before.then[ticks] = course
-        self._last = course
+        self._last, self._lags = course, True
         return course
 
     def _course(self, bundle: Bundle, axes: Index, x: Array, v: Array, ticks: int) -> Course:
@@ -232,17 +251,18 @@ class MujocoWorld:
         """Robots whose operation has ended stop where their reference is. They may hand over at a
         low speed: left as a setpoint it would carry them out of the goal, and of the next
         domain."""
-        left = np.zeros(len(self.speed), bool)
+        left = np.zeros_like(self._under_way)
         left[self._active] = True
         left[active] = False
         (axes,) = left.nonzero()
         self.speed[axes] = 0.0
-        self.setpoints.stand(axes, self.reference[axes], self._under_way[axes])
+        self.setpoints.stand(axes, self._x[axes], self._under_way[axes])
         self._active, self._moves, self._last = active, b"", None
 
     def move(self, axes: Index, x: Array, v: Array, a: Array) -> None:
         """From now on the references of `axes` run from x [m] at speed v under acceleration a, in
         ticks that have not been set otherwise."""
+        self._catch_up()
         self._last = None
         self.setpoints.move(axes, x, v, a)
 
@@ -251,10 +271,10 @@ class MujocoWorld:
         stopped: all at once, and one by one again where anything has touched, since contacts are
         looked at in every step."""
         m, d, step, vicinity = self.m, self.d, mujoco.mj_step, self.vicinity
-        self._send_tray(self._tray_course(1))
-        told, moves = self.setpoints.update(steps)
-        if len(told):
-            self._attend(told, moves)
+        if self._tray_goes_to is not None:
+            self._send_tray(self._tray_course(1))
+        if self.setpoints.any_due:
+            self._attend(*self.setpoints.update(steps))
         vicinity.notice()
         if vicinity.stale:
             vicinity.look()
@@ -320,7 +340,7 @@ class MujocoWorld:
             self._is_home = self._tray_is_at(0.0)
             self.supplied |= self._is_home
         place = 0.0 if unit is None else way
-        x, v = self.reference[self.tray], self.speed[self.tray]
+        x, v = self._x[self.tray], self._v[self.tray]
         self._tray_goes_to = place if x != place or v else None
         self._tray_settles = abs(x - place) < NEAR + AHEAD and not (unit is None and self._is_home)
 
@@ -329,22 +349,20 @@ class MujocoWorld:
         x, v = self.d.qpos[self.qpos[self.tray]], self.d.qvel[self.dof[self.tray]]
         return bool(abs(x - place) < NEAR and abs(v) < NEAR / self.tick)
 
-    def _tray_course(self, ticks: int) -> Course | None:
+    def _tray_course(self, ticks: int) -> Course:
         """Some ticks of the tray's way to where it goes, as fast as its limits allow, until it is
-        nearly there; None where it goes nowhere."""
+        nearly there."""
         place = self._tray_goes_to
-        if place is None:
-            return None
-        x, v = self.reference[self._tray], self.speed[self._tray]
+        assert place is not None
+        x, v = self._x[self._tray], self._v[self._tray]
         begin = place, ticks, x.tobytes(), v.tobytes()
         return self.courses.of(begin, lambda: self._course_of_tray(x, v, place, ticks))
 
-    def _send_tray(self, course: Course | None) -> None:
-        if course is not None:
-            self.reference[self._tray], self.speed[self._tray], _ = course.told.after.T
-            self.setpoints.follow(self._tray, course.told)
-            self._attend(self._tray, np.frombuffer(course.moves, bool))
-            self._tray_goes_to = None
+    def _send_tray(self, course: Course) -> None:
+        self._x[self._tray], self._v[self._tray], _ = course.told.after.T
+        self.setpoints.follow(self._tray, course.told)
+        self._attend(self._tray, np.frombuffer(course.moves, bool))
+        self._tray_goes_to = None
 
     def _course_of_tray(self, x: Array, v: Array, place: float, ticks: int) -> Course:
         """It goes to the end of its way with a product and comes back without."""

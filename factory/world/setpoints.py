@@ -24,8 +24,6 @@ from factory.engine import mujoco
 INPUTS = 3
 """A drive follows a position [m] and a speed [m/s], and pushes with a force besides [N]."""
 
-NOBODY = np.empty(0, np.intp)
-
 Leg = tuple[Array, Array, Array]
 """A tick of n axes: the positions [m] and speeds [m/s] where it begins, its accelerations
 [m/s²]."""
@@ -34,20 +32,19 @@ Leg = tuple[Array, Array, Array]
 @dataclass(frozen=True, slots=True, eq=False)
 class Told:
     """What n axes are told for some ticks: their `setpoints` in every step (n, steps * 3), position
-    [m], speed [m/s] and force [N], and those `after` it (n, 3); and where: the numbers of their
-    `buffers` (n,), and their `inputs` in `ctrl` (n, 3)."""
+    [m], speed [m/s] and force [N], and those `after` it (n, 3). `drives` (n,): by number."""
 
     setpoints: Array
     after: Array
-    buffers: Index
-    inputs: Index
+    drives: Index
 
 
 class Setpoints:
     """The setpoints of axes, whose drives are `actuators`, for ticks of so many `steps`; each feeds
     forward what accelerates its `mass` [kg], of its own at first, and carries its `weight` [N].
 
-    `control` (axes,): where in `ctrl` an axis's setpoints begin.
+    `control` (axes,): where in `ctrl` an axis's setpoints begin. `any_due`: some axis is to be told
+    what `move`, `stand` or `load` has changed.
     """
 
     def __init__(
@@ -61,7 +58,7 @@ class Setpoints:
     ) -> None:
         self.d, self.own, self.mass, self.weight = d, mass, mass.copy(), weight
         self.control = m.actuator_ctrladr[actuators]
-        self._inputs = self.control[:, None] + np.arange(INPUTS)
+        self._drives, self._ctrl = actuators, d.ctrl.reshape(-1, INPUTS)
         self._timestep = float(m.opt.timestep)
         samples = int(m.actuator_history[actuators[0], 0])
         most = samples - steps
@@ -69,15 +66,15 @@ class Setpoints:
         self._ahead = self._timestep * np.arange(most)
         self._steps = steps
         size = 2 + (1 + INPUTS) * samples
-        self._buffer = m.actuator_historyadr[actuators] // size
         buffers = d.history.reshape(-1, size)
         self._heads = buffers[:, 1 : 2 + samples]
         self._tails = [buffers[:, size - INPUTS * told :] for told in range(most + 1)]
         self._head = np.full(1 + samples, samples - 1.0)
+        self._times = self._head[1:]
         self._early = self._timestep * (np.arange(samples) - samples - most - 0.5)
         self._latest: list[tuple[float, float, Told]] = []
         self._plan = np.zeros((4, len(actuators)))
-        self._due, self._any_due = np.zeros(len(actuators), bool), False
+        self._due, self.any_due = np.zeros(len(actuators), bool), False
 
     def of(self, axes: Index, legs: Sequence[Leg], x1: Array, v1: Array) -> Told:
         """What axes are told that run through `legs`, a tick each, and are at x1 [m] with the speed
@@ -93,8 +90,7 @@ class Setpoints:
         return Told(
             setpoints.reshape(len(axes), -1),
             np.stack([x1, v1, force], axis=1),
-            self._buffer[axes],
-            self._inputs[axes],
+            self._drives[axes],
         )
 
     def tell(self, told: Told) -> None:
@@ -104,7 +100,7 @@ class Setpoints:
         self._latest = [said for said in self._latest if said[0] > now + self._timestep / 2]
         self._latest.append((end, now, told))
         self._write(now, told)
-        self.d.ctrl[told.inputs] = told.after
+        self._ctrl[told.drives] = told.after
 
     def again(self) -> None:
         """Tell again what is not over yet: the engine goes back in time, or has used up what there
@@ -114,14 +110,15 @@ class Setpoints:
 
     def _write(self, begin: float, told: Told) -> None:
         steps = told.setpoints.shape[1] // INPUTS
-        self._head[1:] = self._early
-        self._head[1:] += begin + steps * self._timestep
-        self._heads[told.buffers] = self._head
-        self._tails[steps][told.buffers] = told.setpoints
+        np.add(self._early, begin + steps * self._timestep, out=self._times)
+        self._heads[told.drives] = self._head
+        self._tails[steps][told.drives] = told.setpoints
 
     def follow(self, axes: Index, told: Told) -> None:
         """Tell axes what comes, whatever `move` has told them."""
-        self._due[axes] = False
+        if self.any_due:
+            self._due[axes] = False
+            self.any_due = bool(self._due.any())
         self.tell(told)
 
     def move(self, axes: Index, x: Array, v: Array, a: Array) -> None:
@@ -130,36 +127,33 @@ class Setpoints:
         plan = self._plan
         plan[0, axes] = self.d.time
         plan[1, axes], plan[2, axes], plan[3, axes] = x, v, a
-        self._due[axes] = self._any_due = True
+        self._due[axes] = self.any_due = True
 
     def stand(self, axes: Index, x: Array, going: Truth) -> None:
         """From now on axes stand at x [m]; those that are `going` are to be told."""
         self._plan[0, axes], self._plan[1, axes] = self.d.time, x
         self._plan[2:, axes] = 0.0
         self._due[axes] |= going
-        self._any_due = bool(self._due.any())
+        self.any_due = bool(self._due.any())
 
     def load(self, axis: int, mass: float, weight: float) -> None:
         """From now on an axis moves a mass [kg] beside its own, and carries a weight [N]. One that
         `move` has set going, or that carries more or less than before, is to be told."""
         if weight != self.weight[axis] or self._plan[3, axis]:
-            self._due[axis] = self._any_due = True
+            self._due[axis] = self.any_due = True
         self.mass[axis], self.weight[axis] = self.own[axis] + mass, weight
 
     def update(self, steps: int) -> tuple[Index, Truth]:
-        """Tell those what comes that `move` has set going or stopped, before so many steps of the
-        engine; gives who they are, and which of them are under way."""
-        (axes,) = self._due.nonzero() if self._any_due else (NOBODY,)
-        self._any_due = len(axes) > 0
-        if not self._any_due:
-            return NOBODY, NOBODY != 0
+        """Tell those what comes that are due, before so many steps of the engine; gives who they
+        are, and which of them are under way."""
+        (axes,) = self._due.nonzero()
         begun, x, v, a = self._plan[:, axes]
         since, ahead = self.d.time - begun, steps * self._timestep
         x, v = x + since * (v + 0.5 * since * a), v + since * a
         x1, v1 = x + ahead * (v + 0.5 * ahead * a), v + ahead * a
         self.tell(self.of(axes, self._legs(x, v, a, steps), x1, v1))
         self._due[axes] = moves = under_way(*self._plan[2:, axes])
-        self._any_due = bool(moves.any())
+        self.any_due = bool(moves.any())
         return axes, moves
 
     def _legs(self, x: Array, v: Array, a: Array, steps: int) -> list[Leg]:

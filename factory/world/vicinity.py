@@ -64,7 +64,7 @@ class Vicinity:
             self._extent = np.full((4, holders + 1), -np.inf)
             self._rest = np.full((4, holders + 1), np.inf, np.float32)
             self._changed = np.ones(holders + 1, bool)
-            everybody = np.unique(self.holder[contacts.collides])
+            everybody = np.unique(self.holder[self.holder != NOBODY])
             self._measure(everybody)
             self._place(everybody)
 
@@ -180,7 +180,7 @@ class Vicinity:
         self._changed[who] = False
         chosen = np.zeros_like(self._near)
         chosen[who] = True
-        bodies = (chosen[self.holder] & self.contacts.collides).nonzero()[0]
+        bodies = chosen[self.holder].nonzero()[0]
         self._extent[:, who] = -np.inf
         if not len(bodies):
             return
