@@ -18,6 +18,7 @@ from factory.layout.plan import Layout
 from factory.settings import Settings
 from factory.simulation import Simulation
 from factory.world import vicinity
+from factory.world.contacts import NOBODY
 from factory.world.vicinity import Vicinity
 from tests.bench.factories import balanced
 from tests.bench.factories import laid_out as floor_of
@@ -186,6 +187,64 @@ def test_who_looks_too_short_ahead_overlooks_what_is_near(monkeypatch: pytest.Mo
     monkeypatch.setattr(settings, "MOST", 200)
     monkeypatch.setattr(vicinity, "SUDDEN", -0.5)
     monkeypatch.setattr(vicinity, "TIMES", -1.0)
+    assert all_overlooked(0)
+
+
+def all_overlooked_by_one(seed: int) -> set[str]:
+    """All others rest while one robot runs into somebody, and is looked at four times as rarely as
+    usual."""
+    simulation, found, rng = ready("20", True), set[str](), np.random.default_rng(seed)
+    world, contacts = simulation.world, simulation.world.stock.contacts
+    for _ in range(int(rng.integers(20, 100))):
+        simulation.supervisor.step()
+    axis, speed = rng.integers(0, world.tray, 1), rng.choice([-0.5, 0.5], 1)
+    everybody, still = np.arange(world.tray), np.zeros(world.tray)
+    world.move(everybody, world.reference[everybody], still, still)
+    for _ in range(20):
+        world.advance(5)
+
+    def step(m: mujoco.MjModel, d: mujoco.MjData, steps: int = 1) -> None:
+        for _ in range(steps):
+            mujoco.mj_step(m, d)
+            found.update(overlooked(m, d, contacts))
+
+    with stepping(step):
+        world.move(axis, world.reference[axis], speed, np.zeros(1))
+        for _ in range(100):
+            if world.d.ncon:
+                break
+            world.advance(5)
+    return found
+
+
+def test_who_looks_back_overlooks_what_is_ahead(monkeypatch: pytest.MonkeyPatch) -> None:
+    reach, seeds = Vicinity._reach, (1, 5, 8, 13)
+
+    def backwards(self: Vicinity, who: np.ndarray) -> np.ndarray:
+        return np.roll(reach(self, who), 2, axis=0)
+
+    monkeypatch.setattr(settings, "LOOK", 0.16)
+    monkeypatch.setattr(settings, "MOST", 16)
+    monkeypatch.setattr(vicinity, "TIMES", 0.0)
+    assert not any(all_overlooked_by_one(seed) for seed in seeds)
+    monkeypatch.setattr(Vicinity, "_reach", backwards)
+    assert any(all_overlooked_by_one(seed) for seed in seeds)
+
+
+def test_who_forgets_what_is_held_overlooks_what_is_near_it(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def forgotten(self: Vicinity, who: np.ndarray) -> None:
+        self._changed[who] = False
+        holder = self.holder.copy()
+        self.holder[[*self.contacts.solid]] = NOBODY
+        try:
+            measure(self, who)
+        finally:
+            self.holder[:] = holder
+
+    measure = Vicinity._measure
+    monkeypatch.setattr(Vicinity, "_measure", forgotten)
     assert all_overlooked(0)
 
 

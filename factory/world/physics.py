@@ -35,6 +35,9 @@ AHEAD = 0.0005
 NEAR = 1e-3
 """The tray is somewhere when it is within this [m]."""
 
+CLOSE = NEAR + AHEAD
+"""It may be there when its reference is within this [m]."""
+
 GIVEN_UP = tuple(
     int(getattr(mujoco.mjtWarning, f"mjWARN_{name}"))
     for name in ("BADQPOS", "BADQVEL", "BADQACC", "BADCTRL")
@@ -342,7 +345,7 @@ class MujocoWorld:
         place = 0.0 if unit is None else way
         x, v = self._x[self.tray], self._v[self.tray]
         self._tray_goes_to = place if x != place or v else None
-        self._tray_settles = abs(x - place) < NEAR + AHEAD and not (unit is None and self._is_home)
+        self._tray_settles = abs(x - place) < CLOSE and not (unit is None and self._is_home)
 
     def _tray_is_at(self, place: float) -> bool:
         """Whether the outfeed's tray rests at a place of its way [m]."""
@@ -382,7 +385,7 @@ class MujocoWorld:
             if legs and going != moves:
                 break
             legs.append((x, v, a))
-            x, v, moves, near = x1, v1, going, abs(float(x1[0]) - place) < NEAR + AHEAD
+            x, v, moves, near = x1, v1, going, abs(float(x1[0]) - place) < CLOSE
         return Course(len(legs), self.setpoints.of(self._tray, legs, x, v), moves, near)
 
     def unstable(self) -> str:

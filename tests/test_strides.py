@@ -1,0 +1,172 @@
+"""Several ticks go to the engine at once where nobody need look in between: it makes no
+difference."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+import pytest
+
+from factory.engine import mujoco
+from factory.settings import LOOK, MOST, Settings
+from factory.simulation import Simulation
+from factory.trace import Event, PhysicsFigures
+from factory.world import gaps, physics
+from factory.world.physics import MujocoWorld
+from tests.bench.replaying import stepping
+from tests.test_fuse import layout_of
+from tests.test_setpoints import one_by_one
+from tests.test_vicinity import ready
+
+UNITS = 2
+
+
+@dataclass
+class Course:
+    """Where everything is, by timestep, after each call of a supervisor; what fired and when; the
+    figures."""
+
+    states: dict[int, bytes] = field(default_factory=dict)
+    events: list[Event] = field(default_factory=list)
+    dropoffs: list[float] = field(default_factory=list)
+    figures: PhysicsFigures = field(default_factory=PhysicsFigures)
+
+    def agrees(self, other: Course) -> bool:
+        """Whether they are the same wherever both have been looked at."""
+        both = self.states.keys() & other.states.keys()
+        return (
+            all(self.states[step] == other.states[step] for step in both)
+            and (self.events, self.dropoffs) == (other.events, other.dropoffs)
+            and self.figures == other.figures
+        )
+
+
+def followed(name: str, ticks: int, **given: Any) -> Course:
+    """A run that is asked for so many ticks at a time."""
+    simulation, course = ready(name, True, **given), Course()
+    world, d = simulation.world, simulation.world.d
+    while world.delivered() < UNITS and world.time < 30.0:
+        simulation.supervisor.step(ticks)
+        step = round(world.time / simulation.settings.timestep)
+        course.states[step] = d.qpos.tobytes() + d.qvel.tobytes()
+    course.events = [*simulation.supervisor.events]
+    course.dropoffs, course.figures = [*world.dropoffs], world.inspection.figures()
+    return course
+
+
+CASES: list[tuple[str, dict[str, Any]]] = [
+    ("paper", {}),
+    ("chest", {}),
+    ("gearbox", {"fuse": True}),
+    ("20", {"fuse": True}),
+    ("lamp", {"settings": Settings(stage=1)}),
+    ("paper", {"settings": Settings(timestep=0.001, substeps=12)}),
+    ("shelf", {"settings": Settings(timestep=0.004)}),
+    ("paper", {"settings": Settings(timestep=0.005, substeps=9)}),
+]
+
+
+@pytest.mark.parametrize(("name", "given"), CASES)
+def test_ticks_at_once_are_the_same_as_one_by_one(name: str, given: dict[str, Any]) -> None:
+    """To the last bit, the figures included."""
+    singly, at_once = followed(name, 1, **given), followed(name, MOST, **given)
+    assert len(singly.dropoffs) == UNITS and at_once.agrees(singly)
+    stride = given.get("settings", Settings()).stride
+    assert len(at_once.states) < (0.7 if stride > 1 else 1.01) * len(singly.states)
+
+
+@pytest.mark.parametrize("name", ["paper", "gearbox", "20"])
+def test_who_goes_back_over_several_ticks_comes_to_the_same_state(name: str) -> None:
+    singly = followed(name, 1)
+    with stepping(one_by_one):
+        assert followed(name, MOST).agrees(singly)
+
+
+def test_who_looks_away_while_the_tray_comes_sees_it_late(monkeypatch: pytest.MonkeyPatch) -> None:
+    singly = followed("chest", 1)
+    monkeypatch.setattr(physics, "CLOSE", 0.0)
+    assert not followed("chest", MOST).agrees(singly)
+
+
+def test_who_looks_away_while_a_goal_is_near_sees_it_late(monkeypatch: pytest.MonkeyPatch) -> None:
+    singly, course = followed("paper", 1), MujocoWorld._course
+
+    def careless(self: MujocoWorld, bundle: Any, *given: Any) -> Any:
+        near = object.__getattribute__(bundle, "near_goal")
+        here = type(bundle).near_goal
+        try:
+            type(bundle).near_goal = lambda *_: False
+            found = course(self, bundle, *given)
+        finally:
+            type(bundle).near_goal = here
+        object.__setattr__(found, "near", near(found.told.after[:, 0], 5e-4))
+        return found
+
+    monkeypatch.setattr(MujocoWorld, "_course", careless)
+    assert not followed("paper", MOST).agrees(singly)
+
+
+@pytest.mark.parametrize(("name", "given"), [("20", {}), ("chest", {}), ("20", {"fuse": True})])
+def test_there_are_setpoints_to_spare(name: str, given: dict[str, Any]) -> None:
+    """A step that wakes somebody takes two of each buffer's samples: in one call of the engine no
+    more do than there are spare ones."""
+    simulation = ready(name, True, **given)
+    world, settings = simulation.world, simulation.settings
+    heads, spare = world.setpoints._heads, []
+
+    def step(m: mujoco.MjModel, d: mujoco.MjData, steps: int = 1) -> None:
+        fresh = heads[:, 0] == settings.samples - 1
+        mujoco.mj_step(m, d, steps)
+        taken = (heads[fresh, 0].astype(int) + 1) % settings.samples
+        spare.extend((taken - steps) % settings.samples)
+
+    with stepping(step):
+        while world.delivered() < 1:
+            simulation.supervisor.step(MOST)
+    assert spare and max(spare) <= settings.substeps
+
+
+@pytest.mark.parametrize("timestep", [1e-5, 1e-3, 2e-3, 4e-3, 2e-2])
+@pytest.mark.parametrize("substeps", [1, 5, 100])
+def test_a_stride_is_no_longer_than_a_look(timestep: float, substeps: int) -> None:
+    settings = Settings(timestep=timestep, substeps=substeps)
+    assert 1 <= settings.stride <= MOST
+    assert settings.stride == 1 or settings.stride * settings.tick <= LOOK + 1e-12
+    assert settings.samples >= settings.stride * substeps + substeps
+
+
+def test_what_is_late_at_max_time_is_not_run() -> None:
+    """Nobody looks, but no more is simulated than was asked for."""
+    run = Simulation(layout_of("paper"), units=5).run(max_time=1.23)
+    assert run.sim_time_s == pytest.approx(1.23) and run.trouble is not None
+
+
+def test_gaps_are_the_same_whenever_they_are_worked_out(monkeypatch: pytest.MonkeyPatch) -> None:
+    late = followed("20", MOST).figures.handoff_gap_max_mm
+    monkeypatch.setattr(gaps, "MANY", 1)
+    assert followed("20", MOST).figures.handoff_gap_max_mm == late > 0.0
+
+
+def test_forgotten_gaps_are_forgotten() -> None:
+    world = ready("paper", True).world
+    noted = world.inspection.gaps
+    weld, body = world.stock.grip[0, "part1"], int(world.stock.body["part1"][0])
+    noted.note([weld], [body])
+    assert noted.largest() > 0.0
+    noted.note([weld], [body])
+    noted.forget()
+    assert noted.largest() == 0.0
+
+
+def test_references_are_where_the_drives_are_told_to_be() -> None:
+    """Written down late, but not too late for who asks."""
+    simulation = ready("chest", True)
+    world, supervisor = simulation.world, simulation.supervisor
+    for _ in range(200):
+        supervisor.step(MOST)
+        axes = supervisor.active.axes
+        told = world.d.ctrl[world.control[axes]]
+        assert np.array_equal(world.reference[axes], told)
+        assert np.array_equal(world.speed[axes], world.d.ctrl[world.control[axes] + 1])
