@@ -150,11 +150,11 @@ def plant(simulation: Simulation, when: Callable[[], bool], act: Callable[[], No
     """Do something to the engine once, at the beginning of a tick; gives the time, when done."""
     step, done = simulation.supervisor.step, list[float]()
 
-    def stepped() -> None:
+    def stepped(ticks: int = 1) -> None:
         if not done and when():
             act()
             done.append(simulation.world.time)
-        step()
+        step(ticks)
 
     simulation.supervisor.step = stepped  # type: ignore[method-assign]
     return done

@@ -13,7 +13,7 @@ from factory.engine import mujoco
 from factory.settings import LOOK, MOST, Settings
 from factory.simulation import Simulation
 from factory.trace import Event, PhysicsFigures
-from factory.world import gaps, physics
+from factory.world import gaps, outfeed
 from factory.world.physics import MujocoWorld
 from tests.bench.replaying import stepping
 from tests.test_fuse import layout_of
@@ -86,7 +86,7 @@ def test_who_goes_back_over_several_ticks_comes_to_the_same_state(name: str) -> 
 
 def test_who_looks_away_while_the_tray_comes_sees_it_late(monkeypatch: pytest.MonkeyPatch) -> None:
     singly = followed("chest", 1)
-    monkeypatch.setattr(physics, "CLOSE", 0.0)
+    monkeypatch.setattr(outfeed, "CLOSE", 0.0)
     assert not followed("chest", MOST).agrees(singly)
 
 

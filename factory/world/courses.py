@@ -9,7 +9,15 @@ from __future__ import annotations
 from collections.abc import Callable, Hashable
 from dataclasses import dataclass, field
 
-from factory.world.setpoints import Told
+from factory.control.mode import Array, Index
+from factory.world.setpoints import Leg, Setpoints, Told, under_way
+
+AHEAD = 0.0005
+"""No robot is further ahead of its reference than this [m]."""
+
+Way = tuple[Leg, Array, Array, bool]
+"""A tick of axes, the positions [m] and speeds [m/s] that it leads to, and whether any of them may
+be where it goes then."""
 
 ROOM = 15_000_000
 """So many numbers are kept, of 8 bytes each: those of a cycle with 1,000 robots."""
@@ -51,3 +59,23 @@ class Courses:
             self._left -= size
             self._kept[begin] = course
         return course
+
+
+def travelled(
+    setpoints: Setpoints,
+    axes: Index,
+    begin: tuple[Array, Array],
+    ticks: int,
+    go: Callable[[Array, Array], Way],
+) -> Course:
+    """The course of axes from positions [m] and speeds [m/s], where `go` tells what they do in a
+    tick from such: until one may be where it goes, or another moves, for so many ticks at most."""
+    (x, v), legs, moves, near = begin, list[Leg](), b"", False
+    while len(legs) < ticks and not near:
+        leg, x1, v1, there = go(x, v)
+        going = under_way(*leg[1:]).tobytes()
+        if legs and going != moves:
+            break
+        legs.append(leg)
+        x, v, moves, near = x1, v1, going, there
+    return Course(len(legs), setpoints.of(axes, legs, x, v), moves, near)

@@ -13,30 +13,21 @@ from time import perf_counter
 
 import numpy as np
 
-from factory.control.governor import follow, govern
-from factory.control.mode import ROUNDING, Array, Index, Truth
+from factory.control.governor import follow
+from factory.control.mode import Array, Index, Truth
 from factory.control.navigation import Bundle
-from factory.control.profile import landing_speed
 from factory.engine import mujoco
 from factory.errors import Diagnostic, InputError
 from factory.factory import Operation
 from factory.mjcf import names
 from factory.mjcf.binary import cached, keep
 from factory.mjcf.model import GRAVITY, HEAD_MASS, Model
-from factory.world.courses import Course, Courses
+from factory.world.courses import AHEAD, Course, Courses, Way, travelled
 from factory.world.inspection import Inspection
+from factory.world.outfeed import Outfeed
 from factory.world.rewind import Rewind
-from factory.world.setpoints import Leg, Setpoints, under_way
+from factory.world.setpoints import Setpoints
 from factory.world.stock import Stock
-
-AHEAD = 0.0005
-"""No robot is further ahead of its reference than this [m]."""
-
-NEAR = 1e-3
-"""The tray is somewhere when it is within this [m]."""
-
-CLOSE = NEAR + AHEAD
-"""It may be there when its reference is within this [m]."""
 
 GIVEN_UP = tuple(
     int(getattr(mujoco.mjtWarning, f"mjWARN_{name}"))
@@ -87,16 +78,12 @@ class MujocoWorld:
         self.body = self.m.jnt_bodyid[joint]
         self.tree = self.m.body_treeid[self.body]
         self.m.actuator_biasprm[actuator[: self.tray], 1:3] *= np.asarray(gains)[:, None]
-        self._x = np.append(np.asarray(start, float), 0.0)
+        self._x = np.array(start, float)
         self._v = np.zeros_like(self._x)
         self.tick, self.steps = self.settings.tick, self.settings.substeps
         self.stride, self.ticks = self.settings.stride, 0
         self.courses = Courses()
-        self._tray = np.array([self.tray])
-        self._way = model.layout.outfeed_way
-        self._tray_goes_to: float | None = None
-        self._tray_settles = False
-        self.supplied = self._is_home = True
+        self.supplied = True
         self._active = np.empty(0, np.intp)
         self._moves = b""
         self._last: Course | None = None
@@ -107,8 +94,11 @@ class MujocoWorld:
         weight[list(self.lift.values())] = HEAD_MASS * GRAVITY
         self.setpoints = Setpoints(self.m, self.d, actuator, self.steps, own.round(9), weight)
         self.control = self.setpoints.control
-        self.d.qpos[self.qpos] = self._x
-        self.move(np.arange(len(slides)), self._x, self._v, self._v)
+        here, still = np.append(self._x, 0.0), np.zeros(len(slides))
+        self.d.qpos[self.qpos] = here
+        self.setpoints.move(np.arange(len(slides)), here, still, still)
+        tray = int(self.qpos[-1]), int(self.dof[-1])
+        self.outfeed = Outfeed(self.d, model, self.tray, tray, self.setpoints, self.courses)
         self.stock = Stock(self.m, self.d, model, units, counts or {}, wip)
         self.vicinity = self.stock.vicinity
         gaps = self.stock.board.gaps
@@ -163,8 +153,7 @@ class MujocoWorld:
     def prepared(self, operation: Operation, unit: int) -> bool:
         """A feeder presents the part of that unit; the outfeed has room for a product."""
         if operation.index == self.model.factory.dropoff.index:
-            self._is_home = self.stock.on_tray is None and self._tray_is_at(0.0)
-            return self._is_home
+            return self.stock.on_tray is None and self.outfeed.rests_home()
         return bool(operation.inputs) or self.stock.presents(operation.label, unit)
 
     def apply(
@@ -200,8 +189,8 @@ class MujocoWorld:
         if axes is not self._active:
             self._halt(axes)
         tray = None
-        if self._tray_goes_to is not None:
-            tray = self._tray_course(ticks)
+        if self.outfeed.goes:
+            tray = self.outfeed.course(ticks)
             ticks = tray.ticks
         if bundle is not None:
             course = self._next(bundle, axes, ticks)
@@ -211,7 +200,7 @@ class MujocoWorld:
                 self._attend(axes, np.frombuffer(course.moves, bool))
             near, ticks = course.near, course.ticks
         if tray is not None:
-            self._send_tray(tray if tray.ticks == ticks else self._tray_course(ticks))
+            self._send_tray(tray if tray.ticks == ticks else self.outfeed.course(ticks))
         self.advance(ticks * self.steps)
         self.settle(ticks)
         return near
@@ -219,7 +208,7 @@ class MujocoWorld:
     def _at_most(self, ticks: int) -> int:
         """So many ticks may go to the engine at once: none but the last of a stride is seen, and
         contacts and a tray that is about to be there ask to be."""
-        if ticks == 1 or self.d.ncon or self._tray_settles:
+        if ticks == 1 or self.d.ncon or self.outfeed.settles:
             return 1
         return min(ticks, self.stride - self.ticks % self.stride)
 
@@ -239,16 +228,12 @@ class MujocoWorld:
     def _course(self, bundle: Bundle, axes: Index, x: Array, v: Array, ticks: int) -> Course:
         """Ticks of the active modes, until one comes near its goal or another robot moves. The load
         of each robot is that of its operation."""
-        legs: list[Leg] = []
-        moves, near = b"", False
-        while len(legs) < ticks and not near:
+
+        def go(x: Array, v: Array) -> Way:
             x1, v1, a = follow(bundle, x, v, self.tick)
-            going = under_way(v, a).tobytes()
-            if legs and going != moves:
-                break
-            legs.append((x, v, a))
-            x, v, moves, near = x1, v1, going, bundle.near_goal(x1, AHEAD)
-        return Course(len(legs), self.setpoints.of(axes, legs, x, v), moves, near)
+            return (x, v, a), x1, v1, bundle.near_goal(x1, AHEAD)
+
+        return travelled(self.setpoints, axes, (x, v), ticks, go)
 
     def _halt(self, active: Index) -> None:
         """Robots whose operation has ended stop where their reference is. They may hand over at a
@@ -274,8 +259,8 @@ class MujocoWorld:
         stopped: all at once, and one by one again where anything has touched, since contacts are
         looked at in every step."""
         m, d, step, vicinity = self.m, self.d, mujoco.mj_step, self.vicinity
-        if self._tray_goes_to is not None:
-            self._send_tray(self._tray_course(1))
+        if self.outfeed.goes:
+            self._send_tray(self.outfeed.course(1))
         if self.setpoints.any_due:
             self._attend(*self.setpoints.update(steps))
         vicinity.notice()
@@ -302,6 +287,10 @@ class MujocoWorld:
             if d.ncon:
                 self.inspection.contacts()
                 vicinity.notice()
+
+    def _send_tray(self, course: Course) -> None:
+        self.outfeed.send(course)
+        self._attend(self.outfeed.axis, np.frombuffer(course.moves, bool))
 
     def _next_tick(self) -> None:
         """Another tick begins of those that went to the engine at once."""
@@ -334,59 +323,14 @@ class MujocoWorld:
             self.inspection.welds()
             if self.stock.joining:
                 self.stock.settle()
-        unit, way = self.stock.on_tray, self._way
-        if unit is not None and self._tray_is_at(way):
+        unit, outfeed = self.stock.on_tray, self.outfeed
+        if unit is not None and outfeed.rests_away():
             self.inspection.measured(*self.stock.finished(unit))
             self.stock.recycle()
-            unit, self.supplied = None, True
-        elif unit is None and not self._is_home:
-            self._is_home = self._tray_is_at(0.0)
-            self.supplied |= self._is_home
-        place = 0.0 if unit is None else way
-        x, v = self._x[self.tray], self._v[self.tray]
-        self._tray_goes_to = place if x != place or v else None
-        self._tray_settles = abs(x - place) < CLOSE and not (unit is None and self._is_home)
-
-    def _tray_is_at(self, place: float) -> bool:
-        """Whether the outfeed's tray rests at a place of its way [m]."""
-        x, v = self.d.qpos[self.qpos[self.tray]], self.d.qvel[self.dof[self.tray]]
-        return bool(abs(x - place) < NEAR and abs(v) < NEAR / self.tick)
-
-    def _tray_course(self, ticks: int) -> Course:
-        """Some ticks of the tray's way to where it goes, as fast as its limits allow, until it is
-        nearly there."""
-        place = self._tray_goes_to
-        assert place is not None
-        x, v = self._x[self._tray], self._v[self._tray]
-        begin = place, ticks, x.tobytes(), v.tobytes()
-        return self.courses.of(begin, lambda: self._course_of_tray(x, v, place, ticks))
-
-    def _send_tray(self, course: Course) -> None:
-        self._x[self._tray], self._v[self._tray], _ = course.told.after.T
-        self.setpoints.follow(self._tray, course.told)
-        self._attend(self._tray, np.frombuffer(course.moves, bool))
-        self._tray_goes_to = None
-
-    def _course_of_tray(self, x: Array, v: Array, place: float, ticks: int) -> Course:
-        """It goes to the end of its way with a product and comes back without."""
-        dt, limit = self.tick, np.array([self.settings.outfeed_acceleration])
-        load = (place > 0.0) * self.model.masses[self.model.factory.pag.root]
-        self.setpoints.load(self.tray, load, 0.0)
-        legs: list[Leg] = []
-        moves, near = b"", False
-        while len(legs) < ticks and not near:
-            left = place - (x + v * (dt / 2))
-            wanted = np.minimum(landing_speed(np.abs(left), limit, dt), self.settings.outfeed)
-            x1, v1, a = govern(x, v, np.copysign(wanted, left), limit, dt)
-            if abs(x1[0] - place) < ROUNDING and abs(v1[0]) < ROUNDING:
-                x1, v1, a = np.array([place]), np.zeros(1), np.zeros(1)
-                x, v = x1, v1
-            going = under_way(v, a).tobytes()
-            if legs and going != moves:
-                break
-            legs.append((x, v, a))
-            x, v, moves, near = x1, v1, going, abs(float(x1[0]) - place) < CLOSE
-        return Course(len(legs), self.setpoints.of(self._tray, legs, x, v), moves, near)
+            self.supplied = True
+        elif unit is None and not outfeed.home and outfeed.rests_home():
+            self.supplied = True
+        outfeed.aim(self.stock.on_tray is not None)
 
     def unstable(self) -> str:
         """What made the engine give up, "" while it has not."""
