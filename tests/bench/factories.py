@@ -15,6 +15,9 @@ from factory.simulation import Simulation
 ENDLESS = 1000
 """Units asked for: more than the pool of parts ever needs, so that it is the whole pool."""
 
+PATIENCE = 8
+"""Cycles that production is given to repeat itself."""
+
 SEEN = 3
 """Products that the ideal world makes to tell when production is steady."""
 
@@ -112,6 +115,19 @@ class Steady:
             simulation.supervisor.step()
         times = simulation.world.dropoffs
         return cls(times[-2], times[-1] - times[-2])
+
+
+def run_in(simulation: Simulation, steady: Steady) -> float:
+    """Tick until production repeats itself, or for `PATIENCE` cycles since it is steady; gives the
+    time [s]. It does when a cycle has gone by in which no reference did anything new."""
+    world = simulation.world
+    run_until(simulation, steady.since)
+    for _ in range(PATIENCE):
+        known = len(world.courses)
+        run_until(simulation, world.time + steady.cycle)
+        if len(world.courses) == known:
+            break
+    return float(world.time)
 
 
 def run_until(simulation: Simulation, time: float) -> None:

@@ -32,12 +32,11 @@ def work(
     """The same window as a run, and replayed."""
     case = Case(robots, timestep, wip, fuse)
     layout = laid_out(robots_at_least(robots))
-    since = Steady.of(layout, wip).since
-    floor = measure_floor(lambda: case.simulation(layout), since, window)
+    floor = measure_floor(lambda: case.simulation(layout), Steady.of(layout, wip), window)
     return {
         "robots": len(layout.factory.robots),
-        "from_s": since,
-        "to_s": since + window,
+        "from_s": floor.since,
+        "to_s": floor.since + window,
         "run": window / floor.run,
         "bare": window / floor.bare,
         "step_us": 1e6 * floor.bare / (window / timestep),
@@ -89,8 +88,9 @@ def section(results: dict[str, Any]) -> str:
             "## Distance to the bare engine",
             "Everything a run writes into the engine between two steps is recorded, and the same"
             " model is stepped through the same writes with nothing else in the loop; both end in"
-            " the same state to the last bit. Run and bare engine in times real time; the distance"
-            " is how much longer the run takes, both timed in one process, the median"
+            " the same state to the last bit. The window begins when production repeats itself, as"
+            " above. Run and bare engine in times real time; the distance is how much longer the"
+            " run takes, both timed in one process, the median"
             f" (least–greatest) of {results['runs']} processes.",
             table(head, rows),
         ]

@@ -7,7 +7,7 @@ import pstats
 from pathlib import Path
 from typing import Any
 
-from tests.bench.factories import Case, Steady, laid_out, robots_at_least, run_until
+from tests.bench.factories import Case, Steady, laid_out, robots_at_least, run_in, run_until
 from tests.bench.processes import ROOT, fresh, serve
 from tests.tables import table
 
@@ -19,8 +19,7 @@ def work(robots: int, timestep: float, window: float) -> dict[str, Any]:
     """The functions of a window of steady production that take the most time of their own."""
     layout = laid_out(robots_at_least(robots))
     simulation = Case(robots, timestep).simulation(layout)
-    since = Steady.of(layout, None).since
-    run_until(simulation, since)
+    since = run_in(simulation, Steady.of(layout, None))
     profile = cProfile.Profile()
     profile.runcall(run_until, simulation, since + window)
     stats = pstats.Stats(profile)

@@ -19,7 +19,7 @@ import numpy as np
 
 from factory.engine import mujoco
 from factory.world import physics
-from tests.bench.factories import run_until
+from tests.bench.factories import Steady, run_in, run_until
 
 DATA = ("ctrl", "history", "qpos", "qvel", "eq_active", "tree_asleep", "xpos", "xmat", "xquat")
 MODEL = (
@@ -96,20 +96,21 @@ def stepping(step: Any) -> Iterator[None]:
 @dataclass(frozen=True)
 class Floor:
     """Seconds for the same window: the factory's run loop, the engine's steps in it, and the bare
-    replay; and how many seconds were simulated."""
+    replay; since when, and how many seconds were simulated."""
 
+    since: float
     simulated: float
     run: float
     physics: float
     bare: float
 
 
-def measure_floor(make: Any, warm: float, window: float) -> Floor:
-    """Both over the window [warm, warm + window] [s] of two runs that are one to the last bit:
-    `make()` gives a simulation ready to go."""
+def measure_floor(make: Any, steady: Steady, window: float) -> Floor:
+    """Both over a window [s] since production repeats itself, of two runs that are one to the last
+    bit: `make()` gives a simulation ready to go."""
     timed, recorded = make(), make()
-    for simulation in (timed, recorded):
-        run_until(simulation, warm)
+    warm = run_in(timed, steady)
+    run_in(recorded, steady)
     world = recorded.world
     recorder = Recorder(world.m, world.d)
     with stepping(recorder.step):
@@ -121,7 +122,7 @@ def measure_floor(make: Any, warm: float, window: float) -> Floor:
     bare = replay(m, d, recorder.writes)
     for own in (world.d, timed.world.d):
         assert np.array_equal(d.qpos, own.qpos) and np.array_equal(d.qvel, own.qvel)
-    return Floor(window, run, timed.world.physics_time - before, bare)
+    return Floor(warm, window, run, timed.world.physics_time - before, bare)
 
 
 def replay(m: mujoco.MjModel, d: mujoco.MjData, writes: list[tuple[list[Write], int]]) -> float:
