@@ -92,7 +92,8 @@ def run_file(
     seen = video is not None or log is not None or bool(options.get("monitor"))
     made = simulation(source, layout, settings, options, seen)
     with ExitStack() as stack:
-        observers: list[Observer] = [stack.enter_context(Interruption()).observe]
+        glances = [stack.enter_context(Interruption()).observe]
+        observers: list[Observer] = []
         watcher = None
         if options.get("monitor"):
             from factory.monitor import beside
@@ -109,8 +110,8 @@ def run_file(
             assert shown is not None
             film = Film(made, video, size or SIZE, options["fps"], **shown.options)
             observers.append(stack.enter_context(film).observe)
-        observers.append(stack.enter_context(Progress(made.units, quiet)).observe)
-        record = made.run(observers, options.get("max_time"))
+        glances.append(stack.enter_context(Progress(made.units, quiet)).observe)
+        record = made.run(observers, options.get("max_time"), glances)
     if watcher is None:
         return record
     report = watcher.report()

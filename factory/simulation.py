@@ -151,10 +151,16 @@ class Simulation:
         gone = counts.get(factory.dropoff.end, 0)
         return {o.label: counts.get(o.start, 0) - gone for o in factory.leaves}
 
-    def run(self, observers: Sequence[Observer] = (), max_time: float | None = None) -> Run:
+    def run(
+        self,
+        observers: Sequence[Observer] = (),
+        max_time: float | None = None,
+        glances: Sequence[Observer] = (),
+    ) -> Run:
         """Tick until `units` products have been dropped off, the run stalls or `max_time` [s]
-        passes. Where the engine gives up it begins anew by itself, at time 0: nobody is shown
-        that, and the run has lasted until then."""
+        passes. Observers are called after every tick; `glances` are, but where there are no
+        observers several ticks may go by between them. Where the engine gives up it begins anew by
+        itself, at time 0: nobody is shown that, and the run has lasted until then."""
         patience = PATIENCE * max(self.delays)
         begin, watched, trouble = perf_counter(), 0.0, None
         supervisor, world, goal = self.supervisor, self.world, self.before + self.units
@@ -164,9 +170,9 @@ class Simulation:
             if self.model is not None and (reason := world.unstable()):
                 trouble = self._trouble("Unstable", f"{reason}, after {before:.2f} s", SMALLER)
                 return self._record(perf_counter() - begin - watched, before, trouble)
-            if observers:
+            if observers or glances:
                 pause = perf_counter()
-                for observe in observers:
+                for observe in (*observers, *glances):
                     observe(world, supervisor)
                 watched += perf_counter() - pause
             if world.time - supervisor.last_event > patience:

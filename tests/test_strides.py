@@ -16,6 +16,7 @@ from factory.trace import Event, PhysicsFigures
 from factory.world import gaps, outfeed
 from factory.world.physics import MujocoWorld
 from tests.bench.replaying import stepping
+from tests.command_line import PAPER, Terminal
 from tests.test_fuse import layout_of
 from tests.test_setpoints import one_by_one
 from tests.test_vicinity import ready
@@ -141,6 +142,32 @@ def test_what_is_late_at_max_time_is_not_run() -> None:
     """Nobody looks, but no more is simulated than was asked for."""
     run = Simulation(layout_of("paper"), units=5).run(max_time=1.23)
     assert run.sim_time_s == pytest.approx(1.23) and run.trouble is not None
+
+
+def test_a_glance_does_not_hold_a_run_up(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Who needs to be called now and then is; who observes sees every tick; the run is the same."""
+    glanced, seen = list[float](), list[float]()
+    first, second = (Simulation(layout_of("chest"), units=1) for _ in range(2))
+    one = first.run(glances=[lambda world, _: glanced.append(world.time)])
+    other = second.run([lambda world, _: seen.append(world.time)], glances=[lambda *_: None])
+    assert glanced[-1] == seen[-1] and set(glanced) <= set(seen)
+    assert len(seen) == round(seen[-1] / 0.01) and len(glanced) < 0.5 * len(seen)
+    assert (one.events, one.physics) == (other.events, other.physics)
+
+
+@pytest.mark.parametrize("more", [[], ["--json"]])
+def test_a_run_in_the_shell_is_not_held_up(
+    run: Terminal, more: list[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    calls, step = list[int](), MujocoWorld.step
+
+    def counted(self: MujocoWorld, bundle: Any, axes: Any, ticks: int = 1) -> bool:
+        calls.append(ticks)
+        return step(self, bundle, axes, ticks)
+
+    monkeypatch.setattr(MujocoWorld, "step", counted)
+    run("run", PAPER, *more)
+    assert max(calls) == MOST
 
 
 def test_gaps_are_the_same_whenever_they_are_worked_out(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -210,7 +210,8 @@ def _run(
     )
     with ExitStack() as stack:
         stop, bar = Interruption(), Progress(units, quiet)
-        run = simulation.run([stack.enter_context(stop).observe, stack.enter_context(bar).observe])
+        glances = [stack.enter_context(stop).observe, stack.enter_context(bar).observe]
+        run = simulation.run(glances=glances)
     if run.trouble is not None:
         print(run.trouble, file=sys.stderr)
     record = record_of(run)

@@ -147,19 +147,27 @@ class Setpoints:
         """Tell those what comes that are due, before so many steps of the engine; gives who they
         are, and which of them are under way."""
         (axes,) = self._due.nonzero()
+        moves = under_way(*self._plan[2:, axes])
+        self._due[axes], self.any_due = moves, bool(moves.any())
+        self.tell(self._planned(axes, steps) if self.any_due else self._standing(axes))
+        return axes, moves
+
+    def _standing(self, axes: Index) -> Told:
+        """What axes are told that stand where they are to stand, for a tick and ever after."""
+        after = np.zeros((len(axes), INPUTS))
+        after[:, 0], after[:, 2] = self._plan[1, axes], self.weight[axes]
+        setpoints = np.broadcast_to(after[:, None], (len(axes), self._steps, INPUTS))
+        return Told(setpoints.reshape(len(axes), -1), after, self._drives[axes])
+
+    def _planned(self, axes: Index, steps: int) -> Told:
+        """What axes are told that `move` has set going, for as many ticks as so many steps take."""
         begun, x, v, a = self._plan[:, axes]
         since, ahead = self.d.time - begun, steps * self._timestep
         x, v = x + since * (v + 0.5 * since * a), v + since * a
         x1, v1 = x + ahead * (v + 0.5 * ahead * a), v + ahead * a
-        self.tell(self.of(axes, self._legs(x, v, a, steps), x1, v1))
-        self._due[axes] = moves = under_way(*self._plan[2:, axes])
-        self.any_due = bool(moves.any())
-        return axes, moves
-
-    def _legs(self, x: Array, v: Array, a: Array, steps: int) -> list[Leg]:
-        """As many whole ticks as so many steps take, under one acceleration."""
         begin = self._ahead[: max(steps, 1) : self._steps]
-        return [(x + t * (v + 0.5 * t * a), v + t * a, a) for t in begin]
+        legs = [(x + t * (v + 0.5 * t * a), v + t * a, a) for t in begin]
+        return self.of(axes, legs, x1, v1)
 
 
 def under_way(v: Array, a: Array) -> Truth:
