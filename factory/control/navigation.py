@@ -185,9 +185,12 @@ class Bundle:
         """How far (modes,) [m] each mode's farthest robot is from its goal."""
         return np.maximum.reduceat(np.abs(x - self.goal), self.starts)
 
-    def near_goal(self, x: Array, within: float) -> bool:
-        """Whether any mode's robots are all that near to its goal ball [m]."""
+    def near_goal(self, x: Array, within: float, slow: Truth | None = None) -> bool:
+        """Whether any mode's robots are all that near to its goal ball [m]; and all of those that
+        are `slow` (n,), but where time in the ball counts."""
         near = np.abs(x - self.goal) < self.eps + within
+        if slow is not None:
+            near &= slow | (self.dwell > 0.0)[self.owner]
         return bool(np.logical_and.reduceat(near, self.starts).any())
 
     def finished(self, there: Truth, clock: Array) -> Truth:

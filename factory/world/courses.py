@@ -15,6 +15,9 @@ from factory.world.setpoints import Leg, Setpoints, Told, under_way
 AHEAD = 0.0005
 """No robot is further ahead of its reference than this [m]."""
 
+SLOW = 0.03
+"""Nor is one at rest whose reference is faster than this [m/s], and cannot stop in a tick."""
+
 Way = tuple[Leg, Array, Array, bool]
 """A tick of axes, the positions [m] and speeds [m/s] that it leads to, and whether any of them may
 be where it goes then."""

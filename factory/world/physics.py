@@ -22,7 +22,7 @@ from factory.factory import Operation
 from factory.mjcf import names
 from factory.mjcf.binary import cached, keep
 from factory.mjcf.model import GRAVITY, HEAD_MASS, Model
-from factory.world.courses import AHEAD, Course, Courses, Way, travelled
+from factory.world.courses import AHEAD, SLOW, Course, Courses, Way, travelled
 from factory.world.inspection import Inspection
 from factory.world.outfeed import Outfeed
 from factory.world.rewind import Rewind
@@ -231,7 +231,8 @@ class MujocoWorld:
 
         def go(x: Array, v: Array) -> Way:
             x1, v1, a = follow(bundle, x, v, self.tick)
-            return (x, v, a), x1, v1, bundle.near_goal(x1, AHEAD)
+            slow = np.abs(v1) < np.maximum(SLOW, bundle.acceleration * self.tick)
+            return (x, v, a), x1, v1, bundle.near_goal(x1, AHEAD, slow)
 
         return travelled(self.setpoints, axes, (x, v), ticks, go)
 
