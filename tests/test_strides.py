@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from factory.disturbance import Gain, disturb
 from factory.engine import mujoco
 from factory.settings import LOOK, MOST, Settings
 from factory.simulation import Simulation
@@ -153,6 +154,17 @@ def test_a_glance_does_not_hold_a_run_up(monkeypatch: pytest.MonkeyPatch) -> Non
     assert glanced[-1] == seen[-1] and set(glanced) <= set(seen)
     assert len(seen) == round(seen[-1] / 0.01) and len(glanced) < 0.5 * len(seen)
     assert (one.events, one.physics) == (other.events, other.physics)
+
+
+def test_what_acts_in_every_tick_is_let_to() -> None:
+    """A weak drive pushes with its share of the force of each tick, whether somebody looks or
+    not."""
+    found = []
+    for observers in ([], [lambda *_: None]):
+        simulation = disturb(Simulation(layout_of("paper"), units=2), Gain(0.5))
+        run = simulation.run(observers)
+        found.append((run.events, run.physics, simulation.world.d.qpos.tobytes()))
+    assert found[0] == found[1]
 
 
 @pytest.mark.parametrize("more", [[], ["--json"]])

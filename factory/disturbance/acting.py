@@ -117,6 +117,7 @@ class _Acting:
             return sense() if self.measured is None else self.measured
 
         self.world.advance, self.world.sense = disturbed, sensed
+        self.world.at_once = 1
         self._measure()
 
     def _act(self) -> None:

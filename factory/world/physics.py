@@ -45,8 +45,8 @@ class MujocoWorld:
     """A compiled model with its data, and the parts' whereabouts.
 
     `gains`: factor on each axis's controller gain; `loaded`: what `load` has given for the model,
-    of which a copy is run. Raises InputError (BadMesh) where the engine refuses the model, with the
-    engine's own words.
+    of which a copy is run. `at_once`: so many ticks go to the engine at once, at most. Raises
+    InputError (BadMesh) where the engine refuses the model, with the engine's own words.
     """
 
     def __init__(
@@ -82,6 +82,7 @@ class MujocoWorld:
         self._v = np.zeros_like(self._x)
         self.tick, self.steps = self.settings.tick, self.settings.substeps
         self.stride, self.ticks = self.settings.stride, 0
+        self.at_once = self.stride
         self.courses = Courses()
         self.supplied = True
         self._active = np.empty(0, np.intp)
@@ -210,7 +211,7 @@ class MujocoWorld:
         contacts and a tray that is about to be there ask to be."""
         if ticks == 1 or self.d.ncon or self.outfeed.settles:
             return 1
-        return min(ticks, self.stride - self.ticks % self.stride)
+        return min(ticks, self.at_once, self.stride - self.ticks % self.stride)
 
     def _next(self, bundle: Bundle, axes: Index, ticks: int) -> Course:
         """What comes after the last course, of so many ticks at most."""
