@@ -71,9 +71,8 @@ class Settings:
 
     @property
     def samples(self) -> int:
-        """Setpoints that a drive's buffer holds: for the steps of a stride, and as many as a tick
-        has to spare."""
-        return (self.stride + 1) * self.substeps
+        """Setpoints that a drive's buffer holds: for the steps of a stride, and one to spare."""
+        return self.stride * self.substeps + 1
 
     def with_options(self, options: Mapping[str, float | int | None]) -> Settings:
         """These settings with every option that is not None put in place.

@@ -221,8 +221,9 @@ class Supervisor:
 
     def _redistribute(self, event: int) -> None:
         """m' = (m - •e) ∪ e•, f_m' = f_m ∘ d_e^-1; asserts that it is legal again."""
-        net, marked = self.net.net, self.marked.__getitem__
-        if not all(map(marked, net.preset[event])) or any(map(marked, net.postset[event])):
+        net = self.net.net
+        around = (*net.preset[event], *net.postset[event])
+        if not net.is_enabled(event, frozenset(p for p in around if self.marked[p])):
             raise AssertionError(f"{self.net.transitions[event].name} fires but is not enabled")
         for place in net.preset[event]:
             self._unmark(place)

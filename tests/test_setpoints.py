@@ -1,4 +1,4 @@
-"""A tick is one call of the engine: what the drives are told ahead, and what is gone back for."""
+"""What the drives are told ahead of the engine's steps, and what the world goes back for."""
 
 from __future__ import annotations
 

@@ -253,8 +253,7 @@ def test_a_contact_that_lasts_is_one(paper: Layout) -> None:
     world.move(axes, world.reference[axes], np.where(axes % 2, 0.3, -0.3), np.zeros(len(axes)))
     for _ in range(800):
         world.advance(1)
-        if not world.d.ncon:
-            world.inspection.apart()
+        world.inspection.tick()
         contact = world.d.contact
         now = {tuple(pair) for pair in contact.geom[contact.dist < 0].tolist()}
         onsets, lasted, before = onsets + len(now - before), lasted + len(now & before), now

@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 
 from factory.disturbance import Gain, disturb
-from factory.engine import mujoco
 from factory.settings import LOOK, MOST, Settings
 from factory.simulation import Simulation
 from factory.trace import Event, PhysicsFigures
@@ -110,33 +109,13 @@ def test_who_looks_away_while_a_goal_is_near_sees_it_late(monkeypatch: pytest.Mo
     assert not followed("paper", MOST).agrees(singly)
 
 
-@pytest.mark.parametrize(("name", "given"), [("20", {}), ("chest", {}), ("20", {"fuse": True})])
-def test_there_are_setpoints_to_spare(name: str, given: dict[str, Any]) -> None:
-    """A step that wakes somebody takes two of each buffer's samples: in one call of the engine no
-    more do than there are spare ones."""
-    simulation = ready(name, True, **given)
-    world, settings = simulation.world, simulation.settings
-    heads, spare = world.setpoints._heads, []
-
-    def step(m: mujoco.MjModel, d: mujoco.MjData, steps: int = 1) -> None:
-        fresh = heads[:, 0] == settings.samples - 1
-        mujoco.mj_step(m, d, steps)
-        taken = (heads[fresh, 0].astype(int) + 1) % settings.samples
-        spare.extend((taken - steps) % settings.samples)
-
-    with stepping(step):
-        while world.delivered() < 1:
-            simulation.supervisor.step(MOST)
-    assert spare and max(spare) <= settings.substeps
-
-
 @pytest.mark.parametrize("timestep", [1e-5, 1e-3, 2e-3, 4e-3, 2e-2])
 @pytest.mark.parametrize("substeps", [1, 5, 100])
 def test_a_stride_is_no_longer_than_a_look(timestep: float, substeps: int) -> None:
     settings = Settings(timestep=timestep, substeps=substeps)
     assert 1 <= settings.stride <= MOST
     assert settings.stride == 1 or settings.stride * settings.tick <= LOOK + 1e-12
-    assert settings.samples >= settings.stride * substeps + substeps
+    assert settings.samples == settings.stride * substeps + 1
 
 
 def test_what_is_late_at_max_time_is_not_run() -> None:

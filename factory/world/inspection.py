@@ -45,9 +45,9 @@ class Inspection:
             position = self.d.efc_pos[:rows].reshape(-1, 6)[:, :3]
             self.residual = max(self.residual, float(np.abs(position).max()))
 
-    def apart(self) -> None:
-        """Nothing touches any more."""
-        if self._touching:
+    def tick(self) -> None:
+        """A tick is over. What touched may be apart: a step without contacts is not looked at."""
+        if self._touching and not self.d.ncon:
             self._touching = frozenset()
 
     def started(self, operation: Operation, unit: int) -> None:

@@ -209,7 +209,7 @@ class MujocoWorld:
     def _at_most(self, ticks: int) -> int:
         """So many ticks may go to the engine at once: none but the last of a stride is seen, and
         contacts and a tray that is about to be there ask to be."""
-        if ticks == 1 or self.d.ncon or self.outfeed.settles:
+        if self.d.ncon or self.outfeed.settles:
             return 1
         return min(ticks, self.at_once, self.stride - self.ticks % self.stride)
 
@@ -280,7 +280,7 @@ class MujocoWorld:
             self.setpoints.again()
         for number in range(steps):
             if number and number % self.steps == 0:
-                self._next_tick()
+                self.inspection.tick()
             if vicinity.stale:
                 vicinity.look()
             begin = perf_counter()
@@ -293,12 +293,6 @@ class MujocoWorld:
     def _send_tray(self, course: Course) -> None:
         self.outfeed.send(course)
         self._attend(self.outfeed.axis, np.frombuffer(course.moves, bool))
-
-    def _next_tick(self) -> None:
-        """Another tick begins of those that went to the engine at once."""
-        self.setpoints.again()
-        if not self.d.ncon:
-            self.inspection.apart()
 
     def _attend(self, axes: Index, moves: Truth) -> None:
         """The engine puts to sleep what has been slow for a while, and a robot under way would
@@ -319,8 +313,7 @@ class MujocoWorld:
         """After some ticks: look at what is looked at once in a stride, and at the outfeed's
         tray."""
         self.ticks += ticks
-        if not self.d.ncon:
-            self.inspection.apart()
+        self.inspection.tick()
         if self.ticks % self.stride == 0:
             self.inspection.welds()
             if self.stock.joining:

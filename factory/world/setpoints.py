@@ -3,8 +3,8 @@
 Each drive has a buffer. The engine reads it late (`mjModel.actuator_delay`), so whatever is written
 before a call of the engine is read in its steps, and there is no need to come back from it in
 between. In each step the engine puts `ctrl` in place of the oldest sample: who has been told to
-stand needs to be told no more. It does so twice in a step that has woken a body, and is begun anew;
-so there are as many samples to spare as a tick has steps.
+stand needs to be told no more. A step in which something falls asleep reads its sample once more,
+after that: there is one to spare.
 
 A buffer in `mjData.history`: one number for users, the place of the newest sample, the samples'
 times, their values. The value at a time is that of the last sample before it, so samples are half a
@@ -61,7 +61,7 @@ class Setpoints:
         self._drives, self._ctrl = actuators, d.ctrl.reshape(-1, INPUTS)
         self._timestep = float(m.opt.timestep)
         samples = int(m.actuator_history[actuators[0], 0])
-        most = samples - steps
+        most = samples - 1
         m.actuator_delay[actuators] = most * self._timestep
         self._ahead = self._timestep * np.arange(most)
         self._steps = steps
@@ -103,8 +103,7 @@ class Setpoints:
         self._ctrl[told.drives] = told.after
 
     def again(self) -> None:
-        """Tell again what is not over yet: the engine goes back in time, or has used up what there
-        is to spare."""
+        """Tell again what is not over yet: the engine has gone back in time."""
         for _, begin, told in self._latest:
             self._write(begin, told)
 
