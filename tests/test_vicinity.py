@@ -3,23 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from functools import cache
 from typing import Any
 
 import numpy as np
 import pytest
 
-from factory import settings
 from factory.disturbance import Push, disturb
 from factory.disturbance.hands import Hands
 from factory.engine import mujoco
 from factory.fidelity.shadow import Shadow
 from factory.layout.plan import Layout
-from factory.settings import Settings
+from factory.settings import MOST, Settings
 from factory.simulation import Simulation
-from factory.world import vicinity
+from factory.world import stock, vicinity
 from factory.world.contacts import NOBODY
-from factory.world.vicinity import Vicinity
+from factory.world.loads import Load, loads
+from factory.world.reach import Reach
+from factory.world.vicinity import SWAY, Vicinity
 from tests.bench.factories import balanced
 from tests.bench.factories import laid_out as floor_of
 from tests.bench.replaying import stepping
@@ -169,39 +171,10 @@ def test_nothing_near_what_moves_is_overlooked(seed: int) -> None:
     assert all_overlooked(seed) == set()
 
 
-def test_who_sees_only_what_moves_overlooks_what_is_near(monkeypatch: pytest.MonkeyPatch) -> None:
-    reached = Vicinity._reached
-
-    def short_sighted(self: Vicinity, who: np.ndarray, bodies: np.ndarray) -> np.ndarray:
-        near = np.zeros_like(reached(self, who, bodies))
-        near[who] = True
-        return near
-
-    monkeypatch.setattr(Vicinity, "_reached", short_sighted)
-    assert all_overlooked(0)
-    assert any(crash(seed, True) != crash(seed, False) for seed in range(4))
-
-
-def test_who_looks_too_short_ahead_overlooks_what_is_near(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(settings, "LOOK", 2.0)
-    monkeypatch.setattr(settings, "MOST", 200)
-    monkeypatch.setattr(vicinity, "SUDDEN", -0.5)
-    monkeypatch.setattr(vicinity, "TIMES", -1.0)
-    assert all_overlooked(0)
-
-
-def all_overlooked_by_one(seed: int) -> set[str]:
-    """All others rest while one robot runs into somebody, and is looked at four times as rarely as
-    usual."""
-    simulation, found, rng = ready("20", True), set[str](), np.random.default_rng(seed)
-    world, contacts = simulation.world, simulation.world.stock.contacts
-    for _ in range(int(rng.integers(20, 100))):
-        simulation.supervisor.step()
-    axis, speed = rng.integers(0, world.tray, 1), rng.choice([-0.5, 0.5], 1)
-    everybody, still = np.arange(world.tray), np.zeros(world.tray)
-    world.move(everybody, world.reference[everybody], still, still)
-    for _ in range(20):
-        world.advance(5)
+def overlooked_in(name: str, **given: object) -> set[str]:
+    """In a run in which all goes well."""
+    simulation, found = ready(name, True, **given), set[str]()
+    contacts = simulation.world.stock.contacts
 
     def step(m: mujoco.MjModel, d: mujoco.MjData, steps: int = 1) -> None:
         for _ in range(steps):
@@ -209,43 +182,91 @@ def all_overlooked_by_one(seed: int) -> set[str]:
             found.update(overlooked(m, d, contacts))
 
     with stepping(step):
-        world.move(axis, world.reference[axis], speed, np.zeros(1))
-        for _ in range(100):
-            if world.d.ncon:
-                break
-            world.advance(5)
+        while simulation.world.time < 5.0:
+            simulation.supervisor.step(MOST)
     return found
 
 
-def test_who_looks_back_overlooks_what_is_ahead(monkeypatch: pytest.MonkeyPatch) -> None:
-    reach, seeds = Vicinity._reach, (1, 5, 8, 13)
-
-    def backwards(self: Vicinity, who: np.ndarray) -> np.ndarray:
-        return np.roll(reach(self, who), 2, axis=0)
-
-    monkeypatch.setattr(settings, "LOOK", 0.16)
-    monkeypatch.setattr(settings, "MOST", 16)
-    monkeypatch.setattr(vicinity, "TIMES", 0.0)
-    assert not any(all_overlooked_by_one(seed) for seed in seeds)
-    monkeypatch.setattr(Vicinity, "_reach", backwards)
-    assert any(all_overlooked_by_one(seed) for seed in seeds)
+RUNS: list[tuple[str, dict[str, Any]]] = [
+    ("paper", {}),
+    ("gearbox", {}),
+    ("gearbox", {"fuse": True}),
+    ("20", {"settings": Settings(stage=1)}),
+    ("20", {"fuse": True}),
+]
 
 
-def test_who_forgets_what_is_held_overlooks_what_is_near_it(
+@pytest.mark.parametrize(("name", "given"), RUNS)
+def test_nothing_that_anybody_meets_on_its_way_is_overlooked(
+    name: str, given: dict[str, Any]
+) -> None:
+    assert overlooked_in(name, **given) == set()
+
+
+def test_who_sees_only_what_moves_overlooks_what_is_near(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(Reach, "_meets", lambda *_: 0)
+    assert overlooked_in("20")
+
+
+def test_who_forgets_what_is_carried_overlooks_what_is_near_it(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    def forgotten(self: Vicinity, who: np.ndarray) -> None:
-        self._changed[who] = False
-        holder = self.holder.copy()
-        self.holder[[*self.contacts.solid]] = NOBODY
-        try:
-            measure(self, who)
-        finally:
-            self.holder[:] = holder
+    def forgotten(*given: Any) -> dict[tuple[int, str], Load]:
+        return {key: replace(load, welds=()) for key, load in loads(*given).items()}
 
-    measure = Vicinity._measure
-    monkeypatch.setattr(Vicinity, "_measure", forgotten)
-    assert all_overlooked(0)
+    monkeypatch.setattr(stock, "loads", forgotten)
+    assert overlooked_in("chest")
+
+
+def stay_at_home(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Everybody goes somewhere else than was foreseen: nobody was to go anywhere."""
+    goes = Vicinity.goes
+    monkeypatch.setattr(Vicinity, "goes", lambda self, who, x, v, _: goes(self, who, x, 0 * v, x))
+
+
+def test_who_leaves_the_way_that_was_foreseen_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
+    stay_at_home(monkeypatch)
+    assert overlooked_in("chest") == set()
+
+
+def test_who_does_not_watch_overlooks_what_is_met_on_other_ways(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    stay_at_home(monkeypatch)
+    monkeypatch.setattr(Vicinity, "holds", lambda _: True)
+    assert overlooked_in("chest")
+
+
+def set_off(seed: int, culls: bool) -> tuple[list[bytes], int]:
+    """Some robots run wherever they like, as those gone wild, and nobody has been told."""
+    simulation = ready("20", culls)
+    world, rng = simulation.world, np.random.default_rng(seed)
+    for _ in range(100):
+        simulation.supervisor.step()
+    axes = rng.choice(world.tray, 6, replace=False)
+    x, v = world.reference[axes], rng.uniform(-0.5, 0.5, 6)
+    world.setpoints.move(axes, x, v, np.zeros(6))
+    for axis in axes:
+        world._attend(np.array([axis]), np.array([True]))
+    found = states(simulation, lambda: world.advance(5), 150)
+    return found, len(world.inspection.unintended)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_collision_off_all_ways_is_the_same_to_the_last_bit(
+    seed: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Even if nobody was to meet anybody."""
+    monkeypatch.setattr(Reach, "_meets", lambda *_: 0)
+    whole, touched = set_off(seed, False)
+    assert touched
+    assert set_off(seed, True) == (whole, touched)
+
+
+def test_who_does_not_watch_overlooks_a_collision(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(Reach, "_meets", lambda *_: 0)
+    monkeypatch.setattr(Vicinity, "holds", lambda _: True)
+    assert any(set_off(seed, True) != set_off(seed, False) for seed in range(3))
 
 
 def test_what_the_engine_wakes_by_itself_is_seen_a_tick_later() -> None:
@@ -256,7 +277,6 @@ def test_what_the_engine_wakes_by_itself_is_seen_a_tick_later() -> None:
     m, d, collides = world.m, world.d, world.stock.contacts.collides
     sleeps = collides & (m.body_contype == 0) & (d.body_awake == 0)
     body = int(np.flatnonzero(sleeps)[0])
-    world.vicinity._due = np.inf
     d.xfrc_applied[body, 2] = 1e-6
     world.advance(1)
     assert d.body_awake[body] == IS_AWAKE
@@ -264,22 +284,22 @@ def test_what_the_engine_wakes_by_itself_is_seen_a_tick_later() -> None:
     assert m.body_contype[body] | m.body_conaffinity[body]
 
 
-def test_the_box_of_a_part_holds_it_whichever_way_it_is_turned() -> None:
-    simulation, rng = ready("gearbox", True), np.random.default_rng(4)
+@pytest.mark.parametrize("fuse", [False, True])
+def test_what_a_holder_has_is_within_its_box(fuse: bool) -> None:
+    simulation = ready("gearbox", True, fuse=fuse)
     world = simulation.world
-    m, d, seen = world.m, world.d, world.vicinity
+    m, d, seen, contacts = world.m, world.d, world.vicinity, world.stock.contacts
     for _ in range(60):
-        simulation.supervisor.step()
-    parts = np.array([*world.stock.contacts.solid])
-    at = m.jnt_qposadr[m.body_jntadr[parts]]
-    for _ in range(5):
-        d.qpos[at[:, None] + np.arange(3, 7)] = rng.normal(size=(len(parts), 4))
-        mujoco.mj_normalizeQuat(m, d.qpos)
+        for _ in range(10):
+            simulation.supervisor.step()
         mujoco.mj_kinematics(m, d)
-        here = parts[world.stock.contacts.collides[parts]]
-        low, high = boxes(m, d, here).transpose(1, 0, 2)
-        assert (d.xpos[here] + seen._lowest[here] <= low + 1e-9).all()
-        assert (high <= d.xpos[here] + seen._highest[here] + 1e-9).all()
+        bodies = np.flatnonzero(contacts.collides & (contacts.code != NOBODY))
+        holder = contacts.code[bodies]
+        low, high = boxes(m, d, bodies).transpose(1, 0, 2)
+        place = np.where(seen.reach.address < 0, 0.0, d.qpos[seen.reach.address])[holder]
+        box = seen.reach._between(seen._load[holder], place, place) + SWAY
+        assert (box >= np.hstack([high[:, :2], -low[:, :2]]).T).all()
+        assert (box <= seen.reach._most[:, holder] + 2 * SWAY).all()
 
 
 def test_a_shadow_sees_what_is_left_out() -> None:

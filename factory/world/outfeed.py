@@ -23,7 +23,8 @@ class Outfeed:
     """A tray that is an axis by number, with its joint's addresses in `qpos` and `qvel`.
 
     `axis` (1,). `home`: it rests at the beginning of its way, or did when somebody looked. `goes`:
-    its reference is not where it is aimed at. `settles`: it may be there any tick.
+    its reference is not where it is aimed at. `settles`: it may be there any
+    tick.
     """
 
     def __init__(
@@ -55,12 +56,18 @@ class Outfeed:
         x, v = self.d.qpos[self._addresses[0]], self.d.qvel[self._addresses[1]]
         return bool(abs(x - place) < NEAR and abs(v) < NEAR / self.settings.tick)
 
-    def aim(self, loaded: bool) -> None:
-        """From now on it carries a product, or none, and goes accordingly."""
-        self._place = self._way if loaded else 0.0
+    def aim(self, loaded: bool) -> bool:
+        """From now on it carries a product, or none, and goes accordingly. Whether that is
+        new."""
+        before, self._place = self._place, self._way if loaded else 0.0
         x, v = float(self._x[0]), float(self._v[0])
         self.goes = x != self._place or v != 0.0
         self.settles = abs(x - self._place) < CLOSE and (loaded or not self.home)
+        return self._place != before
+
+    def way(self) -> tuple[Array, Array, Array]:
+        """Where its reference is [m], how fast [m/s], and where it is aimed at."""
+        return self._x, self._v, np.array([self._place])
 
     def course(self, ticks: int) -> Course:
         """Some ticks of its way, as fast as its limits allow, until it is nearly there."""

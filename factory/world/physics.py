@@ -22,6 +22,7 @@ from factory.factory import Operation
 from factory.mjcf import names
 from factory.mjcf.binary import cached, keep
 from factory.mjcf.model import GRAVITY, HEAD_MASS, Model
+from factory.world.contacts import NOBODY
 from factory.world.courses import AHEAD, SLOW, Course, Courses, Way, travelled
 from factory.world.inspection import Inspection
 from factory.world.outfeed import Outfeed
@@ -102,6 +103,10 @@ class MujocoWorld:
         self.outfeed = Outfeed(self.d, model, self.tray, tray, self.setpoints, self.courses)
         self.stock = Stock(self.m, self.d, model, units, counts or {}, wip)
         self.vicinity = self.stock.vicinity
+        self._holder = np.full(len(slides), NOBODY)
+        self._holder[: len(carriages)] = np.arange(len(carriages)) + 1
+        self._holder[self.tray] = self.stock.tray
+        self.vicinity.goes(self._holder, here, still, here)
         gaps = self.stock.board.gaps
         self.inspection = Inspection(self.m, self.d, model, self.stock.contacts, gaps)
         for operation in factory.operations:
@@ -172,6 +177,7 @@ class MujocoWorld:
                 self.inspection.measured(*self.stock.finished(unit))
             for slot, robot in enumerate(operation.robots):
                 self._load(robot, self.model.masses.get(operation.after[slot], 0.0))
+                self.vicinity.carries(robot, operation.after[slot])
         self.inspection.handoffs += self.stock.hand_over(ended)
         self.supplied = True
 
@@ -188,7 +194,7 @@ class MujocoWorld:
         reference."""
         near, ticks = False, self._at_most(ticks)
         if axes is not self._active:
-            self._halt(axes)
+            self._turn(bundle, axes)
         tray = None
         if self.outfeed.goes:
             tray = self.outfeed.course(ticks)
@@ -211,7 +217,7 @@ class MujocoWorld:
         contacts and a tray that is about to be there ask to be."""
         if self.d.ncon or self.outfeed.settles:
             return 1
-        return min(ticks, self.at_once, self.stride - self.ticks % self.stride)
+        return min(ticks, self.at_once, self.stride - self.ticks)
 
     def _next(self, bundle: Bundle, axes: Index, ticks: int) -> Course:
         """What comes after the last course, of so many ticks at most."""
@@ -237,10 +243,10 @@ class MujocoWorld:
 
         return travelled(self.setpoints, axes, (x, v), ticks, go)
 
-    def _halt(self, active: Index) -> None:
-        """Robots whose operation has ended stop where their reference is. They may hand over at a
-        low speed: left as a setpoint it would carry them out of the goal, and of the next
-        domain."""
+    def _turn(self, bundle: Bundle | None, active: Index) -> None:
+        """Other modes are active. Robots whose operation has ended stop where their reference is.
+        They may hand over at a low speed: left as a setpoint it would carry them out of the goal,
+        and of the next domain."""
         left = np.zeros_like(self._under_way)
         left[self._active] = True
         left[active] = False
@@ -248,12 +254,19 @@ class MujocoWorld:
         self.speed[axes] = 0.0
         self.setpoints.stand(axes, self._x[axes], self._under_way[axes])
         self._active, self._moves, self._last = active, b"", None
+        self._look()
+        goals = self._x.copy()
+        if bundle is not None:
+            goals[active] = bundle.goal
+        axes = np.concatenate([axes, active])
+        self.vicinity.goes(self._holder[axes], self._x[axes], self._v[axes], goals[axes])
 
     def move(self, axes: Index, x: Array, v: Array, a: Array) -> None:
         """From now on the references of `axes` run from x [m] at speed v under acceleration a, in
         ticks that have not been set otherwise."""
         self._catch_up()
         self._last = None
+        self.vicinity.astray()
         self.setpoints.move(axes, x, v, a)
 
     def advance(self, steps: int) -> None:
@@ -274,9 +287,12 @@ class MujocoWorld:
             begin = perf_counter()
             step(m, d, steps)
             self.physics_time += perf_counter() - begin
-            if not d.maxuse_con:
+            strays = not vicinity.holds()
+            if not d.maxuse_con and not strays:
                 return
             self._begin.restore()
+            if strays:
+                vicinity.astray()
             self.setpoints.again()
         for number in range(steps):
             if number and number % self.steps == 0:
@@ -314,10 +330,8 @@ class MujocoWorld:
         tray."""
         self.ticks += ticks
         self.inspection.tick()
-        if self.ticks % self.stride == 0:
-            self.inspection.welds()
-            if self.stock.joining:
-                self.stock.settle()
+        if self.ticks >= self.stride:
+            self._look()
         unit, outfeed = self.stock.on_tray, self.outfeed
         if unit is not None and outfeed.rests_away():
             self.inspection.measured(*self.stock.finished(unit))
@@ -325,7 +339,15 @@ class MujocoWorld:
             self.supplied = True
         elif unit is None and not outfeed.home and outfeed.rests_home():
             self.supplied = True
-        outfeed.aim(self.stock.on_tray is not None)
+        if outfeed.aim(self.stock.on_tray is not None):
+            self.vicinity.goes(self._holder[outfeed.axis], *outfeed.way())
+
+    def _look(self) -> None:
+        """At what is looked at when other modes begin, and once in a stride from then."""
+        self.ticks = 0
+        self.inspection.welds()
+        if self.stock.joining:
+            self.stock.settle()
 
     def unstable(self) -> str:
         """What made the engine give up, "" while it has not."""

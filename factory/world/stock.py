@@ -17,8 +17,10 @@ from factory.mjcf.parts import parked_at, presented_at
 from factory.pag import NOPART
 from factory.world.contacts import NOBODY, Contacts
 from factory.world.fusing import RIGID, SETTLING, Groups, fuse, misfit
+from factory.world.loads import Load, loads
+from factory.world.reach import Reach
 from factory.world.switchboard import Switchboard
-from factory.world.vicinity import Vicinity
+from factory.world.vicinity import Vicinity, margin
 
 NOTHING: Mapping[int, float] = MappingProxyType({})
 
@@ -78,7 +80,7 @@ class Stock:
         settings = model.settings
         asked = max(settings.acceleration, settings.outfeed_acceleration)
         period = settings.stride * settings.tick
-        self.vicinity = Vicinity(m, d, self.contacts, holders, period, asked)
+        self.vicinity = self._vicinity(holders, margin(asked, period), asked, bool(counts))
         self.board = Switchboard(m, d, self.contacts, self.vicinity)
         self._hide_spares()
         self._hand_out(counts)
@@ -298,6 +300,26 @@ class Stock:
         tree, one = self.m.body_treeid, self.m.eq_obj1id
         found = {int(tree[one[weld]]): robot + 1 for (robot, _), weld in self.grip.items()}
         return found | {int(tree[one[weld]]): self.tray for weld in self.hold.values()}
+
+    def _vicinity(self, holders: int, margin: float, asked: float, begun: bool) -> Vicinity:
+        """Where a marking has `begun`, robots have at first whatever they ever have."""
+        layout, robots = self.model.layout, self.model.factory.robots
+        first = [Load(holder) for holder in range(holders + 1)]
+        grips: dict[int, list[int]] = {robot.index: [] for robot in robots}
+        for (robot, _), weld in self.grip.items() if begun else ():
+            grips[robot].append(weld)
+        for (robot, welds), path in zip(grips.items(), layout.guidepaths, strict=True):
+            first[robot + 1] = Load(robot + 1, tuple(welds), 0.0, path.length)
+        for label, holder in self.feeder.items():
+            first[holder] = Load(holder, (self.feed[label],))
+        first[self.tray] = Load(self.tray, tuple(self.hold.values()), 0.0, layout.outfeed_way)
+        slides = {robot.index + 1: names.slide(robot.name) for robot in robots}
+        slides[self.tray] = names.OUTFEED_SLIDE
+        joints = {holder: self.m.joint(name).id for holder, name in slides.items()}
+        others = loads(self.model, self.grip)
+        reach = Reach(self.m, self.d, self.contacts, [*first, *others.values()], joints, margin)
+        numbers = {key: n for n, key in enumerate(others, start=len(first))}
+        return Vicinity(self.m, self.d, self.contacts, reach, numbers, asked)
 
     def _put_away(self, labels: Sequence[str], copies: Sequence[int]) -> None:
         spares = list(zip(labels, copies, strict=True))

@@ -79,16 +79,10 @@ class Switchboard:
             d.eq_active[on] = True
             self.wake(np.array(touched))
         if self._held:
-            self._take(_listed(self._held), _listed(self._held.values()))
+            self.contacts.hold(_listed(self._held), _listed(self._held.values()))
         for gathered in (self._on, self._off, self._gripped, self._held, self._placed):
             gathered.clear()
         return gripped
-
-    def _take(self, bodies: Index, holders: Index) -> None:
-        """Parts change hands."""
-        self.vicinity.changed(self.contacts.code[bodies])
-        self.vicinity.changed(holders)
-        self.contacts.hold(bodies, holders)
 
     def _put(self) -> None:
         """Put bodies where they belong."""

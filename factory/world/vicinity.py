@@ -1,43 +1,56 @@
-"""Which bodies the engine's broad phase looks at: those that move, and all that they may reach.
+"""Which bodies the engine's broad phase looks at: those of whoever is under way, and of all that
+they may meet there.
 
 The engine boxes every body that can collide in every step, and drops pairs of sleepers afterwards.
-Most of a factory rests, far from what moves: it is left out of the broad phase until something
-comes near, or it moves itself. No pair that could touch is left out, so a run is the same to the
-last bit.
+Most of a factory rests, far from what moves: it is left out of the broad phase until it moves
+itself, or somebody goes by. Where they go is known; should anybody leave their way, or anything
+touch, all is looked at until the next modes begin. No pair that could touch is left out, so a run
+is the same to the last bit.
 """
 
 from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import reduce
+from operator import or_
 
 import numpy as np
 
 from factory.control.mode import Array, Index
 from factory.engine import mujoco
 from factory.world.contacts import NOBODY, Contacts
+from factory.world.reach import CELL, Reach
 
 TIMES = 2.0
 """Nothing gains speed faster than so many times what the settings ask for, unless it touches
 something or is pushed."""
 
-SUDDEN = 20.0
-"""What touches something does not gain speed faster than this [m/s²], or than the above."""
-
-CROWD = 0.25
-"""Where more than this share of all holders moves, there is little to leave out, and nothing is."""
-
 FEW = 250
 """Where there are fewer holders, looking takes longer than it saves: up to some 100 robots."""
 
+CALM = 0.1
+"""What has touched is back in its place in the hand so long [s] after that."""
+
+AWAKE = np.iinfo(np.int32).min
+"""The engine has less than nought for who is awake, and more than this."""
+
 SWAY = 1e-3
-"""What is held is not further than this from where it was when it was taken [m], unless something
+"""What is held is not further than this from its place in the hand [m], unless something
 touches."""
+
+
+def margin(acceleration: float, period: float) -> float:
+    """How far [m] anything may have been off its way, and come back, while nobody looked for so
+    long [s], where the settings ask for that acceleration [m/s²]; and sway besides."""
+    return TIMES * acceleration * period**2 / 8 + SWAY
 
 
 class Vicinity:
     """The bodies that the broad phase of a model looks at: all, where there are few holders.
 
-    All that is in the same hands is looked at as one box, seen from above, that goes where its
-    holder goes; `holders` are the codes that `contacts` has. All that moves is looked at every
-    `period` [s]. `stale`: something has been woken since the last look, or that is due.
+    `loads`: the number that `reach` has for each robot (index) with what it carries, by label; what
+    holders have at first has their own numbers. `asked`: the greatest acceleration in the settings
+    [m/s²]. `stale`: it has to look before the engine's next step.
     """
 
     def __init__(
@@ -45,39 +58,28 @@ class Vicinity:
         m: mujoco.MjModel,
         d: mujoco.MjData,
         contacts: Contacts,
-        holders: int,
-        period: float,
-        asked: float = 0.0,
+        reach: Reach,
+        loads: Mapping[tuple[int, str], int],
+        asked: float,
     ) -> None:
-        self.m, self.d, self.contacts, self.holder = m, d, contacts, contacts.code
-        self._gains = TIMES * asked
-        self._period, self._early = period, float(m.opt.timestep) / 2
-        self._culls, self._due = holders >= FEW, 0.0
-        self.stale = self._anew = self._touches = False
-        self._woken = [np.empty(0, np.intp)]
-        if self._culls:
-            self._seen = np.zeros(m.ntree, bool)
-            self._near = np.ones(holders + 1, bool)
-            self._meets = np.empty((2, int(CROWD * len(self._near)) + 1, len(self._near)), bool)
-            self._lowest, self._highest = _boxes(m, d, contacts)
-            self._of_tree, self._anchor = self._whose(holders)
-            self._extent = np.full((4, holders + 1), -np.inf)
-            self._rest = np.full((4, holders + 1), np.inf, np.float32)
-            self._changed = np.ones(holders + 1, bool)
-            everybody = np.unique(self.holder[self.holder != NOBODY])
-            self._measure(everybody)
-            self._place(everybody)
-
-    def _whose(self, holders: int) -> tuple[Index, Index]:
-        """A body of each tree that says whose it is, and the body that each holder goes with: the
-        world's for those that stand."""
-        own = self.holder.nonzero()[0]
-        trees, first = np.unique(self.m.body_treeid, return_index=True)
-        of_tree, anchor = first[trees >= 0], np.zeros(holders + 1, np.intp)
-        own = own[self.m.body_treeid[own] >= 0]
-        anchor[self.holder[own]] = of_tree[self.m.body_treeid[own]]
-        of_tree[self.m.body_treeid[own]] = own
-        return of_tree, anchor
+        self.m, self.d, self.contacts, self.holder, self.reach = (
+            m,
+            d,
+            contacts,
+            contacts.code,
+            reach,
+        )
+        self._asked, self._loads = asked, loads
+        count = len(reach.address)
+        self._culls, self._all = count > FEW, True
+        self.stale = self._foreseen = False
+        self._calm = -np.inf
+        self._woken: list[Index] = []
+        self._goal = np.full(count, np.nan)
+        self._met, self._anew = dict[int, int](), np.ones(count, bool)
+        self._span, self._load = np.zeros((2, count), np.intp), np.arange(count)
+        self._watched, self._low, self._high = np.empty(0, np.intp), np.empty(0), np.empty(0)
+        self._of_tree, self._asleep = _of_trees(m, self.holder), np.zeros_like(d.tree_asleep)
 
     def woken(self, bodies: Index) -> None:
         """Bodies are about to move."""
@@ -85,130 +87,99 @@ class Vicinity:
             self._woken.append(bodies)
             self.stale = True
 
-    def changed(self, holders: Index) -> None:
-        """Holders have something else in their hands."""
+    def carries(self, robot: int, label: str) -> None:
+        """A robot (index) has something else from now on, by its label."""
+        self._load[robot + 1] = self._loads[robot, label]
+        self._anew[robot + 1] = True
+
+    def goes(self, holders: Index, x: Array, v: Array, places: Array) -> None:
+        """From now on holders go to `places` on their slides [m], from x at speed v, and straight;
+        they may have to stop first. Who has not been told otherwise goes on."""
+        if not self._culls:
+            return
+        (new,) = (places != self._goal[holders]).nonzero()
+        holders, x, v, places = holders[new], x[new], v[new], places[new]
+        ways = np.stack([x, x + v * np.abs(v) / (2 * self._asked), places]) / CELL
+        self._goal[holders] = places
+        self._span[:, holders] = np.floor(ways.min(axis=0)) - 1, np.ceil(ways.max(axis=0)) + 1
+        self._anew[holders] = self._foreseen = self.stale = True
+
+    def astray(self) -> None:
+        """From now on nobody knows who goes where."""
         if self._culls:
-            self._changed[holders] = True
+            self._foreseen, self.stale = False, True
+
+    def holds(self) -> bool:
+        """Whether everybody that moves is where that was foreseen, if it was."""
+        if self._all:
+            return True
+        x = self.d.qpos.take(self._watched)
+        return not np.count_nonzero((x < self._low) | (x > self._high))
 
     def notice(self) -> None:
-        """It is stale at the end of a period, and where something has begun to touch or the engine
-        has woken something by itself."""
-        if self._culls and (
-            self.d.time >= self._due
-            or (self.d.ncon and not self._touches)
-            or (self._awake > self._seen).any()
-        ):
-            self._anew = self.stale = True
+        """It is stale where something touches, or the engine has woken something by itself."""
+        if not self._all and (self.d.ncon or np.count_nonzero(self.d.tree_asleep < self._asleep)):
+            self.stale = True
 
     def everything(self) -> None:
         """From now on nothing is left out: somebody pushes."""
         self._culls = self.stale = False
-        self._show(np.ones(self.m.nbody, bool))
-
-    @property
-    def _awake(self) -> np.ndarray:
-        return np.asarray(self.d.tree_asleep < 0)
+        self._all = True
+        self._show(np.ones_like(self._goal, bool))
 
     def look(self) -> None:
-        """Choose what the broad phase looks at: anew where that is due, else what has been woken
-        besides."""
-        anew, self._anew, self.stale = self._anew, False, False
-        touched, self._touches = self._touches, bool(self.d.ncon)
-        bodies, woken = self._woken[0], len(self._woken) > 1
-        if woken:
-            bodies = np.concatenate(self._woken)
-            del self._woken[1:]
-        if anew:
-            self._seen = self._awake
-            bodies = np.concatenate([bodies, self._of_tree[self._seen]])
-            if self.d.time >= self._due:
-                self._due = self.d.time + self._period - self._early
-        moves = np.zeros_like(self._near)
-        moves[self.holder[bodies]] = True
+        """Choose what the broad phase looks at."""
+        if self.d.ncon:
+            self._calm = self.d.time + CALM
+        before, self._all = self._all, not self._foreseen or self.d.time < self._calm
+        if not self._all:
+            self._show(self._near())
+        elif not before:
+            self._show(np.ones_like(self._goal, bool))
+        self._woken.clear()
+        self.stale = False
+
+    def _near(self) -> np.ndarray:
+        """The holders (holders + 1,) that move, and that those may meet; and watch them."""
+        awake, moves = self.d.tree_asleep < 0, np.zeros_like(self._goal, bool)
+        if self._woken:
+            awake[self._with(np.concatenate(self._woken))] = True
+        moves[self.holder[self._of_tree[awake]]] = True
         moves[NOBODY] = False
-        who = moves.nonzero()[0]
-        reach = self._reach_of_any(who, bodies) if touched or self._touches else self._reach(who)
-        near = self._reached(who, reach)
-        if not anew:
-            near |= self._near
-        if woken:
-            self._seen |= moves[self.holder[self._of_tree]]
-        self._near = near
-        self._show(near[self.holder])
+        self._asleep[:] = np.where(awake, AWAKE, 0)
+        (who,) = moves.nonzero()
+        span, address = self._span[:, who], self.reach.address[who]
+        on = address >= 0
+        self._watched, (self._low, self._high) = address[on], span[:, on] * CELL
+        met, anew = self._met, who[self._anew[who]]
+        ways = zip(self._load[anew].tolist(), *self._span[:, anew].tolist(), strict=True)
+        met.update(zip(anew.tolist(), map(self.reach.met.__getitem__, ways), strict=True))
+        self._anew[anew] = False
+        bits = reduce(or_, map(met.__getitem__, who.tolist()), 0)
+        packed = np.frombuffer(bits.to_bytes(len(moves) // 8 + 1, "little"), np.uint8)
+        meets = np.unpackbits(packed, count=len(moves), bitorder="little")
+        return np.asarray(moves | meets.view(bool))
 
-    def _reach(self, who: Index) -> Array:
-        """How far holders that move come within a period, to the east, north, west and south
-        (4, n) [m]: as fast as they are they go on, or somewhat faster or slower."""
-        changed = who[self._changed[who]]
-        if len(changed):
-            self._measure(changed)
-        ahead = self.d.cvel.take(self._anchor[who], axis=0)[:, 3:5].T * self._period
-        ahead = np.maximum(np.concatenate([ahead, -ahead]), 0.0)
-        return np.asarray(ahead + (self._gains * self._period**2 / 2 + SWAY))
-
-    def _reach_of_any(self, who: Index, bodies: Index) -> Array:
-        """The same of holders with bodies that move, where something touches: whichever way, and
-        with what they have wherever it is."""
-        if len(who):
-            self._measure(who)
-        speed = np.abs(self.d.cvel[[*self._anchor[who], *bodies], 3:]).max(initial=0.0)
-        gain = max(SUDDEN, self._gains) * self._period
-        return np.full((4, len(who)), (speed + gain / 2) * self._period + SWAY)
-
-    def _reached(self, who: Index, reach: Array) -> np.ndarray:
-        """The holders (holders + 1,) that moving ones may reach within a period; themselves among
-        them."""
-        extent = self._place(who)
-        if len(who) > CROWD * len(self._near):
-            return np.ones_like(self._near)
-        east, north, west, south = (extent + reach).astype(np.float32)[:, :, None]
-        meets, also = self._meets[:, : len(who)]
-        np.less_equal(self._rest[0], west, out=meets)
-        for side, other in zip(self._rest[1:], (south, east, north), strict=True):
-            meets &= np.less_equal(side, other, out=also)
-        return np.asarray(meets.any(axis=0))
-
-    def _place(self, who: Index) -> Array:
-        """Where holders extend to now, to the east, north, west and south (4, n) [m]."""
-        at = self.d.xpos.take(self._anchor[who], axis=0)[:, :2].T
-        extent = self._extent.take(who, axis=1) + np.concatenate([at, -at])
-        self._rest[:, who] = -extent
-        return np.asarray(extent)
-
-    def _measure(self, who: Index) -> None:
-        """Measure how far what holders have extends from the body that they go with."""
-        self._changed[who] = False
-        chosen = np.zeros_like(self._near)
-        chosen[who] = True
-        bodies = chosen[self.holder].nonzero()[0]
-        self._extent[:, who] = -np.inf
-        if not len(bodies):
-            return
-        bodies = bodies[np.argsort(self.holder[bodies], kind="stable")]
-        holder, place = self.holder[bodies], self.d.xpos
-        first = np.concatenate([[0], (holder[1:] != holder[:-1]).nonzero()[0] + 1])
-        at = (place[bodies] - place[self._anchor[holder]])[:, :2]
-        sides = [at + self._highest[bodies, :2], -at - self._lowest[bodies, :2]]
-        self._extent[:, holder[first]] = np.maximum.reduceat(np.hstack(sides), first).T
+    def _with(self, bodies: Index) -> list[int]:
+        """The trees of bodies, and those that the engine wakes with them: that fell asleep
+        together, each with the number of the next."""
+        asleep, found = self.d.tree_asleep, set[int]()
+        for tree in self.m.body_treeid[bodies].tolist():
+            while tree not in found:
+                found.add(tree)
+                tree = int(asleep[tree]) if asleep[tree] >= 0 else tree
+        return [*found]
 
     def _show(self, near: np.ndarray) -> None:
-        np.multiply(self.contacts.contype, near, out=self.m.body_contype)
-        np.multiply(self.contacts.conaffinity, near, out=self.m.body_conaffinity)
+        seen = near[self.holder]
+        np.multiply(self.contacts.contype, seen, out=self.m.body_contype)
+        np.multiply(self.contacts.conaffinity, seen, out=self.m.body_conaffinity)
 
 
-def _boxes(m: mujoco.MjModel, d: mujoco.MjData, contacts: Contacts) -> tuple[Array, Array]:
-    """The lowest and highest corner of each body's box from its origin, in the world's directions
-    (nbody, 3) [m]. That of a part holds it whichever way it is turned; all else does not turn."""
-    mujoco.mj_kinematics(m, d)
-    turn, body = d.geom_xmat.reshape(-1, 3, 3), m.geom_bodyid
-    middle = d.geom_xpos + (turn @ m.geom_aabb[:, :3, None])[:, :, 0] - d.xpos[body]
-    half = (np.abs(turn) @ m.geom_aabb[:, 3:, None])[:, :, 0]
-    ball = np.linalg.norm(middle, axis=1) + np.linalg.norm(half, axis=1)
-    turns = np.isin(body, [*contacts.solid])
-    middle[turns], half[turns] = 0.0, ball[turns, None]
-    solid = contacts.collides[body]
-    solid[np.concatenate([*contacts.solid.values()])] = True
-    low, high = np.full((m.nbody, 3), np.inf), np.full((m.nbody, 3), -np.inf)
-    np.minimum.at(low, body[solid], (middle - half)[solid])
-    np.maximum.at(high, body[solid], (middle + half)[solid])
-    return low, high
+def _of_trees(m: mujoco.MjModel, holder: Index) -> Index:
+    """A body of each tree (ntree,) that says whose it is."""
+    trees, first = np.unique(m.body_treeid, return_index=True)
+    found = first[trees >= 0]
+    (own,) = ((holder != NOBODY) & (m.body_treeid >= 0)).nonzero()
+    found[m.body_treeid[own]] = own
+    return np.asarray(found)
