@@ -23,7 +23,7 @@ RANGES = {
 }
 """Least and greatest value of each setting: beyond lie nothing but overflows and endless runs."""
 
-LOOK = 0.08
+LOOK = 0.06
 """What need not be looked at in every tick is looked at again within this [s], or in the next."""
 
 MOST = 8

@@ -83,9 +83,8 @@ class PetriNet:
 
     def is_enabled(self, event: int, marking: Marking) -> bool:
         """Whether •e is inside m and e• outside m (Definition 3.4, condition 1)."""
-        return all(p in marking for p in self.preset[event]) and not any(
-            p in marking for p in self.postset[event]
-        )
+        before, after = self.preset[event], self.postset[event]
+        return marking.issuperset(before) and marking.isdisjoint(after)
 
     def is_detached(self, events: Iterable[int]) -> bool:
         """Whether the presets are pairwise disjoint, and the postsets too (section 3.1)."""

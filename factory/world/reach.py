@@ -34,9 +34,10 @@ class _Met(dict[Way, int]):
 class Reach:
     """Of holders, by the codes that `contacts` has, with what they may carry, `loads`, by number.
 
-    `slides`: the joint that a holder is on; who is on none stands. `margin` [m]: what comes as near
-    as that is met. `address` (holders + 1,): of each slide in `qpos`, -1 for none. `met`: the
-    holders that one with a load may meet on a way, wherever they are, as the bits of a number.
+    `slides`: the joint that a holder is on; who is on none stands. `margins` (holders + 1,): what
+    comes as near to a holder as that [m] is met. `address` (holders + 1,): of each slide in `qpos`,
+    -1 for none. `met`: the holders that one with a load may meet on a way, wherever they are, as
+    the bits of a number.
     """
 
     def __init__(
@@ -46,10 +47,10 @@ class Reach:
         contacts: Contacts,
         loads: Sequence[Load],
         slides: Mapping[int, int],
-        margin: float,
+        margins: Array,
     ) -> None:
         mujoco.mj_kinematics(m, d)
-        self._holder, self._margin = np.array([load.holder for load in loads]), margin
+        self._holder, self._margins = np.array([load.holder for load in loads]), margins
         count = int(self._holder.max()) + 1
         riders, joint = [*slides], np.array([*slides.values()])
         self.address = np.full(count, -1)
@@ -76,7 +77,7 @@ class Reach:
         if (here > self._most[:, holder] + 2 * CELL).any():
             self._most[:, holder] = np.maximum(self._most[:, holder], here)
             self.met.clear()
-        opposite = here[[2, 3, 0, 1], None] + self._margin
+        opposite = here[[2, 3, 0, 1], None] + self._margins[holder]
         meets = (opposite + self._most >= 0.0).all(axis=0)
         return int.from_bytes(np.packbits(meets, bitorder="little").tobytes(), "little")
 

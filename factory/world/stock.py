@@ -77,10 +77,7 @@ class Stock:
         self.on_tray: int | None = None
         self.left: list[float] = []
         holders = self.contacts.own(self._trees(), self.tray + len(self.feeder))
-        settings = model.settings
-        asked = max(settings.acceleration, settings.outfeed_acceleration)
-        period = settings.stride * settings.tick
-        self.vicinity = self._vicinity(holders, margin(asked, period), asked, bool(counts))
+        self.vicinity = self._vicinity(holders, bool(counts))
         self.board = Switchboard(m, d, self.contacts, self.vicinity)
         self._hide_spares()
         self._hand_out(counts)
@@ -301,7 +298,7 @@ class Stock:
         found = {int(tree[one[weld]]): robot + 1 for (robot, _), weld in self.grip.items()}
         return found | {int(tree[one[weld]]): self.tray for weld in self.hold.values()}
 
-    def _vicinity(self, holders: int, margin: float, asked: float, begun: bool) -> Vicinity:
+    def _vicinity(self, holders: int, begun: bool) -> Vicinity:
         """Where a marking has `begun`, robots have at first whatever they ever have."""
         layout, robots = self.model.layout, self.model.factory.robots
         first = [Load(holder) for holder in range(holders + 1)]
@@ -317,7 +314,11 @@ class Stock:
         slides[self.tray] = names.OUTFEED_SLIDE
         joints = {holder: self.m.joint(name).id for holder, name in slides.items()}
         others = loads(self.model, self.grip)
-        reach = Reach(self.m, self.d, self.contacts, [*first, *others.values()], joints, margin)
+        settings = self.model.settings
+        asked = np.full(len(first), settings.acceleration)
+        asked[self.tray] = settings.outfeed_acceleration
+        margins = margin(asked, settings.stride * settings.tick)
+        reach = Reach(self.m, self.d, self.contacts, [*first, *others.values()], joints, margins)
         numbers = {key: n for n, key in enumerate(others, start=len(first))}
         return Vicinity(self.m, self.d, self.contacts, reach, numbers, asked)
 

@@ -39,18 +39,19 @@ SWAY = 1e-3
 touches."""
 
 
-def margin(acceleration: float, period: float) -> float:
-    """How far [m] anything may have been off its way, and come back, while nobody looked for so
-    long [s], where the settings ask for that acceleration [m/s²]; and sway besides."""
-    return TIMES * acceleration * period**2 / 8 + SWAY
+def margin(accelerations: Array, period: float) -> Array:
+    """How far [m] anything may have been off its way, further than is watched for, and have come
+    back, while nobody looked for so long [s], where the settings ask for such accelerations [m/s²];
+    and sway besides."""
+    return np.asarray(np.maximum(TIMES * accelerations * period**2 / 8 - CELL, 0.0) + SWAY)
 
 
 class Vicinity:
     """The bodies that the broad phase of a model looks at: all, where there are few holders.
 
     `loads`: the number that `reach` has for each robot (index) with what it carries, by label; what
-    holders have at first has their own numbers. `asked`: the greatest acceleration in the settings
-    [m/s²]. `stale`: it has to look before the engine's next step.
+    holders have at first has their own numbers. `asked` (holders + 1,): the accelerations in the
+    settings [m/s²]. `stale`: it has to look before the engine's next step.
     """
 
     def __init__(
@@ -60,7 +61,7 @@ class Vicinity:
         contacts: Contacts,
         reach: Reach,
         loads: Mapping[tuple[int, str], int],
-        asked: float,
+        asked: Array,
     ) -> None:
         self.m, self.d, self.contacts, self.holder, self.reach = (
             m,
@@ -99,7 +100,8 @@ class Vicinity:
             return
         (new,) = (places != self._goal[holders]).nonzero()
         holders, x, v, places = holders[new], x[new], v[new], places[new]
-        ways = np.stack([x, x + v * np.abs(v) / (2 * self._asked), places]) / CELL
+        stop = x + v * np.abs(v) / (2 * self._asked[holders])
+        ways = np.stack([x, stop, places]) / CELL
         self._goal[holders] = places
         self._span[:, holders] = np.floor(ways.min(axis=0)) - 1, np.ceil(ways.max(axis=0)) + 1
         self._anew[holders] = self._foreseen = self.stale = True
