@@ -105,6 +105,7 @@ class Supervisor:
         self.fired = [0] * len(self.net.transitions)
         for transition, count in (counts or {}).items():
             self.fired[transition] = count
+        self.right = [place.right for place in self.net.places]
         self.missing = [len(places) for places in self.net.net.preset]
         self.ready: set[int] = set()
         for place in marking:
@@ -240,7 +241,7 @@ class Supervisor:
 
     def _mark(self, place: int) -> None:
         self.marked[place] = 1
-        for event in self.net.places[place].right:
+        for event in self.right[place]:
             self.missing[event] -= 1
             if self.missing[event] == 0 and event % 2 == 0:
                 self.ready.add(event)
@@ -248,7 +249,7 @@ class Supervisor:
 
     def _unmark(self, place: int) -> None:
         self.marked[place] = 0
-        for event in self.net.places[place].right:
+        for event in self.right[place]:
             self.missing[event] += 1
             self.ready.discard(event)
 

@@ -146,7 +146,7 @@ def test_a_fused_run_agrees_with_the_unfused(name: str) -> None:
     gap = fused.physics.handoff_gap_max_mm
     assert gap == pytest.approx(apart.physics.handoff_gap_max_mm, abs=0.01)
     error = fused.physics.product_error_max_mm
-    assert error is not None and 1e-4 < error < 0.002, "what is rounded away when bodies become one"
+    assert error is not None and 1e-9 < error < 0.002, "what is rounded away when bodies become one"
     assert other.model and one.model and other.model.bodies != one.model.bodies
 
 

@@ -237,6 +237,20 @@ def test_who_does_not_watch_overlooks_what_is_met_on_other_ways(
     assert overlooked_in("chest")
 
 
+def test_who_is_where_it_was_not_to_be_has_everything_looked_at(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """At rest there it would be overlooked by all others."""
+
+    def never_far(*given: Any) -> dict[tuple[int, str], Load]:
+        return {key: replace(load, high=load.low) for key, load in loads(*given).items()}
+
+    monkeypatch.setattr(stock, "loads", never_far)
+    simulation = ready("chest", True)
+    assert simulation.run(max_time=3.0).events
+    assert simulation.world.vicinity.reach.beyond and looked_at(simulation) == 1.0
+
+
 def set_off(seed: int, culls: bool) -> tuple[list[bytes], int]:
     """Some robots run wherever they like, as those gone wild, and nobody has been told."""
     simulation = ready("20", culls)

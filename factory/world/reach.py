@@ -15,6 +15,9 @@ CELL = 1e-3
 """Places on slides are rounded to this [m]: robots go the same ways again and again."""
 
 
+BESIDE = 3e-3
+"""Nobody is further than this from its ways [m]: some cells."""
+
 Way = tuple[int, int, int]
 """A load, and the two places on its holder's slide between which it is [cells]."""
 
@@ -37,7 +40,8 @@ class Reach:
     `slides`: the joint that a holder is on; who is on none stands. `margins` (holders + 1,): what
     comes as near to a holder as that [m] is met. `address` (holders + 1,): of each slide in `qpos`,
     -1 for none. `met`: the holders that one with a load may meet on a way, wherever they are, as
-    the bits of a number.
+    the bits of a number. `beyond`: somebody has been where it was not to be with its load, and may
+    be met there by others.
     """
 
     def __init__(
@@ -62,22 +66,18 @@ class Reach:
         )
         self._begin = at - self._way * d.qpos[self.address]
         self._extent = _extents(m, d, contacts, at, loads)
+        self.met, self.beyond = _Met(self._meets), False
+        self._ends = np.array([(load.low - BESIDE, load.high + BESIDE) for load in loads]).T
+        sides = self._between(np.arange(len(loads)), *self._ends)
         self._most = np.full((4, count), -np.inf)
-        self.met = _Met(self._meets)
-        ends = np.array([(load.low - CELL, load.high + CELL) for load in loads]).T
-        for number, side in zip(
-            self._holder, self._between(np.arange(len(loads)), *ends).T, strict=True
-        ):
-            self._most[:, number] = np.maximum(self._most[:, number], side)
+        np.maximum.at(self._most.T, self._holder, sides.T)
 
     def _meets(self, way: Way) -> int:
         load, *cells = way
-        ends = np.array(cells) * CELL
-        here, holder = self._between(np.array([load]), *ends[:, None])[:, 0], self._holder[load]
-        if (here > self._most[:, holder] + 2 * CELL).any():
-            self._most[:, holder] = np.maximum(self._most[:, holder], here)
-            self.met.clear()
-        opposite = here[[2, 3, 0, 1], None] + self._margins[holder]
+        ends, (low, high) = np.array(cells) * CELL, self._ends[:, load]
+        self.beyond |= bool(ends[0] < low or high < ends[1])
+        here = self._between(np.array([load]), *ends[:, None])
+        opposite = here[[2, 3, 0, 1]] + self._margins[self._holder[load]]
         meets = (opposite + self._most >= 0.0).all(axis=0)
         return int.from_bytes(np.packbits(meets, bitorder="little").tobytes(), "little")
 

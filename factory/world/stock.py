@@ -320,7 +320,7 @@ class Stock:
         margins = margin(asked, settings.stride * settings.tick)
         reach = Reach(self.m, self.d, self.contacts, [*first, *others.values()], joints, margins)
         numbers = {key: n for n, key in enumerate(others, start=len(first))}
-        return Vicinity(self.m, self.d, self.contacts, reach, numbers, asked)
+        return Vicinity(self.m, self.d, self.contacts, reach, numbers, asked.tolist())
 
     def _put_away(self, labels: Sequence[str], copies: Sequence[int]) -> None:
         spares = list(zip(labels, copies, strict=True))

@@ -10,8 +10,9 @@ is the same to the last bit.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import reduce
+from math import ceil, floor
 from operator import or_
 
 import numpy as np
@@ -25,8 +26,8 @@ TIMES = 2.0
 """Nothing gains speed faster than so many times what the settings ask for, unless it touches
 something or is pushed."""
 
-FEW = 250
-"""Where there are fewer holders, looking takes longer than it saves: up to some 100 robots."""
+FEW = 120
+"""Where there are fewer holders, looking takes longer than it saves: up to some 60 robots."""
 
 CALM = 0.1
 """What has touched is back in its place in the hand so long [s] after that."""
@@ -50,8 +51,8 @@ class Vicinity:
     """The bodies that the broad phase of a model looks at: all, where there are few holders.
 
     `loads`: the number that `reach` has for each robot (index) with what it carries, by label; what
-    holders have at first has their own numbers. `asked` (holders + 1,): the accelerations in the
-    settings [m/s²]. `stale`: it has to look before the engine's next step.
+    holders have at first has their own numbers. `asked`: the accelerations in the settings
+    [m/s²], of each holder. `stale`: it has to look before the engine's next step.
     """
 
     def __init__(
@@ -61,15 +62,10 @@ class Vicinity:
         contacts: Contacts,
         reach: Reach,
         loads: Mapping[tuple[int, str], int],
-        asked: Array,
+        asked: Sequence[float],
     ) -> None:
-        self.m, self.d, self.contacts, self.holder, self.reach = (
-            m,
-            d,
-            contacts,
-            contacts.code,
-            reach,
-        )
+        self.m, self.d, self.contacts, self.reach = m, d, contacts, reach
+        self.holder = contacts.code
         self._asked, self._loads = asked, loads
         count = len(reach.address)
         self._culls, self._all = count > FEW, True
@@ -98,13 +94,15 @@ class Vicinity:
         they may have to stop first. Who has not been told otherwise goes on."""
         if not self._culls:
             return
-        (new,) = (places != self._goal[holders]).nonzero()
-        holders, x, v, places = holders[new], x[new], v[new], places[new]
-        stop = x + v * np.abs(v) / (2 * self._asked[holders])
-        ways = np.stack([x, stop, places]) / CELL
-        self._goal[holders] = places
-        self._span[:, holders] = np.floor(ways.min(axis=0)) - 1, np.ceil(ways.max(axis=0)) + 1
-        self._anew[holders] = self._foreseen = self.stale = True
+        (new,) = ((places != self._goal[holders]) | (places == x)).nonzero()
+        holders, places = holders[new], places[new]
+        self._goal[holders], self._anew[holders] = places, True
+        self._foreseen = self.stale = True
+        ways = (values.tolist() for values in (holders, x[new], v[new], places))
+        for holder, here, speed, place in zip(*ways, strict=True):
+            ends = here, here + speed * abs(speed) / (2 * self._asked[holder]), place
+            self._span[0, holder] = floor(min(ends) / CELL) - 1
+            self._span[1, holder] = ceil(max(ends) / CELL) + 1
 
     def astray(self) -> None:
         """From now on nobody knows who goes where."""
@@ -148,7 +146,7 @@ class Vicinity:
             awake[self._with(np.concatenate(self._woken))] = True
         moves[self.holder[self._of_tree[awake]]] = True
         moves[NOBODY] = False
-        self._asleep[:] = np.where(awake, AWAKE, 0)
+        np.multiply(awake, AWAKE, out=self._asleep, dtype=np.int32)
         (who,) = moves.nonzero()
         span, address = self._span[:, who], self.reach.address[who]
         on = address >= 0
@@ -157,6 +155,9 @@ class Vicinity:
         ways = zip(self._load[anew].tolist(), *self._span[:, anew].tolist(), strict=True)
         met.update(zip(anew.tolist(), map(self.reach.met.__getitem__, ways), strict=True))
         self._anew[anew] = False
+        if self.reach.beyond:
+            self.everything()
+            return np.ones_like(moves)
         bits = reduce(or_, map(met.__getitem__, who.tolist()), 0)
         packed = np.frombuffer(bits.to_bytes(len(moves) // 8 + 1, "little"), np.uint8)
         meets = np.unpackbits(packed, count=len(moves), bitorder="little")
