@@ -47,16 +47,18 @@ class Upkeep:
         for holder, name in (
             (world.vicinity, "look"),
             (world.vicinity, "notice"),
+            (world.vicinity, "holds"),
             (world._begin, "save"),
             (world.inspection, "welds"),
         ):
             setattr(holder, name, self._timed(getattr(holder, name)))
 
-    def _timed(self, act: Callable[[], None]) -> Callable[[], None]:
-        def timed() -> None:
+    def _timed(self, act: Callable[[], Any]) -> Callable[[], Any]:
+        def timed() -> Any:
             begin = perf_counter()
-            act()
+            found = act()
             self.seconds += perf_counter() - begin
+            return found
 
         return timed
 
