@@ -272,7 +272,7 @@ class MujocoWorld:
     def advance(self, steps: int) -> None:
         """Steps of the engine, the setpoints of those kept up to date that `move` has set going or
         stopped: all at once, and one by one again where anything has touched, since contacts are
-        looked at in every step."""
+        looked at in every step, or somebody has left their way, since not all were looked at."""
         m, d, step, vicinity = self.m, self.d, mujoco.mj_step, self.vicinity
         if self.outfeed.goes:
             self._send_tray(self.outfeed.course(1))
