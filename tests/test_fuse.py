@@ -131,8 +131,8 @@ def test_turns_are_those_of_the_engine() -> None:
         assert np.allclose(turn.reshape(9), matrix, rtol=0, atol=1e-15)
 
 
-@pytest.mark.parametrize("name", ["paper", "lamp", "gearbox"])
-def test_a_fused_run_agrees_with_the_unfused(name: str) -> None:
+@pytest.mark.parametrize(("name", "least"), [("paper", 1e-6), ("lamp", 1e-4), ("gearbox", 1e-4)])
+def test_a_fused_run_agrees_with_the_unfused(name: str, least: float) -> None:
     layout = layout_of(name)
     one, other = (Simulation(layout, units=2, jitter=0.3, seed=2, fuse=f) for f in (False, True))
     apart, fused = one.run(), other.run()
@@ -146,7 +146,9 @@ def test_a_fused_run_agrees_with_the_unfused(name: str) -> None:
     gap = fused.physics.handoff_gap_max_mm
     assert gap == pytest.approx(apart.physics.handoff_gap_max_mm, abs=0.01)
     error = fused.physics.product_error_max_mm
-    assert error is not None and 1e-9 < error < 0.002, "what is rounded away when bodies become one"
+    assert error is not None and least < error < 0.002, (
+        "what is rounded away when bodies become one"
+    )
     assert other.model and one.model and other.model.bodies != one.model.bodies
 
 

@@ -21,7 +21,8 @@ from factory.world import stock, vicinity
 from factory.world.contacts import NOBODY
 from factory.world.loads import Load, loads
 from factory.world.reach import Reach
-from factory.world.vicinity import SWAY, Vicinity
+from factory.world.stock import Stock
+from factory.world.vicinity import CALM, SWAY, Vicinity
 from tests.bench.factories import balanced
 from tests.bench.factories import laid_out as floor_of
 from tests.bench.replaying import stepping
@@ -203,6 +204,28 @@ def test_nothing_that_anybody_meets_on_its_way_is_overlooked(
     assert overlooked_in(name, **given) == set()
 
 
+@pytest.mark.parametrize("calm", [CALM, 0.0])
+def test_everything_is_looked_at_from_where_anything_touches(
+    calm: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """And for a while; who is calm at once does not see it."""
+    monkeypatch.setattr(vicinity, "CALM", calm)
+    simulation, shares = ready("shelf", True, settings=Settings(timestep=0.004)), list[float]()
+    touched = [-np.inf]
+
+    def step(m: mujoco.MjModel, d: mujoco.MjData, steps: int = 1) -> None:
+        if d.ncon:
+            touched.append(d.time)
+        if d.time < touched[-1] + 0.9 * CALM:
+            shares.append(looked_at(simulation))
+        mujoco.mj_step(m, d, steps)
+
+    with stepping(step):
+        while simulation.world.time < 8.0:
+            simulation.supervisor.step(MOST)
+    assert shares and (min(shares) == 1.0) == (calm > 0.0)
+
+
 def test_who_sees_only_what_moves_overlooks_what_is_near(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(Reach, "_meets", lambda *_: 0)
     assert overlooked_in("20")
@@ -298,22 +321,43 @@ def test_what_the_engine_wakes_by_itself_is_seen_a_tick_later() -> None:
     assert m.body_contype[body] | m.body_conaffinity[body]
 
 
+def within_boxes(simulation: Simulation) -> bool:
+    """Whether all that holders have is within the boxes that are foreseen for them."""
+    world = simulation.world
+    m, d, seen, contacts = world.m, world.d, world.vicinity, world.stock.contacts
+    mujoco.mj_kinematics(m, d)
+    bodies = np.flatnonzero(contacts.collides & (contacts.code != NOBODY))
+    holder = contacts.code[bodies]
+    low, high = boxes(m, d, bodies).transpose(1, 0, 2)
+    place = np.where(seen.reach.address < 0, 0.0, d.qpos[seen.reach.address])[holder]
+    box = seen.reach._between(seen._load[holder], place, place) + SWAY
+    most = seen.reach._most[:, holder] + 2 * SWAY
+    return bool((box >= np.hstack([high[:, :2], -low[:, :2]]).T).all() and (box <= most).all())
+
+
 @pytest.mark.parametrize("fuse", [False, True])
 def test_what_a_holder_has_is_within_its_box(fuse: bool) -> None:
     simulation = ready("gearbox", True, fuse=fuse)
-    world = simulation.world
-    m, d, seen, contacts = world.m, world.d, world.vicinity, world.stock.contacts
     for _ in range(60):
         for _ in range(10):
             simulation.supervisor.step()
-        mujoco.mj_kinematics(m, d)
-        bodies = np.flatnonzero(contacts.collides & (contacts.code != NOBODY))
-        holder = contacts.code[bodies]
-        low, high = boxes(m, d, bodies).transpose(1, 0, 2)
-        place = np.where(seen.reach.address < 0, 0.0, d.qpos[seen.reach.address])[holder]
-        box = seen.reach._between(seen._load[holder], place, place) + SWAY
-        assert (box >= np.hstack([high[:, :2], -low[:, :2]]).T).all()
-        assert (box <= seen.reach._most[:, holder] + 2 * SWAY).all()
+        assert within_boxes(simulation)
+
+
+def under_way(name: str) -> frozenset[int]:
+    """A marking in which robots carry parts."""
+    supervisor = ready(name, True).supervisor
+    while supervisor.world.time < 3.0:
+        supervisor.step()
+    return frozenset(place for place, marked in enumerate(supervisor.marked) if marked)
+
+
+def test_what_a_run_starts_with_is_within_boxes(monkeypatch: pytest.MonkeyPatch) -> None:
+    """And is not where that is forgotten."""
+    start, reach = under_way("chest"), Stock._reach
+    assert within_boxes(ready("chest", True, start=start))
+    monkeypatch.setattr(Stock, "_reach", lambda self, holders, _: reach(self, holders, False))
+    assert not within_boxes(ready("chest", True, start=start))
 
 
 def test_a_shadow_sees_what_is_left_out() -> None:

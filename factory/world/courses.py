@@ -23,7 +23,7 @@ Way = tuple[Leg, Array, Array, bool]
 be where it goes then."""
 
 ROOM = 15_000_000
-"""So many numbers are kept, of 8 bytes each: those of a cycle with 1,000 robots."""
+"""So many numbers are kept, of 8 bytes each: twice those of the cycles of 1,000 robots."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

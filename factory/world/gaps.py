@@ -30,8 +30,7 @@ class Gaps:
         self._slides = m.jnt_qposadr[joint]
         self._ways = np.where(joint[:, :, None] < 0, 0.0, d.xaxis[joint])
         gone = (self._ways * d.qpos[self._slides][:, :, None]).sum(axis=1)
-        reach = d.xmat[holder].reshape(-1, 3, 3) @ m.eq_data[:, 3:6, None]
-        self._frame = d.xpos[holder] - gone + reach[:, :, 0]
+        self._frame = held_at(m, d, np.arange(m.neq)) - gone
         self._free = m.jnt_qposadr[m.body_jntadr][:, None] + np.arange(3)
         self._notes: list[tuple[Index, Array, Array]] = []
         self._largest = 0.0
@@ -57,6 +56,13 @@ class Gaps:
         """Begin anew."""
         self._notes.clear()
         self._largest = 0.0
+
+
+def held_at(m: mujoco.MjModel, d: mujoco.MjData, welds: Index) -> Array:
+    """Where welds hold the origins of their second bodies (n, 3) [m]."""
+    holder = m.eq_obj1id[welds]
+    reach = d.xmat[holder].reshape(-1, 3, 3) @ m.eq_data[welds, 3:6, None]
+    return np.asarray(d.xpos[holder] + reach[:, :, 0])
 
 
 def _slides(m: mujoco.MjModel) -> Index:

@@ -255,11 +255,12 @@ class MujocoWorld:
         self.setpoints.stand(axes, self._x[axes], self._under_way[axes])
         self._active, self._moves, self._last = active, b"", None
         self._look()
-        goals = self._x.copy()
-        if bundle is not None:
-            goals[active] = bundle.goal
-        axes = np.concatenate([axes, active])
-        self.vicinity.goes(self._holder[axes], self._x[axes], self._v[axes], goals[axes])
+        if self.vicinity.culls:
+            goals = self._x.copy()
+            if bundle is not None:
+                goals[active] = bundle.goal
+            axes = np.concatenate([axes, active])
+            self.vicinity.goes(self._holder[axes], self._x[axes], self._v[axes], goals[axes])
 
     def move(self, axes: Index, x: Array, v: Array, a: Array) -> None:
         """From now on the references of `axes` run from x [m] at speed v under acceleration a, in
@@ -287,12 +288,11 @@ class MujocoWorld:
             begin = perf_counter()
             step(m, d, steps)
             self.physics_time += perf_counter() - begin
-            strays = not vicinity.holds()
-            if not d.maxuse_con and not strays:
+            if not vicinity.holds():
+                vicinity.astray()
+            elif not d.maxuse_con:
                 return
             self._begin.restore()
-            if strays:
-                vicinity.astray()
             self.setpoints.again()
         for number in range(steps):
             if number and number % self.steps == 0:

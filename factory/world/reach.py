@@ -9,6 +9,7 @@ import numpy as np
 from factory.control.mode import Array, Index
 from factory.engine import mujoco
 from factory.world.contacts import NOBODY, Contacts
+from factory.world.gaps import held_at
 from factory.world.loads import Load
 
 CELL = 1e-3
@@ -100,10 +101,8 @@ def _extents(
     bare = _bounds(contacts.code[own], d.xpos[own], low[own], high[own], at.shape[1])
     number = np.repeat(np.arange(len(loads)), [len(load.welds) for load in loads])
     weld = np.array([weld for load in loads for weld in load.welds], np.intp)
-    one, body = m.eq_obj1id[weld], m.eq_obj2id[weld]
-    turn = d.xmat[one].reshape(-1, 3, 3)
-    place = d.xpos[one] + (turn @ m.eq_data[weld, 3:6, None])[:, :, 0]
-    held = _bounds(number, place, low[body], high[body], len(loads))
+    body = m.eq_obj2id[weld]
+    held = _bounds(number, held_at(m, d, weld), low[body], high[body], len(loads))
     holder = [load.holder for load in loads]
     return np.asarray(np.maximum(bare[:, holder], held) - np.concatenate([at, -at])[:, holder])
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Iterable, Mapping, Sequence
+from functools import partial
 from types import MappingProxyType
 
 import numpy as np
@@ -17,6 +18,7 @@ from factory.mjcf.parts import parked_at, presented_at
 from factory.pag import NOPART
 from factory.world.contacts import NOBODY, Contacts
 from factory.world.fusing import RIGID, SETTLING, Groups, fuse, misfit
+from factory.world.gaps import held_at
 from factory.world.loads import Load, loads
 from factory.world.reach import Reach
 from factory.world.switchboard import Switchboard
@@ -77,7 +79,8 @@ class Stock:
         self.on_tray: int | None = None
         self.left: list[float] = []
         holders = self.contacts.own(self._trees(), self.tray + len(self.feeder))
-        self.vicinity = self._vicinity(holders, bool(counts))
+        plan = partial(self._reach, holders, bool(counts))
+        self.vicinity = Vicinity(m, d, self.contacts, holders, plan)
         self.board = Switchboard(m, d, self.contacts, self.vicinity)
         self._hide_spares()
         self._hand_out(counts)
@@ -298,8 +301,11 @@ class Stock:
         found = {int(tree[one[weld]]): robot + 1 for (robot, _), weld in self.grip.items()}
         return found | {int(tree[one[weld]]): self.tray for weld in self.hold.values()}
 
-    def _vicinity(self, holders: int, begun: bool) -> Vicinity:
-        """Where a marking has `begun`, robots have at first whatever they ever have."""
+    def _reach(
+        self, holders: int, begun: bool
+    ) -> tuple[Reach, dict[tuple[int, str], int], list[float]]:
+        """What the vicinity is told. Where a marking has `begun`, robots have at first whatever
+        they ever have."""
         layout, robots = self.model.layout, self.model.factory.robots
         first = [Load(holder) for holder in range(holders + 1)]
         grips: dict[int, list[int]] = {robot.index: [] for robot in robots}
@@ -320,7 +326,7 @@ class Stock:
         margins = margin(asked, settings.stride * settings.tick)
         reach = Reach(self.m, self.d, self.contacts, [*first, *others.values()], joints, margins)
         numbers = {key: n for n, key in enumerate(others, start=len(first))}
-        return Vicinity(self.m, self.d, self.contacts, reach, numbers, asked.tolist())
+        return reach, numbers, asked.tolist()
 
     def _put_away(self, labels: Sequence[str], copies: Sequence[int]) -> None:
         spares = list(zip(labels, copies, strict=True))
@@ -353,8 +359,7 @@ class Stock:
         self.copy_of[label, unit] = copy
         body, weld = int(self.body[label][copy]), self.grip[robot, label]
         mujoco.mj_kinematics(self.m, self.d)
-        holder = self.m.eq_obj1id[weld]
-        at = self.d.xpos[holder] + self.d.xmat[holder].reshape(3, 3) @ self.m.eq_data[weld, 3:6]
+        at = held_at(self.m, self.d, np.array([weld]))[0]
         self.contacts.enter(label, unit, body)
         self.board.place([body], [(float(at[0]), float(at[1]), float(at[2]))])
         self.board.hold([body], robot + 1)

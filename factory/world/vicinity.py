@@ -10,7 +10,7 @@ is the same to the last bit.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import reduce
 from math import ceil, floor
 from operator import or_
@@ -48,11 +48,12 @@ def margin(accelerations: Array, period: float) -> Array:
 
 
 class Vicinity:
-    """The bodies that the broad phase of a model looks at: all, where there are few holders.
+    """The bodies that the broad phase of a model looks at: all, where there are few `holders`.
 
-    `loads`: the number that `reach` has for each robot (index) with what it carries, by label; what
-    holders have at first has their own numbers. `asked`: the accelerations in the settings
-    [m/s²], of each holder. `stale`: it has to look before the engine's next step.
+    `planned` tells, where it is needed, the reach of the holders, the number that it has for each
+    robot (index) with what it carries, by label (what holders have at first has their own numbers),
+    and the accelerations in the settings [m/s²], of each holder. `culls`: something may be left
+    out. `stale`: it has to look before the engine's next step.
     """
 
     def __init__(
@@ -60,17 +61,17 @@ class Vicinity:
         m: mujoco.MjModel,
         d: mujoco.MjData,
         contacts: Contacts,
-        reach: Reach,
-        loads: Mapping[tuple[int, str], int],
-        asked: Sequence[float],
+        holders: int,
+        planned: Callable[[], tuple[Reach, Mapping[tuple[int, str], int], Sequence[float]]],
     ) -> None:
-        self.m, self.d, self.contacts, self.reach = m, d, contacts, reach
-        self.holder = contacts.code
-        self._asked, self._loads = asked, loads
-        count = len(reach.address)
-        self._culls, self._all = count > FEW, True
+        self.m, self.d, self.contacts, self.holder = m, d, contacts, contacts.code
+        self._everybody = np.ones(holders + 1, bool)
+        self.culls, self._all = holders >= FEW, True
         self.stale = self._foreseen = False
-        self._calm = -np.inf
+        if not self.culls:
+            return
+        self.reach, self._loads, self._asked = planned()
+        count, self._calm = holders + 1, -np.inf
         self._woken: list[Index] = []
         self._goal = np.full(count, np.nan)
         self._met, self._anew = dict[int, int](), np.ones(count, bool)
@@ -80,19 +81,20 @@ class Vicinity:
 
     def woken(self, bodies: Index) -> None:
         """Bodies are about to move."""
-        if self._culls and len(bodies):
+        if self.culls and len(bodies):
             self._woken.append(bodies)
             self.stale = True
 
     def carries(self, robot: int, label: str) -> None:
         """A robot (index) has something else from now on, by its label."""
-        self._load[robot + 1] = self._loads[robot, label]
-        self._anew[robot + 1] = True
+        if self.culls:
+            self._load[robot + 1] = self._loads[robot, label]
+            self._anew[robot + 1] = True
 
     def goes(self, holders: Index, x: Array, v: Array, places: Array) -> None:
         """From now on holders go to `places` on their slides [m], from x at speed v, and straight;
         they may have to stop first. Who has not been told otherwise goes on."""
-        if not self._culls:
+        if not self.culls:
             return
         (new,) = ((places != self._goal[holders]) | (places == x)).nonzero()
         holders, places = holders[new], places[new]
@@ -106,7 +108,7 @@ class Vicinity:
 
     def astray(self) -> None:
         """From now on nobody knows who goes where."""
-        if self._culls:
+        if self.culls:
             self._foreseen, self.stale = False, True
 
     def holds(self) -> bool:
@@ -123,9 +125,9 @@ class Vicinity:
 
     def everything(self) -> None:
         """From now on nothing is left out: somebody pushes."""
-        self._culls = self.stale = False
+        self.culls = self.stale = False
         self._all = True
-        self._show(np.ones_like(self._goal, bool))
+        self._show(self._everybody)
 
     def look(self) -> None:
         """Choose what the broad phase looks at."""
@@ -134,14 +136,16 @@ class Vicinity:
         before, self._all = self._all, not self._foreseen or self.d.time < self._calm
         if not self._all:
             self._show(self._near())
+            if self.reach.beyond:
+                self.everything()
         elif not before:
-            self._show(np.ones_like(self._goal, bool))
+            self._show(self._everybody)
         self._woken.clear()
         self.stale = False
 
     def _near(self) -> np.ndarray:
         """The holders (holders + 1,) that move, and that those may meet; and watch them."""
-        awake, moves = self.d.tree_asleep < 0, np.zeros_like(self._goal, bool)
+        awake, moves = self.d.tree_asleep < 0, np.zeros_like(self._everybody)
         if self._woken:
             awake[self._with(np.concatenate(self._woken))] = True
         moves[self.holder[self._of_tree[awake]]] = True
@@ -155,9 +159,6 @@ class Vicinity:
         ways = zip(self._load[anew].tolist(), *self._span[:, anew].tolist(), strict=True)
         met.update(zip(anew.tolist(), map(self.reach.met.__getitem__, ways), strict=True))
         self._anew[anew] = False
-        if self.reach.beyond:
-            self.everything()
-            return np.ones_like(moves)
         bits = reduce(or_, map(met.__getitem__, who.tolist()), 0)
         packed = np.frombuffer(bits.to_bytes(len(moves) // 8 + 1, "little"), np.uint8)
         meets = np.unpackbits(packed, count=len(moves), bitorder="little")
