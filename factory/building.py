@@ -84,7 +84,7 @@ def _binary(model: Model, path: Path | None) -> dict[Path, bytes]:
     already: the engine has accepted this model before. Raises InputError where it does not."""
     if path and kept(path, key_of(model)) is not None:
         return {}
-    from factory.world.physics import load
+    from factory.mjcf.loading import load
 
     m = load(model)
     return sealed(path, key_of(model), packed(m)) if path else {}

@@ -17,12 +17,11 @@ from typing import Any
 import numpy as np
 
 from factory.control.governor import govern
-from factory.control.mode import ROUNDING, Array, Index, Limits, Mode
+from factory.control.mode import REST, ROUNDING, Array, Index, Limits, Mode
 from factory.control.navigation import Bundle
 from factory.control.staging import Stage
 from factory.factory import Factory, Operation
 from factory.programs import Program, Step, program_of
-from factory.supervisor import REST
 from factory.trace import Event
 
 RATES = (3, 11)
@@ -140,7 +139,6 @@ class DistributedSupervisor:
         self.busy = [0.0] * len(factory.robots)
         self.last_event = world.time
         self.active = _Active()
-        self.ready: set[int] = set()
         self.count = 0
 
     @property
@@ -151,6 +149,10 @@ class DistributedSupervisor:
     def marking(self) -> tuple[str, ...]:
         """The names of the places that the record marks."""
         return tuple(p.name for p, m in zip(self.net.places, self.marked, strict=True) if m)
+
+    def awaited(self) -> list[Operation]:
+        """Nobody sees all the robots of an operation wait for it."""
+        return []
 
     def limit(self, limits: Limits) -> None:
         """From now on axes have these limits."""

@@ -223,9 +223,7 @@ class Simulation:
         """Names the robots that are in an operation, or else those that wait for one that cannot
         start."""
         factory, supervisor = self.layout.factory, self.supervisor
-        numbers = supervisor.active.operations or tuple(
-            event // 2 for event in sorted(supervisor.ready)
-        )
+        numbers = supervisor.active.operations or tuple(o.index for o in supervisor.awaited())
         places = [factory.operations[n] for n in numbers[:3]]
         robots = ", ".join(
             f"{factory.robots[r].name} in {o.template.name}({o.label})"
@@ -249,7 +247,7 @@ def compiled(
     modes = operation_modes(layout, settings.eps)
     if world == "ideal":
         return Compiled(modes)
-    from factory.world.physics import load
+    from factory.mjcf.loading import load
 
     model = physical_model(layout, units, settings, catalogue, wip, fuse=fuse, shown=False)
     return Compiled(modes, model, load(model))

@@ -13,16 +13,14 @@ from typing import Protocol
 
 import numpy as np
 
-from factory.control.mode import Array, Index, Limits, Mode
+from factory.control.mode import REST, Array, Index, Limits, Mode
 from factory.control.navigation import Bundle
 from factory.control.obstacles import ranges
 from factory.control.staging import Stage
 from factory.factory import Factory, Operation
 from factory.nets.petri import Marking
+from factory.nets.threads import Threads
 from factory.trace import Event
-
-REST = 0.01
-"""Robots hand over only when slower than this [m/s]."""
 
 
 class World(Protocol):
@@ -75,9 +73,9 @@ class _Active:
 class Supervisor:
     """Runs the gear net of a factory from a legal marking over a world.
 
-    `threads` is f_m: the robot in each slot of a marked place; every firing moves robots by the
-    redistribution functions and asserts that the marking stays legal. `stages`: what robots do
-    while they wait, where that is not to stand; nothing of it is in the net.
+    `threads` is (m, f_m): every firing moves robots by the redistribution functions and asserts
+    that the marking stays legal. `stages`: what robots do while they wait, where that is not to
+    stand; nothing of it is in the net.
     """
 
     def __init__(
@@ -100,16 +98,12 @@ class Supervisor:
         self.near = self.enabled = True
         self.limit(limits)
         marking = factory.net.initial_marking if start is None else start
-        self.threads = dict(factory.net.marking_of(marking).threads)
-        self.marked = bytearray(len(self.net.places))
+        starts = [operation.start for operation in factory.operations]
+        self.threads = Threads(self.net, factory.net.marking_of(marking), starts)
+        self.marked = self.threads.marked
         self.fired = [0] * len(self.net.transitions)
         for transition, count in (counts or {}).items():
             self.fired[transition] = count
-        self.right = [place.right for place in self.net.places]
-        self.missing = [len(places) for places in self.net.net.preset]
-        self.ready: set[int] = set()
-        for place in marking:
-            self._mark(place)
         self.events: list[Event] = []
         self.busy = [0.0] * len(factory.robots)
         self.since: dict[int, float] = {}
@@ -166,8 +160,7 @@ class Supervisor:
 
     def awaited(self) -> list[Operation]:
         """The operations all of whose robots wait for them."""
-        operations = (self.factory.operations[event // 2] for event in sorted(self.ready))
-        return [operation for operation in operations if not self.marked[operation.place]]
+        return [self.factory.operations[event // 2] for event in self.threads.possible().tolist()]
 
     def _startable(self) -> list[int]:
         """Operations X with X_s enabled: waits marked (their goals are everything), the robots in
@@ -207,54 +200,19 @@ class Supervisor:
         return [number for number, ends in zip(numbers, done & still, strict=True) if ends]
 
     def _fire(self, started: list[int], ended: list[int]) -> None:
-        operations = self.factory.operations
-        events = [operations[o].start for o in started] + [operations[o].end for o in ended]
-        if not self.net.net.is_detached(events):
-            raise AssertionError("the enabled transitions are not a detached set")
+        operations, now = self.factory.operations, self.world.time
         starts = [(operations[o], self.fired[operations[o].start]) for o in started]
         ends = [(operations[o], self.fired[operations[o].end]) for o in ended]
+        events = (*(o.start for o, _ in starts), *(o.end for o, _ in ends))
+        self.enabled |= self.threads.fire(events)
         for event in events:
-            self._redistribute(event)
-            self.events.append(Event(self.world.time, self.net.transitions[event].name))
-        self._account(started, ended)
+            self.fired[event] += 1
+            self.events.append(Event(now, self.net.transitions[event].name))
+        self._account(started, ended, now)
         self.world.apply(starts, ends)
-        self.last_event = self.world.time
+        self.last_event = now
 
-    def _redistribute(self, event: int) -> None:
-        """m' = (m - •e) ∪ e•, f_m' = f_m ∘ d_e^-1; asserts that it is legal again."""
-        net = self.net.net
-        around = (*net.preset[event], *net.postset[event])
-        if not net.is_enabled(event, frozenset(p for p in around if self.marked[p])):
-            raise AssertionError(f"{self.net.transitions[event].name} fires but is not enabled")
-        for place in net.preset[event]:
-            self._unmark(place)
-        moved = [(self.threads.pop(b), after) for b, after in self.net.redistribution[event]]
-        for robot, after in moved:
-            if after in self.threads:
-                raise AssertionError(f"two robots in one slot of {net.places[after[0]].name}")
-            self.threads[after] = robot
-        for place in net.postset[event]:
-            self._mark(place)
-        self.fired[event] += 1
-        if len(self.threads) != len(self.factory.robots):
-            raise AssertionError("the marking is not legal: some robot is in no mode")
-
-    def _mark(self, place: int) -> None:
-        self.marked[place] = 1
-        for event in self.right[place]:
-            self.missing[event] -= 1
-            if self.missing[event] == 0 and event % 2 == 0:
-                self.ready.add(event)
-                self.enabled = True
-
-    def _unmark(self, place: int) -> None:
-        self.marked[place] = 0
-        for event in self.right[place]:
-            self.missing[event] += 1
-            self.ready.discard(event)
-
-    def _account(self, started: Iterable[int], ended: Iterable[int]) -> None:
-        now = self.world.time
+    def _account(self, started: Iterable[int], ended: Iterable[int], now: float) -> None:
         for number in started:
             self.since[number] = now
         for number in ended:

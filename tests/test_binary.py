@@ -14,11 +14,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from factory.log import LogWriter
-from factory.mjcf import binary
+from factory.mjcf import binary, loading
 from factory.mjcf.binary import beside, kept, key_of, packed, seal_of, sealed
 from factory.mjcf.model import Model
 from factory.simulation import Simulation, physical_model
-from factory.world import physics
 from tests.command_line import PAPER, ROOT, Terminal, files_in
 from tests.fidelity.products import layout
 
@@ -44,13 +43,13 @@ def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 def compiled(monkeypatch: pytest.MonkeyPatch) -> list[Model]:
     """The models that the engine compiles from now on."""
     seen: list[Model] = []
-    real = physics._compiled
+    real = loading._compiled
 
     def watched(model: Model) -> mujoco.MjModel:
         seen.append(model)
         return real(model)
 
-    monkeypatch.setattr(physics, "_compiled", watched)
+    monkeypatch.setattr(loading, "_compiled", watched)
     return seen
 
 
@@ -116,9 +115,9 @@ def test_the_key_tells_models_engines_and_machines_apart(
 
 
 def test_a_kept_model_is_the_compiled_one(cache: Path, compiled: list[Model], model: Model) -> None:
-    first, second = physics.load(model), physics.load(model)
+    first, second = loading.load(model), loading.load(model)
     assert compiled == [model]
-    assert packed(first) == packed(second) == packed(physics._compiled(model))
+    assert packed(first) == packed(second) == packed(loading._compiled(model))
     assert len(files_in(cache)) == 2
 
 
@@ -126,7 +125,7 @@ def test_small_models_are_not_kept(
     cache: Path, model: Model, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(binary, "LEAST", len(model.xml) + 1)
-    physics.load(model)
+    loading.load(model)
     assert not cache.exists()
 
 
@@ -137,7 +136,7 @@ def test_a_damaged_model_is_compiled_again(
     cache: Path, compiled: list[Model], model: Model, where: str
 ) -> None:
     """The engine would end the process over some of these."""
-    right = packed(physics.load(model))
+    right = packed(loading.load(model))
     (path,) = cache.glob("*.mjb")
     size = len(right)
     places = {"start": 0, "header": 17, "body": size // 2, "end": size - 1}
@@ -147,19 +146,19 @@ def test_a_damaged_model_is_compiled_again(
         flip(seal_of(path), 10)
     else:
         path.write_bytes({"cut": right[:-1], "empty": b"", "text": b"<mujoco/>"}[where])
-    assert packed(physics.load(model)) == right
+    assert packed(loading.load(model)) == right
     assert len(compiled) == 2
     assert path.read_bytes() == right
-    assert packed(physics.load(model)) == right
+    assert packed(loading.load(model)) == right
     assert len(compiled) == 2
 
 
 def test_another_version_of_the_engine_compiles_for_itself(
     cache: Path, compiled: list[Model], model: Model, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    physics.load(model)
+    loading.load(model)
     monkeypatch.setattr(binary, "version", lambda name: "4.0.1")
-    physics.load(model)
+    loading.load(model)
     assert len(compiled) == 2
 
 
@@ -169,7 +168,7 @@ def test_what_the_engine_refuses_is_compiled_again(
     """A right seal on something that is no model."""
     cache.mkdir(parents=True)
     write(sealed(cache / f"{key_of(model)}.mjb", key_of(model), b""))
-    assert packed(physics.load(model)) == packed(physics._compiled(model))
+    assert packed(loading.load(model)) == packed(loading._compiled(model))
     assert len(compiled) == 2
 
 
@@ -177,8 +176,8 @@ def test_a_cache_that_cannot_be_written_is_no_error(
     cache: Path, compiled: list[Model], model: Model
 ) -> None:
     cache.parent.parent.write_text("no folder")
-    physics.load(model)
-    physics.load(model)
+    loading.load(model)
+    loading.load(model)
     assert len(compiled) == 2
 
 
@@ -187,20 +186,20 @@ def test_the_cache_is_bounded(
 ) -> None:
     """What was not used for longest goes first; what is too large on its own is not kept."""
     models = [replace(model, xml=f"{model.xml}{' ' * n}") for n in range(4)]
-    size = len(packed(physics.load(models[0])))
+    size = len(packed(loading.load(models[0])))
     monkeypatch.setattr(binary, "MOST", 3 * size + size // 2)
     for n in (1, 2):
-        physics.load(models[n])
+        loading.load(models[n])
     for path in cache.iterdir():
         long_ago = next(n for n in (0, 1, 2) if path.name.startswith(key_of(models[n])))
         os.utime(path, (long_ago, long_ago))
     for n in (0, 3):
-        physics.load(models[n])
+        loading.load(models[n])
     names = {path.name for path in cache.glob("*.mjb")}
     assert names == {f"{key_of(models[n])}.mjb" for n in (0, 2, 3)}
     assert len(compiled) == 4
     monkeypatch.setattr(binary, "MOST", size - 1)
-    physics.load(replace(model, xml=f"{model.xml}\n"))
+    loading.load(replace(model, xml=f"{model.xml}\n"))
     assert {path.name for path in cache.glob("*.mjb")} == names
 
 
@@ -222,7 +221,7 @@ KEEP = """
 import sys
 from factory.mjcf import binary
 from factory.simulation import physical_model
-from factory.world.physics import load
+from factory.mjcf.loading import load
 from tests.fidelity.products import layout
 binary.LEAST = 0
 model = physical_model(layout("paper"), 3)
@@ -237,7 +236,7 @@ def test_processes_share_the_cache(cache: Path, compiled: list[Model], model: Mo
     others = [subprocess.Popen(words, cwd=ROOT) for _ in range(4)]
     assert [process.wait(120) for process in others] == [0] * 4
     assert sorted(files_in(cache)) == [f"{key_of(model)}.mjb", f"{key_of(model)}.mjb.seal"]
-    physics.load(model)
+    loading.load(model)
     assert compiled == []
 
 
@@ -255,7 +254,7 @@ def test_the_second_build_leaves_the_engine_alone(
     assert [Path(name).name for name in document["files"]] == ["m.xml", "m.mjb", "m.mjb.seal"]
     files = files_in(tmp_path)
     assert len(compiled) == 1
-    monkeypatch.setattr(physics, "load", None)
+    monkeypatch.setattr(loading, "load", None)
     assert built(run, tmp_path / "m.xml") == document
     assert files_in(tmp_path) == files
 

@@ -34,9 +34,9 @@ def test_nothing_touches(number: int) -> None:
 @pytest.mark.parametrize("layout", [*LAYOUTS[:4], row_of_inserts()])
 def test_bodies_are_inside_their_regions(layout: Layout) -> None:
     """Every geom that can collide, at both ends of its robot's guidepath."""
+    from factory.mjcf.loading import load
     from factory.mjcf.model import build_model
     from factory.robots import load_catalogue
-    from factory.world.physics import load
 
     copies = {leaf.label: 1 for leaf in layout.factory.leaves}
     m = load(build_model(layout, load_catalogue(), copies, Settings()))

@@ -24,10 +24,10 @@ from factory.errors import InputError
 from factory.files import write_all
 from factory.layout.plan import Layout
 from factory.mjcf import names
+from factory.mjcf.loading import load
 from factory.mjcf.model import Model, model_files
 from factory.settings import Settings
 from factory.simulation import physical_model
-from factory.world.physics import load
 from tests.command_line import PAPER, ROOT, Terminal, files_in
 
 KARY = """root = s; s = mate(a, b, c, t); t = mate(e, f); c = inspect(d, dwell = 0.2);

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import random
+
 import pytest
 from hypothesis import given
+from hypothesis import strategies as st
 
 from factory.compiler import expand
 from factory.factory import Factory
 from factory.nets.petri import PetriNet, Place, Transition
 from factory.nets.threaded import ThreadedMarking, ThreadedNet
-from tests.net_values import legal_markings
+from factory.nets.threads import Threads
+from tests.net_values import legal_markings, random_legal_marking
 from tests.pag_values import TEMPLATES, factories, factory_of, paper
 
 _T = (Transition("a"), Transition("b"))
@@ -110,3 +114,58 @@ def test_the_initial_marking_is_legal(factory: Factory) -> None:
     net = factory.net
     assert net.marking_of(net.initial_marking).is_legal(net.threaded, len(net.gears))
     assert all(net.threaded.places[p].label == "nopart" for p in net.initial)
+
+
+def threads_of(factory: Factory, marked: frozenset[int]) -> Threads:
+    starts = [operation.start for operation in factory.operations]
+    return Threads(factory.net.threaded, factory.net.marking_of(marked), starts)
+
+
+@given(factories(), st.integers(0, 2**32))
+def test_sets_fire_as_definition_3_4_says(factory: Factory, seed: int) -> None:
+    """Maximal detached sets of enabled transitions, again and again, from any legal marking: the
+    marking, the robot in each slot, and which operations may start are those of the follower."""
+    rng, net = random.Random(seed), factory.net.threaded
+    here = factory.net.marking_of(random_legal_marking(factory.net, rng))
+    threads = threads_of(factory, here.marked)
+    for _ in range(20):
+        enabled = net.net.enabled(here.marked)
+        ready = [event for event in enabled if event % 2 == 0]
+        assert threads.possible().tolist() == ready
+        chosen = list[int]()
+        for event in rng.sample(enabled, len(enabled)):
+            if net.net.is_detached((*chosen, event)) and (not chosen or rng.random() < 0.7):
+                chosen.append(event)
+        if not chosen:
+            return
+        there = here.follower(net, chosen)
+        new = {event for event in net.net.enabled(there.marked) if event % 2 == 0} - {*ready}
+        assert threads.fire(tuple(chosen)) == bool(new)
+        assert threads.threads() == there
+        here = there
+
+
+def test_what_may_not_fire_does_not() -> None:
+    factory = factory_of(paper())
+    by_label = factory.by_label
+    threads = threads_of(factory, factory.net.initial_marking)
+    before, start = threads.threads(), by_label["part1"].start
+    for events, words in (
+        ((by_label["part1"].end,), "not all enabled"),
+        ((start, by_label["sub1"].start), "not all enabled"),
+        ((start, start), "not a detached set"),
+    ):
+        with pytest.raises(AssertionError, match=words):
+            threads.fire(events)
+        assert threads.threads() == before
+    threads.fire((start,))
+    with pytest.raises(AssertionError, match="not all enabled"):
+        threads.fire((start,))
+
+
+def test_a_robot_that_is_not_where_its_token_is_does_not_fire() -> None:
+    net = ThreadedNet(_RING, ((((1, 0), (0, 0)),), (((0, 0), (1, 0)),)))
+    threads = Threads(net, ThreadedMarking({(1, 0): 0}), (1,))
+    threads.marked[:] = 1, 0
+    with pytest.raises(AssertionError, match="not legal"):
+        threads.fire((1,))

@@ -204,8 +204,8 @@ def test_a_robot_reads_only_its_own_mode(paper: Layout) -> None:
 def test_an_event_that_is_not_enabled_cannot_fire(paper: Layout) -> None:
     """Planted fault: the supervisor is made to end an operation that has not begun."""
     supervisor = Simulation(paper, world="ideal", units=1).supervisor
-    with pytest.raises(AssertionError, match="sub3_e fires but is not enabled"):
-        supervisor._redistribute(paper.factory.by_label["sub3"].end)
+    with pytest.raises(AssertionError, match="sub3_e fire but are not all enabled"):
+        supervisor._fire([], [paper.factory.by_label["sub3"].index])
 
 
 def test_the_outfeed_may_be_the_bottleneck() -> None:

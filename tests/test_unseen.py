@@ -10,9 +10,9 @@ import pytest
 
 from factory.layout.plan import Layout
 from factory.log import read_log
+from factory.mjcf import loading
 from factory.mjcf.unseen import leave_out_what_is_shown
 from factory.simulation import Simulation, physical_model
-from factory.world import physics
 from tests.command_line import PAPER, Terminal
 from tests.test_lift import FENCE
 from tests.test_simulation import laid_out
@@ -71,7 +71,7 @@ def test_nothing_that_weighs_or_touches_is_left_out() -> None:
 
 def test_only_meshes_that_are_drawn_are_left_out() -> None:
     full, bare = (physical_model(layout("gearbox"), 1, shown=shown) for shown in (True, False))
-    assert physics.load(bare).nmesh < physics.load(full).nmesh
+    assert loading.load(bare).nmesh < loading.load(full).nmesh
 
 
 def test_what_is_logged_can_be_looked_at(run: Terminal, tmp_path: Path) -> None:

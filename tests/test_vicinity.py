@@ -330,7 +330,7 @@ def within_boxes(simulation: Simulation) -> bool:
     holder = contacts.code[bodies]
     low, high = boxes(m, d, bodies).transpose(1, 0, 2)
     place = np.where(seen.reach.address < 0, 0.0, d.qpos[seen.reach.address])[holder]
-    box = seen.reach._between(seen._load[holder], place, place) + SWAY
+    box = seen.reach._between(seen._ways[0, holder], place, place) + SWAY
     most = seen.reach._most[:, holder] + 2 * SWAY
     return bool((box >= np.hstack([high[:, :2], -low[:, :2]]).T).all() and (box <= most).all())
 

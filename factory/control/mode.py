@@ -19,6 +19,9 @@ Truth = NDArray[np.bool_]
 REACH = 1.5
 """An obstacle of Δ acts on robots up to this many times the touching distance apart."""
 
+REST = 0.01
+"""Robots hand over only when slower than this [m/s]."""
+
 ROUNDING = 1e-9
 """Lengths [m] closer than this are the same."""
 

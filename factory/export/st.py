@@ -15,13 +15,12 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from math import ceil
 
-from factory.control.mode import Mode
+from factory.control.mode import REST, Mode
 from factory.control.plan import operation_modes
 from factory.export.subject import Subject
 from factory.layout.plan import Layout
 from factory.pag import NOPART
 from factory.programs import Program, Step, program_of
-from factory.supervisor import REST
 
 FORMAT, TAKES = "st", "pag"
 

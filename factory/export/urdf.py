@@ -35,7 +35,7 @@ DRAWN = 3
 
 def export(subject: Subject) -> str | Mapping[str, bytes]:
     """The URDF; with its meshes, where there are any."""
-    from factory.world.physics import load
+    from factory.mjcf.loading import load
 
     layout = subject.layout
     model = physical_model(layout, 1, subject.settings, subject.source.catalogue)

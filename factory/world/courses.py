@@ -9,14 +9,13 @@ from __future__ import annotations
 from collections.abc import Callable, Hashable
 from dataclasses import dataclass, field
 
+import numpy as np
+
 from factory.control.mode import Array, Index
 from factory.world.setpoints import Leg, Setpoints, Told, under_way
 
 AHEAD = 0.0005
 """No robot is further ahead of its reference than this [m]."""
-
-SLOW = 0.03
-"""Nor is one at rest whose reference is faster than this [m/s], and cannot stop in a tick."""
 
 Way = tuple[Leg, Array, Array, bool]
 """A tick of axes, the positions [m] and speeds [m/s] that it leads to, and whether any of them may
@@ -29,8 +28,9 @@ ROOM = 15_000_000
 @dataclass(frozen=True, slots=True, eq=False)
 class Course:
     """Some `ticks` of n axes: what their drives are `told`, with positions and speeds `after` it,
-    which of them `moves` (the bytes of n truths), and whether any mode is `near` its goal then, as
-    none is before; and the courses that come `then`, of at most so many ticks, if known."""
+    which of them `moves` in any (the bytes of n truths), and whether any mode is `near` its goal
+    then, as none is before; and the courses that come `then`, of at most so many ticks, if
+    known."""
 
     ticks: int
     told: Told
@@ -72,13 +72,10 @@ def travelled(
     go: Callable[[Array, Array], Way],
 ) -> Course:
     """The course of axes from positions [m] and speeds [m/s], where `go` tells what they do in a
-    tick from such: until one may be where it goes, or another moves, for so many ticks at most."""
-    (x, v), legs, moves, near = begin, list[Leg](), b"", False
+    tick from such: until one may be where it goes, for so many ticks at most."""
+    (x, v), legs, moves, near = begin, list[Leg](), np.zeros(len(axes), bool), False
     while len(legs) < ticks and not near:
-        leg, x1, v1, there = go(x, v)
-        going = under_way(*leg[1:]).tobytes()
-        if legs and going != moves:
-            break
+        leg, x, v, near = go(x, v)
         legs.append(leg)
-        x, v, moves, near = x1, v1, going, there
-    return Course(len(legs), setpoints.of(axes, legs, x, v), moves, near)
+        moves |= under_way(*leg[1:])
+    return Course(len(legs), setpoints.of(axes, legs, x, v), moves.tobytes(), near)

@@ -14,16 +14,15 @@ from time import perf_counter
 import numpy as np
 
 from factory.control.governor import follow
-from factory.control.mode import Array, Index, Truth
+from factory.control.mode import REST, Array, Index, Truth
 from factory.control.navigation import Bundle
 from factory.engine import mujoco
-from factory.errors import Diagnostic, InputError
 from factory.factory import Operation
 from factory.mjcf import names
-from factory.mjcf.binary import cached, keep
+from factory.mjcf.loading import load
 from factory.mjcf.model import GRAVITY, HEAD_MASS, Model
 from factory.world.contacts import NOBODY
-from factory.world.courses import AHEAD, SLOW, Course, Courses, Way, travelled
+from factory.world.courses import AHEAD, Course, Courses, Way, travelled
 from factory.world.inspection import Inspection
 from factory.world.outfeed import Outfeed
 from factory.world.rewind import Rewind
@@ -89,7 +88,7 @@ class MujocoWorld:
         self._active = np.empty(0, np.intp)
         self._moves = b""
         self._last: Course | None = None
-        self._lags = False
+        self._lags, self._anew = False, True
         self._under_way = np.zeros(len(slides), bool)
         own = self.m.body_subtreemass[self.body] + self.m.dof_armature[self.dof]
         weight = np.zeros(len(slides))
@@ -190,8 +189,8 @@ class MujocoWorld:
     def step(self, bundle: Bundle | None, axes: Index, ticks: int = 1) -> bool:
         """Some ticks of the engine, the drives following a reference that obeys F_p under the
         limits: as many as are asked for, or fewer, but never past one that somebody has to see the
-        end of. Whether any mode may have come to its goal: no robot is far ahead of its
-        reference."""
+        end of. Whether any mode may have come to its goal: no robot is far ahead of its reference,
+        nor at rest before that is."""
         near, ticks = False, self._at_most(ticks)
         if axes is not self._active:
             self._turn(bundle, axes)
@@ -200,12 +199,13 @@ class MujocoWorld:
             tray = self.outfeed.course(ticks)
             ticks = tray.ticks
         if bundle is not None:
+            if self._anew:
+                self._foresee(bundle, axes)
             course = self._next(bundle, axes, ticks)
+            self._last, self._lags = course, True
             self.setpoints.follow(axes, course.told)
-            if course.moves != self._moves:
-                self._moves = course.moves
-                self._attend(axes, np.frombuffer(course.moves, bool))
-            near, ticks = course.near, course.ticks
+            self._anew = near = course.near
+            ticks = course.ticks
         if tray is not None:
             self._send_tray(tray if tray.ticks == ticks else self.outfeed.course(ticks))
         self.advance(ticks * self.steps)
@@ -219,6 +219,14 @@ class MujocoWorld:
             return 1
         return min(ticks, self.at_once, self.stride - self.ticks)
 
+    def _foresee(self, bundle: Bundle, axes: Index) -> None:
+        """Attend to all that move before somebody looks again, or may be where they go; however
+        many ticks go to the engine at once."""
+        moves = self._next(bundle, axes, self.stride - self.ticks).moves
+        if moves != self._moves:
+            self._moves = moves
+            self._attend(axes, np.frombuffer(moves, bool))
+
     def _next(self, bundle: Bundle, axes: Index, ticks: int) -> Course:
         """What comes after the last course, of so many ticks at most."""
         before = self._last
@@ -229,17 +237,15 @@ class MujocoWorld:
             course = self.courses.of(begin, lambda: self._course(bundle, axes, x, v, ticks))
             if before is not None:
                 before.then[ticks] = course
-        self._last, self._lags = course, True
         return course
 
     def _course(self, bundle: Bundle, axes: Index, x: Array, v: Array, ticks: int) -> Course:
-        """Ticks of the active modes, until one comes near its goal or another robot moves. The load
-        of each robot is that of its operation."""
+        """Ticks of the active modes, until one comes near its goal. The load of each robot is that
+        of its operation."""
 
         def go(x: Array, v: Array) -> Way:
             x1, v1, a = follow(bundle, x, v, self.tick)
-            slow = np.abs(v1) < np.maximum(SLOW, bundle.acceleration * self.tick)
-            return (x, v, a), x1, v1, bundle.near_goal(x1, AHEAD, slow)
+            return (x, v, a), x1, v1, bundle.near_goal(x1, AHEAD, np.abs(v1) < REST)
 
         return travelled(self.setpoints, axes, (x, v), ticks, go)
 
@@ -344,7 +350,7 @@ class MujocoWorld:
 
     def _look(self) -> None:
         """At what is looked at when other modes begin, and once in a stride from then."""
-        self.ticks = 0
+        self.ticks, self._anew = 0, True
         self.inspection.welds()
         if self.stock.joining:
             self.stock.settle()
@@ -360,36 +366,3 @@ class MujocoWorld:
     def delivered(self) -> int:
         """Products that have left the outfeed, since the beginning of time."""
         return self.done + len(self.stock.left)
-
-
-def load(model: Model) -> mujoco.MjModel:
-    """The engine's model of what `model_files` gives; from the user's cache if it is there. Raises
-    InputError (BadMesh, BadValue, Engine) where the engine refuses it."""
-    m = cached(model)
-    if m is None:
-        m = _compiled(model)
-        keep(model, m)
-    return m
-
-
-def _compiled(model: Model) -> mujoco.MjModel:
-    xml = model.xml
-    files: Mapping[str, bytes] = {
-        f"meshes/{name}": content for name, content in model.files.items()
-    }
-    try:
-        return mujoco.MjModel.from_xml_string(xml, dict(files))
-    except ValueError as error:
-        raise InputError(_explained(model, str(error))) from error
-
-
-def _explained(model: Model, words: str) -> Diagnostic:
-    """The engine's error, at the line of the part it speaks of where it names one."""
-    for solid in model.layout.product.solids.values():
-        mesh = f"mesh/{solid.mesh.name}" if solid.mesh else ""
-        if f"part/{solid.label}#" in words or (mesh and mesh in words):
-            position = model.factory.pag[solid.label].position
-            hint = "repair the mesh of this part" if solid.mesh else "give it another shape or mass"
-            code = "BadMesh" if solid.mesh else "BadValue"
-            return Diagnostic(code, words.strip(), position, hint)
-    return Diagnostic("Engine", words.strip(), None, "please report this as a bug of factory")

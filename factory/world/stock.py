@@ -301,9 +301,7 @@ class Stock:
         found = {int(tree[one[weld]]): robot + 1 for (robot, _), weld in self.grip.items()}
         return found | {int(tree[one[weld]]): self.tray for weld in self.hold.values()}
 
-    def _reach(
-        self, holders: int, begun: bool
-    ) -> tuple[Reach, dict[tuple[int, str], int], list[float]]:
+    def _reach(self, holders: int, begun: bool) -> tuple[Reach, dict[tuple[int, str], int], Array]:
         """What the vicinity is told. Where a marking has `begun`, robots have at first whatever
         they ever have."""
         layout, robots = self.model.layout, self.model.factory.robots
@@ -326,7 +324,7 @@ class Stock:
         margins = margin(asked, settings.stride * settings.tick)
         reach = Reach(self.m, self.d, self.contacts, [*first, *others.values()], joints, margins)
         numbers = {key: n for n, key in enumerate(others, start=len(first))}
-        return reach, numbers, asked.tolist()
+        return reach, numbers, asked
 
     def _put_away(self, labels: Sequence[str], copies: Sequence[int]) -> None:
         spares = list(zip(labels, copies, strict=True))

@@ -10,14 +10,14 @@ is the same to the last bit.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from functools import reduce
-from math import ceil, floor
 from operator import or_
 
 import numpy as np
 
-from factory.control.mode import Array, Index
+from factory.control.mode import Array, Index, Truth
 from factory.engine import mujoco
 from factory.world.contacts import NOBODY, Contacts
 from factory.world.reach import CELL, Reach
@@ -40,11 +40,26 @@ SWAY = 1e-3
 touches."""
 
 
+KEPT = 500
+"""So many views are kept: in steady production the same robots go the same ways again and again."""
+
+
 def margin(accelerations: Array, period: float) -> Array:
     """How far [m] anything may have been off its way, further than is watched for, and have come
     back, while nobody looked for so long [s], where the settings ask for such accelerations [m/s²];
     and sway besides."""
     return np.asarray(np.maximum(TIMES * accelerations * period**2 / 8 - CELL, 0.0) + SWAY)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _View:
+    """Whom some holders that go their ways may meet, and themselves (holders + 1,); and where those
+    on slides are meanwhile: their addresses in `qpos`, between `low` and `high` [m]."""
+
+    near: Truth
+    watched: Index
+    low: Array
+    high: Array
 
 
 class Vicinity:
@@ -62,7 +77,7 @@ class Vicinity:
         d: mujoco.MjData,
         contacts: Contacts,
         holders: int,
-        planned: Callable[[], tuple[Reach, Mapping[tuple[int, str], int], Sequence[float]]],
+        planned: Callable[[], tuple[Reach, Mapping[tuple[int, str], int], Array]],
     ) -> None:
         self.m, self.d, self.contacts, self.holder = m, d, contacts, contacts.code
         self._everybody = np.ones(holders + 1, bool)
@@ -74,9 +89,10 @@ class Vicinity:
         count, self._calm = holders + 1, -np.inf
         self._woken: list[Index] = []
         self._goal = np.full(count, np.nan)
-        self._met, self._anew = dict[int, int](), np.ones(count, bool)
-        self._span, self._load = np.zeros((2, count), np.intp), np.arange(count)
-        self._watched, self._low, self._high = np.empty(0, np.intp), np.empty(0), np.empty(0)
+        self._ways = np.zeros((3, count), np.intp)
+        self._ways[0] = np.arange(count)
+        self._views: dict[bytes, _View] = {}
+        self._view = _View(self._everybody, np.empty(0, np.intp), np.empty(0), np.empty(0))
         self._of_tree, self._asleep = _of_trees(m, self.holder), np.zeros_like(d.tree_asleep)
 
     def woken(self, bodies: Index) -> None:
@@ -88,23 +104,20 @@ class Vicinity:
     def carries(self, robot: int, label: str) -> None:
         """A robot (index) has something else from now on, by its label."""
         if self.culls:
-            self._load[robot + 1] = self._loads[robot, label]
-            self._anew[robot + 1] = True
+            self._ways[0, robot + 1] = self._loads[robot, label]
 
     def goes(self, holders: Index, x: Array, v: Array, places: Array) -> None:
         """From now on holders go to `places` on their slides [m], from x at speed v, and straight;
         they may have to stop first. Who has not been told otherwise goes on."""
         if not self.culls:
             return
-        (new,) = ((places != self._goal[holders]) | (places == x)).nonzero()
-        holders, places = holders[new], places[new]
-        self._goal[holders], self._anew[holders] = places, True
+        new = (places != self._goal[holders]) | (places == x)
+        holders, x, v, places = holders[new], x[new], v[new], places[new]
+        self._goal[holders] = places
         self._foreseen = self.stale = True
-        ways = (values.tolist() for values in (holders, x[new], v[new], places))
-        for holder, here, speed, place in zip(*ways, strict=True):
-            ends = here, here + speed * abs(speed) / (2 * self._asked[holder]), place
-            self._span[0, holder] = floor(min(ends) / CELL) - 1
-            self._span[1, holder] = ceil(max(ends) / CELL) + 1
+        ends = np.stack([x, x + v * np.abs(v) / (2 * self._asked[holders]), places])
+        self._ways[1, holders] = np.floor(ends.min(axis=0) / CELL) - 1
+        self._ways[2, holders] = np.ceil(ends.max(axis=0) / CELL) + 1
 
     def astray(self) -> None:
         """From now on nobody knows who goes where."""
@@ -115,8 +128,9 @@ class Vicinity:
         """Whether everybody that moves is where that was foreseen, if it was."""
         if self._all:
             return True
-        x = self.d.qpos.take(self._watched)
-        return not np.count_nonzero((x < self._low) | (x > self._high))
+        view = self._view
+        x = self.d.qpos.take(view.watched)
+        return not np.count_nonzero((x < view.low) | (x > view.high))
 
     def notice(self) -> None:
         """It is stale where something touches, or the engine has woken something by itself."""
@@ -135,7 +149,8 @@ class Vicinity:
             self._calm = self.d.time + CALM
         before, self._all = self._all, not self._foreseen or self.d.time < self._calm
         if not self._all:
-            self._show(self._near())
+            self._view = self._seen()
+            self._show(self._view.near)
             if self.reach.beyond:
                 self.everything()
         elif not before:
@@ -143,36 +158,42 @@ class Vicinity:
         self._woken.clear()
         self.stale = False
 
-    def _near(self) -> np.ndarray:
-        """The holders (holders + 1,) that move, and that those may meet; and watch them."""
+    def _seen(self) -> _View:
+        """What is to be seen of all that move."""
         awake, moves = self.d.tree_asleep < 0, np.zeros_like(self._everybody)
         if self._woken:
-            awake[self._with(np.concatenate(self._woken))] = True
+            self._wake(awake, self.m.body_treeid[np.concatenate(self._woken)])
         moves[self.holder[self._of_tree[awake]]] = True
         moves[NOBODY] = False
         np.multiply(awake, AWAKE, out=self._asleep, dtype=np.int32)
-        (who,) = moves.nonzero()
-        span, address = self._span[:, who], self.reach.address[who]
-        on = address >= 0
-        self._watched, (self._low, self._high) = address[on], span[:, on] * CELL
-        met, anew = self._met, who[self._anew[who]]
-        ways = zip(self._load[anew].tolist(), *self._span[:, anew].tolist(), strict=True)
-        met.update(zip(anew.tolist(), map(self.reach.met.__getitem__, ways), strict=True))
-        self._anew[anew] = False
-        bits = reduce(or_, map(met.__getitem__, who.tolist()), 0)
+        ways = self._ways[:, moves]
+        key = moves.tobytes() + ways.tobytes()
+        view = self._views.get(key)
+        if view is None:
+            if len(self._views) == KEPT:
+                self._views.clear()
+            self._views[key] = view = self._viewed(moves, ways)
+        return view
+
+    def _viewed(self, moves: Truth, ways: Index) -> _View:
+        """What is to be seen of those that move (holders + 1,), each with a load between two places
+        (3, n)."""
+        bits = reduce(or_, map(self.reach.met.__getitem__, zip(*ways.tolist(), strict=True)), 0)
         packed = np.frombuffer(bits.to_bytes(len(moves) // 8 + 1, "little"), np.uint8)
         meets = np.unpackbits(packed, count=len(moves), bitorder="little")
-        return np.asarray(moves | meets.view(bool))
+        address = self.reach.address[moves]
+        on = address >= 0
+        low, high = ways[1:, on] * CELL
+        return _View(moves | meets.view(bool), address[on], low, high)
 
-    def _with(self, bodies: Index) -> list[int]:
-        """The trees of bodies, and those that the engine wakes with them: that fell asleep
-        together, each with the number of the next."""
-        asleep, found = self.d.tree_asleep, set[int]()
-        for tree in self.m.body_treeid[bodies].tolist():
-            while tree not in found:
-                found.add(tree)
-                tree = int(asleep[tree]) if asleep[tree] >= 0 else tree
-        return [*found]
+    def _wake(self, awake: Truth, trees: Index) -> None:
+        """Trees are `awake` from now on (ntree,), and those that the engine wakes with them: that
+        fell asleep together, each with the number of the next."""
+        while len(trees):
+            awake[trees] = True
+            trees = self.d.tree_asleep[trees]
+            trees = trees[trees >= 0]
+            trees = trees[~awake[trees]]
 
     def _show(self, near: np.ndarray) -> None:
         seen = near[self.holder]

@@ -1,0 +1,43 @@
+"""The engine's model of a factory: compiled, or from the cache."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from factory.engine import mujoco
+from factory.errors import Diagnostic, InputError
+from factory.mjcf.binary import cached, keep
+from factory.mjcf.model import Model
+
+
+def load(model: Model) -> mujoco.MjModel:
+    """The engine's model of what `model_files` gives; from the user's cache if it is there. Raises
+    InputError (BadMesh, BadValue, Engine) where the engine refuses it."""
+    m = cached(model)
+    if m is None:
+        m = _compiled(model)
+        keep(model, m)
+    return m
+
+
+def _compiled(model: Model) -> mujoco.MjModel:
+    xml = model.xml
+    files: Mapping[str, bytes] = {
+        f"meshes/{name}": content for name, content in model.files.items()
+    }
+    try:
+        return mujoco.MjModel.from_xml_string(xml, dict(files))
+    except ValueError as error:
+        raise InputError(_explained(model, str(error))) from error
+
+
+def _explained(model: Model, words: str) -> Diagnostic:
+    """The engine's error, at the line of the part it speaks of where it names one."""
+    for solid in model.layout.product.solids.values():
+        mesh = f"mesh/{solid.mesh.name}" if solid.mesh else ""
+        if f"part/{solid.label}#" in words or (mesh and mesh in words):
+            position = model.factory.pag[solid.label].position
+            hint = "repair the mesh of this part" if solid.mesh else "give it another shape or mass"
+            code = "BadMesh" if solid.mesh else "BadValue"
+            return Diagnostic(code, words.strip(), position, hint)
+    return Diagnostic("Engine", words.strip(), None, "please report this as a bug of factory")
