@@ -16,7 +16,7 @@ from factory.layout.plan import Layout
 from factory.monitor import beside
 from factory.simulation import Simulation, physical_model
 from factory.wholes import FUSE_FROM, bodies_of, fused_copies, fusing_pays
-from factory.world.fusing import Groups, fuse, misfit, turns
+from factory.world.fusing import Fusion, Groups, turns
 from tests.command_line import PAPER, ROOT, Terminal
 from tests.test_simulation import laid_out
 
@@ -61,6 +61,11 @@ def momentum(m: mujoco.MjModel, d: mujoco.MjData, bodies: list[int]) -> np.ndarr
     )
 
 
+def nowhere(m: mujoco.MjModel, d: mujoco.MjData) -> Fusion:
+    """Of bodies that belong nowhere."""
+    return Fusion(m, d, np.zeros((m.nbody, 3)), np.zeros(m.nbody))
+
+
 @settings(max_examples=25, deadline=None)
 @given(st.integers(2, 5), st.integers(0, 2**32 - 1))
 def test_momentum_goes_over_to_the_one_body(count: int, seed: int) -> None:
@@ -69,7 +74,7 @@ def test_momentum_goes_over_to_the_one_body(count: int, seed: int) -> None:
     d.qvel[: 6 * count] = rng.normal(0, 1, 6 * count)
     bodies = list(range(1, whole))
     before = momentum(m, d, bodies)
-    fuse(m, d, Groups.of([bodies]), np.array([whole]))
+    nowhere(m, d).fuse(Groups.of([bodies]), np.array([whole]))
     after = momentum(m, d, [whole])
     assert np.allclose(after, before, atol=1e-9)
     assert np.allclose(d.xipos[whole], m.body_mass[bodies] @ d.xipos[bodies] / m.body_mass[whole])
@@ -84,7 +89,7 @@ def test_a_rigid_motion_goes_over_unchanged() -> None:
         d.qvel[v + 3 : v + 6] = turning
     mujoco.mj_forward(m, d)
     before = d.energy.copy()
-    fuse(m, d, Groups.of([[1, 2, 3]]), np.array([whole]))
+    nowhere(m, d).fuse(Groups.of([[1, 2, 3]]), np.array([whole]))
     assert np.allclose(d.qvel[-3:], turning)
     assert np.array_equal(before, d.energy)
 
@@ -92,15 +97,15 @@ def test_a_rigid_motion_goes_over_unchanged() -> None:
 def test_misfit_sees_a_shift_and_a_turn() -> None:
     m, d, _ = free_bodies(np.random.default_rng(1), 2)
     mujoco.mj_forward(m, d)
-    places, radii, both = d.xpos[1:3].copy(), np.array([0.1, 0.1]), Groups.of([[1, 2]])
-    assert misfit(d, both, places, radii) < 1e-12
+    fusion, both = Fusion(m, d, d.xpos.copy(), np.full(m.nbody, 0.1)), Groups.of([[1, 2]])
+    assert fusion.misfit(both) < 1e-12
     d.qpos[7] += 1e-5
     mujoco.mj_forward(m, d)
-    assert misfit(d, both, places, radii) == pytest.approx(1e-5)
+    assert fusion.misfit(both) == pytest.approx(1e-5)
     d.qpos[7] -= 1e-5
     d.qpos[10:14] = np.cos(5e-4), 0, 0, np.sin(5e-4)
     mujoco.mj_forward(m, d)
-    assert misfit(d, both, places, radii) > 1e-3 * 0.1
+    assert fusion.misfit(both) > 1e-3 * 0.1
 
 
 def test_groups_are_treated_as_each_would_be_alone() -> None:
@@ -112,12 +117,12 @@ def test_groups_are_treated_as_each_would_be_alone() -> None:
     alone = mujoco.MjData(m)
     mujoco.mj_copyData(alone, m, d)
     places, radii = d.xpos + rng.normal(0, 0.1, d.xpos.shape), rng.uniform(0, 0.1, m.nbody)
-    far = [misfit(alone, Groups.of([group]), places[group], radii[group])[0] for group in groups]
+    singly, at_once = (Fusion(m, data, places, radii) for data in (alone, d))
+    far = [singly.misfit(Groups.of([group]))[0] for group in groups]
     for group, whole in zip(groups, wholes, strict=True):
-        fuse(m, alone, Groups.of([group]), np.array([whole]))
-    every = [body for group in groups for body in group]
-    assert misfit(d, Groups.of(groups), places[every], radii[every]) == pytest.approx(far)
-    fuse(m, d, Groups.of(groups), np.array(wholes))
+        singly.fuse(Groups.of([group]), np.array([whole]))
+    assert at_once.misfit(Groups.of(groups)) == pytest.approx(far)
+    at_once.fuse(Groups.of(groups), np.array(wholes))
     for name in ("qpos", "qvel", "xpos", "xmat", "xquat"):
         assert np.allclose(getattr(d, name), getattr(alone, name), rtol=0, atol=1e-12), name
 

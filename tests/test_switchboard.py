@@ -26,7 +26,7 @@ def a_board() -> tuple[Switchboard, Stock]:
 
 def test_what_is_said_last_of_a_weld_holds() -> None:
     board, stock = a_board()
-    m, d = board.m, board.d
+    m, d = stock.m, stock.d
     one, other, third, fourth = [*stock.grip.values()][:4]
     before = int(m.eq_obj2id[other])
     board.join([one], [5])
@@ -46,7 +46,7 @@ def test_what_is_said_last_of_a_weld_holds() -> None:
 
 def test_what_is_said_last_of_a_body_holds() -> None:
     board, stock = a_board()
-    m, d = board.m, board.d
+    m, d = stock.m, stock.d
     body, other = (int(stock.body[label][0]) for label in ("part1", "part2"))
     board.place([body], [(1.0, 2.0, 3.0)])
     board.place([body, other], [(4.0, 5.0, 6.0), (7.0, 8.0, 9.0)])
@@ -83,7 +83,7 @@ def test_what_is_put_somewhere_is_looked_at_there(monkeypatch: pytest.MonkeyPatc
 
 def test_what_a_weld_joins_and_joined_is_woken() -> None:
     board, stock = a_board()
-    m, d = board.m, board.d
+    m, d = stock.m, stock.d
     tree = {label: m.body_treeid[ids[0]] for label, ids in stock.body.items()}
     first = {label: m.body_dofadr[ids[0]] for label, ids in stock.body.items()}
     for label in ("part1", "part2"):

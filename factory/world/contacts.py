@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 
 from factory.approach import Pair
 from factory.control.mode import Index
-from factory.control.obstacles import ranges
 from factory.engine import mujoco
 
 NOBODY = 0
@@ -46,12 +45,12 @@ class Contacts:
         self.unit = np.full(m.nbody, -1)
         self.contype, self.conaffinity = m.body_contype.copy(), m.body_conaffinity.copy()
         self.solid = {int(b): self._solid(int(b)) for ids in bodies.values() for b in ids}
-        self._geoms = np.concatenate([*self.solid.values()])
-        self._count = np.zeros(m.nbody, np.intp)
-        self._count[[*self.solid]] = [len(geoms) for geoms in self.solid.values()]
-        self._first = np.zeros(m.nbody, np.intp)
-        self._first[[*self.solid]] = np.cumsum(self._count[[*self.solid]])
-        self._first -= self._count
+        self._geoms = {body: geoms.tolist() for body, geoms in self.solid.items()}
+        self._of_geoms = memoryview(m.geom_contype), memoryview(m.geom_conaffinity)
+        self._of_bodies = tuple(
+            memoryview(masks)
+            for masks in (self.contype, m.body_contype, self.conaffinity, m.body_conaffinity)
+        )
         self.partners: dict[str, list[str]] = {}
         for one, other in excluded:
             self.partners.setdefault(one, []).append(other)
@@ -65,16 +64,17 @@ class Contacts:
         geoms = self.m.body_geomadr[body] + np.arange(self.m.body_geomnum[body])
         return np.asarray(geoms[self.m.geom_group[geoms] != 1])
 
-    def hold(self, bodies: Index, holders: Index) -> None:
-        """From now on parts are each in the hands of a holder (its code)."""
-        own, others = self._masks[:, holders]
-        count = self._count[bodies]
-        geoms = self._geoms[ranges(self._first[bodies], count)]
-        self.code[bodies] = holders
-        self.m.geom_contype[geoms] = np.repeat(own, count)
-        self.m.geom_conaffinity[geoms] = np.repeat(others, count)
-        self.contype[bodies] = self.m.body_contype[bodies] = own
-        self.conaffinity[bodies] = self.m.body_conaffinity[bodies] = others
+    def hold(self, holders: Mapping[int, int]) -> None:
+        """From now on parts are each in the hands of a holder (its code), by body."""
+        contype, conaffinity = self._of_geoms
+        own_type, type_, own_affinity, affinity = self._of_bodies
+        for body, holder in holders.items():
+            self.code[body] = holder
+            own, others = self._masks[holder]
+            own_type[body] = type_[body] = own
+            own_affinity[body] = affinity[body] = others
+            for geom in self._geoms[body]:
+                contype[geom], conaffinity[geom] = own, others
 
     @property
     def collides(self) -> NDArray[np.bool_]:
@@ -90,9 +90,8 @@ class Contacts:
                 fixed = (tree := int(self.m.body_treeid[body])) not in trees
                 holders += fixed
                 self.code[body] = holders if fixed else trees[tree]
-        codes = np.arange(holders + 1)
-        self._masks = np.stack([codes << 1, ((~codes & ALL) << 1) | 1])
-        self._masks[:, NOBODY] = 0
+        self._masks = [(code << 1, ((~code & ALL) << 1) | 1) for code in range(holders + 1)]
+        self._masks[NOBODY] = 0, 0
         return holders
 
     def enter(self, label: str, unit: int, body: int) -> None:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import accumulate
 
 import numpy as np
 
@@ -42,85 +43,86 @@ TURN = np.array(
 components."""
 
 
+CURL = np.zeros((9, 3))
+"""The cross product of two vectors by the products of their components, row by row."""
+CURL[[5, 6, 1], [0, 1, 2]], CURL[[7, 2, 3], [0, 1, 2]] = 1.0, -1.0
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Groups:
-    """Bodies in groups: all `bodies` (n,) one group after another, the number of each group's first
-    in `starts`, and of each body's group in `owner` (n,)."""
+    """Bodies in groups: all `bodies` (n,), one group after another; where each group begins in
+    `starts`; for each body (n,) its group in `owner`, and where that begins in `head`."""
 
     bodies: Index
     starts: Index
     owner: Index
+    head: Index
 
     @classmethod
     def of(cls, groups: Sequence[Sequence[int]]) -> Groups:
         """From lists of bodies, none of them empty."""
-        sizes = np.array([len(group) for group in groups], np.intp)
-        bodies = np.array([body for group in groups for body in group], np.intp)
-        return cls(bodies, np.cumsum(sizes) - sizes, np.repeat(np.arange(len(sizes)), sizes))
+        starts = [*accumulate(map(len, groups[:-1]), initial=0)]
+        owner = [number for number, group in enumerate(groups) for _ in group]
+        bodies = [body for group in groups for body in group]
+        return cls(*map(np.array, (bodies, starts, owner, [starts[number] for number in owner])))
 
     def sum(self, values: Array) -> Array:
         """The sum of values (n, ...) over each group (groups, ...)."""
         return np.asarray(np.add.reduceat(values, self.starts))
 
-    def first(self, values: Array) -> Array:
-        """For each body (n, ...) the value that the first of its group has."""
-        return np.asarray(values[self.starts][self.owner])
 
+class Fusion:
+    """Of free bodies whose origins are their centres of mass.
 
-def misfit(d: mujoco.MjData, groups: Groups, places: Array, radii: Array) -> Array:
-    """How far at most any vertex of each group (groups,) is from its place beside the first
-    body [m].
-
-    `places` (n, 3): their centres of mass in the frame of the product; `radii` (n,): how far their
-    vertices are from those. Bodies never turn but by what their welds yield.
+    `places` (nbody, 3): where those are in the frame of the product; `radii` (nbody,): how far
+    their vertices are from there [m].
     """
-    here, turn = d.xpos[groups.bodies], d.xmat[groups.bodies].reshape(-1, 3, 3)
-    against, straight = groups.first(turn), places - groups.first(places)
-    apart = ((here - groups.first(here))[:, None] @ against)[:, 0] - straight
-    tilt = (turn - against).reshape(-1, 9)
-    far = np.sqrt((apart * apart).sum(axis=1)) + np.sqrt((tilt * tilt).sum(axis=1)) * radii
-    return np.asarray(np.maximum.reduceat(far, groups.starts))
 
+    def __init__(self, m: mujoco.MjModel, d: mujoco.MjData, places: Array, radii: Array) -> None:
+        self.d, self._places, self._radii, self._mass = d, places, radii, m.body_mass
+        self._pose = m.jnt_qposadr[m.body_jntadr][:, None] + np.arange(7)
+        self._speed = m.jnt_dofadr[m.body_jntadr][:, None] + np.arange(6)
+        axes = turns(m.body_iquat)
+        back, least = axes.transpose(0, 2, 1), np.finfo(float).tiny
+        self._inertia = (axes * m.body_inertia[:, None]) @ back
+        self._yields = (axes / np.maximum(m.body_inertia, least)[:, None]) @ back
 
-def fuse(m: mujoco.MjModel, d: mujoco.MjData, groups: Groups, wholes: Index) -> None:
-    """Put each of the bodies `wholes` (groups,) in the place of a group of free bodies: pose,
-    momentum and angular momentum are theirs. Its turn is that of the heaviest, and all origins are
-    centres of mass; speeds of turning are in a body's own frame, inertia is in that of its
-    principal axes."""
-    bodies, owner = groups.bodies, groups.owner
-    joint = m.body_jntadr[bodies]
-    q, v = m.jnt_qposadr[joint], m.jnt_dofadr[joint]
-    mass = m.body_mass[bodies]
-    share = (mass / groups.sum(mass)[owner])[:, None]
-    pose = d.qpos[q[:, None] + np.arange(7)]
-    speed = d.qvel[v[:, None] + np.arange(6)]
-    count = len(bodies)
-    principal = turns(m.body_iquat[np.concatenate([bodies, wholes])])
-    turn, axes = turns(pose[:, 3:]), principal[:count]
-    centre, common = groups.sum(share * pose[:, :3]), groups.sum(share * speed[:, :3])
-    arm, drift = mass[:, None] * (pose[:, :3] - centre[owner]), speed[:, :3] - common[owner]
-    moment = groups.sum(arm[:, :, None] * drift[:, None])  # m r vᵀ
-    spin = (moment - moment.transpose(0, 2, 1))[:, [1, 2, 0], [2, 0, 1]]
-    own = _times(axes, m.body_inertia[bodies] * _times(axes.transpose(0, 2, 1), speed[:, 3:]))
-    spin += groups.sum(_times(turn, own))
-    heaviest = np.lexsort((-mass, owner))[groups.starts]
-    joint = m.body_jntadr[wholes]
-    q, v = m.jnt_qposadr[joint][:, None], m.jnt_dofadr[joint][:, None]
-    d.qpos[q + np.arange(3)], d.qpos[q + np.arange(3, 7)] = centre, pose[heaviest, 3:]
-    axes = principal[count:]
-    back = axes.transpose(0, 2, 1) @ turn[heaviest].transpose(0, 2, 1)
-    d.qvel[v + np.arange(3)] = common
-    d.qvel[v + np.arange(3, 6)] = _times(axes, _times(back, spin) / m.body_inertia[wholes])
-    d.xpos[wholes] = groups.sum(share * d.xpos[bodies])
-    d.xmat[wholes], d.xquat[wholes] = d.xmat[bodies[heaviest]], d.xquat[bodies[heaviest]]
+    def misfit(self, groups: Groups) -> Array:
+        """How far at most any vertex of each group (groups,) is from its place beside the first
+        body [m]. Bodies never turn but by what their welds yield."""
+        bodies, head = groups.bodies, groups.head
+        here, turn, places = self.d.xpos[bodies], self.d.xmat[bodies], self._places[bodies]
+        back = turn[head].reshape(-1, 3, 3)
+        apart = ((here - here[head])[:, None] @ back)[:, 0] - (places - places[head])
+        tilt = turn - turn[head]
+        far = np.sqrt((apart * apart).sum(axis=1))
+        far += np.sqrt((tilt * tilt).sum(axis=1)) * self._radii[bodies]
+        return np.asarray(np.maximum.reduceat(far, groups.starts))
+
+    def fuse(self, groups: Groups, wholes: Index) -> None:
+        """Put each of the bodies `wholes` (groups,) in the place of a group: pose, momentum and
+        angular momentum are theirs. Its turn is that of the heaviest. Speeds of turning are in a
+        body's own frame."""
+        d, bodies, owner = self.d, groups.bodies, groups.owner
+        mass, pose = self._mass[bodies], d.qpos[self._pose[bodies]]
+        speed, turn = d.qvel[self._speed[bodies]], turns(pose[:, 3:])
+        share = (mass / groups.sum(mass)[owner])[:, None]
+        each = np.concatenate([pose[:, :3], speed[:, :3], d.xpos[bodies]], axis=1)
+        common = groups.sum(share * each)
+        apart = each - common[owner]
+        moment = (apart[:, :3, None] * apart[:, None, 3:6]).reshape(-1, 9) @ CURL  # r x v
+        own = turn @ (self._inertia[bodies] @ speed[:, 3:, None])
+        spin = groups.sum(mass[:, None] * moment + own[:, :, 0])
+        heaviest = np.lexsort((-mass, owner))[groups.starts]
+        turned = turn[heaviest].transpose(0, 2, 1) @ spin[:, :, None]
+        turning = (self._yields[wholes] @ turned)[:, :, 0]
+        d.qpos[self._pose[wholes]] = np.concatenate([common[:, :3], pose[heaviest, 3:]], axis=1)
+        d.qvel[self._speed[wholes]] = np.concatenate([common[:, 3:6], turning], axis=1)
+        d.xpos[wholes], heaviest = common[:, 6:], bodies[heaviest]
+        d.xmat[wholes], d.xquat[wholes] = d.xmat[heaviest], d.xquat[heaviest]
 
 
 def turns(quaternions: Array) -> Array:
     """Rotation matrices (n, 3, 3) of unit quaternions (n, 4)."""
     products = (quaternions[:, :, None] * quaternions[:, None]).reshape(-1, 16)
     return np.asarray((products @ TURN).reshape(-1, 3, 3))
-
-
-def _times(matrices: Array, vectors: Array) -> Array:
-    """Each matrix (n, 3, 3) times its vector (n, 3)."""
-    return np.asarray((matrices @ vectors[:, :, None])[:, :, 0])

@@ -329,7 +329,7 @@ class MujocoWorld:
 
     def rouse(self, axes: Index) -> None:
         """Wake robots that sleep, and let those that are about to wait as long again."""
-        self.stock.board.wake(self.body[axes])
+        self.stock.board.wake(self.body[axes].tolist())
 
     def settle(self, ticks: int = 1) -> None:
         """After some ticks: look at what is looked at once in a stride, and at the outfeed's

@@ -17,7 +17,7 @@ from factory.mjcf.model import Model
 from factory.mjcf.parts import parked_at, presented_at
 from factory.pag import NOPART
 from factory.world.contacts import NOBODY, Contacts
-from factory.world.fusing import RIGID, SETTLING, Groups, fuse, misfit
+from factory.world.fusing import RIGID, SETTLING, Fusion, Groups
 from factory.world.gaps import held_at
 from factory.world.loads import Load, loads
 from factory.world.reach import Reach
@@ -82,6 +82,7 @@ class Stock:
         plan = partial(self._reach, holders, bool(counts))
         self.vicinity = Vicinity(m, d, self.contacts, holders, plan)
         self.board = Switchboard(m, d, self.contacts, self.vicinity)
+        self.fusion = self._fusion()
         self._hide_spares()
         self._hand_out(counts)
         for label in self.feed:
@@ -182,7 +183,7 @@ class Stock:
         now = self.d.time
         waiting = [robot for robot, (_, since) in self.joining.items() if now - since > SETTLING]
         if waiting:
-            apart = dict(zip(waiting, self._misfits(waiting).tolist(), strict=True))
+            apart = self._misfits(waiting, self._held(waiting))
             self.fuse([robot for robot in waiting if apart[robot] < RIGID], apart)
             self.board.write()
 
@@ -191,12 +192,9 @@ class Stock:
         loads = (self.load[robot] for robot in robots)
         return Groups.of([self._bodies(labels, unit) for unit, labels in loads])
 
-    def _misfits(self, robots: Iterable[int]) -> Array:
-        """How far out of place anything of what robots hold is [m]."""
-        labels = [label for robot in robots for label in self.load[robot][1]]
-        places = np.array([self.bodies.centre[label] for label in labels])
-        radii = np.array([self.bodies.radius[label] for label in labels])
-        return misfit(self.d, self._held(robots), places, radii)
+    def _misfits(self, robots: Iterable[int], held: Groups) -> dict[int, float]:
+        """How far out of place anything is of what each robot holds [m]."""
+        return dict(zip(robots, self.fusion.misfit(held).tolist(), strict=True))
 
     def fuse(self, robots: Iterable[int], apart: Mapping[int, float] = NOTHING) -> None:
         """Let one body each take the place of those that robots (index) have joined, if it has not
@@ -220,15 +218,16 @@ class Stock:
         if not made:
             return
         self.board.write()
+        held = self._held(made)
         if not made.keys() <= apart.keys():
-            apart = dict(zip(made, self._misfits(made).tolist(), strict=True))
+            apart = self._misfits(made, held)
         for robot in made:
             unit, _ = self.load[robot]
             self.misfit[unit] = max(self.misfit.get(unit, 0.0), apart[robot])
         copies = [self.free[label].popleft() for label in made.values()]
         wholes = [int(self.body[k][n]) for k, n in zip(made.values(), copies, strict=True)]
-        fuse(self.m, self.d, self._held(made), np.array(wholes))
-        self.vicinity.woken(np.array(wholes))
+        self.fusion.fuse(held, np.array(wholes))
+        self.vicinity.woken(wholes)
         for (robot, label), copy, whole in zip(made.items(), copies, wholes, strict=True):
             unit, labels = self.load[robot]
             self.board.loose([*(self.grip[robot, k] for k in labels), self.park[label, copy]])
@@ -294,6 +293,12 @@ class Stock:
             for label in self.bodies.handled(self.model.factory, robot.index):
                 found[robot.index, label] = self.m.equality(names.grip(robot.name, label)).id
         return found
+
+    def _fusion(self) -> Fusion:
+        places, radii = np.zeros((self.m.nbody, 3)), np.zeros(self.m.nbody)
+        for label, ids in self.body.items():
+            places[ids], radii[ids] = self.bodies.centre[label], self.bodies.radius[label]
+        return Fusion(self.m, self.d, places, radii)
 
     def _trees(self) -> dict[int, int]:
         """The code of the holder that each kinematic tree with a grip is."""

@@ -10,7 +10,7 @@ is the same to the last bit.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
 from functools import reduce
 from operator import or_
@@ -87,7 +87,7 @@ class Vicinity:
             return
         self.reach, self._loads, self._asked = planned()
         count, self._calm = holders + 1, -np.inf
-        self._woken: list[Index] = []
+        self._woken: list[int] = []
         self._goal = np.full(count, np.nan)
         self._ways = np.zeros((3, count), np.intp)
         self._ways[0] = np.arange(count)
@@ -95,10 +95,10 @@ class Vicinity:
         self._view = _View(self._everybody, np.empty(0, np.intp), np.empty(0), np.empty(0))
         self._of_tree, self._asleep = _of_trees(m, self.holder), np.zeros_like(d.tree_asleep)
 
-    def woken(self, bodies: Index) -> None:
+    def woken(self, bodies: Collection[int]) -> None:
         """Bodies are about to move."""
-        if self.culls and len(bodies):
-            self._woken.append(bodies)
+        if self.culls and bodies:
+            self._woken += bodies
             self.stale = True
 
     def carries(self, robot: int, label: str) -> None:
@@ -162,7 +162,7 @@ class Vicinity:
         """What is to be seen of all that move."""
         awake, moves = self.d.tree_asleep < 0, np.zeros_like(self._everybody)
         if self._woken:
-            self._wake(awake, self.m.body_treeid[np.concatenate(self._woken)])
+            self._wake(awake, self.m.body_treeid[self._woken])
         moves[self.holder[self._of_tree[awake]]] = True
         moves[NOBODY] = False
         np.multiply(awake, AWAKE, out=self._asleep, dtype=np.int32)
