@@ -71,8 +71,9 @@ class Settings:
 
     @property
     def samples(self) -> int:
-        """Setpoints that a drive's buffer holds: for the steps of a stride, and one to spare."""
-        return self.stride * self.substeps + 1
+        """Setpoints that a drive's buffer holds: for the steps of a stride, for ever after, and one
+        to spare."""
+        return self.stride * self.substeps + 2
 
     def with_options(self, options: Mapping[str, float | int | None]) -> Settings:
         """These settings with every option that is not None put in place.

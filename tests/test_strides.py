@@ -115,7 +115,7 @@ def test_a_stride_is_no_longer_than_a_look(timestep: float, substeps: int) -> No
     settings = Settings(timestep=timestep, substeps=substeps)
     assert 1 <= settings.stride <= MOST
     assert settings.stride == 1 or settings.stride * settings.tick <= LOOK + 1e-12
-    assert settings.samples == settings.stride * substeps + 1
+    assert settings.samples == settings.stride * substeps + 2
 
 
 def test_what_is_late_at_max_time_is_not_run() -> None:

@@ -55,7 +55,7 @@ class Courses:
         course = self._kept.get(begin)
         if course is None:
             course = made()
-            size = course.told.setpoints.size + course.told.after.size
+            size = course.told.setpoints.size
             if size > self._left:
                 self._kept.clear()
                 self._left = self.room

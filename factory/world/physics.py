@@ -14,7 +14,7 @@ from time import perf_counter
 import numpy as np
 
 from factory.control.governor import follow
-from factory.control.mode import REST, Array, Index, Truth
+from factory.control.mode import REST, ROUNDING, Array, Index, Truth
 from factory.control.navigation import Bundle
 from factory.engine import mujoco
 from factory.factory import Operation
@@ -257,8 +257,9 @@ class MujocoWorld:
         left[self._active] = True
         left[active] = False
         (axes,) = left.nonzero()
-        self.speed[axes] = 0.0
-        self.setpoints.stand(axes, self._x[axes], self._under_way[axes])
+        self.setpoints.stand(axes, self.reference[axes], np.abs(self._v[axes]) >= ROUNDING)
+        self._v[axes] = 0.0
+        self._attend(axes, np.zeros(len(axes), bool))
         self._active, self._moves, self._last = active, b"", None
         self._look()
         if self.vicinity.culls:

@@ -2,8 +2,8 @@
 
 Each drive has a buffer. The engine reads it late (`mjModel.actuator_delay`), so whatever is written
 before a call of the engine is read in its steps, and there is no need to come back from it in
-between. In each step the engine puts `ctrl` in place of the oldest sample: who has been told to
-stand needs to be told no more. A step in which something falls asleep reads its sample once more,
+between. The last sample is for ever after: in each step the engine puts `ctrl` in place of the
+oldest one, and that is the same. A step in which something falls asleep reads its sample once more,
 after that: there is one to spare.
 
 A buffer in `mjData.history`: one number for users, the place of the newest sample, the samples'
@@ -18,7 +18,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from factory.control.mode import Array, Index, Truth
+from factory.control.mode import ROUNDING, Array, Index, Truth
 from factory.engine import mujoco
 
 INPUTS = 3
@@ -31,12 +31,21 @@ Leg = tuple[Array, Array, Array]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Told:
-    """What n axes are told for some ticks: their `setpoints` in every step (n, steps * 3), position
-    [m], speed [m/s] and force [N], and those `after` it (n, 3). `drives` (n,): by number."""
+    """What n axes are told for some ticks: their `setpoints` in every step, and those after it
+    (n, (steps + 1) * 3), position [m], speed [m/s] and force [N]. `drives` (n,): by number."""
 
     setpoints: Array
-    after: Array
     drives: Index
+
+    @property
+    def after(self) -> Array:
+        """The setpoints after it (n, 3)."""
+        return self.setpoints[:, -INPUTS:]
+
+    @property
+    def samples(self) -> int:
+        """How many each axis is told."""
+        return int(self.setpoints.shape[1]) // INPUTS
 
 
 class Setpoints:
@@ -61,14 +70,14 @@ class Setpoints:
         self._drives, self._ctrl = actuators, d.ctrl.reshape(-1, INPUTS)
         self._timestep = float(m.opt.timestep)
         samples = int(m.actuator_history[actuators[0], 0])
-        most = samples - 1
+        most = samples - 2
         m.actuator_delay[actuators] = most * self._timestep
         self._ahead = self._timestep * np.arange(most)
         self._steps = steps
         size = 2 + (1 + INPUTS) * samples
         buffers = d.history.reshape(-1, size)
         self._heads = buffers[:, 1 : 2 + samples]
-        self._tails = [buffers[:, size - INPUTS * told :] for told in range(most + 1)]
+        self._tails = [buffers[:, size - INPUTS * told :] for told in range(samples)]
         self._head = np.full(1 + samples, samples - 1.0)
         self._times = self._head[1:]
         self._early = self._timestep * (np.arange(samples) - samples - most - 0.5)
@@ -78,25 +87,24 @@ class Setpoints:
 
     def of(self, axes: Index, legs: Sequence[Leg], x1: Array, v1: Array) -> Told:
         """What axes are told that run through `legs`, a tick each, and are at x1 [m] with the speed
-        v1 when the engine comes back."""
-        setpoints = np.empty((len(axes), len(legs), self._steps, INPUTS))
-        t = self._ahead[: self._steps]
+        v1 when the engine comes back. Who is at rest then stands until told otherwise."""
+        setpoints = np.empty((len(axes), len(legs) * self._steps + 1, INPUTS))
+        t, weight = self._ahead[: self._steps], self.weight[axes]
         for tick, (x, v, a) in enumerate(legs):
-            force = self.mass[axes] * a + self.weight[axes]
-            speed = v[:, None] + t * a[:, None]
-            setpoints[:, tick, :, 0] = x[:, None] + (t / 2) * (v[:, None] + speed)
-            setpoints[:, tick, :, 1] = speed
-            setpoints[:, tick, :, 2] = force[:, None]
-        return Told(
-            setpoints.reshape(len(axes), -1),
-            np.stack([x1, v1, force], axis=1),
-            self._drives[axes],
-        )
+            here = setpoints[:, tick * self._steps : (tick + 1) * self._steps]
+            force = self.mass[axes] * a + weight
+            here[:, :, 1] = speed = v[:, None] + t * a[:, None]
+            here[:, :, 0] = x[:, None] + (t / 2) * (v[:, None] + speed)
+            here[:, :, 2] = force[:, None]
+        after = setpoints[:, -1]
+        after[:, 0], after[:, 1] = x1, v1
+        after[:, 2] = np.where(np.abs(v1) < ROUNDING, weight, force)
+        return Told(setpoints.reshape(len(axes), -1), self._drives[axes])
 
     def tell(self, told: Told) -> None:
         """Tell drives; the first tick begins now."""
         now = float(self.d.time)
-        end = now + told.setpoints.shape[1] // INPUTS * self._timestep
+        end = now + (told.samples - 1 or len(self._ahead)) * self._timestep
         self._latest = [said for said in self._latest if said[0] > now + self._timestep / 2]
         self._latest.append((end, now, told))
         self._write(now, told)
@@ -108,10 +116,10 @@ class Setpoints:
             self._write(begin, told)
 
     def _write(self, begin: float, told: Told) -> None:
-        steps = told.setpoints.shape[1] // INPUTS
-        np.add(self._early, begin + steps * self._timestep, out=self._times)
+        samples = told.samples
+        np.add(self._early, begin + samples * self._timestep, out=self._times)
         self._heads[told.drives] = self._head
-        self._tails[steps][told.drives] = told.setpoints
+        self._tails[samples][told.drives] = told.setpoints
 
     def follow(self, axes: Index, told: Told) -> None:
         """Tell axes what comes, whatever `move` has told them."""
@@ -132,8 +140,8 @@ class Setpoints:
         """From now on axes stand at x [m]; those that are `going` are to be told."""
         self._plan[0, axes], self._plan[1, axes] = self.d.time, x
         self._plan[2:, axes] = 0.0
-        self._due[axes] |= going
-        self.any_due = bool(self._due.any())
+        if going.any():
+            self._due[axes[going]] = self.any_due = True
 
     def load(self, axis: int, mass: float, weight: float) -> None:
         """From now on an axis moves a mass [kg] beside its own, and carries a weight [N]. One that
@@ -152,11 +160,10 @@ class Setpoints:
         return axes, moves
 
     def _standing(self, axes: Index) -> Told:
-        """What axes are told that stand where they are to stand, for a tick and ever after."""
+        """What axes are told that stand where they are to stand."""
         after = np.zeros((len(axes), INPUTS))
         after[:, 0], after[:, 2] = self._plan[1, axes], self.weight[axes]
-        setpoints = np.broadcast_to(after[:, None], (len(axes), self._steps, INPUTS))
-        return Told(setpoints.reshape(len(axes), -1), after, self._drives[axes])
+        return Told(after, self._drives[axes])
 
     def _planned(self, axes: Index, steps: int) -> Told:
         """What axes are told that `move` has set going, for as many ticks as so many steps take."""
