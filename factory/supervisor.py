@@ -160,7 +160,7 @@ class Supervisor:
 
     def awaited(self) -> list[Operation]:
         """The operations all of whose robots wait for them."""
-        return [self.factory.operations[event // 2] for event in self.threads.possible().tolist()]
+        return [self.factory.operations[event // 2] for event in sorted(self.threads.possible)]
 
     def _startable(self) -> list[int]:
         """Operations X with X_s enabled: waits marked (their goals are everything), the robots in

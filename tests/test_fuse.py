@@ -285,15 +285,14 @@ def test_a_body_that_has_just_become_free_can_take_the_place_of_others(
             for maker, label in made.items()
             if not stock.free[label]
             for consumer in made
-            if label in stock.load[consumer][1]
+            if label in stock.load[consumer].labels
         ]
     consumer, maker = found[0]
-    unit, labels = stock.load[maker]
-    held = [stock.body_of(label, unit) for label in labels]
+    unit, held = stock.load[maker].unit, stock.load[maker].bodies
     centre = world.m.body_mass[held] @ world.d.xpos[held] / world.m.body_mass[held].sum()
     stock.fuse([consumer, maker] if first == "consumer" else [maker, consumer])
     stock.board.write()
-    (label,) = stock.load[maker][1]
+    (label,) = stock.load[maker].labels
     at = world.m.jnt_qposadr[world.m.body_jntadr[stock.body_of(label, unit)]]
     assert np.linalg.norm(world.d.qpos[at : at + 3] - centre) < 0.005
     done = simulation.run()

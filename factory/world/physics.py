@@ -169,7 +169,8 @@ class MujocoWorld:
             self.inspection.started(operation, unit)
         if not ended:
             return
-        self.stock.fuse([robot for operation, _ in ended for robot in operation.robots])
+        if self.stock.joining:
+            self.stock.fuse([robot for operation, _ in ended for robot in operation.robots])
         for operation, unit in ended:
             self.inspection.ended(operation)
             if operation.index == self.model.factory.dropoff.index:

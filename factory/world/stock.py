@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
 from functools import partial
 from types import MappingProxyType
 
@@ -27,14 +28,23 @@ from factory.world.vicinity import Vicinity, margin
 NOTHING: Mapping[int, float] = MappingProxyType({})
 
 
+@dataclass(slots=True)
+class Hand:
+    """The `bodies` that a robot holds, their `labels`, and the `unit` that they are for."""
+
+    unit: int
+    labels: list[str] = field(default_factory=list)
+    bodies: list[int] = field(default_factory=list)
+
+
 class Stock:
     """Copies of parts, fed in the order of units: the n-th part of each label is for unit n.
 
     A weld is aimed at the copy it holds by writing its body at run time; its nominal frame is the
-    same for all copies. `load`: the labels of the bodies that each robot holds, and the unit they
-    are for. Where the model has bodies for sub-assemblies, `joining` are the robots (index) whose
-    bodies have yet to settle before one takes their place, and since when [s]; `misfit`: how far
-    out of place any vertex of a unit's parts was when that happened [m].
+    same for all copies. `load`: what each robot (index) holds. Where the model has bodies for
+    sub-assemblies, `joining` are the robots (index) whose bodies have yet to settle before one
+    takes their place, and since when [s]; `misfit`: how far out of place any vertex of a unit's
+    parts was when that happened [m].
     """
 
     def __init__(
@@ -49,7 +59,8 @@ class Stock:
         self.m, self.d, self.model, self.wip = m, d, model, wip
         factory, self.bodies = model.factory, model.carried
         self.parts = self.bodies.carried[factory.pag.root]
-        self.load: dict[int, tuple[int, list[str]]] = {}
+        self.load: dict[int, Hand] = {}
+        self._switched: dict[int, tuple[list[tuple[int, str]], list[int], list[int]]] = {}
         self.joining: dict[int, tuple[str, float]] = {}
         self.misfit: dict[int, float] = {}
         self.body = {
@@ -147,23 +158,26 @@ class Stock:
         self.board.loose([self.feed[label]])
         self.board.grip([self.grip[operation.carrier, label]], body)
         self.board.hold(body, operation.carrier + 1)
-        self.load[operation.carrier] = unit, [label]
+        self.load[operation.carrier] = Hand(unit, [label], body)
 
     def _pass_on(self, operation: Operation, unit: int) -> None:
-        carrier = operation.carrier
-        _, kept = self.load.setdefault(carrier, (unit, []))
-        moved = [
-            (robot, label)
-            for robot in operation.robots
-            if robot != carrier and robot in self.load
-            for label in self.load.pop(robot)[1]
-        ]
-        labels = [label for _, label in moved]
-        bodies = self._bodies(labels, unit)
-        self.board.loose([self.grip[pair] for pair in moved])
-        self.board.grip([self.grip[carrier, label] for label in labels], bodies)
+        carrier, moved, bodies = operation.carrier, list[tuple[int, str]](), list[int]()
+        for robot in operation.robots:
+            if robot != carrier and robot in self.load:
+                given = self.load.pop(robot)
+                moved += [(robot, label) for label in given.labels]
+                bodies += given.bodies
+        before, let_go, take_over = self._switched.get(operation.index, (None, [], []))
+        if before != moved:
+            let_go = [self.grip[pair] for pair in moved]
+            take_over = [self.grip[carrier, label] for _, label in moved]
+            self._switched[operation.index] = moved, let_go, take_over
+        self.board.loose(let_go)
+        self.board.grip(take_over, bodies)
         self.board.hold(bodies, carrier + 1)
-        self.load[carrier] = unit, kept + labels
+        hand = self.load.setdefault(carrier, Hand(unit))
+        hand.labels += [label for _, label in moved]
+        hand.bodies += bodies
         if operation.label in self.bodies.wholes:
             self.joining[carrier] = operation.label, float(self.d.time)
 
@@ -189,8 +203,7 @@ class Stock:
 
     def _held(self, robots: Iterable[int]) -> Groups:
         """The bodies that robots hold, those of each together."""
-        loads = (self.load[robot] for robot in robots)
-        return Groups.of([self._bodies(labels, unit) for unit, labels in loads])
+        return Groups.of([self.load[robot].bodies for robot in robots])
 
     def _misfits(self, robots: Iterable[int], held: Groups) -> dict[int, float]:
         """How far out of place anything is of what each robot holds [m]."""
@@ -208,7 +221,7 @@ class Stock:
                     self._become_one(made, apart)
                     made = {}
                 if not self.free[label]:
-                    self.fuse([next(r for r in self.joining if label in self.load[r][1])])
+                    self.fuse([next(r for r in self.joining if label in self.load[r].labels)])
                 made[robot] = label
         self._become_one(made, apart)
 
@@ -222,21 +235,21 @@ class Stock:
         if not made.keys() <= apart.keys():
             apart = self._misfits(made, held)
         for robot in made:
-            unit, _ = self.load[robot]
+            unit = self.load[robot].unit
             self.misfit[unit] = max(self.misfit.get(unit, 0.0), apart[robot])
         copies = [self.free[label].popleft() for label in made.values()]
         wholes = [int(self.body[k][n]) for k, n in zip(made.values(), copies, strict=True)]
         self.fusion.fuse(held, np.array(wholes))
         self.vicinity.woken(wholes)
         for (robot, label), copy, whole in zip(made.items(), copies, wholes, strict=True):
-            unit, labels = self.load[robot]
+            unit, labels = self.load[robot].unit, self.load[robot].labels
             self.board.loose([*(self.grip[robot, k] for k in labels), self.park[label, copy]])
             self._retire(labels, unit)
             self.copy_of[label, unit] = copy
             self.contacts.enter(label, unit, whole)
             self.board.join([self.grip[robot, label]], [whole])
             self.board.hold([whole], robot + 1)
-            self.load[robot] = unit, [label]
+            self.load[robot] = Hand(unit, [label], [whole])
 
     def body_of(self, label: str, unit: int) -> int:
         """The body of the part `label` in a unit."""
@@ -368,7 +381,9 @@ class Stock:
         self.board.hold([body], robot + 1)
         self.board.loose([self.park[label, copy]])
         self.board.join([weld], [body])
-        self.load.setdefault(robot, (unit, []))[1].append(label)
+        hand = self.load.setdefault(robot, Hand(unit))
+        hand.labels.append(label)
+        hand.bodies.append(body)
 
     def _hide_spares(self) -> None:
         self.board.loose([*self.feed.values(), *self.hold.values()])
