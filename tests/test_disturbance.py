@@ -16,6 +16,7 @@ from factory.disturbance import (
     Slowed,
     disturb,
 )
+from factory.engine import mujoco
 from factory.errors import InputError
 from factory.simulation import Simulation
 from factory.world.courses import Courses
@@ -77,6 +78,30 @@ def test_a_weak_drive_scales_its_whole_force() -> None:
     assert world.d.actuator_force[world.m.actuator("r2/drive").id] == pytest.approx(
         kp * 1e-4 + 0.5 * 2.0
     )
+
+
+def test_a_weak_drive_is_as_weak_when_it_brakes() -> None:
+    """In every step it pushes with half of what a whole one would, until its robot rests."""
+    world = (weak := simulated(Gain(0.5, ("r5",)))).world
+    drive, (q, v) = world.m.actuator("r5/drive").id, (world.qpos[4], world.dof[4])
+    kp, kv = np.array(simulated().world.m.actuator_biasprm[drive, 1:3])
+    advance, pushed = world.advance, list[float]()
+
+    def watched(steps: int) -> None:
+        for _ in range(steps):
+            told = np.zeros((3, 1))
+            told = mujoco.mj_readCtrl(world.m, world.d, drive, world.d.time, told, -1).copy()
+            x, speed = world.d.qpos[q], world.d.qvel[v]
+            advance(1)
+            if world.d.tree_asleep[world.tree[4]] < 0:
+                whole = -kp * (told[0] - x) - kv * (told[1] - speed) + told[2]
+                assert world.d.actuator_force[drive] == pytest.approx(0.5 * whole, abs=1e-9)
+                pushed.append(told[2])
+
+    world.advance = watched
+    for _ in range(150):
+        weak.supervisor.step()
+    assert min(pushed) < 0.0 < max(pushed)
 
 
 def test_a_push_lasts_as_long_as_it_says() -> None:

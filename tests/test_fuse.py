@@ -10,6 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import factory
+from factory.disturbance import Mass, disturb
 from factory.engine import mujoco
 from factory.geometry import product_geometry
 from factory.layout.plan import Layout
@@ -92,6 +93,22 @@ def test_a_rigid_motion_goes_over_unchanged() -> None:
     nowhere(m, d).fuse(Groups.of([[1, 2, 3]]), np.array([whole]))
     assert np.allclose(d.qvel[-3:], turning)
     assert np.array_equal(before, d.energy)
+
+
+def test_what_has_become_heavier_keeps_its_momentum() -> None:
+    simulation = Simulation(layout_of("gearbox"), units=1, fuse=True)
+    m, d, stock = simulation.world.m, simulation.world.d, simulation.world.stock
+    disturb(simulation, Mass(2.0, tuple(stock.feed)[:2]))
+    whole = int(next(stock.body[label][0] for label in stock.body if label not in stock.feed))
+    bodies = [int(stock.body[label][0]) for label in [*stock.feed][:2]]
+    for body in bodies:
+        at = m.body_dofadr[body]
+        d.qvel[at : at + 6] = np.random.default_rng(body).normal(0, 1, 6)
+    m.body_mass[whole] = m.body_mass[bodies].sum()
+    mujoco.mj_setConst(m, mujoco.MjData(m))
+    before = momentum(m, d, bodies)
+    stock.fusion.fuse(Groups.of([bodies]), np.array([whole]))
+    assert np.allclose(momentum(m, d, [whole]), before, atol=1e-9)
 
 
 def test_misfit_sees_a_shift_and_a_turn() -> None:

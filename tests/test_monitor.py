@@ -512,7 +512,7 @@ def test_a_faulty_run_fails(run: Terminal, tmp_path: Path, monkeypatch: pytest.M
     loose = Switchboard.loose
 
     def sticky(self: Switchboard, welds: list[int]) -> None:
-        loose(self, [n for n in welds if self.m.equality(n).name != "grip/r5/part1"])
+        loose(self, [n for n in welds if self.vicinity.m.equality(n).name != "grip/r5/part1"])
 
     monkeypatch.setattr(Switchboard, "loose", sticky)
     log = tmp_path / "log"

@@ -128,6 +128,7 @@ def test_sets_fire_as_definition_3_4_says(factory: Factory, seed: int) -> None:
     rng, net = random.Random(seed), factory.net.threaded
     here = factory.net.marking_of(random_legal_marking(factory.net, rng))
     threads = threads_of(factory, here.marked)
+    threads.kept = rng.choice((1, 2, 100))
     for _ in range(20):
         enabled = net.net.enabled(here.marked)
         ready = [event for event in enabled if event % 2 == 0]
@@ -141,7 +142,7 @@ def test_sets_fire_as_definition_3_4_says(factory: Factory, seed: int) -> None:
         there = here.follower(net, chosen)
         new = {event for event in net.net.enabled(there.marked) if event % 2 == 0} - {*ready}
         assert threads.fire(tuple(chosen)) == bool(new)
-        assert threads.threads() == there
+        assert threads.threads() == there and len(threads._kept) <= threads.kept
         here = there
 
 
@@ -151,15 +152,15 @@ def test_what_may_not_fire_does_not() -> None:
     threads = threads_of(factory, factory.net.initial_marking)
     before, start = threads.threads(), by_label["part1"].start
     for events, words in (
-        ((by_label["part1"].end,), "not all enabled"),
-        ((start, by_label["sub1"].start), "not all enabled"),
+        ((by_label["part1"].end,), "not all are enabled"),
+        ((start, by_label["sub1"].start), "not all are enabled"),
         ((start, start), "not a detached set"),
     ):
         with pytest.raises(AssertionError, match=words):
             threads.fire(events)
         assert threads.threads() == before
     threads.fire((start,))
-    with pytest.raises(AssertionError, match="not all enabled"):
+    with pytest.raises(AssertionError, match="not all are enabled"):
         threads.fire((start,))
 
 
@@ -169,3 +170,14 @@ def test_a_robot_that_is_not_where_its_token_is_does_not_fire() -> None:
     threads.marked[:] = bytes([1, 0])
     with pytest.raises(AssertionError, match="not legal"):
         threads.fire((1,))
+
+
+def test_who_takes_the_token_leaves_none_for_others() -> None:
+    """Nets with choice are no gear nets, and yet one cannot have what another took."""
+    places = (Place("p", (), (0, 1)), Place("q", (0,), ()), Place("r", (1,), ()))
+    moves = ((((0, 0), (1, 0)),), (((0, 0), (2, 0)),))
+    net = ThreadedNet(PetriNet(_T, places), moves)
+    threads = Threads(net, ThreadedMarking({(0, 0): 7}), (0, 1))
+    assert threads.possible == {0, 1}
+    threads.fire((1,))
+    assert threads.possible == set() and threads.threads().threads == {(2, 0): 7}

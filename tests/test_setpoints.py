@@ -194,6 +194,51 @@ def test_what_has_been_written_over_can_be_told_again() -> None:
         mujoco.mj_step(m, d)
 
 
+def test_who_comes_to_rest_stands_for_ever_after() -> None:
+    """Nobody tells a drive more than that: not while the samples last, nor later, nor when the
+    engine goes back."""
+    simulation = Simulation(layout_of("paper"), units=2)
+    world, told = simulation.world, simulation.world.setpoints
+    m, d, axis, tick = world.m, world.d, np.array([1]), world.tick
+    x, rest, a = world.reference[axis], np.zeros(1), np.array([-2.0])
+    told.weight[axis] = 0.3
+    end = x + 0.5 * 2.0 * tick**2
+    told.tell(told.of(axis, [(x, -a * tick, a)], end, rest))
+    mujoco.mj_step(m, d, world.steps)
+    for step in range(3 * simulation.settings.samples):
+        begin = Rewind(m, d)
+        begin.save()
+        for _ in range(1 + (step % 7 == 0)):
+            read = mujoco.mj_readCtrl(m, d, 1, d.time, np.zeros((INPUTS, 1)), -1)
+            assert read.tolist() == [end[0], 0.0, 0.3]
+            mujoco.mj_step(m, d)
+            if step % 7 == 0:
+                begin.restore()
+                told.again()
+
+
+def test_who_was_told_to_stand_and_then_went_elsewhere_stands_there() -> None:
+    """Going back does not bring back what has been told before."""
+    simulation = Simulation(layout_of("paper"), units=2)
+    world, told = simulation.world, simulation.world.setpoints
+    m, d, steps, begin = world.m, world.d, world.steps, Rewind(world.m, world.d)
+    axis, rest = np.array([1]), np.zeros(1)
+    x = world.reference[axis]
+    told.move(axis, x, rest, rest)
+    told.update(steps)
+    mujoco.mj_step(m, d, steps)
+    told.tell(told.of(axis, [(x, rest, rest)], x + 1e-3, rest))
+    mujoco.mj_step(m, d, steps)
+    begin.save()
+    other = np.array([4])
+    told.tell(told.of(other, [(world.reference[other], rest, rest)], world.reference[other], rest))
+    mujoco.mj_step(m, d, steps)
+    begin.restore()
+    told.again()
+    read = mujoco.mj_readCtrl(m, d, 1, d.time, np.zeros((INPUTS, 1)), -1)
+    assert read[0] == x[0] + 1e-3
+
+
 # --- courses ---------------------------------------------------------------------------------
 
 

@@ -204,7 +204,7 @@ def test_a_robot_reads_only_its_own_mode(paper: Layout) -> None:
 def test_an_event_that_is_not_enabled_cannot_fire(paper: Layout) -> None:
     """Planted fault: the supervisor is made to end an operation that has not begun."""
     supervisor = Simulation(paper, world="ideal", units=1).supervisor
-    with pytest.raises(AssertionError, match="sub3_e fire but are not all enabled"):
+    with pytest.raises(AssertionError, match="not all are enabled that fire: sub3_e"):
         supervisor._fire([], [paper.factory.by_label["sub3"].index])
 
 

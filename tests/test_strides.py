@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from factory.control.navigation import Bundle
 from factory.disturbance import Gain, disturb
 from factory.settings import LOOK, MOST, Settings
 from factory.simulation import Simulation
@@ -188,3 +189,15 @@ def test_references_are_where_the_drives_are_told_to_be() -> None:
         told = world.d.ctrl[world.control[axes]]
         assert np.array_equal(world.reference[axes], told)
         assert np.array_equal(world.speed[axes], world.d.ctrl[world.control[axes] + 1])
+
+
+@pytest.mark.parametrize(("name", "given"), [*CASES, ("paper", {"settings": Settings(eps=5e-3)})])
+def test_nobody_comes_to_a_goal_before_the_reference_rests(
+    name: str, given: dict[str, Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Who asks as soon as references are close to it hears of no end any earlier."""
+    asked, near_goal = followed(name, MOST, **given), Bundle.near_goal
+    monkeypatch.setattr(
+        Bundle, "near_goal", lambda self, x, within, slow=None: near_goal(self, x, within)
+    )
+    assert followed(name, MOST, **given).events == asked.events

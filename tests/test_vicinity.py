@@ -74,6 +74,27 @@ def test_a_run_is_the_same_to_the_last_bit(name: str, fuse: bool) -> None:
     assert states(whole, whole.supervisor.step, 400) == states(culled, culled.supervisor.step, 400)
 
 
+def test_a_view_is_the_same_when_it_is_kept(monkeypatch: pytest.MonkeyPatch) -> None:
+    kept, made = (Simulation(layout("20"), units=6) for _ in range(2))
+    expected = states(kept, kept.supervisor.step, 1200)
+    monkeypatch.setattr(vicinity, "KEPT", 1)
+    looks = counted(made.world.vicinity)
+    assert states(made, made.supervisor.step, 1200) == expected
+    assert len(made.world.vicinity._views) == 1 < len(kept.world.vicinity._views) < 0.9 * looks[0]
+
+
+def counted(vicinity: Vicinity) -> list[int]:
+    """How often it has looked since."""
+    looks, look = [0], vicinity.look
+
+    def counting() -> None:
+        looks[0] += 1
+        look()
+
+    vicinity.look = counting  # type: ignore[method-assign]
+    return looks
+
+
 def test_most_of_a_factory_is_left_out() -> None:
     simulation = ready("20", True)
     shares = []

@@ -28,6 +28,7 @@ from factory.disturbance.values import (
 from factory.engine import mujoco
 from factory.errors import Diagnostic, InputError, did_you_mean
 from factory.mjcf import names
+from factory.world.setpoints import INPUTS
 
 if TYPE_CHECKING:
     from factory.simulation import Simulation
@@ -129,13 +130,20 @@ class _Acting:
             if push.at - half <= now < push.at + push.duration - half:
                 self.d.xfrc_applied[body, :3] += push.force
         self._measure()
-        bias = (self.gain - 1.0) * self.d.ctrl[self.control + 2]
+        bias = np.zeros(len(self.gain))
+        for axis in np.flatnonzero(self.gain != 1.0).tolist():
+            bias[axis] = (self.gain[axis] - 1.0) * self._told(axis)[2]
         if self.measured is not None:
             q, v = self.measured
             kp, kv = self.m.actuator_biasprm[self.actuator, 1:3].T
             bias += kp * (q - self.d.qpos[self.qpos]) + kv * (v - self.d.qvel[self.dof])
             self.world.rouse(self.axes)  # or the engine lets sleep what stands
         self.m.actuator_biasprm[self.actuator, 0] = bias
+
+    def _told(self, axis: int) -> Array:
+        """What a drive reads in this step: position [m], speed [m/s], force [N]."""
+        m, d, read = self.m, self.d, np.zeros((INPUTS, 1))
+        return np.asarray(mujoco.mj_readCtrl(m, d, self.actuator[axis], d.time, read, -1))
 
     def _measure(self) -> None:
         if not self.measures:
@@ -155,6 +163,7 @@ class _Acting:
                 self.m.body_mass[body] *= mass.factor
                 self.m.body_inertia[body] *= mass.factor
         mujoco.mj_setConst(self.m, mujoco.MjData(self.m))
+        self.world.stock.weigh()
 
     def _slow(self, slowed: Slowed) -> None:
         limits = self.simulation.limits

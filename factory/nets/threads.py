@@ -13,18 +13,20 @@ NOBODY = -1
 """The robot in a slot of a place that is not marked."""
 
 KEPT = 2000
-"""So many detached sets are kept: in steady production the same fire again and again."""
+"""So many detached sets: in steady production the same fire again and again."""
 
 
 @dataclass(frozen=True, slots=True)
 class _Firing:
-    """A detached set G: •G, G•, the slots that robots are in `before` and `after`, and those of
-    the transitions asked for that G• may enable, `fed`, with their presets."""
+    """A detached set G: •G, G•, the slots that robots are in `before` and `after`; and of the
+    transitions asked for those that are `robbed` of a token, and those that get one, `fed`, with
+    their presets."""
 
     preset: tuple[int, ...]
     postset: tuple[int, ...]
     before: tuple[int, ...]
     after: tuple[int, ...]
+    robbed: frozenset[int]
     fed: tuple[tuple[int, tuple[int, ...]], ...]
 
 
@@ -32,11 +34,11 @@ class Threads:
     """(m, f_m) of a threaded net, at first that of `start`.
 
     `marked` (places,): m. `possible`: those of the transitions `asked` for whose presets are
-    marked.
+    marked. So many detached sets are `kept`.
     """
 
     def __init__(self, net: ThreadedNet, start: ThreadedMarking, asked: Iterable[int]) -> None:
-        self.net, self._asked = net, frozenset(asked)
+        self.net, self._asked, self.kept = net, frozenset(asked), KEPT
         self._first = [*accumulate((place.size for place in net.places), initial=0)]
         self.marked = bytearray(p in start.marked for p in range(len(net.places)))
         self._robot = [NOBODY] * self._first[-1]
@@ -56,10 +58,10 @@ class Threads:
         firing = self._kept.get(events) or self._keep(events)
         marked, robot = self.marked, self._robot
         if not self._all_marked(firing.preset) or any(map(marked.__getitem__, firing.postset)):
-            raise AssertionError(f"{self._names(events)} fire but are not all enabled")
+            raise AssertionError(f"not all are enabled that fire: {self._names(events)}")
         moved = [robot[slot] for slot in firing.before]
         if NOBODY in moved or any(robot[slot] != NOBODY for slot in firing.after):
-            raise AssertionError(f"after {self._names(events)} the marking is not legal")
+            raise AssertionError(f"the marking is not legal after {self._names(events)}")
         for place in firing.preset:
             marked[place] = 0
         for place in firing.postset:
@@ -69,7 +71,7 @@ class Threads:
         for slot, number in zip(firing.after, moved, strict=True):
             robot[slot] = number
         new = [event for event, preset in firing.fed if self._all_marked(preset)]
-        self.possible.difference_update(events)
+        self.possible -= firing.robbed
         self.possible.update(new)
         return bool(new)
 
@@ -82,17 +84,22 @@ class Threads:
     def _keep(self, events: tuple[int, ...]) -> _Firing:
         net = self.net.net
         if not net.is_detached(events):
-            raise AssertionError(f"{self._names(events)} are not a detached set")
+            raise AssertionError(f"not a detached set: {self._names(events)}")
         moves = [pair for event in events for pair in self.net.redistribution[event]]
+        preset = [place for event in events for place in net.preset[event]]
         postset = [place for event in events for place in net.postset[event]]
-        fed = {event for place in postset for event in net.places[place].right} & self._asked
-        if len(self._kept) == KEPT:
+        robbed, fed = (
+            self._asked & {event for place in places for event in net.places[place].right}
+            for places in (preset, postset)
+        )
+        if len(self._kept) == self.kept:
             self._kept.clear()
         self._kept[events] = firing = _Firing(
-            tuple(place for event in events for place in net.preset[event]),
+            tuple(preset),
             tuple(postset),
             tuple(self._slot(slot) for slot, _ in moves),
             tuple(self._slot(slot) for _, slot in moves),
+            robbed,
             tuple((event, net.preset[event]) for event in fed),
         )
         return firing

@@ -43,9 +43,15 @@ TURN = np.array(
 components."""
 
 
-CURL = np.zeros((9, 3))
-"""The cross product of two vectors by the products of their components, row by row."""
-CURL[[5, 6, 1], [0, 1, 2]], CURL[[7, 2, 3], [0, 1, 2]] = 1.0, -1.0
+CURL = np.array(
+    [  # xx xy xz  yx yy yz  zx zy zz
+        [0, 0, 0, 0, 0, 1, 0, -1, 0],
+        [0, 0, -1, 0, 0, 0, 1, 0, 0],
+        [0, 1, 0, -1, 0, 0, 0, 0, 0],
+    ],
+    float,
+).T
+"""The cross product of two vectors, by the products of their components."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -118,8 +124,12 @@ class Fusion:
         turning = (self._yields[wholes] @ turned)[:, :, 0]
         d.qpos[self._pose[wholes]] = np.concatenate([common[:, :3], pose[heaviest, 3:]], axis=1)
         d.qvel[self._speed[wholes]] = np.concatenate([common[:, 3:6], turning], axis=1)
-        d.xpos[wholes], heaviest = common[:, 6:], bodies[heaviest]
-        d.xmat[wholes], d.xquat[wholes] = d.xmat[heaviest], d.xquat[heaviest]
+        model = bodies[heaviest]
+        d.xpos[wholes], d.xmat[wholes], d.xquat[wholes] = (
+            common[:, 6:],
+            d.xmat[model],
+            d.xquat[model],
+        )
 
 
 def turns(quaternions: Array) -> Array:

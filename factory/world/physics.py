@@ -222,11 +222,10 @@ class MujocoWorld:
 
     def _foresee(self, bundle: Bundle, axes: Index) -> None:
         """Attend to all that move before somebody looks again, or may be where they go; however
-        many ticks go to the engine at once."""
-        moves = self._next(bundle, axes, self.stride - self.ticks).moves
-        if moves != self._moves:
-            self._moves = moves
-            self._attend(axes, np.frombuffer(moves, bool))
+        many ticks go to the engine at once. Who moved until now comes to rest awake."""
+        before, self._moves = self._moves, self._next(bundle, axes, self.stride - self.ticks).moves
+        moved = np.frombuffer(before, bool) if before else self._under_way[axes]
+        self._attend(axes, np.frombuffer(self._moves, bool) | moved)
 
     def _next(self, bundle: Bundle, axes: Index, ticks: int) -> Course:
         """What comes after the last course, of so many ticks at most."""
@@ -246,7 +245,9 @@ class MujocoWorld:
 
         def go(x: Array, v: Array) -> Way:
             x1, v1, a = follow(bundle, x, v, self.tick)
-            return (x, v, a), x1, v1, bundle.near_goal(x1, AHEAD, np.abs(v1) < REST)
+            slow = np.abs(v1)
+            v1[slow < ROUNDING] = 0.0
+            return (x, v, a), x1, v1, bundle.near_goal(x1, AHEAD, slow < REST)
 
         return travelled(self.setpoints, axes, (x, v), ticks, go)
 
@@ -258,7 +259,7 @@ class MujocoWorld:
         left[self._active] = True
         left[active] = False
         (axes,) = left.nonzero()
-        self.setpoints.stand(axes, self.reference[axes], np.abs(self._v[axes]) >= ROUNDING)
+        self.setpoints.stand(axes, self.reference[axes], self._v[axes] != 0.0)
         self._v[axes] = 0.0
         self._attend(axes, np.zeros(len(axes), bool))
         self._active, self._moves, self._last = active, b"", None

@@ -18,7 +18,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from factory.control.mode import ROUNDING, Array, Index, Truth
+from factory.control.mode import Array, Index, Truth
 from factory.engine import mujoco
 
 INPUTS = 3
@@ -98,13 +98,13 @@ class Setpoints:
             here[:, :, 2] = force[:, None]
         after = setpoints[:, -1]
         after[:, 0], after[:, 1] = x1, v1
-        after[:, 2] = np.where(np.abs(v1) < ROUNDING, weight, force)
+        after[:, 2] = np.where(v1 == 0.0, weight, force)
         return Told(setpoints.reshape(len(axes), -1), self._drives[axes])
 
     def tell(self, told: Told) -> None:
-        """Tell drives; the first tick begins now."""
+        """Tell drives; the first tick begins now. Who is told to stand is for a tick at least."""
         now = float(self.d.time)
-        end = now + (told.samples - 1 or len(self._ahead)) * self._timestep
+        end = now + max(told.samples - 1, self._steps) * self._timestep
         self._latest = [said for said in self._latest if said[0] > now + self._timestep / 2]
         self._latest.append((end, now, told))
         self._write(now, told)

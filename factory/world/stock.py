@@ -60,7 +60,6 @@ class Stock:
         factory, self.bodies = model.factory, model.carried
         self.parts = self.bodies.carried[factory.pag.root]
         self.load: dict[int, Hand] = {}
-        self._switched: dict[int, tuple[list[tuple[int, str]], list[int], list[int]]] = {}
         self.joining: dict[int, tuple[str, float]] = {}
         self.misfit: dict[int, float] = {}
         self.body = {
@@ -93,7 +92,7 @@ class Stock:
         plan = partial(self._reach, holders, bool(counts))
         self.vicinity = Vicinity(m, d, self.contacts, holders, plan)
         self.board = Switchboard(m, d, self.contacts, self.vicinity)
-        self.fusion = self._fusion()
+        self.weigh()
         self._hide_spares()
         self._hand_out(counts)
         for label in self.feed:
@@ -167,13 +166,8 @@ class Stock:
                 given = self.load.pop(robot)
                 moved += [(robot, label) for label in given.labels]
                 bodies += given.bodies
-        before, let_go, take_over = self._switched.get(operation.index, (None, [], []))
-        if before != moved:
-            let_go = [self.grip[pair] for pair in moved]
-            take_over = [self.grip[carrier, label] for _, label in moved]
-            self._switched[operation.index] = moved, let_go, take_over
-        self.board.loose(let_go)
-        self.board.grip(take_over, bodies)
+        self.board.loose([self.grip[pair] for pair in moved])
+        self.board.grip([self.grip[carrier, label] for _, label in moved], bodies)
         self.board.hold(bodies, carrier + 1)
         hand = self.load.setdefault(carrier, Hand(unit))
         hand.labels += [label for _, label in moved]
@@ -307,11 +301,12 @@ class Stock:
                 found[robot.index, label] = self.m.equality(names.grip(robot.name, label)).id
         return found
 
-    def _fusion(self) -> Fusion:
+    def weigh(self) -> None:
+        """From now on bodies have the masses that the model has."""
         places, radii = np.zeros((self.m.nbody, 3)), np.zeros(self.m.nbody)
         for label, ids in self.body.items():
             places[ids], radii[ids] = self.bodies.centre[label], self.bodies.radius[label]
-        return Fusion(self.m, self.d, places, radii)
+        self.fusion = Fusion(self.m, self.d, places, radii)
 
     def _trees(self) -> dict[int, int]:
         """The code of the holder that each kinematic tree with a grip is."""

@@ -39,7 +39,6 @@ SWAY = 1e-3
 """What is held is not further than this from its place in the hand [m], unless something
 touches."""
 
-
 KEPT = 500
 """So many views are kept: in steady production the same robots go the same ways again and again."""
 

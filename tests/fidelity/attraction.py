@@ -16,13 +16,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from factory.control.mode import Array
+from factory.control.mode import REST, Array
 from factory.control.navigation import Bundle
 from factory.engine import mujoco
 from factory.layout.plan import Layout
 from factory.nets.petri import Marking
 from factory.simulation import Simulation
-from factory.supervisor import REST
 from tests.fidelity.products import CAMPAIGN, layout
 from tests.tables import table
 
