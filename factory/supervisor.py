@@ -189,11 +189,11 @@ class Supervisor:
             return []
         x, v = self.world.sense()
         there = active.bundle.at_goal(x[active.axes])
-        if not there.any():
+        if not np.count_nonzero(there):
             return []
         active.clocks += self.tick * there
         done = active.bundle.finished(there, active.clocks)
-        if not done.any():
+        if not np.count_nonzero(done):
             return []
         still = np.logical_and.reduceat(np.abs(v[active.axes]) < REST, active.bundle.starts)
         numbers = (*active.operations, *active.ahead)
@@ -232,9 +232,11 @@ class Supervisor:
         active = self.active
         operations, ahead = tuple(operations), tuple(ahead)
         numbers = (*operations, *ahead)
-        clocks = dict(zip((*active.operations, *active.ahead), active.clocks, strict=True))
         bundle, axes = self._bundle(numbers)
-        kept = np.array([clocks.get(o, 0.0) for o in numbers])
+        kept = np.zeros(len(numbers))
+        if np.count_nonzero(active.clocks):
+            clocks = dict(zip((*active.operations, *active.ahead), active.clocks, strict=True))
+            kept[:] = [clocks.get(o, 0.0) for o in numbers]
         self.active = _Active(operations, ahead, bundle if numbers else None, axes, kept)
 
     def _bundle(self, numbers: tuple[int, ...]) -> tuple[Bundle, Index]:

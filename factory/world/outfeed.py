@@ -23,8 +23,8 @@ class Outfeed:
     """A tray that is an axis by number, with its joint's addresses in `qpos` and `qvel`.
 
     `axis` (1,). `home`: it rests at the beginning of its way, or did when somebody looked. `goes`:
-    its reference is not where it is aimed at. `settles`: it may be there any
-    tick.
+    its reference is not where it is aimed at. `settles`: it may be there any tick. `idle`: it has
+    come home, and nobody has aimed it elsewhere since.
     """
 
     def __init__(
@@ -41,7 +41,7 @@ class Outfeed:
         self._product = model.masses[model.factory.pag.root]
         self._way, self._place = model.layout.outfeed_way, 0.0
         self._x, self._v = np.zeros(1), np.zeros(1)
-        self.home, self.goes, self.settles = True, False, False
+        self.home, self.idle, self.goes, self.settles = True, True, False, False
 
     def rests_away(self) -> bool:
         """Whether it rests at the end of its way."""
@@ -63,6 +63,7 @@ class Outfeed:
         x, v = float(self._x[0]), float(self._v[0])
         self.goes = x != self._place or v != 0.0
         self.settles = abs(x - self._place) < CLOSE and (loaded or not self.home)
+        self.idle = self.home and not (loaded or self.goes)
         return self._place != before
 
     def way(self) -> tuple[Array, Array, Array]:

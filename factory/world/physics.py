@@ -86,7 +86,7 @@ class MujocoWorld:
         self.courses = Courses()
         self.supplied = True
         self._active = np.empty(0, np.intp)
-        self._moves = b""
+        self._moved = b"", b""
         self._last: Course | None = None
         self._lags, self._anew = False, True
         self._under_way = np.zeros(len(slides), bool)
@@ -223,9 +223,14 @@ class MujocoWorld:
     def _foresee(self, bundle: Bundle, axes: Index) -> None:
         """Attend to all that move before somebody looks again, or may be where they go; however
         many ticks go to the engine at once. Who moved until now comes to rest awake."""
-        before, self._moves = self._moves, self._next(bundle, axes, self.stride - self.ticks).moves
-        moved = np.frombuffer(before, bool) if before else self._under_way[axes]
-        self._attend(axes, np.frombuffer(self._moves, bool) | moved)
+        (earlier, before), moves = (
+            self._moved,
+            self._next(bundle, axes, self.stride - self.ticks).moves,
+        )
+        self._moved = before, moves
+        if not earlier == before == moves:
+            moved = np.frombuffer(before, bool) if before else self._under_way[axes]
+            self._attend(axes, np.frombuffer(moves, bool) | moved)
 
     def _next(self, bundle: Bundle, axes: Index, ticks: int) -> Course:
         """What comes after the last course, of so many ticks at most."""
@@ -262,14 +267,13 @@ class MujocoWorld:
         self.setpoints.stand(axes, self.reference[axes], self._v[axes] != 0.0)
         self._v[axes] = 0.0
         self._attend(axes, np.zeros(len(axes), bool))
-        self._active, self._moves, self._last = active, b"", None
+        self._active, self._moved, self._last = active, (b"", b""), None
         self._look()
         if self.vicinity.culls:
-            goals = self._x.copy()
-            if bundle is not None:
-                goals[active] = bundle.goal
+            places = [self._x[axes]] if bundle is None else [self._x[axes], bundle.goal]
             axes = np.concatenate([axes, active])
-            self.vicinity.goes(self._holder[axes], self._x[axes], self._v[axes], goals[axes])
+            way = self._x[axes], self._v[axes], np.concatenate(places)
+            self.vicinity.goes(self._holder[axes], *way)
 
     def move(self, axes: Index, x: Array, v: Array, a: Array) -> None:
         """From now on the references of `axes` run from x [m] at speed v under acceleration a, in
@@ -322,7 +326,7 @@ class MujocoWorld:
     def _attend(self, axes: Index, moves: Truth) -> None:
         """The engine puts to sleep what has been slow for a while, and a robot under way would
         never come to its goal: what moves stays awake, what stands may sleep."""
-        if (self._under_way[axes] == moves).all():
+        if not np.count_nonzero(self._under_way[axes] != moves):
             return
         self._under_way[axes] = moves
         policy = self.m.tree_sleep_policy
@@ -342,6 +346,8 @@ class MujocoWorld:
         if self.ticks >= self.stride:
             self._look()
         unit, outfeed = self.stock.on_tray, self.outfeed
+        if unit is None and outfeed.idle:
+            return
         if unit is not None and outfeed.rests_away():
             self.inspection.measured(*self.stock.finished(unit))
             self.stock.recycle()

@@ -140,7 +140,7 @@ class Setpoints:
         """From now on axes stand at x [m]; those that are `going` are to be told."""
         self._plan[0, axes], self._plan[1, axes] = self.d.time, x
         self._plan[2:, axes] = 0.0
-        if going.any():
+        if np.count_nonzero(going):
             self._due[axes[going]] = self.any_due = True
 
     def load(self, axis: int, mass: float, weight: float) -> None:

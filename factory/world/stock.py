@@ -70,6 +70,9 @@ class Stock:
         self.tray = len(factory.robots) + 1
         self.feeder = {o.label: self.tray + 1 + n for n, o in enumerate(factory.leaves)}
         self.grip, self.park = self._grips(), self._parks()
+        self._grips_of: dict[int, dict[str, int]] = {}
+        for (robot, label), weld in self.grip.items():
+            self._grips_of.setdefault(robot, {})[label] = weld
         layout = model.layout
         self.presented = {o.label: presented_at(layout, o.label) for o in factory.leaves}
         self.parked = {(k, n): parked_at(layout, k, n + 1) for k, n in self.park}
@@ -160,17 +163,17 @@ class Stock:
         self.load[operation.carrier] = Hand(unit, [label], body)
 
     def _pass_on(self, operation: Operation, unit: int) -> None:
-        carrier, moved, bodies = operation.carrier, list[tuple[int, str]](), list[int]()
+        carrier, labels, bodies = operation.carrier, list[str](), list[int]()
         for robot in operation.robots:
             if robot != carrier and robot in self.load:
                 given = self.load.pop(robot)
-                moved += [(robot, label) for label in given.labels]
+                self.board.loose(map(self._grips_of[robot].__getitem__, given.labels))
+                labels += given.labels
                 bodies += given.bodies
-        self.board.loose([self.grip[pair] for pair in moved])
-        self.board.grip([self.grip[carrier, label] for _, label in moved], bodies)
+        self.board.grip([*map(self._grips_of[carrier].__getitem__, labels)], bodies)
         self.board.hold(bodies, carrier + 1)
         hand = self.load.setdefault(carrier, Hand(unit))
-        hand.labels += [label for _, label in moved]
+        hand.labels += labels
         hand.bodies += bodies
         if operation.label in self.bodies.wholes:
             self.joining[carrier] = operation.label, float(self.d.time)

@@ -114,9 +114,11 @@ class Vicinity:
         holders, x, v, places = holders[new], x[new], v[new], places[new]
         self._goal[holders] = places
         self._foreseen = self.stale = True
-        ends = np.stack([x, x + v * np.abs(v) / (2 * self._asked[holders]), places])
-        self._ways[1, holders] = np.floor(ends.min(axis=0) / CELL) - 1
-        self._ways[2, holders] = np.ceil(ends.max(axis=0) / CELL) + 1
+        low, high = np.minimum(x, places), np.maximum(x, places)
+        if np.count_nonzero(v):
+            stop = x + v * np.abs(v) / (2 * self._asked[holders])
+            low, high = np.minimum(low, stop), np.maximum(high, stop)
+        self._ways[1, holders], self._ways[2, holders] = low // CELL - 1, high // CELL + 2
 
     def astray(self) -> None:
         """From now on nobody knows who goes where."""
