@@ -10,8 +10,9 @@ from hypothesis import strategies as st
 
 from factory.compiler import expand
 from factory.factory import Factory
+from factory.nets import threads as nets_threads
 from factory.nets.petri import PetriNet, Place, Transition
-from factory.nets.threaded import ThreadedMarking, ThreadedNet
+from factory.nets.threaded import Slot, ThreadedMarking, ThreadedNet
 from factory.nets.threads import Threads
 from tests.net_values import legal_markings, random_legal_marking
 from tests.pag_values import TEMPLATES, factories, factory_of, paper
@@ -128,7 +129,7 @@ def test_sets_fire_as_definition_3_4_says(factory: Factory, seed: int) -> None:
     rng, net = random.Random(seed), factory.net.threaded
     here = factory.net.marking_of(random_legal_marking(factory.net, rng))
     threads = threads_of(factory, here.marked)
-    threads.kept = rng.choice((1, 2, 100))
+    kept = rng.choice((1, 2, 100))
     for _ in range(20):
         enabled = net.net.enabled(here.marked)
         ready = [event for event in enabled if event % 2 == 0]
@@ -141,8 +142,10 @@ def test_sets_fire_as_definition_3_4_says(factory: Factory, seed: int) -> None:
             return
         there = here.follower(net, chosen)
         new = {event for event in net.net.enabled(there.marked) if event % 2 == 0} - {*ready}
-        assert threads.fire(tuple(chosen)) == bool(new)
-        assert threads.threads() == there and len(threads._kept) <= threads.kept
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr(nets_threads, "KEPT", kept)
+            assert threads.fire(tuple(chosen)) == bool(new)
+        assert threads.threads() == there and len(threads._kept) <= kept
         here = there
 
 
@@ -164,9 +167,11 @@ def test_what_may_not_fire_does_not() -> None:
         threads.fire((start,))
 
 
-def test_a_robot_that_is_not_where_its_token_is_does_not_fire() -> None:
+@pytest.mark.parametrize("robots", [{(1, 0): 0}, {}, {(0, 0): 0, (1, 0): 1}])
+def test_a_robot_that_is_not_where_its_token_is_does_not_fire(robots: dict[Slot, int]) -> None:
+    """Elsewhere, nowhere, or where another is already."""
     net = ThreadedNet(_RING, ((((1, 0), (0, 0)),), (((0, 0), (1, 0)),)))
-    threads = Threads(net, ThreadedMarking({(1, 0): 0}), (1,))
+    threads = Threads(net, ThreadedMarking(robots), (1,))
     threads.marked[:] = bytes([1, 0])
     with pytest.raises(AssertionError, match="not legal"):
         threads.fire((1,))

@@ -68,9 +68,8 @@ class _Acting:
         self.m, self.d = m, world.d
         self.axes = np.arange(world.tray)
         self.qpos, self.dof = world.qpos[self.axes], world.dof[self.axes]
-        self.control = world.control[self.axes]
         number = {int(adr): n for n, adr in enumerate(m.actuator_ctrladr)}
-        self.actuator = np.array([number[int(adr)] for adr in self.control])
+        self.actuator = np.array([number[int(adr)] for adr in world.control[self.axes]])
         self.gain = np.ones(len(self.axes))
         self.pushes: list[tuple[int, Push]] = []
         self.measures: list[Measure] = []

@@ -13,7 +13,7 @@ NOBODY = -1
 """The robot in a slot of a place that is not marked."""
 
 KEPT = 2000
-"""So many detached sets: in steady production the same fire again and again."""
+"""So many detached sets are kept: in steady production the same fire again and again."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,11 +34,11 @@ class Threads:
     """(m, f_m) of a threaded net, at first that of `start`.
 
     `marked` (places,): m. `possible`: those of the transitions `asked` for whose presets are
-    marked. So many detached sets are `kept`.
+    marked.
     """
 
     def __init__(self, net: ThreadedNet, start: ThreadedMarking, asked: Iterable[int]) -> None:
-        self.net, self._asked, self.kept = net, frozenset(asked), KEPT
+        self.net, self._asked = net, frozenset(asked)
         self._first = [*accumulate((place.size for place in net.places), initial=0)]
         self.marked = bytearray(p in start.marked for p in range(len(net.places)))
         self._robot = [NOBODY] * self._first[-1]
@@ -92,7 +92,7 @@ class Threads:
             self._asked & {event for place in places for event in net.places[place].right}
             for places in (preset, postset)
         )
-        if len(self._kept) == self.kept:
+        if len(self._kept) >= KEPT:
             self._kept.clear()
         self._kept[events] = firing = _Firing(
             tuple(preset),

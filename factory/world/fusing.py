@@ -124,12 +124,8 @@ class Fusion:
         turning = (self._yields[wholes] @ turned)[:, :, 0]
         d.qpos[self._pose[wholes]] = np.concatenate([common[:, :3], pose[heaviest, 3:]], axis=1)
         d.qvel[self._speed[wholes]] = np.concatenate([common[:, 3:6], turning], axis=1)
-        model = bodies[heaviest]
-        d.xpos[wholes], d.xmat[wholes], d.xquat[wholes] = (
-            common[:, 6:],
-            d.xmat[model],
-            d.xquat[model],
-        )
+        d.xpos[wholes] = common[:, 6:]
+        d.xmat[wholes], d.xquat[wholes] = d.xmat[bodies[heaviest]], d.xquat[bodies[heaviest]]
 
 
 def turns(quaternions: Array) -> Array:

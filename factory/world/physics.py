@@ -223,10 +223,8 @@ class MujocoWorld:
     def _foresee(self, bundle: Bundle, axes: Index) -> None:
         """Attend to all that move before somebody looks again, or may be where they go; however
         many ticks go to the engine at once. Who moved until now comes to rest awake."""
-        (earlier, before), moves = (
-            self._moved,
-            self._next(bundle, axes, self.stride - self.ticks).moves,
-        )
+        earlier, before = self._moved
+        moves = self._next(bundle, axes, self.stride - self.ticks).moves
         self._moved = before, moves
         if not earlier == before == moves:
             moved = np.frombuffer(before, bool) if before else self._under_way[axes]

@@ -70,9 +70,6 @@ class Stock:
         self.tray = len(factory.robots) + 1
         self.feeder = {o.label: self.tray + 1 + n for n, o in enumerate(factory.leaves)}
         self.grip, self.park = self._grips(), self._parks()
-        self._grips_of: dict[int, dict[str, int]] = {}
-        for (robot, label), weld in self.grip.items():
-            self._grips_of.setdefault(robot, {})[label] = weld
         layout = model.layout
         self.presented = {o.label: presented_at(layout, o.label) for o in factory.leaves}
         self.parked = {(k, n): parked_at(layout, k, n + 1) for k, n in self.park}
@@ -167,10 +164,10 @@ class Stock:
         for robot in operation.robots:
             if robot != carrier and robot in self.load:
                 given = self.load.pop(robot)
-                self.board.loose(map(self._grips_of[robot].__getitem__, given.labels))
+                self.board.loose([self.grip[robot, label] for label in given.labels])
                 labels += given.labels
                 bodies += given.bodies
-        self.board.grip([*map(self._grips_of[carrier].__getitem__, labels)], bodies)
+        self.board.grip([self.grip[carrier, label] for label in labels], bodies)
         self.board.hold(bodies, carrier + 1)
         hand = self.load.setdefault(carrier, Hand(unit))
         hand.labels += labels
