@@ -149,8 +149,8 @@ def wrong_mass(m: mujoco.MjModel) -> None:
     mujoco.mj_setConst(m, mujoco.MjData(m))
 
 
-def euler(m: mujoco.MjModel) -> None:
-    m.opt.integrator = int(mujoco.mjtIntegrator.mjINT_EULER)
+def implicit(m: mujoco.MjModel) -> None:
+    m.opt.integrator = int(mujoco.mjtIntegrator.mjINT_IMPLICITFAST)
 
 
 def weaker_drives(m: mujoco.MjModel) -> None:
@@ -158,12 +158,15 @@ def weaker_drives(m: mujoco.MjModel) -> None:
 
 
 FAULTS: dict[str, tuple[Alter, set[str]]] = {
-    "softer welds": (softer_welds, {"weld_residual_max_mm", "weld_residual_p99_mm"}),
-    "softer impedance": (softer_impedance, {"weld_residual_max_mm"}),
+    "softer welds": (softer_welds, {"weld_residual_max_mm"}),
+    "softer impedance": (softer_impedance, {"weld_residual_max_mm", "weld_residual_p99_mm"}),
     "a shifted site": (shifted_site, {"handoff_gap_max_mm", "handoff_energy_max_mJ_per_kg"}),
     "a shifted robot": (shifted_robot, {"handoff_gap_max_mm", "handoff_energy_max_mJ_per_kg"}),
     "a wrong mass": (wrong_mass, {"moved_mass_kg"}),
-    "Euler's method": (euler, {"drive_work_J", "tracking_error_rms_mm", "force_peak_percent"}),
+    "an implicit method": (
+        implicit,
+        {"drive_work_J", "tracking_error_rms_mm", "force_peak_percent"},
+    ),
     "weaker drives": (weaker_drives, {"force_peak_percent"}),
 }
 
@@ -180,7 +183,7 @@ def test_a_planted_fault_is_caught(name: str, fault: str) -> None:
 def test_a_doubled_timestep_is_caught(name: str) -> None:
     settings = replace(Settings(), timestep=0.004, substeps=3)
     told = deviations(figures(name, settings=settings), kept(name))
-    assert {"weld_residual_p99_mm", "drive_work_J", "tracking_error_rms_mm"} <= set(told), told
+    assert {"weld_residual_p99_mm", "drive_work_J", "tracking_error_max_mm"} <= set(told), told
 
 
 @pytest.mark.parametrize("flag", ["sleep", "island"])

@@ -16,9 +16,9 @@ from factory.fidelity.approach import BEYOND, Approaches
 from factory.fidelity.drives import Drives
 from factory.fidelity.finished import Finished
 from factory.fidelity.handoffs import HandOffs
-from factory.fidelity.histogram import Histogram
 from factory.fidelity.payload import Payload
 from factory.fidelity.record import HandOff
+from factory.fidelity.residual import Residual
 from factory.fidelity.shadow import Shadow
 from factory.fidelity.steps import Steps
 from factory.fidelity.welds import HOLD, Velocities, Welds
@@ -45,7 +45,7 @@ class Measurement:
         self.drives = Drives(world)
         self.approaches = Approaches(world, layout, self.welds, self.shadow)
         self.finished = Finished(model)
-        self.residual = Histogram()
+        self.residual = Residual(world, velocities)
         self.seconds = 0.0
         self._order = {part: place for place, part in enumerate(self.finished.parts)}
         self._product: Index | None = None
@@ -72,9 +72,7 @@ class Measurement:
         self.handoffs.tick(v, world.time)
         self.payload.tick(v)
         self.drives.tick(v, force)
-        if rows := self.d.ne:
-            position = self.d.efc_pos[:rows].reshape(-1, 6)[:, :3]
-            self.residual.add(np.sqrt(np.einsum("ij,ij->i", position, position)))
+        self.residual.tick(v[-1])
         self.shadow.follow()
         self.approaches.tick(supervisor.active.operations)
         self.seconds += perf_counter() - begin
@@ -115,7 +113,7 @@ class Measurement:
             "handoffs": sum(h.parts for h in handoffs),
             **_of_handoffs(handoffs),
             "weld_residual_max_mm": 1e3 * self.residual.largest,
-            "weld_residual_p99_mm": 1e3 * self.residual.quantile(0.99),
+            "weld_residual_p99_mm": 1e3 * self.residual.moving.quantile(0.99),
             "product_position_max_mm": max((m.position_mm for m in misplaced), default=None),
             "product_angle_max_deg": max((m.angle_deg for m in misplaced), default=None),
             "product_vertex_max_mm": max((m.vertex_mm for m in misplaced), default=None),

@@ -149,7 +149,12 @@ _ALL = (
         "Largest distance between the frames joined by an active, awake weld, at the end of ticks.",
         1,
     ),
-    Quantity("weld_residual_p99_mm", "mm", "99th percentile of it over welds and ticks.", 0.1),
+    Quantity(
+        "weld_residual_p99_mm",
+        "mm",
+        "99th percentile of it over ticks and welds to what goes faster than 10 mm/s.",
+        0.1,
+    ),
     Quantity(
         "product_position_max_mm",
         "mm",

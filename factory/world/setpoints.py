@@ -9,6 +9,10 @@ after that: there is one to spare.
 A buffer in `mjData.history`: one number for users, the place of the newest sample, the samples'
 times, their values. The value at a time is that of the last sample before it, so samples are half a
 step early.
+
+The engine's speeds are those of half a timestep before: it adds to a position what comes of the
+speed after the step. So are the speeds that drives are told, or else they would push robots off
+their references by half a timestep's acceleration, to a place where their stiffness pushes back.
 """
 
 from __future__ import annotations
@@ -68,7 +72,7 @@ class Setpoints:
         self.d, self.own, self.mass, self.weight = d, mass, mass.copy(), weight
         self.control = m.actuator_ctrladr[actuators]
         self._drives, self._ctrl = actuators, d.ctrl.reshape(-1, INPUTS)
-        self._timestep = float(m.opt.timestep)
+        self._timestep, self._half = float(m.opt.timestep), float(m.opt.timestep) / 2
         samples = int(m.actuator_history[actuators[0], 0])
         most = samples - 2
         m.actuator_delay[actuators] = most * self._timestep
@@ -93,8 +97,9 @@ class Setpoints:
         for tick, (x, v, a) in enumerate(legs):
             here = setpoints[:, tick * self._steps : (tick + 1) * self._steps]
             force = self.mass[axes] * a + weight
-            here[:, :, 1] = speed = v[:, None] + t * a[:, None]
+            speed = v[:, None] + t * a[:, None]
             here[:, :, 0] = x[:, None] + (t / 2) * (v[:, None] + speed)
+            here[:, :, 1] = speed - self._half * a[:, None]
             here[:, :, 2] = force[:, None]
         after = setpoints[:, -1]
         after[:, 0], after[:, 1] = x1, v1

@@ -135,7 +135,10 @@ class Vicinity:
 
     def notice(self) -> None:
         """It is stale where something touches, or the engine has woken something by itself."""
-        if not self._all and (self.d.ncon or np.count_nonzero(self.d.tree_asleep < self._asleep)):
+        touches = self.d.ncon > 0
+        if touches and self.culls:
+            self._calm = self.d.time + CALM
+        if not self._all and (touches or np.count_nonzero(self.d.tree_asleep < self._asleep)):
             self.stale = True
 
     def everything(self) -> None:
@@ -146,8 +149,6 @@ class Vicinity:
 
     def look(self) -> None:
         """Choose what the broad phase looks at."""
-        if self.d.ncon:
-            self._calm = self.d.time + CALM
         before, self._all = self._all, not self._foreseen or self.d.time < self._calm
         if not self._all:
             self._view = self._seen()
