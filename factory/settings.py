@@ -23,10 +23,10 @@ RANGES = {
 }
 """Least and greatest value of each setting: beyond lie nothing but overflows and endless runs."""
 
-LOOK = 0.06
+LOOK = 0.1
 """What need not be looked at in every tick is looked at again within this [s], or in the next."""
 
-MOST = 8
+MOST = 10
 """Ticks, and no more, that go to the engine at once."""
 
 WHOLE = ("substeps", "stage")

@@ -66,7 +66,7 @@ CASES: list[tuple[str, dict[str, Any]]] = [
     ("lamp", {"settings": Settings(stage=1)}),
     ("paper", {"settings": Settings(timestep=0.001, substeps=12)}),
     ("shelf", {"settings": Settings(timestep=0.004)}),
-    ("paper", {"settings": Settings(timestep=0.005, substeps=9)}),
+    ("paper", {"settings": Settings(timestep=0.005, substeps=11)}),
 ]
 
 
