@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from factory.approach import Pair
 from factory.errors import Diagnostic
@@ -13,8 +13,7 @@ if TYPE_CHECKING:
     from factory.monitor.report import Report
 
 
-@dataclass(frozen=True, slots=True)
-class Event:
+class Event(NamedTuple):
     """A transition that fired at time t [s]."""
 
     t: float

@@ -20,7 +20,7 @@ class Inspection:
         self, m: mujoco.MjModel, d: mujoco.MjData, model: Model, held: Contacts, gaps: Gaps
     ) -> None:
         self.m, self.d, self.model, self.held, self.gaps = m, d, model, held, gaps
-        self.joining: dict[int, tuple[int, frozenset[int]]] = {}
+        self.joining: dict[int, int] = {}
         self.force: dict[str, float] = {}
         self.handoffs = 0
         self.residual = 0.0
@@ -52,8 +52,7 @@ class Inspection:
 
     def started(self, operation: Operation, unit: int) -> None:
         """The inputs of an operation are being joined from now on."""
-        holders = frozenset(robot + 1 for robot in operation.robots)
-        self.joining[operation.index] = unit, holders
+        self.joining[operation.index] = unit
 
     def ended(self, operation: Operation) -> None:
         """They are joined."""
@@ -81,9 +80,10 @@ class Inspection:
         unit, code = self.held.unit, self.held.code
         if unit[a] < 0 or unit[a] != unit[b]:
             return None
-        for number, (worked_on, holders) in self.joining.items():
-            if unit[a] == worked_on and code[a] in holders and code[b] in holders:
-                return self.model.factory.operations[number].label
+        for number, worked_on in self.joining.items():
+            operation = self.model.factory.operations[number]
+            if unit[a] == worked_on and {code[a] - 1, code[b] - 1} <= {*operation.robots}:
+                return operation.label
         return None
 
     def _press(self, label: str, contact: int) -> None:

@@ -41,7 +41,8 @@ class Stock:
     """Copies of parts, fed in the order of units: the n-th part of each label is for unit n.
 
     A weld is aimed at the copy it holds by writing its body at run time; its nominal frame is the
-    same for all copies. `load`: what each robot (index) holds. Where the model has bodies for
+    same for all copies. `load`: what each robot (index) holds. `refilled`: the labels whose feeders
+    are filled again when each operation has ended. Where the model has bodies for
     sub-assemblies, `joining` are the robots (index) whose bodies have yet to settle before one
     takes their place, and since when [s]; `misfit`: how far out of place any vertex of a unit's
     parts was when that happened [m].
@@ -84,7 +85,11 @@ class Stock:
         self.begun = {o.label: counts.get(o.start, 0) for o in factory.leaves}
         self.units = self.released + units
         self.next_unit = {o.label: counts.get(o.end, 0) for o in factory.leaves}
-        self.feeds_robot = {o.carrier: o.label for o in factory.leaves}
+        fed = {o.carrier: o.label for o in factory.leaves}
+        self.refilled = [
+            [fed[r] for r, k in zip(o.robots, o.after, strict=True) if r in fed and k == NOPART]
+            for o in factory.operations
+        ]
         self.hold = {label: m.equality(names.hold(label)).id for label in self.parts}
         self.on_tray: int | None = None
         self.left: list[float] = []
@@ -143,11 +148,9 @@ class Stock:
             self._release(operation, unit)
         else:
             self._pass_on(operation, unit)
-        for robot in operation.robots:
-            label = self.feeds_robot.get(robot)
-            if label and operation.after[operation.robots.index(robot)] == NOPART:
-                self.taken.discard(label)
-                self.feed_next(label)
+        for label in self.refilled[operation.index]:
+            self.taken.discard(label)
+            self.feed_next(label)
 
     def _take(self, operation: Operation, unit: int) -> None:
         label = operation.label
