@@ -61,13 +61,13 @@ KEPT = 500
 @dataclass(slots=True)
 class _Active:
     """The modes under way: of operations, then of robots that go ahead to the next one while they
-    wait, both by number; their bundle, the axes of each slot, and the clocks."""
+    wait, both by number; their bundle, the axes of each slot, and the clocks, if any has run."""
 
     operations: tuple[int, ...]
     ahead: tuple[int, ...]
     bundle: Bundle | None
     axes: Index
-    clocks: Array
+    clocks: Array | None = None
 
 
 class Supervisor:
@@ -92,9 +92,10 @@ class Supervisor:
         self.factory, self.world, self.tick = factory, world, tick
         self.modes = [*modes, *(stage.mode for stage in stages)]
         self.net = factory.net.threaded
+        self.names = [transition.name for transition in self.net.transitions]
         self.axes_of = [*factory.axes, *((stage.robot,) for stage in stages)]
         self.axes = np.array([axis for axes in self.axes_of for axis in axes], np.intp)
-        self.active = _Active((), (), None, np.empty(0, np.intp), np.empty(0))
+        self.active = _Active((), (), None, np.empty(0, np.intp))
         self.near = self.enabled = True
         self.limit(limits)
         marking = factory.net.initial_marking if start is None else start
@@ -191,8 +192,10 @@ class Supervisor:
         there = active.bundle.at_goal(x[active.axes])
         if not np.count_nonzero(there):
             return []
-        active.clocks += self.tick * there
-        done = active.bundle.finished(there, active.clocks)
+        clocks = self.tick * there.astype(float)
+        if active.clocks is not None:
+            clocks += active.clocks
+        active.clocks, done = clocks, active.bundle.finished(there, clocks)
         if not np.count_nonzero(done):
             return []
         still = np.logical_and.reduceat(np.abs(v[active.axes]) < REST, active.bundle.starts)
@@ -207,7 +210,7 @@ class Supervisor:
         self.enabled |= self.threads.fire(events)
         for event in events:
             self.fired[event] += 1
-            self.events.append(Event(now, self.net.transitions[event].name))
+            self.events.append(Event(now, self.names[event]))
         self._account(started, ended, now)
         self.world.apply(starts, ends)
         self.last_event = now
@@ -233,10 +236,10 @@ class Supervisor:
         operations, ahead = tuple(operations), tuple(ahead)
         numbers = (*operations, *ahead)
         bundle, axes = self._bundle(numbers)
-        kept = np.zeros(len(numbers))
-        if np.count_nonzero(active.clocks):
+        kept = None
+        if active.clocks is not None and np.count_nonzero(active.clocks):
             clocks = dict(zip((*active.operations, *active.ahead), active.clocks, strict=True))
-            kept[:] = [clocks.get(o, 0.0) for o in numbers]
+            kept = np.array([clocks.get(o, 0.0) for o in numbers])
         self.active = _Active(operations, ahead, bundle if numbers else None, axes, kept)
 
     def _bundle(self, numbers: tuple[int, ...]) -> tuple[Bundle, Index]:

@@ -277,7 +277,7 @@ def test_bundles_are_forgotten_too(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_there_is_room_for_so_many_numbers() -> None:
-    courses, told = Courses(35), Told(np.zeros((2, 5)), np.zeros(2, int))
+    courses, told = Courses(42), Told.of(np.zeros((2, 2, INPUTS)), np.zeros(2, int))
     for number in range(100):
         course = courses.of(number % 7, lambda: Course(1, told, b"", False))
         assert courses.of(number % 7, lambda: pytest.fail("was forgotten")) is course

@@ -35,21 +35,21 @@ Leg = tuple[Array, Array, Array]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Told:
-    """What n axes are told for some ticks: their `setpoints` in every step, and those after it
-    (n, (steps + 1) * 3), position [m], speed [m/s] and force [N]. `drives` (n,): by number."""
+    """What n axes are told for some ticks: their `setpoints` in every step, and those `after` it
+    (n, (steps + 1) * 3), position [m], speed [m/s] and force [N], so many `samples` each.
+    `drives` (n,): by number."""
 
     setpoints: Array
     drives: Index
+    after: Array
+    samples: int
 
-    @property
-    def after(self) -> Array:
-        """The setpoints after it (n, 3)."""
-        return self.setpoints[:, -INPUTS:]
-
-    @property
-    def samples(self) -> int:
-        """How many each axis is told."""
-        return int(self.setpoints.shape[1]) // INPUTS
+    @staticmethod
+    def of(setpoints: Array, drives: Index) -> Told:
+        """Of setpoints (n, steps + 1, 3)."""
+        axes, samples, _ = setpoints.shape
+        flat = setpoints.reshape(axes, samples * INPUTS)
+        return Told(flat, drives, flat[:, -INPUTS:], samples)
 
 
 class Setpoints:
@@ -104,7 +104,7 @@ class Setpoints:
         after = setpoints[:, -1]
         after[:, 0], after[:, 1] = x1, v1
         after[:, 2] = np.where(v1 == 0.0, weight, force)
-        return Told(setpoints.reshape(len(axes), -1), self._drives[axes])
+        return Told.of(setpoints, self._drives[axes])
 
     def tell(self, told: Told) -> None:
         """Tell drives; the first tick begins now. Who is told to stand is for a tick at least."""
@@ -166,9 +166,9 @@ class Setpoints:
 
     def _standing(self, axes: Index) -> Told:
         """What axes are told that stand where they are to stand."""
-        after = np.zeros((len(axes), INPUTS))
-        after[:, 0], after[:, 2] = self._plan[1, axes], self.weight[axes]
-        return Told(after, self._drives[axes])
+        after = np.zeros((len(axes), 1, INPUTS))
+        after[:, 0, 0], after[:, 0, 2] = self._plan[1, axes], self.weight[axes]
+        return Told.of(after, self._drives[axes])
 
     def _planned(self, axes: Index, steps: int) -> Told:
         """What axes are told that `move` has set going, for as many ticks as so many steps take."""
