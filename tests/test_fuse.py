@@ -17,7 +17,7 @@ from factory.layout.plan import Layout
 from factory.monitor import beside
 from factory.simulation import Simulation, physical_model
 from factory.wholes import FUSE_FROM, bodies_of, fused_copies, fusing_pays
-from factory.world.fusing import Fusion, Groups, turns
+from factory.world.fusing import Fusion, turned
 from tests.command_line import PAPER, ROOT, Terminal
 from tests.test_simulation import laid_out
 
@@ -75,7 +75,7 @@ def test_momentum_goes_over_to_the_one_body(count: int, seed: int) -> None:
     d.qvel[: 6 * count] = rng.normal(0, 1, 6 * count)
     bodies = list(range(1, whole))
     before = momentum(m, d, bodies)
-    nowhere(m, d).fuse(Groups.of([bodies]), np.array([whole]))
+    nowhere(m, d).fuse(bodies, whole)
     after = momentum(m, d, [whole])
     assert np.allclose(after, before, atol=1e-9)
     assert np.allclose(d.xipos[whole], m.body_mass[bodies] @ d.xipos[bodies] / m.body_mass[whole])
@@ -90,7 +90,7 @@ def test_a_rigid_motion_goes_over_unchanged() -> None:
         d.qvel[v + 3 : v + 6] = turning
     mujoco.mj_forward(m, d)
     before = d.energy.copy()
-    nowhere(m, d).fuse(Groups.of([[1, 2, 3]]), np.array([whole]))
+    nowhere(m, d).fuse([1, 2, 3], whole)
     assert np.allclose(d.qvel[-3:], turning)
     assert np.array_equal(before, d.energy)
 
@@ -107,14 +107,14 @@ def test_what_has_become_heavier_keeps_its_momentum() -> None:
     m.body_mass[whole] = m.body_mass[bodies].sum()
     mujoco.mj_setConst(m, mujoco.MjData(m))
     before = momentum(m, d, bodies)
-    stock.fusion.fuse(Groups.of([bodies]), np.array([whole]))
+    stock.fusion.fuse(bodies, whole)
     assert np.allclose(momentum(m, d, [whole]), before, atol=1e-9)
 
 
 def test_misfit_sees_a_shift_and_a_turn() -> None:
     m, d, _ = free_bodies(np.random.default_rng(1), 2)
     mujoco.mj_forward(m, d)
-    fusion, both = Fusion(m, d, d.xpos.copy(), np.full(m.nbody, 0.1)), Groups.of([[1, 2]])
+    fusion, both = Fusion(m, d, d.xpos.copy(), np.full(m.nbody, 0.1)), [1, 2]
     assert fusion.misfit(both) < 1e-12
     d.qpos[7] += 1e-5
     mujoco.mj_forward(m, d)
@@ -125,32 +125,13 @@ def test_misfit_sees_a_shift_and_a_turn() -> None:
     assert fusion.misfit(both) > 1e-3 * 0.1
 
 
-def test_groups_are_treated_as_each_would_be_alone() -> None:
-    rng = np.random.default_rng(5)
-    m, d, _ = free_bodies(rng, 9)
-    d.qvel[:] = rng.normal(0, 1, m.nv)
-    mujoco.mj_forward(m, d)
-    groups, wholes = [[1, 2, 3], [4], [6, 5]], [8, 9, 7]
-    alone = mujoco.MjData(m)
-    mujoco.mj_copyData(alone, m, d)
-    places, radii = d.xpos + rng.normal(0, 0.1, d.xpos.shape), rng.uniform(0, 0.1, m.nbody)
-    singly, at_once = (Fusion(m, data, places, radii) for data in (alone, d))
-    far = [singly.misfit(Groups.of([group]))[0] for group in groups]
-    for group, whole in zip(groups, wholes, strict=True):
-        singly.fuse(Groups.of([group]), np.array([whole]))
-    assert at_once.misfit(Groups.of(groups)) == pytest.approx(far)
-    at_once.fuse(Groups.of(groups), np.array(wholes))
-    for name in ("qpos", "qvel", "xpos", "xmat", "xquat"):
-        assert np.allclose(getattr(d, name), getattr(alone, name), rtol=0, atol=1e-12), name
-
-
 def test_turns_are_those_of_the_engine() -> None:
     quaternions = np.random.default_rng(6).normal(size=(20, 4))
     quaternions /= np.linalg.norm(quaternions, axis=1)[:, None]
     matrix = np.empty(9)
-    for quaternion, turn in zip(quaternions, turns(quaternions), strict=True):
+    for quaternion in quaternions:
         mujoco.mju_quat2Mat(matrix, quaternion)
-        assert np.allclose(turn.reshape(9), matrix, rtol=0, atol=1e-15)
+        assert np.allclose(turned(*quaternion), matrix, rtol=0, atol=1e-15)
 
 
 @pytest.mark.parametrize(("name", "least"), [("paper", 1e-6), ("lamp", 1e-4), ("gearbox", 1e-4)])

@@ -18,7 +18,7 @@ from factory.mjcf.model import Model
 from factory.mjcf.parts import parked_at, presented_at
 from factory.pag import NOPART
 from factory.world.contacts import NOBODY, Contacts
-from factory.world.fusing import RIGID, SETTLING, Fusion, Groups
+from factory.world.fusing import RIGID, SETTLING, Fusion
 from factory.world.gaps import held_at
 from factory.world.loads import Load, loads
 from factory.world.reach import Reach
@@ -194,17 +194,13 @@ class Stock:
         now = self.d.time
         waiting = [robot for robot, (_, since) in self.joining.items() if now - since > SETTLING]
         if waiting:
-            apart = self._misfits(waiting, self._held(waiting))
+            apart = self._misfits(waiting)
             self.fuse([robot for robot in waiting if apart[robot] < RIGID], apart)
             self.board.write()
 
-    def _held(self, robots: Iterable[int]) -> Groups:
-        """The bodies that robots hold, those of each together."""
-        return Groups.of([self.load[robot].bodies for robot in robots])
-
-    def _misfits(self, robots: Iterable[int], held: Groups) -> dict[int, float]:
+    def _misfits(self, robots: Iterable[int]) -> dict[int, float]:
         """How far out of place anything is of what each robot holds [m]."""
-        return dict(zip(robots, self.fusion.misfit(held).tolist(), strict=True))
+        return {robot: self.fusion.misfit(self.load[robot].bodies) for robot in robots}
 
     def fuse(self, robots: Iterable[int], apart: Mapping[int, float] = NOTHING) -> None:
         """Let one body each take the place of those that robots (index) have joined, if it has not
@@ -228,15 +224,15 @@ class Stock:
         if not made:
             return
         self.board.write()
-        held = self._held(made)
         if not made.keys() <= apart.keys():
-            apart = self._misfits(made, held)
+            apart = self._misfits(made)
         for robot in made:
             unit = self.load[robot].unit
             self.misfit[unit] = max(self.misfit.get(unit, 0.0), apart[robot])
         copies = [self.free[label].popleft() for label in made.values()]
         wholes = [int(self.body[k][n]) for k, n in zip(made.values(), copies, strict=True)]
-        self.fusion.fuse(held, np.array(wholes))
+        for robot, whole in zip(made, wholes, strict=True):
+            self.fusion.fuse(self.load[robot].bodies, whole)
         self.vicinity.woken(wholes)
         for (robot, label), copy, whole in zip(made.items(), copies, wholes, strict=True):
             unit, labels = self.load[robot].unit, self.load[robot].labels
