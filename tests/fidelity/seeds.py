@@ -119,6 +119,7 @@ def section(results: dict[str, Any]) -> str:
             f"{p['passed']} of {p['seeds']}",
             *(p["worst"][key] for key in LIMITS),
             "; ".join([*p["missed"], *p["troubles"], *p["contacts"]]) or "all hold",
+            p["date"],
         )
         for p in products
     ]
@@ -141,6 +142,7 @@ def section(results: dict[str, Any]) -> str:
                     "passed",
                     *(key.replace("_", " ") for key in LIMITS),
                     "limits",
+                    "measured",
                 ),
                 asked,
             ),
