@@ -158,7 +158,7 @@ def weaker_drives(m: mujoco.MjModel) -> None:
 
 
 FAULTS: dict[str, tuple[Alter, set[str]]] = {
-    "softer welds": (softer_welds, {"weld_residual_max_mm"}),
+    "softer welds": (softer_welds, {"weld_residual_max_mm", "weld_residual_p99_mm"}),
     "softer impedance": (softer_impedance, {"weld_residual_max_mm", "weld_residual_p99_mm"}),
     "a shifted site": (shifted_site, {"handoff_gap_max_mm", "handoff_energy_max_mJ_per_kg"}),
     "a shifted robot": (shifted_robot, {"handoff_gap_max_mm", "handoff_energy_max_mJ_per_kg"}),

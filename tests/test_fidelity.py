@@ -207,7 +207,7 @@ def test_softer_welds_show_in_the_residual() -> None:
     give = [figure(altered(Softened(f)), "weld_residual_p99_mm") for f in (2.0, 4.0, 8.0)]
     assert figure(good(), "weld_residual_p99_mm") < 0.6 * give[0]
     assert give[1] > 3 * give[0]
-    assert give[2] == pytest.approx(4 * give[1], rel=0.3)
+    assert give[2] == pytest.approx(4 * give[1], rel=0.15)
 
 
 def test_weak_drives_saturate_and_lag() -> None:
@@ -412,7 +412,7 @@ def test_a_figure_converges_or_is_marked() -> None:
 
 
 def test_a_study_over_timestep_and_stiffness() -> None:
-    found = study(Case(layout(), units=1), seed=0, timesteps=(2.0, 1.0, 0.5), stiffnesses=(8, 1))
+    found = study(Case(layout(), units=1), seed=0, timesteps=(2.0, 1.0, 0.5), stiffnesses=(4, 1))
     steps, welds = found.series
     residual = [f["weld_residual_p99_mm"] or 0 for f in welds.figures]
     assert residual[0] > 3 * residual[1]
@@ -430,7 +430,7 @@ def test_a_study_over_timestep_and_stiffness() -> None:
 def test_a_report_has_a_page_figures_and_plots(tmp_path: Path) -> None:
     pytest.importorskip("matplotlib")
     found = measure(layout(), range(2), units=2)
-    studied = study(Case(layout(), units=1), timesteps=(1.0, 0.5), stiffnesses=(8.0, 1.0))
+    studied = study(Case(layout(), units=1), timesteps=(1.0, 0.5), stiffnesses=(4.0, 1.0))
     write_report(tmp_path / "report", found, studied)
     files = files_in(tmp_path / "report")
     plots = {"limits", "times", "handoffs", "product", "approach", "convergence"}

@@ -206,10 +206,10 @@ def drive_for(
     """Critically damped gains for what moves a load, and the load [kg]; the force that their
     acceleration [m/s²] takes; the inertia that the motor adds."""
     inertia = max(0.0, LEAST * load - own)
-    mass = own + inertia + load
-    rate = 1 / settings.timestep
-    kp = min(mass * stiffness**2, PUSHED * (own + inertia) * rate**2)
-    kv = min(2 * mass * stiffness, DAMPED * (own + inertia) * rate)
+    empty, rate = own + inertia, 1 / settings.timestep
+    mass = empty + load
+    kp = min(mass * stiffness**2, PUSHED * empty * rate**2)
+    kv = min(2 * mass * stiffness, DAMPED * empty * rate)
     force = settings.force * mass * acceleration + 5
     return Drive(round(kp, 3), round(kv, 3), round(force, 3), settings.samples, round(inertia, 3))
 

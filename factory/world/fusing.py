@@ -98,7 +98,7 @@ class Fusion:
 
 def turns(quaternions: Array) -> Array:
     """Rotation matrices (n, 3, 3) of unit quaternions (n, 4)."""
-    return np.array([turned(*each) for each in quaternions.tolist()]).reshape(-1, 3, 3)
+    return np.array(turned(*quaternions.T)).T.reshape(-1, 3, 3)
 
 
 def turned(w: float, x: float, y: float, z: float) -> Matrix:
