@@ -111,6 +111,20 @@ def test_what_has_become_heavier_keeps_its_momentum() -> None:
     assert np.allclose(momentum(m, d, [whole]), before, atol=1e-9)
 
 
+def test_the_one_body_is_shown_where_the_others_were() -> None:
+    """Until the engine's next step, and turned as the heaviest from then on."""
+    m, d, whole = free_bodies(np.random.default_rng(4), 3)
+    m.body_mass[1:4] = 1.0, 3.0, 2.0
+    d.qpos[: 7 * 3] += np.random.default_rng(7).normal(0, 0.2, 7 * 3)
+    mujoco.mj_forward(m, d)
+    d.xpos[1:4] += 0.1
+    nowhere(m, d).fuse([1, 2, 3], whole)
+    assert np.allclose(d.xpos[whole], m.body_mass[1:4] @ d.xpos[1:4] / 6)
+    assert np.array_equal(d.xmat[whole], d.xmat[2])
+    assert np.array_equal(d.xquat[whole], d.xquat[2])
+    assert np.array_equal(d.qpos[7 * 3 + 3 :], d.qpos[7 + 3 : 14])
+
+
 def test_misfit_sees_a_shift_and_a_turn() -> None:
     m, d, _ = free_bodies(np.random.default_rng(1), 2)
     mujoco.mj_forward(m, d)

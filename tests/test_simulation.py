@@ -388,3 +388,65 @@ def test_templates_of_the_user_run_without_a_change_of_code(tmp_path) -> None:
     pag = factory.load_pag(tmp_path / "p.pag", [tmp_path])
     plan = factory.compile(pag, [tmp_path])
     assert_good(factory.run(factory.lay_out(plan), units=2))
+
+
+def test_clocks_go_on_when_other_modes_begin() -> None:
+    simulation = Simulation(laid_out(KARY), units=2)
+    supervisor = simulation.supervisor
+    while len(supervisor.active.operations) < 2 or not any(_clocks(supervisor).values()):
+        supervisor.step()
+    active, run = supervisor.active, _clocks(supervisor)
+    supervisor._activate(reversed(active.operations), reversed(active.ahead))
+    assert _clocks(supervisor) == run
+
+
+def _clocks(supervisor: Any) -> dict[int, float]:
+    """The clock [s] of every mode under way, by its number."""
+    active = supervisor.active
+    if active.clocks is None:
+        return {}
+    numbers = (*active.operations, *active.ahead)
+    return dict(zip(numbers, active.clocks.tolist(), strict=True))
+
+
+def test_the_tray_is_looked_for_until_it_has_come_home() -> None:
+    """Who has asked for it in vain does not ask again before something has changed; that it ought
+    to be home is not enough, where something has held it."""
+    simulation = Simulation(laid_out(PAPER), units=1)
+    world = simulation.world
+    while not world.delivered():
+        simulation.supervisor.step()
+    assert not world.prepared(simulation.layout.factory.dropoff, 1)
+    assert not world.outfeed.home
+    until = world.time + 3.0
+    while world.time < until:
+        if world.time < until - 1.0:
+            world.d.joint("outfeed/slide").qpos = 0.01
+        simulation.supervisor.step()
+    assert world.outfeed.home and world.outfeed.idle
+
+
+def test_only_who_is_joined_may_touch() -> None:
+    """Inputs of one unit in the hands of the robots of one operation, while it goes on."""
+    simulation = Simulation(laid_out(PAPER), units=2)
+    inspection, operations = simulation.world.inspection, simulation.layout.factory.operations
+    m, held = simulation.world.m, inspection.held
+    join = next(o for o in operations if len(o.inputs) == 2)
+    other = next(r for r in range(len(simulation.layout.factory.robots)) if r not in join.robots)
+    one, two = (int(body) for body in [*held.solid][:2])
+    geoms = int(m.body_geomadr[one]), int(m.body_geomadr[two])
+    inspection.joining = {join.index: 7}
+    for unit, robots, expected in (
+        ((7, 7), join.robots[:2], join.label),
+        ((7, 7), (join.robots[0], other), None),
+        ((7, 7), (other, join.robots[0]), None),
+        ((8, 8), join.robots[:2], None),
+        ((7, 8), join.robots[:2], None),
+    ):
+        held.unit[[one, two]] = unit
+        held.code[[one, two]] = np.array(robots) + 1
+        assert inspection._joined(*geoms) == expected
+    inspection.ended(join)
+    held.unit[[one, two]] = 7
+    held.code[[one, two]] = np.array(join.robots[:2]) + 1
+    assert inspection._joined(*geoms) is None
