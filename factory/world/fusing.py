@@ -8,13 +8,13 @@ against each other, which the welds that join them have brought to rest before.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import hypot
+from math import dist
 
 import numpy as np
 
 from factory.engine import mujoco
 from factory.meshes import Array
-from factory.world.memory import plain
+from factory.world.memory import BYTES, reader, writer
 
 SETTLING = 0.025
 """It takes that long at least [s]: nobody looks before."""
@@ -23,9 +23,12 @@ RIGID = 1e-6
 """Bodies have settled when none of their vertices is further than this from where it belongs beside
 the others [m]."""
 
-Vector = list[float]
+PLACE, TURN, AXES = 3 * BYTES, 4 * BYTES, 9 * BYTES
+"""What the engine has of a body takes so much: where it is, its quaternion, and its matrix."""
 
-Matrix = list[float]
+Vector = tuple[float, ...]
+
+Matrix = Sequence[float]
 """Nine numbers, row by row."""
 
 
@@ -39,10 +42,13 @@ class Fusion:
     def __init__(self, m: mujoco.MjModel, d: mujoco.MjData, places: Array, radii: Array) -> None:
         self._places, self._radii = places.tolist(), radii.tolist()
         self._mass = m.body_mass.tolist()
-        self._pose_of = m.jnt_qposadr[m.body_jntadr].tolist()
-        self._speed_of = m.jnt_dofadr[m.body_jntadr].tolist()
-        self._pose, self._speed = plain(d.qpos), plain(d.qvel)
-        self._place, self._axes, self._turn = map(plain, (d.xpos, d.xmat, d.xquat))
+        self._pose_of = (BYTES * m.jnt_qposadr[m.body_jntadr]).tolist()
+        self._speed_of = (BYTES * m.jnt_dofadr[m.body_jntadr]).tolist()
+        self._pose, self._set_pose = reader(d.qpos, 7), writer(d.qpos, 7)
+        self._speed, self._set_speed = reader(d.qvel, 6), writer(d.qvel, 6)
+        self._place, self._set_place = reader(d.xpos, 3), writer(d.xpos, 3)
+        self._turn, self._set_turn = reader(d.xquat, 4), writer(d.xquat, 4)
+        self._axes, self._set_axes = reader(d.xmat, 9), writer(d.xmat, 9)
         axes = turns(m.body_iquat)
         back, least = axes.transpose(0, 2, 1), np.finfo(float).tiny
         self._inertia = _flat((axes * m.body_inertia[:, None]) @ back)
@@ -51,49 +57,42 @@ class Fusion:
     def misfit(self, bodies: Sequence[int]) -> float:
         """How far at most any vertex of some bodies is from its place beside the first [m]. Bodies
         never turn but by what their welds yield."""
-        first = bodies[0]
-        here, axes = self._at(self._place, 3 * first), self._at(self._axes, 9 * first, 9)
-        worst = 0.0
+        first, worst = bodies[0], 0.0
+        here, axes, belongs = (
+            self._place(PLACE * first),
+            self._axes(AXES * first),
+            self._places[first],
+        )
         for body in bodies[1:]:
-            away = _back(axes, _less(self._at(self._place, 3 * body), here))
-            apart = _less(away, _less(self._places[body], self._places[first]))
-            tilt = _less(self._at(self._axes, 9 * body, 9), axes)
-            worst = max(worst, hypot(*apart) + hypot(*tilt) * self._radii[body])
+            away = _back(axes, _less(self._place(PLACE * body), here))
+            apart = dist(away, _less(self._places[body], belongs))
+            tilt = dist(axes, self._axes(AXES * body))
+            worst = max(worst, apart + tilt * self._radii[body])
         return worst
 
     def fuse(self, bodies: Sequence[int], whole: int) -> None:
         """Put the body `whole` in the place of others: pose, momentum and angular momentum are
         theirs. Its turn is that of the heaviest. Speeds of turning are in a body's own frame."""
         mass = [self._mass[body] for body in bodies]
-        share = [m / sum(mass) for m in mass]
-        poses = [self._at(self._pose, self._pose_of[body], 7) for body in bodies]
-        speeds = [self._at(self._speed, self._speed_of[body], 6) for body in bodies]
+        total = sum(mass)
+        share = [m / total for m in mass]
+        poses = [self._pose(self._pose_of[body]) for body in bodies]
+        speeds = [self._speed(self._speed_of[body]) for body in bodies]
         x, v = _mean(share, poses), _mean(share, speeds)
-        spin: Vector = [0.0, 0.0, 0.0]
+        a = b = c = 0.0
         for body, m, pose, speed in zip(bodies, mass, poses, speeds, strict=True):
-            own = _times(turned(*pose[3:]), _times(self._inertia[body], speed[3:]))
-            moment = _cross(_less(pose[:3], x), _less(speed[:3], v))
-            spin = [s + m * r + o for s, r, o in zip(spin, moment, own, strict=True)]
+            i, j, k = _times(turned(*pose[3:]), _times(self._inertia[body], speed[3:]))
+            p, q, r = _cross(_less(pose, x), _less(speed, v))
+            a, b, c = a + m * p + i, b + m * q + j, c + m * r + k
         most = mass.index(max(mass))
         heaviest, turn = bodies[most], poses[most][3:]
-        turning = _times(self._yields[whole], _back(turned(*turn), spin))
-        self._put(self._pose, self._pose_of[whole], x + turn)
-        self._put(self._speed, self._speed_of[whole], v + turning)
-        places = [self._at(self._place, 3 * body) for body in bodies]
-        self._put(self._place, 3 * whole, _mean(share, places))
-        for values, size in ((self._axes, 9), (self._turn, 4)):
-            self._put(values, size * whole, self._at(values, size * heaviest, size))
-
-    @staticmethod
-    def _at(values: memoryview[float], at: int, count: int = 3) -> Vector:
-        found: Vector = [*values[at : at + count]]
-        return found
-
-    @staticmethod
-    def _put(values: memoryview[float], at: int, numbers: Vector) -> None:
-        for number in numbers:
-            values[at] = number
-            at += 1
+        turning = _times(self._yields[whole], _back(turned(*turn), (a, b, c)))
+        self._set_pose(self._pose_of[whole], *x, *turn)
+        self._set_speed(self._speed_of[whole], *v, *turning)
+        places = [self._place(PLACE * body) for body in bodies]
+        self._set_place(PLACE * whole, *_mean(share, places))
+        self._set_turn(TURN * whole, *self._turn(TURN * heaviest))
+        self._set_axes(AXES * whole, *self._axes(AXES * heaviest))
 
 
 def turns(quaternions: Array) -> Array:
@@ -112,31 +111,35 @@ def turned(w: float, x: float, y: float, z: float) -> Matrix:
     ]
 
 
-def _flat(matrices: Array) -> list[Matrix]:
-    found: list[Matrix] = matrices.reshape(-1, 9).tolist()
+def _flat(matrices: Array) -> Sequence[Matrix]:
+    found: Sequence[Matrix] = matrices.reshape(-1, 9).tolist()
     return found
 
 
 def _mean(share: Sequence[float], vectors: Sequence[Vector]) -> Vector:
     """The mean of vectors by their first three components, each with its share."""
-    return [sum(s * v[k] for s, v in zip(share, vectors, strict=True)) for k in range(3)]
+    x = y = z = 0.0
+    for s, v in zip(share, vectors, strict=True):
+        x, y, z = x + s * v[0], y + s * v[1], z + s * v[2]
+    return x, y, z
 
 
 def _less(one: Vector, other: Vector) -> Vector:
-    return [a - b for a, b in zip(one, other, strict=True)]
+    """By their first three components."""
+    return one[0] - other[0], one[1] - other[1], one[2] - other[2]
 
 
 def _times(m: Matrix, v: Vector) -> Vector:
-    x, y, z = v
-    return [m[k] * x + m[k + 1] * y + m[k + 2] * z for k in (0, 3, 6)]
+    (a, b, c, d, e, f, g, h, i), (x, y, z) = m, v
+    return a * x + b * y + c * z, d * x + e * y + f * z, g * x + h * y + i * z
 
 
 def _back(m: Matrix, v: Vector) -> Vector:
     """With the transpose."""
-    x, y, z = v
-    return [m[k] * x + m[k + 3] * y + m[k + 6] * z for k in range(3)]
+    (a, b, c, d, e, f, g, h, i), (x, y, z) = m, v
+    return a * x + d * y + g * z, b * x + e * y + h * z, c * x + f * y + i * z
 
 
 def _cross(one: Vector, other: Vector) -> Vector:
     (a, b, c), (x, y, z) = one, other
-    return [b * z - c * y, c * x - a * z, a * y - b * x]
+    return b * z - c * y, c * x - a * z, a * y - b * x

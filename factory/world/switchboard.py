@@ -11,7 +11,7 @@ import numpy as np
 from factory.engine import mujoco
 from factory.world.contacts import Contacts
 from factory.world.gaps import Gaps
-from factory.world.memory import plain
+from factory.world.memory import BYTES, writer
 from factory.world.vicinity import Vicinity
 
 AWAKE = -0.0
@@ -35,7 +35,8 @@ class Switchboard:
         self._qpos = np.where(m.body_jntnum > 0, m.jnt_qposadr[m.body_jntadr], -1).tolist()
         self._aim, self._active = memoryview(m.eq_obj2id), memoryview(d.eq_active)
         self._asleep = memoryview(d.tree_asleep)
-        self._pose, self._speed, self._place = map(plain, (d.qpos, d.qvel, d.xpos))
+        self._speed, self._set_speed = d.qvel.data, writer(d.qvel, 6)
+        self._set_pose, self._set_place = writer(d.qpos, 7), writer(d.xpos, 3)
         self._on: dict[int, int] = {}
         self._off: set[int] = set()
         self._gripped: list[int] = []
@@ -88,13 +89,10 @@ class Switchboard:
 
     def _put(self) -> None:
         """Put bodies where they belong."""
-        pose, place, speed = self._pose, self._place, self._speed
         for body, at in self._placed.items():
-            q, v = self._qpos[body], self._dof[body]
-            for number in range(3):
-                pose[q + number] = place[3 * body + number] = at[number]
-                pose[q + 4 + number] = speed[v + number] = speed[v + 3 + number] = 0.0
-            pose[q + 3] = 1.0
+            self._set_pose(BYTES * self._qpos[body], *at, 1.0, 0.0, 0.0, 0.0)
+            self._set_place(3 * BYTES * body, *at)
+            self._set_speed(BYTES * self._dof[body], 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
         self.vicinity.woken(self._placed)
 
     def wake(self, bodies: Iterable[int]) -> None:
