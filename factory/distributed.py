@@ -89,7 +89,7 @@ class Record:
 
     events: list[Event] = field(default_factory=list)
     started: set[tuple[int, int]] = field(default_factory=set)
-    under_way: dict[int, float] = field(default_factory=dict)
+    under_way: list[int] = field(default_factory=list)
 
 
 class DistributedSupervisor:
@@ -136,7 +136,6 @@ class DistributedSupervisor:
         self.bundles: dict[int, Bundle] = {}
         self.alone: dict[tuple[int, int], Bundle] = {}
         self.record = Record()
-        self.busy = [0.0] * len(factory.robots)
         self.last_event = world.time
         self.active = _Active()
         self.count = 0
@@ -311,7 +310,7 @@ class DistributedSupervisor:
         if (operation.index, unit) in self.record.started:
             return
         self.record.started.add((operation.index, unit))
-        self.record.under_way[operation.index] = self.world.time
+        self.record.under_way.append(operation.index)
         self.world.apply([(operation, unit)], [])
         self._log(operation.start)
 
@@ -319,9 +318,7 @@ class DistributedSupervisor:
         """Parts change hands when the carrier says so."""
         self._log(operation.end)
         self.record.started.discard((operation.index, unit - 1))
-        since = self.record.under_way.pop(operation.index)
-        for robot in operation.robots:
-            self.busy[robot] += self.world.time - since
+        self.record.under_way.remove(operation.index)
         self.world.apply([], [(operation, unit)])
 
     def _log(self, event: int) -> None:

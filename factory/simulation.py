@@ -23,7 +23,7 @@ from factory.prediction import operation_delays, predict, ways_ahead
 from factory.robots import Catalogue, load_catalogue
 from factory.settings import MOST, Settings
 from factory.supervisor import Supervisor
-from factory.trace import PhysicsFigures, Run
+from factory.trace import PhysicsFigures, Run, busy_times
 from factory.wholes import bodies_of, fused_copies
 from factory.world.ideal import IdealWorld
 
@@ -212,7 +212,7 @@ class Simulation:
             verdict.refines,
             tuple(supervisor.events),
             tuple(world.dropoffs),
-            tuple(supervisor.busy),
+            busy_times(factory, supervisor.events),
             figures,
             self.seed,
             self.jitter,

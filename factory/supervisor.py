@@ -106,8 +106,6 @@ class Supervisor:
         for transition, count in (counts or {}).items():
             self.fired[transition] = count
         self.events: list[Event] = []
-        self.busy = [0.0] * len(factory.robots)
-        self.since: dict[int, float] = {}
         self.last_event = world.time
         waits = self._stages(stages)
         self._activate(
@@ -192,36 +190,28 @@ class Supervisor:
         there = active.bundle.at_goal(x[active.axes])
         if not np.count_nonzero(there):
             return []
-        clocks = self.tick * there.astype(float)
-        if active.clocks is not None:
-            clocks += active.clocks
-        active.clocks, done = clocks, active.bundle.finished(there, clocks)
-        if not np.count_nonzero(done):
-            return []
+        if active.bundle.dwells:
+            clocks = self.tick * there.astype(float)
+            if active.clocks is not None:
+                clocks += active.clocks
+            active.clocks, there = clocks, active.bundle.finished(there, clocks)
+            if not np.count_nonzero(there):
+                return []
         still = np.logical_and.reduceat(np.abs(v[active.axes]) < REST, active.bundle.starts)
         numbers = (*active.operations, *active.ahead)
-        return [number for number, ends in zip(numbers, done & still, strict=True) if ends]
+        return [numbers[number] for number in (there & still).nonzero()[0].tolist()]
 
     def _fire(self, started: list[int], ended: list[int]) -> None:
         operations, now = self.factory.operations, self.world.time
-        starts = [(operations[o], self.fired[operations[o].start]) for o in started]
-        ends = [(operations[o], self.fired[operations[o].end]) for o in ended]
-        events = (*(o.start for o, _ in starts), *(o.end for o, _ in ends))
+        starts = [(operations[o], self.fired[2 * o]) for o in started]
+        ends = [(operations[o], self.fired[2 * o + 1]) for o in ended]
+        events = (*(2 * o for o in started), *(2 * o + 1 for o in ended))
         self.enabled |= self.threads.fire(events)
         for event in events:
             self.fired[event] += 1
             self.events.append(Event(now, self.names[event]))
-        self._account(started, ended, now)
         self.world.apply(starts, ends)
         self.last_event = now
-
-    def _account(self, started: Iterable[int], ended: Iterable[int], now: float) -> None:
-        for number in started:
-            self.since[number] = now
-        for number in ended:
-            spent = now - self.since.pop(number, 0.0)
-            for robot in self.factory.operations[number].robots:
-                self.busy[robot] += spent
 
     def _going_ahead(self, started: list[int], ended: list[int], over: list[int]) -> list[int]:
         """The stages under way from now on: those that were, and have neither come to their goal

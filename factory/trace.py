@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, NamedTuple
 
 from factory.approach import Pair
 from factory.errors import Diagnostic
+from factory.factory import Factory
 
 if TYPE_CHECKING:
     from factory.monitor.report import Report
@@ -18,6 +19,22 @@ class Event(NamedTuple):
 
     t: float
     transition: str
+
+
+def busy_times(factory: Factory, events: Iterable[Event]) -> tuple[float, ...]:
+    """How long each robot was in operations that have ended [s]; one without a start among the
+    events was under way from the beginning, time 0."""
+    numbers = {t.name: number for number, t in enumerate(factory.net.threaded.transitions)}
+    begun, spent = dict[int, float](), [0.0] * len(factory.robots)
+    for t, transition in events:
+        operation, is_end = divmod(numbers[transition], 2)
+        if not is_end:
+            begun[operation] = t
+            continue
+        lasted = t - begun.pop(operation, 0.0)
+        for robot in factory.operations[operation].robots:
+            spent[robot] += lasted
+    return tuple(spent)
 
 
 @dataclass(frozen=True, slots=True)

@@ -288,11 +288,12 @@ def hurry(simulation: Simulation, label: str, delay: float) -> list[float]:
     """The supervisor ends an operation so long after it started, whatever its robots do."""
     supervisor, done = simulation.supervisor, list[float]()
     number = simulation.layout.factory.by_label[label].index
-    finished = supervisor._finished
+    finished, own = supervisor._finished, (f"{label}_s", f"{label}_e")
 
     def hasty() -> list[int]:
         found = list(finished())
-        since = supervisor.since.get(number, float("inf"))
+        last = next((e for e in reversed(supervisor.events) if e.transition in own), None)
+        since = last.t if last and last.transition == own[0] else float("inf")
         if not done and since + delay <= supervisor.world.time and number not in found:
             done.append(supervisor.world.time)
             found.append(number)

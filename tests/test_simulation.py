@@ -18,6 +18,7 @@ from factory.pipeline import all_templates
 from factory.programs import program_of, write_program
 from factory.settings import Settings
 from factory.simulation import Simulation
+from factory.trace import Event, busy_times
 from tests.bench.factories import laid_out as floor_of
 from tests.test_compiler import PAPER, compiled
 
@@ -450,3 +451,13 @@ def test_only_who_is_joined_may_touch() -> None:
     held.unit[[one, two]] = 7
     held.code[[one, two]] = np.array(join.robots[:2]) + 1
     assert inspection._joined(*geoms) is None
+
+
+def test_busy_times_are_those_of_operations_that_have_ended() -> None:
+    """`sub1` was under way from the beginning, and `sub2` is at the end."""
+    plan = laid_out(PAPER).factory
+    sub1 = plan.by_label["sub1"]
+    fired = ((2.0, "sub1_e"), (3.0, "sub2_s"), (3.5, "sub1_s"), (4.25, "sub1_e"))
+    busy = busy_times(plan, [Event(*event) for event in fired])
+    assert {robot for robot, spent in enumerate(busy) if spent == 2.75} == {*sub1.robots}
+    assert sum(busy) == 2.75 * len(sub1.robots)

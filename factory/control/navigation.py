@@ -60,7 +60,7 @@ class _Terms:
 class Bundle:
     """All active modes, concatenated: a configuration x (n,) has the robots of the first mode
     first, in the mode's order. `starts` (modes,): the number of each mode's first robot; `sizes`
-    (modes,): how many it has.
+    (modes,): how many it has. `dwells`: a clock has to run out in some mode.
 
     No call loops over robots or modes; arrays are made once, by `of`.
     """
@@ -81,6 +81,7 @@ class Bundle:
     gates: Gates
     pairs: Pairs
     moving: Array | None
+    dwells: bool
 
     @classmethod
     def of(cls, modes: Sequence[Mode], limits: Sequence[Limits]) -> Bundle:
@@ -111,6 +112,7 @@ class Bundle:
             Gates.of(modes, starts),
             Pairs.of(modes, starts),
             np.repeat(np.where(still, 0.0, 1.0), sizes) if still.any() else None,
+            any(mode.dwell > 0.0 for mode in modes),
         )
 
     def select(self, numbers: Sequence[int]) -> Bundle:
@@ -137,6 +139,7 @@ class Bundle:
             self.gates.select(chosen, shift),
             self.pairs.select(chosen, shift),
             None if self.moving is None else self.moving[robots],
+            bool((self.dwell[chosen] > 0.0).any()),
         )
 
     def potential(self, x: Array) -> Array:

@@ -48,8 +48,11 @@ class Contacts:
         self._geoms = {body: geoms.tolist() for body, geoms in self.solid.items()}
         self._of_geoms = memoryview(m.geom_contype), memoryview(m.geom_conaffinity)
         self._of_bodies = tuple(
-            memoryview(masks)
-            for masks in (self.contype, m.body_contype, self.conaffinity, m.body_conaffinity)
+            values.data
+            for values in (
+                *(self.code, self.contype, m.body_contype),
+                *(self.conaffinity, m.body_conaffinity),
+            )
         )
         self.partners: dict[str, list[str]] = {}
         for one, other in excluded:
@@ -67,9 +70,9 @@ class Contacts:
     def hold(self, holders: Mapping[int, int]) -> None:
         """From now on parts are each in the hands of a holder (its code), by body."""
         contype, conaffinity = self._of_geoms
-        own_type, type_, own_affinity, affinity = self._of_bodies
+        code, own_type, type_, own_affinity, affinity = self._of_bodies
         for body, holder in holders.items():
-            self.code[body] = holder
+            code[body] = holder
             own, others = self._masks[holder]
             own_type[body] = type_[body] = own
             own_affinity[body] = affinity[body] = others

@@ -83,7 +83,7 @@ class Outfeed:
         self.goes = False
 
     def _course(self, ticks: int) -> Course:
-        self.setpoints.load(int(self.axis[0]), (self._place > 0.0) * self._product, 0.0)
+        self.setpoints.load(self.axis, (self._place > 0.0) * self._product, 0.0)
         return travelled(self.setpoints, self.axis, (self._x, self._v), ticks, self._go)
 
     def _go(self, x: Array, v: Array) -> Way:

@@ -112,8 +112,8 @@ class MujocoWorld:
             begun, over = ((counts or {}).get(t, 0) for t in (operation.start, operation.end))
             if begun > over:
                 self.inspection.started(operation, over)
-        for robot, carried in self.stock.loads().items():
-            self._load(robot, carried)
+        loads = self.stock.loads()
+        self._load([*loads], [*loads.values()])
         self.setpoints.update(0)
         self._begin = Rewind(self.m, self.d)
         self.physics_time = 0.0
@@ -171,21 +171,25 @@ class MujocoWorld:
             return
         if self.stock.joining:
             self.stock.fuse([robot for operation, _ in ended for robot in operation.robots])
+        dropoff = self.model.factory.dropoff.index
         for operation, unit in ended:
             self.inspection.ended(operation)
-            if operation.index == self.model.factory.dropoff.index:
+            if operation.index == dropoff:
                 self.inspection.measured(*self.stock.finished(unit))
-            for slot, robot in enumerate(operation.robots):
-                self._load(robot, self.model.masses.get(operation.after[slot], 0.0))
-                self.vicinity.carries(robot, operation.after[slot])
+        robots = [robot for operation, _ in ended for robot in operation.robots]
+        labels = [label for operation, _ in ended for label in operation.after]
+        self._load(robots, [self.model.masses.get(label, 0.0) for label in labels])
+        self.vicinity.carries(robots, labels)
         self.inspection.handoffs += self.stock.hand_over(ended)
         self.supplied = True
 
-    def _load(self, robot: int, load: float) -> None:
-        """A robot carries so much from now on [kg]: its drives push accordingly."""
-        self.setpoints.load(robot, load, 0.0)
-        if robot in self.lift:
-            self.setpoints.load(self.lift[robot], load, (HEAD_MASS + load) * GRAVITY)
+    def _load(self, robots: Sequence[int], loads: Sequence[float]) -> None:
+        """Robots carry so much from now on [kg]: their drives push accordingly."""
+        self.setpoints.load(np.array(robots, np.intp), np.array(loads), 0.0)
+        lifts = [(self.lift[r], m) for r, m in zip(robots, loads, strict=True) if r in self.lift]
+        if lifts:
+            axes, mass = np.array([lift for lift, _ in lifts]), np.array([m for _, m in lifts])
+            self.setpoints.load(axes, mass, (HEAD_MASS + mass) * GRAVITY)
 
     def step(self, bundle: Bundle | None, axes: Index, ticks: int = 1) -> bool:
         """Some ticks of the engine, the drives following a reference that obeys F_p under the
@@ -258,20 +262,21 @@ class MujocoWorld:
         """Other modes are active. Robots whose operation has ended stop where their reference is.
         They may hand over at a low speed: left as a setpoint it would carry them out of the goal,
         and of the next domain."""
+        self._catch_up()
         left = np.zeros_like(self._under_way)
         left[self._active] = True
         left[active] = False
         (axes,) = left.nonzero()
-        self.setpoints.stand(axes, self.reference[axes], self._v[axes] != 0.0)
-        self._v[axes] = 0.0
-        self._attend(axes, np.zeros(len(axes), bool))
+        if len(axes):
+            here, going = self._x[axes], self._v[axes] != 0.0
+            self._v[axes] = 0.0
+            self.setpoints.stand(axes, here, going)
+            self._attend(axes, np.zeros_like(going))
+            self.vicinity.goes(self._holder[axes], here, self._v[axes], here)
+        if bundle is not None:
+            self.vicinity.goes(self._holder[active], self._x[active], self._v[active], bundle.goal)
         self._active, self._moved, self._last = active, (b"", b""), None
         self._look()
-        if self.vicinity.culls:
-            places = [self._x[axes]] if bundle is None else [self._x[axes], bundle.goal]
-            axes = np.concatenate([axes, active])
-            way = self._x[axes], self._v[axes], np.concatenate(places)
-            self.vicinity.goes(self._holder[axes], *way)
 
     def move(self, axes: Index, x: Array, v: Array, a: Array) -> None:
         """From now on the references of `axes` run from x [m] at speed v under acceleration a, in

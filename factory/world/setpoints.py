@@ -148,12 +148,13 @@ class Setpoints:
         if np.count_nonzero(going):
             self._due[axes[going]] = self.any_due = True
 
-    def load(self, axis: int, mass: float, weight: float) -> None:
-        """From now on an axis moves a mass [kg] beside its own, and carries a weight [N]. One that
-        `move` has set going, or that carries more or less than before, is to be told."""
-        if weight != self.weight[axis] or self._plan[3, axis]:
-            self._due[axis] = self.any_due = True
-        self.mass[axis], self.weight[axis] = self.own[axis] + mass, weight
+    def load(self, axes: Index, mass: Array | float, weight: Array | float) -> None:
+        """From now on axes move a mass each beside their own [kg], and carry a weight [N]. Those
+        that `move` has set going, or that carry more or less than before, are to be told."""
+        changed = (self.weight[axes] != weight) | (self._plan[3, axes] != 0.0)
+        if np.count_nonzero(changed):
+            self._due[axes[changed]] = self.any_due = True
+        self.mass[axes], self.weight[axes] = self.own[axes] + mass, weight
 
     def update(self, steps: int) -> tuple[Index, Truth]:
         """Tell those what comes that are due, before so many steps of the engine; gives who they

@@ -90,6 +90,11 @@ class Stock:
             [fed[r] for r, k in zip(o.robots, o.after, strict=True) if r in fed and k == NOPART]
             for o in factory.operations
         ]
+        dropoff = factory.dropoff.index
+        self._ends = [
+            self._release if o.index == dropoff else self._pass_on if o.inputs else self._take
+            for o in factory.operations
+        ]
         self.hold = {label: m.equality(names.hold(label)).id for label in self.parts}
         self.on_tray: int | None = None
         self.left: list[float] = []
@@ -116,8 +121,9 @@ class Stock:
         it, and the robot has delivered the part it took last: until then it may still stand
         there."""
         unit = self.next_unit[label]
-        wanted = unit < max(self.units, self.begun[label])
-        if label in self.taken or label in self.shown or not wanted or not self.free[label]:
+        if label in self.taken or label in self.shown or not self.free[label]:
+            return
+        if unit >= max(self.units, self.begun[label]):
             return
         copy = self.free[label].popleft()
         self.copy_of[label, unit] = copy
@@ -133,48 +139,37 @@ class Stock:
     # --- handing over --------------------------------------------------------------------------
 
     def hand_over(self, ended: Sequence[tuple[Operation, int]]) -> int:
-        """Switch the grips that the ends of operations ask for, each with the number of its unit.
+        """Switch the grips that the ends of operations ask for, each with the number of its unit: a
+        feeder's too, and at dropoff all of the output robot's against those of the outfeed's tray.
         Gives how many bodies have been taken over."""
         for operation, unit in ended:
-            self._hand_over(operation, unit)
+            self._ends[operation.index](operation, unit)
+            for label in self.refilled[operation.index]:
+                self.taken.discard(label)
+                self.feed_next(label)
         return self.board.write()
 
-    def _hand_over(self, operation: Operation, unit: int) -> None:
-        """A feeder's grip too, and at dropoff all of the output robot's against those of the
-        outfeed's tray."""
-        if not operation.inputs:
-            self._take(operation, unit)
-        elif operation.index == self.model.factory.dropoff.index:
-            self._release(operation, unit)
-        else:
-            self._pass_on(operation, unit)
-        for label in self.refilled[operation.index]:
-            self.taken.discard(label)
-            self.feed_next(label)
-
     def _take(self, operation: Operation, unit: int) -> None:
-        label = operation.label
+        label, robot = operation.label, operation.carrier
         del self.shown[label]
         self.taken.add(label)
         body = [self.body_of(label, unit)]
         self.board.loose([self.feed[label]])
-        self.board.grip([self.grip[operation.carrier, label]], body)
-        self.board.hold(body, operation.carrier + 1)
-        self.load[operation.carrier] = Hand(unit, [label], body)
+        self.board.grip([self.grip[robot, label]], body)
+        self.board.hold(body, robot + 1)
+        self.load[robot] = Hand(unit, [label], body)
 
     def _pass_on(self, operation: Operation, unit: int) -> None:
-        carrier, labels, bodies = operation.carrier, list[str](), list[int]()
+        carrier = operation.carrier
+        hand = self.load.setdefault(carrier, Hand(unit))
         for robot in operation.robots:
             if robot != carrier and robot in self.load:
                 given = self.load.pop(robot)
                 self.board.loose([self.grip[robot, label] for label in given.labels])
-                labels += given.labels
-                bodies += given.bodies
-        self.board.grip([self.grip[carrier, label] for label in labels], bodies)
-        self.board.hold(bodies, carrier + 1)
-        hand = self.load.setdefault(carrier, Hand(unit))
-        hand.labels += labels
-        hand.bodies += bodies
+                self.board.grip([self.grip[carrier, label] for label in given.labels], given.bodies)
+                self.board.hold(given.bodies, carrier + 1)
+                hand.labels += given.labels
+                hand.bodies += given.bodies
         if operation.label in self.bodies.wholes:
             self.joining[carrier] = operation.label, float(self.d.time)
 

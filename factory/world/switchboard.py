@@ -74,7 +74,8 @@ class Switchboard:
         gripped = len(self._gripped)
         if gripped:
             self.gaps.note(self._gripped, [self._on[weld] for weld in self._gripped])
-        aim, active, touched = self._aim, self._active, list[int]()
+        aim, active = self._aim, self._active
+        touched: list[int] = []
         for weld in self._off:
             active[weld] = False
             touched += aim[weld], self._holder[weld]
@@ -98,7 +99,8 @@ class Switchboard:
     def wake(self, bodies: Iterable[int]) -> None:
         """Wake bodies that sleep, and let those that are about to, being slow, wait as long
         again."""
-        asleep, speed, woken = self._asleep, self._speed, list[int]()
+        asleep, speed = self._asleep, self._speed
+        woken: list[int] = []
         for body in bodies:
             tree = self._tree[body]
             if tree < 0:

@@ -10,7 +10,7 @@ is the same to the last bit.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from functools import reduce
 from operator import or_
@@ -100,10 +100,11 @@ class Vicinity:
             self._woken += bodies
             self.stale = True
 
-    def carries(self, robot: int, label: str) -> None:
-        """A robot (index) has something else from now on, by its label."""
+    def carries(self, robots: Sequence[int], labels: Sequence[str]) -> None:
+        """Robots (index) have something else from now on, by its label."""
         if self.culls:
-            self._ways[0, robot + 1] = self._loads[robot, label]
+            loads = map(self._loads.__getitem__, zip(robots, labels, strict=True))
+            self._ways[0, np.array(robots) + 1] = [*loads]
 
     def goes(self, holders: Index, x: Array, v: Array, places: Array) -> None:
         """From now on holders go to `places` on their slides [m], from x at speed v, and straight;
@@ -111,6 +112,8 @@ class Vicinity:
         if not self.culls:
             return
         new = (places != self._goal[holders]) | (places == x)
+        if not np.count_nonzero(new):
+            return
         holders, x, v, places = holders[new], x[new], v[new], places[new]
         self._goal[holders] = places
         self._foreseen = self.stale = True
