@@ -177,8 +177,8 @@ class Bundle:
         """Whether each mode is in W - Δ (modes,): no two robots touching, every robot on its
         guidepath and no nearer to its goal than its gate allows, both to within eps."""
         inside = (x >= self.lower - self.eps) & (x <= self.upper + self.eps)
-        gated = self.gates.robot
-        inside[gated] &= self._offset(x)[gated] >= -self.eps[gated]
+        if (gated := self.gates.robot).size:
+            inside[gated] &= self._offset(x)[gated] >= -self.eps[gated]
         touching = self.pairs.mode[self.pairs.apart(x) <= self.pairs.touch]
         found = np.logical_and.reduceat(inside, self.starts)
         found[touching] = False

@@ -157,9 +157,11 @@ class MujocoWorld:
 
     def prepared(self, operation: Operation, unit: int) -> bool:
         """A feeder presents the part of that unit; the outfeed has room for a product."""
+        if operation.label in self.stock.feed:
+            return self.stock.presents(operation.label, unit)
         if operation.index == self.model.factory.dropoff.index:
             return self.stock.on_tray is None and self.outfeed.rests_home()
-        return bool(operation.inputs) or self.stock.presents(operation.label, unit)
+        return True
 
     def apply(
         self, started: Sequence[tuple[Operation, int]], ended: Sequence[tuple[Operation, int]]
