@@ -83,6 +83,7 @@ def compile_pag(
     nodes = expand(pag, templates)
     draft = _Draft([], [], [], [], [], [])
     output = templates[DROPOFF]
+    _check_types(nodes, output, catalogue)
     carrier = draft.allocate(output.robots[0], pag[pag.root].position)
     _compile_nodes(nodes, pag.root, carrier, draft, catalogue, approaches)
     _add_dropoff(output, pag, carrier, draft)
@@ -93,6 +94,25 @@ def compile_pag(
     if draft.troubles:
         raise InputError(draft.troubles)
     return Factory(pag, robots, operations, gear_net(robots, operations), tuple(draft.parents))
+
+
+def _check_types(nodes: Mapping[str, Node], output: Template, catalogue: Catalogue) -> None:
+    """Raises InputError (TypeMismatch) where a template asks for a type of robot that is not in the
+    catalogue: once for each place in a template."""
+    users = {node.template.name: (node.template, node.position) for node in nodes.values()}
+    troubles = [
+        Diagnostic(
+            "TypeMismatch",
+            f"{template.name} asks for a robot of unknown type '{wanted}'",
+            template.robot_position(slot) or position,
+            did_you_mean(wanted, list(catalogue.types), "robot types"),
+        )
+        for template, position in ((output, None), *users.values())
+        for slot, wanted in enumerate(template.robots)
+        if wanted not in catalogue.types
+    ]
+    if troubles:
+        raise InputError(troubles)
 
 
 def expand(pag: PAG, templates: Mapping[str, Template]) -> dict[str, Node]:
@@ -221,12 +241,6 @@ def _allocate(
         return (1, 0, i) if label == NOPART else (0, nodes[label].size, argument[label])
 
     for i in sorted(new, key=order):
-        if template.robots[i] not in catalogue.types:
-            hint = did_you_mean(template.robots[i], list(catalogue.types), "robot types")
-            message = f"{template.name} asks for a robot of unknown type '{template.robots[i]}'"
-            draft.troubles.append(
-                Diagnostic("TypeMismatch", message, template.position or node.position, hint)
-            )
         wanted = template.robots[i]
         if lowered and brought[i] == lowered:
             wanted = _lift(wanted, node, draft, catalogue)

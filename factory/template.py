@@ -67,11 +67,16 @@ class Template:
     geometry: bool = False
     position: Position | None = field(default=None, compare=False)
     further_position: Position | None = field(default=None, compare=False)
+    robot_positions: tuple[Position, ...] = field(default=(), compare=False)
 
     @property
     def inputs(self) -> tuple[str, ...]:
         """The distinct label variables of a, in the order of the robots: the sub-assemblies."""
         return tuple(dict.fromkeys(label for label in self.before if label != NOPART))
+
+    def robot_position(self, slot: int) -> Position | None:
+        """Where the type of a robot is written; else the template."""
+        return self.robot_positions[slot] if self.robot_positions else self.position
 
     @property
     def law_position(self) -> Position | None:

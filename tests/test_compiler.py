@@ -125,6 +125,20 @@ def test_the_output_type_must_fit_too() -> None:
     assert codes(error) == ["TypeMismatch"]
 
 
+def test_an_unknown_type_is_named_once_and_where_it_is_written() -> None:
+    """Though two operations ask for it; the carrier's too, which no role fits then."""
+    turn = HOIST.replace("hoist", "turn").replace("lift, dot >", "dit, tol >")
+    turn = turn.replace("LAB1, LAB2; LAB3, nopart", "LAB1, nopart; LAB2, nopart")
+    with pytest.raises(InputError) as error:
+        compiled("root = t; t = turn(s); s = turn(a); a = atomic()", turn)
+    said = [(str(d.position), d.message) for d in error.value.diagnostics]
+    column = turn.index("dit") + 1
+    assert said == [
+        (f"<text>:1:{column}", "turn asks for a robot of unknown type 'dit'"),
+        (f"<text>:1:{column + 5}", "turn asks for a robot of unknown type 'tol'"),
+    ]
+
+
 def test_an_unknown_type_is_named_with_a_suggestion() -> None:
     with pytest.raises(InputError) as error:
         compiled(

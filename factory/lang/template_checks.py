@@ -62,6 +62,7 @@ class TemplateMaker:
             geometry,
             self.source.at(name),
             self.source.at(further) if further else None,
+            tuple(map(self.source.at, robots)),
         )
 
     def _bad(self, message: str, at: Token | Position, hint: str) -> None:
