@@ -113,6 +113,22 @@ def test_build_writes_a_folder(run: Terminal, tmp_path: Path) -> None:
     assert check_certificate(proof) == []
 
 
+def test_a_build_lists_what_it_has_written_and_says_how_much_more(run: Terminal, out: Path) -> None:
+    """Its meshes, in a folder of their own, behind."""
+    words = "build", PAPER.parent / "chest.pag", "-o", out / "chest"
+    document = run(*words, "--json").json
+    for given in ([], ["-v"]):
+        listed = [line for line in run(*words, *given).out.splitlines() if line.startswith("  ")]
+        files = [Path(line.strip()) for line in listed if not line.endswith(" more: -v lists them")]
+        where = [file.parent.name for file in files]
+        assert where == sorted(where, key="chest_meshes".__eq__) and "chest_meshes" in where
+        if given:
+            assert sorted(files) == sorted(map(Path, document["files"]))
+            assert len(listed) == len(files)
+        else:
+            assert len(listed) == 20 and listed[-1].split()[1] == str(len(document["files"]) - 19)
+
+
 def test_run_in_mujoco(run: Terminal) -> None:
     done = run("run", PAPER, "--units", 2, "--json")
     document = done.json

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from pathlib import Path
 from time import perf_counter
@@ -30,6 +31,9 @@ if TYPE_CHECKING:
     from factory.layout.plan import Layout
     from factory.pipeline import Source
     from factory.settings import Settings
+
+SHOWN = 20
+"""So many files are listed, unless `-v` asks for all."""
 
 
 @click.command()
@@ -79,15 +83,24 @@ def build(
         receipt.keep(name, _inputs(source, folders), built.files, told)
     else:
         told["document"]["compile_s"] = perf_counter() - begin
-        told["lines"].append("nothing has changed since: these files are up to date")
+        told["news"] = ["nothing has changed since: these files are up to date"]
     for text in [] if quiet else told["warnings"]:
         print(text, file=sys.stderr)
     if as_json:
         emit(told["document"])
     elif not quiet:
-        for line in told["lines"]:
+        for line in (*told["lines"], *_listed(told["document"]["files"], verbose), *told["news"]):
             say(line)
     return 0
+
+
+def _listed(files: list[str], verbose: bool) -> list[str]:
+    """The files that have been written, what lies in further folders behind: all, or the first and
+    how many more."""
+    files = sorted(files, key=lambda path: path.count(os.sep))
+    shown = files if verbose or len(files) <= SHOWN else files[: SHOWN - 1]
+    more = len(files) - len(shown)
+    return [f"  {path}" for path in shown] + [f"  and {more} more: -v lists them"] * (more > 0)
 
 
 def _told(layout: Layout, built: Built, settings: Settings, spent: float) -> dict[str, Any]:
@@ -118,10 +131,9 @@ def _told(layout: Layout, built: Built, settings: Settings, spent: float) -> dic
         f"floor {layout.area:.2f} m², guidepaths {layout.guidepath_length:.2f} m, "
         f"clearance {settings.clearance * 1000:g} mm proved",
         str(gained),
-        *(f"  {path}" for path in built.files[:20]),
     ]
     warnings = [warning(diagnostic) for diagnostic in layout.product.warnings]
-    return {"document": document, "lines": lines, "warnings": warnings}
+    return {"document": document, "lines": lines, "warnings": warnings, "news": []}
 
 
 def _inputs(source: Source, folders: tuple[Path, ...]) -> tuple[Path, ...]:
