@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from math import dist
+from typing import Any
 
 import numpy as np
 
@@ -100,8 +101,8 @@ def turns(quaternions: Array) -> Array:
     return np.array(turned(*quaternions.T)).T.reshape(-1, 3, 3)
 
 
-def turned(w: float, x: float, y: float, z: float) -> Matrix:
-    """The rotation matrix of a unit quaternion."""
+def turned(w: Any, x: Any, y: Any, z: Any) -> list[Any]:
+    """The rotation matrix of a unit quaternion, or those of many, number by number."""
     ww, xx, yy, zz = w * w, x * x, y * y, z * z
     wx, wy, wz, xy, xz, yz = w * x, w * y, w * z, x * y, x * z, y * z
     return [
@@ -124,7 +125,7 @@ def _mean(share: Sequence[float], vectors: Sequence[Vector]) -> Vector:
     return x, y, z
 
 
-def _less(one: Vector, other: Vector) -> Vector:
+def _less(one: Sequence[float], other: Sequence[float]) -> Vector:
     """By their first three components."""
     return one[0] - other[0], one[1] - other[1], one[2] - other[2]
 
