@@ -75,13 +75,13 @@ class Switchboard:
         if gripped:
             self.gaps.note(self._gripped, [self._on[weld] for weld in self._gripped])
         aim, active = self._aim, self._active
-        touched: list[int] = []
+        touched = {self._holder[weld] for weld in (*self._off, *self._on)}
         for weld in self._off:
             active[weld] = False
-            touched += aim[weld], self._holder[weld]
+            touched.add(aim[weld])
         for weld, body in self._on.items():
             aim[weld], active[weld] = body, True
-            touched += body, self._holder[weld]
+            touched.add(body)
         self.wake(touched)
         self.contacts.hold(self._held)
         for gathered in (self._on, self._off, self._gripped, self._held, self._placed):
