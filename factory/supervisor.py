@@ -168,17 +168,18 @@ class Supervisor:
         if not (self.enabled or self.world.supplied):
             return []
         self.enabled = self.world.supplied = False
+        operations, prepared = self.factory.operations, self.world.prepared
         possible = [
-            operation
-            for operation in self.awaited()
-            if self.world.prepared(operation, self.fired[operation.start])
+            event // 2
+            for event in sorted(self.threads.possible)
+            if prepared(operations[event // 2], self.fired[event])
         ]
         if not possible:
             return []
-        bundle, axes = self._bundle(tuple(operation.index for operation in possible))
+        bundle, axes = self._bundle(tuple(possible))
         inside = bundle.in_domain(self.world.sense()[0][axes])
         self.enabled = not inside.all()
-        return [o.index for o, within in zip(possible, inside, strict=True) if within]
+        return [number for number, within in zip(possible, inside.tolist(), strict=True) if within]
 
     def _finished(self) -> list[int]:
         """Operations X with X_e enabled: robots in the goal ball, at rest, and the clock run out;
