@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from itertools import combinations
 
 import numpy as np
@@ -182,6 +183,14 @@ def test_batch_equals_one_by_one(case: str) -> None:
         for name in ("potential", "at_goal", "in_domain", "distance_to_goal"):
             whole, part = getattr(bundle, name)(x), getattr(alone, name)(x[here])
             assert np.allclose(whole[number], part[0], rtol=1e-12)
+
+
+def test_a_clock_is_looked_at_where_one_has_to_run_out() -> None:
+    still, long = Mode.still(2), replace(Mode.still(1), dwell=0.5)
+    both = bundle_of([still, long])
+    assert both.dwells and not bundle_of([still]).dwells
+    for chosen in ([0], [1], [1, 0]):
+        assert both.select(chosen).dwells == (1 in chosen)
 
 
 def test_phi_is_0_at_the_goal_and_1_on_the_obstacles() -> None:

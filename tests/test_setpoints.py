@@ -13,6 +13,7 @@ import pytest
 from factory import supervisor
 from factory.control.governor import follow
 from factory.engine import mujoco
+from factory.mjcf.model import GRAVITY, HEAD_MASS
 from factory.settings import Settings
 from factory.simulation import Simulation
 from factory.world import physics
@@ -239,6 +240,22 @@ def test_who_was_told_to_stand_and_then_went_elsewhere_stands_there() -> None:
     told.again()
     read = mujoco.mj_readCtrl(m, d, 1, d.time, np.zeros((INPUTS, 1)), -1)
     assert read[0] == x[0] + 1e-3
+
+
+def test_lifts_that_carry_more_than_before_are_told() -> None:
+    """All whose robots have been given something; who stands does not sag."""
+    world = Simulation(layout_of("gearbox"), units=2).world
+    robots, told = [*world.lift][:2], world.setpoints
+    axes = np.array([world.lift[robot] for robot in robots])
+    assert not told.any_due
+    world._load([*robots, next(r for r in range(9) if r not in world.lift)], [1.0, 2.0, 3.0])
+    assert told.any_due
+    told.update(world.steps)
+    pushes = world.d.ctrl[world.control[axes] + 2]
+    assert pushes.tolist() == pytest.approx([(HEAD_MASS + kg) * GRAVITY for kg in (1.0, 2.0)])
+    assert (told.mass[axes] - told.own[axes]).tolist() == pytest.approx([1.0, 2.0])
+    world._load(robots, [1.0, 2.0])
+    assert not told.any_due, "nothing is new"
 
 
 # --- courses ---------------------------------------------------------------------------------

@@ -93,16 +93,18 @@ def test_what_a_weld_joins_and_joined_is_woken() -> None:
     weld = stock.grip[0, "part1"]
     m.eq_obj2id[weld] = stock.body["part2"][0]
     holder = m.eq_obj1id[weld]
-    tree["holder"], first["holder"] = m.body_treeid[holder], m.body_dofadr[holder]
-    d.tree_asleep[tree["holder"]] = tree["holder"]
-    d.qvel[first["holder"]] = 0.0
+    joins = next(weld for (robot, label), weld in stock.grip.items() if robot and label == "part3")
+    for name, body in (("holder", holder), ("other", m.eq_obj1id[joins])):
+        tree[name], first[name] = m.body_treeid[body], m.body_dofadr[body]
+        d.tree_asleep[tree[name]] = tree[name]
+        d.qvel[first[name]] = 0.0
     board.loose([weld])
     board.join([weld], [int(stock.body["part1"][0])])
-    board.join([stock.feed["part3"]], [int(stock.body["part3"][0])])
+    board.join([stock.feed["part3"], joins], 2 * [int(stock.body["part3"][0])])
     board.write()
-    for label, dofs in (("part1", 6), ("part2", 6), ("holder", int(m.body_dofnum[holder]))):
+    for label, dofs in (("part1", 6), ("part2", 6), ("holder", 1), ("other", 1)):
         speeds = d.qvel[first[label] : first[label] + dofs]
-        assert dofs and (speeds == 0.0).all() and (np.signbit(speeds) == np.signbit(AWAKE)).any()
+        assert (speeds == 0.0).all() and (np.signbit(speeds) == np.signbit(AWAKE)).any()
     assert d.tree_asleep[tree["part3"]] == FRESH
 
 

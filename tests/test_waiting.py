@@ -6,6 +6,8 @@ from typing import Any
 
 import pytest
 
+from factory.control import Bundle
+from factory.control.mode import Array, Truth
 from factory.settings import Settings
 from factory.simulation import Simulation
 from tests.test_vicinity import layout
@@ -56,3 +58,20 @@ def test_nobody_is_asked_while_nothing_changes(name: str, given: dict[str, Any])
         assert world.time < LONG
     changes = len({event.t for event in supervisor.events}) + 2 * world.delivered()
     assert len(asked) <= changes + 1 < ticks / 2
+
+
+@pytest.mark.parametrize("world", ["ideal", "mujoco"])
+def test_who_is_not_in_the_domain_yet_is_asked_again(
+    world: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    inside, simulation = Bundle.in_domain, Simulation(layout("paper"), world)
+    supervisor = simulation.supervisor
+
+    def late(bundle: Bundle, x: Array) -> Truth:
+        return inside(bundle, x) & (supervisor.world.time > 0.5)
+
+    monkeypatch.setattr(Bundle, "in_domain", late)
+    while not supervisor.events:
+        supervisor.step()
+        assert supervisor.world.time < 1.0
+    assert supervisor.events[0].t > 0.5

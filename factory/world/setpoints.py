@@ -150,8 +150,8 @@ class Setpoints:
 
     def load(self, axes: Index, mass: Array | float, weight: Array | float) -> None:
         """From now on axes move a mass each beside their own [kg], and carry a weight [N]. Those
-        that `move` has set going, or that carry more or less than before, are to be told."""
-        changed = (self.weight[axes] != weight) | (self._plan[3, axes] != 0.0)
+        that carry more or less than before are to be told."""
+        changed = self.weight[axes] != weight
         if np.count_nonzero(changed):
             self._due[axes[changed]] = self.any_due = True
         self.mass[axes], self.weight[axes] = self.own[axes] + mass, weight
