@@ -168,15 +168,11 @@ class Supervisor:
         if not (self.enabled or self.world.supplied):
             return []
         self.enabled = self.world.supplied = False
-        operations, prepared = self.factory.operations, self.world.prepared
-        possible = [
-            event // 2
-            for event in sorted(self.threads.possible)
-            if prepared(operations[event // 2], self.fired[event])
-        ]
+        prepared, fired = self.world.prepared, self.fired
+        possible = tuple(o.index for o in self.awaited() if prepared(o, fired[o.start]))
         if not possible:
             return []
-        bundle, axes = self._bundle(tuple(possible))
+        bundle, axes = self._bundle(possible)
         inside = bundle.in_domain(self.world.sense()[0][axes])
         self.enabled = not inside.all()
         return [number for number, within in zip(possible, inside.tolist(), strict=True) if within]
@@ -204,9 +200,9 @@ class Supervisor:
 
     def _fire(self, started: list[int], ended: list[int]) -> None:
         operations, now = self.factory.operations, self.world.time
-        starts = [(operations[o], self.fired[2 * o]) for o in started]
-        ends = [(operations[o], self.fired[2 * o + 1]) for o in ended]
-        events = (*(2 * o for o in started), *(2 * o + 1 for o in ended))
+        starts = [(operations[o], self.fired[operations[o].start]) for o in started]
+        ends = [(operations[o], self.fired[operations[o].end]) for o in ended]
+        events = (*(o.start for o, _ in starts), *(o.end for o, _ in ends))
         self.enabled |= self.threads.fire(events)
         for event in events:
             self.fired[event] += 1

@@ -20,7 +20,7 @@ from factory.simulation import Simulation
 from factory.world import stock, vicinity
 from factory.world.contacts import NOBODY
 from factory.world.loads import Load, loads
-from factory.world.reach import Reach
+from factory.world.reach import CELL, Reach
 from factory.world.stock import Stock
 from factory.world.vicinity import CALM, SWAY, Vicinity
 from tests.bench.factories import balanced
@@ -417,3 +417,17 @@ def test_where_somebody_pushes_nothing_is_left_out() -> None:
     for simulation in (pushed, handled):
         simulation.supervisor.step()
         assert looked_at(simulation) == 1.0
+
+
+def test_who_goes_elsewhere_is_heard_beside_who_goes_on() -> None:
+    seen = ready("20", True).world.vicinity
+    both, x, rest = np.array([1, 2]), np.array([0.1, 0.1]), np.zeros(2)
+    seen.goes(both, x, rest, np.array([0.3, 0.4]))
+    seen.look()
+    seen.goes(both, x + 0.1, rest, np.array([0.3, 0.4]))
+    assert not seen.stale, "nobody goes elsewhere"
+    seen.goes(both, x + 0.1, rest, np.array([0.3, 0.5]))
+    assert seen.stale
+    low, high = seen._ways[1:, both] * CELL
+    assert np.allclose(low, (0.1, 0.2), atol=2 * CELL)
+    assert np.allclose(high, (0.3, 0.5), atol=2 * CELL)

@@ -73,7 +73,7 @@ def build(
     settings = settings_of(file, options)
     wanted = {"folders": folders, "mjcf": mjcf, "output": output, "units": units, "wip": wip}
     name = receipt.request(file, {**options, **wanted, "floor": floor, "settings": settings})
-    told = receipt.find(name)
+    told, news = receipt.find(name), ""
     if told is None:
         source, factory, layout = plan(file, folders, settings, floor, options)
         verdict = proved(factory.net)
@@ -83,14 +83,16 @@ def build(
         receipt.keep(name, _inputs(source, folders), built.files, told)
     else:
         told["document"]["compile_s"] = perf_counter() - begin
-        told["news"] = ["nothing has changed since: these files are up to date"]
+        news = "nothing has changed since: these files are up to date"
     for text in [] if quiet else told["warnings"]:
         print(text, file=sys.stderr)
     if as_json:
         emit(told["document"])
     elif not quiet:
-        for line in (*told["lines"], *_listed(told["document"]["files"], verbose), *told["news"]):
+        for line in (*told["lines"], *_listed(told["document"]["files"], verbose)):
             say(line)
+        if news:
+            say(news)
     return 0
 
 
@@ -133,7 +135,7 @@ def _told(layout: Layout, built: Built, settings: Settings, spent: float) -> dic
         str(gained),
     ]
     warnings = [warning(diagnostic) for diagnostic in layout.product.warnings]
-    return {"document": document, "lines": lines, "warnings": warnings, "news": []}
+    return {"document": document, "lines": lines, "warnings": warnings}
 
 
 def _inputs(source: Source, folders: tuple[Path, ...]) -> tuple[Path, ...]:

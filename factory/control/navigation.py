@@ -27,7 +27,7 @@ Euler steps stay in W - Δ as the flow does, if in a tick no two robots close in
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -81,7 +81,10 @@ class Bundle:
     gates: Gates
     pairs: Pairs
     moving: Array | None
-    dwells: bool
+    dwells: bool = field(init=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "dwells", bool((self.dwell > 0.0).any()))
 
     @classmethod
     def of(cls, modes: Sequence[Mode], limits: Sequence[Limits]) -> Bundle:
@@ -112,7 +115,6 @@ class Bundle:
             Gates.of(modes, starts),
             Pairs.of(modes, starts),
             np.repeat(np.where(still, 0.0, 1.0), sizes) if still.any() else None,
-            any(mode.dwell > 0.0 for mode in modes),
         )
 
     def select(self, numbers: Sequence[int]) -> Bundle:
@@ -139,7 +141,6 @@ class Bundle:
             self.gates.select(chosen, shift),
             self.pairs.select(chosen, shift),
             None if self.moving is None else self.moving[robots],
-            bool((self.dwell[chosen] > 0.0).any()),
         )
 
     def potential(self, x: Array) -> Array:

@@ -47,13 +47,8 @@ class Contacts:
         self.solid = {int(b): self._solid(int(b)) for ids in bodies.values() for b in ids}
         self._geoms = {body: geoms.tolist() for body, geoms in self.solid.items()}
         self._of_geoms = memoryview(m.geom_contype), memoryview(m.geom_conaffinity)
-        self._of_bodies = tuple(
-            values.data
-            for values in (
-                *(self.code, self.contype, m.body_contype),
-                *(self.conaffinity, m.body_conaffinity),
-            )
-        )
+        masks = self.contype, m.body_contype, self.conaffinity, m.body_conaffinity
+        self._of_bodies = tuple(values.data for values in (self.code, *masks))
         self.partners: dict[str, list[str]] = {}
         for one, other in excluded:
             self.partners.setdefault(one, []).append(other)

@@ -15,7 +15,7 @@ import numpy as np
 
 from factory.engine import mujoco
 from factory.meshes import Array
-from factory.world.memory import BYTES, reader, writer
+from factory.world.memory import AXES, BYTES, PLACE, TURN, reader, writer
 
 SETTLING = 0.025
 """It takes that long at least [s]: nobody looks before."""
@@ -23,9 +23,6 @@ SETTLING = 0.025
 RIGID = 1e-6
 """Bodies have settled when none of their vertices is further than this from where it belongs beside
 the others [m]."""
-
-PLACE, TURN, AXES = 3 * BYTES, 4 * BYTES, 9 * BYTES
-"""What the engine has of a body takes so much: where it is, its quaternion, and its matrix."""
 
 Vector = tuple[float, ...]
 

@@ -14,6 +14,9 @@ from factory.control.mode import Array
 BYTES = 8
 """A number takes so much."""
 
+PLACE, TURN, AXES = 3 * BYTES, 4 * BYTES, 9 * BYTES
+"""What the engine has of a body takes so much: where it is, its quaternion, and its matrix."""
+
 
 def reader(values: Array, count: int) -> Callable[[int], tuple[float, ...]]:
     """What gives so many numbers of an array from a byte on."""

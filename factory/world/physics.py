@@ -274,11 +274,16 @@ class MujocoWorld:
             self._v[axes] = 0.0
             self.setpoints.stand(axes, here, going)
             self._attend(axes, np.zeros_like(going))
-            self.vicinity.goes(self._holder[axes], here, self._v[axes], here)
+            self._goes(axes, here)
         if bundle is not None:
-            self.vicinity.goes(self._holder[active], self._x[active], self._v[active], bundle.goal)
+            self._goes(active, bundle.goal)
         self._active, self._moved, self._last = active, (b"", b""), None
         self._look()
+
+    def _goes(self, axes: Index, places: Array) -> None:
+        """From now on the references of `axes` go to places [m]."""
+        if self.vicinity.culls:
+            self.vicinity.goes(self._holder[axes], self._x[axes], self._v[axes], places)
 
     def move(self, axes: Index, x: Array, v: Array, a: Array) -> None:
         """From now on the references of `axes` run from x [m] at speed v under acceleration a, in

@@ -11,7 +11,7 @@ import numpy as np
 from factory.engine import mujoco
 from factory.world.contacts import Contacts
 from factory.world.gaps import Gaps
-from factory.world.memory import BYTES, writer
+from factory.world.memory import BYTES, PLACE, writer
 from factory.world.vicinity import Vicinity
 
 AWAKE = -0.0
@@ -92,7 +92,7 @@ class Switchboard:
         """Put bodies where they belong."""
         for body, at in self._placed.items():
             self._set_pose(BYTES * self._qpos[body], *at, 1.0, 0.0, 0.0, 0.0)
-            self._set_place(3 * BYTES * body, *at)
+            self._set_place(PLACE * body, *at)
             self._set_speed(BYTES * self._dof[body], 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
         self.vicinity.woken(self._placed)
 
