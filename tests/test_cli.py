@@ -207,6 +207,18 @@ def test_people_get_a_summary(run: Terminal) -> None:
     assert len(run("templates", "-v").out) > len(run("templates").out)
 
 
+def test_more_is_said_of_what_was_written(run: Terminal, tmp_path: Path) -> None:
+    cart = PAPER.parent / "cart.mpd"
+    for words in (("new", tmp_path / "a"), ("import", cart, "-o", tmp_path / "b")):
+        said = run(*words, "-v").out.splitlines()
+        assert sorted(line.strip() for line in said if line.startswith("  /")) == sorted(
+            str(path) for path in Path(words[-1]).rglob("*") if path.is_file()
+        )
+    words = "report", PAPER, "--units", 1, "-o", tmp_path / "paper.html"
+    assert "Utilisation" not in run(*words).out
+    assert "1 of 1 products" in (said := run(*words, "-v").out) and "Utilisation" in said
+
+
 # --- diagnostics ----------------------------------------------------------------------------------
 
 BROKEN = """root = s;

@@ -90,6 +90,8 @@ def import_(
     elif not quiet:
         operations = len(product.pag) - parts
         say(f"{pag}: parts {parts}, operations {operations}, meshes {meshes_made}")
+        for path in files if verbose else ():
+            say(f"  {path}")
     return 0
 
 
@@ -126,6 +128,8 @@ def new(name: Path, as_json: bool, quiet: bool, verbose: bool) -> int:
         emit({"folder": str(name), "files": [str(path) for path in files]})
     elif not quiet:
         say(f"{name}: {len(files)} files")
+        for path in files if verbose else ():
+            say(f"  {path}")
         say(f"  cd {name}")
         say(f"  factory run {name.name}.pag --units 3")
     return 0

@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -25,6 +25,9 @@ from factory.cli.options import (
     writable,
 )
 from factory.console import emit, say, warn
+
+if TYPE_CHECKING:
+    from factory.trace import Run
 
 
 @click.command()
@@ -54,12 +57,12 @@ def report(
     from factory.report import page, recording_of
 
     writable(file, output)
-    status = 0
+    run = None
     if is_log(file):
         for_a_pag(file, "a log", "output")
         recording = recording_of(file)
     else:
-        recording, status = _run(file, folders, floor, quiet, as_json, options)
+        recording, run = _run(file, folders, floor, quiet, as_json, options)
     text = page(recording)
     write_text(output, text)
     size = len(text.encode())
@@ -76,7 +79,11 @@ def report(
         say(f"{output}: {size / 1e6:.1f} MB, {recording.end:.2f} s of a run")
         if recording.missing:
             say(f"  no predictions: {recording.missing}")
-    return status
+        if run is not None and verbose:
+            from factory.running import summarise
+
+            summarise(run, recording.factory, verbose)
+    return int(run is not None and (run.trouble is not None or not run.refines_net))
 
 
 def _run(
@@ -86,9 +93,8 @@ def _run(
     quiet: bool,
     as_json: bool,
     options: dict[str, Any],
-) -> tuple[Any, int]:
-    """A run to be told about, with its log in a folder that is gone afterwards; status 1 where it
-    was troubled."""
+) -> tuple[Any, Run]:
+    """A run to be told about, with its log in a folder that is gone afterwards."""
     from factory.report import recording_of
     from factory.running import run_file
 
@@ -102,4 +108,4 @@ def _run(
         recording = recording_of(log, layout)
     if run.trouble is not None:
         print(run.trouble, file=sys.stderr)
-    return recording, int(run.trouble is not None or not run.refines_net)
+    return recording, run
