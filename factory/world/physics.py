@@ -198,10 +198,9 @@ class MujocoWorld:
         limits: as many as are asked for, or fewer, but never past one that somebody has to see the
         end of. Whether any mode may have come to its goal: no robot is far ahead of its reference,
         nor at rest before that is."""
-        near, ticks = False, self._at_most(ticks)
         if axes is not self._active:
             self._turn(bundle, axes)
-        tray = None
+        near, ticks, tray = False, self._at_most(ticks), None
         if self.outfeed.goes:
             tray = self.outfeed.course(ticks)
             ticks = tray.ticks
