@@ -145,8 +145,9 @@ class Supervisor:
             ended = [number for number in over if number < count]
             if started or ended:
                 self._fire(started, ended)
+            gone = {*ended}
             self._activate(
-                [o for o in self.active.operations if o not in ended] + started,
+                [o for o in self.active.operations if o not in gone] + started,
                 self._going_ahead(started, ended, over),
             )
         if self.enabled or self.world.supplied:

@@ -296,8 +296,8 @@ def test_bundles_are_forgotten_too(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_there_is_room_for_so_many_numbers() -> None:
     courses, told = Courses(42), Told.of(np.zeros((2, 2, INPUTS)), np.zeros(2, int))
     for number in range(100):
-        course = courses.of(number % 7, lambda: Course(1, told, b"", False))
-        assert courses.of(number % 7, lambda: pytest.fail("was forgotten")) is course
+        course = courses.of(number % 7, 1, lambda: Course(1, told, b"", False))
+        assert courses.of(number % 7, 1, lambda: pytest.fail("was forgotten")) is course
         assert 1 <= len(courses) <= 3
 
 
@@ -324,8 +324,10 @@ def test_who_creeps_stays_awake(monkeypatch: pytest.MonkeyPatch) -> None:
     assert crept() > 5e-4
 
 
-def test_who_waits_sleeps() -> None:
-    simulation = Simulation(layout_of("chest"), units=2)
+@pytest.mark.parametrize(("name", "stage"), [("chest", 0), ("gearbox", 1)])
+def test_who_waits_sleeps(name: str, stage: int) -> None:
+    """A lift stops where its carriage goes ahead at once: the two are one tree."""
+    simulation = Simulation(layout_of(name), units=2, settings=Settings(stage=stage))
     world, supervisor = simulation.world, simulation.supervisor
     asleep = 0
     for _ in range(600):

@@ -29,7 +29,7 @@ ROOM = 15_000_000
 class Course:
     """Some `ticks` of n axes: what their drives are `told`, with positions and speeds `after` it,
     which of them `moves` in any (the bytes of n truths), and whether any mode is `near` its goal
-    then, as none is before; and the courses that come `then`, of at most so many ticks, if
+    then, as none is before; and the courses that come `then`, by how many ticks at most, if
     known."""
 
     ticks: int
@@ -40,27 +40,34 @@ class Course:
 
 
 class Courses:
-    """Courses by where they begin; all are forgotten when there is no room for more."""
+    """Courses by where they begin and how many ticks they may take; all are forgotten when there is
+    no room for more."""
 
     def __init__(self, room: int = ROOM) -> None:
-        self.room, self._left = room, room
-        self._kept: dict[Hashable, Course] = {}
+        self.room, self._left, self._count = room, room, 0
+        self._kept: dict[Hashable, dict[int, Course]] = {}
 
     def __len__(self) -> int:
-        return len(self._kept)
+        return self._count
 
-    def of(self, begin: Hashable, made: Callable[[], Course]) -> Course:
-        """The course from a beginning, which says all that it depends on: that of before, or what
-        is `made` now."""
-        course = self._kept.get(begin)
+    def since(self, begin: Hashable) -> dict[int, Course]:
+        """What is kept from a beginning, which says all that courses depend on: by how many ticks
+        at most."""
+        return self._kept.setdefault(begin, {})
+
+    def of(self, begin: Hashable, ticks: int, made: Callable[[], Course]) -> Course:
+        """The course from a beginning, of so many ticks at most: that of before, or what is `made`
+        now."""
+        course = self.since(begin).get(ticks)
         if course is None:
             course = made()
             size = course.told.setpoints.size
             if size > self._left:
                 self._kept.clear()
-                self._left = self.room
+                self._left, self._count = self.room, 0
             self._left -= size
-            self._kept[begin] = course
+            self._count += 1
+            self.since(begin)[ticks] = course
         return course
 
 

@@ -73,8 +73,8 @@ class Outfeed:
     def course(self, ticks: int) -> Course:
         """Some ticks of its way, as fast as its limits allow, until it is nearly there."""
         x, v = self._x, self._v
-        begin = self._place, ticks, x.tobytes(), v.tobytes()
-        return self.courses.of(begin, lambda: self._course(ticks))
+        begin = self._place, x.tobytes(), v.tobytes()
+        return self.courses.of(begin, ticks, lambda: self._course(ticks))
 
     def send(self, course: Course) -> None:
         """It does that now."""

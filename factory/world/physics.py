@@ -76,7 +76,7 @@ class MujocoWorld:
         self.dof = self.m.jnt_dofadr[joint]
         self._sensed = self.qpos[: self.tray], self.dof[: self.tray]
         self.body = self.m.jnt_bodyid[joint]
-        self.tree = self.m.body_treeid[self.body]
+        self.tree, self._policy = self.m.body_treeid[self.body], self.m.tree_sleep_policy
         self.m.actuator_biasprm[actuator[: self.tray], 1:3] *= np.asarray(gains)[:, None]
         self._x = np.array(start, float)
         self._v = np.zeros_like(self._x)
@@ -88,6 +88,7 @@ class MujocoWorld:
         self._active = np.empty(0, np.intp)
         self._moved = b"", b""
         self._last: Course | None = None
+        self._then: dict[int, Course] = {}
         self._lags, self._anew = False, True
         self._under_way = np.zeros(len(slides), bool)
         own = self.m.body_subtreemass[self.body] + self.m.dof_armature[self.dof]
@@ -208,7 +209,7 @@ class MujocoWorld:
             if self._anew:
                 self._foresee(bundle, axes)
             course = self._next(bundle, axes, ticks)
-            self._last, self._lags = course, True
+            self._last, self._then, self._lags = course, course.then, True
             self.setpoints.follow(axes, course.told)
             self._anew = near = course.near
             ticks = course.ticks
@@ -237,19 +238,21 @@ class MujocoWorld:
 
     def _next(self, bundle: Bundle, axes: Index, ticks: int) -> Course:
         """What comes after the last course, of so many ticks at most."""
-        before = self._last
-        course = None if before is None else before.then.get(ticks)
+        course = self._then.get(ticks)
         if course is None:
-            x, v = self.reference[axes], self._v[axes]
-            begin = bundle, ticks, x.tobytes(), v.tobytes()
-            course = self.courses.of(begin, lambda: self._course(bundle, axes, x, v, ticks))
-            if before is not None:
-                before.then[ticks] = course
+            begin = self._beginning(bundle, axes)
+            course = self.courses.of(begin, ticks, lambda: self._course(bundle, axes, ticks))
+            self._then[ticks] = course
         return course
 
-    def _course(self, bundle: Bundle, axes: Index, x: Array, v: Array, ticks: int) -> Course:
+    def _beginning(self, bundle: Bundle, axes: Index) -> tuple[Bundle, bytes, bytes]:
+        """All that a course depends on which begins here."""
+        return bundle, self.reference[axes].tobytes(), self._v[axes].tobytes()
+
+    def _course(self, bundle: Bundle, axes: Index, ticks: int) -> Course:
         """Ticks of the active modes, until one comes near its goal. The load of each robot is that
         of its operation."""
+        begin = self.reference[axes], self._v[axes]
 
         def go(x: Array, v: Array) -> Way:
             x1, v1, a = follow(bundle, x, v, self.tick)
@@ -257,7 +260,7 @@ class MujocoWorld:
             v1[slow < ROUNDING] = 0.0
             return (x, v, a), x1, v1, bundle.near_goal(x1, AHEAD, slow < REST)
 
-        return travelled(self.setpoints, axes, (x, v), ticks, go)
+        return travelled(self.setpoints, axes, begin, ticks, go)
 
     def _turn(self, bundle: Bundle | None, active: Index) -> None:
         """Other modes are active. Robots whose operation has ended stop where their reference is.
@@ -276,7 +279,8 @@ class MujocoWorld:
             self._goes(axes, here)
         if bundle is not None:
             self._goes(active, bundle.goal)
-        self._active, self._moved, self._last = active, (b"", b""), None
+            self._then = self.courses.since(self._beginning(bundle, active))
+        self._active, self._moved = active, (b"", b"")
         self._look()
 
     def _goes(self, axes: Index, places: Array) -> None:
@@ -288,7 +292,7 @@ class MujocoWorld:
         """From now on the references of `axes` run from x [m] at speed v under acceleration a, in
         ticks that have not been set otherwise."""
         self._catch_up()
-        self._last = None
+        self._last, self._then = None, {}
         self.vicinity.astray()
         self.setpoints.move(axes, x, v, a)
 
@@ -338,9 +342,8 @@ class MujocoWorld:
         if not np.count_nonzero(self._under_way[axes] != moves):
             return
         self._under_way[axes] = moves
-        policy = self.m.tree_sleep_policy
-        policy[self.tree[axes]] = MAY_SLEEP
-        policy[self.tree[self._under_way]] = STAYS_AWAKE
+        self._policy[self.tree[axes]] = MAY_SLEEP
+        self._policy[self.tree[self._under_way]] = STAYS_AWAKE
         self.rouse(axes[moves])
 
     def rouse(self, axes: Index) -> None:

@@ -143,8 +143,7 @@ class Setpoints:
 
     def stand(self, axes: Index, x: Array, going: Truth) -> None:
         """From now on axes stand at x [m]; those that are `going` are to be told."""
-        self._plan[0, axes], self._plan[1, axes] = self.d.time, x
-        self._plan[2:, axes] = 0.0
+        self._plan[1, axes], self._plan[2:, axes] = x, 0.0
         if np.count_nonzero(going):
             self._due[axes[going]] = self.any_due = True
 
