@@ -151,7 +151,8 @@ class Supervisor:
                 self._going_ahead(started, ended, over),
             )
         if self.enabled or self.world.supplied:
-            ticks = 1
+            self.enabled = self.world.supplied = bool(self._prepared())
+            ticks = 1 if self.enabled else ticks
         self.near = self.world.step(self.active.bundle, self.active.axes, ticks)
 
     def marking(self) -> tuple[str, ...]:
@@ -169,14 +170,18 @@ class Supervisor:
         if not (self.enabled or self.world.supplied):
             return []
         self.enabled = self.world.supplied = False
-        prepared, fired = self.world.prepared, self.fired
-        possible = tuple(o.index for o in self.awaited() if prepared(o, fired[o.start]))
+        possible = self._prepared()
         if not possible:
             return []
         bundle, axes = self._bundle(possible)
         inside = bundle.in_domain(self.world.sense()[0][axes])
         self.enabled = not inside.all()
         return [number for number, within in zip(possible, inside.tolist(), strict=True) if within]
+
+    def _prepared(self) -> tuple[int, ...]:
+        """The operations that are awaited and that the world is prepared for."""
+        prepared, fired = self.world.prepared, self.fired
+        return tuple(o.index for o in self.awaited() if prepared(o, fired[o.start]))
 
     def _finished(self) -> list[int]:
         """Operations X with X_e enabled: robots in the goal ball, at rest, and the clock run out;

@@ -79,6 +79,21 @@ def test_ticks_at_once_are_the_same_as_one_by_one(name: str, given: dict[str, An
     assert len(at_once.states) < (0.7 if stride > 1 else 1.01) * len(singly.states)
 
 
+@pytest.mark.parametrize("name", ["chest", "gearbox", "20"])
+def test_nobody_comes_back_for_nothing(name: str) -> None:
+    """A call of the engine lasts until something fires, a mode may have come to its goal or a
+    stride is over; the tray's way apart."""
+    simulation = ready(name, True)
+    supervisor, world = simulation.supervisor, simulation.world
+    for_a_reason, tray = True, False
+    while world.delivered() < UNITS:
+        fired = len(supervisor.events)
+        supervisor.step(MOST)
+        assert for_a_reason or len(supervisor.events) > fired
+        before, tray = tray, not world.outfeed.idle or world.stock.on_tray is not None
+        for_a_reason = world.ticks == 0 or supervisor.near or before or tray
+
+
 @pytest.mark.parametrize("name", ["paper", "gearbox", "20"])
 def test_who_goes_back_over_several_ticks_comes_to_the_same_state(name: str) -> None:
     singly = followed(name, 1)

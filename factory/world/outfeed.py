@@ -43,6 +43,11 @@ class Outfeed:
         self._x, self._v = np.zeros(1), np.zeros(1)
         self.home, self.idle, self.goes, self.settles = True, True, False, False
 
+    @property
+    def leaves(self) -> bool:
+        """Whether it is aimed at the end of its way."""
+        return self._place > 0.0
+
     def rests_away(self) -> bool:
         """Whether it rests at the end of its way."""
         return self._rests_at(self._way)
@@ -83,7 +88,7 @@ class Outfeed:
         self.goes = False
 
     def _course(self, ticks: int) -> Course:
-        self.setpoints.load(self.axis, (self._place > 0.0) * self._product, 0.0)
+        self.setpoints.load(self.axis, self.leaves * self._product, 0.0)
         return travelled(self.setpoints, self.axis, (self._x, self._v), ticks, self._go)
 
     def _go(self, x: Array, v: Array) -> Way:

@@ -221,8 +221,9 @@ class MujocoWorld:
 
     def _at_most(self, ticks: int) -> int:
         """So many ticks may go to the engine at once: none but the last of a stride is seen, and
-        contacts and a tray that is about to be there ask to be."""
-        if self.d.ncon or self.outfeed.settles:
+        contacts ask to be, and a tray that has just been loaded or is about to be there."""
+        waits = self.stock.on_tray is not None and not self.outfeed.leaves
+        if self.d.ncon or self.outfeed.settles or waits:
             return 1
         return min(ticks, self.at_once, self.stride - self.ticks)
 
