@@ -35,6 +35,9 @@ in percent that are aimed at."""
 LEAST = 10.0
 """Simulated at least [s], and at least one cycle."""
 
+RUNS = 5
+"""Processes a case: what a machine's other tenants do to a share shows in single ones."""
+
 MEMORY = 1500.0
 """The largest resident set aimed at, with 1,000 robots [MB]."""
 
@@ -113,7 +116,7 @@ def measure(quick: bool = False) -> dict[str, Any]:
     cases = AIMS[:1] if quick else AIMS
     window = 1.0 if quick else None
     jobs = [partial(fresh, work, **asdict(case), window=window) for case, *_ in cases]
-    found = interleaved(jobs, 2 if quick else 3)
+    found = interleaved(jobs, 2 if quick else RUNS)
     return {
         "runs": len(found[0]),
         "rows": [
