@@ -150,9 +150,8 @@ class Supervisor:
                 [o for o in self.active.operations if o not in gone] + started,
                 self._going_ahead(started, ended, over),
             )
-        if self.enabled or self.world.supplied:
-            self.enabled = self.world.supplied = bool(self._prepared())
-            ticks = 1 if self.enabled else ticks
+        if self._prepared():
+            ticks = 1
         self.near = self.world.step(self.active.bundle, self.active.axes, ticks)
 
     def marking(self) -> tuple[str, ...]:
@@ -165,11 +164,7 @@ class Supervisor:
 
     def _startable(self) -> list[int]:
         """Operations X with X_s enabled: waits marked (their goals are everything), the robots in
-        the domain of X's mode, and the world prepared. Nobody is asked twice where nothing has
-        changed."""
-        if not (self.enabled or self.world.supplied):
-            return []
-        self.enabled = self.world.supplied = False
+        the domain of X's mode, and the world prepared."""
         possible = self._prepared()
         if not possible:
             return []
@@ -179,9 +174,14 @@ class Supervisor:
         return [number for number, within in zip(possible, inside.tolist(), strict=True) if within]
 
     def _prepared(self) -> tuple[int, ...]:
-        """The operations that are awaited and that the world is prepared for."""
+        """The operations that are awaited and that the world is prepared for. Nobody is asked again
+        where there was none and nothing has changed."""
+        if not (self.enabled or self.world.supplied):
+            return ()
         prepared, fired = self.world.prepared, self.fired
-        return tuple(o.index for o in self.awaited() if prepared(o, fired[o.start]))
+        found = tuple(o.index for o in self.awaited() if prepared(o, fired[o.start]))
+        self.enabled, self.world.supplied = bool(found), False
+        return found
 
     def _finished(self) -> list[int]:
         """Operations X with X_e enabled: robots in the goal ball, at rest, and the clock run out;

@@ -89,6 +89,11 @@ class Run:
     monitor: Report | None = None
 
     @property
+    def succeeded(self) -> bool:
+        """Whether it came to its end, and its events are a run of the net."""
+        return self.trouble is None and self.refines_net
+
+    @property
     def realtime_factor(self) -> float:
         """Simulated seconds per second of the run loop."""
         return self.sim_time_s / self.wall_time_s if self.wall_time_s else 0.0

@@ -75,7 +75,7 @@ def run(
     say_violations(record.monitor)
     if record.trouble is not None:
         print(record.trouble, file=sys.stderr)
-    return 1 if record.trouble is not None or not record.refines_net else 0
+    return 0 if record.succeeded else 1
 
 
 @click.command()

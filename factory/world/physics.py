@@ -89,7 +89,7 @@ class MujocoWorld:
         self._moved = b"", b""
         self._last: Course | None = None
         self._then: dict[int, Course] = {}
-        self._lags, self._anew = False, True
+        self._anew = True
         self._under_way = np.zeros(len(slides), bool)
         own = self.m.body_subtreemass[self.body] + self.m.dof_armature[self.dof]
         weight = np.zeros(len(slides))
@@ -144,9 +144,9 @@ class MujocoWorld:
 
     def _catch_up(self) -> None:
         """Where the last course has led to is not written down until somebody asks."""
-        if self._lags and self._last is not None:
+        if self._last is not None:
             self._x[self._active], self._v[self._active], _ = self._last.told.after.T
-        self._lags = False
+            self._last = None
 
     def axes_of(self, robot: int) -> list[int]:
         """The axes of a robot (index): its carriage, and its lift if it has one."""
@@ -209,7 +209,7 @@ class MujocoWorld:
             if self._anew:
                 self._foresee(bundle, axes)
             course = self._next(bundle, axes, ticks)
-            self._last, self._then, self._lags = course, course.then, True
+            self._last, self._then = course, course.then
             self.setpoints.follow(axes, course.told)
             self._anew = near = course.near
             ticks = course.ticks
@@ -293,7 +293,7 @@ class MujocoWorld:
         """From now on the references of `axes` run from x [m] at speed v under acceleration a, in
         ticks that have not been set otherwise."""
         self._catch_up()
-        self._last, self._then = None, {}
+        self._then = {}
         self.vicinity.astray()
         self.setpoints.move(axes, x, v, a)
 
