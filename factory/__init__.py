@@ -23,15 +23,15 @@ from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
-from factory.errors import Diagnostic, FactoryError, InputError, MissingError, RunError
-from factory.settings import Settings
+from factory.support.errors import Diagnostic, FactoryError, InputError, MissingError, RunError
+from factory.support.settings import Settings
 
 if TYPE_CHECKING:
-    from factory.factory import Factory
-    from factory.layout.plan import Layout
+    from factory.layout.layout import Layout
     from factory.nets.verdict import Verdict
-    from factory.pag import PAG
-    from factory.trace import Run
+    from factory.plant.factory import Factory
+    from factory.problem.pag import PAG
+    from factory.simulation.run import Run
 
 __version__ = "0.1.0"
 
@@ -64,7 +64,7 @@ def load_pag(path: str | PathLike[str], templates: Sequence[Path] = ()) -> PAG:
 def compile(pag: PAG, templates: Sequence[Path] = ()) -> Factory:
     """The factory (R, ~, N) that makes a product (paper, section 5). Raises InputError."""
     from factory.pipeline import Source, all_templates
-    from factory.robots import load_catalogue
+    from factory.problem.robot_types import load_catalogue
 
     return Source(pag, all_templates(templates), load_catalogue()).compile()
 
@@ -91,8 +91,8 @@ def lay_out(
     more robots then. Raises InputError for a mesh that cannot be read,
     RunError where the factory does not fit the floor.
     """
-    from factory.geometry import product_geometry
-    from factory.planning import Ground
+    from factory.geometry.solids import product_geometry
+    from factory.layout.request import Ground
 
     ground = Ground(floor, relay, cycle if relay else None)
     return ground.lay_out(plan, product_geometry(plan.pag), Settings(clearance=clearance))
@@ -111,10 +111,10 @@ def run(
     """Run the net over a world until `units` products are dropped off.
 
     `seed` and `jitter` draw each robot's speed and gain within ± jitter; `max_time` [s] of
-    simulated time; further options are those of `factory.simulation.Simulation`. Raises RunError
-    for a run that stalls or takes longer, InputError where the engine refuses a mesh.
+    simulated time; further options are those of `Simulation`. Raises RunError for a run that
+    stalls or takes longer, InputError where the engine refuses a mesh.
     """
-    from factory.simulation import Simulation, require
+    from factory.simulation.simulation import Simulation, require
 
     options = {"shown": False, **options}
     simulation = Simulation(layout, world, units, seed, jitter, settings, **options)

@@ -8,18 +8,18 @@ from functools import cached_property
 from os import PathLike
 from pathlib import Path
 
-from factory.approach import Approach
-from factory.assets import templates_folder
-from factory.compiler import compile_pag
-from factory.errors import Diagnostic, InputError
-from factory.factory import Factory
-from factory.geometry import Product, product_geometry
+from factory.compiler.compiler import compile_pag
+from factory.compiler.mating import Matings, matings, shaped
+from factory.geometry.solids import Product, product_geometry
 from factory.lang.pag_reader import load_pag
 from factory.lang.template_reader import load_templates
-from factory.mating import Matings, matings, shaped
-from factory.pag import PAG
-from factory.robots import Catalogue, load_catalogue
-from factory.template import Template
+from factory.plant.approaches import Approach
+from factory.plant.factory import Factory
+from factory.problem.pag import PAG
+from factory.problem.robot_types import Catalogue, load_catalogue
+from factory.problem.template import Template
+from factory.support.errors import Diagnostic, InputError
+from factory.support.resources import templates_folder
 
 
 @dataclass(frozen=True)
@@ -52,7 +52,7 @@ class Source:
         own = {name for name, template in self.templates.items() if not _is_shipped(template)}
         tried = own and own & {operation.template.name for operation in factory.operations}
         if tried:
-            from factory.control.preparing import check_modes
+            from factory.modes.preparing import check_modes
 
             check_modes(factory, [self.templates[name] for name in sorted(tried)], self.product)
         return factory

@@ -14,7 +14,7 @@ from typing import Any
 
 import pytest
 
-from factory.cli import run_command
+from factory.commands import run_command
 
 ROOT = Path(__file__).resolve().parent.parent
 PAPER = ROOT / "examples" / "paper.pag"

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import HealthCheck, settings
 
 from factory.lang import load_templates
-from factory.template import Template
+from factory.problem.template import Template
 from tests.command_line import Terminal
 
 TESTS = Path(__file__).parent

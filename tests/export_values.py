@@ -13,8 +13,8 @@ from typing import Any
 import pytest
 
 from factory.export import Made, Subject, exporters
-from factory.layout.plan import Layout
-from factory.simulation import Simulation
+from factory.layout.layout import Layout
+from factory.simulation.simulation import Simulation
 from tests.command_line import PAPER, ROOT
 
 LAMP = ROOT / "examples" / "lamp.pag"
@@ -63,7 +63,7 @@ def write(made: Made, path: Path) -> Path:
 
 def kept_log(layout: Layout, path: Path, **options: Any) -> Path:
     """A log of a run."""
-    from factory.log import LogWriter
+    from factory.record.log import LogWriter
 
     simulation = Simulation(layout, **options)
     with LogWriter(path, simulation) as log:

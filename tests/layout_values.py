@@ -10,12 +10,12 @@ from functools import cache
 
 from pag_values import SHAPES, factory_of, paper, random_pag
 
-from factory.geometry import Product, Solid, product_geometry
+from factory.geometry.solids import Product, Solid, product_geometry
 from factory.layout.crossings import delivered_to
 from factory.layout.embedding import lay_out
-from factory.layout.plan import Layout
+from factory.layout.layout import Layout
 from factory.layout.stretching import is_tool
-from factory.pag import PAG, Assembly, Parameter, Value
+from factory.problem.pag import PAG, Assembly, Parameter, Value
 
 STYLES = ("plain", "small", "medium", "large", "far", "mixed")
 """How large parts are, and how far from the middle of the product."""

@@ -8,12 +8,12 @@ from pathlib import Path
 
 from hypothesis import strategies as st
 
-from factory.compiler import compile_pag
-from factory.errors import Position
-from factory.factory import Factory
-from factory.pag import PAG, Assembly
-from factory.robots import Catalogue, RobotType
-from factory.template import Law, Point, Template
+from factory.compiler.compiler import compile_pag
+from factory.plant.factory import Factory
+from factory.problem.pag import PAG, Assembly
+from factory.problem.robot_types import Catalogue, RobotType
+from factory.problem.template import Law, Point, Template
+from factory.support.errors import Position
 
 _DOT = Template(
     "atomic", ("dot",), 1, (), ("nopart",), ("LAB1",), Law("navigation", (Point("B", 1),))

@@ -7,8 +7,8 @@ from typing import Any
 
 from hypothesis import strategies as st
 
-from factory.pag import PAG, RESERVED, Assembly, Parameter, Value
-from factory.template import Law, Point, Template
+from factory.problem.pag import PAG, RESERVED, Assembly, Parameter, Value
+from factory.problem.template import Law, Point, Template
 
 LABEL_LETTERS = "abzAZ0189_-.äßλД中é"
 UNARY = ("weld", "inspect", "press", "glue")

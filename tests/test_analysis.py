@@ -20,24 +20,24 @@ from hypothesis import strategies as st
 from scipy.optimize import linprog
 from scipy.sparse import coo_array
 
-from factory.analysis import Change, Timing, analyse
-from factory.analysis.bounds import wip_curve
-from factory.analysis.flow import flow
-from factory.analysis.steady import reached
-from factory.analysis.timed import timed_net
-from factory.analysis.what_if import scenarios
 from factory.control.mode import Limits
-from factory.control.plan import robot_limits
-from factory.layout.plan import Layout
+from factory.layout.layout import Layout
+from factory.modes.modes import robot_limits
 from factory.nets.cycle_ratio import max_cycle_ratio
 from factory.nets.firing import earliest_firings, settled_firings
 from factory.nets.marked import MarkedNet
-from factory.nets.pool import part_pool
 from factory.nets.slack import circuits, slacks
-from factory.prediction import operation_delays, predict
-from factory.settings import Settings
-from factory.simulation import Simulation
-from factory.trace import Run
+from factory.simulation.run import Run
+from factory.simulation.simulation import Simulation
+from factory.study.analysis import Change, Timing, analyse
+from factory.study.analysis.bounds import wip_curve
+from factory.study.analysis.flow import flow
+from factory.study.analysis.steady import reached
+from factory.study.analysis.timed import timed_net
+from factory.study.analysis.what_if import scenarios
+from factory.support.settings import Settings
+from factory.timing.pool import part_pool
+from factory.timing.prediction import operation_delays, predict
 from tests.command_line import PAPER, ROOT, Terminal
 from tests.layout_values import paper_layout, random_layout
 from tests.net_values import net_from
@@ -286,7 +286,7 @@ def test_sensitivity_is_what_a_changed_run_shows(
         return Limits(speed, acceleration), gains
 
     before = Simulation(timing.layout, "ideal", 6, settings=slow).run().cycle_time_s
-    monkeypatch.setattr("factory.simulation.robot_limits", limits)
+    monkeypatch.setattr("factory.simulation.simulation.robot_limits", limits)
     after = Simulation(timing.layout, "ideal", 6, settings=slow).run().cycle_time_s
     assert before is not None and after is not None
     assert abs(predicted) > 0.2
@@ -380,7 +380,7 @@ def test_a_slow_robot_shows(monkeypatch: pytest.MonkeyPatch, run: Terminal) -> N
         speed[1] *= 0.1
         return Limits(speed, found.acceleration), gains
 
-    monkeypatch.setattr("factory.simulation.robot_limits", limits)
+    monkeypatch.setattr("factory.simulation.simulation.robot_limits", limits)
     done = run("analyze", PAPER, "--world", "ideal", "--units", 4, "--run", "--json")
     errors = {d["label"]: d["error"] for d in done.json["measured"]["durations"]}
     assert errors["part3"] < -0.5 and errors["sub3"] < -0.5

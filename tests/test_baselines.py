@@ -15,12 +15,12 @@ from pathlib import Path
 import pytest
 
 import factory
-from factory.engine import mujoco
-from factory.fidelity import QUANTITIES, measure_seed
-from factory.fidelity.comparing import Alter, Case
-from factory.fidelity.record import Figures
-from factory.layout.plan import Layout
-from factory.settings import Settings
+from factory.layout.layout import Layout
+from factory.study.fidelity import QUANTITIES, measure_seed
+from factory.study.fidelity.comparing import Alter, Case
+from factory.study.fidelity.record import Figures
+from factory.support.engine import mujoco
+from factory.support.settings import Settings
 
 FOLDER = Path(__file__).parent / "baselines"
 EXAMPLES = FOLDER.parent.parent / "examples"

@@ -13,11 +13,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from factory.log import LogWriter
 from factory.mjcf import binary, loading
 from factory.mjcf.binary import beside, kept, key_of, packed, seal_of, sealed
 from factory.mjcf.model import Model
-from factory.simulation import Simulation, physical_model
+from factory.record.log import LogWriter
+from factory.simulation.simulation import Simulation, physical_model
 from tests.command_line import PAPER, ROOT, Terminal, files_in
 from tests.fidelity.products import layout
 
@@ -220,7 +220,7 @@ def test_the_same_run_with_and_without_the_cache(
 KEEP = """
 import sys
 from factory.mjcf import binary
-from factory.simulation import physical_model
+from factory.simulation.simulation import physical_model
 from factory.mjcf.loading import load
 from tests.fidelity.products import layout
 binary.LEAST = 0

@@ -14,8 +14,8 @@ from factory.export import exporters
 from factory.lang import read_template, write_template
 from factory.mjcf.robots import load_robot_model
 from factory.pipeline import all_templates
-from factory.robots import load_catalogue
-from factory.template import Template
+from factory.problem.robot_types import load_catalogue
+from factory.problem.template import Template
 from tests.command_line import ROOT, Terminal, files_in
 from tests.test_simulation import assert_good
 

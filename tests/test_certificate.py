@@ -17,15 +17,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import factory.nets
-from factory.errors import InputError
 from factory.export.pnml import read_pnml, write_pnml
-from factory.factory import Factory
+from factory.foreign_nets.general import analyse
 from factory.nets.certificate import certificate, check_certificate
 from factory.nets.certificate_net import digest
 from factory.nets.gears import GearNet
-from factory.nets.general import analyse
 from factory.nets.marked import MarkedNet, marked
 from factory.nets.petri import Place
+from factory.plant.factory import Factory
+from factory.support.errors import InputError
 from tests.net_values import (
     net_from,
     planted,

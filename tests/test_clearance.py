@@ -27,15 +27,8 @@ from pag_values import SHAPES
 from factory.layout.certificate import Certificate
 from factory.layout.clearance import _Search, certify, separation
 from factory.layout.crossings import touching
-from factory.layout.plan import Layout
-from factory.layout.sweeps import (
-    ALWAYS,
-    KINDS,
-    PAYLOAD_BODY,
-    PAYLOADS,
-    STATIONS,
-    Region,
-)
+from factory.layout.layout import Layout
+from factory.layout.sweeps import ALWAYS, KINDS, PAYLOAD_BODY, PAYLOADS, STATIONS, Region
 
 
 def broken(layout: Layout, *words: str) -> Certificate:

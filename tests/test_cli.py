@@ -505,7 +505,7 @@ def test_folders_of_templates_are_searched_in_order(run: Terminal, tmp_path: Pat
 
 
 def test_a_witness_reads_as_a_sentence(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    from factory.cli import run_command
+    from factory.commands import run_command
 
     net = tmp_path / "net.pnml"
     assert run_command(["export", str(PAPER), "--format", "pnml", "-o", str(net)]) == 0

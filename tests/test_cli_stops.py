@@ -14,9 +14,9 @@ from pathlib import Path
 import imageio.v3 as iio
 import pytest
 
-from factory.errors import MissingError
-from factory.gl import probe
-from factory.log import read_log
+from factory.record.log import read_log
+from factory.support.errors import MissingError
+from factory.support.gl import probe
 from tests.command_line import PAPER, ROOT, Terminal, files_in, spawn, started
 
 # --- a run that fails, or is stopped --------------------------------------------------------------
@@ -123,7 +123,7 @@ WITHOUT_GL = {
 
 EACH = """
 import sys
-from factory.cli import run_command
+from factory.commands import run_command
 for words in (["check"], ["build", "--mjcf", sys.argv[2]], ["programs"],
               ["export", "--format", "pnml"], ["run"]):
     assert run_command([words[0], sys.argv[1], *words[1:], "-q"]) == 0, words
@@ -173,7 +173,7 @@ def test_without_the_engine(bare: str, out: Path) -> None:
 def test_the_engine_warns_on_stderr(out: Path) -> None:
     """Not on stdout, where a document may be, and not in a file in the current folder."""
     code = (
-        "from factory.engine import mujoco\n"
+        "from factory.support.engine import mujoco\n"
         "m = mujoco.MjModel.from_xml_string('<mujoco><worldbody><body><freejoint/>"
         '<geom size=".1"/></body></worldbody></mujoco>\')\n'
         "d = mujoco.MjData(m); d.qvel[0] = float('nan'); mujoco.mj_step(m, d)\n"

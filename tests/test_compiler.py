@@ -7,12 +7,12 @@ from dataclasses import replace
 import pytest
 from hypothesis import given
 
-from factory.compiler import compile_pag, expand
-from factory.errors import InputError
+from factory.compiler.compiler import compile_pag, expand
 from factory.lang import read_pag, read_template
-from factory.pag import PAG
 from factory.pipeline import all_templates
-from factory.robots import Catalogue, RobotType, load_catalogue
+from factory.problem.pag import PAG
+from factory.problem.robot_types import Catalogue, RobotType, load_catalogue
+from factory.support.errors import InputError
 from tests.strategies import pags
 
 PAPER = """6 parts; root = sub3; sub3 = mate ( sub2, part3 ); sub2 = weld ( sub1 );

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from factory.control import LAWS, Setting, mode_of
-from factory.errors import InputError
-from factory.template import Law, Point, Template
+from factory.problem.template import Law, Point, Template
+from factory.support.errors import InputError
 
 MATE = Template(
     name="mate",

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from factory.disturbance import (
+from factory.simulation.disturbance import (
     Delay,
     Dragged,
     Friction,
@@ -16,10 +16,10 @@ from factory.disturbance import (
     Slowed,
     disturb,
 )
-from factory.engine import mujoco
-from factory.errors import InputError
-from factory.simulation import Simulation
-from factory.world.courses import Courses
+from factory.simulation.mujoco.fast.reference_cache import Courses
+from factory.simulation.simulation import Simulation
+from factory.support.engine import mujoco
+from factory.support.errors import InputError
 from tests.fidelity import attraction, disturbances
 from tests.fidelity.products import PAPER, layout
 

@@ -14,13 +14,13 @@ from pathlib import Path
 import click
 import pytest
 
-from factory.cli import cli
-from factory.explanations import codes
+from factory.commands import cli
 from factory.export import exporters
 from factory.lang.values import GEOMETRY
 from factory.pipeline import all_templates
-from factory.robots import load_catalogue
-from factory.settings import RANGES
+from factory.problem.robot_types import load_catalogue
+from factory.support.explanations import codes
+from factory.support.settings import RANGES
 from tests.command_line import ROOT, Terminal
 
 DOCS = ROOT / "docs"

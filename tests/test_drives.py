@@ -14,9 +14,9 @@ from hypothesis import strategies as st
 from factory.mjcf import model
 from factory.mjcf.model import CARRIAGE_MASS, HOIST_STIFFNESS, STIFFNESS, drive_for
 from factory.mjcf.robots import Drive
-from factory.settings import RANGES, Settings
-from factory.simulation import Simulation
-from factory.world.setpoints import Setpoints
+from factory.simulation.mujoco.drives import Setpoints
+from factory.simulation.simulation import Simulation
+from factory.support.settings import RANGES, Settings
 from tests.test_fuse import layout_of
 from tests.test_vicinity import layout
 

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from factory.explanations import codes, explain
+from factory.support.explanations import codes, explain
 from tests.command_line import ROOT, Done, Terminal, files_in
 
 PACKAGE = ROOT / "factory"

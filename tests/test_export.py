@@ -25,7 +25,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import factory.export
-from factory.control.plan import operation_modes
 from factory.export import exporters
 from factory.export.bodies import file_name
 from factory.export.events import COLUMNS
@@ -35,10 +34,11 @@ from factory.export.swimlanes import owners_of, swimlanes
 from factory.export.tina import write_tina
 from factory.export.tree_drawing import draw_tree
 from factory.export.urdf import roll_pitch_yaw
-from factory.factory import Factory
-from factory.geometry import rotation
+from factory.geometry.solids import rotation
+from factory.modes.modes import operation_modes
 from factory.nets.marked import MarkedNet, marked
 from factory.nets.petri import PetriNet, Place, Transition
+from factory.plant.factory import Factory
 from tests.command_line import PAPER, ROOT, Terminal, files_in
 from tests.export_values import LAMP, MESHES, kept_log, made, subject
 from tests.net_values import planted

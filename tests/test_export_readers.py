@@ -13,13 +13,13 @@ import pytest
 
 from factory.export import exporters
 from factory.export.bodies import parts_of
-from factory.geometry import rotation
-from factory.layout.plan import Layout
+from factory.geometry.solids import rotation
+from factory.layout.layout import Layout
 from factory.mjcf.loading import load
 from factory.mjcf.names import COMPASS
 from factory.nets.marked import MarkedNet, marked
 from factory.nets.replay import replay
-from factory.simulation import physical_model
+from factory.simulation.simulation import physical_model
 from tests.command_line import PAPER, ROOT
 from tests.export_values import LAMP, MESHES, READERS, ask, kept_log, made, reads, subject, table
 from tests.export_values import write as written

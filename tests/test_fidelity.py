@@ -15,9 +15,11 @@ import numpy as np
 import pytest
 
 import factory
-from factory.engine import mujoco
-from factory.fidelity import QUANTITIES, SeedRecord, measure, measure_seed, study
-from factory.fidelity.causality import (
+from factory.layout.layout import Layout
+from factory.simulation.run import Event
+from factory.simulation.simulation import Simulation
+from factory.study.fidelity import QUANTITIES, SeedRecord, measure, measure_seed, study
+from factory.study.fidelity.causality import (
     Orders,
     Process,
     compare,
@@ -25,15 +27,13 @@ from factory.fidelity.causality import (
     duration_differences,
     process,
 )
-from factory.fidelity.comparing import Alter, Case
-from factory.fidelity.convergence import Series, Softened
-from factory.fidelity.finished import Finished
-from factory.fidelity.histogram import Histogram
-from factory.fidelity.measuring import Measurement
-from factory.fidelity.report import write_report
-from factory.layout.plan import Layout
-from factory.simulation import Simulation
-from factory.trace import Event
+from factory.study.fidelity.comparing import Alter, Case
+from factory.study.fidelity.convergence import Series, Softened
+from factory.study.fidelity.finished import Finished
+from factory.study.fidelity.histogram import Histogram
+from factory.study.fidelity.measuring import Measurement
+from factory.study.fidelity.report import write_report
+from factory.support.engine import mujoco
 from tests.command_line import PAPER, Terminal, files_in
 from tests.test_baselines import FOLDER
 

@@ -10,14 +10,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import factory
-from factory.disturbance import Mass, disturb
-from factory.engine import mujoco
-from factory.geometry import product_geometry
-from factory.layout.plan import Layout
-from factory.monitor import beside
-from factory.simulation import Simulation, physical_model
-from factory.wholes import FUSE_FROM, bodies_of, fused_copies, fusing_pays
-from factory.world.fusing import Fusion, turned
+from factory.geometry.solids import product_geometry
+from factory.layout.layout import Layout
+from factory.plant.fused_bodies import FUSE_FROM, bodies_of, fused_copies, fusing_pays
+from factory.record.monitor import beside
+from factory.simulation.disturbance import Mass, disturb
+from factory.simulation.mujoco.fusing import Fusion, turned
+from factory.simulation.simulation import Simulation, physical_model
+from factory.support.engine import mujoco
 from tests.command_line import PAPER, ROOT, Terminal
 from tests.test_simulation import laid_out
 
@@ -263,7 +263,7 @@ def test_large_factories_are_fused_by_themselves(tmp_path: Path) -> None:
     chain += "".join(f"n{k} = mate(n{k - 1}, q{k});\n" for k in range(2, 120))
     assert not fuses(tmp_path, chain + ";\n".join(f"q{n} = atomic()" for n in range(120)))
     with pytest.MonkeyPatch.context() as patch:  # convex pieces count, not parts
-        patch.setattr("factory.wholes.FUSE_FROM", 1)
+        patch.setattr("factory.plant.fused_bodies.FUSE_FROM", 1)
         assert fusing_pays(small.factory, small.product)
         assert not fusing_pays(many.factory, many.product)
 
@@ -284,7 +284,7 @@ def test_a_body_that_has_just_become_free_can_take_the_place_of_others(
 ) -> None:
     """The only copy of a sub-assembly is still joined to something else when the next one is
     made; both become one in the same tick, in either order."""
-    monkeypatch.setattr("factory.world.stock.SETTLING", np.inf)
+    monkeypatch.setattr("factory.simulation.mujoco.parts.SETTLING", np.inf)
     simulation = Simulation(layout_of("chest"), units=4, fuse=True)
     world, stock = simulation.world, simulation.world.stock
     found: list[tuple[int, int]] = []

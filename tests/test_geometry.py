@@ -11,10 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from layout_values import table_pag
 
-from factory.errors import InputError
-from factory.geometry import Product, Solid, product_geometry, rotation
-from factory.lang import read_pag
-from factory.meshes import (
+from factory.geometry.meshes import (
     LEAST_INERTIA,
     LEAST_MASS,
     MOST_FACES,
@@ -23,8 +20,11 @@ from factory.meshes import (
     sound,
     usable,
 )
-from factory.pag import PAG, Value
+from factory.geometry.solids import Product, Solid, product_geometry, rotation
+from factory.lang import read_pag
 from factory.pipeline import all_templates
+from factory.problem.pag import PAG, Value
+from factory.support.errors import InputError
 
 lengths = st.floats(0.001, 1.0)
 turns = st.tuples(*[st.floats(-1, 1)] * 4).filter(lambda q: sum(v * v for v in q) > 0.01)

@@ -16,13 +16,13 @@ import yaml
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from factory.errors import InputError
-from factory.geometry import product_geometry, rotation
+from factory.geometry.solids import product_geometry, rotation
 from factory.importing import Options, import_product
 from factory.importing.places import quaternion
 from factory.lang import read_pag
-from factory.pag import PAG
-from factory.template import Template
+from factory.problem.pag import PAG
+from factory.problem.template import Template
+from factory.support.errors import InputError
 from tests.command_line import ROOT, Terminal, files_in
 from tests.strategies import pags
 

@@ -17,15 +17,15 @@ from layout_values import (
 )
 from pag_values import SHAPES, TEMPLATES, catalogue, factory_of, paper
 
-from factory.compiler import compile_pag
-from factory.control.plan import operation_modes
-from factory.errors import InputError, RunError
-from factory.geometry import product_geometry
+from factory.compiler.compiler import compile_pag
+from factory.geometry.solids import product_geometry
 from factory.layout.crossings import delivered_to
 from factory.layout.embedding import lay_out
-from factory.layout.plan import Layout
+from factory.layout.layout import Layout
 from factory.layout.sweeps import hull, piles
-from factory.template import Law, Point
+from factory.modes.modes import operation_modes
+from factory.problem.template import Law, Point
+from factory.support.errors import InputError, RunError
 
 
 def test_the_paper_s_example() -> None:

@@ -11,11 +11,11 @@ import pytest
 from layout_values import many_layouts, paper_layout, random_layout, row_of_inserts, table_pag
 from pag_values import factory_of
 
-from factory.geometry import product_geometry
+from factory.geometry.solids import product_geometry
 from factory.layout.drawing import outline, write_svg
 from factory.layout.embedding import lay_out
+from factory.layout.layout import Layout
 from factory.layout.lettering import Lettering
-from factory.layout.plan import Layout
 from factory.layout.svg import LONGEST, clean, label, number
 
 SVG = "{http://www.w3.org/2000/svg}"

@@ -14,23 +14,23 @@ from layout_values import STYLES, paper_layout, random_layout, row_of_inserts, t
 from pag_values import SHAPES, factory_of
 
 import factory.layout.optimising as optimising
-from factory.control.plan import operation_modes, robot_limits
-from factory.errors import RunError
-from factory.geometry import product_geometry
+from factory.geometry.solids import product_geometry
 from factory.layout.bounds import cycle_time_bound
 from factory.layout.dimensions import LAYERS, Clearance
 from factory.layout.durations import Pace, gear_times, operation_times
 from factory.layout.embedding import lay_out
-from factory.layout.flank import Flank
 from factory.layout.gain import gain
+from factory.layout.layout import Layout
 from factory.layout.optimising import first_feasible
 from factory.layout.outline import Outline, Plan
-from factory.layout.plan import Layout
+from factory.layout.request import Ground
+from factory.layout.skyline import Flank
 from factory.layout.stretching import Shape
+from factory.modes.modes import operation_modes, robot_limits
 from factory.pipeline import read
-from factory.planning import Ground
-from factory.prediction import operation_delays
-from factory.settings import Settings
+from factory.support.errors import RunError
+from factory.support.settings import Settings
+from factory.timing.prediction import operation_delays
 from tests.command_line import ROOT, Terminal
 
 PACE = Pace.of(Settings())

@@ -7,10 +7,10 @@ import pytest
 from layout_values import STYLES, random_layout, row_of_inserts
 from pag_values import SHAPES
 
-from factory.layout.plan import Box, Layout
+from factory.layout.layout import Box, Layout
 from factory.layout.sweeps import KINDS, NAMES
-from factory.settings import Settings
-from factory.simulation import Simulation
+from factory.simulation.simulation import Simulation
+from factory.support.settings import Settings
 
 mujoco = pytest.importorskip("mujoco")
 
@@ -36,7 +36,7 @@ def test_bodies_are_inside_their_regions(layout: Layout) -> None:
     """Every geom that can collide, at both ends of its robot's guidepath."""
     from factory.mjcf.loading import load
     from factory.mjcf.model import build_model
-    from factory.robots import load_catalogue
+    from factory.problem.robot_types import load_catalogue
 
     copies = {leaf.label: 1 for leaf in layout.factory.leaves}
     m = load(build_model(layout, load_catalogue(), copies, Settings()))

@@ -8,12 +8,12 @@ import pytest
 
 import factory.layout.arranging as arranging
 import factory.layout.optimising as optimising
-from factory.geometry import product_geometry
+from factory.compiler.mating.judged import judged
+from factory.geometry.solids import product_geometry
 from factory.layout.embedding import lay_out
-from factory.layout.plan import Layout
+from factory.layout.layout import Layout
 from factory.layout.sides import admissible, admitted
-from factory.mating.judged import judged
-from factory.simulation import Simulation
+from factory.simulation.simulation import Simulation
 from tests.test_compiler import PAPER, compiled
 
 BALANCED = """root = r; r = mate(s, t); s = mate(a, b); t = mate(c, d);

@@ -8,20 +8,20 @@ from functools import cache
 import numpy as np
 import pytest
 
-from factory.approach import MARGIN
-from factory.control.plan import operation_modes, operation_starts
-from factory.errors import InputError
-from factory.factory import Factory
-from factory.geometry import product_geometry
+from factory.compiler.mating import matings
+from factory.geometry.solids import product_geometry
 from factory.lang.pag_reader import read_pag
 from factory.layout.clearance import certify
 from factory.layout.embedding import lay_out
-from factory.layout.plan import Layout
-from factory.mating import matings
+from factory.layout.layout import Layout
+from factory.modes.modes import operation_modes, operation_starts
 from factory.nets.verify import verify
 from factory.pipeline import all_templates
-from factory.robots import load_catalogue
-from factory.simulation import Simulation
+from factory.plant.approaches import MARGIN
+from factory.plant.factory import Factory
+from factory.problem.robot_types import load_catalogue
+from factory.simulation.simulation import Simulation
+from factory.support.errors import InputError
 from tests.test_compiler import compiled
 
 CASTLE = """root = castle; castle = mate(lower, roof, flag); lower = weld(walls, dwell = 0.2);
@@ -66,7 +66,7 @@ def laid_out(text: str) -> Layout:
     pag = read_pag(text, templates)
     product = product_geometry(pag)
     found = matings(pag, templates, product).approaches
-    from factory.compiler import compile_pag
+    from factory.compiler.compiler import compile_pag
 
     return lay_out(compile_pag(pag, templates, load_catalogue(), found), product)
 
@@ -210,7 +210,7 @@ def test_without_a_lift_the_ball_is_blocked_and_its_pairs_left_out() -> None:
 
 
 def test_a_catalogue_without_lifts_is_told() -> None:
-    from factory.compiler import compile_pag
+    from factory.compiler.compiler import compile_pag
     from tests.pag_values import catalogue
 
     templates = all_templates()

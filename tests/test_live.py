@@ -17,10 +17,10 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
-from factory.disturbance.hands import Hands
-from factory.errors import InputError
-from factory.live import Frame, Server, Session
-from factory.live.commands import (
+from factory.nets.replay import replay
+from factory.record.monitor import beside
+from factory.show.live import Frame, Server, Session
+from factory.show.live.commands import (
     KINDS,
     Block,
     Pause,
@@ -32,12 +32,12 @@ from factory.live.commands import (
     Step,
     command_of,
 )
-from factory.live.page import page, stage_of
-from factory.monitor import beside
-from factory.nets.replay import replay
-from factory.report.floor import floor_plan
-from factory.report.links import labels_of
-from factory.simulation import Simulation
+from factory.show.live.page import page, stage_of
+from factory.show.report.floor import floor_plan
+from factory.show.report.links import labels_of
+from factory.simulation.disturbance.hands import Hands
+from factory.simulation.simulation import Simulation
+from factory.support.errors import InputError
 from tests.command_line import PAPER, Terminal, started
 from tests.layout_values import paper_layout
 
@@ -331,7 +331,7 @@ def test_no_more_may_watch_than_it_can_serve(
 ) -> None:
     from websockets.exceptions import InvalidStatus
 
-    monkeypatch.setattr("factory.live.server.MOST", 2)
+    monkeypatch.setattr("factory.show.live.server.MOST", 2)
     with socket_of(server) as one, socket_of(server) as other:
         assert one.recv(10) and other.recv(10)
         with pytest.raises(InvalidStatus, match="503"), socket_of(server):
@@ -427,14 +427,14 @@ def test_the_command_serves_until_it_is_interrupted() -> None:
 
 def test_other_hosts_need_a_word(run: Terminal, monkeypatch: pytest.MonkeyPatch) -> None:
     """It is said before anything is laid out."""
-    monkeypatch.setattr(sys.modules["factory.cli.view"], "plan", None)
+    monkeypatch.setattr(sys.modules["factory.commands.view"], "plan", None)
     done = run("view", PAPER, "--host", "0.0.0.0", "--json")
     assert done.status == 2 and done.codes == ["BadValue"]
     assert "--expose" in done.json["errors"][0]["hint"]
 
 
 def test_what_is_missing_is_said_first(run: Terminal, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(sys.modules["factory.cli.view"], "plan", None)
+    monkeypatch.setattr(sys.modules["factory.commands.view"], "plan", None)
     monkeypatch.setitem(sys.modules, "websockets.sync.server", None)
     done = run("view", PAPER, "--json")
     assert done.status == 3 and done.codes == ["Missing"]

@@ -9,8 +9,8 @@ from typing import Any
 
 import pytest
 
-from factory.live import Server
-from factory.live.page import page
+from factory.show.live import Server
+from factory.show.live.page import page
 from tests.test_live import Running, a_session
 from tests.test_report_browser import CHROMIUM, browser  # noqa: F401
 

@@ -13,11 +13,11 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 
 import factory
-from factory.engine import mujoco
-from factory.errors import InputError
-from factory.log import MAGIC, Log, LogWriter, is_log, read_log
-from factory.log.blocks import HEAD, LENGTH, pack_rows, unpack_rows
-from factory.simulation import Simulation
+from factory.record.log import MAGIC, Log, LogWriter, is_log, read_log
+from factory.record.log.blocks import HEAD, LENGTH, pack_rows, unpack_rows
+from factory.simulation.simulation import Simulation
+from factory.support.engine import mujoco
+from factory.support.errors import InputError
 
 PAPER = Path(__file__).parent.parent / "examples" / "paper.pag"
 

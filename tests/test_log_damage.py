@@ -11,12 +11,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from factory.errors import InputError
-from factory.log import MAGIC, LogWriter, read_log
-from factory.log.blocks import HEAD, LENGTH, Arrays, block, unpacked
-from factory.log.header import KEYS
-from factory.log.model import model_of
-from factory.simulation import Simulation
+from factory.record.log import MAGIC, LogWriter, read_log
+from factory.record.log.blocks import HEAD, LENGTH, Arrays, block, unpacked
+from factory.record.log.header import KEYS
+from factory.record.log.model import model_of
+from factory.simulation.simulation import Simulation
+from factory.support.errors import InputError
 from tests.command_line import PAPER, Terminal
 from tests.layout_values import paper_layout
 
@@ -232,5 +232,5 @@ def test_a_log_that_does_not_fit(
     def full(*_: object) -> None:
         raise error("too much")
 
-    monkeypatch.setattr("factory.log.reader.unpack_rows", full)
+    monkeypatch.setattr("factory.record.log.reader.unpack_rows", full)
     assert is_refused(log, "too much")

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from factory.simulation import Simulation
+from factory.simulation.simulation import Simulation
 from tests.fidelity import long_runs
 from tests.fidelity.__main__ import REPORT
 from tests.fidelity.products import PAPER, layout

@@ -18,12 +18,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial import ConvexHull
 
-import factory.checking
-from factory.clashes import draw, picture_names
-from factory.compiler import expand
-from factory.geometry import Product, product_geometry
-from factory.lang import read_pag
-from factory.mating import (
+import factory.commands.check_product
+from factory.commands.clashes import draw, picture_names
+from factory.compiler.compiler import expand
+from factory.compiler.mating import (
     BLOCKED,
     LEFT_OUT,
     NO_DEEPER,
@@ -35,12 +33,14 @@ from factory.mating import (
     matings,
     shaped,
 )
-from factory.mating.contacts import CHUNK
-from factory.mating.depth import deepest, exact, polytope, rough
-from factory.mating.meetings import meetings
-from factory.pag import PAG
+from factory.compiler.mating.contacts import CHUNK
+from factory.compiler.mating.depth import deepest, exact, polytope, rough
+from factory.compiler.mating.meetings import meetings
+from factory.geometry.solids import Product, product_geometry
+from factory.lang import read_pag
 from factory.pipeline import all_templates
-from factory.template import Template
+from factory.problem.pag import PAG
+from factory.problem.template import Template
 from tests.command_line import Terminal
 from tests.strategies import pags, random_pag_text
 

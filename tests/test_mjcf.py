@@ -20,14 +20,14 @@ import pytest
 import trimesh
 
 import factory
-from factory.errors import InputError
-from factory.files import write_all
-from factory.layout.plan import Layout
+from factory.layout.layout import Layout
 from factory.mjcf import names
 from factory.mjcf.loading import load
 from factory.mjcf.model import Model, model_files
-from factory.settings import Settings
-from factory.simulation import physical_model
+from factory.simulation.simulation import physical_model
+from factory.support.errors import InputError
+from factory.support.files import write_all
+from factory.support.settings import Settings
 from tests.command_line import PAPER, ROOT, Terminal, files_in
 
 KARY = """root = s; s = mate(a, b, c, t); t = mate(e, f); c = inspect(d, dwell = 0.2);
@@ -90,7 +90,7 @@ def test_the_papers_example_to_the_letter(
 
 DIGEST = """
 import sys, hashlib
-from factory.cli import run_command
+from factory.commands import run_command
 run_command(["build", sys.argv[1], "-o", sys.argv[2], "-q"])
 """
 

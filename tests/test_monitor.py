@@ -14,17 +14,17 @@ import pytest
 from layout_values import random_layout
 
 import factory
-from factory.errors import InputError
 from factory.lang import read_pag
-from factory.layout.plan import Layout
-from factory.log import Log, LogWriter, read_log
-from factory.monitor import Anatomy, Monitor, Report, Subject, subject_of, subject_of_run
-from factory.monitor.explanation import Explanation
-from factory.monitor.record import watch_log
+from factory.layout.layout import Layout
 from factory.nets.history import legal_marking
 from factory.pipeline import all_templates, read
-from factory.settings import Settings
-from factory.simulation import Simulation
+from factory.record.log import Log, LogWriter, read_log
+from factory.record.monitor import Anatomy, Monitor, Report, Subject, subject_of, subject_of_run
+from factory.record.monitor.explanation import Explanation
+from factory.record.monitor.record import watch_log
+from factory.simulation.simulation import Simulation
+from factory.support.errors import InputError
+from factory.support.settings import Settings
 from tests.command_line import PAPER, ROOT, Terminal
 from tests.test_simulation import PRODUCTS, UNARY, laid_out, random_marking
 
@@ -135,12 +135,14 @@ def test_robots_that_lower_what_they_bring_are_explained() -> None:
 
 def test_it_reads_neither_the_supervisor_nor_the_world() -> None:
     imported = set()
-    for path in sorted((ROOT / "factory" / "monitor").glob("*.py")):
+    paths = sorted((ROOT / "factory" / "record" / "monitor").glob("*.py"))
+    assert len(paths) > 5
+    for path in paths:
         for node in ast.walk(ast.parse(path.read_text("utf-8"))):
             if isinstance(node, ast.ImportFrom):
                 imported.add(node.module or "")
     rooms = {name.split(".")[1] for name in imported if name.startswith("factory.")}
-    assert not rooms & {"supervisor", "distributed", "world", "simulation", "control", "running"}
+    assert not rooms & {"simulation", "control", "modes", "commands"}
 
 
 # --- planted faults -------------------------------------------------------------------------------
@@ -508,7 +510,7 @@ def test_run_with_a_monitor(run: Terminal) -> None:
 
 def test_a_faulty_run_fails(run: Terminal, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Two parts are never let go: status 1, beside the run and from its log."""
-    from factory.world.switchboard import Switchboard
+    from factory.simulation.mujoco.welds import Switchboard
 
     loose = Switchboard.loose
 

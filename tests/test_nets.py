@@ -8,12 +8,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from factory.compiler import expand
-from factory.factory import Factory
+from factory.compiler.compiler import expand
 from factory.nets import threads as nets_threads
 from factory.nets.petri import PetriNet, Place, Transition
 from factory.nets.threaded import Slot, ThreadedMarking, ThreadedNet
 from factory.nets.threads import Threads
+from factory.plant.factory import Factory
 from tests.net_values import legal_markings, random_legal_marking
 from tests.pag_values import TEMPLATES, factories, factory_of, paper
 

@@ -11,9 +11,9 @@ from pathlib import Path
 import pytest
 import trimesh
 
-from factory.defaults import OPTIONS, load_defaults
-from factory.settings import RANGES, Settings
-from factory.starting import LABELS
+from factory.commands.new import LABELS
+from factory.support.settings import RANGES, Settings
+from factory.support.user_defaults import OPTIONS, load_defaults
 from tests.command_line import PAPER, Terminal, files_in, spawn
 
 # --- factory new ----------------------------------------------------------------------------------

@@ -14,8 +14,8 @@ import numpy as np
 import pytest
 
 import factory
-from factory.geometry import Product, product_geometry
-from factory.meshes import Array
+from factory.geometry.meshes import Array
+from factory.geometry.solids import Product, product_geometry
 from tests.command_line import ROOT, Terminal, files_in
 
 EXAMPLES = ROOT / "examples"

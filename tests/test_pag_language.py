@@ -13,11 +13,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from strategies import mutations, pags, random_pag_text
 
-from factory.errors import Diagnostic, InputError
 from factory.lang import load_pag, load_templates, read_pag, write_pag
 from factory.lang import pag_syntax as syntax
 from factory.lang.recovery import Stuck, drive
-from factory.pag import PAG, Parameter
+from factory.problem.pag import PAG, Parameter
+from factory.support.errors import Diagnostic, InputError
 
 HERE = Path(__file__).parent
 BROKEN = HERE / "broken"

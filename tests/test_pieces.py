@@ -19,14 +19,10 @@ from hypothesis import strategies as st
 from layout_values import table_pag
 
 import factory
-from factory import decomposition
-from factory.decomposition import in_pieces
-from factory.geometry import Solid, product_geometry
-from factory.meshes import Array, Mesh
-from factory.mjcf import names
-from factory.mjcf.model import model_files
-from factory.pag import PAG
-from factory.pieces import (
+from factory.geometry import decomposition
+from factory.geometry.decomposition import in_pieces
+from factory.geometry.meshes import Array, Mesh
+from factory.geometry.pieces import (
     MOST_PIECES,
     ROUND,
     box_piece,
@@ -36,7 +32,11 @@ from factory.pieces import (
     is_closed,
     sphere_piece,
 )
-from factory.simulation import physical_model
+from factory.geometry.solids import Solid, product_geometry
+from factory.mjcf import names
+from factory.mjcf.model import model_files
+from factory.problem.pag import PAG
+from factory.simulation.simulation import physical_model
 
 radii = st.floats(1e-4, 2.0)
 

@@ -12,14 +12,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from factory.errors import InputError
 from factory.export.dot import write_dot
 from factory.export.pnml import read_pnml, write_pnml
-from factory.factory import Factory
+from factory.foreign_nets.general import analyse
 from factory.nets.gears import GearNet
-from factory.nets.general import analyse
 from factory.nets.marked import MarkedNet, marked
 from factory.nets.petri import Transition
+from factory.plant.factory import Factory
+from factory.support.errors import InputError
 from tests.net_values import (
     net_from,
     planted,

@@ -10,12 +10,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from factory.errors import InputError
-from factory.factory import Factory
 from factory.nets.behaviour import behaviour
 from factory.nets.marked import MarkedNet, marked
-from factory.nets.pool import part_pool, with_wip
-from factory.nets.timing import cycle_time, marked_graph_cycle_time
+from factory.plant.factory import Factory
+from factory.support.errors import InputError
+from factory.timing.cycle_time import cycle_time, marked_graph_cycle_time
+from factory.timing.pool import part_pool, with_wip
 from tests.net_values import net_from
 from tests.pag_values import factories, factory_of, paper, random_pag
 

@@ -8,7 +8,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from factory.progress import Progress
+from factory.support.progress import Progress
 
 
 class Terminal(io.StringIO):

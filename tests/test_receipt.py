@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from factory.files import user_cache
+from factory.support.files import user_cache
 from tests.command_line import PAPER, ROOT, Terminal, files_in
 
 MESHED = """root = a;

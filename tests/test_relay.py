@@ -16,28 +16,28 @@ from hypothesis import strategies as st
 from layout_values import STYLES, paper_layout, random_layout, row_of_inserts, table_pag
 from pag_values import SHAPES, factory_of
 
-from factory.assets import templates_folder
 from factory.lang import read_pag, write_pag
 from factory.lang.template_reader import load_templates
 from factory.layout.clearance import certify
 from factory.layout.dimensions import Clearance
 from factory.layout.durations import Pace, gear_times
 from factory.layout.embedding import lay_out
+from factory.layout.layout import Layout
 from factory.layout.optimising import optimised
-from factory.layout.plan import Layout
-from factory.monitor import beside
-from factory.nets.pool import part_pool
+from factory.layout.relaying import relayed
+from factory.layout.relaying.naming import named
+from factory.layout.relaying.splitting import split
+from factory.layout.relaying.ways import Way, ways
 from factory.nets.verify import verify
 from factory.pipeline import read
-from factory.relaying import relayed
-from factory.relaying.naming import named
-from factory.relaying.splitting import split
-from factory.relaying.ways import Way, ways
-from factory.report import recording_of
-from factory.robots import load_catalogue
-from factory.settings import Settings
-from factory.simulation import Simulation
-from factory.template import Template
+from factory.problem.robot_types import load_catalogue
+from factory.problem.template import Template
+from factory.record.monitor import beside
+from factory.show.report import recording_of
+from factory.simulation.simulation import Simulation
+from factory.support.resources import templates_folder
+from factory.support.settings import Settings
+from factory.timing.pool import part_pool
 from tests.bench.factories import cube, laid_out
 from tests.command_line import Terminal
 

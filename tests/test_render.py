@@ -20,15 +20,15 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 
 import factory
-from factory import gl
-from factory.errors import InputError, MissingError
-from factory.geometry import Mesh
-from factory.log import LogWriter, read_log
+from factory.geometry.solids import Mesh
 from factory.mjcf.mesh_files import corner_normals, face_normals, mesh_file
+from factory.record.log import LogWriter, read_log
 from factory.render import Film, Still, camera_named, check_output, render_log, still
 from factory.render.camera import Frame, fit, from_above, overview, towards
 from factory.render.video import VideoFile
-from factory.simulation import Simulation
+from factory.simulation.simulation import Simulation
+from factory.support import gl
+from factory.support.errors import InputError, MissingError
 
 ROOT = Path(__file__).parent.parent
 PAPER = ROOT / "examples" / "paper.pag"

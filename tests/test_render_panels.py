@@ -10,12 +10,11 @@ import numpy as np
 import pytest
 
 import factory
-from factory.errors import InputError
 from factory.lang import read_pag
-from factory.log import Log, LogWriter, read_log
-from factory.monitor.record import recorded_subject
-from factory.monitor.subject import subject_of_run
 from factory.pipeline import all_templates
+from factory.record.log import Log, LogWriter, read_log
+from factory.record.monitor.record import recorded_subject
+from factory.record.monitor.subject import subject_of_run
 from factory.render import Film, camera_named, panels_named, render_log
 from factory.render.area import PANELS, shared
 from factory.render.camera import Frame, orbit
@@ -31,7 +30,8 @@ from factory.render.replay import moment_of
 from factory.render.rows import NEIGHBOURS, Rows, neighbourhood
 from factory.render.subject import Snapshot
 from factory.render.title import FADES, SHOWN, draw_title, strength
-from factory.simulation import Simulation
+from factory.simulation.simulation import Simulation
+from factory.support.errors import InputError
 from tests.command_line import PAPER, Terminal, files_in
 from tests.strategies import random_pag_text
 from tests.test_render import needs_gl

@@ -9,13 +9,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from factory.errors import InputError
-from factory.factory import Factory
 from factory.nets.gears import Gear, GearNet
 from factory.nets.history import firings, legal_marking
 from factory.nets.marked import marked, play
 from factory.nets.replay import replay
 from factory.nets.threaded import ThreadedNet
+from factory.plant.factory import Factory
+from factory.support.errors import InputError
 from tests.net_values import fair_run, legal_markings, net_from, random_legal_marking
 from tests.pag_values import factories, factory_of, paper
 

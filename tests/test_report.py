@@ -14,22 +14,22 @@ import numpy as np
 import pytest
 
 import factory
-from factory.analysis import Timing, analyse
-from factory.analysis.recorded import logged_record
-from factory.errors import InputError
-from factory.log import LogWriter, read_log
-from factory.log.blocks import LENGTH, MAGIC
-from factory.pag import PAG, Assembly
-from factory.report import page, recording_of
-from factory.report.fidelity import fidelity
-from factory.report.floor import floor_plan
-from factory.report.links import labels_of, links
-from factory.report.measured import measured
-from factory.report.packing import json_inside
-from factory.report.page import SCRIPTS
-from factory.report.tree import assembly_tree
-from factory.report.words import proof
-from factory.simulation import Simulation
+from factory.problem.pag import PAG, Assembly
+from factory.record.log import LogWriter, read_log
+from factory.record.log.blocks import LENGTH, MAGIC
+from factory.show.report import page, recording_of
+from factory.show.report.fidelity import fidelity
+from factory.show.report.floor import floor_plan
+from factory.show.report.links import labels_of, links
+from factory.show.report.measured import measured
+from factory.show.report.packing import json_inside
+from factory.show.report.page import SCRIPTS
+from factory.show.report.tree import assembly_tree
+from factory.show.report.words import proof
+from factory.simulation.simulation import Simulation
+from factory.study.analysis import Timing, analyse
+from factory.study.analysis.recorded import logged_record
+from factory.support.errors import InputError
 from tests.command_line import PAPER, Terminal, files_in
 from tests.layout_values import paper_layout
 from tests.report_values import Page

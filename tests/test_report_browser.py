@@ -12,9 +12,9 @@ from typing import Any
 import pytest
 
 import factory
-from factory.log import LogWriter, read_log
-from factory.report import page, recording_of
-from factory.simulation import Simulation
+from factory.record.log import LogWriter, read_log
+from factory.show.report import page, recording_of
+from factory.simulation.simulation import Simulation
 from tests.command_line import PAPER
 from tests.test_report import EVIL, altered
 

@@ -13,11 +13,11 @@ from pathlib import Path
 
 import pytest
 
-from factory.errors import MissingError
-from factory.gl import probe
-from factory.log import MAGIC, LogWriter, read_log
-from factory.log.blocks import LENGTH
-from factory.simulation import Simulation
+from factory.record.log import MAGIC, LogWriter, read_log
+from factory.record.log.blocks import LENGTH
+from factory.simulation.simulation import Simulation
+from factory.support.errors import MissingError
+from factory.support.gl import probe
 from tests.command_line import PAPER, ROOT
 from tests.fidelity.products import layout
 
@@ -29,7 +29,7 @@ print(digest(simulated()))
 
 LOGGED = """
 import sys
-from factory.log import LogWriter
+from factory.record.log import LogWriter
 from tests.test_reproducible import simulated
 made = simulated(1000000)
 def tell(world, supervisor):

@@ -10,16 +10,16 @@ from typing import Any
 import numpy as np
 import pytest
 
-from factory import supervisor
 from factory.control.governor import follow
-from factory.engine import mujoco
 from factory.mjcf.model import GRAVITY, HEAD_MASS
-from factory.settings import Settings
-from factory.simulation import Simulation
-from factory.world import physics
-from factory.world.courses import Course, Courses
-from factory.world.rewind import Rewind, tell_who_is_awake
-from factory.world.setpoints import INPUTS, Told
+from factory.simulation import supervisor
+from factory.simulation.mujoco import world as physics
+from factory.simulation.mujoco.drives import INPUTS, Told
+from factory.simulation.mujoco.fast.checkpoint import Rewind, tell_who_is_awake
+from factory.simulation.mujoco.fast.reference_cache import Course, Courses
+from factory.simulation.simulation import Simulation
+from factory.support.engine import mujoco
+from factory.support.settings import Settings
 from tests.bench.replaying import stepping
 from tests.test_fuse import layout_of
 from tests.test_vicinity import gone_wild, ready, states

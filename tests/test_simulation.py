@@ -10,15 +10,15 @@ import numpy as np
 import pytest
 
 import factory
-from factory.distributed import Link
-from factory.layout.plan import Layout
+from factory.layout.layout import Layout
 from factory.nets.history import firings, legal_marking
 from factory.nets.replay import replay
 from factory.pipeline import all_templates
-from factory.programs import program_of, write_program
-from factory.settings import Settings
-from factory.simulation import Simulation
-from factory.trace import Event, busy_times
+from factory.plant.programs import program_of, write_program
+from factory.simulation.distributed import Link
+from factory.simulation.run import Event, busy_times
+from factory.simulation.simulation import Simulation
+from factory.support.settings import Settings
 from tests.bench.factories import laid_out as floor_of
 from tests.test_compiler import PAPER, compiled
 

@@ -18,32 +18,32 @@ from layout_values import STYLES, random_layout
 from pag_values import SHAPES
 
 import factory
-from factory import simulation as simulations
-from factory.analysis import Timing
-from factory.analysis.analysing import operation_slacks
-from factory.analysis.flow import flow
-from factory.analysis.timed import timed_net
-from factory.analysis.timing import Change
-from factory.control import staging
 from factory.control.mode import Mode
-from factory.control.plan import operation_modes, robot_limits
-from factory.control.staging import stages
 from factory.layout.bounds import cycle_time_bound
 from factory.layout.clearance import certify
 from factory.layout.dimensions import Clearance
 from factory.layout.durations import Pace, gear_times, operation_times
+from factory.layout.layout import Layout
 from factory.layout.optimising import first_feasible, optimised
-from factory.layout.plan import Layout
-from factory.monitor import beside
+from factory.modes import staging
+from factory.modes.modes import operation_modes, robot_limits
+from factory.modes.staging import stages
 from factory.nets.cycle_ratio import max_cycle_ratio
 from factory.nets.firing import earliest_firings
 from factory.nets.marked import MarkedNet
 from factory.nets.petri import PetriNet, Place, Transition
-from factory.nets.timing import cycle_time
-from factory.pag import NOPART
-from factory.prediction import operation_delays, predict, ways_ahead
-from factory.settings import Settings
-from factory.simulation import Simulation
+from factory.problem.pag import NOPART
+from factory.record.monitor import beside
+from factory.simulation import simulation as simulations
+from factory.simulation.simulation import Simulation
+from factory.study.analysis import Timing
+from factory.study.analysis.analysing import operation_slacks
+from factory.study.analysis.flow import flow
+from factory.study.analysis.timed import timed_net
+from factory.study.analysis.timing import Change
+from factory.support.settings import Settings
+from factory.timing.cycle_time import cycle_time
+from factory.timing.prediction import operation_delays, predict, ways_ahead
 from tests.command_line import PAPER, ROOT, Terminal
 
 STAGED, STILL = Settings(stage=1), Settings()

@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 
 from factory.control.navigation import Bundle
-from factory.disturbance import Gain, disturb
-from factory.settings import LOOK, MOST, Settings
-from factory.simulation import Simulation
-from factory.trace import Event, PhysicsFigures
-from factory.world import gaps, outfeed
-from factory.world.physics import MujocoWorld
+from factory.simulation.disturbance import Gain, disturb
+from factory.simulation.mujoco import gaps, outfeed
+from factory.simulation.mujoco.world import MujocoWorld
+from factory.simulation.run import Event, PhysicsFigures
+from factory.simulation.simulation import Simulation
+from factory.support.settings import LOOK, MOST, Settings
 from tests.bench.replaying import stepping
 from tests.command_line import PAPER, Terminal
 from tests.test_fuse import layout_of

@@ -22,18 +22,18 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import stats
 
-from factory.errors import InputError, MissingError, RunError
 from factory.layout.embedding import lay_out
 from factory.pipeline import read
-from factory.settings import Settings
-from factory.simulation import Simulation
-from factory.sweep import Recipe, local, points, read_axes, summarise, sweeping
-from factory.sweep.grid import Point, Value
-from factory.sweep.kept import COLUMNS
-from factory.sweep.local import run_local
-from factory.sweep.store import Store
-from factory.sweep.sweeping import sweep
-from factory.sweep.work import FIGURES, Outcome, Runner
+from factory.simulation.simulation import Simulation
+from factory.study.sweep import Recipe, local, points, read_axes, summarise, sweeping
+from factory.study.sweep.grid import Point, Value
+from factory.study.sweep.kept import COLUMNS
+from factory.study.sweep.local import run_local
+from factory.study.sweep.store import Store
+from factory.study.sweep.sweeping import sweep
+from factory.study.sweep.work import FIGURES, Outcome, Runner
+from factory.support.errors import InputError, MissingError, RunError
+from factory.support.settings import Settings
 from tests.command_line import PAPER, ROOT, Terminal, files_in
 from tests.deadly import Deadly, Stillborn
 
@@ -547,7 +547,7 @@ def test_a_cluster_survives_the_death_of_a_worker(
 ) -> None:
     from distributed import Client
 
-    from factory.sweep.cluster import run_dask
+    from factory.study.sweep.cluster import run_dask
 
     place, (_, first, _) = cluster
     with Client(place.replace("dask", "tcp"), set_as_default=False) as client:
@@ -569,7 +569,7 @@ def test_a_cluster_survives_the_death_of_a_worker(
 
 def test_nobody_at_the_address(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip("distributed")
-    from factory.sweep import cluster
+    from factory.study.sweep import cluster
 
     monkeypatch.setattr(cluster, "PATIENCE", "0.3s")
     place = f"dask://127.0.0.1:{free_port()}"

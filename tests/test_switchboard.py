@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from factory.factory import Operation
-from factory.simulation import Simulation
-from factory.world import vicinity as vicinity_of_what_moves
-from factory.world.stock import Stock
-from factory.world.switchboard import AWAKE, FRESH, Switchboard
+from factory.plant.factory import Operation
+from factory.simulation.mujoco.fast import broad_phase as vicinity_of_what_moves
+from factory.simulation.mujoco.parts import Stock
+from factory.simulation.mujoco.welds import AWAKE, FRESH, Switchboard
+from factory.simulation.simulation import Simulation
 from tests.test_vicinity import layout, states
 
 

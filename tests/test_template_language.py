@@ -11,9 +11,9 @@ from hypothesis import strategies as st
 from strategies import mutations
 from strategies import templates as random_templates
 
-from factory.errors import Diagnostic, InputError
 from factory.lang import load_templates, read_template, write_template
-from factory.template import Law, Point, Template
+from factory.problem.template import Law, Point, Template
+from factory.support.errors import Diagnostic, InputError
 
 HERE = Path(__file__).parent
 BROKEN = HERE / "broken"

@@ -10,12 +10,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from factory.factory import Factory
-from factory.nets.general import analyse
+from factory.foreign_nets.general import analyse
 from factory.nets.history import firings
 from factory.nets.marked import MarkedNet, marked, play
 from factory.nets.petri import Marking
 from factory.nets.verify import verify
+from factory.plant.factory import Factory
 from tests.net_values import (
     explored,
     fair_run,

@@ -8,11 +8,11 @@ from xml.etree import ElementTree
 
 import pytest
 
-from factory.layout.plan import Layout
-from factory.log import read_log
+from factory.layout.layout import Layout
 from factory.mjcf import loading
 from factory.mjcf.unseen import leave_out_what_is_shown
-from factory.simulation import Simulation, physical_model
+from factory.record.log import read_log
+from factory.simulation.simulation import Simulation, physical_model
 from tests.command_line import PAPER, Terminal
 from tests.test_lift import FENCE
 from tests.test_simulation import laid_out

@@ -9,13 +9,13 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from factory.factory import Factory
-from factory.nets.explore import explore
+from factory.foreign_nets.explore import explore
+from factory.foreign_nets.general import analyse
 from factory.nets.gears import Gear, GearNet
-from factory.nets.general import analyse
 from factory.nets.marked import MarkedNet, marked
 from factory.nets.verdict import Verdict, Witness
 from factory.nets.verify import verify
+from factory.plant.factory import Factory
 from tests.net_values import (
     crossed_twice,
     doubled_token,

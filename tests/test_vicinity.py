@@ -10,19 +10,20 @@ from typing import Any
 import numpy as np
 import pytest
 
-from factory.disturbance import Push, disturb
-from factory.disturbance.hands import Hands
-from factory.engine import mujoco
-from factory.fidelity.shadow import Shadow
-from factory.layout.plan import Layout
-from factory.settings import MOST, Settings
-from factory.simulation import Simulation
-from factory.world import stock, vicinity
-from factory.world.contacts import NOBODY
-from factory.world.loads import Load, loads
-from factory.world.reach import CELL, Reach
-from factory.world.stock import Stock
-from factory.world.vicinity import CALM, SWAY, Vicinity
+from factory.layout.layout import Layout
+from factory.simulation.disturbance import Push, disturb
+from factory.simulation.disturbance.hands import Hands
+from factory.simulation.mujoco import parts as stock
+from factory.simulation.mujoco.contacts import NOBODY
+from factory.simulation.mujoco.fast import broad_phase as vicinity
+from factory.simulation.mujoco.fast.broad_phase import CALM, SWAY, Vicinity
+from factory.simulation.mujoco.fast.swept_boxes import CELL, Reach
+from factory.simulation.mujoco.loads import Load, loads
+from factory.simulation.mujoco.parts import Stock
+from factory.simulation.simulation import Simulation
+from factory.study.fidelity.shadow import Shadow
+from factory.support.engine import mujoco
+from factory.support.settings import MOST, Settings
 from tests.bench.factories import balanced
 from tests.bench.factories import laid_out as floor_of
 from tests.bench.replaying import stepping

@@ -8,8 +8,8 @@ import pytest
 
 from factory.control import Bundle
 from factory.control.mode import Array, Truth
-from factory.settings import Settings
-from factory.simulation import Simulation
+from factory.simulation.simulation import Simulation
+from factory.support.settings import Settings
 from tests.test_vicinity import layout
 
 RUNS: list[tuple[str, dict[str, Any]]] = [

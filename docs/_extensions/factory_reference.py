@@ -14,15 +14,15 @@ from typing import TYPE_CHECKING, Any
 import click
 from reference_text import code, definition, heading, prose, table
 
-from factory.assets import mjcf_folder
-from factory.cli import cli
-from factory.defaults import OPTIONS
-from factory.explanations import codes, explain
+from factory.commands import cli
 from factory.export import exporters
 from factory.lang.values import GEOMETRY
 from factory.pipeline import all_templates
-from factory.robots import load_catalogue
-from factory.settings import RANGES, Settings
+from factory.problem.robot_types import load_catalogue
+from factory.support.explanations import codes, explain
+from factory.support.resources import mjcf_folder
+from factory.support.settings import RANGES, Settings
+from factory.support.user_defaults import OPTIONS
 
 if TYPE_CHECKING:
     from sphinx.application import Sphinx
@@ -32,9 +32,10 @@ PACKAGE = ROOT / "factory"
 
 CALLS = ("load_pag", "compile", "verify", "lay_out", "run")
 VALUES = (
-    *("settings.Settings", "pag.PAG", "pag.Assembly", "template.Template", "factory.Factory"),
-    *("factory.Operation", "factory.Robot", "nets.verdict.Verdict", "layout.plan.Layout"),
-    *("trace.Run", "trace.PhysicsFigures"),
+    *("support.settings.Settings", "problem.pag.PAG", "problem.pag.Assembly"),
+    *("problem.template.Template", "plant.factory.Factory", "plant.factory.Operation"),
+    *("plant.factory.Robot", "nets.verdict.Verdict", "layout.layout.Layout"),
+    *("simulation.run.Run", "simulation.run.PhysicsFigures"),
 )
 """What the calls take and give."""
 
@@ -147,8 +148,8 @@ def diagnostics() -> str:
 
 def log_format() -> str:
     """The log of a run, as the package that writes and reads it describes it."""
-    from factory import log
-    from factory.log import blocks
+    from factory.record import log
+    from factory.record.log import blocks
 
     return "\n\n".join(
         [
@@ -157,7 +158,7 @@ def log_format() -> str:
             heading(2, "Blocks"),
             definition(docstring(blocks)),
             "`factory export LOG --format csv`, `parquet`, `mcap` or `usd` makes other files of "
-            "it; `factory.log.read_log` reads it in Python.",
+            "it; `factory.record.log.read_log` reads it in Python.",
         ]
     )
 
@@ -199,7 +200,7 @@ def python() -> str:
     """The public names of `factory`, by autodoc."""
     calls = [f".. autofunction:: factory.{name}" for name in CALLS]
     values = [f".. autoclass:: factory.{name}" for name in VALUES]
-    errors = [f".. autoclass:: factory.errors.{name}" for name in ERRORS]
+    errors = [f".. autoclass:: factory.support.errors.{name}" for name in ERRORS]
     return "\n\n".join(
         [
             heading(1, "Python"),

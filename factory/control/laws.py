@@ -14,8 +14,8 @@ from types import MappingProxyType
 import numpy as np
 
 from factory.control.mode import Array, Index, Mode, lock, lock_index
-from factory.errors import Diagnostic, InputError, did_you_mean
-from factory.template import Point, Template
+from factory.problem.template import Point, Template
+from factory.support.errors import Diagnostic, InputError, did_you_mean
 
 
 @dataclass(frozen=True, slots=True, eq=False)

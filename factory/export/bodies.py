@@ -7,9 +7,9 @@ from collections.abc import Iterator
 import numpy as np
 
 from factory.export.subject import Subject
-from factory.geometry import Solid, rotation
-from factory.meshes import Mesh
-from factory.pag import PAG
+from factory.geometry.meshes import Mesh
+from factory.geometry.solids import Solid, rotation
+from factory.problem.pag import PAG
 
 ROUND = 64
 """Sides of a cylinder."""

@@ -11,7 +11,7 @@ from factory.export.swimlanes import owners_of
 from factory.export.views import pag_of, view_of
 from factory.nets.gears import GearNet
 from factory.nets.marked import MarkedNet, marked
-from factory.pag import PAG
+from factory.problem.pag import PAG
 
 FORMAT, TAKES, OF = "dot", "net", "net or tree"
 

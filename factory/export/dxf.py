@@ -9,13 +9,13 @@ from contextlib import contextmanager
 from typing import Any
 
 from factory.export.subject import Subject
-from factory.extras import optional
-from factory.factory import Factory
-from factory.geometry import Solid
+from factory.geometry.solids import Solid
 from factory.layout.dimensions import ARM_WIDTH, CARRIAGE
 from factory.layout.drawing import outline
-from factory.layout.plan import Box, Extent, Layout, Point2
+from factory.layout.layout import Box, Extent, Layout, Point2
 from factory.layout.sweeps import ALWAYS, PAYLOAD_BODY, piles, regions
+from factory.plant.factory import Factory
+from factory.support.extras import optional
 
 FORMAT, TAKES = "dxf", "pag"
 

@@ -6,12 +6,12 @@ from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from factory.errors import InputError
 from factory.export.subject import Subject
-from factory.factory import Factory
-from factory.log import Log
-from factory.log.blocks import bad_log
-from factory.log.recompiled import factory_of
+from factory.plant.factory import Factory
+from factory.record.log import Log
+from factory.record.log.blocks import bad_log
+from factory.record.log.recompiled import factory_of
+from factory.support.errors import InputError
 
 
 @dataclass(frozen=True, slots=True)

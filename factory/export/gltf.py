@@ -14,10 +14,10 @@ import numpy as np
 
 from factory.export.bodies import triangles, wanted
 from factory.export.subject import Subject
-from factory.geometry import Product, Solid, rotation
-from factory.meshes import Array, Indices, Mesh
+from factory.geometry.meshes import Array, Indices, Mesh
+from factory.geometry.solids import Product, Solid, rotation
 from factory.mjcf.mesh_files import corner_normals
-from factory.pag import PAG
+from factory.problem.pag import PAG
 
 FORMAT, TAKES, BINARY, FOLDER, OF = "gltf", "pag", True, True, "a label"
 

@@ -16,12 +16,12 @@ from factory.control.mode import Truth
 from factory.export.events import Row, compiled, rows
 from factory.export.motion import Motion, motion_of
 from factory.export.subject import Subject
-from factory.extras import optional
-from factory.log import Log
-from factory.meshes import Array
+from factory.geometry.meshes import Array
+from factory.record.log import Log
+from factory.support.extras import optional
 
 if TYPE_CHECKING:
-    from factory.engine import mujoco
+    from factory.support.engine import mujoco
 
 FORMAT, TAKES, BINARY = "mcap", "log", True
 
@@ -111,7 +111,7 @@ class _Recorder:
             self.scene.log(message, log_time=_nanoseconds(time))
 
     def _joints(self, time: float, row: int) -> None:
-        from factory.engine import mujoco
+        from factory.support.engine import mujoco
 
         m, found = self.motion.m, []
         for joint in range(m.njnt):
@@ -149,7 +149,7 @@ class Looks:
 
     def of(self, body: int) -> dict[str, list[Any]]:
         """The primitives of a body by the field of the entity that they belong to."""
-        from factory.engine import mujoco
+        from factory.support.engine import mujoco
 
         found: dict[str, list[Any]] = {"cubes": [], "cylinders": [], "spheres": [], "triangles": []}
         for geom in self._drawn(body):
@@ -175,7 +175,7 @@ class Looks:
         return found
 
     def _drawn(self, body: int) -> Iterator[int]:
-        from factory.engine import mujoco
+        from factory.support.engine import mujoco
 
         first = int(self.m.body_geomadr[body])
         for geom in range(first, first + int(self.m.body_geomnum[body])):

@@ -9,14 +9,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from factory.control.mode import Truth
-from factory.errors import Diagnostic, InputError
 from factory.export.subject import Subject
-from factory.log import Log
-from factory.meshes import Array, Indices
+from factory.geometry.meshes import Array, Indices
 from factory.mjcf.parts import HIDDEN
+from factory.record.log import Log
+from factory.support.errors import Diagnostic, InputError
 
 if TYPE_CHECKING:
-    from factory.engine import mujoco
+    from factory.support.engine import mujoco
 
 RATE = 50.0
 """Frames a second, at most."""
@@ -61,8 +61,8 @@ class Motion:
 
 def motion_of(subject: Subject) -> Motion:
     """The motion of a log. Raises InputError for a log of the ideal world or one without a tick."""
-    from factory.engine import mujoco
-    from factory.log.model import model_of
+    from factory.record.log.model import model_of
+    from factory.support.engine import mujoco
 
     log = subject.log
     if not log.xml:
@@ -87,7 +87,7 @@ def motion_of(subject: Subject) -> Motion:
 
 def _relative(d: mujoco.MjData, parent: int, body: int, position: Array, turn: Array) -> None:
     """Writes the pose of a body relative to its parent."""
-    from factory.engine import mujoco
+    from factory.support.engine import mujoco
 
     back = np.zeros(4)
     mujoco.mju_negQuat(back, d.xquat[parent])

@@ -7,7 +7,7 @@ from dataclasses import asdict
 
 from factory.export.events import COLUMNS, compiled, rows
 from factory.export.subject import Subject
-from factory.extras import optional
+from factory.support.extras import optional
 
 FORMAT, TAKES, BINARY = "parquet", "log", True
 

@@ -12,15 +12,15 @@ import re
 from collections.abc import Iterable, Iterator
 from xml.sax.saxutils import escape, quoteattr
 
-from factory.errors import Position
-from factory.export.pnml_reader import NET_TYPE, PNML, TOOL, VERSION, read_pnml
 from factory.export.subject import Subject
 from factory.export.swimlanes import Swimlanes, swimlanes
-from factory.layout.plan import Point2
+from factory.foreign_nets.pnml_reader import NET_TYPE, PNML, TOOL, VERSION, read_pnml
+from factory.layout.layout import Point2
 from factory.nets.gears import Gear, GearNet
 from factory.nets.marked import MarkedNet, marked
 from factory.nets.petri import Place, Transition
 from factory.nets.threaded import Redistribution
+from factory.support.errors import Position
 
 __all__ = ["FORMAT", "export", "read_pnml", "write_pnml"]
 

@@ -16,11 +16,11 @@ from functools import cached_property
 from math import ceil
 
 from factory.control.mode import REST, Mode
-from factory.control.plan import operation_modes
 from factory.export.subject import Subject
-from factory.layout.plan import Layout
-from factory.pag import NOPART
-from factory.programs import Program, Step, program_of
+from factory.layout.layout import Layout
+from factory.modes.modes import operation_modes
+from factory.plant.programs import Program, Step, program_of
+from factory.problem.pag import NOPART
 
 FORMAT, TAKES = "st", "pag"
 

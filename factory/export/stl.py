@@ -7,7 +7,7 @@ from collections.abc import Mapping
 
 from factory.export.bodies import joined, parts_of, placed, wanted
 from factory.export.subject import Subject
-from factory.meshes import Mesh
+from factory.geometry.meshes import Mesh
 from factory.mjcf.mesh_files import stl
 
 FORMAT, TAKES, BINARY, FOLDER, OF = "stl", "pag", True, True, "a label"

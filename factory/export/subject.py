@@ -6,17 +6,17 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 
-from factory.checking import is_net
-from factory.errors import Diagnostic, InputError, did_you_mean
-from factory.factory import Factory
-from factory.geometry import Product
-from factory.layout.plan import Layout
-from factory.log import Log, is_log, read_log
+from factory.commands.check_product import is_net
+from factory.geometry.solids import Product
+from factory.layout.layout import Layout
+from factory.layout.request import Ground
 from factory.nets.gears import GearNet
 from factory.nets.marked import MarkedNet
 from factory.pipeline import Source, read
-from factory.planning import Ground
-from factory.settings import Settings
+from factory.plant.factory import Factory
+from factory.record.log import Log, is_log, read_log
+from factory.support.errors import Diagnostic, InputError, did_you_mean
+from factory.support.settings import Settings
 
 SOURCES = {"net": ("a PAG", "a net in PNML"), "pag": ("a PAG",), "log": ("a log",)}
 """What an exporter can take, as people call it."""
@@ -80,7 +80,7 @@ class Subject:
         """The factory's net, or that of a PNML file. Raises InputError."""
         if self.kind == "a PAG":
             return self.factory.net
-        from factory.export.pnml_reader import read_pnml
+        from factory.foreign_nets.pnml_reader import read_pnml
         from factory.lang.source import read_text
 
         return read_pnml(read_text(self.file), str(self.file))

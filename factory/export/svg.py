@@ -11,7 +11,7 @@ from factory.export.palette import colour
 from factory.export.subject import Subject
 from factory.export.swimlanes import LEFT, Swimlanes, owners_of, swimlanes
 from factory.export.views import pag_of, view_of
-from factory.layout.plan import Point2
+from factory.layout.layout import Point2
 from factory.layout.svg import circle, clean, label, line, rectangle, text
 from factory.nets.marked import MarkedNet, marked
 

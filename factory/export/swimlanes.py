@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from factory.layout.plan import Point2
+from factory.layout.layout import Point2
 from factory.nets.marked import MarkedNet, token_free
 
 PITCH, LANE = 120.0, 64.0

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from factory.geometry import colour
-from factory.layout.plan import Point2
+from factory.geometry.solids import colour
+from factory.layout.layout import Point2
 from factory.layout.svg import clean, number, rectangle, shortened, text
-from factory.pag import PAG, Assembly
+from factory.problem.pag import PAG, Assembly
 
 ROW, COLUMN, BOX, EDGE = 34.0, 190.0, 120.0, 24.0
 """Height of a row, distance of columns, width of a box, margin."""

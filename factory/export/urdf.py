@@ -16,16 +16,16 @@ from xml.etree.ElementTree import Element
 import numpy as np
 
 from factory.export.subject import Subject
-from factory.geometry import rotation
-from factory.layout.plan import Layout
-from factory.meshes import Array, Mesh
+from factory.geometry.meshes import Array, Mesh
+from factory.geometry.solids import rotation
+from factory.layout.layout import Layout
 from factory.mjcf import names
 from factory.mjcf.elements import add, exact, numbers
 from factory.mjcf.mesh_files import stl
-from factory.simulation import physical_model
+from factory.simulation.simulation import physical_model
 
 if TYPE_CHECKING:
-    from factory.engine import mujoco
+    from factory.support.engine import mujoco
 
 FORMAT, TAKES = "urdf", "pag"
 
@@ -73,7 +73,7 @@ class _Writer:
         return '<?xml version="1.0"?>\n' + ElementTree.tostring(root, encoding="unicode") + "\n"
 
     def _link(self, root: Element, body: int) -> None:
-        from factory.engine import mujoco
+        from factory.support.engine import mujoco
 
         m = self.m
         link = add(root, "link", name=m.body(body).name)
@@ -100,7 +100,7 @@ class _Writer:
         add(inertial, "inertia", **{axis: exact([i]) for axis, i in moments}, **products)
 
     def _joint(self, root: Element, body: int) -> None:
-        from factory.engine import mujoco
+        from factory.support.engine import mujoco
 
         m, name = self.m, self.m.body(body).name
         joint = m.body_jntadr[body]
@@ -123,7 +123,7 @@ class _Writer:
 
     def _shapes(self, geom: int, colliding: bool) -> Iterator[tuple[Array, Element]]:
         """The shapes of a geom, and how far along its axis each is."""
-        from factory.engine import mujoco
+        from factory.support.engine import mujoco
 
         m, size, here = self.m, self.m.geom_size[geom], np.zeros(3)
         kind = mujoco.mjtGeom(m.geom_type[geom])
@@ -199,7 +199,7 @@ def roll_pitch_yaw(quaternion: Array) -> tuple[float, float, float]:
 
 
 def _turned(quaternion: Array, vector: Array) -> Array:
-    from factory.engine import mujoco
+    from factory.support.engine import mujoco
 
     found: Any = np.zeros(3)
     mujoco.mju_rotVecQuat(found, np.asarray(vector, float), np.asarray(quaternion, float))

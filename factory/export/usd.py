@@ -11,8 +11,8 @@ import numpy as np
 
 from factory.export.motion import Motion, motion_of
 from factory.export.subject import Subject
-from factory.extras import optional
-from factory.log import Log
+from factory.record.log import Log
+from factory.support.extras import optional
 
 if TYPE_CHECKING:
     pass
@@ -40,7 +40,7 @@ def export(subject: Subject) -> Mapping[str, bytes]:
 
 def _record(motion: Motion, log: Log, folder: str) -> None:
     """Every frame, by MuJoCo's exporter."""
-    from factory.engine import mujoco
+    from factory.support.engine import mujoco
 
     exporter = optional("mujoco.usd.exporter", "usd-core", "USD", "usd")
     m, d = motion.m, mujoco.MjData(motion.m)

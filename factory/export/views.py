@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from factory.errors import Diagnostic, InputError
 from factory.export.subject import Subject
-from factory.pag import PAG
+from factory.problem.pag import PAG
+from factory.support.errors import Diagnostic, InputError
 
 VIEWS = ["net", "tree"]
 

@@ -4,6 +4,6 @@ Each reader makes drafts of a file; `assembling` makes the PAG of them. Nothing 
 an `Imported` holds every file that is to be, by its name in the output folder.
 """
 
-from factory.importing.bringing import Imported, Options, import_product
+from factory.importing.importer import Imported, Options, import_product
 
 __all__ = ["Imported", "Options", "import_product"]

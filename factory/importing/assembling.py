@@ -8,7 +8,7 @@ from typing import Literal
 
 from factory.importing.draft import MATE, Draft, Faults, postorder
 from factory.importing.labels import Labels
-from factory.pag import PAG, Assembly
+from factory.problem.pag import PAG, Assembly
 
 Mates = Literal["many", "chain"]
 """How three inputs and more are mated: in one operation, or two at a time in their order."""

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 
-from factory.errors import Diagnostic, InputError
 from factory.importing.bill_rows import Row, Table
 from factory.importing.draft import MATE, MOST_NODES, PART, Draft, Faults, too_many
 from factory.importing.part_maker import PartMaker, fits
@@ -13,7 +12,8 @@ from factory.importing.tree_file import mesh_name
 from factory.lang.source import Source, quoted
 from factory.lang.values import GEOMETRY
 from factory.lang.words import number
-from factory.pag import Value
+from factory.problem.pag import Value
+from factory.support.errors import Diagnostic, InputError
 
 MOST_COPIES = 10_000
 """The greatest quantity of a row."""

@@ -7,9 +7,9 @@ import re
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
-from factory.errors import Diagnostic, InputError, Position
 from factory.importing.draft import Faults
 from factory.lang.source import Source, quoted
+from factory.support.errors import Diagnostic, InputError, Position
 
 COLUMNS = {
     "level": ("level", "lvl", "indent"),

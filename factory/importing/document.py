@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any, Literal
 
-from factory.errors import Diagnostic, InputError, Position
 from factory.lang.source import Source, quoted
+from factory.support.errors import Diagnostic, InputError, Position
 
 Kind = Literal["object", "list", "text", "number", "boolean", "null"]
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
-from factory.errors import Diagnostic, InputError, Position
 from factory.lang.source import Findings
-from factory.pag import Parameter
+from factory.problem.pag import Parameter
+from factory.support.errors import Diagnostic, InputError, Position
 
 PART, MATE = "atomic", "mate"
 

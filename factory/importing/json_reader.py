@@ -9,9 +9,9 @@ from typing import Any
 from lark import Lark, Token, Transformer
 from lark.exceptions import UnexpectedCharacters, UnexpectedInput, UnexpectedToken
 
-from factory.errors import InputError
 from factory.importing.document import Kind, Value, syntax_error
 from factory.lang.source import Source, quoted
+from factory.support.errors import InputError
 
 GRAMMAR = r"""
 ?start: value

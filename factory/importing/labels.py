@@ -8,7 +8,7 @@ from collections.abc import Iterable, Iterator, Sequence
 
 from factory.importing.draft import Draft
 from factory.lang.words import is_label
-from factory.pag import RESERVED
+from factory.problem.pag import RESERVED
 
 _FOREIGN = re.compile(r"[^\w.\-]+")
 _LONGEST = 80

@@ -7,11 +7,11 @@ from pathlib import Path, PurePosixPath
 
 import numpy as np
 
-from factory.errors import Position
 from factory.importing.draft import Faults
 from factory.importing.mesh_store import MeshStore
 from factory.lang.operations import MESHES
 from factory.lang.source import near_file, quoted
+from factory.support.errors import Position
 
 
 class MeshFolder:

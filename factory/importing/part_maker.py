@@ -6,13 +6,13 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from factory.errors import Position
 from factory.importing.draft import Faults
 from factory.importing.mesh_folder import MeshFolder
 from factory.importing.places import Place
 from factory.lang.source import quoted
 from factory.lang.values import SHAPES, Kind
-from factory.pag import Parameter, Value
+from factory.problem.pag import Parameter, Value
+from factory.support.errors import Position
 
 LENGTHS = ("scale", "pos", "box", "cylinder", "sphere")
 """What is in the unit of the file."""

@@ -6,9 +6,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from factory.geometry import rotation
-from factory.meshes import Array
-from factory.pag import Parameter
+from factory.geometry.meshes import Array
+from factory.geometry.solids import rotation
+from factory.problem.pag import Parameter
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -6,7 +6,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import PurePosixPath
 
-from factory.errors import did_you_mean
 from factory.importing.document import Value as Node
 from factory.importing.draft import MATE, MOST_NODES, PART, Draft, Faults, too_many
 from factory.importing.labels import label_of
@@ -15,7 +14,8 @@ from factory.importing.places import Place
 from factory.lang.operations import MESHES, Signature
 from factory.lang.source import quoted
 from factory.lang.values import GEOMETRY, SHAPES, Kind
-from factory.pag import Parameter, Value
+from factory.problem.pag import Parameter, Value
+from factory.support.errors import did_you_mean
 
 GROUP = ("name", "children", "operation", "parameters", "at", "quat")
 LEAF = ("name", "part", "at", *(name for name in GEOMETRY if name not in ("pos", "mesh")))

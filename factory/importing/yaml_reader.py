@@ -9,10 +9,10 @@ from __future__ import annotations
 
 from typing import Any
 
-from factory.errors import Diagnostic, InputError, MissingError, Position
 from factory.importing.document import Value, syntax_error
 from factory.lang.source import Source, quoted
 from factory.lang.words import is_number
+from factory.support.errors import Diagnostic, InputError, MissingError, Position
 
 _WORDS = {"true": True, "false": False, "null": None, "~": None, "": None}
 HINT = "one YAML document of mappings, sequences and scalars"

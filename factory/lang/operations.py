@@ -8,13 +8,13 @@ from dataclasses import dataclass, field
 
 from lark import Token
 
-from factory.errors import Position, did_you_mean
 from factory.lang.pag_syntax import Definition, Keyword
 from factory.lang.source import Findings, Source, near_file, quoted
 from factory.lang.values import GEOMETRY, SHAPES, Kind, ValueReader, kind_of
 from factory.lang.words import LABEL_HINT, is_label, is_number
-from factory.pag import RESERVED, Assembly, Parameter
-from factory.template import Template
+from factory.problem.pag import RESERVED, Assembly, Parameter
+from factory.problem.template import Template
+from factory.support.errors import Position, did_you_mean
 
 MESHES = (".obj", ".stl", ".ply", ".glb")
 

@@ -9,13 +9,13 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping
 
-from factory.collector import collector_paused
 from factory.lang.operations import AssemblyReader, signature
 from factory.lang.pag_syntax import draft_of
 from factory.lang.source import Findings, read_text, source_of
 from factory.lang.tree import TreeCheck, count_of, root_of
-from factory.pag import PAG
-from factory.template import Template
+from factory.problem.pag import PAG
+from factory.problem.template import Template
+from factory.support.collector import collector_paused
 
 
 @collector_paused()

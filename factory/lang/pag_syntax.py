@@ -16,14 +16,7 @@ from typing import Any, NamedTuple, cast
 from lark import Lark, Token, Transformer, UnexpectedInput
 
 from factory.lang.pag_lessons import FALLBACK, FALSE_ROOT, LESSONS
-from factory.lang.recovery import (
-    UNLAWFUL,
-    Lesson,
-    Stuck,
-    drive,
-    learn,
-    unlawful_words,
-)
+from factory.lang.recovery import UNLAWFUL, Lesson, Stuck, drive, learn, unlawful_words
 from factory.lang.source import Findings, Source, quoted
 
 _SIGN_OR_WORD = re.compile(r"[=(),]|[^\s=(),]+")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from factory.pag import PAG, Assembly, Value
+from factory.problem.pag import PAG, Assembly, Value
 
 
 def write_pag(pag: PAG) -> str:

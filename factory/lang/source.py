@@ -8,8 +8,8 @@ from pathlib import Path
 
 from lark import Token
 
-from factory.errors import Diagnostic, InputError, Position, did_you_mean
-from factory.files import LOG
+from factory.support.errors import Diagnostic, InputError, Position, did_you_mean
+from factory.support.files import LOG
 
 FILES = 1000  # at most so many names of a folder are compared with a missing one
 

@@ -8,13 +8,13 @@ from collections.abc import Mapping, Sequence
 
 from lark import Token
 
-from factory.errors import Position, did_you_mean
 from factory.lang.source import Findings, Source, quoted
 from factory.lang.template_syntax import Defaults, Labels, RawLaw, TemplateDraft, Words
 from factory.lang.values import GEOMETRY, ValueReader
 from factory.lang.words import LABEL_HINT, is_label, is_number, number
-from factory.pag import NOPART, RESERVED, Value
-from factory.template import Law, Point, Template
+from factory.problem.pag import NOPART, RESERVED, Value
+from factory.problem.template import Law, Point, Template
+from factory.support.errors import Position, did_you_mean
 
 _POINT = re.compile(r"([ABS])([0-9]+)(?:([+-])([0-9.]*(?:[eE][+-]?[0-9]+)?)r)?")
 _VARIABLE = re.compile(r"LAB([1-9][0-9]{0,8})")

@@ -12,12 +12,12 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from types import MappingProxyType
 
-from factory.errors import Diagnostic, InputError, Position, did_you_mean
 from factory.lang.source import Findings, quoted, read_text, source_of
 from factory.lang.template_checks import TemplateMaker
 from factory.lang.template_syntax import template_draft_of
-from factory.pag import NOPART
-from factory.template import Template
+from factory.problem.pag import NOPART
+from factory.problem.template import Template
+from factory.support.errors import Diagnostic, InputError, Position, did_you_mean
 
 Folder = str | os.PathLike[str]
 

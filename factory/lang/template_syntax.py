@@ -14,10 +14,10 @@ from typing import Any, NamedTuple
 
 from lark import Lark, Token, Transformer
 
-from factory.errors import did_you_mean
 from factory.lang.pag_syntax import Vector
 from factory.lang.recovery import END, UNLAWFUL, Stuck, drive, unlawful_words
 from factory.lang.source import Findings, Source, quoted
+from factory.support.errors import did_you_mean
 
 Words = list[Token]
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from factory.lang.pag_writer import write_number, write_value
-from factory.template import Law, Point, Template
+from factory.problem.template import Law, Point, Template
 
 
 def write_template(template: Template) -> str:

@@ -10,11 +10,11 @@ from dataclasses import dataclass, field
 
 from lark import Token
 
-from factory.errors import Position, did_you_mean
 from factory.lang.pag_syntax import Draft
 from factory.lang.source import Findings, Source, quoted
 from factory.lang.words import LABEL_HINT, is_label, is_number
-from factory.pag import RESERVED, Assembly
+from factory.problem.pag import RESERVED, Assembly
+from factory.support.errors import Position, did_you_mean
 
 SUGGESTIONS = 20
 CANDIDATES = 1000

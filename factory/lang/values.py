@@ -9,11 +9,11 @@ from types import MappingProxyType
 
 from lark import Token
 
-from factory.errors import Position
 from factory.lang.pag_syntax import Vector, spelled
 from factory.lang.source import Findings, Source, quoted
 from factory.lang.words import is_number, number
-from factory.pag import Value
+from factory.problem.pag import Value
+from factory.support.errors import Position
 
 HUGE = 1e150  # a vector within is safe to normalise
 

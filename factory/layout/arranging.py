@@ -9,13 +9,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from factory.factory import Operation
+from factory.layout.layout import Box, Point2
 from factory.layout.outline import Outline
 from factory.layout.packing import Packing, Task
-from factory.layout.plan import Box, Point2
 from factory.layout.shapes import carriers, oriented_shape
 from factory.layout.sides import admitted
 from factory.layout.stretching import Shape, Sides, Stretched, up
+from factory.plant.factory import Operation
 
 Frame = tuple[Point2, Point2]
 """(u, t): how a robot lies on the floor."""

@@ -18,15 +18,15 @@ from __future__ import annotations
 from dataclasses import dataclass
 from math import sqrt
 
-from factory.factory import Factory, Operation
-from factory.geometry import Product
+from factory.geometry.solids import Product
 from factory.layout.clearance import TOLERANCE
 from factory.layout.dimensions import CARRIAGE
 from factory.layout.durations import Pace
-from factory.layout.plan import BESIDE
+from factory.layout.layout import BESIDE
 from factory.layout.shapes import carried, carriers, payload_boxes
 from factory.layout.stretching import ahead_of
-from factory.pag import NOPART
+from factory.plant.factory import Factory, Operation
+from factory.problem.pag import NOPART
 
 ROUNDED = 1e-3
 """Lanes are in whole millimetres: two are off by so much at most [m]."""

@@ -5,9 +5,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from factory.errors import Diagnostic, Position
-from factory.layout.plan import Point2
+from factory.layout.layout import Point2
 from factory.layout.sweeps import ALWAYS, KINDS, NAMES, Region
+from factory.support.errors import Diagnostic, Position
 
 MILLI = 1000.0
 

@@ -18,8 +18,6 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from factory.approach import MARGIN
-from factory.factory import Operation
 from factory.layout.certificate import Certificate, Fault, Shared
 from factory.layout.crossings import CHUNK, embedding_faults
 from factory.layout.dimensions import (
@@ -32,7 +30,7 @@ from factory.layout.dimensions import (
     PAYLOAD,
     PAYLOADS,
 )
-from factory.layout.plan import Box, Layout
+from factory.layout.layout import Box, Layout
 from factory.layout.sweeps import (
     ALWAYS,
     BOOM,
@@ -49,7 +47,9 @@ from factory.layout.sweeps import (
     regions,
     sweep,
 )
-from factory.pag import NOPART
+from factory.plant.approaches import MARGIN
+from factory.plant.factory import Operation
+from factory.problem.pag import NOPART
 
 Index = NDArray[np.intp]
 

@@ -16,8 +16,8 @@ import shapely
 from numpy.typing import NDArray
 
 from factory.layout.certificate import Fault
-from factory.layout.plan import Layout, Point2
-from factory.pag import NOPART
+from factory.layout.layout import Layout, Point2
+from factory.problem.pag import NOPART
 
 CHUNK = 512
 """Boxes looked up at a time, so that a heap of them all in one place takes no more memory."""

@@ -7,13 +7,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import floor
 
-from factory.factory import Factory
-from factory.geometry import Product
+from factory.geometry.solids import Product
 from factory.layout.dimensions import CARRIAGE, Clearance
-from factory.layout.plan import Box, Extent, Guidepath, Layout, Point2
+from factory.layout.layout import Box, Extent, Guidepath, Layout, Point2
 from factory.layout.shapes import carriers
 from factory.layout.stretching import Shape, Sides, Stretched, up
 from factory.layout.sweeps import ALWAYS, KINDS, OUTFEED, Region, hull, piles, regions
+from factory.plant.factory import Factory
 
 SHED = 0.1
 """Length of the open part of the outfeed beyond the product, and of what its end has to spare

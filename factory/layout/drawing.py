@@ -11,10 +11,10 @@ from math import floor
 
 import numpy as np
 
-from factory.geometry import Solid
+from factory.geometry.solids import Solid
 from factory.layout.dimensions import ARM_WIDTH, CARRIAGE
+from factory.layout.layout import Box, Extent, Guidepath, Layout, Point2
 from factory.layout.lettering import Lettering
-from factory.layout.plan import Box, Extent, Guidepath, Layout, Point2
 from factory.layout.sheet import Sheet
 from factory.layout.svg import circle, clean, label, line, number, polygon, rectangle
 from factory.layout.sweeps import ALWAYS, PAYLOAD_BODY, piles, regions

@@ -1,6 +1,6 @@
 """How long robots take, from lengths alone: what the layout is optimised by.
 
-A robot goes from rest to rest along a trapezoid of speed. `factory.prediction` predicts the run
+A robot goes from rest to rest along a trapezoid of speed. `timing/prediction.py` predicts the run
 itself, from the modes; the tests hold the two together.
 """
 
@@ -9,17 +9,17 @@ from __future__ import annotations
 from dataclasses import dataclass
 from math import sqrt
 
-from factory.factory import Operation
-from factory.layout.plan import Layout
-from factory.pag import NOPART
-from factory.settings import Settings
+from factory.layout.layout import Layout
+from factory.plant.factory import Operation
+from factory.problem.pag import NOPART
+from factory.support.settings import Settings
 
 
 @dataclass(frozen=True, slots=True)
 class Pace:
     """Speed [m/s] and acceleration [m/s²] of the robots, radius eps of a goal ball [m], and the
     time [s] lost between two operations; `ahead`: that lost on the way of a robot that goes ahead
-    while it waits (`control/staging.py`), None where none does."""
+    while it waits (`modes/staging.py`), None where none does."""
 
     speed: float = 0.5
     acceleration: float = 2.0

@@ -10,17 +10,17 @@ from __future__ import annotations
 from dataclasses import replace
 from math import ceil
 
-from factory.errors import Diagnostic, RunError
-from factory.factory import Factory
-from factory.geometry import Product
+from factory.compiler.mating.judged import judged
+from factory.geometry.solids import Product
 from factory.layout.clearance import certify
 from factory.layout.dimensions import Clearance
 from factory.layout.durations import Pace
+from factory.layout.layout import Layout, Point2
 from factory.layout.optimising import bounds, optimised
-from factory.layout.plan import Layout, Point2
 from factory.layout.shapes import project
 from factory.layout.sweeps import KINDS, OUTFEED, STATIONS, Region
-from factory.mating.judged import judged
+from factory.plant.factory import Factory
+from factory.support.errors import Diagnostic, RunError
 
 
 def lay_out(

@@ -7,8 +7,8 @@ from dataclasses import asdict, dataclass
 from factory.layout.bounds import cycle_time_bound
 from factory.layout.dimensions import Clearance
 from factory.layout.durations import Pace, gear_times
+from factory.layout.layout import Layout
 from factory.layout.optimising import bounds, first_feasible
-from factory.layout.plan import Layout
 from factory.layout.sweeps import piles, regions
 
 

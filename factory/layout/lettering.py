@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 
-from factory.layout.plan import Box, Point2
+from factory.layout.layout import Box, Point2
 from factory.layout.svg import label, shortened
 
 WIDTH = 0.6

@@ -11,18 +11,18 @@ from __future__ import annotations
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
 
-from factory.factory import Factory
-from factory.geometry import Product
+from factory.geometry.solids import Product
 from factory.layout.arranging import arrange
 from factory.layout.dimensions import Clearance
 from factory.layout.drafting import Draft, headings
 from factory.layout.durations import Pace, gear_times
+from factory.layout.layout import Box, Layout, Point2
 from factory.layout.packing import Task
-from factory.layout.plan import Box, Layout, Point2
 from factory.layout.shapes import exact_shapes, payload_boxes, symmetric_shapes
 from factory.layout.sides import admissible
 from factory.layout.stretching import Sides, stretch
 from factory.layout.sweeps import Region, hull, piles, regions
+from factory.plant.factory import Factory
 
 EFFORT = 800
 """Robots times layouts that are looked at, four layouts at most."""

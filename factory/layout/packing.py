@@ -13,7 +13,6 @@ from dataclasses import dataclass, replace
 from itertools import accumulate, product
 from math import inf
 
-from factory.factory import Factory, Operation
 from factory.layout.dimensions import (
     ARMS,
     CARRIAGE,
@@ -26,10 +25,11 @@ from factory.layout.dimensions import (
     Clearance,
 )
 from factory.layout.durations import Pace
-from factory.layout.flank import Flank
+from factory.layout.layout import BESIDE, Extent
 from factory.layout.outline import Guest, Outline, Plan, crowns
-from factory.layout.plan import BESIDE, Extent
+from factory.layout.skyline import Flank
 from factory.layout.stretching import Shape, Sides, ahead_of, check_guests, up
+from factory.plant.factory import Factory, Operation
 
 SPAN = 0.15
 """A station is not looked at that costs as much more than the best as so long a way [m]."""

@@ -5,12 +5,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping
 
-from factory.factory import Factory
-from factory.geometry import Product
+from factory.geometry.solids import Product
 from factory.layout.dimensions import Clearance
-from factory.layout.plan import Box, Extent, Point2
+from factory.layout.layout import Box, Extent, Point2
 from factory.layout.stretching import Shape, is_tool, up
 from factory.layout.sweeps import hull
+from factory.plant.factory import Factory
 
 NOWHERE: Extent = (0.0, 0.0, 0.0, 0.0)
 

@@ -6,8 +6,8 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from math import floor, log10, sqrt
 
+from factory.layout.layout import Box, Point2
 from factory.layout.lettering import WIDTH
-from factory.layout.plan import Box, Point2
 from factory.layout.svg import circle, line, rectangle, text
 
 Entries = Sequence[tuple[str, str]]

@@ -1,18 +1,18 @@
 """From which side the inputs of an operation come: one from which they can.
 
 They come along the carrier's side t, from either end of it. Which of the two lets them slide
-together without passing through each other is known of each operation (`factory.approach`), in the
-directions of the product; what t is follows from the sides of all carriers on the way to the
+together without passing through each other is known of each operation (`plant/approaches.py`), in
+the directions of the product; what t is follows from the sides of all carriers on the way to the
 output robot.
 """
 
 from __future__ import annotations
 
-from factory.factory import Factory, Operation
-from factory.layout.plan import Point2
+from factory.layout.layout import Point2
 from factory.layout.shapes import carriers
 from factory.layout.stretching import Sides
-from factory.pag import NOPART
+from factory.plant.factory import Factory, Operation
+from factory.problem.pag import NOPART
 
 
 def admissible(factory: Factory, sides: Sides) -> Sides:

@@ -20,8 +20,6 @@ from dataclasses import dataclass
 from itertools import accumulate
 from math import ceil
 
-from factory.errors import Diagnostic, InputError
-from factory.factory import Factory, Operation
 from factory.layout.dimensions import (
     ARMS,
     CARRIAGE,
@@ -33,8 +31,10 @@ from factory.layout.dimensions import (
     TOOL_TRAVEL,
     Clearance,
 )
-from factory.layout.plan import Extent
-from factory.pag import NOPART
+from factory.layout.layout import Extent
+from factory.plant.factory import Factory, Operation
+from factory.problem.pag import NOPART
+from factory.support.errors import Diagnostic, InputError
 
 NOTHING = float("-inf")
 

@@ -6,7 +6,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from xml.sax.saxutils import escape
 
-from factory.layout.plan import Box, Point2
+from factory.layout.layout import Box, Point2
 
 LONGEST = 20
 """A label of more letters is cut; the whole of it is shown as a tooltip."""

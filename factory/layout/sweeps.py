@@ -16,8 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from factory.factory import Factory
-from factory.geometry import Product
+from factory.geometry.solids import Product
 from factory.layout.dimensions import (
     ARM_LOW,
     ARM_TOP,
@@ -32,8 +31,9 @@ from factory.layout.dimensions import (
     PAYLOAD,
     PAYLOADS,
 )
-from factory.layout.plan import Box, Extent, Guidepath, Layout
-from factory.pag import NOPART
+from factory.layout.layout import Box, Extent, Guidepath, Layout
+from factory.plant.factory import Factory
+from factory.problem.pag import NOPART
 
 NAMES = ("carriages", "masts and arms", "payloads")
 """The layers' names."""

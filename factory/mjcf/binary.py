@@ -18,11 +18,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from factory.files import user_cache, write_all
 from factory.mjcf.model import Model
+from factory.support.files import user_cache, write_all
 
 if TYPE_CHECKING:
-    from factory.engine import mujoco
+    from factory.support.engine import mujoco
 
 ENDING = ".mjb"
 
@@ -80,7 +80,7 @@ def kept(path: Path, key: str) -> bytes | None:
 
 def packed(m: mujoco.MjModel) -> bytes:
     """A model of the engine as the bytes of a binary file."""
-    from factory.engine import mujoco
+    from factory.support.engine import mujoco
 
     content = np.empty(mujoco.mj_sizeModel(m), np.uint8)
     mujoco.mj_saveModel(m, None, content)
@@ -91,7 +91,7 @@ def cached(model: Model) -> mujoco.MjModel | None:
     """What the engine made of the model before, None where the cache does not have it."""
     if not _is_large(model):
         return None
-    from factory.engine import mujoco
+    from factory.support.engine import mujoco
 
     key = key_of(model)
     path, name = _place(key), f"model{ENDING}"

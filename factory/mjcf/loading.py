@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from factory.engine import mujoco
-from factory.errors import Diagnostic, InputError
 from factory.mjcf.binary import cached, keep
 from factory.mjcf.model import Model
+from factory.support.engine import mujoco
+from factory.support.errors import Diagnostic, InputError
 
 
 def load(model: Model) -> mujoco.MjModel:

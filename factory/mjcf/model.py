@@ -17,25 +17,19 @@ from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
 from xml.sax.saxutils import quoteattr
 
-from factory.factory import Factory
-from factory.layout.plan import Layout
+from factory.layout.layout import Layout
 from factory.mjcf import names
 from factory.mjcf.elements import add
 from factory.mjcf.outfeed import TRAY_MASS, add_tray
 from factory.mjcf.parts import add_meshes, add_parts, add_wholes
-from factory.mjcf.robots import (
-    Drive,
-    Hoist,
-    add_paints,
-    instantiate,
-    load_robot_model,
-)
+from factory.mjcf.robots import Drive, Hoist, add_paints, instantiate, load_robot_model
 from factory.mjcf.scene import add_assets, add_follower, add_scene, add_visuals
 from factory.mjcf.unseen import leave_out_what_is_shown
 from factory.mjcf.welds import add_welds, exclusions, held_at
-from factory.robots import Catalogue
-from factory.settings import Settings
-from factory.wholes import Bodies, bodies_of
+from factory.plant.factory import Factory
+from factory.plant.fused_bodies import Bodies, bodies_of
+from factory.problem.robot_types import Catalogue
+from factory.support.settings import Settings
 
 CARRIAGE_MASS = 1.9
 """What a `dot` weighs without payload [kg]."""

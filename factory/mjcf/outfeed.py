@@ -9,7 +9,7 @@ from __future__ import annotations
 from xml.etree.ElementTree import Element
 
 from factory.layout.dimensions import BELT_GAP, FINGER_TOP, PAYLOAD, TRAY
-from factory.layout.plan import Layout, Point2
+from factory.layout.layout import Layout, Point2
 from factory.mjcf import names
 from factory.mjcf.elements import add, add_shown
 from factory.mjcf.robots import Drive, add_inertia

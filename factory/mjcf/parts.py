@@ -6,14 +6,14 @@ from __future__ import annotations
 from collections.abc import Mapping
 from xml.etree.ElementTree import Element
 
-from factory.geometry import Mesh, Product, Solid
+from factory.geometry.meshes import Array
+from factory.geometry.solids import Mesh, Product, Solid
 from factory.layout.dimensions import PAYLOAD
-from factory.layout.plan import Layout, Point2
-from factory.meshes import Array
+from factory.layout.layout import Layout, Point2
 from factory.mjcf.elements import add, exact, numbers
 from factory.mjcf.mesh_files import mesh_file, piece_files
 from factory.mjcf.names import part, piece
-from factory.wholes import Bodies
+from factory.plant.fused_bodies import Bodies
 
 PARKED = -0.6
 """Height at which the first spare copy of a part is kept, under the floor [m]."""

@@ -9,12 +9,12 @@ from pathlib import Path
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
 
-from factory.errors import Diagnostic, InputError, Position
 from factory.layout.dimensions import FINGER_TOP, PAYLOAD
-from factory.layout.plan import Guidepath, Point2
+from factory.layout.layout import Guidepath, Point2
 from factory.mjcf.elements import add, number, numbers
 from factory.mjcf.names import carriage
-from factory.robots import RobotType
+from factory.problem.robot_types import RobotType
+from factory.support.errors import Diagnostic, InputError, Position
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,14 +6,9 @@ from __future__ import annotations
 from math import cos, hypot, radians, sin, tan
 from xml.etree.ElementTree import Element
 
-from factory.layout.dimensions import (
-    CARRIAGE,
-    PAYLOAD,
-    POST,
-    Clearance,
-)
+from factory.layout.dimensions import CARRIAGE, PAYLOAD, POST, Clearance
 from factory.layout.embedding import project
-from factory.layout.plan import Layout
+from factory.layout.layout import Layout
 from factory.mjcf.elements import add, add_shown, numbers
 from factory.mjcf.names import COMPASS, feeder
 from factory.mjcf.outfeed import add_outfeed

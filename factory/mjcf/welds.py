@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 from xml.etree.ElementTree import Element
 
-from factory.layout.plan import Layout
+from factory.layout.layout import Layout
 from factory.mjcf import names
 from factory.mjcf.elements import add, numbers
 from factory.mjcf.parts import parked_at, place_in
 from factory.mjcf.robots import heading_quaternion
-from factory.wholes import Bodies
+from factory.plant.fused_bodies import Bodies
 
 
 def add_welds(equality: Element, layout: Layout, bodies: Bodies, copies: Mapping[str, int]) -> None:

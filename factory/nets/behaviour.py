@@ -12,7 +12,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from itertools import islice
 
-from factory.nets.explore import LIMIT, Exploration, explore
+from factory.foreign_nets.explore import LIMIT, Exploration, explore
 from factory.nets.marked import (
     NONE,
     MarkedNet,

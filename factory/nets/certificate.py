@@ -25,12 +25,12 @@ from __future__ import annotations
 
 from typing import Any
 
+from factory.foreign_nets.general import with_gears
 from factory.nets.behaviour import cover
 from factory.nets.certificate_check import CLAIMS, SCHEMA, check_certificate
 from factory.nets.certificate_net import digest
 from factory.nets.composition import Composition, compose
 from factory.nets.gears import GearNet
-from factory.nets.general import with_gears
 from factory.nets.marked import NONE, MarkedNet, marked, overfill, token_free
 from factory.nets.verdict import Verdict, Witness
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from factory.errors import Diagnostic, InputError, Position, did_you_mean
 from factory.nets.gears import GearNet
 from factory.nets.petri import Marking
+from factory.support.errors import Diagnostic, InputError, Position, did_you_mean
 
 
 def firings(net: GearNet, marking: Marking) -> dict[int, int]:

@@ -11,7 +11,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 from functools import cached_property
 
-from factory.errors import Position
+from factory.support.errors import Position
 
 Marking = frozenset[int]
 """m, a subset of P: the indices of the marked places."""

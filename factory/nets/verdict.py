@@ -6,10 +6,10 @@ import builtins
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 
-from factory.errors import Position
 from factory.nets.gears import Gear
 from factory.nets.marked import MarkedNet
-from factory.pag import NOPART
+from factory.problem.pag import NOPART
+from factory.support.errors import Position
 
 PROPERTIES = ("gear_net", "live", "safe", "reversible", "legal")
 

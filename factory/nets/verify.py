@@ -10,14 +10,14 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from itertools import islice
 
-from factory.collector import collector_paused
-from factory.errors import Diagnostic, Position, RunError
+from factory.foreign_nets.explore import LIMIT
 from factory.nets.behaviour import behaviour
 from factory.nets.composition import MOST, Composition, compose, named
-from factory.nets.explore import LIMIT
 from factory.nets.gears import GearNet
 from factory.nets.marked import MarkedNet, marked
 from factory.nets.verdict import Fault, Verdict, Witness, listing, testify
+from factory.support.collector import collector_paused
+from factory.support.errors import Diagnostic, Position, RunError
 
 __all__ = ["Verdict", "Witness", "verify"]
 

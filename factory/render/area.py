@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal, get_args
 
-from factory.errors import Diagnostic, InputError, did_you_mean
+from factory.support.errors import Diagnostic, InputError, did_you_mean
 
 PanelName = Literal["net", "gantt"]
 """`net`: the net with its tokens; `gantt`: what each robot did in the last seconds."""

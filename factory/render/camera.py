@@ -15,7 +15,7 @@ from typing import Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from factory.errors import Diagnostic, InputError, did_you_mean
+from factory.support.errors import Diagnostic, InputError, did_you_mean
 
 Array = NDArray[np.float64]
 

@@ -9,10 +9,7 @@ from typing import Literal
 
 import numpy as np
 
-from factory.engine import mujoco
-from factory.errors import Diagnostic, InputError
-from factory.files import write_bytes
-from factory.monitor.subject import Subject
+from factory.record.monitor.subject import Subject
 from factory.render.area import PanelName, shared
 from factory.render.camera import Camera
 from factory.render.caption import Caption, Words
@@ -22,6 +19,9 @@ from factory.render.stage import Stage
 from factory.render.subject import Snapshot
 from factory.render.title import draw_title
 from factory.render.video import VideoFile
+from factory.support.engine import mujoco
+from factory.support.errors import Diagnostic, InputError
+from factory.support.files import write_bytes
 
 Size = tuple[int, int]
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from factory.factory import Factory
 from factory.mjcf.model import role_of
 from factory.mjcf.robots import ROLES
+from factory.plant.factory import Factory
 from factory.render.ink import Colour, mixed
 
 GROUND, INK, FAINT, LINE = (243, 243, 245), (38, 44, 54), (112, 121, 134), (205, 209, 215)

@@ -5,8 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from factory.closing import Closing
-from factory.monitor.subject import subject_of_run
+from factory.record.monitor.subject import subject_of_run
 from factory.render.area import PanelName, shared
 from factory.render.camera import camera_named
 from factory.render.camerawork import FPS, SIZE, Moment, Reel, Size, Take, When, pictureless, save
@@ -14,9 +13,10 @@ from factory.render.history import History
 from factory.render.poster import Poster
 from factory.render.subject import Snapshot, held
 from factory.render.video import check_output
+from factory.support.resource import Closing
 
 if TYPE_CHECKING:
-    from factory.simulation import Simulation
+    from factory.simulation.simulation import Simulation
 
 
 class _Observer(Closing):

@@ -9,11 +9,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from factory.engine import mujoco
 from factory.mjcf import names
-from factory.monitor.subject import Subject
+from factory.record.monitor.subject import Subject
 from factory.render.camera import Array
 from factory.render.subject import SIGNS, Snapshot, corners
+from factory.support.engine import mujoco
 
 NEAR = 0.02
 """A body in the place of one that is gone is the same product where it is no further [m]."""

@@ -10,9 +10,9 @@ from functools import cached_property
 from math import inf
 
 from factory.control.mode import Array
-from factory.factory import Factory, Operation
 from factory.layout.durations import Pace
-from factory.monitor.subject import Subject
+from factory.plant.factory import Factory, Operation
+from factory.record.monitor.subject import Subject
 
 TIE = 1e-9
 """Times that are no further apart are the same [s]."""

@@ -13,8 +13,8 @@ from collections.abc import Iterator
 import numpy as np
 
 from factory.control.mode import Array
-from factory.factory import Operation
-from factory.layout.plan import Point2
+from factory.layout.layout import Point2
+from factory.plant.factory import Operation
 from factory.render.colours import (
     FAINT,
     FLASH,

@@ -7,10 +7,7 @@ from copy import copy
 import numpy as np
 from numpy.typing import NDArray
 
-from factory import gl
-from factory.closing import Closing
-from factory.engine import mujoco
-from factory.monitor.subject import Subject
+from factory.record.monitor.subject import Subject
 from factory.render.camera import (
     PART,
     Array,
@@ -25,6 +22,9 @@ from factory.render.camera import (
 )
 from factory.render.following import Followed
 from factory.render.subject import Snapshot, extent
+from factory.support import gl
+from factory.support.engine import mujoco
+from factory.support.resource import Closing
 
 Pixels = NDArray[np.uint8]
 

@@ -6,12 +6,10 @@ from pathlib import Path
 
 import numpy as np
 
-from factory.engine import mujoco
-from factory.errors import Diagnostic, InputError
-from factory.log import Log
-from factory.log.model import model_of
-from factory.monitor.record import AGAIN, recorded_subject
-from factory.monitor.subject import Subject
+from factory.record.log import Log
+from factory.record.log.model import model_of
+from factory.record.monitor.record import AGAIN, recorded_subject
+from factory.record.monitor.subject import Subject
 from factory.render.area import PanelName, shared
 from factory.render.camera import camera_named
 from factory.render.camerawork import FPS, SIZE, Moment, Reel, Size, Take, When, pictureless, save
@@ -19,6 +17,8 @@ from factory.render.history import History
 from factory.render.poster import Poster
 from factory.render.subject import Snapshot, held
 from factory.render.video import check_output
+from factory.support.engine import mujoco
+from factory.support.errors import Diagnostic, InputError
 
 
 def render_log(

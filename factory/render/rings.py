@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from factory.layout.plan import Point2
+from factory.layout.layout import Point2
 from factory.render.rows import Rows
 from factory.render.sheet import Sheet
 

@@ -13,7 +13,7 @@ from functools import cached_property
 
 import numpy as np
 
-from factory.factory import Factory, Operation
+from factory.plant.factory import Factory, Operation
 from factory.render.history import History, depths, followed
 
 LIMIT = 20

@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 
 from factory.control.mode import Array
-from factory.engine import mujoco
 from factory.mjcf import names
 from factory.render.area import Area, PanelName
 from factory.render.gantt_panel import GanttPanel
@@ -13,6 +12,7 @@ from factory.render.history import History
 from factory.render.net_panel import NetPanel
 from factory.render.painter import Pixels
 from factory.render.rows import Rows
+from factory.support.engine import mujoco
 
 KINDS: dict[PanelName, type[NetPanel] | type[GanttPanel]] = {"net": NetPanel, "gantt": GanttPanel}
 

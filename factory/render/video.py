@@ -13,10 +13,10 @@ from math import isfinite
 from pathlib import Path
 from typing import Any
 
-from factory.closing import Closing
-from factory.errors import Diagnostic, InputError, MissingError
-from factory.files import partial_of
 from factory.render.painter import Pixels
+from factory.support.errors import Diagnostic, InputError, MissingError
+from factory.support.files import partial_of
+from factory.support.resource import Closing
 
 FILMS, STILLS = (".mp4", ".mkv"), (".png",)
 

@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import Any
 
 import factory
-from factory.layout.plan import Layout
-from factory.settings import MOST, Settings
-from factory.simulation import Simulation
+from factory.layout.layout import Layout
+from factory.simulation.simulation import Simulation
+from factory.support.settings import MOST, Settings
 
 ENDLESS = 1000
 """Units asked for: more than the pool of parts ever needs, so that it is the whole pool."""

@@ -8,7 +8,7 @@ from functools import partial
 from time import perf_counter
 from typing import Any
 
-from factory.simulation import Simulation
+from factory.simulation.simulation import Simulation
 from tests.bench.factories import (
     PATIENCE,
     Case,

@@ -35,10 +35,10 @@ BUILD_AIM = 1.0
 
 def work(file: str, lay_out: bool) -> dict[str, Any]:
     """The stages of `check`, and of `build` up to the certificate, one by one [s]."""
-    from factory.collector import collector_paused
-    from factory.nets.pool import part_pool
     from factory.nets.verify import verify
     from factory.pipeline import read
+    from factory.support.collector import collector_paused
+    from factory.timing.pool import part_pool
 
     found: dict[str, Any] = {}
     with collector_paused():
@@ -56,7 +56,7 @@ def work(file: str, lay_out: bool) -> dict[str, Any]:
 
 
 def _laid_out(plan: Any) -> dict[str, float]:
-    from factory.geometry import product_geometry
+    from factory.geometry.solids import product_geometry
     from factory.layout.clearance import certify
     from factory.layout.embedding import lay_out
 

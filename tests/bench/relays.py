@@ -7,13 +7,13 @@ from time import process_time
 from typing import Any
 
 import factory
-from factory.control.plan import operation_modes, robot_limits
 from factory.layout.durations import Pace, gear_times
-from factory.layout.plan import Layout
+from factory.layout.layout import Layout
+from factory.layout.relaying import relayed
+from factory.modes.modes import operation_modes, robot_limits
 from factory.nets.verify import verify
-from factory.prediction import operation_delays, predict
-from factory.relaying import relayed
-from factory.settings import Settings
+from factory.support.settings import Settings
+from factory.timing.prediction import operation_delays, predict
 from tests.bench.factories import cube, laid_out
 from tests.tables import table
 

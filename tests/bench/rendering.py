@@ -11,12 +11,12 @@ from typing import Any
 
 import numpy as np
 
-from factory import gl
-from factory.engine import mujoco
 from factory.render.camera import camera_named
 from factory.render.camerawork import FPS, SIZE, Camerawork, Moment, Reel, Take
 from factory.render.subject import Snapshot
-from factory.simulation import Simulation
+from factory.simulation.simulation import Simulation
+from factory.support import gl
+from factory.support.engine import mujoco
 from tests.bench.factories import Case, Steady, laid_out, robots_at_least, run_until
 from tests.bench.processes import ROOT, fresh, interleaved, median, ratio, serve, spread
 from tests.tables import table

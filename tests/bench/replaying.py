@@ -17,8 +17,8 @@ from typing import Any
 
 import numpy as np
 
-from factory.engine import mujoco
-from factory.world import physics
+from factory.simulation.mujoco import world as physics
+from factory.support.engine import mujoco
 from tests.bench.factories import Steady, run_in, run_until
 
 DATA = ("ctrl", "history", "qpos", "qvel", "eq_active", "tree_asleep", "xpos", "xmat", "xquat")

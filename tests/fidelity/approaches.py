@@ -5,10 +5,10 @@ from __future__ import annotations
 from time import perf_counter
 from typing import Any
 
-from factory.mating import LEFT_OUT, NO_DEEPER, STRICT, TOLERANCE
-from factory.mating.contacts import CLEAR
+from factory.compiler.mating import LEFT_OUT, NO_DEEPER, STRICT, TOLERANCE
+from factory.compiler.mating.contacts import CLEAR
 from factory.pipeline import read
-from factory.simulation import Simulation
+from factory.simulation.simulation import Simulation
 from tests.fidelity.products import BRICKS_NAMES, REAL, file_of, is_here, layout
 from tests.tables import table
 

@@ -18,10 +18,10 @@ import numpy as np
 
 from factory.control.mode import REST, Array
 from factory.control.navigation import Bundle
-from factory.engine import mujoco
-from factory.layout.plan import Layout
+from factory.layout.layout import Layout
 from factory.nets.petri import Marking
-from factory.simulation import Simulation
+from factory.simulation.simulation import Simulation
+from factory.support.engine import mujoco
 from tests.fidelity.products import CAMPAIGN, layout
 from tests.tables import table
 

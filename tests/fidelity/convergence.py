@@ -5,8 +5,8 @@ from __future__ import annotations
 import os
 from typing import Any
 
-from factory.fidelity import study
-from factory.fidelity.comparing import Case
+from factory.study.fidelity import study
+from factory.study.fidelity.comparing import Case
 from tests.fidelity.products import PAPER, REAL, layout
 from tests.tables import table
 

@@ -12,7 +12,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from factory.disturbance import (
+from factory.layout.layout import Layout
+from factory.simulation.disturbance import (
     Delay,
     Disturbance,
     Dragged,
@@ -24,9 +25,8 @@ from factory.disturbance import (
     Slowed,
     disturb,
 )
-from factory.layout.plan import Layout
-from factory.simulation import Simulation
-from factory.trace import Run
+from factory.simulation.run import Run
+from factory.simulation.simulation import Simulation
 from tests.fidelity.products import SMALL, layout
 from tests.tables import table
 

@@ -22,7 +22,7 @@ from typing import Any
 import numpy as np
 
 from factory.mjcf import names
-from factory.simulation import Simulation
+from factory.simulation.simulation import Simulation
 from tests.fidelity.products import PAPER, REAL, layout
 from tests.tables import table
 

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 from typing import Any
 
-from factory.fidelity import measure as compared
+from factory.study.fidelity import measure as compared
 from tests.tables import table
 
 from .products import PAPER, REAL, is_here, layout

@@ -7,10 +7,10 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
-from factory.errors import Position
 from factory.importing.draft import Faults
 from factory.lang.source import Source, quoted
 from factory.lang.words import number
+from factory.support.errors import Position
 
 FURTHEST = 1e7
 """No number of a line is larger [LDU]; that is 4 km."""

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from factory.errors import Diagnostic
+from factory.geometry.meshes import Array
 from factory.importing.draft import MATE, MOST_NODES, PART, Draft, Faults, too_many
 from factory.importing.ldraw.colours import INHERITED, direct_colour
 from factory.importing.ldraw.lines import LDrawFile, Reference, key_of
@@ -18,8 +18,8 @@ from factory.importing.ldraw.shelf import Shelf
 from factory.importing.mesh_store import MeshStore
 from factory.importing.places import quaternion, rounded
 from factory.lang.source import quoted
-from factory.meshes import Array
-from factory.pag import Parameter
+from factory.problem.pag import Parameter
+from factory.support.errors import Diagnostic
 
 DENSITY = 1050.0
 """Of ABS [kg/m³]."""

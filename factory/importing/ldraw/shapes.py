@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from factory.errors import Diagnostic
+from factory.geometry.meshes import Array
 from factory.importing.ldraw.lines import LDrawFile, Reference
 from factory.importing.ldraw.shelf import Shelf
 from factory.lang.source import quoted
-from factory.meshes import Array
+from factory.support.errors import Diagnostic
 
 LDU = 0.0004
 """[m]"""

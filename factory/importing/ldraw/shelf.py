@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from pathlib import Path, PurePosixPath
 
-from factory.errors import Position
 from factory.importing.draft import Faults
 from factory.importing.ldraw.colours import common_colours
 from factory.importing.ldraw.lines import LDrawFile, key_of, read_lines
 from factory.lang.source import quoted, read_text, source_of
+from factory.support.errors import Position
 
 ROOMS = ("parts", "p", "models", "unofficial/parts", "unofficial/p")
 """Where a library keeps files, in the order in which they are looked for."""

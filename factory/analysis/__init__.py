@@ -1,6 +1,0 @@
-"""How fast a factory is, what sets its pace and what would change it, from its timed net."""
-
-from factory.analysis.analysing import Analysis, analyse
-from factory.analysis.timing import Change, Timing
-
-__all__ = ["Analysis", "Change", "Timing", "analyse"]

@@ -1,0 +1,190 @@
+"""The command line: thin. Each command reads, calls the stages and writes; see the README."""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+from collections.abc import Sequence
+from contextlib import suppress
+from typing import Any
+
+import click
+
+from factory import __version__
+from factory.commands.analyze import analyze
+from factory.commands.build import build
+from factory.commands.check import check, programs
+from factory.commands.defaults import from_environment, with_defaults
+from factory.commands.explain import Code, tell_code
+from factory.commands.export import export
+from factory.commands.fidelity import fidelity
+from factory.commands.import_new import import_, new
+from factory.commands.monitor import monitor
+from factory.commands.report import report
+from factory.commands.run import render, run
+from factory.commands.sweep import sweep
+from factory.commands.templates import doctor, templates
+from factory.commands.view import view
+from factory.support.console import emit, fail, say
+from factory.support.errors import Diagnostic, FactoryError, InputError, MissingError, did_you_mean
+from factory.support.interruption import stop_on_signals
+
+CONTEXT = {"help_option_names": ["-h", "--help"], "max_content_width": 100}
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """The entry point: runs a command and exits with its status, never with a traceback."""
+    words = list(sys.argv[1:] if arguments is None else arguments)
+    _open_streams()
+    stop_on_signals(signal.default_int_handler)
+    status = run_command(words)
+    try:
+        sys.stdout.flush()
+    except OSError as error:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
+        if not isinstance(error, BrokenPipeError):
+            status = fail(_unwritten(error), False)
+    try:
+        sys.stderr.flush()
+    except OSError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), 2)
+    sys.exit(status)
+
+
+def _open_streams() -> None:
+    """A stream that is closed swallows what is printed; one whose encoding lacks a sign shows
+    `?`."""
+    for name in ("stdout", "stderr"):
+        if getattr(sys, name) is None:
+            setattr(sys, name, open(os.devnull, "w", encoding="utf-8"))  # noqa: SIM115
+        with suppress(AttributeError):
+            getattr(sys, name).reconfigure(errors="replace")
+
+
+def run_command(words: list[str]) -> int:
+    """The exit status of a command line: 0 ok, 1 a check or run failed, 2 bad input, 3 something is
+    missing on the machine, 130 interrupted."""
+    try:
+        result = cli.main(words, prog_name="factory", standalone_mode=False)
+        return result if isinstance(result, int) else 0
+    except click.exceptions.Exit as done:
+        return done.exit_code
+    except (BrokenPipeError, SystemExit):  # click exits where nobody reads its stdout any more
+        return 0
+    except (Exception, KeyboardInterrupt) as error:
+        return fail(_refusal(error), "--json" in words)
+
+
+class _Interrupted(FactoryError):
+    exit_status = 130
+
+
+def _refusal(error: BaseException) -> FactoryError:
+    """Whatever went wrong, as an error for the user."""
+    if isinstance(error, FactoryError):
+        return error
+    if isinstance(error, KeyboardInterrupt | click.Abort):
+        return _Interrupted(Diagnostic("Interrupted", "stopped by the user"))
+    if isinstance(error, click.ClickException):
+        return InputError(_usage(error))
+    if isinstance(error, ImportError) and not (error.name or "").startswith("factory"):
+        return _missing_package(error)
+    if isinstance(error, OSError):
+        return _unwritten(error)
+    if isinstance(error, MemoryError):
+        message = f"there is not enough memory: {error or 'no more to be had'}"
+        return MissingError(Diagnostic("Missing", message, None, "take a smaller product"))
+    if isinstance(error, RecursionError):
+        message = "the input is nested too deeply"
+        return InputError(Diagnostic("Syntax", message, None, "flatten it"))
+    if os.environ.get("FACTORY_TRACEBACK"):
+        raise error
+    message = f"{type(error).__name__}: {error}"
+    hint = "a fault of factory: please report it, with what FACTORY_TRACEBACK=1 prints"
+    return InputError(Diagnostic("Internal", message, None, hint))
+
+
+def _usage(error: click.ClickException) -> Diagnostic:
+    """A usage error of click as a diagnostic."""
+    context = getattr(error, "ctx", None)
+    hint = f"see {context.command_path if context else 'factory'} --help"
+    message = error.format_message()
+    if isinstance(error, click.exceptions.NoSuchOption):
+        message = f"there is no option '{error.option_name}'"
+        if error.possibilities:
+            hint = did_you_mean(error.option_name, sorted(error.possibilities), "options")
+    if isinstance(error, click.BadParameter):
+        message += from_environment(error)
+    return Diagnostic("Usage", message, None, hint)
+
+
+def _missing_package(error: ImportError) -> MissingError:
+    name = (error.name or "").partition(".")[0] or "a package"
+    message = f"the Python package '{name}' cannot be imported: {error}"
+    return MissingError(Diagnostic("Missing", message, None, f"pip install {name}"))
+
+
+def _unwritten(error: OSError) -> InputError:
+    where = f"{error.filename}: " if error.filename else ""
+    message = f"{where}{error.strerror or error}"
+    hint = "check the path, its permissions and the space on the disk"
+    return InputError(Diagnostic("BadFile", message, None, hint))
+
+
+class _Commands(click.Group):
+    """A group that suggests the nearest command."""
+
+    def resolve_command(self, ctx: click.Context, args: list[str]) -> Any:
+        try:
+            return super().resolve_command(ctx, args)
+        except click.UsageError as error:
+            hint = did_you_mean(args[0], list(self.commands), "commands")
+            message = f"there is no command '{args[0]}'"
+            raise InputError(Diagnostic("Usage", message, None, hint)) from error
+
+
+@click.group(cls=_Commands, context_settings=CONTEXT, invoke_without_command=True)
+@click.option("--version", is_flag=True, help="Show the version and exit.")
+@click.option("--explain", type=Code(), help="Say more about the code of an error and exit.")
+@click.option("--json", "as_json", is_flag=True, hidden=True)
+@click.pass_context
+def cli(ctx: click.Context, version: bool, explain: str | None, as_json: bool) -> None:
+    """Compile a product assembly graph (PAG) into a factory, prove it live, run it in MuJoCo."""
+    if version:
+        emit({"version": __version__}) if as_json else say(f"factory {__version__}")
+        ctx.exit()
+    if explain is not None:
+        tell_code(explain, as_json)
+        ctx.exit()
+    if ctx.invoked_subcommand is None:
+        if not as_json:
+            click.echo(ctx.get_help() + "\n", err=True)
+        raise click.UsageError("there is no command", ctx)
+    if as_json:
+        raise click.UsageError("--json comes after the command", ctx)
+
+
+for _command in (
+    new,
+    import_,
+    check,
+    build,
+    run,
+    render,
+    view,
+    fidelity,
+    analyze,
+    report,
+    sweep,
+    monitor,
+    programs,
+    export,
+    templates,
+    doctor,
+):
+    cli.add_command(_command)
+for _command in (check, build, run, render, view, fidelity, analyze, report, programs, export):
+    with_defaults(_command)
+
+__all__ = ["cli", "main", "run_command"]

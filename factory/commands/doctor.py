@@ -1,0 +1,90 @@
+"""The command `doctor`: what works on this machine, and the one line that mends what does not."""
+
+from __future__ import annotations
+
+import platform
+import sys
+from dataclasses import dataclass
+from importlib.metadata import PackageNotFoundError, version
+
+from factory.support.errors import FactoryError
+
+PACKAGES = (
+    "mujoco",
+    "numpy",
+    "networkx",
+    "lark",
+    "trimesh",
+    "scipy",
+    "shapely",
+    "imageio",
+    "av",
+    "pillow",
+    "click",
+    "rich",
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """One thing looked at: whether it is well, what was found, and what mends it."""
+
+    name: str
+    ok: bool
+    found: str
+    mend: str = ""
+
+
+def examine() -> list[Finding]:
+    """Python, packages, assets, the engine and headless rendering."""
+    engine = _engine()
+    rendering = _rendering() if engine.ok else Finding("rendering", False, "no engine", engine.mend)
+    return [_python(), *map(_package, PACKAGES), _assets(), engine, rendering]
+
+
+def _python() -> Finding:
+    good = sys.version_info >= (3, 11)
+    return Finding("python", good, platform.python_version(), "install Python 3.11 or newer")
+
+
+def _package(name: str) -> Finding:
+    try:
+        return Finding(name, True, version(name))
+    except PackageNotFoundError:
+        return Finding(name, False, "not installed", f"pip install {name}")
+
+
+def _assets() -> Finding:
+    try:
+        from factory.pipeline import all_templates
+        from factory.problem.robot_types import load_catalogue
+
+        found = f"{len(all_templates())} operations, {len(load_catalogue().types)} robot types"
+        return Finding("assets", True, found)
+    except (FactoryError, ImportError) as error:
+        return Finding("assets", False, str(error), "install factory again")
+
+
+def _engine() -> Finding:
+    try:
+        from factory.support.gl import import_mujoco
+
+        mujoco = import_mujoco()
+        model = mujoco.MjModel.from_xml_string("<mujoco><worldbody/></mujoco>")
+        mujoco.mj_step(model, mujoco.MjData(model))
+        return Finding("engine", True, f"MuJoCo {mujoco.mj_versionString()} steps")
+    except FactoryError as error:
+        return Finding("engine", False, error.diagnostics[0].message, error.diagnostics[0].hint)
+    except Exception as error:  # whatever a broken installation raises
+        return Finding("engine", False, str(error), "pip install --force-reinstall mujoco")
+
+
+def _rendering() -> Finding:
+    from factory.support.gl import probe
+
+    try:
+        probe()
+        return Finding("rendering", True, "EGL draws headless")
+    except FactoryError as error:
+        first = error.diagnostics[0]
+        return Finding("rendering", False, first.message, first.hint)

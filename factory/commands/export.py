@@ -1,0 +1,141 @@
+"""The command `export`: a factory for other tools."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from factory.commands.options import (
+    FLOOR,
+    MOTION,
+    OUTPUT,
+    PATH,
+    RELAY,
+    SOURCE,
+    ground,
+    settings_of,
+    writable,
+    writable_folder,
+)
+from factory.support.console import emit, say, warn
+from factory.support.errors import Diagnostic, InputError, did_you_mean
+
+if TYPE_CHECKING:
+    from factory.export import Exporter, Made, Subject
+
+
+class _Listing(click.Command):
+    """A command whose help ends with what every exporter says of itself."""
+
+    def format_epilog(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        from factory.export import exporters
+
+        with formatter.section("Formats"):
+            formatter.write_dl([(e.format, e.summary) for e in exporters().values()])
+
+
+@click.command(cls=_Listing)
+@SOURCE
+@click.option("--format", "form", required=True, help="One of those below.")
+@click.option("-o", "--output", type=PATH, help="A file; stdout without, for texts.")
+@click.option("--of", default="", help="What to export of it, where a format offers a choice.")
+@FLOOR
+@RELAY
+@MOTION
+@OUTPUT
+def export(
+    file: Path,
+    folders: tuple[Path, ...],
+    form: str,
+    output: Path | None,
+    of: str,
+    floor: str | None,
+    as_json: bool,
+    quiet: bool,
+    verbose: bool,
+    **options: Any,
+) -> int:
+    """Write FILE.pag, a net in FILE.pnml or a LOG of a run for other tools."""
+    from factory.export import Subject
+    from factory.support.files import write_all
+
+    chosen = _exporter(form, of)
+    whole = chosen.folder and output is not None and _is_folder(output)
+    _writable(file, output, whole, chosen)
+    subject = Subject(
+        file,
+        folders,
+        settings_of(file, options),
+        ground(floor, options),
+        of,
+        output.name if output else "",
+        whole,
+    )
+    subject.require(form, chosen.takes)
+    made = chosen.export(subject)
+    _warn(subject, quiet)
+    files = _files(made, output, whole)
+    if output is not None:
+        write_all(files)
+    _tell(form, made, output, list(files), as_json)
+    return 0
+
+
+def _exporter(form: str, of: str) -> Exporter:
+    from factory.export import exporters
+
+    known = exporters()
+    if form not in known:
+        hint = did_you_mean(form, list(known), "formats")
+        raise InputError(Diagnostic("Usage", f"unknown format '{form}'", None, hint))
+    if of and not known[form].of:
+        some = ", ".join(f"{e.format} ({e.of})" for e in known.values() if e.of)
+        message = f"there is no choice with {form}, so no --of"
+        raise InputError(Diagnostic("Usage", message, None, f"there is with {some}"))
+    return known[form]
+
+
+def _is_folder(output: Path) -> bool:
+    """Whether an output is meant as a folder: it is one, or nothing yet and without an ending."""
+    return output.is_dir() or not (output.suffix or output.exists())
+
+
+def _writable(file: Path, output: Path | None, whole: bool, chosen: Exporter) -> None:
+    if output is None and chosen.binary:
+        message = f"{chosen.format} is binary and is not written to a terminal"
+        raise InputError(Diagnostic("Usage", message, None, f"give -o OUT.{chosen.format}"))
+    if whole:
+        writable_folder(output)
+    else:
+        writable(file, output)
+
+
+def _warn(subject: Subject, quiet: bool) -> None:
+    """Warnings of the geometry, where an exporter looked at it."""
+    source = subject.__dict__.get("source")
+    if source is not None and "product" in source.__dict__:
+        warn(source.product.warnings, quiet)
+
+
+def _files(made: Made, output: Path | None, whole: bool) -> dict[Path, bytes]:
+    """What is to be written where. Raises InputError (Usage) where several files have no place."""
+    if not isinstance(made, Mapping):
+        content = made.encode() if isinstance(made, str) else made
+        return {} if output is None else {output: content}
+    if output is None:
+        message = f"this takes {len(made)} files"
+        raise InputError(Diagnostic("Usage", message, None, "give -o OUT for the first of them"))
+    folder = output if whole else output.parent
+    return {folder / name if name else output: content for name, content in made.items()}
+
+
+def _tell(form: str, made: Made, output: Path | None, files: list[Path], as_json: bool) -> None:
+    text = {"text": made} if output is None else {}
+    if as_json:
+        shown = str(output) if output else None
+        emit({"format": form, "output": shown, "files": [str(f) for f in files], **text})
+    elif output is None and isinstance(made, str):
+        say(made.rstrip("\n"))

@@ -1,0 +1,130 @@
+"""The command `fidelity`."""
+
+from __future__ import annotations
+
+import os
+import sys
+from pathlib import Path
+from typing import Any
+
+import click
+
+from factory.commands.options import (
+    FLOOR,
+    MOTION,
+    OUTPUT,
+    PATH,
+    RELAY,
+    SOURCE,
+    Number,
+    plan,
+    settings_of,
+    writable,
+    writable_folder,
+)
+from factory.support.console import emit, say, table, warn
+
+
+@click.command()
+@SOURCE
+@click.option("--seeds", type=click.IntRange(1, 10_000), default=5, help="Runs, seeds 0 to K - 1.")
+@click.option(
+    "--units",
+    type=click.IntRange(1, 10**6),
+    help="Products of each run; default: as many, 4 to 100, as it takes until they come at the pace"
+    " of the net.",
+)
+@click.option(
+    "--jitter",
+    type=Number(0, 0.9),
+    default=0.3,
+    help="Draw each robot's speed and gain within ± this share.",
+)
+@click.option("--jobs", type=click.IntRange(1, 1024), help="Processes; default: the cores.")
+@click.option(
+    "--convergence/--no-convergence",
+    default=True,
+    help="Study seed 0 with other timesteps and weld stiffnesses too.",
+)
+@click.option("-o", "--output", type=PATH, help="A folder for a report, or a .json file.")
+@click.option("--max-time", type=Number(0, min_open=True), help="Stop a run after this time [s].")
+@FLOOR
+@RELAY
+@MOTION
+@OUTPUT
+def fidelity(
+    file: Path,
+    folders: tuple[Path, ...],
+    seeds: int,
+    units: int | None,
+    jitter: float,
+    jobs: int | None,
+    convergence: bool,
+    output: Path | None,
+    max_time: float | None,
+    floor: str | None,
+    as_json: bool,
+    quiet: bool,
+    verbose: bool,
+    **options: Any,
+) -> int:
+    """Compare FILE.pag in MuJoCo with the ideal world over the same seeds."""
+    from factory.nets.verify import proved
+    from factory.study.fidelity import measure, study
+    from factory.study.fidelity.bar import Bar
+    from factory.study.fidelity.comparing import Case
+    from factory.study.fidelity.convergence import runs
+    from factory.study.fidelity.report import check_report, document, write_report
+
+    check_report(output)
+    if output is not None:
+        is_file = output.suffix.lower() == ".json"
+        writable(file, output) if is_file else writable_folder(output)
+    settings = settings_of(file, options)
+    _, factory, layout = plan(file, folders, settings, floor, options)
+    proved(factory.net)
+    warn(layout.product.warnings, quiet)
+    jobs = jobs or os.cpu_count() or 1
+    with Bar(seeds + (runs() if convergence else 0), quiet or as_json) as bar:
+        found = measure(layout, range(seeds), units, jitter, settings, jobs, bar.advance, max_time)
+        case = Case(layout, units, jitter, settings, max_time)
+        studied = study(case, 0, jobs, bar.advance) if convergence else None
+    written = [] if output is None else write_report(output, found, studied)
+    if as_json:
+        emit(document(found, studied))
+    elif not quiet:
+        _tell(found, studied, verbose)
+        for path in written:
+            say(f"wrote {path}")
+    for trouble in (t for record in found.seeds for t in record.trouble):
+        print(trouble, file=sys.stderr)
+    return 0 if found.passed else 1
+
+
+def _tell(found: Any, studied: Any, verbose: bool) -> None:
+    """The figures as a table for people."""
+    from factory.study.fidelity import QUANTITIES
+    from factory.study.fidelity.report import remark, shown
+
+    worst, mean = found.worst(), found.mean()
+    rows = [
+        (
+            key,
+            shown(worst[key]),
+            shown(mean[key]),
+            q.unit,
+            shown(q.limit),
+            remark(key, worst[key], studied),
+        )
+        for key, q in QUANTITIES.items()
+        if worst[key] is not None
+    ]
+    title = f"{found.product}: {found.runs}, jitter {found.jitter:g}"
+    table(title, ("figure", "worst", "mean", "unit", "limit", ""), rows)
+    if verbose:
+        for q in QUANTITIES.values():
+            say(f"{q.key} [{q.unit}]: {q.definition}")
+    say("all runs passed" if found.passed else "SOME RUN FAILED")
+    for record in found.seeds:
+        for pair in record.contacts:
+            say(f"  seed {record.seed} touched: {pair}")

@@ -1,0 +1,146 @@
+"""The commands `import` and `new`: how a product gets into the house."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, cast
+
+import click
+
+from factory.commands.options import OUTPUT, PATH, writable_folder
+from factory.support.console import emit, say, warn
+from factory.support.errors import Diagnostic, InputError
+
+if TYPE_CHECKING:
+    from factory.problem.template import Template
+
+UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254}
+
+
+@click.command("import")
+@click.argument("source", type=PATH)
+@click.option("-o", "--output", type=PATH, help="The folder to write; named after SOURCE without.")
+@click.option("--library", type=PATH, envvar="LDRAWDIR", help="An LDraw parts library.")
+@click.option("--boxes", is_flag=True, help="Parts whose shape is missing become boxes.")
+@click.option("--meshes", type=PATH, help="Where the meshes of a tree or a bill are.")
+@click.option(
+    "--unit", type=click.Choice(list(UNITS)), default="m", help="Of a tree, a bill, their meshes."
+)
+@click.option(
+    "--mates",
+    type=click.Choice(["many", "chain"]),
+    default="many",
+    help="Mate all inputs in one operation, or two at a time.",
+)
+@click.option(
+    "--templates",
+    "folders",
+    multiple=True,
+    type=PATH,
+    help="A folder of further operations, searched first (repeatable).",
+)
+@OUTPUT
+def import_(
+    source: Path,
+    output: Path | None,
+    library: Path | None,
+    boxes: bool,
+    meshes: Path | None,
+    unit: str,
+    mates: str,
+    folders: tuple[Path, ...],
+    as_json: bool,
+    quiet: bool,
+    verbose: bool,
+) -> int:
+    """Make a PAG of SOURCE: an LDraw model (.ldr, .mpd), a tree of meshes (.json, .yaml), a bill of
+    materials with levels (.csv), or a folder with one of these."""
+    from factory.importing import Options, import_product
+    from factory.importing.assembling import Mates
+    from factory.pipeline import all_templates
+    from factory.support.files import own_names, write_all
+
+    for folder, option in ((library, "--library"), (meshes, "--meshes")):
+        _require_folder(folder, option)
+    options = Options(library, boxes, meshes, UNITS[unit], cast("Mates", mates))
+    templates = all_templates(folders)
+    product = import_product(source, templates, options)
+    folder = output or Path(product.name)
+    writable_folder(folder)
+    files = {folder / name: content for name, content in product.files.items()}
+    own_names(folder, files)
+    write_all(files)
+    pag, meshes_made = next(iter(files)), len(files) - 1
+    warnings = (*product.warnings, *_shape_warnings(pag, templates))
+    warn(warnings, quiet)
+    parts = sum(1 for _ in product.pag.parts())
+    if as_json:
+        emit(
+            {
+                "pag": str(pag),
+                "product": product.pag.root,
+                "labels": len(product.pag),
+                "parts": parts,
+                "meshes": meshes_made,
+                "files": [str(path) for path in files],
+                "warnings": [d.as_json() for d in warnings],
+            }
+        )
+    elif not quiet:
+        operations = len(product.pag) - parts
+        say(f"{pag}: parts {parts}, operations {operations}, meshes {meshes_made}")
+        for path in files if verbose else ():
+            say(f"  {path}")
+    return 0
+
+
+def _shape_warnings(pag: Path, templates: Mapping[str, Template]) -> tuple[Diagnostic, ...]:
+    """What `build` will say of the shapes in a PAG that has been written."""
+    from factory.geometry.solids import product_geometry
+    from factory.lang.pag_reader import load_pag
+
+    try:
+        return product_geometry(load_pag(pag, templates)).warnings
+    except InputError as error:
+        return error.diagnostics
+
+
+def _require_folder(folder: Path | None, option: str) -> None:
+    if folder is not None and not folder.is_dir():
+        message = f"{option}: there is no folder '{folder}'"
+        raise InputError(Diagnostic("BadFile", message, None, "give the name of a folder"))
+
+
+@click.command()
+@click.argument("name", type=PATH)
+@OUTPUT
+def new(name: Path, as_json: bool, quiet: bool, verbose: bool) -> int:
+    """Write a small product to start from in a new folder NAME."""
+    from factory.commands.new import starter
+    from factory.support.files import write_all
+
+    files = {name / path: content for path, content in starter(name.name).items()}
+    _require_new(name)
+    writable_folder(name)
+    write_all(files)
+    if as_json:
+        emit({"folder": str(name), "files": [str(path) for path in files]})
+    elif not quiet:
+        say(f"{name}: {len(files)} files")
+        for path in files if verbose else ():
+            say(f"  {path}")
+        say(f"  cd {name}")
+        say(f"  factory run {name.name}.pag --units 3")
+    return 0
+
+
+def _require_new(folder: Path) -> None:
+    """Raises InputError (BadFile) where there is something already."""
+    if folder.is_symlink() or (folder.exists() and not _is_empty(folder)):
+        message, hint = f"'{folder}' is there already", "choose another name"
+        raise InputError(Diagnostic("BadFile", message, None, hint))
+
+
+def _is_empty(folder: Path) -> bool:
+    return folder.is_dir() and not any(folder.iterdir())

@@ -1,0 +1,233 @@
+"""The command `sweep`."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from factory.commands.options import (
+    FLOOR,
+    MOTION,
+    OUTPUT,
+    PATH,
+    RELAY,
+    WIP,
+    Number,
+    ground,
+    plan,
+    settings_of,
+    writable,
+    writable_folder,
+)
+from factory.support.console import emit, say, table, warn
+from factory.support.errors import Diagnostic, InputError
+
+if TYPE_CHECKING:
+    from factory.study.sweep.summary import Statistic, Summary
+    from factory.study.sweep.sweeping import Tally
+
+SHOWN = 8
+"""So many reasons of failed runs are told."""
+
+
+@click.command()
+@click.argument("file", type=PATH, required=False)
+@click.option("--templates", "folders", multiple=True, type=PATH, help="As of `run`.")
+@click.option(
+    "--vary",
+    multiple=True,
+    metavar="KEY=VALUES",
+    help="seed=0:100, jitter=0.1,0.3, speed=0.2:0.6:0.1 ... (repeatable).",
+)
+@click.option("-o", "--output", "database", type=PATH, help="The database of the results.")
+@click.option("--jobs", type=click.IntRange(1, 1024), help="Processes; default: the cores.")
+@click.option("--on", default="local", help="local, or dask://HOST:PORT of a Dask scheduler.")
+@click.option("--retry", is_flag=True, help="Run those again that failed.")
+@click.option("--summary", is_flag=True, help="Tell means, spreads and confidence intervals.")
+@click.option("--plots", type=PATH, help="Draw the summary into a folder.")
+@click.option("--world", type=click.Choice(["mujoco", "ideal"]), help="As of `run`.")
+@click.option("--units", type=click.IntRange(1, 10**9), help="Products of each run; default: 4.")
+@click.option("--seed", type=click.IntRange(0), help="As of `run`.")
+@click.option("--jitter", type=Number(0, 0.9), help="As of `run`; default: 0.")
+@WIP
+@click.option("--max-time", type=Number(0, min_open=True), help="Stop a run after this time [s].")
+@click.option("--fuse/--no-fuse", default=None, help="As of `run`.")
+@FLOOR
+@RELAY
+@MOTION
+@OUTPUT
+def sweep(
+    file: Path | None,
+    database: Path | None,
+    vary: tuple[str, ...],
+    summary: bool,
+    plots: Path | None,
+    as_json: bool,
+    quiet: bool,
+    verbose: bool,
+    **options: Any,
+) -> int:
+    """Run FILE.pag many times, over all combinations of what varies, into an SQLite database.
+
+    Called again it goes on where it was stopped. `factory sweep RESULTS --summary` summarises what
+    is there, also while a sweep goes on.
+    """
+    writable_folder(plots)
+    if plots is not None:
+        from factory.study.fidelity.plots import check_plots
+
+        check_plots()
+    told = summary or plots is not None
+    document: dict[str, Any] = {}
+    failed = False
+    if vary:
+        tally, database = _carry_out(file, database, vary, quiet or as_json, options)
+        failed = tally.failed + tally.there_failed > 0
+        document = _document(tally, database, options)
+        if not (as_json or quiet):
+            _tell(tally, database)
+    elif not told:
+        message, hint = "nothing varies", "for example --vary seed=0:100"
+        raise InputError(Diagnostic("Usage", message, None, hint))
+    if told:
+        document |= _summarise(database or file, plots, as_json or quiet, verbose)
+    if as_json:
+        emit(document)
+    return 1 if failed else 0
+
+
+def _carry_out(
+    file: Path | None,
+    database: Path | None,
+    vary: tuple[str, ...],
+    quiet: bool,
+    options: dict[str, Any],
+) -> tuple[Tally, Path]:
+    """Plan, prove and run. Raises InputError for what cannot be."""
+    from factory.commands.run_factory import check_ideal
+    from factory.nets.verify import proved
+    from factory.pipeline import read
+    from factory.study.sweep.grid import DEFAULTS, SETTINGS, read_axes
+    from factory.study.sweep.local import cores
+    from factory.study.sweep.recipe import Recipe
+    from factory.study.sweep.sweeping import LOCAL, sweep
+
+    if file is None:
+        raise InputError(Diagnostic("Usage", "there is no FILE.pag", None, "see sweep --help"))
+    if database is None:
+        message, hint = "there is no database for the results", "for example -o results.db"
+        raise InputError(Diagnostic("Usage", message, None, hint))
+    if options["on"] != LOCAL:
+        from factory.study.sweep.cluster import address_of
+
+        address_of(options["on"])
+    writable(file, database)
+    axes = read_axes(vary)
+    for axis in axes:
+        if options.get(axis.key) is not None:
+            message = f"{axis.key} is both given and varied"
+            raise InputError(Diagnostic("Usage", message, None, "leave one of them out"))
+    worlds = next((axis.values for axis in axes if axis.key == "world"), (options["world"],))
+    if set(worlds) == {"ideal"}:
+        check_ideal(options)
+    settings = settings_of(file, options)
+    if any(axis.key == "clearance" for axis in axes):
+        source = read(file, options["folders"])
+        factory = source.compile()
+    else:  # a layout that cannot be is told before anything is run
+        source, factory, _ = plan(file, options["folders"], settings, options["floor"], options)
+    proved(factory.net)
+    warn(source.product.warnings, quiet)
+    fixed = {name: getattr(settings, name) for name in SETTINGS}
+    fixed |= {k: options[k] for k in DEFAULTS if options[k] is not None}
+    most, room = options["max_time"], ground(options["floor"], options)
+    recipe = Recipe(source.compile(), source.product, fixed, most, room, options["fuse"])
+    jobs = options["jobs"] or cores()
+    done = sweep(recipe, axes, database, jobs, options["on"], options["retry"], quiet)
+    return done, database
+
+
+def _document(tally: Tally, database: Path, options: dict[str, Any]) -> dict[str, Any]:
+    """The keys of `sweep --json`."""
+    return {
+        "database": str(database),
+        "on": options["on"],
+        "runs": tally.runs,
+        "there": tally.there,
+        "there_failed": tally.there_failed,
+        "done": tally.done,
+        "failed": tally.failed,
+        "wall_time_s": tally.wall_time_s,
+        "runs_per_s": tally.rate,
+        "loops_time_s": tally.loops_time_s,
+        "rows_time_s": tally.rows_time_s,
+        "overhead_percent": None if tally.overhead is None else 100 * tally.overhead,
+    }
+
+
+def _tell(tally: Tally, database: Path) -> None:
+    """What a sweep did, for people."""
+    there = f"{tally.there} of {tally.runs} were there"
+    if tally.there_failed:
+        there += f", of which {tally.there_failed} failed; --retry runs them again"
+    there = f" ({there})" if tally.there else ""
+    say(f"{tally.done + tally.failed} runs, {tally.failed} failed{there}: {database}")
+    if tally.overhead is not None:
+        say(
+            f"{tally.rate:.1f} runs/s in {tally.wall_time_s:.1f} s; "
+            f"overhead {100 * tally.overhead:.1f} % of a run"
+        )
+
+
+def _summarise(
+    database: Path | None, folder: Path | None, quiet: bool, verbose: bool
+) -> dict[str, Any]:
+    """Summarise a database, and draw it. Gives the keys of `sweep --summary --json`."""
+    from factory.study.sweep.summary import summarise
+    from factory.support.files import write_all
+
+    if database is None:
+        message, hint = "there is no database", "factory sweep RESULTS --summary"
+        raise InputError(Diagnostic("Usage", message, None, hint))
+    found = summarise(database)
+    drawn: dict[Path, bytes] = {}
+    if folder is not None:
+        from factory.study.sweep.plots import plots
+
+        drawn = {folder / name: picture for name, picture in plots(found).items()}
+        write_all(drawn)
+    if not quiet:
+        _tell_summary(found, verbose)
+        for path in drawn:
+            say(f"wrote {path}")
+    return {"summary": found.as_json(), "files": [str(path) for path in drawn]}
+
+
+def _tell_summary(found: Summary, verbose: bool) -> None:
+    """A table for each group: figure, mean, spread, confidence interval."""
+    from factory.study.sweep.summary import CONFIDENCE
+
+    heads = ("figure", "mean", "deviation", f"{CONFIDENCE:.0%} from", "to", "least", "greatest")
+    for group in found.groups:
+        at = ", ".join(f"{key} {value}" for key, value in group.values) or found.product
+        failed = f", {group.failed} failed" if group.failed else ""
+        rows = [
+            (key, *map(_shown, _cells(s)))
+            for key, s in group.figures.items()
+            if verbose or s.least != s.greatest or key == "cycle_time_s"
+        ]
+        title = f"{at}: {group.done} runs{failed}"
+        table(title, heads, rows) if rows else say(title)
+    for reason, count in list(found.reasons.items())[:SHOWN]:
+        print(f"{count} failed: {reason}", file=sys.stderr)
+
+
+def _cells(s: Statistic) -> tuple[float | None, ...]:
+    return s.mean, s.deviation, s.low, s.high, s.least, s.greatest
+
+
+def _shown(value: float | None) -> str:
+    return "–" if value is None else f"{value:.6g}"

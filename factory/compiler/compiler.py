@@ -1,0 +1,332 @@
+"""Compile and CompileNode (paper, section 5): from a PAG to a factory F = (R, ~, N).
+
+Guarantees: the net is composed of one gear per robot and is a gear net (Theorem 5.1);
+`factory.nets. verify` proves it again, independently. What would break that is refused here. Linear
+in the PAG.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cache
+from types import MappingProxyType
+
+from factory.compiler.domains import check_prepared
+from factory.nets.gears import Gear, GearNet
+from factory.nets.petri import PetriNet, Place, Transition
+from factory.nets.threaded import Redistribution, ThreadedNet
+from factory.plant.approaches import Approach
+from factory.plant.factory import Factory, Operation, Robot
+from factory.problem.pag import NOPART, PAG, Assembly
+from factory.problem.robot_types import Catalogue
+from factory.problem.template import Template, variable_number
+from factory.support.collector import collector_paused
+from factory.support.errors import Diagnostic, InputError, Position, did_you_mean
+
+DROPOFF = "dropoff"
+
+LIFT = "lift"
+"""The type of a robot that lowers what it brings."""
+
+
+@dataclass(frozen=True, slots=True)
+class Node:
+    """An operation to compile: a node of the PAG, or one pile of a node with many inputs.
+
+    `size` counts the operation instances of its subtree, itself included.
+    """
+
+    label: str
+    template: Template
+    inputs: tuple[str, ...]
+    dwell: float
+    size: int
+    position: Position | None
+
+
+@dataclass(slots=True)
+class _Draft:
+    """What CompileNode has allocated so far: types, operations and, per robot, its operations from
+    the last of its cycle to the first."""
+
+    types: list[str]
+    births: list[Position | None]
+    visits: list[list[int]]
+    operations: list[Operation]
+    parents: list[int]
+    troubles: list[Diagnostic]
+
+    def allocate(self, robot_type: str, position: Position | None) -> int:
+        self.types.append(robot_type)
+        self.births.append(position)
+        self.visits.append([])
+        return len(self.types) - 1
+
+
+@collector_paused()
+def compile_pag(
+    pag: PAG,
+    templates: Mapping[str, Template],
+    catalogue: Catalogue,
+    approaches: Mapping[str, Approach] = MappingProxyType({}),
+) -> Factory:
+    """The factory that makes the product `pag`.
+
+    `approaches`: how the inputs of operations (by label, see `expand`) can come together; where one
+    is to be lowered, a lift brings it.
+
+    Raises InputError with every TypeMismatch and NotPrepared found. Robots and operations are
+    numbered as in the specification of the net: the output robot is r1; an operation numbers all
+    its new robots at once, the input with fewest operation instances first, tools last.
+    """
+    nodes = expand(pag, templates)
+    draft = _Draft([], [], [], [], [], [])
+    output = templates[DROPOFF]
+    _check_types(nodes, output, catalogue)
+    carrier = draft.allocate(output.robots[0], pag[pag.root].position)
+    _compile_nodes(nodes, pag.root, carrier, draft, catalogue, approaches)
+    _add_dropoff(output, pag, carrier, draft)
+    if not draft.troubles:
+        robots = _robots(draft)
+        operations = tuple(draft.operations)
+        draft.troubles.extend(check_prepared(robots, operations))
+    if draft.troubles:
+        raise InputError(draft.troubles)
+    return Factory(pag, robots, operations, gear_net(robots, operations), tuple(draft.parents))
+
+
+def _check_types(nodes: Mapping[str, Node], output: Template, catalogue: Catalogue) -> None:
+    """Raises InputError (TypeMismatch) where a template asks for a type of robot that is not in the
+    catalogue: once for each place in a template."""
+    users = {node.template.name: (node.template, node.position) for node in nodes.values()}
+    troubles = [
+        Diagnostic(
+            "TypeMismatch",
+            f"{template.name} asks for a robot of unknown type '{wanted}'",
+            template.robot_position(slot) or position,
+            did_you_mean(wanted, list(catalogue.types), "robot types"),
+        )
+        for template, position in ((output, None), *users.values())
+        for slot, wanted in enumerate(template.robots)
+        if wanted not in catalogue.types
+    ]
+    if troubles:
+        raise InputError(troubles)
+
+
+def expand(pag: PAG, templates: Mapping[str, Template]) -> dict[str, Node]:
+    """The operation instances by label, with the inputs of each beyond those of its template
+    inserted one by one: `mate(a, b, c)` becomes `x/2 = mate(a, b)`, `x = insert(x/2, c)`."""
+    nodes: dict[str, Node] = {}
+    for assembly in pag.postorder():
+        template = templates[assembly.operation]
+        taken = len(template.inputs)
+        inputs, spare = assembly.inputs[:taken], assembly.inputs[taken:]
+        label = f"{assembly.label}/{taken}" if spare else assembly.label
+        _add_node(nodes, label, template, inputs, assembly)
+        for number, further in enumerate(spare, start=taken + 1):
+            pile, label = label, f"{assembly.label}/{number}"
+            if number == len(assembly.inputs):
+                label = assembly.label
+            _add_node(nodes, label, templates[template.further], (pile, further), assembly)
+    return nodes
+
+
+def _add_node(
+    nodes: dict[str, Node],
+    label: str,
+    template: Template,
+    inputs: tuple[str, ...],
+    assembly: Assembly,
+) -> None:
+    size = 1 + sum(nodes[i].size for i in inputs)
+    dwell = _dwell(template, assembly)
+    nodes[label] = Node(label, template, inputs, dwell, size, assembly.position)
+
+
+def _dwell(template: Template, assembly: Assembly) -> float:
+    wanted = template.law.dwell
+    if isinstance(wanted, str):
+        wanted = assembly.parameter(wanted, dict(template.parameters).get(wanted))  # type: ignore[assignment]
+    return float(wanted) if isinstance(wanted, int | float) else 0.0
+
+
+def _compile_nodes(
+    nodes: Mapping[str, Node],
+    root: str,
+    output: int,
+    draft: _Draft,
+    catalogue: Catalogue,
+    approaches: Mapping[str, Approach],
+) -> None:
+    """CompileNode(P, carrier) for every node in preorder, with a stack in place of recursion."""
+    stack: list[tuple[str, int, int]] = [(root, output, -1)]
+    while stack:
+        label, carrier, parent = stack.pop()
+        node = nodes[label]
+        index = len(draft.operations)
+        brought = _brought(node)
+        _claim_carrier(node, carrier, draft, catalogue)
+        approach = approaches.get(label)
+        lowered = approach.lowered if approach else ""
+        robots = _allocate(node, carrier, brought, nodes, draft, catalogue, lowered)
+        before = tuple(brought)
+        after = tuple(NOPART if b == NOPART else label for b in node.template.after)
+        draft.operations.append(
+            Operation(
+                index,
+                label,
+                node.template,
+                robots,
+                before,
+                after,
+                node.dwell,
+                node.position,
+                approach,
+            )
+        )
+        draft.parents.append(parent)
+        for robot in robots:
+            draft.visits[robot].append(index)
+        inputs = sorted((r, x) for r, x in zip(robots, before, strict=True) if x != NOPART)
+        stack.extend((x, robot, index) for robot, x in reversed(inputs))
+
+
+def _brought(node: Node) -> list[str]:
+    """a, with the template's label variables replaced by the labels of the inputs."""
+    return [NOPART if i < 0 else node.inputs[i] for i in _arguments(node.template.before)]
+
+
+@cache
+def _arguments(before: tuple[str, ...]) -> tuple[int, ...]:
+    """For each label of a template's a the number of the input that it stands for, -1 for none."""
+    variables = sorted({*before} - {NOPART}, key=variable_number)
+    return tuple(-1 if label == NOPART else variables.index(label) for label in before)
+
+
+def _claim_carrier(node: Node, carrier: int, draft: _Draft, catalogue: Catalogue) -> None:
+    """The carrier takes the role T_j: its type becomes the more special of the two."""
+    wanted, given = node.template.robots[node.template.carrier - 1], draft.types[carrier]
+    met = catalogue.meet(given, wanted)
+    if met is None:
+        message = (
+            f"robot r{carrier + 1} carries '{node.label}' and must be a '{wanted}' for"
+            f" {node.template.name}, but its next role asks for a '{given}'"
+        )
+        hint = f"use an operation whose carrier is a '{given}', or a type that extends both"
+        draft.troubles.append(Diagnostic("TypeMismatch", message, node.position, hint))
+    else:
+        draft.types[carrier] = met
+
+
+def _allocate(
+    node: Node,
+    carrier: int,
+    brought: list[str],
+    nodes: Mapping[str, Node],
+    draft: _Draft,
+    catalogue: Catalogue,
+    lowered: str,
+) -> tuple[int, ...]:
+    """r_1, ..., r_k: the carrier and the new robots, numbered smallest input first, tools last. The
+    one that brings `lowered` is a lift."""
+    template = node.template
+    robots = {template.carrier - 1: carrier}
+    new = [i for i in range(len(template.robots)) if i != template.carrier - 1]
+    argument = {label: i for i, label in enumerate(node.inputs)}
+
+    def order(i: int) -> tuple[int, int, int]:
+        label = brought[i]
+        return (1, 0, i) if label == NOPART else (0, nodes[label].size, argument[label])
+
+    for i in sorted(new, key=order):
+        wanted = template.robots[i]
+        if lowered and brought[i] == lowered:
+            wanted = _lift(wanted, node, draft, catalogue)
+        robots[i] = draft.allocate(wanted, node.position)
+    return tuple(robots[i] for i in range(len(template.robots)))
+
+
+def _lift(wanted: str, node: Node, draft: _Draft, catalogue: Catalogue) -> str:
+    """The type of a robot that takes the role of a `wanted` and can lower what it brings."""
+    met = catalogue.meet(LIFT, wanted) if LIFT in catalogue.types else None
+    if met is not None and catalogue.fits(met, LIFT):
+        return met
+    message = f"what '{node.label}' takes must be lowered, and a '{wanted}' has no lift"
+    hint = "let the template ask for a 'dot', or the type extend 'lift'"
+    draft.troubles.append(Diagnostic("TypeMismatch", message, node.position, hint))
+    return wanted
+
+
+def _add_dropoff(output: Template, pag: PAG, carrier: int, draft: _Draft) -> None:
+    index = len(draft.operations)
+    draft.operations.append(
+        Operation(
+            index, DROPOFF, output, (carrier,), (pag.root,), (NOPART,), 0.0, pag[pag.root].position
+        )
+    )
+    draft.parents = [index if p == -1 else p for p in draft.parents] + [-1]
+    draft.visits[carrier].insert(0, index)
+
+
+def _robots(draft: _Draft) -> tuple[Robot, ...]:
+    return tuple(
+        Robot(i, f"r{i + 1}", draft.types[i], tuple(reversed(visits)), draft.births[i])
+        for i, visits in enumerate(draft.visits)
+    )
+
+
+def gear_net(robots: tuple[Robot, ...], operations: tuple[Operation, ...]) -> GearNet:
+    """N: for each operation a start, an end and a place; for each robot a gear through them.
+
+    Operation i has transitions 2i and 2i + 1 and place i; the wait places follow, robot by robot.
+    """
+    transitions = tuple(
+        Transition(f"{o.name}_{end}", o.position) for o in operations for end in ("s", "e")
+    )
+    places = [
+        Place(
+            o.name,
+            (o.start,),
+            (o.end,),
+            o.template.name,
+            "" if o.after[o.template.carrier - 1] == NOPART else o.label,
+            len(o.robots),
+            o.position,
+        )
+        for o in operations
+    ]
+    slots = [o.robots for o in operations]
+    slot_of = [{robot: i for i, robot in enumerate(o.robots)} for o in operations]
+    pairs: list[list[tuple[tuple[int, int], tuple[int, int]]]] = [[] for _ in transitions]
+    gears = []
+    for robot in robots:
+        gear_places, gear_events = [], []
+        for step, number in enumerate(robot.operations):
+            before, operation = operations[robot.operations[step - 1]], operations[number]
+            done, begun = before.end, operation.start
+            slot = slot_of[number][robot.index]
+            label = operation.before[slot]
+            stays = label != NOPART and operation.after[slot] != NOPART
+            wait = len(places)
+            places.append(
+                Place(
+                    f"{robot.name}:{label}",
+                    (done,),
+                    (begun,),
+                    "hold" if stays else "wait",
+                    label,
+                    1,
+                    operation.position,
+                )
+            )
+            slots.append((robot.index,))
+            pairs[begun].append(((wait, 0), (number, slot)))
+            pairs[done].append(((before.place, slot_of[before.index][robot.index]), (wait, 0)))
+            gear_places += [wait, number]
+            gear_events += [done, begun]
+        gears.append(Gear(robot.name, robot.type, tuple(gear_places), tuple(gear_events)))
+    redistribution: tuple[Redistribution, ...] = tuple(tuple(sorted(p)) for p in pairs)
+    net = ThreadedNet(PetriNet(transitions, tuple(places)), redistribution)
+    return GearNet(net, tuple(gears), tuple(g.places[0] for g in gears), tuple(slots))

@@ -1,0 +1,65 @@
+"""The convex bodies of a product's parts as arrays, and which of them are boxes along the axes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from factory.geometry.meshes import Array
+from factory.geometry.solids import Product
+
+ROUNDING = 1e-9
+"""Vertices are the same within this [m]."""
+
+
+@dataclass(frozen=True, slots=True)
+class Bodies:
+    """All convex bodies: `vertices` (n, 3) of each, `low`, `high` (bodies, 3) its bounding box,
+    `part` the number of the part it belongs to, `boxes` whether it is its bounding box [m]."""
+
+    vertices: tuple[Array, ...] = field(repr=False)
+    part: NDArray[np.int64]
+    low: Array
+    high: Array
+    boxes: NDArray[np.bool_]
+
+    def shape(self, body: int) -> tuple[Array, bytes]:
+        """A body's vertices from the low corner of its box, and a key that is the same for bodies
+        of the same shape, turned the same way."""
+        placed = self.vertices[body] - self.low[body]
+        key = np.round(placed / ROUNDING).astype(np.int64)
+        return placed, key.tobytes()
+
+
+def bodies(product: Product, parts: Sequence[str]) -> Bodies:
+    """The bodies of the parts, in their order, as the engine collides them."""
+    found: list[Array] = []
+    part: list[int] = []
+    for number, label in enumerate(parts):
+        solid = product.solids[label]
+        pieces = solid.pieces or (solid.corners,)
+        found.extend(pieces)
+        part.extend([number] * len(pieces))
+    counts = np.array([len(vertices) for vertices in found], np.int64)
+    starts = np.concatenate([[0], np.cumsum(counts)[:-1]])
+    points = np.concatenate(found)
+    low, high = np.minimum.reduceat(points, starts), np.maximum.reduceat(points, starts)
+    boxes = _boxes(points, starts, counts, low, high)
+    return Bodies(tuple(found), np.array(part, np.int64), low, high, boxes)
+
+
+def _boxes(
+    points: Array, starts: NDArray[np.int64], counts: NDArray[np.int64], low: Array, high: Array
+) -> NDArray[np.bool_]:
+    """Whether a body has eight vertices, one in each corner of its bounding box."""
+    found = counts == 8
+    chosen = np.flatnonzero(found)
+    corners = points[starts[chosen][:, None] + np.arange(8)]
+    at_low = np.abs(corners - low[chosen][:, None]) < ROUNDING
+    at_high = np.abs(corners - high[chosen][:, None]) < ROUNDING
+    which = np.sort(at_high @ np.array([1, 2, 4]), axis=1)
+    found[chosen] = (at_low ^ at_high).all(axis=(1, 2)) & (which == np.arange(8)).all(axis=1)
+    return np.asarray(found)

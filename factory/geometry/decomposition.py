@@ -1,0 +1,132 @@
+"""A mesh that is not convex, as convex bodies that collide in its place.
+
+What is open, or convex but for a fiftieth of its hull, keeps its hull. A file that holds several
+closed convex bodies (a plate with a hole, written as wedges that touch) is exactly these bodies.
+What else is closed is decomposed by CoACD, where that is installed (the extra `decompose`), else it
+has its hull. Its results are kept in the user's cache.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import io
+from collections.abc import Callable
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+
+import numpy as np
+
+from factory.geometry.meshes import Array, Indices, Mesh
+from factory.geometry.pieces import FLATNESS, convex_bodies, is_closed
+from factory.support.files import user_cache, write_bytes
+
+FULL = 0.98
+"""A closed mesh that fills more than this share of its hull collides as its hull."""
+
+CONCAVITY = 0.02
+"""How far, at most, CoACD lets a body differ from its mesh: its `threshold`, in about half the
+longest edge of the mesh's box."""
+
+PARAMETERS = {"threshold": CONCAVITY, "seed": 0, "preprocess_mode": "auto"}
+"""What CoACD is called with."""
+
+SLIVER = 1e-6
+"""A body of less than this share of the mesh's volume is left out: the engine refuses flat ones."""
+
+
+def in_pieces(mesh: Mesh, as_written: Callable[[], tuple[Array, Indices]]) -> Mesh:
+    """The mesh with its convex bodies, where it is found to have several. `as_written` reads it
+    again with vertices that lie in the same place kept apart, as bodies that touch need."""
+    if not is_closed(mesh.faces) or _share_of_hull(mesh) >= 1 - FLATNESS:
+        return mesh
+    bodies = convex_bodies(mesh.vertices, mesh.faces) or convex_bodies(*as_written())
+    if bodies:
+        return _of_bodies(mesh.name, bodies)
+    if _share_of_hull(mesh) >= FULL:
+        return mesh
+    return Mesh(mesh.name, mesh.vertices, mesh.faces, _decomposed(mesh))
+
+
+def _share_of_hull(mesh: Mesh) -> float:
+    """The volume of a mesh in that of its hull; 1 where it has none."""
+    import trimesh
+
+    body = trimesh.Trimesh(mesh.vertices, mesh.faces, process=False)
+    volume = float(body.volume)
+    return volume / float(body.convex_hull.volume) if volume > 0 else 1.0
+
+
+def _of_bodies(name: str, bodies: list[tuple[Array, Indices]]) -> Mesh:
+    """One mesh of bodies that share no vertex, so that each is closed and mass adds up."""
+    starts = np.cumsum([0, *(len(vertices) for vertices, _ in bodies)])
+    faces = [faces + start for (_, faces), start in zip(bodies, starts, strict=False)]
+    pieces = tuple(vertices for vertices, _ in bodies)
+    return Mesh(name, np.concatenate(pieces), np.concatenate(faces), pieces)
+
+
+def _decomposed(mesh: Mesh) -> tuple[Array, ...]:
+    """The bodies that CoACD makes of a mesh, from the cache if it did so before; none where it is
+    not installed or fails, or finds that one will do."""
+    try:
+        release = version("coacd")
+    except PackageNotFoundError:
+        return ()
+    kept = cache_folder() / f"{_key(mesh, release)}.npz"
+    found = _read(kept)
+    if found is None:
+        found = _run_coacd(mesh)
+        with contextlib.suppress(OSError):
+            write_bytes(kept, _packed(found))
+    return found if len(found) > 1 else ()
+
+
+def cache_folder() -> Path:
+    """Where decompositions are kept."""
+    return user_cache() / "pieces"
+
+
+def _key(mesh: Mesh, release: str) -> str:
+    """What a decomposition depends on, as a digest."""
+    digest = hashlib.sha256(f"{release} {sorted(PARAMETERS.items())} {SLIVER}".encode())
+    for array in (mesh.vertices, mesh.faces):
+        digest.update(f" {array.shape} ".encode())
+        digest.update(np.ascontiguousarray(array).tobytes())
+    return digest.hexdigest()
+
+
+def _run_coacd(mesh: Mesh) -> tuple[Array, ...]:
+    """The bodies that CoACD makes of a mesh, without slivers; none where it fails."""
+    import trimesh
+
+    try:
+        import coacd
+
+        coacd.set_log_level("off")
+        bodies = coacd.run_coacd(coacd.Mesh(mesh.vertices, mesh.faces), **PARAMETERS)
+        hulls = [trimesh.convex.convex_hull(np.asarray(vertices, float)) for vertices, _ in bodies]
+    except Exception:  # whatever a library of C++ makes of a strange mesh, its hull still serves
+        return ()
+    least = SLIVER * sum(float(hull.volume) for hull in hulls)
+    return tuple(np.asarray(hull.vertices) for hull in hulls if hull.volume > least)
+
+
+def _packed(pieces: tuple[Array, ...]) -> bytes:
+    content = io.BytesIO()
+    counts = np.array([len(piece) for piece in pieces], np.int64)
+    np.savez(content, counts=counts, vertices=np.concatenate([np.zeros((0, 3)), *pieces]))
+    return content.getvalue()
+
+
+def _read(path: Path) -> tuple[Array, ...] | None:
+    """What `_packed` wrote; None where there is none, or it is damaged."""
+    try:
+        with np.load(path, allow_pickle=False) as content:
+            counts, vertices = content["counts"], content["vertices"]
+        if vertices.shape != (int(counts.sum()), 3) or not np.isfinite(vertices).all():
+            return None
+        if (counts < 4).any():
+            return None
+        return tuple(np.split(vertices, np.cumsum(counts)[:-1])) if len(counts) else ()
+    except Exception:  # numpy and zipfile raise anything on a broken file
+        return None

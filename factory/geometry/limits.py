@@ -1,0 +1,67 @@
+"""Numbers of a product's geometry that lead too far: what is refused, what is warned about, and
+where they are written."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from factory.geometry.meshes import Array
+from factory.problem.pag import PAG, Assembly
+from factory.support.errors import Diagnostic, Position
+
+if TYPE_CHECKING:
+    from factory.geometry.solids import Solid
+
+SMALLEST, FURTHEST, HEAVIEST = 5e-9, 1e4, 1e12
+"""A part of a smaller half length, or beyond this distance [m] or mass [kg], is refused: the engine
+cannot compute with it."""
+
+LONGEST, SHORTEST = 5.0, 0.005
+"""A product outside these lengths [m] gets a warning."""
+
+SHAPES = ("box", "cylinder", "sphere", "mesh")
+"""Parameters that give a part a shape."""
+
+
+def beyond(node: Assembly, solid: Solid) -> Diagnostic | None:
+    """What is wrong with a part whose numbers, each fine in itself, lead too far."""
+    reach = float(np.max(np.abs([solid.low, solid.high])))
+    if not reach <= FURTHEST:
+        is_away = not 2 * float(np.max(np.abs(solid.position))) < reach
+        return too_far(node, *(("pos",) if is_away else ()), "scale", *SHAPES)
+    if not (0 < solid.mass <= HEAVIEST and np.isfinite(solid.inertia).all()):
+        position = value_position(node, "mass", "density", "scale", *SHAPES)
+        message = f"'{node.label}' weighs {solid.mass:g} kg"
+        hint = f"more than 0 and at most {HEAVIEST:g} kg: check mass, density and shape"
+        return Diagnostic("BadValue", message, position, hint)
+    return None
+
+
+def too_far(node: Assembly, *names: str) -> Diagnostic:
+    """A part is out of reach because of the first of these parameters that it has."""
+    message = f"'{node.label}' reaches further than {FURTHEST:g} m from the origin"
+    hint = "lengths are in metres: check pos, scale and the shape"
+    return Diagnostic("BadValue", message, value_position(node, *names), hint)
+
+
+def is_plain(pag: PAG) -> bool:
+    """Whether no part says more of its geometry than its colour: nothing can be wrong with it."""
+    return all(p.name == "rgba" for node in pag.parts() for p in node.parameters)
+
+
+def value_position(node: Assembly, *names: str) -> Position | None:
+    """Where the value of the first of these parameters is that the part has; else its label."""
+    found = {p.name: p.position for p in node.parameters}
+    return next((found[name] for name in names if name in found), node.position)
+
+
+def size_warnings(pag: PAG, low: Array, high: Array) -> list[Diagnostic]:
+    """The warning about a product that is very long or very short."""
+    longest = float((high - low).max())
+    if SHORTEST <= longest <= LONGEST:
+        return []
+    hint = "is a mesh in millimetres? then write scale = 0.001, or import with --unit mm"
+    message = f"the product is {longest:g} m long"
+    return [Diagnostic("Size", message, pag[pag.root].position, hint)]

@@ -1,0 +1,111 @@
+"""From a file to an `Imported`: which reader it takes, and the files that come out."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from factory.importing.assembling import Mates, assemble
+from factory.importing.bill import BillReader
+from factory.importing.draft import Draft, Faults
+from factory.importing.json_reader import read_json
+from factory.importing.labels import file_stem
+from factory.importing.ldraw import read_ldraw
+from factory.importing.mesh_folder import MeshFolder
+from factory.importing.mesh_store import MeshStore
+from factory.importing.part_maker import PartMaker
+from factory.importing.tree_file import TreeReader
+from factory.importing.yaml_reader import read_yaml
+from factory.lang.operations import signature
+from factory.lang.pag_writer import write_pag
+from factory.lang.source import quoted, read_text, source_of
+from factory.problem.pag import PAG
+from factory.problem.template import Template
+from factory.support.collector import collector_paused
+from factory.support.errors import Diagnostic, InputError, did_you_mean
+
+LDRAW, YAML, JSON, BILL = (".ldr", ".mpd", ".dat"), (".yaml", ".yml"), (".json",), (".csv", ".tsv")
+KINDS = (*LDRAW[:2], *JSON, *YAML, *BILL)
+"""The endings of files that can be imported."""
+
+
+@dataclass(frozen=True, slots=True)
+class Options:
+    """`library`: an LDraw parts library; `boxes`: parts whose shape is missing become boxes;
+    `meshes`: where a tree's meshes are, else beside it; `unit`: the length that 1 stands for in a
+    tree or a bill and in its meshes [m]; `mates`: how more than two inputs are mated."""
+
+    library: Path | None = None
+    boxes: bool = False
+    meshes: Path | None = None
+    unit: float = 1.0
+    mates: Mates = "many"
+
+
+@dataclass(frozen=True, slots=True)
+class Imported:
+    """A product and the files that it comes in: contents by their paths in the output folder.
+    `name` is that of the PAG's file, without `.pag`."""
+
+    pag: PAG
+    name: str
+    files: Mapping[str, bytes]
+    warnings: tuple[Diagnostic, ...]
+
+
+@collector_paused()
+def import_product(
+    path: Path, templates: Mapping[str, Template], options: Options | None = None
+) -> Imported:
+    """The product in a file, or in a folder with one tree or bill. Nothing is written. Raises
+    InputError with every fault found."""
+    options = options or Options()
+    file = _file(path)
+    faults = Faults()
+    store = MeshStore("bricks" if file.suffix.lower() in LDRAW else "meshes")
+    drafts = _drafts(file, templates, options, store, faults)
+    pag = assemble(drafts, faults, options.mates)
+    name = file_stem(file.stem)
+    text = f"// {name}, imported from {file.name}\n".encode() + write_pag(pag).encode()
+    return Imported(pag, name, {f"{name}.pag": text, **store.files}, tuple(faults.warnings))
+
+
+def _drafts(
+    file: Path,
+    templates: Mapping[str, Template],
+    options: Options,
+    store: MeshStore,
+    faults: Faults,
+) -> list[Draft]:
+    kind = file.suffix.lower()
+    if kind in LDRAW:
+        return read_ldraw(file, options.library, options.boxes, store, faults)
+    if kind not in KINDS:
+        hint = did_you_mean(kind, KINDS, "endings of files")
+        message = f"{quoted(file.name)} is nothing that can be imported"
+        raise InputError(Diagnostic("BadFile", message, None, hint))
+    source = source_of(read_text(file), str(file))
+    meshes = MeshFolder(options.meshes or file.parent, store, faults)
+    parts = PartMaker(meshes, options.unit, faults)
+    if kind in BILL:
+        return BillReader(source, parts, faults).read(file.stem)
+    operations = {name: signature(template) for name, template in templates.items()}
+    root = read_json(source) if kind in JSON else read_yaml(source)
+    return TreeReader(operations, parts, faults).read(root, file.stem)
+
+
+def _file(path: Path) -> Path:
+    """The file itself; of a folder, the one tree or bill in it."""
+    if not path.is_dir():
+        return path
+    found = sorted(p for p in path.iterdir() if p.suffix.lower() in KINDS and p.is_file())
+    if len(found) == 1:
+        return found[0]
+    named = ", ".join(p.name for p in found[:5])
+    message = f"the folder {quoted(str(path))} has {named or 'no tree of its meshes'}"
+    hint = "name one of them" if found else "say how they go together: a tree.json or a bill.csv"
+    raise InputError(Diagnostic("BadFile", message, None, hint))
+
+
+__all__ = ["KINDS", "Imported", "Options", "import_product"]

@@ -1,0 +1,188 @@
+"""Choose the relays: few, for the wanted cycle time.
+
+The layout is made with room for two lanes on every guidepath that could be cut. Then ways get one
+relay more each where a robot whose gear takes too long waits for them, until none does or none can
+be cut. What cannot be certified is not cut.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator, Mapping
+from dataclasses import replace
+
+from factory.lang.template_reader import load_templates
+from factory.layout.clearance import certify
+from factory.layout.dimensions import Clearance
+from factory.layout.durations import Pace, gear_times
+from factory.layout.embedding import certified
+from factory.layout.layout import Layout, Point2
+from factory.layout.optimising import optimised
+from factory.layout.relaying.splitting import split
+from factory.layout.relaying.ways import Way, ways
+from factory.plant.factory import Robot
+from factory.problem.pag import NOPART
+from factory.problem.robot_types import Catalogue, load_catalogue
+from factory.problem.template import Template
+from factory.support.collector import collector_paused
+from factory.support.resources import templates_folder
+from factory.support.settings import Settings
+
+WITHIN = 1.05
+"""Where no cycle time is asked for: that of the most relays there can be, times this."""
+
+GUESS = 0.6
+"""At first no piece of a way takes longer than this share of the wanted cycle time."""
+
+WIDENED = 3
+"""So often the layout is made anew to have room for relays on guidepaths that got longer."""
+
+
+@collector_paused()
+def relayed(
+    plain: Layout,
+    settings: Settings,
+    cycle: float | None = None,
+    floor: Point2 | None = None,
+) -> Layout:
+    """A layout with relays, its own net and certificate, for a `cycle` time [s] if one is given, or
+    near the least there can be; `plain` itself where no relay makes it faster. Raises RunError
+    (Layout) where it does not fit the floor."""
+    search = _searched(plain, _cuttable(plain, settings, floor), settings, cycle, floor)
+    used = {way.robot for label, way in search.ways.items() if search.numbers[label]}
+    again = _searched(plain, used, settings, search.cycle, floor)
+    if again.seconds(again.found) <= max(search.cycle, search.seconds(search.found)) + 1e-9:
+        search = again
+    if not search.seconds(search.found) < search.seconds(plain):
+        return plain
+    return replace(certified(search.found, floor), plain=plain)
+
+
+def _cuttable(plain: Layout, settings: Settings, floor: Point2 | None) -> set[int]:
+    """The robots with a way that can be cut, where all of these have room for it."""
+    layout, wide = plain, set[int]()
+    for _ in range(WIDENED):
+        more = wide | {way.robot for way in ways(layout).values()}
+        if more == wide:
+            break
+        wide, layout = more, _roomy(plain, more, settings, floor)
+    return wide
+
+
+def _roomy(
+    plain: Layout, wide: Collection[int], settings: Settings, floor: Point2 | None
+) -> Layout:
+    """The layout with room for two lanes on the guidepaths of these robots."""
+    c, pace = Clearance(plain.clearance), Pace.of(settings)
+    return optimised(plain.factory, plain.product, c, pace, floor, wide)
+
+
+def _searched(
+    plain: Layout,
+    wide: Collection[int],
+    settings: Settings,
+    cycle: float | None,
+    floor: Point2 | None,
+) -> _Search:
+    """What was found with relays for these robots alone, such that it can be certified."""
+    layout = _roomy(plain, wide, settings, floor)
+    chosen = {label: way for label, way in ways(layout).items() if way.robot in wide}
+    templates = {o.template.name: o.template for o in plain.factory.operations}
+    templates = {**load_templates([templates_folder()]), **templates}
+    search = _Search(layout, chosen, templates, load_catalogue(), settings)
+    search.look(cycle)
+    while search.ways and not (certificate := certify(search.found)).holds:
+        search.forbid({name for fault in certificate.faults for name in fault.robots})
+        search.look(cycle)
+    return search
+
+
+class _Search:
+    """Looks for `numbers` of relays on the `ways` of a layout; `found`: the layout with them,
+    `cycle`: what it was to reach [s]."""
+
+    def __init__(
+        self,
+        layout: Layout,
+        ways: Mapping[str, Way],
+        templates: Mapping[str, Template],
+        catalogue: Catalogue,
+        settings: Settings,
+    ) -> None:
+        self.layout, self.ways, self.settings = layout, ways, settings
+        self.templates, self.catalogue = templates, catalogue
+        self.numbers: dict[str, int] = {}
+        self.found = layout
+        self.origins: Mapping[str, str] = {}
+        self.cycle = 0.0
+
+    def times(self, layout: Layout) -> list[float]:
+        """How long the gear of each robot takes [s]; of the output robot's, how long the outfeed
+        does where that is longer."""
+        pace, settings = Pace.of(self.settings), self.settings
+        found = gear_times(layout, pace)
+        tray = Pace(settings.outfeed, settings.outfeed_acceleration).rest(layout.outfeed_way)
+        dropoff = layout.factory.dropoff.index
+        way = layout.home(0, dropoff) - layout.goal(dropoff, 0)
+        outfeed = pace.rest(way) + pace.lost + 2 * (tray + settings.tick)
+        found[0] = max(found[0], outfeed)
+        return found
+
+    def seconds(self, layout: Layout) -> float:
+        """The cycle time [s]."""
+        return max(self.times(layout))
+
+    def look(self, cycle: float | None) -> None:
+        """For few relays that make it as fast as wanted, or as can be."""
+        pace = Pace.of(self.settings)
+        if cycle is None:
+            most, _ = self._split({label: way.most for label, way in self.ways.items()})
+            cycle = max(WITHIN * max(gear_times(most, pace)), self.seconds(most))
+        times = self.times(self.layout)
+        late = {label: way for label, way in self.ways.items() if times[way.robot] > cycle}
+        self.cycle, self.numbers = cycle, dict.fromkeys(self.ways, 0)
+        self.numbers |= {label: self._guess(way, GUESS * cycle) for label, way in late.items()}
+        self.found, self.origins = self._split(self.numbers)
+        while more := self._more():
+            self.numbers = {label: n + (label in more) for label, n in self.numbers.items()}
+            self.found, self.origins = self._split(self.numbers)
+
+    def forbid(self, robots: Collection[str]) -> None:
+        """Cut no way any more that one of these robots (by name) has a piece of; where they have
+        none, no way at all."""
+        chosen = (r for r in self.found.factory.robots if r.name in robots)
+        labels = {self._way(x) for robot in chosen for x in _carried(self.found, robot)}
+        shared = labels & set(self.ways)
+        self.ways = {k: way for k, way in self.ways.items() if shared and k not in shared}
+
+    def _split(self, numbers: Mapping[str, int]) -> tuple[Layout, Mapping[str, str]]:
+        return split(self.layout, self.ways, numbers, self.templates, self.catalogue)
+
+    def _guess(self, way: Way, seconds: float) -> int:
+        """The least number of cuts that leaves no piece that takes longer."""
+        pace = Pace.of(self.settings)
+        fast = (n for n in range(way.most) if pace.rest(way.longest(n)) <= seconds)
+        return next(fast, way.most)
+
+    def _more(self) -> set[str]:
+        """The ways to cut once more: of each robot that takes too long the longest that it waits
+        for, or goes itself."""
+        found = set[str]()
+        times, numbers = self.times(self.found), self.numbers
+        for robot in self.found.factory.robots:
+            if times[robot.index] > self.cycle + 1e-9:
+                labels = map(self._way, _carried(self.found, robot))
+                left = [x for x in labels if x in self.ways and numbers[x] < self.ways[x].most]
+                if left:
+                    found.add(max(left, key=lambda x: (self.ways[x].longest(numbers[x]), x)))
+        return found
+
+    def _way(self, label: str) -> str:
+        """The label of the way on which a label of the layout found is carried."""
+        return self.origins.get(label, "")
+
+
+def _carried(layout: Layout, robot: Robot) -> Iterator[str]:
+    """All that is carried in the operations of a robot, to them and from them."""
+    for number in robot.operations:
+        operation = layout.factory.operations[number]
+        yield from (x for x in (*operation.before, *operation.after) if x != NOPART)

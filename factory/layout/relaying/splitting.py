@@ -1,0 +1,120 @@
+"""A layout with relays: each way that is cut becomes the guidepaths of several robots.
+
+Guarantees that what is carried goes where it went: the guidepaths of robots that relay each other
+lie in one line, their carriages in two lanes beside it by turns.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+
+from factory.compiler.compiler import compile_pag
+from factory.layout.dimensions import Clearance
+from factory.layout.layout import Guidepath, Layout
+from factory.layout.relaying.naming import Named, named
+from factory.layout.relaying.ways import Way
+from factory.layout.shapes import payload_boxes
+from factory.plant.approaches import Approach
+from factory.plant.factory import Factory
+from factory.problem.pag import NOPART
+from factory.problem.robot_types import Catalogue
+from factory.problem.template import Template
+
+
+@dataclass(frozen=True, slots=True)
+class Piece:
+    """What one robot has of the guidepath that was another's: from `start` to `end`, distances
+    from its B end [m]; the operations (by their labels without relays) that it does there."""
+
+    robot: int
+    start: float
+    end: float
+
+
+def split(
+    layout: Layout,
+    ways: Mapping[str, Way],
+    numbers: Mapping[str, int],
+    templates: Mapping[str, Template],
+    catalogue: Catalogue,
+) -> tuple[Layout, Mapping[str, str]]:
+    """The layout with so many relays on the way of each label; and for each label of it what that
+    was called before. Linear."""
+    before = layout.factory
+    names = named(before, numbers)
+    factory = compile_pag(names.pag, templates, catalogue, _approaches(before, names))
+    paths: dict[int, Guidepath] = {}
+    starts: dict[int, float] = {}
+    for robot in range(len(before.robots)):
+        pieces = list(_pieces(layout, robot, ways, names, factory))
+        for number, piece in enumerate(reversed(pieces)):
+            lane = 0.0
+            if len(pieces) > 1:
+                lane = Clearance(layout.clearance).spread * (-1) ** number
+            paths[piece.robot] = _path(layout.guidepaths[robot], piece, lane)
+            starts[piece.robot] = piece.start
+    stations = [0.0] * len(factory.operations)
+    for operation in before.operations:
+        made = _made(names, factory, operation.label)
+        station = layout.stations[operation.index]
+        if operation.index != before.dropoff.index:
+            station = round(station - starts[factory.operations[made].carrier], 3)
+        stations[made] = station
+    relayed = replace(
+        layout,
+        factory=factory,
+        guidepaths=tuple(paths[robot.index] for robot in factory.robots),
+        stations=tuple(stations),
+        payloads=payload_boxes(factory, layout.product),
+        certificate=None,
+    )
+    return relayed, names.origins
+
+
+def _made(names: Named, factory: Factory, label: str) -> int:
+    """The number of an operation after relays are added, by its label before."""
+    return factory.by_label[names.made.get(label, label)].index
+
+
+def _approaches(factory: Factory, names: Named) -> dict[str, Approach]:
+    """How inputs come together is as before: a relay turns nothing."""
+    return {
+        names.made[o.label]: replace(
+            o.approach, lowered=names.delivered(o.approach.lowered) if o.approach.lowered else ""
+        )
+        for o in factory.operations
+        if o.approach is not None
+    }
+
+
+def _pieces(
+    layout: Layout, robot: int, ways: Mapping[str, Way], names: Named, factory: Factory
+) -> Iterator[Piece]:
+    """The pieces of one guidepath, from B to A."""
+    start, before = 0.0, layout.factory
+    for number in before.robots[robot].operations:
+        operation = before.operations[number]
+        slot = operation.robots.index(robot)
+        chosen = factory.operations[_made(names, factory, operation.label)].robots[slot]
+        label = operation.after[slot]
+        if label == NOPART or not names.relays[label]:
+            continue
+        relays = names.relays[label]
+        for relay, cut in zip(relays, ways[label].cuts(len(relays)), strict=True):
+            yield Piece(chosen, start, cut)
+            start, chosen = cut, factory.by_label[relay].carrier
+    yield Piece(chosen, start, layout.guidepaths[robot].travel)
+
+
+def _path(path: Guidepath, piece: Piece, lane: float) -> Guidepath:
+    """The guidepath of a piece, in a lane so far to the side."""
+    back = path.travel - piece.end
+    a = tuple(round(a - u * back, 3) for a, u in zip(path.a, path.heading, strict=True))
+    return replace(
+        path,
+        a=(a[0], a[1]),
+        travel=round(piece.end - piece.start, 3),
+        offset=round(path.offset + lane, 3),
+        aside=-lane,
+    )

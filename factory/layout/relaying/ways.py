@@ -1,0 +1,116 @@
+"""The ways on which a robot can be relayed, and where.
+
+A robot carries each label along one *way*, from the goal of the operation that makes it to the goal
+of the next. A cut of the way is where the robot hands over to another, in line with it, which waits
+there with what it has taken over. So cuts and goals are so far apart that what stands at one is
+clear of what comes to the one before, carriages of every second robot, which run in one lane, are
+clear of each other, and what stands at the last cut is clear of all that the robot it is brought to
+carries past.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import accumulate, pairwise
+from math import ceil, floor, inf
+
+from factory.layout.dimensions import CARRIAGE, MAST
+from factory.layout.layout import Layout
+from factory.problem.pag import NOPART
+
+
+@dataclass(frozen=True, slots=True)
+class Way:
+    """Where `robot` carries `label`: from `start` (or where it has been farther already) to `end`,
+    distances from its B end [m]. A cut is at least a `step` after the one before or the start, and
+    `last` before the end."""
+
+    label: str
+    robot: int
+    start: float
+    end: float
+    step: float
+    last: float
+
+    @property
+    def most(self) -> int:
+        """How many cuts there can be."""
+        return max(0, floor((self.end - self.start - self.last) / self.step + 1e-9))
+
+    def longest(self, number: int) -> float:
+        """The longest piece with so many cuts [m]."""
+        at = (self.start, *self.cuts(number), self.end)
+        return max(after - before for before, after in pairwise(at))
+
+    def cuts(self, number: int) -> tuple[float, ...]:
+        """So many cuts, as evenly as can be, in whole millimetres."""
+        length = self.end - self.start
+        if not number:
+            return ()
+        even = min(length / (number + 1), (length - self.last) / number)
+        piece = max(self.step, floor(even * 1000 + 1e-6) / 1000)
+        return tuple(round(self.start + piece * (n + 1), 3) for n in range(number))
+
+
+def ways(layout: Layout) -> dict[str, Way]:
+    """The way of every label, of those that can be cut."""
+    found = (way for robot in range(len(layout.guidepaths)) for way in _ways(layout, robot))
+    return {way.label: way for way in found if way.most}
+
+
+def stops(layout: Layout, robot: int) -> list[float]:
+    """How far from its B end a robot has its goals, in the order of its gear [m]."""
+    operations, path = layout.factory.operations, layout.guidepaths[robot]
+    return [
+        round(path.length - layout.goal(n, operations[n].robots.index(robot)), 3)
+        for n in layout.factory.robots[robot].operations
+    ]
+
+
+def _ways(layout: Layout, robot: int) -> Iterator[Way]:
+    path, c = layout.guidepaths[robot], layout.clearance
+    lanes = max(CARRIAGE, path.reach - path.arm + MAST / 2)
+    at, piles = stops(layout, robot), _piles(layout, robot)
+    fronts = [-inf, *(front for _, _, front in piles)]
+    ends = (at[n] + max(front, before) for n, (before, front) in enumerate(pairwise(fronts)))
+    reached = list(accumulate(ends, max))
+    beyond = path.travel + _beyond(layout, robot)
+    found = []
+    for step in reversed(range(len(piles))):
+        label, rear, front = piles[step]
+        if label != NOPART:
+            last = max(0.0, at[step + 1] + front - beyond) + c
+            apart = max(front - rear, lanes) + c
+            start = max(at[step], reached[step] - front)
+            found.append(Way(label, robot, _up(start), at[step + 1], _up(apart), _up(last)))
+        beyond = min(beyond, at[step] + rear)
+    yield from reversed(found)
+
+
+def _piles(layout: Layout, robot: int) -> list[tuple[str, float, float]]:
+    """What a robot carries after each operation but the last, with its extent behind and ahead of
+    the product's middle [m]."""
+    found, path = [], layout.guidepaths[robot]
+    for number in layout.factory.robots[robot].operations[:-1]:
+        operation = layout.factory.operations[number]
+        label = operation.after[operation.robots.index(robot)]
+        box = layout.payloads.get(label, (0.0, 0.0, 0.0, 0.0))
+        found.append((label, *path.frame(box)[:2]))
+    return found
+
+
+def _beyond(layout: Layout, robot: int) -> float:
+    """Where ahead of A begins what a robot delivers to: the way of what its carrier brings, or the
+    outfeed. A payload at a cut, and a carriage and arm there, are clear of it [m]."""
+    path, factory, c = layout.guidepaths[robot], layout.factory, layout.clearance
+    operation = factory.operations[factory.robots[robot].operations[-1]]
+    beside = path.frame(layout.payloads[factory.delivered(operation.carrier)])[0]
+    if operation.index != factory.dropoff.index:
+        return beside
+    front = path.frame(layout.payloads[factory.pag.root])[1]
+    return beside - c + min(0.0, front + path.arm, front + path.reach - CARRIAGE / 2)
+
+
+def _up(length: float) -> float:
+    return ceil(length * 1000 - 1e-6) / 1000

@@ -1,0 +1,42 @@
+"""How a factory is laid out for a run: at the pace of its settings, with relays if asked for."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass, replace
+from typing import TYPE_CHECKING
+
+from factory.plant.factory import Factory
+from factory.support.settings import Settings
+
+if TYPE_CHECKING:
+    from factory.geometry.solids import Product
+    from factory.layout.layout import Layout
+
+
+@dataclass(frozen=True, slots=True)
+class Ground:
+    """What a layout is made for, beside settings: width and depth of the floor [m], None for as
+    much as it takes; whether guidepaths are shared among `relay` robots, or the `cycle` time [s]
+    that those are to reach, None for the shortest."""
+
+    floor: tuple[float, float] | None = None
+    relay: bool = False
+    cycle: float | None = None
+
+    @property
+    def relays(self) -> bool:
+        """Whether relays are asked for: a cycle time asks for them too."""
+        return self.relay or self.cycle is not None
+
+    def lay_out(self, factory: Factory, product: Product, settings: Settings) -> Layout:
+        """The layout of a compiled factory. Raises RunError (Layout) where there is no room."""
+        from factory.layout.durations import Pace
+        from factory.layout.embedding import lay_out
+
+        pace = Pace.of(settings)
+        layout = lay_out(factory, product, settings.clearance, self.floor, pace)
+        if self.relays:
+            from factory.layout.relaying import relayed
+
+            layout = relayed(layout, settings, self.cycle, self.floor)
+        return replace(layout, ground=asdict(self))

@@ -1,0 +1,166 @@
+"""The modes of a laid-out factory: each operation's control law composed with the stretching f.
+
+Stretching changes B - A alone, never r, eps or a speed (paper, section 5.1).
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import lru_cache
+
+import numpy as np
+
+from factory.control.laws import Setting, mode_of
+from factory.control.mode import Array, Limits, Mode
+from factory.control.navigation import Bundle
+from factory.layout.dimensions import CARRIAGE
+from factory.layout.layout import Layout
+from factory.plant.factory import Operation
+from factory.problem.pag import NOPART
+from factory.problem.template import Point, Template
+from factory.support.errors import Diagnostic, InputError
+from factory.support.settings import Settings
+
+
+def operation_modes(layout: Layout, eps: float) -> tuple[Mode, ...]:
+    """F_p, D_p and G_p of every operation, in arc length.
+
+    Raises InputError (NotPrepared) where the operations before leave the robots outside the domain
+    of a mode, or where one may hold another up for ever.
+    """
+    operations = layout.factory.operations
+    modes = tuple(operation_mode(layout, operation, eps) for operation in operations)
+    starts = operation_starts(layout)
+    count = len(layout.guidepaths)
+    count += len(layout.lifts)
+    limits = Limits(np.ones(count), np.ones(count))
+    bundle = Bundle.of(modes, [limits.of(axes) for axes in layout.factory.axes])
+    inside = bundle.in_domain(np.concatenate(starts))
+    faults = [
+        _unprepared(operation, within)
+        for operation, mode, start, within in zip(operations, modes, starts, inside, strict=True)
+        if not within or (mode.trapped and not mode.clear_from(start))
+    ]
+    if faults:
+        raise InputError(faults)
+    return modes
+
+
+def operation_starts(layout: Layout) -> list[Array]:
+    """For each operation where its axes (k,) are when it starts: where the ones before left
+    them."""
+    factory = layout.factory
+    left: dict[tuple[int, int], float] = {}
+    for robot in factory.robots:
+        for step, number in enumerate(robot.operations):
+            before = factory.operations[robot.operations[step - 1]]
+            left[number, robot.index] = layout.goal(before.index, before.robots.index(robot.index))
+    for axis, lift in enumerate(layout.lifts, start=len(factory.robots)):
+        gear, stroke = factory.robots[lift].operations, factory.strokes[lift]
+        left[gear[0], axis] = 0.0
+        left[gear[-1], axis] = stroke
+    return [np.array([left[o.index, a] for a in factory.axes[o.index]]) for o in factory.operations]
+
+
+def _unprepared(operation: Operation, inside: bool) -> Diagnostic:
+    what = (
+        "its robots may hold each other up for ever"
+        if inside
+        else "the operations before leave its robots outside its domain"
+    )
+    message = f"{operation.template.name}: '{operation.label}' cannot reach its goal; {what}"
+    position = operation.template.law_position or operation.position
+    return Diagnostic("NotPrepared", message, position, "let ~ join A ends to a B end or a station")
+
+
+def operation_mode(layout: Layout, operation: Operation, eps: float) -> Mode:
+    """The mode of one operation. The way of a robot that is not the carrier ends at its goal: what
+    is left of its guidepath is taken by the others. A robot that brings something to a carrier that
+    brings something too keeps its distance until the carrier stands: they would meet diagonally. So
+    does one that is to lower what it brings: it does so when all others stand."""
+    paths = [layout.guidepaths[robot] for robot in operation.robots]
+    carrier = operation.template.carrier - 1
+    gate, standoff = np.full(len(paths), -1), np.zeros(len(paths))
+    if operation.before[carrier] != NOPART:
+        for slot, label in enumerate(operation.before):
+            if slot != carrier and label != NOPART:
+                gate[slot], standoff[slot] = carrier, layout.standoff(operation, slot)
+    elif operation.lowered >= 0:
+        others = (s for s, label in enumerate(operation.before) if label != NOPART)
+        slot = operation.lowered
+        gate[slot] = next(other for other in others if other != slot)
+        standoff[slot] = layout.standoff(operation, slot)
+    r = np.array([path.r for path in paths])
+    stations = [
+        path.length - layout.stations[operation.index] - path.reach if slot == carrier else np.nan
+        for slot, path in enumerate(paths)
+    ]
+    setting = Setting(
+        lower=np.zeros(len(paths)),
+        upper=np.array([path.length for path in paths]),
+        r=r,
+        eps=eps,
+        station=np.array(stations),
+        width=np.minimum(r, CARRIAGE),
+        dwell=operation.dwell,
+        gate=gate,
+        standoff=standoff,
+    )
+    template = operation.template
+    if template.before[carrier] != NOPART:
+        template = _inside(template)
+    mode = mode_of(template, setting)
+    if operation.inputs and operation.index != layout.factory.dropoff.index:
+        guests = np.arange(len(paths)) != carrier
+        mode = replace(mode, lower=np.where(guests, mode.goals, mode.lower))
+    return _with_lifts(mode, layout, operation)
+
+
+def _with_lifts(mode: Mode, layout: Layout, operation: Operation) -> Mode:
+    """The mode with the lifts that its robots raise, or lower: one that is lowered is up until its
+    own robot stands, which stands after all others."""
+    factory, count = layout.factory, len(operation.robots)
+    axes = factory.axes[operation.index][count:]
+    if not axes:
+        return mode
+    robots = [layout.lifts[axis - len(factory.robots)] for axis in axes]
+    strokes = np.array([factory.strokes[robot] for robot in robots])
+    goals = np.array([layout.goal(operation.index, count + n) for n in range(len(axes))])
+    lowers = goals < strokes
+    own = np.array([operation.robots.index(robot) for robot in robots])
+    return replace(
+        mode,
+        goals=np.append(mode.goals, goals),
+        lower=np.append(mode.lower, np.zeros(len(axes))),
+        upper=np.append(mode.upper, strokes),
+        gate=np.append(mode.gate, np.where(lowers, own, -1)),
+        standoff=np.append(mode.standoff, np.where(lowers, strokes, 0.0)),
+    )
+
+
+@lru_cache(maxsize=256)
+def _inside(template: Template) -> Template:
+    """A template whose carrier brings something, with its B end written as the station where the
+    layout puts it: B = S + 2r."""
+    j = template.carrier
+
+    def moved(point: Point) -> Point:
+        if point.robot == j and point.end == "B":
+            return replace(point, end="S", multiple=point.multiple + 2)
+        return point
+
+    law = replace(template.law, goals=tuple(moved(p) for p in template.law.goals))
+    identified = tuple(tuple(moved(p) for p in points) for points in template.identifications)
+    return replace(template, law=law, identifications=identified)
+
+
+def robot_limits(
+    layout: Layout, settings: Settings, seed: int = 0, jitter: float = 0.0
+) -> tuple[Limits, np.ndarray]:
+    """Each axis's speed and acceleration, and the factor on its controller's gain: drawn for each
+    robot within ± jitter by the seed, and the same for its lift."""
+    count = len(layout.guidepaths)
+    draw = np.random.default_rng(seed).uniform(1 - jitter, 1 + jitter, size=(2, count))
+    robots = [*range(count), *layout.lifts]
+    speed = settings.speed * draw[0, robots]
+    return Limits(speed, np.full(len(robots), settings.acceleration)), draw[1, robots]

@@ -1,0 +1,35 @@
+"""How the inputs of an operation can come together: a value, found by `compiler/mating/` from the
+geometry of a product, used by Compile (robot types), the layout (sides) and the run (contacts)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+Kind = Literal["slide", "lower", "blocked"]
+
+Pair = tuple[str, str]
+"""Labels of two parts, in alphabetical order."""
+
+MARGIN = 0.02
+"""What is to be lowered comes at least this far above everything of the others [m]."""
+
+
+@dataclass(frozen=True, slots=True)
+class Approach:
+    """The admissible approaches of one operation with two inputs (or a pile and one more).
+
+    `axis`: 0 for x or 1 for y of the product, along which its inputs come in the layout. `sides`:
+    the sides of that axis, +1 or -1, from which the *last* input may come (moving against it); the
+    other comes from, or stands on, the opposite side. `lowered`: the label of the input that comes
+    `stroke` [m] above its place and is lowered when all others stand, "" where none is. `excluded`:
+    for each of `sides` the pairs of parts that cannot come so without passing through each other,
+    whose contact is switched off.
+    """
+
+    kind: Kind
+    axis: int
+    sides: tuple[int, ...] = (-1, +1)
+    lowered: str = ""
+    stroke: float = 0.0
+    excluded: tuple[tuple[Pair, ...], ...] = ((), ())

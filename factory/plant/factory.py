@@ -1,0 +1,168 @@
+"""A factory F = (R, ~, N) (paper, section 4.4): robots, identifications, gear net.
+
+Operations are the instances of templates; their places and transitions in the net are found by
+number: operation i has start 2i, end 2i + 1 and operation place i.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from types import MappingProxyType
+
+from factory.nets.gears import GearNet
+from factory.plant.approaches import Approach
+from factory.problem.pag import NOPART, PAG
+from factory.problem.template import Template, variable_number
+from factory.support.errors import Position
+
+
+@dataclass(frozen=True, slots=True)
+class Operation:
+    """A template instantiated: O(r_1, ..., r_k) (section 4.3).
+
+    `robots` are indices into `Factory.robots`, in the template's order; `before` and `after` the
+    labels each carries when it starts and ends (NOPART for none); `dwell` [s]; `approach`: how its
+    inputs come together, None where that is free.
+    """
+
+    index: int
+    label: str
+    template: Template
+    robots: tuple[int, ...]
+    before: tuple[str, ...]
+    after: tuple[str, ...]
+    dwell: float = 0.0
+    position: Position | None = field(default=None, compare=False)
+    approach: Approach | None = field(default=None, repr=False)
+
+    @property
+    def name(self) -> str:
+        """X: the label of the result, `dropoff` for the last."""
+        return self.label
+
+    @property
+    def carrier(self) -> int:
+        """The robot that holds the result (index into `Factory.robots`)."""
+        return self.robots[self.template.carrier - 1]
+
+    @property
+    def inputs(self) -> tuple[str, ...]:
+        """The labels brought, in the order of the robots."""
+        return tuple(label for label in self.before if label != NOPART)
+
+    def awaits_empty(self, slot: int) -> bool:
+        """Whether the robot in a slot waits for others, with nothing in its hands."""
+        return len(self.robots) > 1 and self.before[slot] == NOPART
+
+    @property
+    def lowered(self) -> int:
+        """The slot of the robot that lowers what it brings, -1 for none."""
+        if self.approach is None or not self.approach.lowered:
+            return -1
+        return self.before.index(self.approach.lowered)
+
+    @property
+    def last(self) -> int:
+        """The slot of the robot that brings the last input, -1 for none."""
+        variables = sorted(self.template.inputs, key=variable_number)
+        return self.template.before.index(variables[-1]) if variables else -1
+
+    @property
+    def start(self) -> int:
+        """Index of the transition X_s."""
+        return 2 * self.index
+
+    @property
+    def end(self) -> int:
+        """Index of the transition X_e."""
+        return 2 * self.index + 1
+
+    @property
+    def place(self) -> int:
+        """Index of the operation place [X_s; X_e]."""
+        return self.index
+
+
+@dataclass(frozen=True, slots=True)
+class Robot:
+    """A robot identifier: name r1, r2, ..., its type, and its operations in the gear's order.
+
+    `birth` is the operation that made it necessary (for diagnostics: the user's line).
+    """
+
+    index: int
+    name: str
+    type: str
+    operations: tuple[int, ...]
+    position: Position | None = field(default=None, compare=False)
+
+
+@dataclass(frozen=True)
+class Factory:
+    """F = (R, ~, N) with the operations it is made of; the last operation is dropoff.
+
+    ~ is the union of the templates' identifications over `operations`. `parents[i]` is the
+    operation that takes the result of operation i (dropoff has none, -1).
+    """
+
+    pag: PAG
+    robots: tuple[Robot, ...]
+    operations: tuple[Operation, ...]
+    net: GearNet
+    parents: tuple[int, ...] = field(repr=False)
+
+    @cached_property
+    def by_label(self) -> Mapping[str, Operation]:
+        """The operation that makes each label; dropoff under its own name."""
+        return MappingProxyType({operation.label: operation for operation in self.operations})
+
+    @cached_property
+    def leaves(self) -> tuple[Operation, ...]:
+        """The operations that make a part out of nothing, in the order of their numbers."""
+        return tuple(o for o in self.operations if not o.inputs and o.index != self.dropoff.index)
+
+    @property
+    def dropoff(self) -> Operation:
+        """The output robot's last operation."""
+        return self.operations[-1]
+
+    @cached_property
+    def strokes(self) -> Mapping[int, float]:
+        """How far [m] each robot (index) with a lift lowers what it delivers, robot by robot."""
+        found = {
+            o.robots[o.lowered]: o.approach.stroke
+            for o in self.operations
+            if o.approach is not None and o.lowered >= 0
+        }
+        return MappingProxyType(dict(sorted(found.items())))
+
+    @cached_property
+    def axes(self) -> tuple[tuple[int, ...], ...]:
+        """For each operation the axes that its mode moves: the carriages of its robots, which have
+        their robots' numbers, and the lifts that are raised or lowered in it, numbered from R on in
+        the order of `strokes`. A lift is up but for the operation that it delivers to."""
+        lift = {robot: len(self.robots) + n for n, robot in enumerate(self.strokes)}
+        found = [list(operation.robots) for operation in self.operations]
+        for robot, axis in lift.items():
+            gear = self.robots[robot].operations
+            for number in dict.fromkeys((gear[0], gear[-1])):
+                found[number].append(axis)
+        return tuple(map(tuple, found))
+
+    def delivered(self, robot: int) -> str:
+        """The label a robot (index) carries to its A end, "" for a tool."""
+        operation = self.operations[self.robots[robot].operations[-1]]
+        label = operation.before[operation.robots.index(robot)]
+        return "" if label == NOPART else label
+
+    @cached_property
+    def contents(self) -> Mapping[str, tuple[str, ...]]:
+        """For each label that is carried: the labels of its parts. Quadratic in a chain; only for
+        factories that are built in the engine."""
+        found: dict[str, tuple[str, ...]] = {}
+        for operation in reversed(self.operations[:-1]):
+            joined = tuple(part for label in operation.inputs for part in found[label])
+            found[operation.label] = joined or (operation.label,)
+        return MappingProxyType(found)

@@ -1,0 +1,160 @@
+"""The rigid bodies that sub-assemblies become once their parts are joined for good."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from types import MappingProxyType
+
+import numpy as np
+
+from factory.geometry.meshes import Array, sound
+from factory.geometry.solids import Product
+from factory.plant.factory import Factory
+from factory.problem.pag import NOPART
+
+FUSE_FROM = 40
+"""From so many robots on, runs are fused unless told otherwise."""
+
+GEOMS = 40
+"""But not where sub-assemblies would have more convex bodies than this for each part: each has
+those of all that it is made of, so that a chain of n parts has n / 2 for each."""
+
+
+@dataclass(frozen=True, slots=True)
+class Whole:
+    """A sub-assembly as one rigid body, in the frame of the finished product: the labels of its
+    `parts`, and their common `mass` [kg], `centre` (3,) of mass [m] and `inertia` (3, 3) about it
+    [kg m²]."""
+
+    label: str
+    parts: tuple[str, ...]
+    mass: float
+    centre: Array = field(repr=False)
+    inertia: Array = field(repr=False)
+
+
+@dataclass(frozen=True)
+class Bodies:
+    """What bodies a run has: one a part, or (`wholes` not empty) one a sub-assembly too.
+
+    `carried`: for each label that is carried, the labels of the bodies it consists of; of each
+    body, by its label: `centre` (3,) of mass [m], `mass` [kg], and `radius`, no less than how far
+    any vertex is from there [m]. A sub-assembly that is only worked upon stays the
+    body that it is.
+    """
+
+    carried: Mapping[str, tuple[str, ...]]
+    centre: Mapping[str, Array] = field(repr=False)
+    mass: Mapping[str, float] = field(repr=False)
+    radius: Mapping[str, float] = field(repr=False)
+    wholes: Mapping[str, Whole]
+
+    def __post_init__(self) -> None:
+        for name in ("carried", "centre", "mass", "radius", "wholes"):
+            object.__setattr__(self, name, MappingProxyType(dict(getattr(self, name))))
+
+    def parts(self, body: str) -> tuple[str, ...]:
+        """The parts that a body is."""
+        return self.wholes[body].parts if body in self.wholes else (body,)
+
+    def handled(self, factory: Factory, robot: int) -> tuple[str, ...]:
+        """The bodies that a robot (index) ever holds: what it delivers, and what it is made of."""
+        if not self.wholes:
+            return self.carried.get(factory.delivered(robot), ())
+        found: dict[str, None] = {}
+        for number in factory.robots[robot].operations:
+            operation = factory.operations[number]
+            if operation.carrier == robot and operation.label in self.carried:
+                for label in (*operation.inputs, operation.label):
+                    found.update(dict.fromkeys(self.carried[label]))
+        return tuple(found)
+
+    def lifted(
+        self, factory: Factory, pairs: tuple[tuple[str, str], ...]
+    ) -> tuple[tuple[str, str], ...]:
+        """Pairs of parts as the pairs of bodies that bring them together, each once."""
+        if not self.wholes:
+            return pairs
+        found: dict[tuple[str, str], None] = {}
+        for one, other in pairs:
+            found[_meeting(factory, self.carried, one, other)] = None
+        return tuple(found)
+
+
+def bodies_of(factory: Factory, product: Product, fuse: bool = False) -> Bodies:
+    """The bodies of a factory's run; with `fuse` every operation with two inputs or more makes one
+    of its own. Mass and inertia add up from the inputs, so this is linear in the labels, but for
+    the lists of parts."""
+    solids = product.solids
+    centre = {label: solid.centre for label, solid in solids.items()}
+    mass = {label: solid.mass for label, solid in solids.items()}
+    radius = {
+        label: float(np.linalg.norm(solid.corners - solid.centre, axis=1).max())
+        for label, solid in solids.items()
+    }
+    if not fuse:
+        return Bodies(factory.contents, centre, mass, radius, {})
+    inertia = {label: solid.inertia for label, solid in solids.items()}
+    carried: dict[str, tuple[str, ...]] = {}
+    wholes: dict[str, Whole] = {}
+    for operation in reversed(factory.operations[:-1]):
+        label, inputs = operation.label, [carried[i][0] for i in operation.inputs]
+        if len(inputs) < 2:
+            carried[label] = (inputs[0] if inputs else label,)
+            continue
+        carried[label] = (label,)
+        mass[label] = sum(mass[i] for i in inputs)
+        centre[label] = np.asarray(sum(mass[i] * centre[i] for i in inputs) / mass[label])
+        away = [(mass[i], centre[i] - centre[label]) for i in inputs]
+        inertia[label] = sum((inertia[i] for i in inputs), np.zeros((3, 3)))
+        inertia[label] = inertia[label] + sum(
+            m * (r @ r * np.eye(3) - np.outer(r, r)) for m, r in away
+        )
+        reach = (float(np.linalg.norm(r)) for _, r in away)
+        radius[label] = max(radius[i] + r for i, r in zip(inputs, reach, strict=True))
+        parts = factory.contents[label]
+        wholes[label] = Whole(label, parts, mass[label], centre[label], sound(inertia[label]))
+    return Bodies(carried, centre, mass, radius, wholes)
+
+
+def fusing_pays(factory: Factory, product: Product) -> bool:
+    """Whether one body for each sub-assembly makes a run faster, as measured."""
+    pieces = {o.label: len(product.solids[o.label].pieces) for o in factory.leaves}
+    wholes = [factory.contents[o.label] for o in factory.operations[:-1] if len(o.inputs) > 1]
+    geoms = sum(pieces[part] for parts in wholes for part in parts)
+    return len(factory.robots) >= FUSE_FROM and geoms <= GEOMS * len(factory.leaves)
+
+
+def fused_copies(bodies: Bodies, factory: Factory, units: int | None) -> dict[str, int]:
+    """How many copies of each body a fused run needs: a part is in its feeder and in the hands of
+    its robot, or not yet fused; a sub-assembly in the hands of one robot; the product on the
+    outfeed's tray too; and what is relayed in the hands of each further robot."""
+    copies = {operation.label: 2 for operation in factory.leaves}
+    (root,) = bodies.carried[factory.pag.root]
+    copies |= {label: 2 if label == root else 1 for label in bodies.wholes}
+    for operation in factory.operations[:-1]:
+        carrier = operation.template.carrier - 1
+        if len(operation.inputs) == 1 and operation.before[carrier] == NOPART:
+            copies[bodies.carried[operation.label][0]] += 1
+    most = max(copies.values()) if units is None else units
+    return {label: min(number, most) for label, number in copies.items()}
+
+
+def _meeting(
+    factory: Factory, carried: Mapping[str, tuple[str, ...]], one: str, other: str
+) -> tuple[str, str]:
+    """The bodies that two parts belong to just before the operation that joins them."""
+    below = {}
+    number = factory.by_label[one].index
+    while number >= 0:
+        above = factory.parents[number]
+        below[above] = number
+        number = above
+    number = factory.by_label[other].index
+    while factory.parents[number] not in below:
+        number = factory.parents[number]
+    first = below[factory.parents[number]]
+    labels = (factory.operations[n].label for n in (first, number))
+    a, b = (carried[label][0] for label in labels)
+    return a, b

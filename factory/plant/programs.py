@@ -1,0 +1,95 @@
+"""The robots' programs, read off their gears (paper, section 6): a loop over what the robot
+carries.
+
+A step waits until the other robots of its operation show what they must bring, then runs its
+component of the operation's field until the labels have changed.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from factory.plant.factory import Factory, Operation
+from factory.problem.pag import NOPART
+
+
+@dataclass(frozen=True, slots=True)
+class Step:
+    """One `If` of a program: what the robot carries, the mode it waits in, the cells it waits for
+    (robot, label), its operation and its component there, from 0."""
+
+    label: str
+    wait: str
+    until: tuple[tuple[int, str], ...]
+    operation: Operation
+    slot: int
+
+    @property
+    def is_carrier(self) -> bool:
+        """Whether this robot holds the result."""
+        return self.slot == self.operation.template.carrier - 1
+
+
+@dataclass(frozen=True, slots=True)
+class Program:
+    """What a robot does for ever: its steps in the order of its gear."""
+
+    robot: int
+    name: str
+    steps: tuple[Step, ...]
+
+
+def program_of(factory: Factory, robot: int) -> Program:
+    """The program of a robot (index), read off its gear."""
+    net = factory.net
+    gear = net.gears[robot]
+    steps = []
+    for position, number in enumerate(factory.robots[robot].operations):
+        operation = factory.operations[number]
+        wait = net.threaded.places[gear.places[2 * position]]
+        others = tuple(
+            (other, label)
+            for other, label in sorted(zip(operation.robots, operation.before, strict=True))
+            if other != robot
+        )
+        slot = operation.robots.index(robot)
+        steps.append(Step(wait.label, wait.mode, others, operation, slot))
+    return Program(robot, factory.robots[robot].name, tuple(steps))
+
+
+def write_program(program: Program) -> str:
+    """The program as the paper prints it, with robots numbered from 1."""
+    me = program.robot + 1
+    lines = [f"// {program.name}", "Loop:"]
+    for step in program.steps:
+        lines += [
+            f"  If state_{me} = {step.label}",
+            f"    Run ẋ_{me} = {step.wait} Until {_condition(step)}",
+            f"    Run ẋ_{me} = {_field(step)} Until {_exit(step, me)}",
+            "    Break",
+        ]
+    return "\n".join([*lines, "End Loop"])
+
+
+def _condition(step: Step) -> str:
+    """What it waits for; with nobody to wait for, what the world must provide."""
+    if step.until:
+        return " ∧ ".join(f"state_{robot + 1} = {label}" for robot, label in step.until)
+    return "a part is at the feeder" if step.label == NOPART else "the outfeed is free"
+
+
+def _field(step: Step) -> str:
+    """π_i ∘ F(x_1, ..., x_k)."""
+    operation = step.operation
+    robots = ", ".join(f"x_{robot + 1}" for robot in operation.robots)
+    return f"π_{step.slot + 1} ∘ {operation.template.name}({robots})"
+
+
+def _exit(step: Step, me: int) -> str:
+    """Its own label where that changes; a tool watches the carrier's."""
+    operation = step.operation
+    after = operation.after[step.slot]
+    if after != step.label:
+        return f"state_{me} = {after}"
+    carrier = operation.template.carrier - 1
+    return f"state_{operation.carrier + 1} = {operation.after[carrier]}"

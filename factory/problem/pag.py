@@ -1,0 +1,87 @@
+"""The product assembly graph (PAG): a tree of labelled sub-assemblies (paper, section 4.1)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from types import MappingProxyType
+
+from factory.support.errors import Position
+
+NOPART = "nopart"
+RESERVED = frozenset({NOPART, "root", "parts", "dropoff"})
+
+Value = float | str | tuple[float, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Parameter:
+    """A keyword argument of an operation, with the place of its value in the text."""
+
+    name: str
+    value: Value
+    position: Position | None = field(default=None, compare=False)
+
+
+@dataclass(frozen=True, slots=True)
+class Assembly:
+    """One node of a PAG: `label = operation(inputs, parameters)`. A part has no inputs.
+
+    Positions are those of the label, of the operation's name and of each input; they do not count
+    in comparisons, so two texts that say the same give equal values.
+    """
+
+    label: str
+    operation: str
+    inputs: tuple[str, ...] = ()
+    parameters: tuple[Parameter, ...] = ()
+    position: Position | None = field(default=None, compare=False)
+    operation_position: Position | None = field(default=None, compare=False)
+    input_positions: tuple[Position, ...] = field(default=(), compare=False)
+
+    def parameter(self, name: str, default: Value | None = None) -> Value | None:
+        """The value of the keyword argument `name`, or `default`."""
+        return next((p.value for p in self.parameters if p.name == name), default)
+
+
+@dataclass(frozen=True)
+class PAG:
+    """A product assembly graph: one tree over its labels, in the order of the text.
+
+    `count` is the number in `N parts`, None where the text leaves it out. `folder` is where mesh
+    paths start. Made by `factory.lang.read_pag`, which checks that it is a tree.
+    """
+
+    root: str
+    nodes: tuple[Assembly, ...]
+    count: int | None = None
+    folder: str = field(default=".", compare=False)
+    file: str = field(default="<text>", compare=False)
+
+    @cached_property
+    def by_label(self) -> Mapping[str, Assembly]:
+        """The nodes by label."""
+        return MappingProxyType({node.label: node for node in self.nodes})
+
+    def __getitem__(self, label: str) -> Assembly:
+        return self.by_label[label]
+
+    def __len__(self) -> int:
+        return len(self.nodes)
+
+    def parts(self) -> Iterator[Assembly]:
+        """The leaves, in the order of the text."""
+        return (node for node in self.nodes if not node.inputs)
+
+    def postorder(self) -> Iterator[Assembly]:
+        """Every node after its inputs, inputs in argument order, root last; without recursion."""
+        stack: list[tuple[str, bool]] = [(self.root, False)]
+        while stack:
+            label, expanded = stack.pop()
+            node = self.by_label[label]
+            if expanded or not node.inputs:
+                yield node
+            else:
+                stack.append((label, True))
+                stack.extend((child, False) for child in reversed(node.inputs))

@@ -1,0 +1,102 @@
+"""Robot types (paper, section 4.2): an MJCF file and an entry in a catalogue,
+`mjcf/catalogue.toml`."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from types import MappingProxyType
+
+from factory.support.errors import Diagnostic, InputError, Position, did_you_mean
+from factory.support.resources import mjcf_folder
+
+
+@dataclass(frozen=True, slots=True)
+class RobotType:
+    """T: its name, MJCF file, the type it extends ("" for none) and what it is for.
+
+    `stretches` names the directions in which its workspace may be made longer (`along`).
+    """
+
+    name: str
+    mjcf: Path
+    extends: str = ""
+    stretches: tuple[str, ...] = ("along",)
+    summary: str = ""
+
+
+@dataclass(frozen=True)
+class Catalogue:
+    """The robot types at our disposal, by name."""
+
+    types: Mapping[str, RobotType]
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "types", MappingProxyType(dict(self.types)))
+
+    def __getitem__(self, name: str) -> RobotType:
+        return self.types[name]
+
+    def fits(self, name: str, wanted: str) -> bool:
+        """Whether a robot of type `name` can take a role that asks for `wanted`: it is that type
+        or extends it, directly or not."""
+        while name != wanted:
+            known = self.types.get(name)
+            if known is None or not known.extends:
+                return False
+            name = known.extends
+        return True
+
+    def meet(self, one: str, other: str) -> str | None:
+        """The more special of two types where one fits the other's role, else None."""
+        if self.fits(one, other):
+            return one
+        return other if self.fits(other, one) else None
+
+
+def load_catalogue(folder: Path | None = None) -> Catalogue:
+    """The catalogue of a folder, the shipped one by default.
+
+    Raises InputError where the file is not readable TOML, or a type extends one that is not there,
+    or itself.
+    """
+    path = (folder or mjcf_folder()) / "catalogue.toml"
+    try:
+        table = tomllib.loads(path.read_text("utf-8"))
+        types = {
+            name: RobotType(
+                name,
+                path.parent / str(entry["mjcf"]),
+                str(entry.get("extends", "")),
+                tuple(entry.get("stretches", ("along",))),
+                str(entry.get("summary", "")),
+            )
+            for name, entry in table.items()
+        }
+    except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
+        raise InputError(_trouble(path, f"the robot catalogue is unusable: {error}")) from error
+    for robot in types.values():
+        _check_ancestry(path, robot, types)
+    return Catalogue(types)
+
+
+def _check_ancestry(path: Path, robot: RobotType, types: Mapping[str, RobotType]) -> None:
+    seen, current = {robot.name}, robot
+    while current.extends:
+        if current.extends not in types:
+            hint = did_you_mean(current.extends, list(types), "robot types")
+            raise InputError(
+                _trouble(path, f"'{current.name}' extends unknown '{current.extends}'", hint)
+            )
+        if current.extends in seen:
+            raise InputError(_trouble(path, f"'{robot.name}' extends itself"))
+        current = types[current.extends]
+        seen.add(current.name)
+
+
+def _trouble(
+    path: Path, message: str, hint: str = "see the shipped mjcf/catalogue.toml"
+) -> Diagnostic:
+    return Diagnostic("BadTemplate", message, Position(str(path), 1, 1), hint)

@@ -1,0 +1,32 @@
+"""The log of a run, `run --log OUT`: its whole state after every tick, in one file that is only
+appended to.
+
+    factory-log 1\\n          magic
+    <I length>{...}          header, JSON: versions, command line, world, seed, jitter, units,
+                             wip, numbers of the places marked at the start, settings, names of
+                             robots, places and transitions, the PAG's name, text and SHA-256 (of
+                             one with relays the text without too), the templates that it uses,
+                             the floor and relays that the layout was made for, what a monitor
+                             knows of the layout, nq, nv
+    blocks                   see blocks.py: a letter, length, CRC-32, compressed arrays
+
+    M  the model, once: `xml`, and `mesh/NAME` for each mesh file, bytes (mujoco only)
+    T  ticks, about a simulated second of them:
+       time (n,) [s], delivered (n,)      products that have left since the run began
+       qpos (n, nq), qvel (n, nv)         the engine's; in the ideal world arc lengths and speeds
+       ctrl (n, nu)                       the engine's setpoints
+       marking_at, _count, marking        rows where the marking changes, how many places, which
+       active_at, _count, active          the same for the active constraints: number, two bodies
+       contact_at, _count, contact        rows with contacts, how many, pairs of geoms
+       contact_dist                       their distances [m]
+       fired_at, fired, fired_t           row, number and time [s] of the transitions fired
+    E  the end, empty: the file was closed properly
+
+Every block stands for itself. What was written is flushed with each, so a file that ends in the
+middle of one lacks at most the last second."""
+
+from factory.record.log.blocks import MAGIC
+from factory.record.log.reader import Log, Ragged, is_log, read_log
+from factory.record.log.writer import LogWriter
+
+__all__ = ["MAGIC", "Log", "LogWriter", "Ragged", "is_log", "read_log"]

@@ -1,0 +1,106 @@
+"""The blocks of a log file: named arrays packed, compressed, and checked when they are read.
+
+A block is one letter, the length of its content and its CRC-32 (`<cII`), then the content, zlib.
+Unpacked, that is the length (`<I`) of a JSON directory [[name, dtype, shape], ...], the directory,
+and the arrays' bytes in a row."""
+
+from __future__ import annotations
+
+import json
+import struct
+import zlib
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from factory.support.errors import Diagnostic
+from factory.support.files import LOG
+
+Arrays = dict[str, NDArray[Any]]
+
+MAGIC = LOG + b"1\n"
+
+HEAD = struct.Struct("<cII")
+LENGTH = struct.Struct("<I")
+DENSEST = 200
+"""No block unpacks to more than so many times its bytes. Models take 20 times theirs, ticks 10:
+their states and times are all different. What is packed to fill the memory takes 1,000 times."""
+
+KINDS = ("|u1", "<i4", "<f8")
+
+
+def block(kind: bytes, arrays: Mapping[str, NDArray[Any]], level: int = 1) -> bytes:
+    """Named arrays as one block."""
+    plain = {name: np.ascontiguousarray(a) for name, a in arrays.items()}
+    entries = [[name, a.dtype.newbyteorder("<").str, list(a.shape)] for name, a in plain.items()]
+    directory = json.dumps(entries).encode()
+    body = b"".join(
+        [LENGTH.pack(len(directory)), directory, *(a.tobytes() for a in plain.values())]
+    )
+    content = zlib.compress(body, level)
+    return HEAD.pack(kind, len(content), zlib.crc32(content)) + content
+
+
+def blocks(data: memoryview) -> Iterator[tuple[bytes, Arrays]]:
+    """The blocks in a file's tail, up to the first that is cut off or damaged."""
+    at = 0
+    while at + HEAD.size <= len(data):
+        kind, length, check = HEAD.unpack_from(data, at)
+        content = data[at + HEAD.size : at + HEAD.size + length]
+        if len(content) != length or zlib.crc32(content) != check:
+            return
+        yield kind, unpacked(content)
+        at += HEAD.size + length
+
+
+def unpacked(content: memoryview) -> Arrays:
+    """The arrays of a block. Raises ValueError where it is none."""
+    try:
+        packed = zlib.decompressobj()
+        body = packed.decompress(content, DENSEST * len(content))
+        if not packed.eof:
+            raise ValueError(f"a block unpacks to more than {DENSEST} times its bytes")
+        (length,) = LENGTH.unpack_from(body)
+        entries = json.loads(body[LENGTH.size : LENGTH.size + length])
+        found, at = {}, LENGTH.size + length
+        for name, kind, shape in entries:
+            if kind not in KINDS or min(shape, default=0) < 0:
+                raise ValueError(f"unknown array {kind} {shape}")
+            count = int(np.prod(shape, dtype=np.int64))
+            found[str(name)] = np.frombuffer(body, kind, count, at).reshape(shape)
+            at += count * np.dtype(kind).itemsize
+        return found
+    except (zlib.error, struct.error, TypeError, RecursionError, OverflowError) as error:
+        raise ValueError(f"a broken block: {error}") from error
+
+
+def pack_rows(name: str, rows: NDArray[np.float64]) -> Arrays:
+    """Rows (n, k) of which most columns stand still: the first row, the columns that change, and of
+    these each value's bits against those of the row before, byte by byte."""
+    bits = rows.view(np.int64)
+    change = bits[1:] ^ bits[:-1]
+    moving = np.flatnonzero(change.any(axis=0)).astype(np.int32)
+    planes = np.ascontiguousarray(change[:, moving].T).view(np.uint8).reshape(-1, 8).T
+    return {f"{name}_first": rows[0], f"{name}_moving": moving, f"{name}_change": planes}
+
+
+def unpack_rows(name: str, arrays: Arrays, count: int) -> NDArray[np.float64]:
+    """The inverse of `pack_rows` for `count` rows. Raises ValueError where they do not fit."""
+    first, moving = arrays[f"{name}_first"], arrays[f"{name}_moving"]
+    planes = arrays[f"{name}_change"]
+    if planes.shape != (8, (count - 1) * len(moving)):
+        raise ValueError(f"{name} has {planes.shape} bytes for {count} rows of {len(moving)}")
+    bits = np.tile(first.view(np.int64), (count, 1))
+    change = np.ascontiguousarray(planes.T).view(np.int64).reshape(len(moving), count - 1).T
+    bits[1:, moving] = bits[0, moving] ^ np.bitwise_xor.accumulate(change, axis=0)
+    return bits.view(np.float64)
+
+
+def bad_log(path: Path, words: str) -> Diagnostic:
+    """What is wrong with a file that should be a log."""
+    return Diagnostic(
+        "BadLog", f"'{path}' {words}", None, "`factory run FILE.pag --log OUT` writes one"
+    )

@@ -1,0 +1,149 @@
+"""What the header of a log must be: checked once, when the log is read."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, fields
+from typing import Any, get_args
+
+from factory.control.profile import World
+from factory.support.settings import RANGES, Settings, wrong_type
+
+LARGE = 10**9
+"""No length [m], time [s] or count in a header is greater."""
+
+Test = Callable[[Any], bool]
+
+
+@dataclass(frozen=True, slots=True)
+class Key:
+    """A key of the header, with a dot within a table: what its value is, in words too; `later`:
+    logs of older versions lack it."""
+
+    name: str
+    wanted: str
+    is_good: Test = field(repr=False)
+    later: bool = False
+
+    def check(self, header: Mapping[str, Any]) -> None:
+        """Raises ValueError where its value is missing or is something else."""
+        value: Any = header
+        for word in self.name.split("."):
+            if word not in value:
+                if self.later:
+                    return
+                raise ValueError(f"its header has no '{self.name}'")
+            value = value[word]
+        if not self.is_good(value):
+            message = f"in its header '{self.name}' must be {self.wanted}, not {value!r:.40}"
+            raise ValueError(message)
+
+
+def check_header(header: Any) -> None:
+    """Raises ValueError where a value is missing, or is none that a run can have."""
+    if not is_table(header):
+        raise ValueError("its header is no table")
+    for key in KEYS:
+        key.check(header)
+    for name in RANGES.keys() & header["settings"].keys():
+        fault = wrong_type(name, header["settings"][name])
+        if fault is not None:
+            raise ValueError(f"in its header {fault.message}")
+    if any(place >= len(header["places"]) for place in header.get("start", ())):
+        raise ValueError("in its header 'start' is out of range")
+
+
+def settings_of(header: Mapping[str, Any]) -> Settings:
+    """The settings of the run: those that this version knows."""
+    known = {field.name for field in fields(Settings)}
+    return Settings(**{k: v for k, v in header["settings"].items() if k in known})
+
+
+def is_table(value: Any) -> bool:
+    """Whether a value is a table."""
+    return isinstance(value, dict)
+
+
+def is_text(value: Any) -> bool:
+    """Whether a value is a text."""
+    return isinstance(value, str)
+
+
+def is_number(value: Any) -> bool:
+    """Whether a value is a number, not too large."""
+    return type(value) in (int, float) and -LARGE <= value <= LARGE
+
+
+def is_positive(value: Any) -> bool:
+    """Whether a value is a number above 0, not too large."""
+    return is_number(value) and value > 0
+
+
+def is_share(value: Any) -> bool:
+    """Whether a value is a number from 0 to less than 1."""
+    return is_number(value) and 0 <= value < 1
+
+
+def is_count(value: Any) -> bool:
+    """Whether a value is a whole number from 0, not too large."""
+    return type(value) is int and 0 <= value <= LARGE
+
+
+def is_some(value: Any) -> bool:
+    """Whether a value is a whole number from 1, not too large."""
+    return is_count(value) and value > 0
+
+
+def is_seed(value: Any) -> bool:
+    """Whether a value is a whole number from 0."""
+    return type(value) is int and value >= 0
+
+
+def listed(test: Test, length: int | None = None) -> Test:
+    """A list of such values, of so many if a length is given."""
+    return lambda v: isinstance(v, list) and length in (None, len(v)) and all(map(test, v))
+
+
+def tabled(test: Test) -> Test:
+    """A table of such values."""
+    return lambda v: isinstance(v, dict) and all(map(test, v.values()))
+
+
+def maybe(test: Test) -> Test:
+    """Such a value, or none."""
+    return lambda v: v is None or test(v)
+
+
+KEYS = (
+    Key("nq", "a whole number from 0", is_count),
+    Key("nv", "a whole number from 0", is_count),
+    Key("versions", "a table of texts", tabled(is_text)),
+    Key("command", "a list of texts", listed(is_text)),
+    Key("world", f"one of {', '.join(get_args(World))}", get_args(World).__contains__),
+    Key("seed", "a whole number from 0", is_seed),
+    Key("jitter", "a number from 0 to less than 1", is_share),
+    Key("units", "a whole number from 1", is_some),
+    Key("wip", "a whole number from 1, or null", maybe(is_some), later=True),
+    Key("start", "a list of numbers of places", listed(is_count), later=True),
+    Key("settings", "a table of numbers", tabled(is_number)),
+    Key("product", "a text", is_text),
+    Key("pag", "a table", is_table),
+    Key("pag.file", "a text", is_text),
+    Key("pag.text", "a text", is_text),
+    Key("pag.sha256", "a text", is_text),
+    Key("pag.plain", "a text, or null", maybe(is_text), later=True),
+    Key("templates", "a table of texts", tabled(is_text), later=True),
+    Key("ground", "a table", is_table, later=True),
+    Key("ground.floor", "two lengths in m, or null", maybe(listed(is_positive, 2)), later=True),
+    Key("ground.relay", "true or false", lambda v: isinstance(v, bool), later=True),
+    Key("ground.cycle", "a time in s, or null", maybe(is_positive), later=True),
+    Key("monitor", "a table", is_table, later=True),
+    Key("monitor.goals", "lists of numbers", listed(listed(is_number)), later=True),
+    Key("monitor.radii", "a list of numbers", listed(is_number), later=True),
+    Key("monitor.places", "a table of x, y, z", tabled(listed(is_number, 3)), later=True),
+    Key("monitor.patience", "a time in s", is_positive, later=True),
+    Key("robots", "a list of texts", listed(is_text)),
+    Key("places", "a list of texts", listed(is_text)),
+    Key("transitions", "a list of texts", listed(is_text)),
+)
+"""What is read of a header, by anybody."""

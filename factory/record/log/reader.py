@@ -1,0 +1,197 @@
+"""Reading a log, whole or cut off."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from factory.record.log.blocks import LENGTH, MAGIC, Arrays, bad_log, blocks, unpack_rows
+from factory.record.log.header import check_header
+from factory.record.log.ticks import Sizes, check_course
+from factory.support.errors import InputError
+
+Index = NDArray[np.int32]
+
+ROOM, FOLD = 1 << 30, 1000
+"""The states of a log take no more than so many bytes, beside so many times those of its file. Of
+runs they take 5 to 15 times those, of one in which 1,000 robots stand still for hours 200 times."""
+
+
+@dataclass(frozen=True, slots=True)
+class Ragged:
+    """For each row of a log an array of its own: `values` from starts[i] to ends[i]."""
+
+    values: NDArray[Any] = field(repr=False)
+    starts: NDArray[np.int64] = field(repr=False)
+    ends: NDArray[np.int64] = field(repr=False)
+
+    def __getitem__(self, row: int) -> NDArray[Any]:
+        return self.values[self.starts[row] : self.ends[row]]
+
+
+@dataclass(frozen=True)
+class Log:
+    """A log, read: locked arrays over n ticks, the first before the run began.
+
+    `marking[i]`: numbers of the marked places; `active[i]` (k, 3): active constraints, and the two
+    bodies each joins; `contacts[i]` (k, 2) geoms, `distances[i]` (k,) [m]; `fired` and `fired_t`:
+    transitions by number and time [s]. `ctrl`: the setpoints; None in the ideal world, and in
+    logs of older versions. `complete`: whether the file was closed properly."""
+
+    header: Mapping[str, Any] = field(repr=False)
+    xml: str = field(repr=False)
+    files: Mapping[str, bytes] = field(repr=False)
+    time: NDArray[np.float64] = field(repr=False)
+    delivered: Index = field(repr=False)
+    qpos: NDArray[np.float64] = field(repr=False)
+    qvel: NDArray[np.float64] = field(repr=False)
+    marking: Ragged = field(repr=False)
+    active: Ragged = field(repr=False)
+    contacts: Ragged = field(repr=False)
+    distances: Ragged = field(repr=False)
+    fired: Index = field(repr=False)
+    fired_t: NDArray[np.float64] = field(repr=False)
+    ctrl: NDArray[np.float64] | None = field(default=None, repr=False)
+    complete: bool = True
+
+    def __len__(self) -> int:
+        return len(self.time)
+
+    @cached_property
+    def events(self) -> tuple[tuple[float, str], ...]:
+        """Time [s] and name of every transition that fired."""
+        names = self.header["transitions"]
+        return tuple((t, names[n]) for t, n in zip(self.fired_t.tolist(), self.fired, strict=True))
+
+
+def read_log(path: Path | str) -> Log:
+    """The log in a file; what a cut-off file still has. Raises InputError (BadLog) for anything
+    else."""
+    path = Path(path)
+    try:
+        data = path.read_bytes()
+    except OSError as error:
+        raise InputError(bad_log(path, f"cannot be read: {error.strerror}")) from error
+    if not data.startswith(MAGIC):
+        raise InputError(bad_log(path, "is no log of factory"))
+    try:
+        return _read(memoryview(data)[len(MAGIC) :])
+    except MemoryError as error:
+        raise InputError(bad_log(path, f"takes more memory than there is: {error}")) from error
+    except (ValueError, KeyError, IndexError, TypeError, OverflowError, RecursionError) as error:
+        raise InputError(bad_log(path, f"is damaged: {error}")) from error
+
+
+def is_log(path: Path | str) -> bool:
+    """Whether a file begins as a log does."""
+    try:
+        with Path(path).open("rb") as file:
+            return file.read(len(MAGIC)) == MAGIC
+    except OSError:
+        return False
+
+
+def _read(data: memoryview) -> Log:
+    if len(data) < LENGTH.size:
+        raise ValueError("it ends in its header")
+    (length,) = LENGTH.unpack_from(data)
+    header = json.loads(bytes(data[LENGTH.size : LENGTH.size + length]))
+    check_header(header)
+    sizes, left = Sizes.of(header), ROOM + FOLD * len(data)
+    xml, files, complete = "", {}, False
+    ticks: list[Arrays] = []
+    for kind, arrays in blocks(data[LENGTH.size + length :]):
+        if kind == b"M":
+            xml = arrays["xml"].tobytes().decode()
+            files = {k[5:]: a.tobytes() for k, a in arrays.items() if k.startswith("mesh/")}
+        elif kind == b"T":
+            sizes.check(arrays)
+            left -= sizes.states(arrays)
+            if left < 0:
+                raise ValueError("its states take too much memory for a file of its size")
+            ticks.append(arrays)
+        complete = kind == b"E"
+    states = [[unpack_rows(q, a, len(a["time"])) for a in ticks] for q in ("qpos", "qvel")]
+    qpos, qvel = (
+        _locked(np.concatenate([np.zeros((0, n)), *rows]))
+        for n, rows in zip((sizes.nq, sizes.nv), states, strict=True)
+    )
+    counts = [len(a["time"]) for a in ticks]
+    time, delivered = _joined("time", ticks, np.float64), _joined("delivered", ticks, np.int32)
+    check_course(time, delivered)
+    return Log(
+        MappingProxyType(header),
+        xml,
+        MappingProxyType(files),
+        time,
+        delivered,
+        qpos,
+        qvel,
+        _lasting("marking", ticks, counts),
+        _lasting("active", ticks, counts),
+        _single("contact", "contact", ticks, counts),
+        _single("contact", "contact_dist", ticks, counts),
+        _joined("fired", ticks, np.int32),
+        _joined("fired_t", ticks, np.float64),
+        _setpoints(ticks),
+        complete,
+    )
+
+
+def _setpoints(ticks: Sequence[Arrays]) -> NDArray[np.float64] | None:
+    if not ticks or "ctrl_first" not in ticks[0]:
+        return None
+    rows = [unpack_rows("ctrl", a, len(a["time"])) for a in ticks]
+    found: NDArray[np.float64] = _locked(np.concatenate(rows))
+    return found
+
+
+def _locked(values: Any) -> Any:
+    values.setflags(write=False)
+    return values
+
+
+def _joined(name: str, ticks: Sequence[Arrays], kind: Any) -> Any:
+    return _locked(np.concatenate([np.zeros(0, kind), *(a[name] for a in ticks)]))
+
+
+def _spans(
+    name: str, ticks: Sequence[Arrays], counts: Sequence[int]
+) -> tuple[NDArray[Any], NDArray[Any], NDArray[Any]]:
+    """Rows of the whole log at which something is recorded, and where its values start and end."""
+    base = np.cumsum([0, *counts])
+    at = np.concatenate(
+        [np.zeros(0, int), *(a[f"{name}_at"] + b for a, b in zip(ticks, base, strict=False))]
+    )
+    ends = np.cumsum(np.concatenate([np.zeros(0, int), *(a[f"{name}_count"] for a in ticks)]))
+    return at, np.concatenate([[0], ends])[: len(ends)], ends
+
+
+def _lasting(name: str, ticks: Sequence[Arrays], counts: Sequence[int]) -> Ragged:
+    """Values that hold until the next are recorded."""
+    at, starts, ends = _spans(name, ticks, counts)
+    values = np.concatenate([a[name] for a in ticks]) if ticks else np.zeros((0,), np.int32)
+    if not len(at):
+        nothing = np.zeros(sum(counts), int)
+        return Ragged(_locked(values.reshape(0, *values.shape[1:])), nothing, nothing)
+    which = np.searchsorted(at, np.arange(sum(counts)), side="right") - 1
+    if which.min(initial=0) < 0:
+        raise ValueError(f"the first tick has no {name}")
+    return Ragged(_locked(values), starts[which], ends[which])
+
+
+def _single(name: str, values: str, ticks: Sequence[Arrays], counts: Sequence[int]) -> Ragged:
+    """Values of one row alone."""
+    at, first, last = _spans(name, ticks, counts)
+    starts, ends = np.zeros(sum(counts), int), np.zeros(sum(counts), int)
+    starts[at], ends[at] = first, last
+    found = np.concatenate([a[values] for a in ticks]) if ticks else np.zeros(0)
+    return Ragged(_locked(found), starts, ends)

@@ -1,0 +1,29 @@
+"""The factory that a log is of, compiled again from what its header holds."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from factory.compiler.compiler import compile_pag
+from factory.lang import read_pag, read_template
+from factory.nets.history import firings
+from factory.plant.factory import Factory
+from factory.problem.robot_types import load_catalogue
+
+
+def factory_of(header: Mapping[str, Any]) -> Factory:
+    """The factory that a log's PAG and templates compile to; its meshes need not be there.
+
+    Raises ValueError where it is another than the header says, or the run began in none of its
+    markings; KeyError where the header is of an older version.
+    """
+    templates = {name: read_template(text, name) for name, text in header["templates"].items()}
+    pag = read_pag(header["pag"]["text"], templates, header["pag"]["file"], None)
+    factory = compile_pag(pag, templates, load_catalogue())
+    net = factory.net.threaded
+    made = [[x.name for x in found] for found in (net.transitions, net.places, factory.robots)]
+    if made != [header["transitions"], header["places"], header["robots"]]:
+        raise ValueError("its net is not that of its PAG")
+    firings(factory.net, frozenset(header["start"]))
+    return factory

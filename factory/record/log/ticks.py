@@ -1,0 +1,109 @@
+"""What the arrays of a block of ticks must be: checked once, when the log is read."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from factory.record.log.blocks import Arrays
+from factory.record.log.header import LARGE
+
+ARRAYS: Mapping[str, tuple[str, tuple[int, ...]]] = {
+    "time": ("<f8", ()),
+    "delivered": ("<i4", ()),
+    "marking": ("<i4", ()),
+    "active": ("<i4", (3,)),
+    "contact": ("<i4", (2,)),
+    "contact_dist": ("<f8", ()),
+    "fired": ("<i4", ()),
+    "fired_t": ("<f8", ()),
+}
+"""The type of each array, and the shape of one row."""
+
+RAGGED = ("marking", "active", "contact")
+"""Arrays of which several rows may be of one tick, or none."""
+
+
+@dataclass(frozen=True, slots=True)
+class Sizes:
+    """How many coordinates, speeds, places and transitions a log has."""
+
+    nq: int
+    nv: int
+    places: int
+    transitions: int
+
+    @classmethod
+    def of(cls, header: Mapping[str, Any]) -> Sizes:
+        """Those that a header states."""
+        return cls(header["nq"], header["nv"], len(header["places"]), len(header["transitions"]))
+
+    def check(self, arrays: Arrays) -> None:
+        """Raises ValueError where the arrays of a block do not fit each other or these sizes,
+        KeyError where one is missing."""
+        for name, (kind, row) in ARRAYS.items():
+            _check_kind(name, arrays[name], kind, row)
+        count = len(arrays["time"])
+        for name, width in (("qpos", self.nq), ("qvel", self.nv), ("ctrl", None)):
+            if f"{name}_first" in arrays or width is not None:
+                _check_rows(name, arrays, width)
+        for name in RAGGED:
+            _check_ragged(name, arrays, count)
+        for one, other in (
+            ("time", "delivered"),
+            ("contact", "contact_dist"),
+            ("fired", "fired_t"),
+        ):
+            if len(arrays[one]) != len(arrays[other]):
+                raise ValueError(f"{one} and {other} differ in length")
+        _check_range("time", arrays["time"], LARGE)
+        _check_range("fired_t", arrays["fired_t"], LARGE)
+        _check_range("marking", arrays["marking"], self.places - 1)
+        _check_range("fired", arrays["fired"], self.transitions - 1)
+
+    def states(self, arrays: Arrays) -> int:
+        """How many bytes the states of a block take."""
+        wide = self.nq + self.nv + len(arrays.get("ctrl_first", ()))
+        return 8 * wide * len(arrays["time"])
+
+
+def check_course(time: NDArray[np.float64], delivered: NDArray[np.int32]) -> None:
+    """Raises ValueError where time goes back, or products do not leave one by one."""
+    if (np.diff(time) < 0).any():
+        raise ValueError("its time goes back")
+    if not np.isin(np.diff(delivered, prepend=0), (0, 1)).all():
+        raise ValueError("its products do not leave one by one")
+
+
+def _check_kind(name: str, found: NDArray[Any], kind: str, row: tuple[int, ...]) -> None:
+    if found.dtype != kind or found.ndim != 1 + len(row) or found.shape[1:] != row:
+        shape = ", ".join(["n", *map(str, row)])
+        raise ValueError(f"{name} is {found.dtype.str} {found.shape}, not {kind} ({shape})")
+
+
+def _check_range(name: str, values: NDArray[Any], most: int) -> None:
+    if not ((values >= 0) & (values <= most)).all():
+        raise ValueError(f"{name} is out of range: not from 0 to {most}")
+
+
+def _check_rows(name: str, arrays: Arrays, width: int | None) -> None:
+    first, moving = arrays[f"{name}_first"], arrays[f"{name}_moving"]
+    _check_kind(f"{name}_first", first, "<f8", ())
+    _check_kind(f"{name}_moving", moving, "<i4", ())
+    if width is not None and len(first) != width:
+        raise ValueError(f"{name} has {len(first)} columns, where its header says {width}")
+    _check_range(f"{name}_moving", moving, len(first) - 1)
+
+
+def _check_ragged(name: str, arrays: Arrays, count: int) -> None:
+    at, counts, values = arrays[f"{name}_at"], arrays[f"{name}_count"], arrays[name]
+    _check_kind(f"{name}_at", at, "<i4", ())
+    _check_kind(f"{name}_count", counts, "<i4", ())
+    _check_range(f"{name}_at", at, count - 1)
+    _check_range(f"{name}_count", counts, len(values))
+    if len(at) != len(counts) or (np.diff(at) <= 0).any() or counts.sum() != len(values):
+        raise ValueError(f"{name} is not what its ticks have")

@@ -1,0 +1,95 @@
+"""Where in the engine's model a monitor looks: robots, copies of parts, welds and their frames.
+
+Everything is found by the names in the model and by its kinematic tree."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from factory.mjcf import names
+from factory.plant.factory import Factory
+from factory.record.monitor.frames import Frames, frames_of
+from factory.record.monitor.observation import Index
+
+PARK, FEED, GRIP, HOLD = KINDS = range(4)
+"""Who holds a part: its parking place, its feeder, a robot, the outfeed's tray."""
+
+WORDS = {"park": PARK, "feed": FEED, "grip": GRIP, "hold": HOLD}
+
+Holder = tuple[int, int]
+"""Kind and, for a grip, the robot's index; -1 for others."""
+
+
+@dataclass(frozen=True, eq=False)
+class Anatomy:
+    """Addresses in the engine's arrays.
+
+    Robots (R,): `slide`, `dof` and `drive`, of their position, speed and setpoint. Actuators (A,):
+    `joint`, `setpoint`, and `owner`, a robot's index or -1 for the outfeed. Copies of parts (C,):
+    `copies`, their names, `label`, and `body` in qpos; `copy_of` (nbody,): the copy that a body is,
+    or -1. Constraints (E,): `holder`, None for one that holds no part, and `part`, the label it is
+    for; `frames`, where they keep it.
+    """
+
+    slide: Index = field(repr=False)
+    dof: Index = field(repr=False)
+    drive: Index = field(repr=False)
+    joint: Index = field(repr=False)
+    setpoint: Index = field(repr=False)
+    owner: tuple[int, ...] = field(repr=False)
+    copies: tuple[str, ...] = field(repr=False)
+    label: tuple[str, ...] = field(repr=False)
+    body: Index = field(repr=False)
+    copy_of: Index = field(repr=False)
+    holder: tuple[Holder | None, ...] = field(repr=False)
+    part: tuple[str, ...] = field(repr=False)
+    frames: Frames = field(repr=False)
+
+    @classmethod
+    def of(cls, m: Any, factory: Factory) -> Anatomy:
+        """The anatomy of an engine's model. Raises ValueError where it is not of that factory."""
+        robots = {r.name: r.index for r in factory.robots}
+        try:
+            slide = [m.joint(names.slide(r)).id for r in robots]
+            drive = [m.actuator(names.drive(r)).id for r in robots]
+        except KeyError as error:
+            raise ValueError(f"the model is not of this factory: {error}") from error
+        actuators = range(len(m.actuator_ctrladr))
+        driven = np.array([m.actuator_trnid[a, 0] for a in actuators], np.intp)
+        owners = (m.actuator(a).name.partition("/")[0] for a in actuators)
+        bodies = [b for b in range(m.nbody) if names.kind(m.body(b).name) == "part"]
+        copy_of = np.full(m.nbody, -1, np.intp)
+        copy_of[bodies] = np.arange(len(bodies))
+        called = [m.body(b).name for b in bodies]
+        welds = [m.equality(e).name.split("/", 2) for e in range(m.neq)]
+        return cls(
+            np.asarray(m.jnt_qposadr[slide], np.intp),
+            np.asarray(m.jnt_dofadr[slide], np.intp),
+            np.asarray(m.actuator_ctrladr[drive], np.intp),
+            np.asarray(m.jnt_qposadr[driven], np.intp),
+            np.asarray(m.actuator_ctrladr, np.intp),
+            tuple(robots.get(name, -1) for name in owners),
+            tuple(name.partition("/")[2] for name in called),
+            tuple(names.label_of(name) for name in called),
+            np.asarray(m.jnt_qposadr[m.body_jntadr[bodies]], np.intp),
+            copy_of,
+            tuple(_holder(words, robots) for words in welds),
+            tuple(_part(words) for words in welds),
+            frames_of(m, [words[0] in WORDS for words in welds]),
+        )
+
+
+def _holder(words: list[str], robots: dict[str, int]) -> Holder | None:
+    kind = WORDS.get(words[0])
+    if kind is None:
+        return None
+    return (kind, robots[words[1]]) if kind == GRIP else (kind, -1)
+
+
+def _part(words: list[str]) -> str:
+    """The label in a weld's name: `grip/r3/part1`, `park/part1#2`."""
+    label = words[-1] if words[0] == "grip" else "/".join(words[1:])
+    return label.rpartition("#")[0] if words[0] == "park" else label

@@ -1,0 +1,174 @@
+"""Whether some legal firing sequence explains what was seen.
+
+The compiled net is a live marked graph: the k-th firing of a transition e needs, for each place
+[d; e] with n initial tokens, the (k - n)-th firing of d, and nothing else. So each firing has an
+interval of times, what was seen bounds some of them, and there is a legal firing sequence if and
+only if no interval is empty. All bounds are found in one pass along the firings and one back.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from dataclasses import dataclass, field
+from math import inf
+
+from factory.nets.marked import MarkedNet, marked, token_free
+from factory.record.monitor.report import Firing, Violation
+from factory.record.monitor.subject import Subject
+from factory.timing.pool import with_wip
+
+
+@dataclass(slots=True)
+class _Seen:
+    """What was seen of a firing: it fired in [earliest, latest]; `t`: when it showed."""
+
+    earliest: float
+    latest: float
+    t: float
+    robot: str
+
+
+@dataclass(slots=True)
+class Explanation:
+    """What was seen of each firing, by transition and number (from 0, since m_0). `slack` [s]: how
+    far times may be off. Linear in the firings."""
+
+    subject: Subject
+    slack: float
+    seen: dict[tuple[int, int], _Seen] = field(default_factory=dict, repr=False)
+
+    def saw(
+        self, event: int, unit: int, earliest: float, latest: float, t: float, robot: str
+    ) -> None:
+        """A transition has fired for the `unit`-th time in [earliest, latest], as a robot showed at
+        `t`."""
+        if unit < self.subject.counts.get(event, 0):
+            return
+        old = self.seen.get((event, unit))
+        if old is None or latest < old.latest:
+            earliest = max(earliest, old.earliest if old else -inf)
+            self.seen[event, unit] = _Seen(earliest, latest, t, robot)
+
+    def solve(self, begin: float, end: float) -> tuple[list[Firing], list[Firing], list[Violation]]:
+        """The firings seen, those inferred, and the firings that nothing explains."""
+        solver = _Solver(self, begin, end)
+        violations = solver.forward()
+        solver.backward()
+        seen, inferred = solver.firings()
+        return seen, inferred, violations
+
+
+class _Solver:
+    """The intervals of all firings that what was seen asks for."""
+
+    def __init__(self, explanation: Explanation, begin: float, end: float) -> None:
+        self.seen, self.subject = explanation.seen, explanation.subject
+        self.slack, self.begin, self.end = explanation.slack, begin, end
+        factory, wip = self.subject.factory, self.subject.wip
+        self.net = marked(factory.net) if wip is None else with_wip(factory, wip)
+        self.events = factory.net.threaded.transitions
+        self.weight = {
+            o.place: max(0.0, o.dwell - explanation.slack) for o in factory.operations if o.dwell
+        }
+        self.done = [self.subject.counts.get(e, 0) for e in range(len(self.events))]
+        self.count = self._counts()
+        self.order = self._order(self.net)
+        self.low: dict[tuple[int, int], float] = {}
+        self.high: dict[tuple[int, int], float] = {}
+
+    def _counts(self) -> list[int]:
+        """How often each transition has fired at least, since m_0."""
+        count = list(self.done)
+        for event, unit in self.seen:
+            count[event] = max(count[event], unit + 1)
+        waiting = deque(range(len(count)))
+        queued = [True] * len(count)
+        while waiting:
+            event = waiting.popleft()
+            queued[event] = False
+            for before, tokens, _ in self._needs(event):
+                if count[before] < count[event] - tokens:
+                    count[before] = count[event] - tokens
+                    if not queued[before]:
+                        queued[before] = True
+                        waiting.append(before)
+        return count
+
+    def _needs(self, event: int) -> list[tuple[int, int, int]]:
+        """The places of a transition's preset: producer, initial tokens, place."""
+        net = self.net
+        return [(net.left[p], net.tokens[p], p) for p in net.net.preset[event]]
+
+    def _order(self, net: MarkedNet) -> list[tuple[int, int]]:
+        """All firings, each after those it needs."""
+        order = token_free(net).order
+        first, last = min(self.done), max(self.count)
+        return [
+            (event, unit)
+            for unit in range(first, last)
+            for event in order
+            if self.done[event] <= unit < self.count[event]
+        ]
+
+    def forward(self) -> list[Violation]:
+        """The earliest time of every firing; a firing seen before it is a violation, and counts
+        from then on as seen, so that one fault gives one violation."""
+        found = []
+        seen_when_over = {
+            o.end for o in self.subject.factory.operations if self.subject.moves_parts[o.index]
+        }
+        for event, unit in self.order:
+            early, cause = self.begin, -1
+            for before, tokens, place in self._needs(event):
+                ready = self.low.get((before, unit - tokens), -inf) + self.weight.get(place, 0.0)
+                if ready > early:
+                    early, cause = ready, before
+            noted = self.seen.get((event, unit))
+            if noted is None:
+                late = event in seen_when_over
+                self.low[event, unit] = self.end if late else min(early, self.end)
+                continue
+            if early > noted.latest + self.slack:
+                found.append(self._violation(event, unit, noted, cause, early))
+                early = noted.earliest
+            self.low[event, unit] = min(max(early, noted.earliest), noted.latest)
+        return found
+
+    def _violation(
+        self, event: int, unit: int, noted: _Seen, cause: int, early: float
+    ) -> Violation:
+        operation = self.subject.factory.operations[event // 2]
+        name, other = self.events[event].name, self.events[cause].name
+        never = f"{other} comes first, and was not seen"
+        why = f"could not fire before {early:.3f} s, for {other} comes first"
+        words = f"{name} was seen at {noted.t:.3f} s, in unit {unit}, but "
+        words += never if early >= self.end else why
+        at = operation.position
+        return Violation(noted.t, noted.robot, operation.label, "Order", words, at)
+
+    def backward(self) -> None:
+        """The latest time of every firing."""
+        for event, unit in self.order:
+            noted = self.seen.get((event, unit))
+            self.high[event, unit] = noted.latest if noted else self.end
+        for event, unit in reversed(self.order):
+            latest = self.high[event, unit]
+            for before, tokens, place in self._needs(event):
+                key = before, unit - tokens
+                if key in self.high:
+                    bound = latest - self.weight.get(place, 0.0)
+                    self.high[key] = max(min(self.high[key], bound), self.low[key])
+
+    def firings(self) -> tuple[list[Firing], list[Firing]]:
+        """All firings, in the order of time."""
+        seen, inferred = [], []
+        for event, unit in self.order:
+            noted = self.seen.get((event, unit))
+            name, low, high = self.events[event].name, self.low[event, unit], self.high[event, unit]
+            if noted is None:
+                inferred.append(Firing(name, unit, low, high))
+            else:
+                seen.append(Firing(name, unit, low, high, noted.t))
+        seen.sort(key=lambda f: (f.seen, f.latest))
+        inferred.sort(key=lambda f: f.latest)
+        return seen, inferred

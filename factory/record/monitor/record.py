@@ -1,0 +1,72 @@
+"""Watching a run that is over, from its log alone."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+import numpy as np
+
+from factory.record.log.header import settings_of
+from factory.record.log.model import model_of
+from factory.record.log.reader import Log
+from factory.record.log.recompiled import factory_of
+from factory.record.monitor.anatomy import Anatomy
+from factory.record.monitor.monitor import Monitor
+from factory.record.monitor.observation import Sight
+from factory.record.monitor.report import Report
+from factory.record.monitor.subject import Subject, subject_from
+from factory.support.errors import Diagnostic, InputError
+
+AGAIN = "record it again: `factory run FILE.pag --log OUT`"
+
+
+def watch_log(log: Log) -> tuple[Report, Subject]:
+    """The verdict on a recorded run, and the factory that it is of: compiled again from what the
+    log's header holds.
+
+    The log's events and markings are not read. Raises InputError (BadLog) for a log of the ideal
+    world, of an older version, or of another factory than its header says.
+    """
+    if not log.xml:
+        raise InputError(
+            _bad("the log is of the ideal world, in which there is nothing to observe")
+        )
+    if log.ctrl is None or "monitor" not in log.header:
+        raise InputError(_bad("the log was kept by an older version, without setpoints"))
+    if not len(log):
+        raise InputError(_bad("the log has no tick"))
+    try:
+        subject = recorded_subject(log.header)
+        monitor = Monitor(subject, Anatomy.of(model_of(log, AGAIN), subject.factory))
+        for sight in sights(log):
+            monitor.see(sight)
+    except (ValueError, KeyError, TypeError, AttributeError, IndexError) as error:
+        raise InputError(_bad(f"the log is not of the factory in its header: {error}")) from error
+    return monitor.report(), subject
+
+
+def sights(log: Log) -> Iterator[Sight]:
+    """What a log shows, row by row; the same array of welds for as long as none is switched."""
+    assert log.ctrl is not None
+    welds = np.empty((0, 3), np.intp)
+    span = (-1, -1)
+    for row in range(len(log)):
+        now = int(log.active.starts[row]), int(log.active.ends[row])
+        if now != span:
+            found, span = log.active[row].astype(np.intp), now
+            if not np.array_equal(found, welds):
+                welds = found
+        yield Sight(float(log.time[row]), log.qpos[row], log.qvel[row], log.ctrl[row], welds)
+
+
+def recorded_subject(header: Mapping[str, Any]) -> Subject:
+    """The factory that a log is of. Raises ValueError, KeyError, TypeError or AttributeError where
+    the header is of none."""
+    factory = factory_of(header)
+    kept, start, wip = header["monitor"], header["start"], header["wip"]
+    return subject_from(factory, kept, settings_of(header), start, wip)
+
+
+def _bad(words: str) -> Diagnostic:
+    return Diagnostic("BadLog", words, None, AGAIN)

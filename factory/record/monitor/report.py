@@ -1,0 +1,82 @@
+"""What a monitor finds: the firings that explain a run, and what nothing explains."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from factory.support.errors import Diagnostic, Position
+
+
+@dataclass(frozen=True, slots=True)
+class Violation:
+    """What no run of the net can show: when [s], whose fault, which label it is about, and the line
+    of the PAG that this comes from. `robot` is "" where none is concerned."""
+
+    t: float
+    robot: str
+    label: str
+    code: str
+    message: str
+    position: Position | None = None
+
+    def as_json(self) -> dict[str, object]:
+        """The violation as `--json` lists it."""
+        at = self.position
+        return {
+            "t": round(self.t, 6),
+            "robot": self.robot,
+            "label": self.label,
+            "file": at.file if at else None,
+            "line": at.line if at else None,
+            "message": self.message,
+            "code": self.code,
+        }
+
+    def diagnostic(self) -> Diagnostic:
+        """The violation for people."""
+        where = f"{self.robot}: " if self.robot else ""
+        return Diagnostic(self.code, f"at {self.t:.3f} s, {where}{self.message}", self.position)
+
+
+@dataclass(frozen=True, slots=True)
+class Firing:
+    """A transition that fired for the `unit`-th time (from 0) between `earliest` and `latest` [s].
+
+    `seen`: the time at which it showed, to a tick; None where it is inferred."""
+
+    transition: str
+    unit: int
+    earliest: float
+    latest: float
+    seen: float | None = None
+
+    def as_json(self) -> dict[str, object]:
+        """The firing as `--json` lists it."""
+        seen = {} if self.seen is None else {"t": round(self.seen, 6)}
+        bounds = {"earliest": round(self.earliest, 6), "latest": round(self.latest, 6)}
+        return {**seen, "transition": self.transition, "unit": self.unit, **bounds}
+
+
+@dataclass(frozen=True, slots=True)
+class Report:
+    """The verdict of a monitor. `time_s`: what the monitor itself took [s]."""
+
+    seen: tuple[Firing, ...] = field(repr=False)
+    inferred: tuple[Firing, ...] = field(repr=False)
+    violations: tuple[Violation, ...]
+    time_s: float = 0.0
+
+    @property
+    def refines_net(self) -> bool:
+        """Whether some legal firing sequence explains the run, and every part was where it had to
+        be."""
+        return not self.violations
+
+    def as_json(self) -> dict[str, object]:
+        """The key `monitor` of `run --json`, and what `monitor --json` prints."""
+        return {
+            "refines_net": self.refines_net,
+            "firings_seen": [f.as_json() for f in self.seen],
+            "firings_inferred": [f.as_json() for f in self.inferred],
+            "violations": [v.as_json() for v in self.violations],
+        }

@@ -1,0 +1,153 @@
+"""What a monitor knows beforehand of the factory it watches: the net, and where its goals are."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from types import MappingProxyType
+from typing import Any
+
+from factory.layout.layout import Layout
+from factory.nets.history import firings
+from factory.nets.petri import Marking
+from factory.plant.factory import Factory, Operation
+from factory.plant.fused_bodies import Bodies, bodies_of
+from factory.support.settings import Settings
+
+PATIENCE = 4.0
+"""Nothing may happen for this many times the longest time an operation can take."""
+
+
+@dataclass(frozen=True)
+class Subject:
+    """The factory under watch.
+
+    `goals[i]`: arc length [m] of the goal of each robot of operation i; `radii[i]`: its goal ball
+    [m]; `places[label]`: the centre of mass of a part, or a sub-assembly that is one body, in the
+    frame of the product [m]; `start`: the marking in which the run begins; `wip`: the bound on
+    what is let in; `patience` [s].
+    """
+
+    factory: Factory
+    goals: tuple[tuple[float, ...], ...] = field(repr=False)
+    radii: tuple[float, ...] = field(repr=False)
+    places: Mapping[str, tuple[float, float, float]] = field(repr=False)
+    settings: Settings
+    start: Marking
+    patience: float
+    wip: int | None = None
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "places", MappingProxyType(dict(self.places)))
+
+    @cached_property
+    def counts(self) -> Mapping[int, int]:
+        """How often each transition has fired when the run begins."""
+        return MappingProxyType(firings(self.factory.net, self.start))
+
+    @cached_property
+    def slots(self) -> Mapping[tuple[int, int], int]:
+        """The slot of each robot in each of its operations, by (operation, robot)."""
+        return MappingProxyType(
+            {(o.index, r): slot for o in self.factory.operations for slot, r in enumerate(o.robots)}
+        )
+
+    @cached_property
+    def moves_parts(self) -> tuple[bool, ...]:
+        """Whether each operation's end shows as a switch of grips: it makes a part, somebody other
+        than its carrier brings one, or it drops the product off."""
+        return tuple(
+            not o.inputs
+            or o.index == self.factory.dropoff.index
+            or any(
+                label in self.factory.contents and robot != o.carrier
+                for robot, label in zip(o.robots, o.before, strict=True)
+            )
+            for o in self.factory.operations
+        )
+
+    def goal(self, operation: Operation, robot: int) -> float:
+        """Arc length [m] at which a robot has its goal in an operation."""
+        return self.goals[operation.index][self.slots[operation.index, robot]]
+
+    def goes_ahead(self, operation: Operation, robot: int) -> bool:
+        """Whether a robot may go to its goal in an operation before that starts."""
+        slot = self.slots[operation.index, robot]
+        return bool(self.settings.stage) and operation.awaits_empty(slot)
+
+    def name(self, operation: Operation) -> str:
+        """An operation for people: `mate(sub1)`."""
+        return f"{operation.template.name}({operation.label})"
+
+    def as_json(self) -> dict[str, Any]:
+        """What a log keeps beside the PAG and the settings."""
+        return {
+            "goals": [list(goals) for goals in self.goals],
+            "radii": list(self.radii),
+            "places": {part: list(place) for part, place in self.places.items()},
+            "patience": self.patience,
+        }
+
+
+def subject_of(
+    layout: Layout,
+    settings: Settings,
+    jitter: float = 0.0,
+    start: Marking | None = None,
+    wip: int | None = None,
+    bodies: Bodies | None = None,
+) -> Subject:
+    """The subject that a layout is, run with these settings from a marking (m_0 where None), of one
+    body a part unless other `bodies` are given."""
+    factory, product = layout.factory, layout.product
+    goals = tuple(
+        tuple(layout.goal(o.index, slot) for slot in range(len(o.robots)))
+        for o in factory.operations
+    )
+    radii = tuple(
+        eps if isinstance(eps := o.template.law.eps, float) else settings.eps
+        for o in factory.operations
+    )
+    centres = (bodies or bodies_of(factory, product)).centre
+    places = {label: (float(c[0]), float(c[1]), float(c[2])) for label, c in centres.items()}
+    slowest = settings.speed * (1 - jitter)
+    longest = max(path.length for path in layout.guidepaths)
+    travel = longest / slowest + slowest / settings.acceleration
+    travel += (4 * longest / settings.acceleration) ** 0.5
+    travel += layout.outfeed_way / settings.outfeed + max(o.dwell for o in factory.operations)
+    marking = factory.net.initial_marking if start is None else start
+    return Subject(
+        factory, goals, radii, places, settings, marking, round(PATIENCE * travel, 6), wip
+    )
+
+
+def subject_of_run(simulation: Any) -> Subject:
+    """The subject that a simulation is, in either world."""
+    model = simulation.model
+    return subject_of(
+        simulation.layout,
+        simulation.settings,
+        simulation.jitter,
+        simulation.start,
+        simulation.wip,
+        model.carried if model else None,
+    )
+
+
+def subject_from(
+    factory: Factory,
+    kept: Mapping[str, Any],
+    settings: Settings,
+    start: Sequence[int],
+    wip: int | None,
+) -> Subject:
+    """The inverse of `as_json`. Raises ValueError where what was kept is not of that factory."""
+    goals = tuple(tuple(float(x) for x in row) for row in kept["goals"])
+    radii = tuple(float(x) for x in kept["radii"])
+    slots = [len(o.robots) for o in factory.operations]
+    if [len(row) for row in goals] != slots or len(radii) != len(slots):
+        raise ValueError("its goals are not those of its PAG")
+    places = {str(k): (float(x), float(y), float(z)) for k, (x, y, z) in kept["places"].items()}
+    patience = float(kept["patience"])
+    return Subject(factory, goals, radii, places, settings, frozenset(start), patience, wip)

@@ -1,0 +1,238 @@
+"""What switched grips mean: which operation has ended, for which unit, and what none asked for."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+
+from factory.plant.factory import Operation
+from factory.problem.pag import NOPART
+from factory.record.monitor.anatomy import FEED, GRIP, HOLD, PARK, Anatomy, Holder
+from factory.record.monitor.grips import Switch
+from factory.record.monitor.subject import Subject
+
+Blame = Callable[[str, int, str, str], None]
+"""Notes a violation: its code, the robot (-1 for none), the label, and what is wrong."""
+
+
+@dataclass(slots=True)
+class Transfers:
+    """The hands that each copy is in, the unit it is for (the k-th one that a feeder presents is
+    for unit k), and how often each operation that moves parts has ended."""
+
+    subject: Subject
+    anatomy: Anatomy
+    blame: Blame
+    at: list[Holder | None] = field(init=False, repr=False)
+    unit: list[int] = field(init=False, repr=False)
+    ended: list[int] = field(init=False, repr=False)
+    presented: dict[str, int] = field(init=False, repr=False)
+    load: dict[Holder, set[int]] = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        factory, counts = self.subject.factory, self.subject.counts
+        copies = len(self.anatomy.copies)
+        self.at, self.unit = [None] * copies, [-1] * copies
+        self.ended = [counts.get(o.end, 0) for o in factory.operations]
+        self.presented = {o.label: counts.get(o.end, 0) for o in factory.leaves}
+        self.load = {}
+
+    def begin(self, switches: Sequence[Switch]) -> None:
+        """Take what is held at first; blames what the marking does not account for."""
+        factory = self.subject.factory
+        for switch in switches:
+            holder = self._holder(switch)
+            if holder is None:
+                continue
+            self._put(switch.copy, holder)
+            if holder[0] == FEED:
+                self._present(switch.copy)
+        for robot in factory.robots:
+            made = self._made(robot.index)
+            label = made.label if made else NOPART
+            copies = self.load.get((GRIP, robot.index), set())
+            for copy in copies:
+                self.unit[copy] = self.ended[made.index] - 1 if made else -1
+            self._complete(robot.index, label, copies, "Start")
+
+    def judge(self, switches: Sequence[Switch]) -> list[tuple[Operation, int]]:
+        """The operations that have ended, each with its unit."""
+        passed: dict[int, list[int]] = {}
+        for switch in self._fused(switches):
+            holder, before = self._holder(switch), self.at[switch.copy]
+            if holder is None or holder == before:
+                continue
+            operation = self._operation(switch.copy, before, holder)
+            self._put(switch.copy, holder)
+            if holder[0] == FEED:
+                self._present(switch.copy)
+            elif holder[0] == PARK:
+                self.unit[switch.copy] = -1
+            if operation is not None:
+                passed.setdefault(operation.index, []).append(switch.copy)
+        return [self._end(number, copies) for number, copies in sorted(passed.items())]
+
+    def _fused(self, switches: Sequence[Switch]) -> list[Switch]:
+        """The switches but those by which bodies in one pair of hands, now parked, have become the
+        one body, parked before, that is made of the same parts; no copy becomes another."""
+        anatomy, at = self.anatomy, self.at
+        gone: dict[Holder, list[int]] = {}
+        for switch in switches:
+            held = at[switch.copy]
+            if held and held[0] == GRIP and self._kinds(switch) == {PARK}:
+                gone.setdefault(held, []).append(switch.copy)
+        parked: set[int] = set()
+        for switch in switches if gone else ():
+            label, held = anatomy.label[switch.copy], at[switch.copy]
+            if not held or held[0] != PARK or PARK in self._kinds(switch):
+                continue
+            parts = set(self.subject.factory.contents[label])
+            for holder, copies in gone.items():
+                others = [c for c in copies if anatomy.label[c] != label]
+                inside = [c for c in others if parts.issuperset(self._parts([c]))]
+                if set(self._parts(inside)) == parts:
+                    parked.update(inside)
+                    self._become(switch.copy, holder, inside)
+        return [switch for switch in switches if switch.copy not in parked]
+
+    def _kinds(self, switch: Switch) -> set[int]:
+        """The kinds of holders that a copy has now."""
+        return {holder[0] for weld in switch.after if (holder := self.anatomy.holder[weld])}
+
+    def _become(self, whole: int, holder: Holder, copies: Sequence[int]) -> None:
+        """Copies in some hands have become one body; blames that they are for several units."""
+        units = {self.unit[copy] for copy in copies}
+        if len(units) > 1:
+            name, label = self.anatomy.copies[whole], self.anatomy.label[whole]
+            message = f"{name} is made of parts for units {sorted(units)}"
+            self.blame("Exchanged", holder[1], label, message)
+        for copy in copies:
+            self._put(copy, (PARK, -1))
+            self.unit[copy] = -1
+        self._put(whole, holder)
+        self.unit[whole] = max(units)
+
+    def _parts(self, copies: Sequence[int]) -> list[str]:
+        """The labels of the parts that copies are, or are made of."""
+        contents = self.subject.factory.contents
+        return [part for copy in copies for part in contents[self.anatomy.label[copy]]]
+
+    # --- one copy ------------------------------------------------------------------------------
+
+    def _holder(self, switch: Switch) -> Holder | None:
+        """Who holds a copy now; blames its being held by nobody, by two, or as another part."""
+        anatomy, label = self.anatomy, self.anatomy.label[switch.copy]
+        before, name = self.at[switch.copy], anatomy.copies[switch.copy]
+        if not switch.after:
+            who = before[1] if before else -1
+            self.blame(
+                "Dropped", who, label, f"nobody holds {name}, which {self._named(before)} held"
+            )
+            return None
+        wrong = [w for w in switch.after if anatomy.part[w] != label]
+        if wrong:
+            holder = anatomy.holder[wrong[0]]
+            message = f"{self._named(holder)} holds {name} in place of {anatomy.part[wrong[0]]}"
+            self.blame("Exchanged", holder[1] if holder else -1, label, message)
+        holders = [holder for w in switch.after if (holder := anatomy.holder[w])]
+        fresh = [h for w, h in zip(switch.after, holders, strict=True) if w not in switch.before]
+        if len(holders) > 1:
+            old = next((h for h in holders if h == before), holders[0])
+            both = " and ".join(self._named(h) for h in holders)
+            self.blame("TwoHolders", old[1], label, f"{both} hold {name} both")
+        return fresh[-1] if fresh else holders[0]
+
+    def _operation(self, copy: int, before: Holder | None, after: Holder) -> Operation | None:
+        """The operation whose end passes a copy on like that; None where none has to. Blames what
+        no operation does."""
+        factory, label = self.subject.factory, self.anatomy.label[copy]
+        found: Operation | None = None
+        if after[0] == FEED and before and before[0] in (PARK, HOLD):
+            return None
+        if after[0] == PARK and before and before[0] == HOLD:
+            return None
+        if after[0] == GRIP and before and before[0] == FEED:
+            found = factory.by_label[label]
+        elif before and before[0] == GRIP and after[0] in (GRIP, HOLD):
+            found = factory.operations[factory.robots[before[1]].operations[-1]]
+        takes = found is not None and (
+            after == (GRIP, found.carrier)
+            if found.index != factory.dropoff.index
+            else after[0] == HOLD
+        )
+        if found is None or not takes:
+            who = after[1] if after[1] >= 0 else before[1] if before else -1
+            name = self.anatomy.copies[copy]
+            words = f"{name} passes from {self._named(before)} to {self._named(after)}"
+            self.blame("Exchanged", who, label, f"{words}, as no operation does")
+            return None
+        return found
+
+    def _put(self, copy: int, holder: Holder) -> None:
+        before = self.at[copy]
+        if before is not None:
+            self.load.get(before, set()).discard(copy)
+        self.at[copy] = holder
+        if holder[0] in (GRIP, HOLD):
+            self.load.setdefault(holder, set()).add(copy)
+
+    def _present(self, copy: int) -> None:
+        label = self.anatomy.label[copy]
+        self.unit[copy] = self.presented[label]
+        self.presented[label] += 1
+
+    # --- one operation -------------------------------------------------------------------------
+
+    def _end(self, number: int, copies: Sequence[int]) -> tuple[Operation, int]:
+        """Count the end of an operation, and look at what its carrier then has."""
+        operation = self.subject.factory.operations[number]
+        unit = self.ended[number]
+        self.ended[number] += 1
+        last = number == self.subject.factory.dropoff.index
+        holder = (HOLD, -1) if last else (GRIP, operation.carrier)
+        label = self.subject.factory.pag.root if last else operation.label
+        load = self.load.get(holder, set())
+        self._complete(operation.carrier, label, load, "Exchanged")
+        others = sorted(copy for copy in {*load, *copies} if self.unit[copy] != unit)
+        if others:
+            name, other = self.anatomy.copies[others[0]], self.unit[others[0]]
+            self.blame(
+                "Exchanged",
+                operation.carrier,
+                self.anatomy.label[others[0]],
+                f"{name}, which is for unit {other}, is put into unit {unit} by"
+                f" {self.subject.name(operation)}",
+            )
+            for copy in others:
+                self.unit[copy] = unit
+        return operation, unit
+
+    def _complete(self, robot: int, label: str, copies: set[int], code: str) -> None:
+        """Blame parts that are missing or too many in what should be the sub-assembly `label`."""
+        wanted = set(self.subject.factory.contents.get(label, ()))
+        found = self._parts(sorted(copies))
+        missing, extra = sorted(wanted - set(found)), sorted(set(found) - wanted)
+        twice = sorted({part for part in found if found.count(part) > 1}) if not extra else []
+        for part, what in [
+            *((p, f"lacks {p}") for p in missing[:1]),
+            *((p, f"has {p} too") for p in extra[:1]),
+            *((p, f"has {p} twice") for p in twice[:1]),
+        ]:
+            what_of = "what it holds" if label == NOPART else label
+            self.blame(code, robot, part, f"{what_of} {what}")
+
+    def _made(self, robot: int) -> Operation | None:
+        """The operation that made what a robot holds in the marking where the run starts."""
+        counts, factory = self.subject.counts, self.subject.factory
+        gear = [factory.operations[o] for o in factory.robots[robot].operations]
+        done = sum(counts.get(o.end, 0) for o in gear)
+        last = gear[done % len(gear) - 1]
+        carries = last.carrier == robot and last.index != factory.dropoff.index
+        return last if done and carries and last.after[last.robots.index(robot)] != NOPART else None
+
+    def _named(self, holder: Holder | None) -> str:
+        if holder is None:
+            return "nobody"
+        if holder[0] == GRIP:
+            return self.subject.factory.robots[holder[1]].name
+        return {PARK: "its parking place", FEED: "its feeder", HOLD: "the outfeed"}[holder[0]]

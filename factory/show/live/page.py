@@ -1,0 +1,117 @@
+"""The page of a running factory: the drawings of a report, moved by what the socket says."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from html import escape
+from typing import Any
+
+import numpy as np
+
+from factory.mjcf import names
+from factory.mjcf.parts import HIDDEN
+from factory.plant.factory import Operation
+from factory.record.monitor.subject import subject_of_run
+from factory.show.live.commands import FACTORS, SPEEDS
+from factory.show.live.session import Session
+from factory.show.report.floor import floor_plan
+from factory.show.report.links import data, labels_of
+from factory.show.report.net_drawing import net_drawing
+from factory.show.report.packing import Pack
+from factory.show.report.page import filled, options
+from factory.show.report.scene import scene
+from factory.show.report.stage import Floats, Stage, stations
+from factory.show.report.tree import assembly_tree
+from factory.simulation.simulation import Simulation
+
+SCRIPTS = (
+    "report/three.min.js",
+    "report/data.js",
+    "report/selection.js",
+    "report/views.js",
+    "report/replay.js",
+    "report/wiring.js",
+    "live/rolling.js",
+    "live/live.js",
+)
+"""In the order in which they run."""
+
+
+def page(session: Session) -> bytes:
+    """The page, for as long as the session lasts."""
+    stage, pack = stage_of(session.simulation), Pack()
+    factory = stage.factory
+    labels, net = labels_of(factory), factory.net.threaded
+    name = factory.pag.root
+    document = {
+        **data(factory),
+        "name": name,
+        "roles": list(stage.roles),
+        "parts": [o.label for o in factory.leaves],
+        "factors": FACTORS,
+        "scene": scene(stage, labels, pack),
+        "frames": {
+            "parents": {},
+            "moving": session.bodies.tolist(),
+            "turning": session.bodies.tolist(),
+            "hidden": HIDDEN,
+            "position": np.round(stage.position, 5).tolist(),
+            "quaternion": np.round(stage.quaternion, 6).tolist(),
+            "reach": np.round(stage.reach[:, session.bodies], 4).tolist(),
+        },
+        "arrays": pack.index,
+    }
+    counts = (
+        f"{len(factory.leaves)} parts, {len(factory.robots)} robots, {len(net.places)} places, "
+        f"{len(net.transitions)} transitions, proved live"
+    )
+    fields = {
+        "name": escape(name, quote=True),
+        "counts": escape(counts),
+        "tree": assembly_tree(factory.pag, labels),
+        "floor": floor_plan(stage, labels),
+        "net": net_drawing(factory, stage.roles),
+        "speeds": "".join(
+            f'<option value="{s:g}"{" selected" * (s == 1)}>{f"{s:g}×" if s else "max"}</option>'
+            for s in SPEEDS
+        ),
+        "options": options(document),
+    }
+    styles = ("report/report.css", "live/live.css")
+    text = filled("live/live.html", fields, document, pack.text(), SCRIPTS, styles, "'self'")
+    return text.encode()
+
+
+def stage_of(simulation: Simulation) -> Stage:
+    """What there is to be drawn of a simulation that has not begun; bodies are where they are in
+    the world."""
+    layout, world = simulation.layout, simulation.world
+    m, d, factory = world.m, world.d, layout.factory
+    low, high = d.xpos.copy(), d.xpos.copy()
+    for robot in factory.robots:
+        body, x = m.body(names.carriage(robot.name)).id, float(d.qpos[world.qpos[robot.index]])
+        ends = [layout.home(robot.index, o) for o in robot.operations]
+        heading = np.array([*layout.guidepaths[robot.index].heading, 0.0])
+        for end in (min(ends), max(ends)):
+            place = d.xpos[body] - heading * (end - x)
+            low[body], high[body] = np.minimum(low[body], place), np.maximum(high[body], place)
+    return Stage(
+        factory,
+        m,
+        d.xpos.copy(),
+        d.xquat.copy(),
+        np.stack([low, high]),
+        subject_of_run(simulation).as_json()["places"],
+        stations(factory, m, _ends(simulation)),
+    )
+
+
+def _ends(simulation: Simulation) -> Iterator[tuple[Operation, Floats]]:
+    """The state of the engine with the robots of an operation where it ends."""
+    layout, world = simulation.layout, simulation.world
+    start: Any = world.d.qpos
+    for operation in layout.factory.operations:
+        qpos = start.copy()
+        for slot, robot in enumerate(operation.robots):
+            qpos[world.qpos[robot]] = layout.goal(operation.index, slot)
+        yield operation, qpos

@@ -1,0 +1,196 @@
+"""Serves a session to browsers: one page, and one socket each, at an address nobody can guess."""
+
+from __future__ import annotations
+
+import json
+import logging
+from collections.abc import Mapping
+from http import HTTPStatus
+from ipaddress import ip_address
+from secrets import token_urlsafe
+from threading import Thread
+from typing import TYPE_CHECKING, Any
+
+from factory.show.live.commands import command_of
+from factory.show.live.session import Frame, Session
+from factory.support.errors import Diagnostic, InputError
+from factory.support.extras import optional
+from factory.support.resource import Closing
+
+if TYPE_CHECKING:
+    from websockets.http11 import Request, Response
+    from websockets.sync.server import ServerConnection
+
+RECENT = 2000
+"""Firings that a watcher who comes later is told of."""
+
+PATIENCE = 1.0
+"""A watcher hears something at least so often [s]."""
+
+LARGEST = 4096
+"""Bytes of the longest command."""
+
+MOST = 16
+"""Watchers at once."""
+
+HEADERS = {
+    "Content-Type": "text/html; charset=utf-8",
+    "Cache-Control": "no-store",
+    "Referrer-Policy": "no-referrer",
+    "X-Content-Type-Options": "nosniff",
+    "X-Frame-Options": "DENY",
+}
+
+
+def is_loopback(host: str) -> bool:
+    """Whether an address is reached from this machine only."""
+    try:
+        return ip_address(host.strip("[]")).is_loopback
+    except ValueError:
+        return host == "localhost"
+
+
+def check_server(host: str, exposed: bool) -> Any:
+    """What sockets are served with. Raises InputError (BadValue) for a host other than loopback
+    that is not to be exposed, MissingError without the package `websockets`."""
+    if not is_loopback(host) and not exposed:
+        message = f"'{host}' can be reached from other machines, who could then run this one"
+        hint = "give --expose if that is meant, or use `ssh -L` and the host 127.0.0.1"
+        raise InputError(Diagnostic("BadValue", message, None, hint))
+    return optional("websockets.sync.server", "websockets", "a page in the browser", "live")
+
+
+class Server(Closing):
+    """Listens from when it is made until it is closed; `address` is what to open. `exposed`: other
+    machines may come, by whatever name they know this one.
+
+    Only who knows the address is let in, which has a secret in it that is new every time; a page
+    from elsewhere is refused. Raises what `check_server` does, and InputError (BadValue) where it
+    cannot listen.
+    """
+
+    def __init__(
+        self,
+        session: Session,
+        page: bytes,
+        host: str = "127.0.0.1",
+        port: int = 0,
+        exposed: bool = False,
+    ) -> None:
+        serving = check_server(host, exposed)
+        self._session, self._page, self._exposed = session, page, exposed
+        self._secret = token_urlsafe(16)
+        self._watchers = 0
+        try:
+            self._server = serving.serve(
+                self._watch,
+                host,
+                port,
+                process_request=self._answer,
+                max_size=LARGEST,
+                logger=_silent(),
+                server_header=None,
+            )
+        except OSError as error:
+            message = f"cannot listen on {host}, port {port}: {error.strerror or error}"
+            hint = "another port: --port 0 takes a free one"
+            raise InputError(Diagnostic("BadValue", message, None, hint)) from error
+        self.port = int(self._server.socket.getsockname()[1])
+        shown = f"[{host}]" if ":" in host else host
+        self.address = f"http://{shown}:{self.port}/{self._secret}/"
+        self._thread = Thread(target=self._server.serve_forever, daemon=True)
+        self._thread.start()
+
+    def close(self) -> None:
+        """Let all watchers go."""
+        self._server.shutdown()
+        self._thread.join()
+
+    def _answer(self, connection: ServerConnection, request: Request) -> Response | None:
+        """The page, or None for what becomes a socket."""
+        host = request.headers.get("Host", "")
+        name = host.rpartition(":")[0] if not host.endswith("]") and ":" in host else host
+        if not self._exposed and not is_loopback(name):
+            return connection.respond(HTTPStatus.FORBIDDEN, "not by this name\n")
+        if request.path == f"/{self._secret}/live":
+            if request.headers.get("Origin") not in (f"http://{host}", None):
+                return connection.respond(HTTPStatus.FORBIDDEN, "not from another page\n")
+            if self._watchers >= MOST:
+                return connection.respond(HTTPStatus.SERVICE_UNAVAILABLE, "too many watch\n")
+            return None
+        if request.path != f"/{self._secret}/":
+            return connection.respond(HTTPStatus.NOT_FOUND, "there is nothing here\n")
+        from websockets.datastructures import Headers
+        from websockets.http11 import Response
+
+        size = str(len(self._page))
+        headers = Headers({**HEADERS, "Content-Length": size, "Connection": "close"})
+        return Response(HTTPStatus.OK, "OK", headers, self._page)
+
+    def _watch(self, connection: ServerConnection) -> None:
+        """Send frames for as long as somebody watches: the newest, and all firings."""
+        from websockets.exceptions import ConnectionClosed
+
+        hearing = Thread(target=self._hear, args=(connection,), daemon=True)
+        self._watchers += 1
+        try:
+            hearing.start()
+            number, run, told = 0, -1, 0
+            while True:
+                frame = self._session.wait(number, PATIENCE)
+                if frame.run != run:
+                    run, told = frame.run, max(0, frame.fired - RECENT)
+                fired = self._session.fired(run, told, frame.fired)
+                connection.send(packed(frame, fired))
+                number, told = frame.number, frame.fired
+        except ConnectionClosed:
+            pass
+        finally:
+            self._watchers -= 1
+
+    def _hear(self, connection: ServerConnection) -> None:
+        """Pass commands on; what is none is told to who sent it."""
+        from websockets.exceptions import ConnectionClosed
+
+        factory = self._session.simulation.layout.factory
+        parts = {o.label for o in factory.leaves}
+        try:
+            for message in connection:
+                try:
+                    command = command_of(message, len(factory.robots), parts)
+                except ValueError as error:
+                    connection.send(json.dumps({"error": str(error)}))
+                else:
+                    self._session.send(command)
+        except ConnectionClosed:
+            pass
+
+
+def _silent() -> logging.Logger:
+    """Watchers come and go, and strangers knock: nobody is told."""
+    logger = logging.Logger("factory.live")
+    logger.addHandler(logging.NullHandler())
+    return logger
+
+
+def packed(frame: Frame, fired: list[tuple[float, int]]) -> bytes:
+    """A frame as the page reads it: the length of a JSON text (4 bytes, little-endian), the text,
+    padded to a multiple of 4, and the poses."""
+    told: Mapping[str, object] = {
+        "run": frame.run,
+        "time": round(frame.time, 4),
+        "marked": frame.marked,
+        "fired": fired,
+        "count": frame.fired,
+        "products": frame.products,
+        "rhythm": frame.rhythm,
+        "playing": frame.playing,
+        "speed": frame.speed,
+        "pace": round(frame.pace, 3),
+        "slowed": frame.slowed,
+        "blocked": frame.blocked,
+        "note": frame.note,
+    }
+    text = json.dumps(told, separators=(",", ":")).encode()
+    text += b" " * (-len(text) % 4)
+    return len(text).to_bytes(4, "little") + text + frame.poses

@@ -1,0 +1,160 @@
+"""How far a recorded run can be believed: figures from the log alone, and against the ideal world
+where there is a layout."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from copy import copy
+from dataclasses import dataclass
+
+import numpy as np
+
+from factory.mjcf.parts import HIDDEN
+from factory.nets.replay import replay
+from factory.record.monitor.record import watch_log
+from factory.record.monitor.report import Report
+from factory.show.report.recording import Recording
+from factory.simulation.run import Event
+from factory.simulation.simulation import Simulation
+from factory.study.analysis.recorded import conditions
+from factory.study.fidelity.causality import duration_differences, process
+from factory.study.fidelity.quantities import QUANTITIES
+from factory.study.fidelity.welds import GRIP, HOLD, Welds
+from factory.support.engine import mujoco
+from factory.support.errors import InputError
+
+EVERY = 5
+"""Residuals of welds are taken every so many ticks."""
+
+
+@dataclass(frozen=True, slots=True)
+class Figure:
+    """A figure by the key of its definition; `value` None where it could not be had."""
+
+    key: str
+    value: float | None
+
+    @property
+    def exceeded(self) -> bool:
+        """Whether it is beyond its limit."""
+        return QUANTITIES[self.key].exceeded(self.value)
+
+
+@dataclass(frozen=True)
+class Fidelity:
+    """The figures, whether the record refines the net, and the verdict of the monitor, None where
+    the log is not one to be judged."""
+
+    figures: tuple[Figure, ...]
+    refines: bool
+    monitor: Report | None
+
+
+def fidelity(recording: Recording) -> Fidelity:
+    """Everything that can be said."""
+    log = recording.log
+    try:
+        monitor = watch_log(log)[0]
+    except InputError:
+        monitor = None
+    events = [name for _, name in log.events]
+    record = replay(recording.factory.net, events, frozenset(recording.start))
+    violations = None if monitor is None else float(len(monitor.violations))
+    found = {
+        "monitor_violations": violations,
+        **_welds(recording),
+        "tracking_error_max_mm": _tracking(recording),
+        **_ideal(recording),
+    }
+    figures = tuple(Figure(key, value) for key, value in found.items() if key in QUANTITIES)
+    return Fidelity(figures, record.refines, monitor)
+
+
+def _tracking(recording: Recording) -> float | None:
+    """How far any axis is from its setpoint at the end of a tick, at most [mm]."""
+    log, m = recording.log, recording.motion.m
+    if log.ctrl is None:
+        return None
+    worst = 0.0
+    for actuator, setpoint in enumerate(m.actuator_ctrladr):
+        joint = int(m.actuator_trnid[actuator, 0])
+        error = np.abs(log.qpos[:, m.jnt_qposadr[joint]] - log.ctrl[:, setpoint])
+        worst = max(worst, float(error.max(initial=0.0)))
+    return 1e3 * worst
+
+
+def _welds(recording: Recording) -> dict[str, float | None]:
+    """Hand-offs, the gap that each finds, what welds leave open, how products turn out [mm]."""
+    log, m = recording.log, copy(recording.motion.m)
+    d = mujoco.MjData(m)
+    _aim(recording, m, d, 0)
+    welds = Welds(m, d)
+    gap = residual = product = 0.0
+    handoffs, finished = 0, bool(log.delivered[-1])
+    for row, switched in _rows(recording):
+        if switched:
+            _pose(recording, m, d, row - 1)
+            _aim(recording, m, d, row)
+            fresh = welds.scan()
+            fresh = fresh[d.xpos[m.eq_obj2id[fresh], 2] > HIDDEN]  # none that replaces others
+            handoffs += len(fresh)
+            gap = max(gap, float(welds.gaps(fresh, d.xpos, d.xmat).max(initial=0.0)))
+            continue
+        _pose(recording, m, d, row)
+        on = np.flatnonzero(welds.active & (welds.kinds >= GRIP))
+        residual = max(residual, float(welds.gaps(on, d.xpos, d.xmat).max(initial=0.0)))
+        held = np.flatnonzero(welds.active & (welds.kinds == HOLD))
+        if len(held):
+            off = d.xpos[m.eq_obj2id[held]] - m.eq_data[held, 3:6]
+            product = max(product, float(np.linalg.norm(off - off[0], axis=1).max()))
+    return {
+        "handoffs": float(handoffs),
+        "handoff_gap_max_mm": 1e3 * gap,
+        "weld_residual_max_mm": 1e3 * residual,
+        "product_position_max_mm": 1e3 * product if finished else None,
+    }
+
+
+def _rows(recording: Recording) -> Iterator[tuple[int, bool]]:
+    """Rows of the log to look at, and whether welds are switched there."""
+    active = recording.log.active
+    for row in range(1, len(recording.log)):
+        if active.starts[row] != active.starts[row - 1]:
+            yield row, True
+        elif row % EVERY == 0:
+            yield row, False
+
+
+def _pose(recording: Recording, m: mujoco.MjModel, d: mujoco.MjData, row: int) -> None:
+    d.qpos[:] = recording.log.qpos[row]
+    mujoco.mj_kinematics(m, d)
+
+
+def _aim(recording: Recording, m: mujoco.MjModel, d: mujoco.MjData, row: int) -> None:
+    """Switch the constraints as they are in a row."""
+    on = recording.log.active[row]
+    d.eq_active[:] = 0
+    d.eq_active[on[:, 0]] = 1
+    m.eq_obj1id[on[:, 0]], m.eq_obj2id[on[:, 0]] = on[:, 1], on[:, 2]
+
+
+def _ideal(recording: Recording) -> dict[str, float | None]:
+    """How long operations take against the ideal world, in which ẋ = F."""
+    if recording.layout is None:
+        return {}
+    log, net = recording.log, recording.factory.net
+    made = conditions(log.header)
+    if not recording.from_start or not log.delivered[-1]:
+        return {}
+    units = int(log.delivered[-1])
+    thought = Simulation(
+        recording.layout, "ideal", units, made.seed, made.jitter, made.settings, wip=made.wip
+    ).run()
+    events = [Event(t, name) for t, name in log.events]
+    apart = duration_differences(process(net, thought.events), process(net, events))
+    if not len(apart):
+        return {}
+    return {
+        "duration_difference_mean_s": float(apart.mean()),
+        "duration_difference_max_s": float(apart[np.abs(apart).argmax()]),
+    }

@@ -1,0 +1,76 @@
+"""The motion of a run as few numbers: positions of what moves, frame by frame."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from factory.export import motion
+from factory.mjcf import names
+from factory.mjcf.parts import HIDDEN
+from factory.show.report.packing import Pack, planes
+from factory.show.report.recording import Recording
+
+RATE = motion.RATE / 3
+"""Frames a second, where the run is not too long: every third of those that other exports have."""
+
+MOST = 4_000_000
+"""Numbers in all frames together; a longer run has fewer frames a second."""
+
+UNITS = 10_000
+"""Positions are whole tenths of a millimetre, components of quaternions whole 1/10000."""
+
+TURNED = 2e-3
+"""What never turns by more, in a component of its quaternion, has one orientation for good."""
+
+
+def frames(recording: Recording, pack: Pack) -> dict[str, Any]:
+    """Poses relative to the parent body: `time` (n,) [s] and, for each body that moves,
+    `x<body>` (3, n), `q<body>` (4, n) if it turns, go into the pack; poses of all at the start,
+    and which body is another's child, are given."""
+    seen = recording.motion
+    m, rows = seen.m, seen.rows
+    time = recording.log.time[rows]
+    parts = {b for b in range(m.nbody) if names.kind(seen.name(b)) == "part"}
+    moved = np.ptp(seen.position, axis=0).max(axis=1) > 0.5 / UNITS
+    moving = [b for b in range(1, m.nbody) if moved[b] or b in parts]
+    kept = _thinned(time, len(moving))
+    pack.add("time", time[kept].astype(np.float32))
+    turning = []
+    for body in moving:
+        pack.add(f"x{body}", planes(_whole(seen.position[kept, body])))
+        turns = _continuous(seen.quaternion[kept, body])
+        if np.ptp(turns, axis=0).max() > TURNED:
+            turning.append(body)
+            pack.add(f"q{body}", planes(_whole(turns)))
+    return {
+        "count": len(kept),
+        "units": UNITS,
+        "hidden": HIDDEN,
+        "moving": moving,
+        "turning": turning,
+        "parents": {str(b): int(p) for b, p in enumerate(m.body_parentid) if p and b},
+        "position": np.round(seen.position[0], 5).tolist(),
+        "quaternion": np.round(seen.quaternion[0], 6).tolist(),
+    }
+
+
+def _thinned(time: NDArray[np.float64], bodies: int) -> NDArray[np.int64]:
+    """The frames that are kept, the first and the last among them."""
+    span = float(time[-1] - time[0])
+    rate = min(RATE, max(1.0, MOST / (3 * max(1, bodies) * max(span, 1e-9))))
+    wanted = np.arange(time[0], time[-1], 1 / rate)
+    found = np.searchsorted(time, wanted - 1e-9)
+    return np.unique([0, *found.tolist(), len(time) - 1]).astype(np.int64)
+
+
+def _continuous(turns: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The same orientations without jumps from a quaternion to its opposite."""
+    flips = np.where(np.sum(turns[1:] * turns[:-1], axis=1) < 0, -1.0, 1.0)
+    return np.asarray(turns * np.cumprod([1.0, *flips])[:, None])
+
+
+def _whole(values: NDArray[np.float64]) -> NDArray[np.int32]:
+    return np.round(values.T * UNITS).astype(np.int32)

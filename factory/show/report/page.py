@@ -1,0 +1,141 @@
+"""The page: everything about a run in one HTML file that refers to nothing outside itself."""
+
+from __future__ import annotations
+
+import hashlib
+from base64 import b64encode
+from collections.abc import Mapping, Sequence
+from html import escape
+from importlib.resources import files
+from typing import Any
+
+from factory.show.report.fidelity import fidelity
+from factory.show.report.floor import floor_plan
+from factory.show.report.frames import frames
+from factory.show.report.links import data, labels_of
+from factory.show.report.measured import measured
+from factory.show.report.net_drawing import net_drawing
+from factory.show.report.packing import Pack, json_inside
+from factory.show.report.prediction import predicted
+from factory.show.report.recording import Recording
+from factory.show.report.scene import scene
+from factory.show.report.sections import (
+    fidelity_words,
+    heading,
+    made_how,
+    pace,
+    proof_words,
+    utilisation,
+)
+from factory.show.report.tree import assembly_tree
+from factory.show.report.words import proof
+
+SCRIPTS = (
+    "report/three.min.js",
+    "report/data.js",
+    "report/selection.js",
+    "report/views.js",
+    "report/gantt.js",
+    "report/replay.js",
+    "report/wiring.js",
+    "report/report.js",
+)
+"""In the order in which they run."""
+
+STYLES = ("report/report.css",)
+
+
+def page(recording: Recording) -> str:
+    """The page as a text, the same for the same recording."""
+    labels = labels_of(recording.factory)
+    run, plan = measured(recording), predicted(recording)
+    proved, found = proof(recording.factory), fidelity(recording)
+    pack = Pack()
+    document = {
+        **data(recording.factory),
+        "name": recording.name,
+        "end": round(recording.end, 6),
+        "roles": list(recording.stage.roles),
+        "start": list(recording.start),
+        "fired": recording.log.fired.tolist(),
+        "times": [round(t, 4) for t in recording.log.fired_t.tolist()],
+        "scene": scene(recording.stage, labels, pack),
+        "frames": frames(recording, pack),
+        "arrays": pack.index,
+    }
+    fields = {
+        "name": escape(recording.name, quote=True),
+        "counts": escape(_counts(recording)),
+        "heading": heading(recording, run, plan, proved, found),
+        "tree": assembly_tree(recording.pag, labels),
+        "floor": floor_plan(recording.stage, labels),
+        "net": net_drawing(recording.factory, recording.stage.roles),
+        "pace": pace(recording, run, plan),
+        "utilisation": utilisation(recording, run, plan),
+        "proof": proof_words(proved),
+        "fidelity": fidelity_words(found),
+        "how": made_how(recording),
+        "options": options(document),
+    }
+    fields["certificate"] = json_inside(proved.document)
+    return filled("report/report.html", fields, document, pack.text(), SCRIPTS, STYLES)
+
+
+def _counts(recording: Recording) -> str:
+    factory, net = recording.factory, recording.factory.net.threaded
+    return (
+        f"{len(factory.leaves)} parts, {len(factory.robots)} robots, {len(net.places)} places, "
+        f"{len(net.transitions)} transitions"
+    )
+
+
+def options(document: dict[str, Any]) -> str:
+    """What the field that finds things by name offers."""
+    kinds = (("robot", "robots"), ("part", "labels"), ("transition", "transitions"))
+    return "".join(
+        f'<option value="{escape(f"{kind} {name}", quote=True)}"></option>'
+        for kind, key in kinds
+        for name in document[key]
+    )
+
+
+def filled(
+    template: str,
+    fields: Mapping[str, str],
+    document: object,
+    packed: str,
+    scripts: Sequence[str],
+    styles: Sequence[str],
+    connects: str = "",
+) -> str:
+    """A template with everything in its place, in one pass: what is filled in is not looked at
+    again. Templates, scripts and styles are named like `report/report.css`; `connects`: what the
+    page may connect to, by its content security policy."""
+    texts = [_asset(name) for name in scripts]
+    every = {
+        **fields,
+        "policy": _policy(texts, connects),
+        "style": "".join(map(_asset, styles)),
+        "data": json_inside(document),
+        "packed": packed,
+        "scripts": "\n".join(f"<script>{script}</script>" for script in texts),
+        "licence": escape(_asset("report/three.LICENSE.txt")),
+    }
+    pieces = _asset(template).split("%%")
+    return "".join(every[piece] if n % 2 else piece for n, piece in enumerate(pieces))
+
+
+def _policy(scripts: list[str], connects: str) -> str:
+    """A content security policy under which only these scripts run, and nothing is fetched."""
+    digests = (b64encode(hashlib.sha256(s.encode()).digest()).decode() for s in scripts)
+    allowed = " ".join(f"'sha256-{digest}'" for digest in digests)
+    return (
+        f"default-src 'none'; script-src {allowed}; style-src 'unsafe-inline'; "
+        + (f"connect-src {connects}; " if connects else "")
+        + "img-src data: blob:; base-uri 'none'; form-action 'none'"
+    )
+
+
+def _asset(name: str) -> str:
+    room, _, file = name.partition("/")
+    return (files(f"factory.show.{room}") / "assets" / file).read_text("utf-8")

@@ -1,0 +1,142 @@
+"""What a report is of: a log with its motion, the factory it compiles to and, where it can be had,
+the layout that it ran in."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator, Mapping
+from contextlib import suppress
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+
+from factory.export.events import compiled
+from factory.export.motion import Motion, motion_of
+from factory.export.subject import Subject
+from factory.geometry.meshes import Array
+from factory.lang import read_pag, read_template
+from factory.layout.layout import Layout
+from factory.layout.request import Ground
+from factory.pipeline import Source
+from factory.plant.factory import Factory, Operation
+from factory.problem.pag import PAG
+from factory.problem.robot_types import load_catalogue
+from factory.problem.template import Template
+from factory.record.log import Log
+from factory.record.monitor import subject_of
+from factory.show.report.stage import Stage, stations
+from factory.study.analysis.recorded import conditions
+from factory.support.errors import InputError, RunError
+
+
+@dataclass(frozen=True)
+class Recording:
+    """A run to be told about. `layout` is what predictions follow from; where it is None, `missing`
+    says why there are none."""
+
+    file: str
+    log: Log = field(repr=False)
+    motion: Motion = field(repr=False)
+    factory: Factory = field(repr=False)
+    layout: Layout | None = field(default=None, repr=False)
+    missing: str = ""
+
+    @property
+    def name(self) -> str:
+        """The name of the product."""
+        return str(self.log.header["product"])
+
+    @property
+    def start(self) -> tuple[int, ...]:
+        """The places that are marked when the run begins."""
+        return tuple(self.log.header["start"])
+
+    @property
+    def from_start(self) -> bool:
+        """Whether that is the net's initial marking."""
+        return frozenset(self.start) == self.factory.net.initial_marking
+
+    @property
+    def pag(self) -> PAG:
+        """The assembly tree."""
+        return self.factory.pag
+
+    @property
+    def end(self) -> float:
+        """When the run ended [s]."""
+        return float(self.log.time[-1])
+
+    @cached_property
+    def stage(self) -> Stage:
+        """What there is to be drawn."""
+        m, seen = self.motion.m, self.motion
+        return Stage(
+            self.factory,
+            m,
+            seen.position[0],
+            seen.quaternion[0],
+            np.stack([seen.position.min(axis=0), seen.position.max(axis=0)]),
+            self.log.header.get("monitor", {}).get("places", {}),
+            stations(self.factory, m, self._ends()),
+        )
+
+    def _ends(self) -> Iterator[tuple[Operation, Array]]:
+        """The state as each operation ends for the first time, of those that do."""
+        log = self.log
+        ends = {int(t): n for n, t in reversed([*enumerate(log.fired.tolist())])}
+        for operation in self.factory.operations:
+            event = ends.get(operation.end)
+            if event is not None:
+                row = int(np.searchsorted(log.time, log.fired_t[event] - 1e-9))
+                yield operation, log.qpos[min(row, len(log) - 1)]
+
+
+def recording_of(path: Path, layout: Layout | None = None) -> Recording:
+    """The recording in a log; of the `layout` that it was made with, if that is at hand, else of
+    one that is made again. Raises InputError (BadLog) for what is no log of a run in MuJoCo."""
+    subject = Subject(path)
+    motion, factory = motion_of(subject), compiled(subject)
+    if layout is not None:
+        return Recording(str(path), subject.log, motion, layout.factory, layout)
+    try:
+        layout = _laid_out(subject.log, path.parent)
+    except (InputError, RunError) as error:
+        why = error.diagnostics[0].message
+        return Recording(str(path), subject.log, motion, factory, None, why)
+    except (KeyError, TypeError, ValueError, AttributeError) as error:
+        return Recording(str(path), subject.log, motion, factory, None, str(error))
+    return Recording(str(path), subject.log, motion, layout.factory, layout)
+
+
+def _laid_out(log: Log, beside: Path) -> Layout:
+    """The layout of a log in the folder `beside`, made again. Raises InputError where meshes are
+    gone, RunError where the floor is too small for it, ValueError where it is not the one that the
+    run was in."""
+    header, made = log.header, conditions(log.header)
+    templates = {word: read_template(text, word) for word, text in header["templates"].items()}
+    source = Source(_pag(header["pag"], templates, beside), templates, load_catalogue())
+    factory, product = source.compile(), source.product
+    ground = header.get("ground", {})
+    floor = ground.get("floor") and tuple(map(float, ground["floor"]))
+    layout = Ground(**{**ground, "floor": floor}).lay_out(factory, product, made.settings)
+    goals = subject_of(layout, made.settings, made.jitter, None, made.wip).as_json()["goals"]
+    if goals != header["monitor"]["goals"]:
+        raise ValueError("the run was in another layout than the one its PAG gets now")
+    return layout
+
+
+def _pag(kept: Mapping[str, str], templates: Mapping[str, Template], beside: Path) -> PAG:
+    """The PAG that a log keeps, with its meshes from where it was or, where they are not there from
+    here, from beside the log. Raises InputError where they are gone."""
+    file, text = kept["file"], kept.get("plain") or kept["text"]
+    try:
+        return read_pag(text, templates, file, os.path.dirname(file) or ".")
+    except InputError:
+        with suppress(InputError):
+            return read_pag(text, templates, file, str(beside))
+        raise
+
+
+__all__ = ["Recording", "recording_of"]

@@ -1,0 +1,149 @@
+"""The 3-D view's things: triangles in colours, shared by bodies that look alike, and what each
+thing stands for."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from hashlib import sha256
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from factory.geometry.solids import rotation
+from factory.mjcf import names
+from factory.show.report.packing import Pack
+from factory.show.report.stage import Stage
+from factory.support.engine import mujoco
+
+DRAWN = 3
+"""Geoms of groups below this one are drawn."""
+
+ROUND = 28
+"""Sides of a cylinder."""
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Look:
+    """Triangles in the frame of a body: `vertices` (n, 3) [m], `faces` (k, 3), `colours` (n, 3)
+    from 0 to 255; `alpha`: how opaque it is."""
+
+    vertices: Floats = field(repr=False)
+    faces: NDArray[np.int64] = field(repr=False)
+    colours: NDArray[np.uint8] = field(repr=False)
+    alpha: float = 1.0
+
+
+def drawn(m: mujoco.MjModel, body: int) -> list[int]:
+    """The geoms of a body that are to be seen."""
+    first = int(m.body_geomadr[body])
+    plane = mujoco.mjtGeom.mjGEOM_PLANE
+    return [
+        g
+        for g in range(first, first + int(m.body_geomnum[body]))
+        if m.geom_group[g] < DRAWN and m.geom_type[g] != plane
+    ]
+
+
+def triangles(m: mujoco.MjModel, geom: int) -> tuple[Floats, NDArray[np.int64]]:
+    """A geom's vertices, in the frame of its body [m], and faces."""
+    from trimesh import creation
+
+    kind, size = mujoco.mjtGeom(m.geom_type[geom]), m.geom_size[geom]
+    if kind == mujoco.mjtGeom.mjGEOM_MESH:
+        mesh = m.mesh(int(m.geom_dataid[geom]))
+        start, count = int(mesh.vertadr[0]), int(mesh.vertnum[0])
+        first, faces = int(mesh.faceadr[0]), int(mesh.facenum[0])
+        points = np.asarray(m.mesh_vert[start : start + count], float)
+        corners = np.asarray(m.mesh_face[first : first + faces], np.int64)
+    else:
+        if kind == mujoco.mjtGeom.mjGEOM_SPHERE:
+            made = creation.icosphere(subdivisions=2, radius=size[0])
+        elif kind == mujoco.mjtGeom.mjGEOM_CYLINDER:
+            made = creation.cylinder(size[0], 2 * size[1], sections=ROUND)
+        else:
+            half = size if kind == mujoco.mjtGeom.mjGEOM_BOX else m.geom_aabb[geom, 3:]
+            made = creation.box(extents=2 * np.asarray(half))
+        points, corners = np.asarray(made.vertices, float), np.asarray(made.faces, np.int64)
+    return points @ rotation(m.geom_quat[geom]).T + m.geom_pos[geom], corners
+
+
+def look(m: mujoco.MjModel, geoms: Sequence[int]) -> Look:
+    """Several geoms of a body as one."""
+    found = [triangles(m, geom) for geom in geoms]
+    paints = [
+        m.mat_rgba[m.geom_matid[g]] if m.geom_matid[g] >= 0 else m.geom_rgba[g] for g in geoms
+    ]
+    starts = np.cumsum([0, *(len(points) for points, _ in found)])
+    return Look(
+        np.concatenate([points for points, _ in found]),
+        np.concatenate([faces + start for (_, faces), start in zip(found, starts, strict=False)]),
+        np.concatenate(
+            [
+                np.tile(np.round(255 * np.clip(rgba[:3], 0, 1)).astype(np.uint8), (len(points), 1))
+                for (points, _), rgba in zip(found, paints, strict=True)
+            ]
+        ),
+        float(min(rgba[3] for rgba in paints)),
+    )
+
+
+def scene(stage: Stage, labels: dict[str, int], pack: Pack) -> dict[str, Any]:
+    """The geometry, into the pack, and the list of things: each a shape, the body it moves with,
+    and what it stands for (`robot` or `label`, by number)."""
+    m = stage.m
+    robots = {robot.name: robot.index for robot in stage.factory.robots}
+    shapes: dict[bytes, int] = {}
+    alphas: list[float] = []
+    things = []
+    for body, geoms in _groups(m):
+        made = look(m, geoms)
+        vertices, faces = made.vertices.astype(np.float32), made.faces.astype(np.uint32)
+        parts: tuple[NDArray[Any], ...] = vertices, faces, made.colours
+        key = sha256(b"".join(a.tobytes() for a in parts) + repr(made.alpha).encode()).digest()
+        if key not in shapes:
+            shapes[key] = number = len(shapes)
+            alphas.append(round(made.alpha, 3))
+            for letter, values in zip("vfc", parts, strict=True):
+                pack.add(f"{letter}{number}", values)
+        name = owner(m.geom(geoms[0]).name) if body == 0 else m.body(body).name
+        things.append({"shape": shapes[key], "body": body, **stands_for(name, robots, labels)})
+    return {"alphas": alphas, "things": things, "places": _places(stage, labels)}
+
+
+def _groups(m: mujoco.MjModel) -> Iterator[tuple[int, list[int]]]:
+    """The geoms that make one thing: those of a body; of the world those of a robot or a feeder."""
+    owned: dict[str, list[int]] = {}
+    for geom in drawn(m, 0):
+        owned.setdefault(owner(m.geom(geom).name), []).append(geom)
+    for geoms in owned.values():
+        yield 0, geoms
+    for body in range(1, m.nbody):
+        if geoms := drawn(m, body):
+            yield body, geoms
+
+
+def owner(geom: str) -> str:
+    """What a geom of the world belongs to, by its name: `feeder/part1` of `feeder/part1/cap`."""
+    return geom.rpartition("/")[0]
+
+
+def stands_for(name: str, robots: dict[str, int], labels: dict[str, int]) -> dict[str, int]:
+    """What a body, or a geom of the world, is about: a robot, or a part with its feeder."""
+    head, _, rest = name.partition("/")
+    if head in robots:
+        return {"robot": robots[head]}
+    if head == "part" and names.label_of(name) in labels:
+        return {"label": labels[names.label_of(name)], "copy": 1}
+    if head == "feeder" and rest in labels:
+        return {"label": labels[rest]}
+    return {}
+
+
+def _places(stage: Stage, labels: dict[str, int]) -> dict[str, list[float]]:
+    """Where the body of each part, by its label's number, is in the finished product [m]."""
+    places = stage.places.items()
+    return {str(labels[k]): [round(x, 6) for x in v] for k, v in places if k in labels}

@@ -1,0 +1,248 @@
+"""The parts of a report that are words and figures, as HTML. All that comes from a user's file is
+escaped here."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from html import escape
+
+from factory.plant.factory import Factory
+from factory.show.report.fidelity import Fidelity
+from factory.show.report.links import words_of
+from factory.show.report.measured import Measured
+from factory.show.report.prediction import Predicted
+from factory.show.report.recording import Recording
+from factory.show.report.words import Proof
+from factory.study.fidelity.quantities import QUANTITIES
+
+SIGNS = {True: "✓", False: "✗", None: "?"}
+
+
+def heading(
+    recording: Recording,
+    run: Measured,
+    plan: Predicted | None,
+    proof: Proof,
+    found: Fidelity,
+) -> str:
+    """The key figures, as cards."""
+    robots = recording.factory.robots
+    asked = recording.log.header["units"]
+    products = f"in {recording.end:.2f} s of simulated time"
+    cards = [("Products", f"{len(run.dropoffs)} <small>of {int(asked)}</small>", products)]
+    if plan is not None:
+        hourly = f"{_figure(_per_hour(plan.cycle))} products an hour"
+        cards.append(("Cycle time", f"{plan.cycle:.3f} <small>s</small>", f"predicted; {hourly}"))
+        names = escape(", ".join(plan.critical[:3]))
+        told = f"measured: gear of {robots[run.critical].name}" if run.dropoffs else "predicted"
+        cards.append(("Sets the pace", names, told))
+    elif run.cycle:
+        hourly = f"{_figure(_per_hour(run.cycle))} products an hour"
+        cards.append(("Cycle time", f"{run.cycle:.3f} <small>s</small>", f"measured; {hourly}"))
+    cards.append(("Net", *_verdict(proof.holds, "proved", "not proved"), "live, safe, reversible"))
+    held = found.refines and (found.monitor is None or found.monitor.refines_net)
+    judge = "record only" if found.monitor is None else "record and monitor agree"
+    cards.append(("Run", *_verdict(held, "follows the net", "does not follow the net"), judge))
+    return "".join(_card(*card) for card in cards)
+
+
+def _verdict(holds: bool, yes: str, no: str) -> tuple[str]:
+    style = "good" if holds else "bad"
+    return (f'<span class="{style}">{SIGNS[holds]} {yes if holds else no}</span>',)
+
+
+def _card(name: str, value: str, note: str) -> str:
+    note = escape(note, quote=True)
+    return f'<div class="card"><h3>{name}</h3><p class="value">{value}</p><p>{note}</p></div>'
+
+
+def _per_hour(cycle: float | None) -> float | None:
+    return 3600 / cycle if cycle else None
+
+
+def pace(recording: Recording, run: Measured, plan: Predicted | None) -> str:
+    """Cycle time, throughput and the critical gear, predicted and measured."""
+    first = run.dropoffs[0] if run.dropoffs else None
+    last = run.dropoffs[-1] if run.dropoffs else None
+    count = len(run.dropoffs)
+    guess = (plan.cycle, plan.first, plan.last) if plan else (None, None, None)
+    rows = [
+        ("Cycle time", guess[0], run.cycle, "s"),
+        ("Throughput", _per_hour(guess[0]), _per_hour(run.cycle), "per hour"),
+        ("First product", guess[1], first, "s"),
+        (f"Product {count}", guess[2], last, "s"),
+    ]
+    body = "".join(
+        f"<tr><th>{name}</th><td>{_figure(a)}</td><td>{_figure(b)}</td><td>{_error(a, b)}</td>"
+        f"<td>{unit}</td></tr>"
+        for name, a, b, unit in rows
+    )
+    names = ("", "predicted", "measured", "error", "")
+    note = ""
+    if plan is None:
+        note = f'<p class="note">No prediction: {escape(recording.missing)}.</p>'
+    elif run.cycle is None:
+        note = '<p class="note">A cycle time is measured from 4 products on.</p>'
+    return _table(names, body) + note + _gears(recording, run, plan)
+
+
+def _gears(recording: Recording, run: Measured, plan: Predicted | None) -> str:
+    """The critical gear as a chain of its operations, as predicted and as measured."""
+    factory = recording.factory
+    names = {robot.name: robot.index for robot in factory.robots}
+    wanted = [("measured", run.critical, run.durations)]
+    told = ""
+    if plan is not None:
+        critical = [names[name] for name in plan.critical if name in names]
+        if not critical:
+            told = f"<p>The pace is set by {escape(', '.join(plan.critical))}, not by a robot.</p>"
+        wanted[:0] = [("predicted", robot, plan.durations) for robot in critical[:1]]
+    longest = max((_sum(factory, r, times) for _, r, times in wanted), default=1.0) or 1.0
+    bars = "".join(_chain(factory, *row, longest) for row in wanted)
+    return f"<h3>Critical gear</h3>{told}<div class='chains'>{bars}</div>"
+
+
+def _sum(factory: Factory, robot: int, times: Iterable[float | None]) -> float:
+    every = list(times)
+    return sum(every[o] or 0.0 for o in factory.robots[robot].operations)
+
+
+def _chain(
+    factory: Factory, how: str, robot: int, times: tuple[float | None, ...], longest: float
+) -> str:
+    pieces = []
+    for number in factory.robots[robot].operations:
+        seconds, operation = times[number] or 0.0, factory.operations[number]
+        if seconds <= 0:
+            continue
+        words = escape(words_of(operation), quote=True)
+        width = 100 * seconds / longest
+        pieces.append(
+            f'<button class="piece" data-operation="{number}" style="width:{width:.2f}%"'
+            f' title="{words}: {seconds:.3f} s"><b>{seconds:.2f}</b> {words}</button>'
+        )
+    total = _sum(factory, robot, times)
+    name = escape(factory.robots[robot].name)
+    return (
+        f'<div class="chain"><span>{how}: <button class="link" data-robot="{robot}">{name}</button>'
+        f" {total:.3f} s</span><div>{''.join(pieces)}</div></div>"
+    )
+
+
+def utilisation(recording: Recording, run: Measured, plan: Predicted | None) -> str:
+    """A bar for each robot, the busiest first, with a mark where it was predicted."""
+    rows, roles = [], recording.stage.roles
+    for robot in sorted(recording.factory.robots, key=lambda r: -run.busy[r.index]):
+        share, role = 100 * run.busy[robot.index], escape(roles[robot.index], quote=True)
+        mark, words = "", f"{share:.0f} % measured"
+        if plan is not None:
+            guess = min(100.0, 100 * plan.busy[robot.index])
+            mark = f'<i style="left:{guess:.2f}%"></i>'
+            words += f", {guess:.0f} % predicted"
+        rows.append(
+            f'<button class="use" data-robot="{robot.index}" title="{words}">'
+            f"<span>{escape(robot.name)}</span><span class='bar'>"
+            f'<b class="{role}" style="width:{min(share, 100):.2f}%"></b>{mark}</span>'
+            f"<span>{share:.0f} %</span></button>"
+        )
+    legend = "bar: measured, share of the run in operations; line: predicted for this run"
+    note = f'<p class="note">{legend}.</p>' if plan else ""
+    return f'<div class="uses">{"".join(rows)}</div>{note}'
+
+
+def proof_words(proof: Proof) -> str:
+    """The proof, claim by claim."""
+    items = "".join(
+        f'<li class="{"good" if claim.holds else "bad"}"><span class="sign">{SIGNS[claim.holds]}'
+        f"</span><div><b>{claim.name}</b>: {escape(claim.means)}."
+        f"<p>{escape(claim.why)}</p></div></li>"
+        for claim in proof.claims
+    )
+    if proof.faults:
+        told = f"The checker refuses the certificate: {escape('; '.join(proof.faults[:3]))}."
+    else:
+        told = "An independent checker accepts the certificate, which says all of this in numbers."
+    digest = f'<p class="note">{told} SHA-256 <code>{escape(proof.digest)}</code> '
+    save = '<button class="link" id="save-certificate">Save the certificate</button></p>'
+    return f'<ul class="claims">{items}</ul>{digest}{save}'
+
+
+def fidelity_words(found: Fidelity) -> str:
+    """The figures in a table, and what the monitor says."""
+    rows = "".join(
+        f'<tr class="{"bad" if figure.exceeded else ""}">'
+        f"<th>{escape(_title(figure.key))}<p>{escape(QUANTITIES[figure.key].definition)}</p></th>"
+        f"<td>{_shown(figure.value)}</td><td>{_shown(QUANTITIES[figure.key].limit)}</td>"
+        f"<td>{escape(QUANTITIES[figure.key].unit)}</td></tr>"
+        for figure in found.figures
+    )
+    table = _table(("", "found", "limit", ""), rows)
+    return "".join(_judged(found)) + table
+
+
+def _judged(found: Fidelity) -> Iterator[str]:
+    yield "<p>The record of firings " + ("refines" if found.refines else "does not refine")
+    yield " the net. "
+    if found.monitor is None:
+        yield "The log has nothing for the monitor to judge.</p>"
+        return
+    report = found.monitor
+    yield f"The monitor, which sees the engine alone, saw {len(report.seen)} firings and inferred "
+    yield f"{len(report.inferred)}; "
+    yield "they explain the run.</p>" if report.refines_net else "some things nothing explains:</p>"
+    if report.violations:
+        words = (escape(str(v.diagnostic())) for v in report.violations[:8])
+        yield "<ul class='violations'>" + "".join(f"<li>{w}</li>" for w in words) + "</ul>"
+
+
+def _title(key: str) -> str:
+    """The key of a figure as words, without its unit."""
+    for unit in ("_mm", "_s"):
+        key = key.removesuffix(unit)
+    return key.replace("_", " ").capitalize()
+
+
+def made_how(recording: Recording) -> str:
+    """How the run was made."""
+    header = recording.log.header
+    settings = ", ".join(f"{k} {v:g}" for k, v in header["settings"].items() if _is_number(v))
+    versions = ", ".join(f"{k} {v}" for k, v in header.get("versions", {}).items())
+    file = header["pag"]["file"].replace("\\", "/").rpartition("/")[2]
+    rows = [
+        ("PAG", f"{file}, SHA-256 {header['pag']['sha256'][:16]}…"),
+        ("World", f"{header['world']}, seed {header['seed']}, jitter {header['jitter']:g}"),
+        ("Settings", settings),
+        ("Versions", versions),
+    ]
+    if not recording.log.complete:
+        rows.append(("Log", "cut off: the run was stopped before its end"))
+    body = "".join(f"<dt>{name}</dt><dd>{escape(str(words))}</dd>" for name, words in rows)
+    return f"<dl>{body}</dl>"
+
+
+def _is_number(value: object) -> bool:
+    return isinstance(value, int | float)
+
+
+def _table(columns: tuple[str, ...], rows: str) -> str:
+    head = "".join(f"<th>{name}</th>" for name in columns)
+    return f"<table><thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table>"
+
+
+def _figure(value: float | None) -> str:
+    if value is None:
+        return "–"
+    return f"{value:.3f}" if abs(value) < 100 else f"{value:.0f}"
+
+
+def _shown(value: float | None) -> str:
+    """A figure in three digits, or that it is too small for that."""
+    if value is None:
+        return "–"
+    return f"{value:.3g}" if not value or abs(value) >= 1e-4 else "&lt; 0.0001"
+
+
+def _error(predicted: float | None, measured: float | None) -> str:
+    if not predicted or not measured:
+        return ""
+    return f"{100 * (predicted / measured - 1):+.1f} %"

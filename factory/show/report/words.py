@@ -1,0 +1,114 @@
+"""The proof of a net in words, from its verdict and certificate."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from typing import Any
+
+from factory.nets.certificate import certificate
+from factory.nets.certificate_check import check_certificate
+from factory.nets.verdict import PROPERTIES, Verdict, listing
+from factory.nets.verify import verify
+from factory.plant.factory import Factory
+
+NAMES = {
+    "gear_net": "Gear net",
+    "live": "Live",
+    "safe": "Safe",
+    "reversible": "Reversible",
+    "legal": "Legal start",
+}
+MEANS = {
+    "gear_net": "every robot goes round in a cycle of its own, and robots meet in operations only",
+    "live": "whatever has happened, every operation can happen again: it never stops",
+    "safe": "no place ever holds two tokens: no robot is asked to be twice at once",
+    "reversible": "the factory can always come back to where it started",
+    "legal": "at the start every robot is at exactly one place of its program",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Claim:
+    """A property, what it means, whether it holds (None: undecided), and why, in words."""
+
+    name: str
+    means: str
+    holds: bool | None
+    why: str
+
+
+@dataclass(frozen=True)
+class Proof:
+    """The claims, the digest of the certificate, the faults that its checker finds, and the
+    document."""
+
+    claims: tuple[Claim, ...]
+    digest: str
+    faults: tuple[str, ...]
+    document: dict[str, Any] = field(repr=False)
+
+    @property
+    def holds(self) -> bool:
+        """Whether everything is proved and the checker agrees."""
+        return not self.faults and all(claim.holds for claim in self.claims)
+
+
+def proof(factory: Factory) -> Proof:
+    """The proof of a factory's net."""
+    verdict = verify(factory.net)
+    document = certificate(factory.net, verdict)
+    faults = tuple(str(fault) for fault in check_certificate(document))
+    claims = tuple(_claim(name, factory, verdict, document) for name in PROPERTIES)
+    return Proof(claims, str(document["digest"]), faults, document)
+
+
+def _claim(name: str, factory: Factory, verdict: Verdict, document: dict[str, Any]) -> Claim:
+    holds: bool | None = getattr(verdict, name)
+    if holds:
+        why = " ".join(_WHY[name](factory, document[name]))
+    else:
+        why = "; ".join(str(w) for w in verdict.witness if w.property == name) or "undecided"
+    return Claim(NAMES[name], MEANS[name], holds, why)
+
+
+def _gear_net(factory: Factory, section: dict[str, Any]) -> Iterator[str]:
+    order = section.get("order", [])
+    names = [factory.robots[joint["gear"]].name for joint in order]
+    yield f"The net is put together from {len(order)} gears, one for each robot, in the order"
+    yield f"{listing(names, 8)}; each new one meets those before it in one operation."
+
+
+def _safe(factory: Factory, section: dict[str, Any]) -> Iterator[str]:
+    cover = section.get("cover", [])
+    yield f"Each of the {len(cover)} places lies on the gear of a robot, a circle with one token;"
+    yield "firing a transition moves that token on and never makes another."
+
+
+def _live(factory: Factory, section: dict[str, Any]) -> Iterator[str]:
+    yield f"The {len(section.get('order', []))} places without a token stand in an order in which"
+    yield "each comes after all that it waits for: no circle waits for itself."
+
+
+def _reversible(factory: Factory, section: dict[str, Any]) -> Iterator[str]:
+    if section.get("root") is None:
+        yield "Live, and every transition that fires equally often brings the marking back."
+        return
+    first = factory.net.threaded.transitions[section["root"]].name
+    depth = max(section["there"]["depth"], default=0)
+    yield f"From {first} there is a way to every transition, at most {depth} steps long, and one"
+    yield "back from each: firing all of them once gives the first marking again."
+
+
+def _legal(factory: Factory, section: dict[str, Any]) -> Iterator[str]:
+    marked = section.get("marked", [])
+    yield f"{len(marked)} robots, {len(marked)} marked places, one in each gear."
+
+
+_WHY = {
+    "gear_net": _gear_net,
+    "safe": _safe,
+    "live": _live,
+    "reversible": _reversible,
+    "legal": _legal,
+}

@@ -1,0 +1,156 @@
+"""What a run leaves behind: its events and its figures, the same for either world."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, NamedTuple
+
+from factory.plant.approaches import Pair
+from factory.plant.factory import Factory
+from factory.support.errors import Diagnostic
+
+if TYPE_CHECKING:
+    from factory.record.monitor.report import Report
+
+
+class Event(NamedTuple):
+    """A transition that fired at time t [s]."""
+
+    t: float
+    transition: str
+
+
+def busy_times(factory: Factory, events: Iterable[Event]) -> tuple[float, ...]:
+    """How long each robot was in operations that have ended [s]; one without a start among the
+    events was under way from the beginning, time 0."""
+    numbers = {t.name: number for number, t in enumerate(factory.net.threaded.transitions)}
+    begun, spent = dict[int, float](), [0.0] * len(factory.robots)
+    for t, transition in events:
+        operation, is_end = divmod(numbers[transition], 2)
+        if not is_end:
+            begun[operation] = t
+            continue
+        lasted = t - begun.pop(operation, 0.0)
+        for robot in factory.operations[operation].robots:
+            spent[robot] += lasted
+    return tuple(spent)
+
+
+@dataclass(frozen=True, slots=True)
+class PhysicsFigures:
+    """What only the engine can tell; see the specification of `run` for each.
+
+    `mating_forces`: by operation, the largest force of a contact between inputs that it was
+    joining [N]; `excluded`: pairs of parts whose contact was off.
+    """
+
+    handoffs: int = 0
+    handoff_gap_max_mm: float = 0.0
+    weld_residual_max_mm: float = 0.0
+    product_error_max_mm: float | None = None
+    unintended_contacts: int = 0
+    engine_warnings: int = 0
+    contacts: tuple[str, ...] = ()
+    mating_forces: Mapping[str, float] = field(default_factory=dict)
+    excluded: tuple[Pair, ...] = ()
+    fused: bool = False
+
+    @property
+    def mating_force_max_n(self) -> float:
+        """The largest force with which inputs touched while they were being joined [N]."""
+        return max(self.mating_forces.values(), default=0.0)
+
+
+@dataclass(frozen=True, slots=True)
+class Run:
+    """The record of a run: figures and events. `trouble` is None for a run that reached its end;
+    `monitor` the verdict of a monitor, if one watched it: `refines_net` is then its and that of the
+    replay."""
+
+    world: str
+    units: int
+    products: int
+    robots: int
+    sim_time_s: float
+    wall_time_s: float
+    physics_time_s: float
+    supervisor_time_s: float
+    predicted_cycle_time_s: float | None
+    bottleneck: str
+    refines_net: bool
+    events: tuple[Event, ...] = field(repr=False)
+    dropoffs: tuple[float, ...] = field(repr=False)
+    busy: tuple[float, ...] = field(repr=False)
+    physics: PhysicsFigures | None = None
+    seed: int = 0
+    jitter: float = 0.0
+    trouble: Diagnostic | None = None
+    monitor: Report | None = None
+
+    @property
+    def succeeded(self) -> bool:
+        """Whether it came to its end, and its events are a run of the net."""
+        return self.trouble is None and self.refines_net
+
+    @property
+    def realtime_factor(self) -> float:
+        """Simulated seconds per second of the run loop."""
+        return self.sim_time_s / self.wall_time_s if self.wall_time_s else 0.0
+
+    @property
+    def cycle_time_s(self) -> float | None:
+        """Mean interval between dropoffs over the last half of the units; None below 4."""
+        if len(self.dropoffs) < 4:
+            return None
+        start = len(self.dropoffs) // 2
+        last = self.dropoffs[start - 1 :]
+        return (last[-1] - last[0]) / (len(last) - 1)
+
+    @property
+    def utilisation(self) -> tuple[float, ...]:
+        """For each robot the share of the time it was in an operation."""
+        total = self.sim_time_s or 1.0
+        return tuple(b / total for b in self.busy)
+
+    def as_json(self) -> dict[str, object]:
+        """The document that `run --json` prints."""
+        physics, monitor = self.physics, self.monitor
+        watched = (
+            {"monitor_time_s": monitor.time_s, "monitor": monitor.as_json()} if monitor else {}
+        )
+        keys = (
+            "handoffs",
+            "handoff_gap_max_mm",
+            "weld_residual_max_mm",
+            "product_error_max_mm",
+            "unintended_contacts",
+            "engine_warnings",
+            "mating_force_max_n",
+        )
+        return {
+            "schema": 1,
+            "world": self.world,
+            "units": self.units,
+            "products": self.products,
+            "robots": self.robots,
+            "seed": self.seed,
+            "jitter": self.jitter,
+            "sim_time_s": round(self.sim_time_s, 6),
+            "wall_time_s": self.wall_time_s,
+            "physics_time_s": self.physics_time_s if physics else None,
+            "supervisor_time_s": self.supervisor_time_s,
+            "realtime_factor": self.realtime_factor,
+            "cycle_time_s": self.cycle_time_s,
+            "predicted_cycle_time_s": self.predicted_cycle_time_s,
+            "bottleneck": self.bottleneck,
+            "transitions_fired": len(self.events),
+            "refines_net": self.refines_net,
+            **{key: getattr(physics, key) if physics else None for key in keys},
+            "contacts": list(physics.contacts) if physics else None,
+            "mating_forces_n": dict(physics.mating_forces) if physics else None,
+            "fused": physics.fused if physics else None,
+            "excluded": [list(pair) for pair in physics.excluded] if physics else None,
+            **watched,
+            "events": [{"t": round(e.t, 6), "transition": e.transition} for e in self.events],
+        }

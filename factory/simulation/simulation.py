@@ -1,0 +1,305 @@
+"""Run a laid-out factory in one of the two worlds until its products are dropped off."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from time import perf_counter
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+
+from factory.control.mode import Mode
+from factory.layout.layout import Layout
+from factory.modes.modes import operation_modes, robot_limits
+from factory.modes.staging import stages_of
+from factory.nets.history import firings
+from factory.nets.petri import Marking
+from factory.nets.replay import replay
+from factory.plant.fused_bodies import bodies_of, fused_copies
+from factory.problem.robot_types import Catalogue, load_catalogue
+from factory.simulation.distributed import DistributedSupervisor
+from factory.simulation.ideal import IdealWorld
+from factory.simulation.run import PhysicsFigures, Run, busy_times
+from factory.simulation.supervisor import Supervisor
+from factory.support.errors import Diagnostic, InputError, RunError
+from factory.support.settings import MOST, Settings
+from factory.timing.pool import part_pool
+from factory.timing.prediction import operation_delays, predict, ways_ahead
+
+if TYPE_CHECKING:
+    from factory.mjcf.model import Model
+
+Observer = Callable[[Any, Any], None]
+"""Called after every tick with the world and the supervisor: to render, to log, to show
+progress."""
+
+PATIENCE = 10.0
+"""A run has stalled when nothing fires for this many times the longest predicted delay."""
+
+LOOK = "look at these robots in `factory render`, or give --max-time more"
+
+SMALLER = "take smaller speeds, a smaller --timestep, or check that the parts are in metres"
+
+
+@dataclass(frozen=True)
+class Compiled:
+    """What runs that differ in seed and jitter alone share: modes and, in MuJoCo, the model and the
+    engine's model `loaded` of it. A run writes into a copy of that one."""
+
+    modes: tuple[Mode, ...]
+    model: Model | None = None
+    loaded: Any = None
+
+
+class Simulation:
+    """One run, ready to go: `run()` does it; `model` is what the engine is given (mujoco only).
+
+    Raises InputError where the engine refuses the model, or a mode starts outside its domain. A
+    run that stalls or takes too long is a Run with its trouble; `require` makes that an error.
+    `compiled`: what it shares with earlier runs, made by `compiled` for the same layout, world,
+    units, settings, wip and `fuse`, from the beginning. `fuse`: parts that are joined
+    for good become one rigid body. `shown`: somebody will look at it, in a film, a log or live; if
+    not, the model has nothing that is only shown, and the run is the same and faster.
+    """
+
+    def __init__(
+        self,
+        layout: Layout,
+        world: Literal["mujoco", "ideal"] = "mujoco",
+        units: int = 1,
+        seed: int = 0,
+        jitter: float = 0.0,
+        settings: Settings | None = None,
+        catalogue: Catalogue | None = None,
+        start: Marking | None = None,
+        wip: int | None = None,
+        distributed: bool = False,
+        compiled: Compiled | None = None,
+        fuse: bool = False,
+        shown: bool = True,
+    ) -> None:
+        self.layout, self.kind, self.units = layout, world, units
+        self.seed, self.jitter, self.wip = seed, jitter, wip
+        self.settings = settings or Settings()
+        factory = layout.factory
+        self.modes = compiled.modes if compiled else operation_modes(layout, self.settings.eps)
+        self.limits, gains = robot_limits(layout, self.settings, seed, jitter)
+        self.stages = stages_of(layout, self.modes, self.settings)
+        self.delays = operation_delays(
+            layout, self.modes, self.limits, self.settings, world, self.stages
+        )
+        self.ways = ways_ahead(self.stages, self.limits, self.settings, world)
+        self.start = factory.net.initial_marking if start is None else start
+        self.counts = firings(factory.net, self.start)
+        positions = start_positions(layout, self.start)
+        self.model: Model | None = None
+        self.world: Any
+        if world == "ideal":
+            done = self.counts.get(factory.dropoff.end, 0)
+            self.world = IdealWorld(
+                positions,
+                factory.dropoff.index,
+                units + done,
+                self.settings.tick,
+                done,
+                wip,
+                self.settings.timestep,
+            )
+        else:
+            loaded = compiled.loaded if compiled else None
+            self.model = compiled.model if compiled else None
+            self.model = self.model or physical_model(
+                layout, units, self.settings, catalogue, wip, self.under_way(), fuse, shown
+            )
+            self.world = _mujoco(self.model, positions, gains, units, self.counts, wip, loaded)
+        self.before = self.world.delivered()
+        self.supervisor = self._distributed() if distributed else self._central()
+
+    def _central(self) -> Supervisor:
+        return Supervisor(
+            self.layout.factory,
+            self.modes,
+            self.limits,
+            self.world,
+            self.settings.tick,
+            self.start,
+            self.counts,
+            self.stages,
+        )
+
+    def _distributed(self) -> DistributedSupervisor:
+        settings, factory = self.settings, self.layout.factory
+        if self.start != factory.net.initial_marking:
+            message = "a distributed run starts where every robot waits with no part"
+            raise InputError(Diagnostic("BadMarking", message, None, "leave out --from"))
+        return DistributedSupervisor(
+            factory,
+            self.modes,
+            self.limits,
+            self.world,
+            settings.timestep,
+            settings.substeps,
+            self.seed,
+            self.stages,
+        )
+
+    def under_way(self) -> dict[str, int]:
+        """How many copies of each part are in the factory in the marking where the run starts,
+        those included that are being taken."""
+        factory, counts = self.layout.factory, self.counts
+        gone = counts.get(factory.dropoff.end, 0)
+        return {o.label: counts.get(o.start, 0) - gone for o in factory.leaves}
+
+    def run(
+        self,
+        observers: Sequence[Observer] = (),
+        max_time: float | None = None,
+        glances: Sequence[Observer] = (),
+    ) -> Run:
+        """Tick until `units` products have been dropped off, the run stalls or `max_time` [s]
+        passes. Observers are called after every tick; `glances` are, but where there are no
+        observers several ticks may go by between them. Where the engine gives up it begins anew by
+        itself, at time 0: nobody is shown that, and the run has lasted until then."""
+        patience = PATIENCE * max(self.delays)
+        begin, watched, trouble = perf_counter(), 0.0, None
+        supervisor, world, goal = self.supervisor, self.world, self.before + self.units
+        while world.delivered() < goal and trouble is None:
+            before = world.time
+            supervisor.step(1 if observers else self._unseen(max_time))
+            if self.model is not None and (reason := world.unstable()):
+                trouble = self._trouble("Unstable", f"{reason}, after {before:.2f} s", SMALLER)
+                return self._record(perf_counter() - begin - watched, before, trouble)
+            if observers or glances:
+                pause = perf_counter()
+                for observe in (*observers, *glances):
+                    observe(world, supervisor)
+                watched += perf_counter() - pause
+            if world.time - supervisor.last_event > patience:
+                what = f"nothing fired for {patience:.2f} s of simulated time"
+                trouble = self._trouble("Stalled", what, LOOK)
+            elif max_time is not None and world.time >= max_time:
+                what = f"not finished after {max_time:.2f} s of simulated time"
+                trouble = self._trouble("Timeout", what, LOOK)
+        return self._record(perf_counter() - begin - watched, world.time, trouble)
+
+    def _unseen(self, max_time: float | None) -> int:
+        """So many ticks may go by at once where nobody looks."""
+        if max_time is None:
+            return MOST
+        left = (max_time - float(self.world.time)) / self.settings.tick
+        return max(1, min(MOST, round(left)))
+
+    def _record(self, wall: float, time: float, trouble: Diagnostic | None) -> Run:
+        supervisor, world, factory = self.supervisor, self.world, self.layout.factory
+        physics = getattr(world, "physics_time", 0.0)
+        predicted = predict(self.layout, self.delays, self.settings, self.kind, self.wip, self.ways)
+        verdict = replay(factory.net, [e.transition for e in supervisor.events], self.start)
+        figures: PhysicsFigures | None = None
+        if self.model is not None:
+            figures = world.inspection.figures()
+        return Run(
+            self.kind,
+            self.units,
+            world.delivered() - self.before,
+            len(factory.robots),
+            time,
+            wall,
+            physics,
+            wall - physics,
+            predicted.seconds,
+            predicted.bottleneck,
+            verdict.refines,
+            tuple(supervisor.events),
+            tuple(world.dropoffs),
+            busy_times(factory, supervisor.events),
+            figures,
+            self.seed,
+            self.jitter,
+            trouble,
+        )
+
+    def _trouble(self, code: str, what: str, hint: str) -> Diagnostic:
+        """Names the robots that are in an operation, or else those that wait for one that cannot
+        start."""
+        factory, supervisor = self.layout.factory, self.supervisor
+        numbers = supervisor.active.operations or tuple(o.index for o in supervisor.awaited())
+        places = [factory.operations[n] for n in numbers[:3]]
+        robots = ", ".join(
+            f"{factory.robots[r].name} in {o.template.name}({o.label})"
+            for o in places
+            for r in o.robots
+        )
+        message = f"{what}; {robots or 'no robot can start'}"
+        return Diagnostic(code, message, places[0].position if places else None, hint)
+
+
+def compiled(
+    layout: Layout,
+    world: Literal["mujoco", "ideal"],
+    units: int,
+    settings: Settings,
+    catalogue: Catalogue,
+    wip: int | None = None,
+    fuse: bool = False,
+) -> Compiled:
+    """What many runs that nobody looks at share. Raises InputError as `Simulation` does."""
+    modes = operation_modes(layout, settings.eps)
+    if world == "ideal":
+        return Compiled(modes)
+    from factory.mjcf.loading import load
+
+    model = physical_model(layout, units, settings, catalogue, wip, fuse=fuse, shown=False)
+    return Compiled(modes, model, load(model))
+
+
+def physical_model(
+    layout: Layout,
+    units: int | None = None,
+    settings: Settings | None = None,
+    catalogue: Catalogue | None = None,
+    wip: int | None = None,
+    under_way: Mapping[str, int] | None = None,
+    fuse: bool = False,
+    shown: bool = True,
+) -> Model:
+    """The MJCF model of a layout with the bodies it needs for `units` (None: for ever): the pool of
+    parts, or with `fuse` bodies of sub-assemblies too, and then few parts. `shown`: with what is
+    only shown, too."""
+    from factory.mjcf.model import build_model, part_copies
+
+    factory = layout.factory
+    bodies = bodies_of(factory, layout.product, fuse)
+    if bodies.wholes:
+        copies = fused_copies(bodies, factory, units)
+    else:
+        copies = part_copies(part_pool(factory), units, wip, under_way)
+    catalogue, settings = catalogue or load_catalogue(), settings or Settings()
+    return build_model(layout, catalogue, copies, settings, bodies, shown)
+
+
+def start_positions(layout: Layout, marking: Marking) -> np.ndarray:
+    """Every axis in a marking: a robot where its last operation left it, or at its B end where it
+    waits with no part at the beginning of its cycle, and then its lift may still be down."""
+    factory, net = layout.factory, layout.factory.net
+    positions = np.zeros(len(factory.robots) + len(layout.lifts))
+    lifts = {robot: len(factory.robots) + n for n, robot in enumerate(layout.lifts)}
+    for robot, gear in zip(factory.robots, net.gears, strict=True):
+        step = next(i for i, place in enumerate(gear.places) if place in marking) // 2
+        positions[robot.index] = layout.home(robot.index, robot.operations[step])
+        if robot.index in lifts and step:
+            positions[lifts[robot.index]] = factory.strokes[robot.index]
+    return positions
+
+
+def _mujoco(*arguments: Any) -> Any:
+    from factory.simulation.mujoco.world import MujocoWorld
+
+    return MujocoWorld(*arguments)
+
+
+def require(run: Run) -> Run:
+    """The run itself, or RunError with what troubled it."""
+    if run.trouble is not None:
+        raise RunError(run.trouble)
+    return run

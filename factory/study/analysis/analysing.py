@@ -1,0 +1,89 @@
+"""The analysis of a factory's pace, by its net: everything in one value."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from math import inf
+
+from factory.nets.slack import slacks
+from factory.study.analysis.bounds import WipCurve, wip_curve
+from factory.study.analysis.flow import Flow, flow
+from factory.study.analysis.measured import Comparison, Record, compare
+from factory.study.analysis.sensitivity import Sensitivity, sensitivities
+from factory.study.analysis.timed import TimedNet, timed_net
+from factory.study.analysis.timing import AS_IT_IS, Change, Timing
+from factory.study.analysis.what_if import Scenario, scenario, scenarios
+
+
+@dataclass(frozen=True)
+class Analysis:
+    """What the timed net of a laid-out factory says; see the values it is made of.
+
+    `slack[i]`: how much longer operation i may take before it sets the pace [s].
+    """
+
+    timing: Timing
+    wip: int | None
+    net: TimedNet = field(repr=False)
+    flow: Flow = field(repr=False)
+    slack: tuple[float, ...] = field(repr=False)
+    sensitivities: tuple[Sensitivity, ...] = field(repr=False)
+    scenarios: tuple[Scenario, ...] = field(repr=False)
+    curve: WipCurve = field(repr=False)
+    measured: Comparison | None = field(repr=False)
+
+    @property
+    def bottlenecks(self) -> tuple[str, ...]:
+        """What sets the pace."""
+        return tuple(circuit.name for circuit in self.net.critical)
+
+
+def analyse(
+    timing: Timing,
+    units: int = 20,
+    wip: int | None = None,
+    asked: tuple[str, Change] | None = None,
+    record: Record | None = None,
+) -> Analysis:
+    """Analyse a laid-out factory: `units` products from the initial marking, a bound `wip` on
+    copies of each part, a change that is `asked` about, in words, and the `record` of a run to
+    compare with.
+
+    Raises InputError where `wip` is below 1 or a mode cannot reach its goal.
+    """
+    net = timed_net(timing, AS_IT_IS, wip)
+    found = flow(timing, net, units)
+    made = scenarios(timing, net, wip)
+    if asked is not None:
+        first = scenario(timing, *asked, wip)
+        made = (first, *(s for s in made if s.change != first.change))
+    return Analysis(
+        timing,
+        wip,
+        net,
+        found,
+        operation_slacks(timing, net),
+        sensitivities(timing, net, wip),
+        made,
+        wip_curve(timing),
+        compare(timing, net, found, record) if record else None,
+    )
+
+
+def operation_slacks(timing: Timing, net: TimedNet) -> tuple[float, ...]:
+    """How much longer each operation may take before it sets the pace [s]: what the tightest of the
+    circuits through it lacks."""
+    operations = timing.factory.operations
+    if net.bounds:
+        found = slacks(net.ratio, (o.place for o in operations))
+        return tuple(found[o.place].seconds for o in operations)
+    least = [inf] * len(operations)
+    for circuit in net.named:
+        for place in circuit.places:
+            if place < len(operations):
+                least[place] = min(least[place], net.slack(circuit))
+    for (robot, number), way in net.ways.items():
+        circuit = net.named[robot]
+        longer = max(net.seconds[way] - net.seconds[number], 0.0)
+        least[number] = min(least[number], net.slack(circuit) + longer)
+    return tuple(least)

@@ -1,0 +1,130 @@
+"""An analysis as one JSON document: the keys of `analyze --json`."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from typing import Any
+
+from factory.study.analysis.analysing import Analysis
+from factory.study.analysis.measured import Comparison, Pair
+
+
+def document(found: Analysis) -> dict[str, Any]:
+    """Everything, times in seconds; null for what does not apply."""
+    timing, net, flow = found.timing, found.net, found.flow
+    return {
+        "product": timing.factory.pag.root,
+        "world": timing.world,
+        "units": flow.units,
+        "seed": timing.seed,
+        "jitter": timing.jitter,
+        "wip": found.wip,
+        "cycle_time_s": net.pace,
+        "products_per_hour": 3600 / net.pace if net.pace else None,
+        "bottlenecks": list(found.bottlenecks),
+        "first_product_s": flow.first,
+        "last_product_s": flow.last,
+        "full_pace_from": flow.full_pace,
+        "settled": flow.settled,
+        "parts_inside": flow.inside,
+        "circuits": _circuits(found),
+        "operations": [
+            {"label": o.label, "operation": o.template.name, "delay_s": delay, "slack_s": slack}
+            for o, delay, slack in zip(
+                timing.factory.operations, net.seconds, found.slack, strict=False
+            )
+        ],
+        "robots": _robots(found),
+        "stocks": [
+            {
+                "label": s.label,
+                "part": s.is_part,
+                "mean": s.mean,
+                "most": s.most,
+                "stay_s": s.stay,
+            }
+            for s in flow.stocks
+        ],
+        "wip_curve": [{"wip": wip, "cycle_time_s": pace} for wip, pace in found.curve.points],
+        "least_wip": found.curve.least,
+        "scenarios": [
+            {
+                "change": s.words,
+                "cycle_time_s": s.pace,
+                "gain_s": net.pace - s.pace,
+                "bottlenecks": list(s.then),
+            }
+            for s in found.scenarios
+        ],
+        "measured": None if found.measured is None else _measured(found, found.measured),
+    }
+
+
+def _circuits(found: Analysis) -> list[dict[str, Any]]:
+    places = found.net.net.net.places
+    return [
+        {
+            "name": circuit.name,
+            "seconds": circuit.seconds,
+            "tokens": circuit.tokens,
+            "pace_s": circuit.pace,
+            "slack_s": found.net.slack(circuit),
+            "places": [places[p].name for p in circuit.places],
+        }
+        for circuit in found.net.circuits
+    ]
+
+
+def _robots(found: Analysis) -> list[dict[str, Any]]:
+    rows = []
+    for robot, share, gain in zip(
+        found.timing.factory.robots, found.flow.shares, found.sensitivities, strict=True
+    ):
+        rows.append(
+            {
+                "robot": robot.name,
+                "type": robot.type,
+                "moving_s": share.moving,
+                "working_s": share.working,
+                "standing_s": share.standing,
+                "waiting_s": share.waiting,
+                "busy": share.busy,
+                "slack_s": gain.slack,
+                "gain_10_percent_slower_s": gain.slower,
+                "gain_10_percent_faster_s": gain.faster,
+                "gain_10_percent_acceleration_s": gain.quicker,
+                "gain_10_percent_shorter_s": gain.shorter,
+                "gain_no_speed_limit_s": gain.most,
+                "enough_speed_factor": gain.enough,
+                "gain_second_robot_s": gain.copy,
+            }
+        )
+    return rows
+
+
+def _measured(found: Analysis, run: Comparison) -> dict[str, Any]:
+    return {
+        "source": run.source,
+        "units": run.units,
+        "cycle_time_s": _pair(run.cycle),
+        "first_product_s": _pair(run.first),
+        "last_product_s": _pair(run.last),
+        "durations": [
+            {
+                "label": d.label,
+                **_pair(d.time),
+                "least": d.least,
+                "greatest": d.greatest,
+                "count": d.count,
+            }
+            for d in run.durations
+        ],
+        "busy": [
+            {"robot": robot.name, **_pair(pair)}
+            for robot, pair in zip(found.timing.factory.robots, run.busy, strict=True)
+        ],
+    }
+
+
+def _pair(pair: Pair) -> dict[str, Any]:
+    return {**asdict(pair), "error": pair.error}

@@ -1,0 +1,173 @@
+"""What the firings of a timed net say: filling, work in progress, where the robots' time goes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from factory.nets.firing import Firings, Floats
+from factory.plant.factory import Operation
+from factory.study.analysis.timed import TimedNet
+from factory.study.analysis.timing import Timing
+
+
+@dataclass(frozen=True, slots=True)
+class Stock:
+    """How many copies of a label there are at once in the long run, and how long each stays [s].
+
+    A part stays from the start of the operation that takes it until it is dropped off, whatever it
+    has become a part of; any other sub-assembly from the end of the operation that makes it to that
+    of the one that takes it.
+    """
+
+    label: str
+    is_part: bool
+    mean: float
+    most: int
+    stay: float
+
+
+@dataclass(frozen=True, slots=True)
+class Share:
+    """Where a robot's time goes, in seconds of each cycle: `moving`; `working`, a dwell; `standing`
+    at its place in an operation while others move, the outfeed's tray too; `waiting` for the next
+    one. To go ahead while it waits counts as moving. Of several copies of a robot, one's."""
+
+    robot: str
+    moving: float
+    working: float
+    standing: float
+    waiting: float
+
+    @property
+    def cycle(self) -> float:
+        """All of it [s]."""
+        return self.moving + self.working + self.standing + self.waiting
+
+    @property
+    def busy(self) -> float:
+        """The share of its time that it is in an operation."""
+        return 1.0 - self.waiting / self.cycle if self.cycle else 0.0
+
+
+@dataclass(frozen=True)
+class Flow:
+    """How products come: `first` and `last`, when the first and the last of `units` products is
+    dropped off (in the engine: has left the outfeed) [s]; `full_pace`: the number of the product
+    from which on they come at the pace; `settled`: whether everything repeats itself within what
+    was looked at, else stocks are those at its end. `inside`: parts in the factory, all together.
+    """
+
+    units: int
+    first: float
+    last: float
+    full_pace: int | None
+    settled: bool
+    stocks: tuple[Stock, ...] = field(repr=False)
+    shares: tuple[Share, ...] = field(repr=False)
+    firings: Firings = field(repr=False)
+
+    @property
+    def inside(self) -> float:
+        """Parts in the factory at once, all together, on the average."""
+        return sum(stock.mean for stock in self.stocks if stock.is_part)
+
+
+def flow(timing: Timing, net: TimedNet, units: int) -> Flow:
+    """Fire the net as soon as possible, from the initial marking, for `units` products at least."""
+    found = net.firings(units)
+    products = found.dates[:, timing.factory.dropoff.end]
+    return Flow(
+        units,
+        float(products[0]) + timing.leaving,
+        float(products[units - 1]) + timing.leaving,
+        _full_pace(products, found),
+        found.settled is not None,
+        _stocks(timing, found),
+        tuple(_share(timing, net, robot) for robot in range(len(timing.factory.robots))),
+        found,
+    )
+
+
+def _full_pace(products: Floats, found: Firings) -> int | None:
+    """The product, counted from 1, after which the mean interval never leaves the pace."""
+    if found.settled is None:
+        return None
+    apart = products[found.period :] - products[: -found.period] - found.advance
+    late = np.flatnonzero(np.abs(apart) > 1e-9 * (1.0 + products[-1]))
+    return int(late[-1]) + 2 if len(late) else 1
+
+
+def _stocks(timing: Timing, found: Firings) -> tuple[Stock, ...]:
+    """Over as many whole periods as lie before the first transition runs out of firings."""
+    factory, dates = timing.factory, found.dates
+    end = float(dates[-1].min())
+    settled = 0 if found.settled is None else found.settled
+    periods = int((end - float(dates[settled].max())) / found.advance) if found.advance else 0
+    begin = end - max(1, periods) * found.advance
+    stocks = []
+    for operation in factory.operations[:-1]:
+        part = not operation.inputs
+        parent = factory.dropoff if part else factory.operations[factory.parents[operation.index]]
+        enters = dates[:, operation.start if part else operation.end]
+        leaves = dates[:, parent.end]
+        stocks.append(_stock(operation, enters, leaves, begin, end))
+    return tuple(stocks)
+
+
+def _stock(operation: Operation, enters: Floats, leaves: Floats, begin: float, end: float) -> Stock:
+    """Time averages between `begin` and `end`. Copies that are gone at the very moment at which
+    another comes are not there with it."""
+    stays = np.clip(leaves, begin, end) - np.clip(enters, begin, end)
+    instants = [(float(t), -1) for t in leaves if begin < t <= end]
+    instants += [(float(t), +1) for t in enters if begin < t <= end]
+    count = most = int(np.sum((enters <= begin) & (leaves > begin)))
+    for _, step in sorted((round(t, 9), step) for t, step in instants):
+        count += step
+        most = max(most, count)
+    counted = (enters > begin) & (enters <= end)
+    whole = (leaves - enters)[counted]
+    stay = float(whole.mean()) if len(whole) else 0.0
+    length = end - begin
+    mean = float(stays.sum()) / length if length > 0 else 0.0
+    return Stock(operation.label, not operation.inputs, mean, most, stay)
+
+
+def _share(timing: Timing, net: TimedNet, number: int) -> Share:
+    robot = timing.factory.robots[number]
+    circuit = next(c for c in net.named if c.name == robot.name)
+    moving = working = spent = 0.0
+    for index in robot.operations:
+        operation = timing.factory.operations[index]
+        moving += timing.travel(index, operation.robots.index(number))
+        working += timing.modes[index].dwell
+        way = net.ways.get((number, index), index)
+        spent += max(net.seconds[index], net.seconds[way]) - timing.settings.tick
+    cycle = net.pace * circuit.tokens
+    moving = min(moving, spent - working)
+    return Share(robot.name, moving, working, max(0.0, spent - moving - working), cycle - spent)
+
+
+def durations(timing: Timing, found: Flow) -> Floats:
+    """(units, operations): how long each operation lasts each time, from its start to its end
+    [s]."""
+    operations, dates = timing.factory.operations, found.firings.dates[: found.units]
+    ends, starts = [o.end for o in operations], [o.start for o in operations]
+    return np.asarray(dates[:, ends] - dates[:, starts] - timing.settings.tick)
+
+
+def lasting(timing: Timing, found: Flow) -> Floats:
+    """(operations,): how long each lasts on the average [s]. The first time is left out where there
+    are others: robots may come from elsewhere."""
+    each = durations(timing, found)
+    return np.asarray(each[min(1, len(each) - 1) :].mean(axis=0))
+
+
+def busy_until(timing: Timing, found: Flow) -> Sequence[float]:
+    """For each robot the share of the time until the last of the units that it is in operations:
+    what a run of so many units shows."""
+    spent = durations(timing, found).sum(axis=0)
+    robots = timing.factory.robots
+    return [float(spent[list(robot.operations)].sum()) / found.last for robot in robots]

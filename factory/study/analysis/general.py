@@ -1,0 +1,142 @@
+"""The pace of any timed marked graph, from PNML say, with a table of delays."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from collections.abc import Iterator
+from dataclasses import dataclass
+from math import isfinite
+from pathlib import Path
+
+from factory.nets.cycle_ratio import max_cycle_ratio
+from factory.nets.gears import GearNet
+from factory.nets.marked import MarkedNet, marked
+from factory.nets.slack import Slack, circuits, slacks
+from factory.study.analysis.tables import SHOWN, Table, cut
+from factory.support.errors import Diagnostic, InputError, Position, did_you_mean
+
+MOST = 1_000
+"""So many places have their own slack; of larger nets, the ones on the critical circuit."""
+
+
+@dataclass(frozen=True)
+class NetAnalysis:
+    """The cycle time of a net [s]; its `circuits`, of those that are the tightest through some
+    place with a time, the critical ones first; the `slack` of each of these places."""
+
+    net: MarkedNet
+    seconds: tuple[float, ...]
+    pace: float
+    circuits: tuple[Slack, ...]
+    slack: dict[int, Slack]
+
+
+def analyse_net(net: GearNet | MarkedNet, delays: dict[str, float], name: str) -> NetAnalysis:
+    """Analyse a net. Raises InputError (BadNet) where it has no cycle time."""
+    subject = marked(net)
+    index = subject.net.place_index
+    seconds = [0.0] * len(subject.tokens)
+    for place, delay in delays.items():
+        seconds[index[place]] = delay
+    try:
+        found = max_cycle_ratio(subject, seconds)
+    except ValueError as error:
+        hint = "`factory check` says what is wrong with it"
+        raise InputError(Diagnostic("BadNet", f"{name}: {error}", None, hint)) from error
+    timed = [p for p, delay in enumerate(seconds) if delay > 0]
+    chosen = timed if len(timed) <= MOST else [p for p in found.circuit if seconds[p] > 0]
+    critical = [*found.circuit[:1], *chosen]
+    return NetAnalysis(
+        subject,
+        tuple(seconds),
+        found.seconds,
+        circuits(found, critical),
+        slacks(found, chosen),
+    )
+
+
+def net_document(name: str, found: NetAnalysis) -> dict[str, object]:
+    """The keys of `analyze --json` for a net."""
+    places = found.net.net.places
+    return {
+        "net": name,
+        "cycle_time_s": found.pace,
+        "circuits": [
+            {
+                "seconds": sum(found.seconds[p] for p in c.circuit),
+                "tokens": sum(found.net.tokens[p] for p in c.circuit),
+                "slack_s": c.seconds,
+                "places": [places[p].name for p in c.circuit],
+            }
+            for c in found.circuits
+        ],
+        "slack_s": {places[p].name: slack.seconds for p, slack in found.slack.items()},
+    }
+
+
+def net_tables(found: NetAnalysis, verbose: bool) -> Iterator[Table]:
+    """The circuits and the places with little slack, for people."""
+    places, most = found.net.net.places, None if verbose else SHOWN
+    rows = []
+    for c in found.circuits:
+        seconds = sum(found.seconds[p] for p in c.circuit)
+        tokens = sum(found.net.tokens[p] for p in c.circuit)
+        names = " · ".join(places[p].name for p in c.circuit)
+        rows.append((f"{c.seconds:.6g}", f"{seconds:.6g}", str(tokens), names))
+    yield cut(
+        "Circuits, the critical first", ("slack [s]", "time [s]", "tokens", "places"), rows, most
+    )
+    ordered = sorted(found.slack.items(), key=lambda item: item[1].seconds)
+    slack = [(places[p].name, f"{found.seconds[p]:.6g}", f"{s.seconds:.6g}") for p, s in ordered]
+    yield cut("Places", ("place", "time [s]", "slack [s]"), slack, most)
+
+
+def read_delays(path: Path, net: GearNet | MarkedNet) -> dict[str, float]:
+    """A table of delays, TOML: `place = seconds`, a name in quotes where it has other signs than
+    letters, digits, - and _.
+
+    Raises InputError with every fault: broken TOML, an unknown place, no time.
+    """
+    try:
+        text = path.read_bytes().decode("utf-8-sig")
+        table = tomllib.loads(text)
+    except OSError as error:
+        message = f"'{path}' cannot be read: {error.strerror}"
+        raise InputError(Diagnostic("BadFile", message, None, "check the path")) from error
+    except ValueError as error:
+        raise InputError(_broken(path, str(error))) from error
+    index = marked(net).net.place_index
+    faults = []
+    for name, value in table.items():
+        where = _line(path, text, name)
+        if name not in index:
+            hint = did_you_mean(name, list(index), "places")
+            faults.append(Diagnostic("BadValue", f"the net has no place '{name}'", where, hint))
+        elif isinstance(value, bool) or not isinstance(value, int | float):
+            faults.append(Diagnostic("BadValue", f"{name} must be a number", where, EXAMPLE))
+        elif not (isfinite(value) and value >= 0):
+            message = f"{name} = {value:g} is no time"
+            faults.append(Diagnostic("BadValue", message, where, EXAMPLE))
+    if faults:
+        raise InputError(faults)
+    return {name: float(value) for name, value in table.items()}
+
+
+EXAMPLE = 'seconds, for example "p1" = 0.5'
+
+
+def _broken(path: Path, words: str) -> Diagnostic:
+    """What tomllib says, at the place it speaks of."""
+    at = re.search(r" \(at line (\d+), column (\d+)\)", words)
+    line, column = (int(at[1]), int(at[2])) if at else (1, 1)
+    words = words.replace(at[0], "") if at else words
+    position = Position(str(path), line, column)
+    return Diagnostic("Syntax", words, position, 'write lines as "p1" = 0.5')
+
+
+def _line(path: Path, text: str, name: str) -> Position:
+    for number, line in enumerate(text.splitlines(), 1):
+        if found := re.match(rf"""\s*\[*\s*["']?({re.escape(name)})\b""", line):
+            return Position(str(path), number, found.start(1) + 1, line)
+    return Position(str(path), 1, 1)

@@ -1,0 +1,115 @@
+"""A run against its prediction: durations, cycle time, utilisation."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from factory.simulation.run import Event
+from factory.study.analysis.flow import Flow, busy_until, durations, lasting
+from factory.study.analysis.timed import TimedNet
+from factory.study.analysis.timing import Timing
+
+
+@dataclass(frozen=True, slots=True)
+class Pair:
+    """A quantity as predicted and as measured, None where a run is too short to say."""
+
+    predicted: float
+    measured: float | None
+
+    @property
+    def error(self) -> float | None:
+        """Predicted less measured, as a share of what was measured."""
+        return self.predicted / self.measured - 1 if self.measured else None
+
+
+@dataclass(frozen=True, slots=True)
+class Duration:
+    """How long an operation takes from its start to its end [s]; `least` and `greatest` of what was
+    measured. The first time is left out where there are others: robots may come from elsewhere."""
+
+    label: str
+    time: Pair
+    least: float
+    greatest: float
+    count: int
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """A run of `units` products against the prediction of just that run."""
+
+    source: str
+    units: int
+    cycle: Pair
+    first: Pair
+    last: Pair
+    durations: tuple[Duration, ...] = field(repr=False)
+    busy: tuple[Pair, ...] = field(repr=False)
+
+    @property
+    def worst(self) -> Duration | None:
+        """The operation whose duration is predicted worst."""
+        known = [d for d in self.durations if d.time.error is not None]
+        return max(known, key=lambda d: abs(d.time.error or 0.0), default=None)
+
+
+@dataclass(frozen=True, slots=True)
+class Record:
+    """What a run left: its events, when each product was dropped off, its end [s]."""
+
+    source: str
+    events: tuple[Event, ...]
+    dropoffs: tuple[float, ...]
+
+
+def compare(timing: Timing, net: TimedNet, found: Flow, record: Record) -> Comparison:
+    """The record of a run from the initial marking against the flow of as many units."""
+    factory = timing.factory
+    times: dict[str, list[float]] = {}
+    for event in record.events:
+        times.setdefault(event.transition, []).append(event.t)
+    names = [transition.name for transition in factory.net.threaded.transitions]
+    first, usual = durations(timing, found)[0], lasting(timing, found)
+    compared, busy = [], [0.0] * len(factory.robots)
+    for operation in factory.operations:
+        begun = times.get(names[operation.start], [])
+        ended = times.get(names[operation.end], [])
+        spent = [end - start for start, end in zip(begun, ended, strict=False)]
+        predicted = float((usual if len(spent) > 1 else first)[operation.index])
+        compared.append(_duration(operation.label, predicted, spent))
+        for robot in operation.robots:
+            busy[robot] += sum(spent)
+    left = record.dropoffs
+    last = left[-1] if left else None
+    shares = busy_until(timing, found)
+    return Comparison(
+        record.source,
+        len(left),
+        Pair(net.pace, _interval(left)),
+        Pair(found.first, left[0] if left else None),
+        Pair(found.last, last),
+        tuple(compared),
+        tuple(Pair(p, b / last if last else None) for p, b in zip(shares, busy, strict=True)),
+    )
+
+
+def _duration(label: str, predicted: float, spent: Sequence[float]) -> Duration:
+    counted = np.array(spent[1:] if len(spent) > 1 else spent)
+    if not len(counted):
+        return Duration(label, Pair(predicted, None), 0.0, 0.0, 0)
+    mean = float(counted.mean())
+    return Duration(
+        label, Pair(predicted, mean), float(counted.min()), float(counted.max()), len(counted)
+    )
+
+
+def _interval(left: Sequence[float]) -> float | None:
+    """The mean interval over the last half of the products; None below 4."""
+    if len(left) < 4:
+        return None
+    tail = left[len(left) // 2 - 1 :]
+    return (tail[-1] - tail[0]) / (len(tail) - 1)

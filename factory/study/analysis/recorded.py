@@ -1,0 +1,77 @@
+"""Runs to compare with: how they were made, and what they left."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from factory.control.profile import World
+from factory.plant.factory import Factory
+from factory.record.log.header import settings_of
+from factory.simulation.run import Event, Run
+from factory.study.analysis.measured import Record
+from factory.support.errors import Diagnostic, InputError
+from factory.support.settings import Settings
+
+
+@dataclass(frozen=True, slots=True)
+class Conditions:
+    """How a run was made, which is what its prediction has to assume."""
+
+    settings: Settings
+    world: World
+    seed: int
+    jitter: float
+    wip: int | None
+
+
+def record_of(run: Run) -> Record:
+    """What a run on the spot left."""
+    return Record("a run on the spot", run.events, run.dropoffs)
+
+
+def logged_record(
+    source: str,
+    events: Sequence[tuple[float, str]],
+    time: NDArray[np.float64],
+    delivered: NDArray[np.int32],
+) -> Record:
+    """What a log holds; the moment of a dropoff is the first tick after it."""
+    grown = np.flatnonzero(np.diff(delivered)) + 1
+    left = tuple(time[grown].tolist())
+    return Record(source, tuple(Event(t, name) for t, name in events), left)
+
+
+def conditions(header: Mapping[str, Any]) -> Conditions:
+    """How the run in a log was made."""
+    settings, jitter = settings_of(header), float(header["jitter"])
+    return Conditions(settings, header["world"], header["seed"], jitter, header.get("wip"))
+
+
+HINT = "`factory run FILE.pag --log OUT` writes one that fits"
+
+
+def check_log(source: str, header: Mapping[str, Any], factory: Factory) -> None:
+    """The run in a log must be one of this factory, from its initial marking, with a product at the
+    least. Raises InputError (BadLog)."""
+    net = factory.net.threaded
+    names = [transition.name for transition in net.transitions]
+    if header.get("transitions") != names:
+        message = f"'{source}' is the log of another factory: other operations, or other robots"
+        raise InputError(Diagnostic("BadLog", message, None, HINT))
+    if header.get("start") != sorted(factory.net.initial_marking):
+        message = f"the run in '{source}' began in the middle (--from)"
+        raise InputError(
+            Diagnostic("BadLog", message, None, "take one that began at the beginning")
+        )
+
+
+def check_products(record: Record) -> None:
+    """A run that left no product says nothing. Raises InputError (BadLog)."""
+    if not record.dropoffs:
+        message = f"'{record.source}' has no finished product"
+        raise InputError(Diagnostic("BadLog", message, None, "take a longer run"))

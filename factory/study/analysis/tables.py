@@ -1,0 +1,194 @@
+"""An analysis as lines and tables for people."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+from factory.study.analysis.analysing import Analysis
+from factory.study.analysis.measured import Comparison, Pair
+from factory.study.analysis.what_if import listed
+
+SHOWN = 12
+"""Rows of a table; `-v` shows all."""
+
+
+ASSUMED = """\
+assumed: 2 × r are two robots that take turns at the work of one, with room for both; where none but
+such robots works, one works at a time; shorter ways are shorter in proportion, all of a robot's"""
+
+
+@dataclass(frozen=True, slots=True)
+class Table:
+    """A table with its title, ready to be printed, and what is to be said after it."""
+
+    title: str
+    columns: tuple[str, ...]
+    rows: Sequence[tuple[str, ...]]
+    note: str = ""
+
+
+def summary(found: Analysis) -> Iterator[str]:
+    """What matters most, in a few lines."""
+    flow, net, timing = found.flow, found.net, found.timing
+    does = "sets" if len(found.bottlenecks) == 1 else "set"
+    hourly = f", {3600 / net.pace:.0f} products an hour" if net.pace else ""
+    yield (
+        f"{timing.factory.pag.root}, {timing.world}: cycle time {net.pace:.3f} s{hourly}; "
+        f"{listed(list(found.bottlenecks))} {does} the pace"
+    )
+    yield f"  {critical_words(found)}"
+    if flow.full_pace is None:
+        pace = "not at the pace by then"
+    else:
+        pace = f"at the pace from product {flow.full_pace} on"
+    yield (
+        f"first product after {flow.first:.2f} s, {flow.units} after {flow.last:.2f} s, {pace}; "
+        f"{flow.inside:.1f} parts inside at once"
+    )
+    if not flow.settled:
+        yield "stocks are those of the last products looked at: the factory still fills then"
+
+
+def critical_words(found: Analysis) -> str:
+    """The first critical circuit: its operations with their times, those that wait left out."""
+    circuit, net = found.net.critical[0], found.net
+    timed = [(net.net.net.places[p], net.seconds[p]) for p in circuit.places if net.seconds[p]]
+    names = [f"{place.mode} {place.label}".strip() + f" {seconds:.3f}" for place, seconds in timed]
+    tokens = f", {circuit.tokens} products a turn" if circuit.tokens > 1 else ""
+    return f"{circuit.name}: {' · '.join(names)} = {circuit.seconds:.3f} s{tokens}"
+
+
+def tables(found: Analysis, verbose: bool) -> Iterator[Table]:
+    """The tables in the order in which they are read."""
+    most = None if verbose else SHOWN
+    yield _shares(found, most)
+    yield _gains(found, most)
+    yield _scenarios(found)
+    yield _stocks(found, most)
+    yield _curve(found)
+    if found.measured is not None:
+        yield _totals(found.measured)
+        yield _durations(found.measured, most)
+
+
+def _shares(found: Analysis, most: int | None) -> Table:
+    run = found.measured
+    columns: tuple[str, ...]
+    columns = ("robot", "type", "moving", "working", "standing", "waiting", "busy")
+    rows: list[tuple[float, tuple[str, ...]]] = []
+    for number, share in enumerate(found.flow.shares):
+        times = (share.moving, share.working, share.standing, share.waiting)
+        robot = found.timing.factory.robots[number]
+        row: tuple[str, ...]
+        row = (robot.name, robot.type, *(f"{t:.3f}" for t in times), _percent(share.busy))
+        if run is not None:
+            pair = run.busy[number]
+            row = (*row, _percent(pair.predicted), _percent(pair.measured))
+        rows.append((share.busy, row))
+    if run is not None:
+        columns = (*columns, "in that run", "measured")
+    ordered = [row for _, row in sorted(rows, key=lambda item: -item[0])]
+    return cut("Where the time of a cycle goes [s]", columns, ordered, most)
+
+
+def _gains(found: Analysis, most: int | None) -> Table:
+    rows = []
+    for s in found.sensitivities:
+        worth = max(s.faster, s.quicker, s.shorter, s.most, s.copy)
+        limit = f"{s.most:.3f}"
+        if s.enough is not None:
+            limit += f" at {s.enough:.2f} times"
+        if worth <= 0 and s.slower >= 0 and len(found.sensitivities) > SHOWN:
+            continue
+        row = (
+            s.robot,
+            f"{s.slack:.3f}",
+            *(f"{x + 0.0:.3f}" for x in (s.slower, s.faster, s.quicker, s.shorter)),
+            limit,
+            s.then if s.most > 0 else "",
+            f"{s.copy:.3f}",
+        )
+        rows.append((worth, row))
+    columns = (
+        "robot",
+        "slack",
+        "speed -10 %",
+        "speed +10 %",
+        "acceleration +10 %",
+        "ways -10 %",
+        "no speed limit",
+        "then",
+        "a second one",
+    )
+    ordered = [row for _, row in sorted(rows, key=lambda item: -item[0])]
+    return cut("What one robot alone buys: cycle time saved [s]", columns, ordered, most)
+
+
+def _scenarios(found: Analysis) -> Table:
+    pace = found.net.pace
+    rows = [
+        (s.words, f"{s.pace:.3f}", f"{pace - s.pace:.3f}", listed(list(s.then), 3))
+        for s in found.scenarios
+    ]
+    columns = ("change", "cycle time [s]", "saved [s]", "then sets the pace")
+    return Table("What if", columns, rows, ASSUMED)
+
+
+def _stocks(found: Analysis, most: int | None) -> Table:
+    ordered = sorted(found.flow.stocks, key=lambda s: (not s.is_part, -s.mean))
+    rows = [
+        (s.label, "part" if s.is_part else "", f"{s.mean:.2f}", str(s.most), f"{s.stay:.3f}")
+        for s in ordered
+    ]
+    title = "Work in progress"
+    return cut(title, ("label", "", "mean", "most", "stay [s]"), rows, most)
+
+
+def _curve(found: Analysis) -> Table:
+    least = found.curve.least
+    rows = [
+        (str(wip), f"{pace:.3f}", "the least with the full pace" if wip == least else "")
+        for wip, pace in found.curve.points
+    ]
+    return Table("Copies of each part let in (--wip)", ("W", "cycle time [s]", ""), rows)
+
+
+def _totals(run: Comparison) -> Table:
+    rows = [
+        ("cycle time [s]", *_compared(run.cycle)),
+        ("first product [s]", *_compared(run.first)),
+        (f"product {run.units} [s]", *_compared(run.last)),
+    ]
+    return Table(f"Against {run.source}", ("", "predicted", "measured", "error"), rows)
+
+
+def _durations(run: Comparison, most: int | None) -> Table:
+    ordered = sorted(run.durations, key=lambda d: -abs(d.time.error or 0.0))
+    rows = [
+        (d.label, *_compared(d.time), f"{d.least:.3f} to {d.greatest:.3f}", str(d.count))
+        for d in ordered
+    ]
+    columns = ("operation", "predicted", "measured", "error", "from and to", "times")
+    return cut("Durations of operations [s]", columns, rows, most)
+
+
+def _compared(pair: Pair) -> tuple[str, str, str]:
+    if pair.measured is None:
+        return f"{pair.predicted:.3f}", "–", ""
+    error = "" if pair.error is None else f"{100 * pair.error:+.1f} %"
+    return f"{pair.predicted:.3f}", f"{pair.measured:.3f}", error
+
+
+def cut(
+    title: str, columns: tuple[str, ...], rows: Sequence[tuple[str, ...]], most: int | None
+) -> Table:
+    """A table of so many rows, and how many more there would be."""
+    if most is None or len(rows) <= most:
+        return Table(title, columns, rows)
+    rest = (f"... {len(rows) - most} more (-v)",) + ("",) * (len(columns) - 1)
+    return Table(title, columns, [*rows[:most], rest])
+
+
+def _percent(share: float | None) -> str:
+    return "–" if share is None else f"{100 * share:.0f} %"

@@ -1,0 +1,179 @@
+"""The timed net of a factory: the compiled one, and what else holds a run up."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from math import lcm
+
+from factory.nets.cycle_ratio import CycleRatio, max_cycle_ratio
+from factory.nets.firing import Firings, settled_firings
+from factory.nets.marked import NONE, MarkedNet, marked
+from factory.nets.petri import PetriNet, Place
+from factory.nets.slack import Slack, circuits
+from factory.study.analysis.timing import AS_IT_IS, Change, Timing
+from factory.timing.pool import with_wip
+from factory.timing.ways import with_ways
+
+SAME = 1e-9
+"""Times that differ by no more than this share are equal."""
+
+LONGEST_PERIOD = 60
+
+
+@dataclass(frozen=True, slots=True)
+class Circuit:
+    """A circuit of the timed net: what it is called (a robot, `outfeed`, `station part1`, `wip
+    part1`), its time [s], its tokens, and its places in order."""
+
+    name: str
+    seconds: float
+    tokens: int
+    places: tuple[int, ...]
+
+    @property
+    def pace(self) -> float:
+        """Seconds per token: no product comes sooner after another."""
+        return self.seconds / self.tokens
+
+
+@dataclass(frozen=True)
+class TimedNet:
+    """A net with the time of each place, and those of its circuits that have a name.
+
+    Without a bound `wip` these are all its simple circuits: robots' gears, and places that go back
+    over one operation alone. With copies of a robot its gear has so many tokens, and an operation
+    that it does alone, which has one place on the floor, a place of one token back over it: one at
+    a time. The outfeed's place goes back over dropoff. Where robots go ahead while they wait, a
+    gear's slowest circuit goes by those of its `ways` (places by robot and operation) that take
+    longer than the operation. `first`: what a place takes for the first time [s], and `ready`: when
+    robots have gone ahead that set out at the beginning, where those are other times.
+    """
+
+    net: MarkedNet
+    seconds: tuple[float, ...]
+    named: tuple[Circuit, ...] = field(repr=False)
+    bounds: tuple[int, ...] = ()
+    ways: Mapping[tuple[int, int], int] = field(default_factory=dict, repr=False)
+    first: Mapping[int, float] = field(default_factory=dict, repr=False)
+    ready: Mapping[int, float] = field(default_factory=dict, repr=False)
+
+    @cached_property
+    def ratio(self) -> CycleRatio:
+        """The maximum cycle ratio with its proof."""
+        return max_cycle_ratio(self.net, self.seconds)
+
+    @cached_property
+    def pace(self) -> float:
+        """The cycle time in the long run [s]."""
+        return self.ratio.seconds if self.bounds else max(c.pace for c in self.named)
+
+    @cached_property
+    def circuits(self) -> tuple[Circuit, ...]:
+        """Those with a name and the tightest through each bound, the slowest first."""
+        found = [self._bounded(slack) for slack in self._tightest]
+        return tuple(sorted((*self.named, *found), key=lambda c: -c.pace))
+
+    @cached_property
+    def critical(self) -> tuple[Circuit, ...]:
+        """The circuits that set the pace."""
+        return tuple(c for c in self.circuits if c.pace >= self.pace * (1 - SAME))
+
+    @cached_property
+    def _tightest(self) -> tuple[Slack, ...]:
+        return circuits(self.ratio, self.bounds) if self.bounds else ()
+
+    def _bounded(self, slack: Slack) -> Circuit:
+        tokens = sum(self.net.tokens[p] for p in slack.circuit)
+        names = [self.net.net.places[p].name for p in slack.circuit if p in self.bounds]
+        seconds = sum(self.seconds[p] for p in slack.circuit)
+        return Circuit(" ".join(names).replace(":", " "), seconds, tokens, slack.circuit)
+
+    def slack(self, circuit: Circuit) -> float:
+        """How much longer a circuit may take before it sets the pace [s]; for a robot's gear, how
+        long it waits in a cycle."""
+        found = self.pace * circuit.tokens - circuit.seconds
+        return found if found > SAME * self.pace else 0.0
+
+    def firings(self, units: int) -> Firings:
+        """As soon as possible, from the initial marking, `units` of them at least."""
+        period = lcm(*(c.tokens for c in self.critical))
+        period = min(period, LONGEST_PERIOD)
+        return settled_firings(
+            self.net, self.seconds, self.pace, period, units, self.first, self.ready
+        )
+
+
+def timed_net(timing: Timing, change: Change = AS_IT_IS, wip: int | None = None) -> TimedNet:
+    """The timed net of a factory with a change of its robots and a bound on copies of each part.
+
+    Raises InputError (BadValue) where `wip` is below 1.
+    """
+    factory = timing.factory
+    subject = marked(factory.net) if wip is None else with_wip(factory, wip)
+    bounds = tuple(range(len(factory.net.threaded.places), len(subject.tokens)))
+    tokens = list(subject.tokens)
+    for robot, copies in change.copies.items():
+        tokens[factory.net.initial[robot]] += copies - 1
+    went = timing.ways(change)
+    ways = dict(zip(went, range(len(tokens), len(tokens) + len(went)), strict=True))
+    seconds = [*timing.changed(change)]
+    seconds += [*[0.0] * (len(tokens) - len(seconds)), *went.values()]
+    moving = with_ways(replace(subject, tokens=tuple(tokens)), factory, ways)
+    tokens, places = list(moving.tokens), list(moving.net.places)
+    back = [(f"station {factory.operations[n].label}", n, 0.0) for n in _alone(timing, change)]
+    if timing.outfeed:
+        back.append(("outfeed", factory.dropoff.index, timing.outfeed))
+    named = _gears(timing, seconds, tokens, ways)
+    for name, number, delay in back:
+        operation = factory.operations[number]
+        place = Place(name, (operation.end,), (operation.start,), "wait", operation.label)
+        named.append(Circuit(name, delay + seconds[number], 1, (operation.place, len(places))))
+        places.append(place)
+        tokens.append(1)
+        seconds.append(delay)
+    net = replace(
+        subject,
+        net=PetriNet(subject.net.transitions, tuple(places)),
+        tokens=tuple(tokens),
+        slots=(),
+    )
+    ready = {ways[key]: taken for key, taken in timing.first_ways.items()}
+    return TimedNet(net, tuple(seconds), tuple(named), bounds, ways, timing.first, ready)
+
+
+def _gears(
+    timing: Timing,
+    seconds: Sequence[float],
+    tokens: Sequence[int],
+    ways: Mapping[tuple[int, int], int],
+) -> list[Circuit]:
+    """The slowest circuit in each gear."""
+    found = []
+    for robot, gear in zip(timing.factory.robots, timing.factory.net.gears, strict=True):
+        slowest = list(gear.places)
+        for step, number in enumerate(robot.operations):
+            way = ways.get((robot.index, number), number)
+            if seconds[way] > seconds[number]:
+                slowest[2 * step], slowest[2 * step + 1] = way, NONE
+        places = tuple(p for p in slowest if p != NONE)
+        found.append(
+            Circuit(
+                gear.robot, sum(seconds[p] for p in places), sum(tokens[p] for p in places), places
+            )
+        )
+    return found
+
+
+def _alone(timing: Timing, change: Change) -> list[int]:
+    """The operations, other than dropoff in the engine, that robots with copies do alone."""
+    factory = timing.factory
+    numbers = dict.fromkeys(n for robot in change.copies for n in factory.robots[robot].operations)
+    outfed = timing.outfeed > 0
+    return [
+        n
+        for n in numbers
+        if all(r in change.copies for r in factory.operations[n].robots)
+        and not (outfed and n == factory.dropoff.index)
+    ]

@@ -1,0 +1,199 @@
+"""The delays of a factory's operations, and what they become when robots change."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from types import MappingProxyType
+
+import numpy as np
+
+from factory.control.mode import Array, Limits, Mode
+from factory.control.profile import World, ideal_time, mode_time, trapezoid_time
+from factory.layout.layout import Layout
+from factory.modes.modes import operation_modes, operation_starts, robot_limits
+from factory.modes.staging import Stage, staged, stages_of
+from factory.plant.factory import Factory
+from factory.simulation.simulation import start_positions
+from factory.support.settings import Settings
+from factory.timing.prediction import way_time
+
+AT_ONCE = 1e6
+"""A factor on a speed that leaves only the acceleration as a bound."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Change:
+    """What is different of some robots (index): factors on their `speed`, their `acceleration` and
+    the length of each of their ways (`way`), and how many robots share the work of one
+    (`copies`)."""
+
+    speed: Mapping[int, float] = field(default_factory=dict)
+    acceleration: Mapping[int, float] = field(default_factory=dict)
+    way: Mapping[int, float] = field(default_factory=dict)
+    copies: Mapping[int, int] = field(default_factory=dict)
+
+
+AS_IT_IS = Change()
+
+
+@dataclass(frozen=True)
+class Timing:
+    """What delays follow from: the modes of a layout, where each starts, and the robots' limits.
+
+    Speeds are those of `seed` and `jitter`, as in a run. Raises InputError where a mode cannot
+    reach its goal.
+    """
+
+    layout: Layout
+    settings: Settings = Settings()  # noqa: RUF009
+    world: World = "mujoco"
+    seed: int = 0
+    jitter: float = 0.0
+
+    @property
+    def factory(self) -> Factory:
+        """The factory that is laid out."""
+        return self.layout.factory
+
+    @cached_property
+    def modes(self) -> Sequence[Mode]:
+        """The mode of each operation."""
+        return operation_modes(self.layout, self.settings.eps)
+
+    @cached_property
+    def limits(self) -> Limits:
+        """The limits of each axis."""
+        return robot_limits(self.layout, self.settings, self.seed, self.jitter)[0]
+
+    @cached_property
+    def stages(self) -> tuple[Stage, ...]:
+        """The ways that robots go ahead of operations while they wait, if they are to."""
+        return stages_of(self.layout, self.modes, self.settings)
+
+    @cached_property
+    def left(self) -> list[Array]:
+        """Where the axes of each operation were left by the ones before, in the long run."""
+        return operation_starts(self.layout)
+
+    @cached_property
+    def starts(self) -> list[Array]:
+        """Where the axes of each operation are when it starts, in the long run, if those that go
+        ahead are there by then."""
+        return staged(self.left, self.stages)
+
+    def ways(self, change: Change = AS_IT_IS) -> dict[tuple[int, int], float]:
+        """What a robot (index) takes [s] to go ahead to an operation."""
+        return {
+            (stage.robot, stage.operation): self._way(stage, stage.start, change)
+            for stage in self.stages
+        }
+
+    @cached_property
+    def first_ways(self) -> Mapping[tuple[int, int], float]:
+        """The same from where robots stand at the beginning, for those that set out then [s]."""
+        positions = start_positions(self.layout, self.factory.net.initial_marking)
+        return MappingProxyType(
+            {
+                (stage.robot, stage.operation): self._way(stage, positions[stage.robot], AS_IT_IS)
+                for stage in self.stages
+                if self.factory.robots[stage.robot].operations[0] == stage.operation
+            }
+        )
+
+    def _way(self, stage: Stage, start: float, change: Change) -> float:
+        start = stage.goal + (start - stage.goal) * change.way.get(stage.robot, 1.0)
+        own = (stage.robot,)
+        return way_time(stage, start, self._limits(own, own, change), self.settings, self.world)
+
+    def _limits(self, axes: Sequence[int], robots: Sequence[int], change: Change) -> Limits:
+        """The limits of axes, which are those of robots, with a change."""
+        limits = self.limits.of(axes)
+        if (change.speed.keys() | change.acceleration.keys()).isdisjoint(robots):
+            return limits
+        speed = [change.speed.get(robot, 1.0) for robot in robots]
+        gain = [change.acceleration.get(robot, 1.0) for robot in robots]
+        return Limits(limits.speed * speed, limits.acceleration * gain)
+
+    @cached_property
+    def rest(self) -> float:
+        """What an operation takes in which nobody moves and nothing dwells: the tick until what
+        follows can fire, and in the engine the time to settle [s]."""
+        settle = self.settings.settle if self.world == "mujoco" else 0.0
+        return settle + self.settings.tick
+
+    @cached_property
+    def delays(self) -> tuple[float, ...]:
+        """The delay of every operation [s], as `factory.timing.prediction` has it."""
+        return tuple(self.delay(number) for number in range(len(self.modes)))
+
+    def delay(self, number: int, change: Change = AS_IT_IS) -> float:
+        """The delay of one operation [s]."""
+        return self._delay(number, self.starts[number], change)
+
+    def changed(self, change: Change) -> tuple[float, ...]:
+        """The delay of every operation with a change [s]."""
+        delays = list(self.delays)
+        robots = [
+            self.factory.robots[robot]
+            for robot in {*change.speed, *change.acceleration, *change.way}
+        ]
+        for number in {number for robot in robots for number in robot.operations}:
+            delays[number] = self.delay(number, change)
+        return tuple(delays)
+
+    @cached_property
+    def first(self) -> Mapping[int, float]:
+        """The delays of operations that take another time when first done [s]: the robots stand at
+        their B ends then."""
+        positions = start_positions(self.layout, self.factory.net.initial_marking)
+        begins = [
+            [self.factory.robots[r].operations[0] == o.index for r in self._of(o.index)]
+            for o in self.factory.operations
+        ]
+        here = (positions[list(axes)] for axes in self.factory.axes)
+        starts = staged([*map(np.where, begins, here, self.left)], self.stages)
+        return MappingProxyType(
+            {n: self._delay(n, start, AS_IT_IS) for n, start in enumerate(starts) if any(begins[n])}
+        )
+
+    def travel(self, number: int, slot: int) -> float:
+        """How long one robot moves in an operation, if it need not wait on its way [s]."""
+        mode = self.modes[number]
+        axis = self.factory.axes[number][slot]
+        v, a = float(self.limits.speed[axis]), float(self.limits.acceleration[axis])
+        way = 0.0 if mode.is_still else abs(float(self.left[number][slot] - mode.goals[slot]))
+        if self.world == "mujoco":
+            return float(trapezoid_time(way, v, a))
+        return max(0.0, float(ideal_time(way, v, a) - ideal_time(mode.eps, v, a)))
+
+    @cached_property
+    def outfeed(self) -> float:
+        """How long the outfeed's tray is away after a dropoff [s]; 0 in the ideal world."""
+        if self.world == "ideal":
+            return 0.0
+        return 2 * self.leaving
+
+    @cached_property
+    def leaving(self) -> float:
+        """How long a product takes from its dropoff until it counts [s]; 0 in the ideal world."""
+        if self.world == "ideal":
+            return 0.0
+        speed, gain = self.settings.outfeed, self.settings.outfeed_acceleration
+        return float(trapezoid_time(self.layout.outfeed_way, speed, gain)) + self.settings.tick
+
+    def _of(self, number: int) -> tuple[int, ...]:
+        """The robot of each axis of an operation."""
+        count, lifts = len(self.factory.robots), self.layout.lifts
+        return tuple(a if a < count else lifts[a - count] for a in self.factory.axes[number])
+
+    def _delay(self, number: int, start: Array, change: Change) -> float:
+        mode, robots = self.modes[number], self._of(number)
+        limits = self._limits(self.factory.axes[number], robots, change)
+        if not change.way.keys().isdisjoint(robots):
+            carriages = len(self.factory.operations[number].robots)
+            shares = [change.way.get(robot, 1.0) for robot in robots[:carriages]]
+            factor = np.array(shares + [1.0] * (len(robots) - carriages))
+            start = mode.goals + (start - mode.goals) * factor
+        return mode_time(mode, start, limits, self.world) + self.rest

@@ -1,0 +1,28 @@
+"""How faithful is the physics? Ideal and MuJoCo runs over the same seeds, figure by figure.
+
+    >>> from factory.study.fidelity import QUANTITIES
+    >>> QUANTITIES["handoff_gap_max_mm"].unit
+    'mm'
+
+`measure(layout, ...)` gives a `Fidelity`; `measure_seed` one seed of it; `study` the convergence
+over timestep and weld stiffness. The definitions of all figures are in `quantities`.
+"""
+
+from factory.study.fidelity.comparing import measure, measure_seed
+from factory.study.fidelity.convergence import Study, study
+from factory.study.fidelity.quantities import QUANTITIES, Quantity
+from factory.study.fidelity.record import Approach, Fidelity, HandOff, Misplaced, SeedRecord
+
+__all__ = [
+    "QUANTITIES",
+    "Approach",
+    "Fidelity",
+    "HandOff",
+    "Misplaced",
+    "Quantity",
+    "SeedRecord",
+    "Study",
+    "measure",
+    "measure_seed",
+    "study",
+]

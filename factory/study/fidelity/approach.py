@@ -1,0 +1,130 @@
+"""How near bodies come that are not meant to touch, against the distance certified for them.
+
+Left out is what is meant to be near: a part and what holds it, parts held by one body, parts whose
+robots are in one and the same active operation, robots on the floor, and the output robot at the
+outfeed that it serves.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from factory.control.mode import Array, Index, Truth
+from factory.layout.clearance import certify
+from factory.layout.layout import Layout
+from factory.mjcf import names
+from factory.study.fidelity.record import Approach
+from factory.study.fidelity.shadow import Shadow
+from factory.study.fidelity.welds import Welds
+
+ROBOT, PART, FEEDER, OUTFEED, NONE = range(5)
+KINDS = ("robot", "part", "feeder", "outfeed")
+
+BEYOND = 2e-3
+"""Distances are measured up to this much more than the clearance [m]."""
+
+
+def certified(layout: Layout) -> Array:
+    """The distance certified for two bodies by their kinds (4, 4) [m]: the clearance in plan or,
+    where layers may lie upon each other, the gap between those if that is less."""
+    certificate = layout.certificate or certify(layout)
+    gaps, c = dict(certificate.gaps), certificate.clearance
+    found = np.full((4, 4), c)
+    found[ROBOT, ROBOT] = min(c, gaps.get("carriages to arms", c))
+    found[ROBOT, PART] = min(c, gaps.get("masts and arms to payloads", c))
+    found[OUTFEED, PART] = min(c, gaps.get("outfeed to payloads", c))
+    return np.asarray(np.minimum(found, found.T))
+
+
+class Approaches:
+    """The least distance for each pair of kinds, with the names of the two bodies."""
+
+    def __init__(self, world: Any, layout: Layout, welds: Welds, shadow: Shadow) -> None:
+        m = world.m
+        self.m, self.welds, self.shadow = m, welds, shadow
+        self.certified = certified(layout)
+        words = [m.body(i).name for i in range(m.nbody)]
+        kinds = [names.kind(word) for word in words]
+        self.kind = np.array([KINDS.index(k) if k in KINDS else NONE for k in kinds])
+        self.robot = _robots(words, [r.name for r in layout.factory.robots])
+        self.operation = np.full(len(layout.factory.robots) + 1, -1)
+        self.operations = layout.factory.operations
+        self.least = np.full((5, 5), np.inf)
+        self.least[NONE] = self.least[:, NONE] = -np.inf
+        self.who: dict[tuple[int, int], tuple[str, str]] = {}
+        self._coupled: tuple[int, ...] | None = None
+
+    def tick(self, active: tuple[int, ...]) -> None:
+        """Look at the present configuration, while the operations `active` are under way."""
+        self.shadow.collide()
+        d = self.shadow.d
+        if not d.ncon:
+            return
+        pairs, dist = self.m.geom_bodyid[d.contact.geom], d.contact.dist
+        kinds = self.kind[pairs]
+        nearer = np.flatnonzero(dist < self.least[kinds[:, 0], kinds[:, 1]])
+        if not len(nearer):
+            return
+        if active != self._coupled:
+            self._couple(active)
+        pairs, dist = pairs[nearer], dist[nearer]
+        kept = np.logical_not(self._meant(*pairs.T))
+        if kept.any():
+            self._keep(pairs[kept], dist[kept])
+
+    def _couple(self, active: tuple[int, ...]) -> None:
+        """Note which robot is in which operation."""
+        self._coupled = active
+        self.operation[:] = -1
+        for number in active:
+            self.operation[list(self.operations[number].robots)] = number
+
+    def _meant(self, a: Index, b: Index) -> Truth:
+        """Whether bodies (n,) and (n,) are meant to be near each other."""
+        root = self.m.body_rootid
+        hold_a, hold_b = self.welds.holder[a], self.welds.holder[b]
+        held = (hold_a >= 0) & (root[hold_a] == root[b]) | (hold_b >= 0) & (root[hold_b] == root[a])
+        both = (hold_a >= 0) & (hold_b >= 0)
+        together = both & (root[hold_a] == root[hold_b])
+        one, other = self.operation[self.robot[hold_a]], self.operation[self.robot[hold_b]]
+        joining = both & (one >= 0) & (one == other)
+        kinds = self.kind[a] + self.kind[b]
+        serving = (kinds == ROBOT + OUTFEED) & (np.minimum(self.robot[a], self.robot[b]) == 0)
+        serving &= (self.kind[a] == OUTFEED) | (self.kind[b] == OUTFEED)
+        return np.asarray(held | together | joining | serving)
+
+    def _keep(self, pairs: Index, dist: Array) -> None:
+        for nearest in np.argsort(-dist):  # the nearest of a kind comes last, and stays
+            a, b = sorted(pairs[nearest], key=lambda body: int(self.kind[body]))
+            i, j = int(self.kind[a]), int(self.kind[b])
+            self.least[i, j] = self.least[j, i] = dist[nearest]
+            self.who[i, j] = (self.m.body(int(a)).name, self.m.body(int(b)).name)
+
+    def found(self) -> tuple[Approach, ...]:
+        """All kinds of pairs that have come within the detection distance."""
+        return tuple(
+            Approach(
+                f"{KINDS[i]} - {KINDS[j]}",
+                1e3 * float(self.certified[i, j]),
+                1e3 * float(self.least[i, j]),
+                self.who[i, j],
+            )
+            for i, j in sorted(self.who)
+        )
+
+    def closest(self) -> float:
+        """The least distance of all but those to the outfeed's table [m]."""
+        return min(self.shadow.reach, float(self.least[:OUTFEED, :OUTFEED].min()))
+
+    def margin(self) -> float:
+        """The least of the distances less what is certified for them [m]."""
+        found = np.minimum(self.least[:NONE, :NONE], self.shadow.reach) - self.certified
+        return float(found[np.triu_indices(4)].min())
+
+
+def _robots(bodies: list[str], robots: list[str]) -> Index:
+    """The number of the robot that a body belongs to; the last, one too many, for no robot."""
+    number = {name: i for i, name in enumerate(robots)}
+    return np.array([number.get(name.partition("/")[0], len(robots)) for name in bodies])

@@ -1,0 +1,117 @@
+"""Two records of one net compared: what caused what, which order, and when.
+
+The n-th firing of a transition in one record stands for the n-th in the other. A firing's immediate
+causes are the firings that made the tokens it takes; what is not before it through causes, nor
+after it, is causally unrelated to it and may come in any order.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from factory.control.mode import Array, Truth
+from factory.nets.gears import GearNet
+from factory.nets.petri import Marking
+from factory.simulation.run import Event
+
+Firing = tuple[str, int]
+"""A transition's name and which of its firings."""
+
+MOST = 6000
+"""So many firings are compared pair by pair; of longer records the first."""
+
+
+@dataclass(frozen=True, slots=True)
+class Process:
+    """A record as a partial order: its firings with their times [s] and immediate causes."""
+
+    times: dict[Firing, float]
+    causes: dict[Firing, frozenset[Firing]]
+
+
+@dataclass(frozen=True, slots=True)
+class Orders:
+    """How two records relate: `swapped` of `unrelated` pairs that are causally unrelated and apart
+    in time in both; how many firings' `causes` differ."""
+
+    swapped: int
+    unrelated: int
+    causes: int
+
+    @property
+    def percent(self) -> float:
+        """Share of the unrelated pairs that are swapped [%]."""
+        return 100.0 * self.swapped / self.unrelated if self.unrelated else 0.0
+
+
+def process(net: GearNet, events: Iterable[Event], start: Marking | None = None) -> Process:
+    """The token game of a legal record, each token knowing the firing that made it."""
+    marking = net.initial_marking if start is None else start
+    threaded = net.threaded.net
+    number = {t.name: i for i, t in enumerate(net.threaded.transitions)}
+    made: dict[int, Firing | None] = dict.fromkeys(marking)
+    count: dict[str, int] = {}
+    times: dict[Firing, float] = {}
+    causes: dict[Firing, frozenset[Firing]] = {}
+    for event in events:
+        name = event.transition
+        count[name] = count.get(name, 0) + 1
+        firing, index = (name, count[name]), number[name]
+        taken = [made.pop(place, None) for place in threaded.preset[index]]
+        causes[firing] = frozenset(cause for cause in taken if cause is not None)
+        times[firing] = event.t
+        made.update(dict.fromkeys(threaded.postset[index], firing))
+    return Process(times, causes)
+
+
+def compare(one: Process, other: Process) -> Orders:
+    """Order and causes of two records, on the firings that both have."""
+    shared = [firing for firing in one.times if firing in other.times]
+    differing = sum(one.causes[f] != other.causes[f] for f in shared)
+    chosen = shared[:MOST]
+    related: Truth = _related(chosen, one)
+    first, second = _signs(chosen, one), _signs(chosen, other)
+    apart = (first != 0) & (second != 0) & ~related
+    upper = np.triu(apart, 1)
+    return Orders(int((upper & (first != second)).sum()), int(upper.sum()), differing)
+
+
+def differences(one: Process, other: Process) -> Array:
+    """Time in `other` less time in `one` of every firing that both have [s]."""
+    shared = [firing for firing in one.times if firing in other.times]
+    return np.array([other.times[f] - one.times[f] for f in shared])
+
+
+def durations(record: Process) -> dict[Firing, float]:
+    """X_e - X_s [s] by the end's firing, where both are in the record."""
+    found = {}
+    for (name, n), time in record.times.items():
+        begun = record.times.get((f"{name[:-2]}_s", n)) if name.endswith("_e") else None
+        if begun is not None:
+            found[name, n] = time - begun
+    return found
+
+
+def duration_differences(one: Process, other: Process) -> Array:
+    """Duration in `other` less that in `one`, of every operation that both have [s]."""
+    first, second = durations(one), durations(other)
+    return np.array([second[f] - first[f] for f in first if f in second])
+
+
+def _related(firings: Sequence[Firing], record: Process) -> Truth:
+    """Whether one of two firings is before the other through causes (n, n)."""
+    place = {firing: i for i, firing in enumerate(firings)}
+    before = np.zeros((len(firings), len(firings)), bool)
+    for i, firing in enumerate(firings):
+        causes = [place[cause] for cause in record.causes[firing] if cause in place]
+        before[i, causes] = True
+        before[i] |= before[causes].any(axis=0)
+    return np.logical_or(before, before.T)
+
+
+def _signs(firings: Sequence[Firing], record: Process) -> Array:
+    times = np.array([record.times[firing] for firing in firings])
+    return np.asarray(np.sign(times[:, None] - times[None, :]))

@@ -1,0 +1,185 @@
+"""Run both worlds over the same seeds and compare them; seeds may go over processes."""
+
+from __future__ import annotations
+
+import signal
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from dataclasses import dataclass, field, replace
+from multiprocessing import active_children, get_context
+from time import perf_counter
+
+import numpy as np
+
+from factory.control.mode import Array
+from factory.layout.layout import Layout
+from factory.mjcf.model import product_name
+from factory.simulation.run import Run
+from factory.simulation.simulation import Simulation
+from factory.study.analysis.steady import steady_units
+from factory.study.analysis.timing import Timing
+from factory.study.fidelity.causality import compare, differences, duration_differences, process
+from factory.study.fidelity.measuring import Measurement
+from factory.study.fidelity.quantities import QUANTITIES
+from factory.study.fidelity.record import Fidelity, SeedRecord
+from factory.support.engine import mujoco
+from factory.support.pickling import pickle_locked_mappings
+from factory.support.settings import Settings
+
+Alter = Callable[[mujoco.MjModel], None]
+"""Changes the engine's model before the run: a softer weld, a planted fault."""
+
+
+pickle_locked_mappings()  # of which layouts are full
+
+
+@dataclass(frozen=True)
+class Case:
+    """What is run: a layout, how many units, and the draws; `alter` must be a plain function of a
+    module where processes share the work. Without `units` each seed makes as many as it takes to
+    show its cycle time, by its net."""
+
+    layout: Layout
+    units: int | None = None
+    jitter: float = 0.3
+    settings: Settings = field(default_factory=Settings)
+    max_time: float | None = None
+    alter: Alter | None = None
+
+
+def measure(
+    layout: Layout,
+    seeds: Sequence[int] = range(5),
+    units: int | None = None,
+    jitter: float = 0.3,
+    settings: Settings | None = None,
+    jobs: int = 1,
+    done: Callable[[int], None] | None = None,
+    max_time: float | None = None,
+) -> Fidelity:
+    """Compare the worlds over `seeds`. With `jobs` > 1 the seeds go over as many processes (a
+    script then needs its `if __name__ == "__main__"`); the figures are the same. `done` hears of
+    every seed that is finished."""
+    case = Case(layout, units, jitter, settings or Settings(), max_time)
+    records = over_cases([(case, seed) for seed in seeds], jobs, done)
+    factory = layout.factory
+    return Fidelity(product_name(factory), len(factory.robots), jitter, tuple(records))
+
+
+def over_cases(
+    work: Sequence[tuple[Case, int]],
+    jobs: int = 1,
+    done: Callable[[int], None] | None = None,
+) -> list[SeedRecord]:
+    """`measure_seed` of every case and seed, in their order."""
+    found: dict[int, SeedRecord] = {}
+    for number, record in _worked(work, jobs):
+        found[number] = record
+        if done is not None:
+            done(len(found))
+    return [found[number] for number in range(len(work))]
+
+
+def _worked(work: Sequence[tuple[Case, int]], jobs: int) -> Iterator[tuple[int, SeedRecord]]:
+    if min(jobs, len(work)) <= 1:
+        for number, (case, seed) in enumerate(work):
+            yield number, measure_seed(case, seed)
+        return
+    others = set(active_children())
+    pool = ProcessPoolExecutor(min(jobs, len(work)), get_context("spawn"), _end_quietly)
+    try:
+        futures = {pool.submit(measure_seed, *item): i for i, item in enumerate(work)}
+        for future in as_completed(futures):
+            yield futures[future], future.result()
+    except BaseException:
+        for child in set(active_children()) - others:
+            child.terminate()
+        raise
+    finally:
+        pool.shutdown(cancel_futures=True)
+
+
+def _end_quietly() -> None:
+    """Let an interruption end a worker without a word."""
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
+
+
+def measure_seed(case: Case, seed: int) -> SeedRecord:
+    """One seed in both worlds."""
+    layout = case.layout
+    units = case.units or steady_units(Timing(layout, case.settings, "mujoco", seed, case.jitter))
+    ideal = Simulation(layout, "ideal", units, seed, case.jitter, case.settings)
+    physical = Simulation(layout, "mujoco", units, seed, case.jitter, case.settings)
+    if case.alter is not None:
+        case.alter(physical.world.m)
+    measurement = Measurement(physical)
+    begin = perf_counter()
+    thought, run = ideal.run(max_time=case.max_time), measurement.run(case.max_time)
+    record = _compared(layout, thought, run)
+    handoffs, misplaced = measurement.handoffs.all(), measurement.finished.found()
+    figures = {**record.figures, **measurement.figures()}
+    return replace(
+        record,
+        seed=seed,
+        figures={key: figures.get(key) for key in QUANTITIES},
+        handoffs=handoffs,
+        misplaced=misplaced,
+        approaches=measurement.approaches.found(),
+        run_s=perf_counter() - begin - measurement.seconds,
+        measuring_s=measurement.seconds,
+    )
+
+
+def _compared(layout: Layout, ideal: Run, run: Run) -> SeedRecord:
+    """The figures that need both runs."""
+    net = layout.factory.net
+    illegal = (not ideal.refines_net) + (not run.refines_net)
+    physics = run.physics
+    figures: dict[str, float | None] = {
+        "illegal_records": illegal,
+        "monitor_violations": len(run.monitor.violations) if run.monitor else None,
+        "cycle_time_s": run.cycle_time_s,
+        "ideal_cycle_time_s": ideal.cycle_time_s,
+        "cycle_from_ideal_percent": _over(run.cycle_time_s, ideal.cycle_time_s),
+        "cycle_from_predicted_percent": _over(run.cycle_time_s, run.predicted_cycle_time_s),
+    }
+    apart = spent = np.empty(0)
+    if not illegal:
+        one, other = process(net, ideal.events), process(net, run.events)
+        orders = compare(one, other)
+        apart, spent = differences(one, other), duration_differences(one, other)
+        cycle = ideal.cycle_time_s or ideal.predicted_cycle_time_s
+        figures |= {
+            "orders_swapped_percent": orders.percent,
+            "causes_differing": orders.causes,
+            **_distances(apart, spent, cycle),
+        }
+    return SeedRecord(
+        run.seed,
+        run.units,
+        figures,
+        differences=tuple(np.round(apart, 9).tolist()),
+        durations=tuple(np.round(spent, 9).tolist()),
+        contacts=physics.contacts if physics else (),
+        trouble=tuple(t for t in (ideal.trouble, run.trouble) if t is not None),
+    )
+
+
+def _distances(apart: Array, spent: Array, cycle: float | None) -> dict[str, float | None]:
+    """How far firing times and durations [s] are apart; `cycle` is the ideal cycle time."""
+    if not len(apart) or not len(spent):
+        return {}
+    mean, most = float(np.abs(apart).mean()), float(np.abs(apart).max())
+    return {
+        "firing_difference_mean_s": mean,
+        "firing_difference_max_s": most,
+        "firing_difference_mean_percent": 100 * mean / cycle if cycle else None,
+        "firing_difference_max_percent": 100 * most / cycle if cycle else None,
+        "duration_difference_mean_s": float(spent.mean()),
+        "duration_difference_max_s": float(spent[np.abs(spent).argmax()]),
+    }
+
+
+def _over(value: float | None, reference: float | None) -> float | None:
+    """How much larger a value is than a reference [%]."""
+    return None if value is None or not reference else 100 * (value / reference - 1)

@@ -1,0 +1,167 @@
+"""Do the figures converge? The same run with other timesteps, and with other weld stiffnesses."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+from factory.study.fidelity.comparing import Case, over_cases
+from factory.study.fidelity.quantities import QUANTITIES
+from factory.study.fidelity.record import Figures, SeedRecord
+from factory.support.engine import mujoco
+
+TIMESTEPS = (2.0, 1.0, 0.5, 0.25)
+"""Factors on the timestep, the finest last."""
+
+STIFFNESSES = (2.0, 1.0, 0.5)
+"""Factors on the time constant of the welds, the stiffest last. All at half the timestep: a time
+constant below two timesteps is raised to those by the engine."""
+
+RELATIVE = 0.05
+"""A figure has converged where its last change is at most this share of its last value..."""
+
+ABSOLUTE = {
+    "%": 0.1,
+    "s": 0.002,
+    "mm": 0.002,
+    "mm/s": 0.2,
+    "mN s": 0.05,
+    "mJ/kg": 0.002,
+    "deg": 0.002,
+    "m/s^2": 0.05,
+    "m/s^3": 5.0,
+    "J": 1e-3,
+    "kg": 1e-9,
+}
+"""... or at most this, by its unit: what nobody would notice. Counts must not change."""
+
+
+@dataclass(frozen=True, slots=True)
+class Softened:
+    """Multiplies the time constant of all welds; may be sent to another process."""
+
+    factor: float
+
+    def __call__(self, m: mujoco.MjModel) -> None:
+        m.eq_solref[:, 0] *= self.factor
+
+
+@dataclass(frozen=True)
+class Series:
+    """One run with several values of one setting, the finest last."""
+
+    setting: str
+    factors: tuple[float, ...]
+    figures: tuple[Figures, ...]
+    troubled: tuple[bool, ...]
+
+    def change(self, key: str) -> float | None:
+        """How much a figure changed between the two finest settings."""
+        one, other = (figures.get(key) for figures in self.figures[-2:])
+        return None if one is None or other is None else other - one
+
+    def converged(self, key: str) -> bool:
+        """Whether a figure's last change is small; one that is not there does not change."""
+        change = self.change(key)
+        if change is None:
+            values = [figures.get(key) for figures in self.figures[-2:]]
+            return values[0] is values[1] is None
+        last = self.figures[-1][key] or 0.0
+        return abs(change) <= max(RELATIVE * abs(last), ABSOLUTE.get(QUANTITIES[key].unit, 0.0))
+
+    def shrinking(self, key: str) -> bool | None:
+        """Whether the last change of a figure is smaller than the one before; None where there are
+        no two changes."""
+        values = [figures.get(key) for figures in self.figures[-3:]]
+        known = [value for value in values if value is not None]
+        if len(known) < 3:
+            return None
+        return abs(known[2] - known[1]) < abs(known[1] - known[0])
+
+    def noticeable(self, key: str) -> bool:
+        """Whether a figure is anywhere more than what nobody would notice."""
+        least = ABSOLUTE.get(QUANTITIES[key].unit, 0.0)
+        return any(abs(figures.get(key) or 0.0) > least for figures in self.figures)
+
+    def as_json(self) -> dict[str, Any]:
+        """The series as the report lists it."""
+        return {
+            "setting": self.setting,
+            "factors": list(self.factors),
+            "troubled": list(self.troubled),
+            "figures": {
+                key: {
+                    "values": [figures.get(key) for figures in self.figures],
+                    "change": self.change(key),
+                    "shrinking": self.shrinking(key),
+                    "converged": self.converged(key),
+                }
+                for key in QUANTITIES
+            },
+        }
+
+
+@dataclass(frozen=True)
+class Study:
+    """The convergence study of one seed: a series over the timestep and one over the stiffness."""
+
+    seed: int
+    series: tuple[Series, ...]
+
+    def unsettled(self) -> list[str]:
+        """The figures that do not converge in some series."""
+        return [k for k in QUANTITIES if not all(s.converged(k) for s in self.series)]
+
+    def as_json(self) -> dict[str, Any]:
+        """The study as the report lists it."""
+        return {
+            "seed": self.seed,
+            "relative_tolerance": RELATIVE,
+            "absolute_tolerance": dict(ABSOLUTE),
+            "not_converged": self.unsettled(),
+            "series": [series.as_json() for series in self.series],
+        }
+
+
+def study(
+    case: Case,
+    seed: int = 0,
+    jobs: int = 1,
+    done: Callable[[int], None] | None = None,
+    timesteps: Sequence[float] = TIMESTEPS,
+    stiffnesses: Sequence[float] = STIFFNESSES,
+) -> Study:
+    """The same seed with other timesteps, then with other stiffnesses."""
+    finer = [_with_timestep(case, factor) for factor in timesteps]
+    half = _with_timestep(case, 0.5)
+    stiffer = [half if f == 1.0 else replace(half, alter=Softened(f)) for f in stiffnesses]
+    cases = list({id(c): c for c in (*finer, *stiffer)}.values())
+    records = over_cases([(c, seed) for c in cases], jobs, done)
+    by_case = {id(c): record for c, record in zip(cases, records, strict=True)}
+    return Study(
+        seed,
+        (
+            _series("timestep", timesteps, [by_case[id(c)] for c in finer]),
+            _series("weld time constant", stiffnesses, [by_case[id(c)] for c in stiffer]),
+        ),
+    )
+
+
+def runs(timesteps: Sequence[float] = TIMESTEPS, stiffnesses: Sequence[float] = STIFFNESSES) -> int:
+    """How many runs a study takes."""
+    return len(timesteps) + len(stiffnesses)
+
+
+def _series(setting: str, factors: Sequence[float], records: Sequence[SeedRecord]) -> Series:
+    figures = tuple(record.figures for record in records)
+    return Series(setting, tuple(factors), figures, tuple(not r.passed for r in records))
+
+
+def _with_timestep(case: Case, factor: float) -> Case:
+    """A case with another timestep; its tick stays as near as whole steps allow."""
+    settings = case.settings
+    substeps = max(1, round(settings.substeps / factor))
+    return replace(
+        case, settings=replace(settings, timestep=settings.timestep * factor, substeps=substeps)
+    )

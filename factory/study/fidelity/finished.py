@@ -1,0 +1,66 @@
+"""The finished product against its geometry: position and angle of every part."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from factory.control.mode import Array, Index
+from factory.mjcf.model import Model
+from factory.study.fidelity.record import Misplaced
+
+
+class Finished:
+    """The worst displacement of every part over all products, after a rigid fit on the first."""
+
+    def __init__(self, model: Model) -> None:
+        product = model.layout.product
+        self.parts = model.factory.contents[model.factory.pag.root]
+        solids = [product.solids[part] for part in self.parts]
+        self._centres = np.array([s.centre for s in solids]) - solids[0].centre
+        counts = [len(s.corners) for s in solids]
+        self._owner = np.repeat(np.arange(len(solids)), counts)
+        self._local = np.concatenate([s.corners - s.centre for s in solids])
+        self._starts = np.cumsum([0, *counts[:-1]])
+        self.position = np.zeros(len(solids))
+        self.angle = np.zeros(len(solids))
+        self.vertex = np.zeros(len(solids))
+        self.products = 0
+
+    def measure(self, bodies: Index, xpos: Array, xmat: Array) -> None:
+        """A product made of `bodies`, in the order of `parts`."""
+        turn = xmat[bodies].reshape(-1, 3, 3)
+        turn = turn[0].T @ turn
+        place = (xpos[bodies] - xpos[bodies[0]]) @ xmat[bodies[0]].reshape(3, 3)
+        off = place - self._centres
+        spin = np.einsum("nij,nj->ni", turn[self._owner] - np.eye(3), self._local)
+        far = np.linalg.norm(off[self._owner] + spin, axis=1)
+        self.position = np.maximum(self.position, np.linalg.norm(off, axis=1))
+        self.angle = np.maximum(self.angle, _angles(turn))
+        self.vertex = np.maximum(self.vertex, np.maximum.reduceat(far, self._starts))
+        self.products += 1
+
+    def found(self) -> tuple[Misplaced, ...]:
+        """Every part at its worst; none where no product was finished."""
+        if not self.products:
+            return ()
+        rows = zip(
+            self.parts,
+            1e3 * self.position,
+            np.degrees(self.angle),
+            1e3 * self.vertex,
+            strict=True,
+        )
+        return tuple(Misplaced(part, float(p), float(a), float(v)) for part, p, a, v in rows)
+
+
+def _angles(turns: Array) -> Array:
+    """The angles of rotation matrices (n, 3, 3) [rad]; exact for small ones, from the sine."""
+    axis = np.stack(
+        [
+            turns[:, 2, 1] - turns[:, 1, 2],
+            turns[:, 0, 2] - turns[:, 2, 0],
+            turns[:, 1, 0] - turns[:, 0, 1],
+        ]
+    )
+    cosine = (np.trace(turns, axis1=1, axis2=2) - 1) / 2
+    return np.asarray(np.arctan2(np.linalg.norm(axis, axis=0) / 2, cosine))

@@ -1,0 +1,156 @@
+"""What a comparison leaves behind: frozen values, the same whoever measured them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field, replace
+from types import MappingProxyType
+from typing import Any
+
+from factory.study.fidelity.quantities import QUANTITIES
+from factory.support.errors import Diagnostic
+
+Figures = Mapping[str, float | None]
+"""Values by the key of their quantity; None where there is nothing to measure."""
+
+
+@dataclass(frozen=True, slots=True)
+class HandOff:
+    """One hand-off: when, to which body, how many parts of what mass; see `quantities` for the
+    figures."""
+
+    time_s: float
+    carrier: str
+    parts: int
+    mass_kg: float
+    gap_mm: float
+    speed_step_mm_s: float
+    impulse_mNs: float = 0.0
+    energy_mJ_per_kg: float = 0.0
+
+    def after(self, impulse: float, energy: float) -> HandOff:
+        """The same, with what followed."""
+        return replace(self, impulse_mNs=impulse, energy_mJ_per_kg=energy)
+
+
+@dataclass(frozen=True, slots=True)
+class Misplaced:
+    """How far a part is from its place in a finished product, at the worst."""
+
+    part: str
+    position_mm: float
+    angle_deg: float
+    vertex_mm: float
+
+
+@dataclass(frozen=True, slots=True)
+class Approach:
+    """The least distance between bodies of two kinds, what is certified for them, and who it was;
+    `least_mm` None where nothing came within the detection distance."""
+
+    kinds: str
+    certified_mm: float
+    least_mm: float | None
+    bodies: tuple[str, str] | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class SeedRecord:
+    """One seed: both worlds run, and what was measured.
+
+    `differences` [s]: MuJoCo's time less the ideal world's for every firing, `durations` for every
+    operation. `trouble`: why a run did not end well.
+    """
+
+    seed: int
+    units: int
+    figures: Figures
+    handoffs: tuple[HandOff, ...] = ()
+    misplaced: tuple[Misplaced, ...] = ()
+    approaches: tuple[Approach, ...] = ()
+    differences: tuple[float, ...] = field(default=(), repr=False)
+    durations: tuple[float, ...] = field(default=(), repr=False)
+    contacts: tuple[str, ...] = ()
+    trouble: tuple[Diagnostic, ...] = ()
+    run_s: float = 0.0
+    measuring_s: float = 0.0
+
+    @property
+    def passed(self) -> bool:
+        """Whether both runs ended, refine the net and nothing touched."""
+        wrong = ("illegal_records", "monitor_violations", "unintended_contacts")
+        return not self.trouble and not any(self.figures.get(key) for key in wrong)
+
+    def as_json(self) -> dict[str, Any]:
+        """The record as the report lists it."""
+        return {
+            "seed": self.seed,
+            "units": self.units,
+            "passed": self.passed,
+            "figures": dict(self.figures),
+            "handoffs": [asdict(h) for h in self.handoffs],
+            "misplaced": [asdict(m) for m in self.misplaced],
+            "approaches": [asdict(a) for a in self.approaches],
+            "firing_differences_s": list(self.differences),
+            "duration_differences_s": list(self.durations),
+            "contacts": list(self.contacts),
+            "errors": [d.as_json() for d in self.trouble],
+        }
+
+
+@dataclass(frozen=True)
+class Fidelity:
+    """A product's comparison over seeds."""
+
+    product: str
+    robots: int
+    jitter: float
+    seeds: tuple[SeedRecord, ...]
+
+    @property
+    def passed(self) -> bool:
+        """Whether every seed passed."""
+        return all(record.passed for record in self.seeds)
+
+    @property
+    def units(self) -> int:
+        """How many products the longest run was asked for."""
+        return max(record.units for record in self.seeds)
+
+    @property
+    def runs(self) -> str:
+        """Seeds and products in words: `50 seeds, 4 units` or `4 to 61 units`."""
+        least, most = min(record.units for record in self.seeds), self.units
+        return f"{len(self.seeds)} seeds, {least if least == most else f'{least} to {most}'} units"
+
+    def values(self, key: str) -> list[float]:
+        """A figure over the seeds that have it."""
+        found = (record.figures.get(key) for record in self.seeds)
+        return [value for value in found if value is not None]
+
+    def worst(self) -> Figures:
+        """Every figure at the worst seed."""
+        return MappingProxyType({k: q.worst(self.values(k)) for k, q in QUANTITIES.items()})
+
+    def mean(self) -> Figures:
+        """Every figure's mean over the seeds."""
+        return MappingProxyType(
+            {k: sum(v) / len(v) if (v := self.values(k)) else None for k in QUANTITIES}
+        )
+
+    def as_json(self) -> dict[str, Any]:
+        """The document of `fidelity --json`, without the convergence study."""
+        worst, mean = self.worst(), self.mean()
+        return {
+            "schema": 1,
+            "product": self.product,
+            "robots": self.robots,
+            "units": self.units,
+            "jitter": self.jitter,
+            "passed": self.passed,
+            "figures": {
+                key: {**q.as_json(), "worst": worst[key], "mean": mean[key]}
+                for key, q in QUANTITIES.items()
+            },
+            "seeds": [record.as_json() for record in self.seeds],
+        }

@@ -1,0 +1,123 @@
+"""A comparison written down: figures.json for machines, report.md with plots for people."""
+
+from __future__ import annotations
+
+import json
+from math import isfinite
+from pathlib import Path
+from typing import Any
+
+from factory.study.fidelity.convergence import Study
+from factory.study.fidelity.plots import check_plots, plots
+from factory.study.fidelity.quantities import QUANTITIES
+from factory.study.fidelity.record import Fidelity
+from factory.support.errors import Diagnostic, InputError
+from factory.support.files import write_all
+
+TITLES = {
+    "limits.png": "Figures that have a limit",
+    "times.png": "Firing times",
+    "handoffs.png": "Hand-offs",
+    "product.png": "The finished product",
+    "approach.png": "Closest approach",
+    "convergence.png": "Convergence",
+}
+
+
+def document(found: Fidelity, study: Study | None = None) -> dict[str, Any]:
+    """Everything as one JSON document; keys as `fidelity --json` prints them."""
+    unsettled = set(study.unsettled()) if study else set()
+    made = found.as_json()
+    for key, figure in made["figures"].items():
+        figure["converged"] = None if study is None else key not in unsettled
+    made["convergence"] = None if study is None else study.as_json()
+    return made
+
+
+def check_report(path: Path | None) -> None:
+    """Whether a report can be written there, before anything is run. Raises InputError (BadFile),
+    MissingError where plots are wanted and there is no matplotlib."""
+    if path is None or _is_json(path):
+        return
+    if path.exists() and not path.is_dir():
+        message, hint = f"'{path}' is a file", "-o takes a folder, or the name of a .json file"
+        raise InputError(Diagnostic("BadFile", message, None, hint))
+    check_plots()
+
+
+def write_report(path: Path, found: Fidelity, study: Study | None = None) -> list[Path]:
+    """Write a folder, or figures alone where `path` ends in .json; all files or none."""
+    text = json.dumps(_finite(document(found, study)), indent=1).encode() + b"\n"
+    if _is_json(path):
+        contents = {path: text}
+    else:
+        pictures = plots(found, study)
+        page = markdown(found, study, list(pictures)).encode()
+        contents = {
+            path / "report.md": page,
+            path / "figures.json": text,
+            **{path / name: picture for name, picture in pictures.items()},
+        }
+    write_all(contents)
+    return list(contents)
+
+
+def markdown(found: Fidelity, study: Study | None, pictures: list[str]) -> str:
+    """The page for people."""
+    verdict = "All runs passed." if found.passed else "**Some run failed.**"
+    lines = [
+        f"# Fidelity of {found.product}",
+        "",
+        f"{found.robots} robots, {found.runs}, jitter {found.jitter:g}. {verdict}",
+        "",
+        "| figure | worst | mean | unit | limit | |",
+        "|---|---:|---:|---|---:|---|",
+        *_rows(found, study),
+        "",
+    ]
+    for record in found.seeds:
+        lines += [f"* seed {record.seed}: {t.code} {t.message}" for t in record.trouble]
+        lines += [f"* seed {record.seed}: contact of {pair}" for pair in record.contacts]
+    for name in pictures:
+        lines += ["", f"## {TITLES[name]}", "", f"![{TITLES[name]}]({name})"]
+    lines += ["", "## Definitions", ""]
+    lines += [f"* `{q.key}` [{q.unit}]: {q.definition}" for q in QUANTITIES.values()]
+    return "\n".join(lines) + "\n"
+
+
+def _rows(found: Fidelity, study: Study | None) -> list[str]:
+    worst, mean = found.worst(), found.mean()
+    return [
+        f"| {key} | {shown(worst[key])} | {shown(mean[key])} | {q.unit} | {shown(q.limit)} | "
+        f"{remark(key, worst[key], study)} |"
+        for key, q in QUANTITIES.items()
+    ]
+
+
+def remark(key: str, value: float | None, study: Study | None) -> str:
+    """What is to be said of a figure: beyond its limit, not converged."""
+    found = [
+        *(["beyond its limit"] if QUANTITIES[key].exceeded(value) else []),
+        *(["not converged"] if study is not None and key in study.unsettled() else []),
+    ]
+    return ", ".join(found)
+
+
+def shown(value: float | None) -> str:
+    """A figure in few digits."""
+    if value is None:
+        return "–"
+    return f"{value:.4g}" if abs(value) >= 1e-9 else "0"
+
+
+def _is_json(path: Path) -> bool:
+    return path.suffix.lower() == ".json"
+
+
+def _finite(value: Any) -> Any:
+    """null for what is not finite."""
+    if isinstance(value, float):
+        return value if isfinite(value) else None
+    if isinstance(value, dict):
+        return {key: _finite(item) for key, item in value.items()}
+    return [_finite(item) for item in value] if isinstance(value, list | tuple) else value

@@ -1,0 +1,17 @@
+"""Many runs at once: a grid of seeds, speeds, clearances, ... over processes, or over a Dask
+cluster, into an SQLite database that a stopped sweep goes on with.
+
+    >>> from factory.study.sweep import points, read_axes
+    >>> [dict(point) for point in points(read_axes(["seed=0:2", "jitter=0.1"]))]
+    [{'jitter': 0.1, 'seed': 0}, {'jitter': 0.1, 'seed': 1}]
+
+`sweep(Recipe(...), axes, database, jobs)` runs one; `summarise(database)` gives means, spreads and
+confidence intervals.
+"""
+
+from factory.study.sweep.grid import Axis, points, read_axes
+from factory.study.sweep.recipe import Recipe
+from factory.study.sweep.summary import Summary, summarise
+from factory.study.sweep.sweeping import Tally, sweep
+
+__all__ = ["Axis", "Recipe", "Summary", "Tally", "points", "read_axes", "summarise", "sweep"]

@@ -1,0 +1,175 @@
+"""The grid of a sweep: which keys vary, over which values, and the points they span.
+
+`seed=0:1000` is a range, its end left out; `speed=0.2:0.6:0.1` has a step; `jitter=0.1,0.3` is a
+list. Items of a list may be ranges.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, fields
+from itertools import product
+from math import ceil, isfinite, prod
+
+from factory.support.errors import Diagnostic, InputError, did_you_mean
+from factory.support.settings import RANGES, Settings
+from factory.support.settings import WHOLE as WHOLE_SETTINGS
+
+Value = float | int | str | None
+
+Point = tuple[tuple[str, Value], ...]
+"""One run of a sweep: a value for each key that varies."""
+
+SETTINGS = tuple(field.name for field in fields(Settings))
+
+WHOLE: Mapping[str, tuple[int, int]] = {
+    "seed": (0, 2**63 - 1),
+    "units": (1, 10**9),
+    "wip": (1, 10**9),
+    **{name: (int(RANGES[name][0]), int(RANGES[name][1])) for name in WHOLE_SETTINGS},
+}
+"""Keys whose values are whole numbers, with the least and the greatest."""
+
+WORLDS = ("mujoco", "ideal")
+
+KEYS = ("seed", "jitter", "units", "wip", "world", *SETTINGS)
+"""All keys that may vary."""
+
+DEFAULTS: Mapping[str, Value] = {
+    "seed": 0,
+    "jitter": 0.0,
+    "units": 4,
+    "wip": None,
+    "world": "mujoco",
+}
+"""Keys that are no settings, with their values where nothing else is said."""
+
+MOST = 1_000_000
+"""A sweep of more runs is refused."""
+
+
+@dataclass(frozen=True, slots=True)
+class Axis:
+    """A key that varies and its values, all different, in the order given."""
+
+    key: str
+    values: tuple[Value, ...]
+
+
+def read_axes(texts: Sequence[str]) -> tuple[Axis, ...]:
+    """The axes that `--vary` was given, e.g. `seed=0:1000`. Raises InputError with every fault."""
+    axes: list[Axis] = []
+    faults: list[Diagnostic] = []
+    for text in texts:
+        try:
+            axes.append(_read_axis(text))
+        except InputError as error:
+            faults += error.diagnostics
+    keys = [axis.key for axis in axes]
+    for key in dict.fromkeys(k for k in keys if keys.count(k) > 1):
+        faults.append(_usage(f"{key} is varied twice", f"--vary {key}=A,B"))
+    size = prod(len(axis.values) for axis in axes)
+    if not faults and size > MOST:
+        faults.append(_usage(f"{size} runs are more than {MOST}", "take fewer values"))
+    if faults:
+        raise InputError(faults)
+    return tuple(axes)
+
+
+def points(axes: Sequence[Axis]) -> Iterator[Point]:
+    """All points of a grid. Settings vary slowest and seeds fastest: other settings ask for another
+    model, some for another layout."""
+    rank = [(axis.key == "seed", axis.key not in SETTINGS) for axis in axes]
+    order = sorted(range(len(axes)), key=lambda i: rank[i])
+    for values in product(*(axes[i].values for i in order)):
+        yield tuple((axes[i].key, value) for i, value in zip(order, values, strict=True))
+
+
+def check_value(key: str, value: Value) -> Diagnostic | None:
+    """What is wrong with the value of a key: a number out of range, a word that is none of it."""
+    if key in SETTINGS and isinstance(value, int | float):
+        try:
+            Settings().with_options({key: value})
+        except InputError as error:
+            return error.diagnostics[0]
+        return None
+    if key == "world":
+        if value in WORLDS:
+            return None
+        hint = did_you_mean(str(value), WORLDS, "worlds")
+        return Diagnostic("BadValue", f"there is no world '{value}'", None, hint)
+    if isinstance(value, int | float):
+        low, high = (0, 0.9) if key == "jitter" else WHOLE[key]
+        if not low <= value <= high:
+            message = f"{key} = {value} is not between {low} and {high}"
+            return Diagnostic("BadValue", message, None, f"for example {_example(key)}")
+    return None
+
+
+def _read_axis(text: str) -> Axis:
+    key, equals, values = (word.strip() for word in text.partition("="))
+    if key not in KEYS:
+        hint = did_you_mean(key, KEYS, "keys")
+        raise InputError(Diagnostic("UnknownParameter", f"unknown key '{key}'", None, hint))
+    found: dict[Value, None] = {}
+    for item in values.split(",") if equals else ():
+        found |= dict.fromkeys(_read_item(key, item.strip()))
+    if not found:
+        raise InputError(_usage(f"'{text}' gives no values", f"for example {_example(key)}"))
+    for value in found:
+        fault = check_value(key, value)
+        if fault is not None:
+            raise InputError(fault)
+    return Axis(key, tuple(found))
+
+
+def _read_item(key: str, item: str) -> Iterator[Value]:
+    """The values of one item of a list: a word, a number or a range."""
+    if key == "world":
+        yield item
+    elif ":" in item:
+        yield from _read_range(key, item)
+    else:
+        yield _number(key, item, item)
+
+
+def _read_range(key: str, item: str) -> Iterator[Value]:
+    """`a:b` of whole numbers, `a:b:step` of any; b is left out."""
+    words = item.split(":")
+    if len(words) > 3 or (len(words) == 2 and key not in WHOLE):
+        raise InputError(_usage(f"'{item}' of {key} has no step", f"{key}=START:END:STEP"))
+    start, end = _number(key, words[0], item), _number(key, words[1], item)
+    step = _number(key, words[2], item) if len(words) == 3 else 1
+    if step <= 0 or end <= start:
+        message = f"the range '{item}' of {key} is empty"
+        raise InputError(_usage(message, f"{key}=START:END:STEP, START less than END"))
+    count = (end - start) / step - 1e-9
+    if count > MOST:
+        raise InputError(_usage(f"{count:.0f} values of {key} are more than {MOST}", "take fewer"))
+    for n in range(ceil(count)):
+        value = start + n * step
+        yield value if key in WHOLE else float(f"{value:.12g}")
+
+
+def _number(key: str, word: str, item: str) -> int | float:
+    """A number as a key takes it. Raises InputError."""
+    kind = "whole number" if key in WHOLE else "number"
+    try:
+        number = int(word) if key in WHOLE else float(word)
+        if "_" in word or not isfinite(number):
+            raise ValueError
+    except (ValueError, OverflowError):
+        message = f"{key} takes a {kind}, not '{item}'"
+        raise InputError(_usage(message, f"for example {_example(key)}")) from None
+    return number
+
+
+def _example(key: str) -> str:
+    """How the values of a key are written."""
+    words = {"seed": "0:100", "jitter": "0.1,0.3", "units": "4,8", "wip": "1:4"}
+    words |= {"world": "ideal,mujoco"}
+    return f"--vary {key}={words.get(key) or getattr(Settings(), key, '')}"
+
+
+def _usage(message: str, hint: str) -> Diagnostic:
+    return Diagnostic("BadValue", message, None, hint)

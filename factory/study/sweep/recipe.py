@@ -1,0 +1,106 @@
+"""What a sweep runs, apart from the points of its grid, and what tells it from another sweep."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, fields, is_dataclass
+from hashlib import sha256
+from importlib.metadata import version
+from typing import Any
+
+import numpy as np
+
+from factory import __version__
+from factory.geometry.solids import Product
+from factory.lang.pag_writer import write_pag
+from factory.lang.template_writer import write_template
+from factory.layout.request import Ground
+from factory.plant.factory import Factory
+from factory.study.sweep.grid import DEFAULTS, SETTINGS, Axis, Point, Value
+from factory.support.pickling import pickle_locked_mappings
+from factory.support.resources import mjcf_folder
+
+pickle_locked_mappings()  # of which factories are full
+
+
+@dataclass(frozen=True)
+class Recipe:
+    """A factory, the solids of its product, the values of keys that are the same in all runs, the
+    simulated time after which a run is given up [s], what it is laid out for, whether joined parts
+    become one body (None: where that pays). It holds all that a worker needs: no file of the user's
+    is read there."""
+
+    factory: Factory
+    product: Product
+    fixed: Mapping[str, Value]
+    max_time: float | None = None
+    ground: Ground = Ground()  # noqa: RUF009
+    fuse: bool | None = None
+
+    def at(self, point: Point) -> dict[str, Value]:
+        """The value of every key at a point."""
+        return {**DEFAULTS, **self.fixed, **dict(point)}
+
+    def identity(self, axes: Sequence[Axis]) -> dict[str, Any]:
+        """What must not change where a sweep is resumed: product, versions, fixed values, which
+        keys vary; their values may, a grid may grow."""
+        varied = sorted(axis.key for axis in axes)
+        fixed = {k: v for k, v in self.at(()).items() if k not in varied}
+        return {
+            "product": self.factory.pag.root,
+            "digest": digest(self.factory, self.product),
+            **versions(),
+            "varied": varied,
+            "max_time": self.max_time,
+            "floor": list(self.ground.floor) if self.ground.floor else None,
+            "relay": self.ground.relay,
+            "cycle": self.ground.cycle,
+            "fuse": self.fuse,
+            **fixed,
+        }
+
+
+def versions() -> dict[str, str]:
+    """What a run's figures depend on, beside its product."""
+    return {"factory": __version__, "mujoco": version("mujoco")}
+
+
+def settings_at(values: Mapping[str, Value]) -> dict[str, Any]:
+    """Those values that are settings."""
+    return {name: values[name] for name in SETTINGS}
+
+
+def digest(factory: Factory, product: Product) -> str:
+    """SHA-256 of a product and what it is made with: the PAG's canonical text, the solids that its
+    meshes gave, the templates it uses, the files of the robot types."""
+    made = sha256(write_pag(factory.pag).encode())
+    for name, template in sorted({o.template.name: o.template for o in factory.operations}.items()):
+        made.update(f"{name}\n{write_template(template)}".encode())
+    for label in sorted(product.solids):
+        for piece in _bytes(product.solids[label]):
+            made.update(piece)
+    for path in sorted(mjcf_folder().rglob("*")):
+        if path.is_file():
+            made.update(path.name.encode() + path.read_bytes())
+    return made.hexdigest()
+
+
+def _bytes(value: Any) -> Iterable[bytes]:
+    """A value of arrays, numbers and texts as bytes."""
+    if is_dataclass(value):
+        for field in fields(value):
+            yield from _bytes(getattr(value, field.name))
+    elif isinstance(value, np.ndarray):
+        yield str((value.dtype, value.shape)).encode() + np.ascontiguousarray(value).tobytes()
+    elif isinstance(value, tuple):
+        yield str(len(value)).encode()
+        for item in value:
+            yield from _bytes(item)
+    else:
+        yield repr(value).encode()
+
+
+def name_of(point: Point) -> str:
+    """A point as the database names it: JSON with its keys in order."""
+    return json.dumps(dict(point), sort_keys=True, separators=(",", ":"))

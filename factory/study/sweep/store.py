@@ -1,0 +1,193 @@
+"""The database of a sweep: SQLite in WAL mode, a row for each run that is done.
+
+Only the parent writes it, and commits every row by itself: killing it, or a worker, loses no row
+that is there. Anybody may read it meanwhile.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import sqlite3
+from collections.abc import Iterator, Mapping
+from contextlib import closing, contextmanager
+from pathlib import Path
+from typing import Any
+
+from factory.study.sweep.grid import Value
+from factory.study.sweep.kept import COLUMNS, kept_identity
+from factory.study.sweep.recipe import name_of
+from factory.study.sweep.work import Outcome
+from factory.support.errors import Diagnostic, InputError
+from factory.support.resource import Closing
+
+APPLICATION = 0x4B4C4156
+"""SQLite's application_id of such a database."""
+
+PATIENCE = 30.0
+"""Wait so long for another writer [s]."""
+
+DISK = "check the path, its permissions and the space on the disk"
+"""A hint, where a database cannot be used that may be all right."""
+
+CIRCUMSTANCES = (
+    sqlite3.SQLITE_PERM,
+    sqlite3.SQLITE_BUSY,
+    sqlite3.SQLITE_READONLY,
+    sqlite3.SQLITE_IOERR,
+    sqlite3.SQLITE_FULL,
+    sqlite3.SQLITE_CANTOPEN,
+    sqlite3.SQLITE_PROTOCOL,
+    sqlite3.SQLITE_NOTADB,
+)
+"""SQLite's codes that do not speak of what a sweep's database holds."""
+
+
+class Store(Closing):
+    """An open database of a sweep, made if need be.
+
+    `identity` is what `Recipe.identity` gives. Raises InputError (BadFile) where the file is
+    something else, holds another sweep, is damaged, or cannot be read or written.
+    """
+
+    def __init__(self, path: Path, identity: Mapping[str, Any]) -> None:
+        self.path = path
+        with _told(path):
+            self.connection = _connect(path)
+            try:
+                kept = _identity(self.connection, path)
+                if kept is not None:
+                    _compare(path, kept, identity)
+                mode = self.connection.execute("PRAGMA journal_mode=WAL").fetchone()[0]
+                if mode != "wal":
+                    raise InputError(_bad(path, f"there is no WAL on this drive ({mode})", DISK))
+                self.connection.execute("PRAGMA synchronous=NORMAL")
+                if kept is None:
+                    self._create(identity)
+            except BaseException:
+                self.connection.close()
+                raise
+
+    def close(self) -> None:
+        """Leave one file behind."""
+        with _told(self.path):
+            self.connection.close()
+
+    def points(self, status: str) -> set[str]:
+        """The names of the points that have a row with this status, done or failed."""
+        with _told(self.path):
+            rows = self.connection.execute("SELECT point FROM runs WHERE status = ?", (status,))
+            return {row[0] for row in rows}
+
+    def add(self, outcome: Outcome, values: Mapping[str, Value]) -> None:
+        """Write a row and commit it; `values` of every key. A row of the same point is replaced."""
+        row = {
+            "point": name_of(outcome.point),
+            "status": "failed" if outcome.reason else "done",
+            "reason": outcome.reason or None,
+            **values,
+            **outcome.figures,
+            "row_time_s": outcome.row_time_s,
+            "worker": outcome.worker,
+            "tries": outcome.tries,
+            "finished": outcome.finished,
+        }
+        names = list(row)
+        marks = ",".join(f":{name}" for name in names)
+        with _told(self.path):
+            self.connection.execute(
+                f"INSERT OR REPLACE INTO runs ({','.join(names)}) VALUES ({marks})", row
+            )
+
+    def _create(self, identity: Mapping[str, Any]) -> None:
+        """Make the tables, in one transaction, unless another sweep has made them meanwhile."""
+        self.connection.execute("BEGIN IMMEDIATE")
+        kept = _identity(self.connection, self.path)
+        if kept is not None:
+            self.connection.execute("ROLLBACK")
+            _compare(self.path, kept, identity)
+            return
+        columns = ", ".join(f"{name} {kind}" for name, kind in COLUMNS.items())
+        rows = [(key, json.dumps(value)) for key, value in identity.items()]
+        for statement in (
+            f"PRAGMA application_id={APPLICATION}",
+            "CREATE TABLE sweep (key TEXT PRIMARY KEY, value TEXT NOT NULL)",
+            f"CREATE TABLE runs ({columns})",
+        ):
+            self.connection.execute(statement)
+        self.connection.executemany("INSERT INTO sweep VALUES (?, ?)", rows)
+        self.connection.execute("COMMIT")
+
+
+@contextmanager
+def reading(path: Path) -> Iterator[tuple[dict[str, Any], Iterator[Mapping[str, Any]]]]:
+    """The identity and the rows of a database, while a sweep writes it or afterwards. Raises
+    InputError (BadFile)."""
+    if not path.is_file():
+        raise InputError(_bad(path, "there is no such file", "give the -o of a sweep"))
+    mode = "rw" if os.access(path, os.W_OK) else "ro"  # who only reads leaves SQLite's WAL behind
+    with _told(path), closing(_connect(path, mode)) as connection:
+        identity = _identity(connection, path)
+        if identity is None:
+            raise InputError(_bad(path, "no sweep has written it", "give the -o of a sweep"))
+        connection.row_factory = sqlite3.Row
+        yield identity, connection.execute(f"SELECT {','.join(COLUMNS)} FROM runs ORDER BY rowid")
+
+
+def _connect(path: Path, mode: str = "rwc") -> sqlite3.Connection:
+    uri = f"{path.absolute().as_uri()}?mode={mode}"
+    return sqlite3.connect(uri, timeout=PATIENCE, isolation_level=None, uri=True)
+
+
+def _identity(connection: sqlite3.Connection, path: Path) -> dict[str, Any] | None:
+    """The identity kept in a database, None for an empty one. Raises InputError (BadFile) for one
+    of another program, sqlite3.Error for one that is not sound."""
+    tables = connection.execute("SELECT count(*) FROM sqlite_master").fetchone()[0]
+    # they and the id come at once: whoever asks for the id last has it where there are tables
+    if connection.execute("PRAGMA application_id").fetchone()[0] == APPLICATION:
+        return kept_identity(connection)
+    if tables:
+        raise InputError(_bad(path, "it is the database of another program", "choose another -o"))
+    return None
+
+
+def _compare(path: Path, kept: Mapping[str, Any], asked: Mapping[str, Any]) -> None:
+    """Raises InputError (BadFile) with what differs between two sweeps."""
+    if kept == dict(asked):
+        return
+    differing = [
+        f"{key} {_shown(kept[key])} there, {_shown(asked[key])} here"
+        for key in asked
+        if key in kept and kept[key] != asked[key] and key != "digest"
+    ]
+    if not differing:
+        differing = [f"{key} is missing there" for key in asked if key not in kept]
+    if not differing:
+        differing = ["the product, a mesh, a template or a robot type has changed"]
+    message = f"it holds another sweep: {'; '.join(differing)}"
+    raise InputError(_bad(path, message, "choose another -o, or ask for the same sweep"))
+
+
+def _shown(value: Any) -> str:
+    if isinstance(value, list):
+        return ", ".join(map(str, value))
+    return "-" if value is None else str(value)
+
+
+def _bad(path: Path, message: str, hint: str) -> Diagnostic:
+    return Diagnostic("BadFile", f"{path}: {message}", None, hint)
+
+
+@contextmanager
+def _told(path: Path) -> Iterator[None]:
+    """Whatever SQLite refuses, as an error for the user; what makes no sense is damaged, or of
+    another version."""
+    try:
+        yield
+    except (sqlite3.Error, UnicodeDecodeError) as error:
+        code = getattr(error, "sqlite_errorcode", sqlite3.SQLITE_CORRUPT) & 0xFF
+        message, hint = str(error), DISK
+        if code not in CIRCUMSTANCES:
+            message = f"it is damaged, or of another version of factory: {error}"
+            hint = "run the sweep again, into another file"
+        raise InputError(_bad(path, message, hint)) from error

@@ -1,0 +1,110 @@
+"""Carry a sweep out: what is not in its database yet is run, and every outcome written as it
+comes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Generator, Sequence
+from contextlib import closing
+from dataclasses import dataclass
+from pathlib import Path
+from time import perf_counter
+
+from factory.study.sweep.bar import Bar
+from factory.study.sweep.grid import Axis, Point, check_value, points
+from factory.study.sweep.local import run_local
+from factory.study.sweep.recipe import Recipe, name_of
+from factory.study.sweep.store import Store
+from factory.study.sweep.work import Outcome
+from factory.support.errors import InputError
+from factory.support.interruption import Interruption
+
+LOCAL = "local"
+
+Outcomes = Generator[Outcome, None, None]
+
+
+@dataclass(slots=True)
+class Tally:
+    """What a sweep did: runs in its grid, rows that were there, how many of these had failed, runs
+    done and failed now; the time it took, and the sums of what its runs took their workers, and of
+    their run loops [s]."""
+
+    runs: int
+    there: int
+    there_failed: int = 0
+    done: int = 0
+    failed: int = 0
+    wall_time_s: float = 0.0
+    rows_time_s: float = 0.0
+    loops_time_s: float = 0.0
+
+    @property
+    def overhead(self) -> float | None:
+        """The share of the workers' time that was not spent in run loops."""
+        return 1 - self.loops_time_s / self.rows_time_s if self.rows_time_s else None
+
+    @property
+    def rate(self) -> float:
+        """Runs per second, from the start of the first worker."""
+        return (self.done + self.failed) / self.wall_time_s if self.wall_time_s else 0.0
+
+    def count(self, outcome: Outcome) -> None:
+        """One more outcome."""
+        self.done += not outcome.reason
+        self.failed += bool(outcome.reason)
+        loop = outcome.figures.get("wall_time_s")
+        if loop is not None:
+            self.rows_time_s += outcome.row_time_s
+            self.loops_time_s += loop
+
+
+def sweep(
+    recipe: Recipe,
+    axes: Sequence[Axis],
+    database: Path,
+    jobs: int = 1,
+    on: str = LOCAL,
+    retry: bool = False,
+    quiet: bool = True,
+) -> Tally:
+    """Run every point of a grid that has no row in the database yet; with `retry`, those that
+    failed too. `on` is `local`, in `jobs` processes, or dask://HOST:PORT.
+
+    After KeyboardInterrupt, or when this process is killed, all rows written stay, and the same
+    call goes on. Raises InputError where a fixed value is out of range (BadValue), where the
+    database holds another sweep or is damaged (BadFile).
+    """
+    fixed = recipe.at(()).items()
+    faults = [fault for key, value in fixed if (fault := check_value(key, value))]
+    if faults:
+        raise InputError(faults)
+    grid = {name_of(point): point for point in points(axes)}
+    with Store(database, recipe.identity(axes)) as store:
+        failed = set() if retry else store.points("failed")
+        there = store.points("done") | failed
+        wanted = [point for name, point in grid.items() if name not in there]
+        tally = Tally(len(grid), len(grid) - len(wanted), len(grid.keys() & failed))
+        if not wanted:
+            return tally
+        begin = perf_counter()
+        with (
+            Bar(len(grid), tally.there, quiet) as bar,
+            closing(_backend(on, jobs)(recipe, wanted)) as outcomes,
+        ):
+            for outcome in outcomes:
+                with Interruption() as interruption:
+                    store.add(outcome, recipe.at(outcome.point))
+                tally.count(outcome)
+                bar.advance(bool(outcome.reason))
+                interruption.observe(None, None)
+        tally.wall_time_s = perf_counter() - begin
+    return tally
+
+
+def _backend(on: str, jobs: int) -> Callable[[Recipe, Sequence[Point]], Outcomes]:
+    """What runs points, by the name of a place."""
+    if on == LOCAL:
+        return lambda recipe, wanted: run_local(recipe, wanted, jobs)
+    from factory.study.sweep.cluster import run_dask
+
+    return lambda recipe, wanted: run_dask(recipe, wanted, on)

@@ -1,0 +1,85 @@
+"""What the command line prints, and the status it ends with.
+
+With `--json`, stdout is one JSON document and nothing else; diagnostics and progress go to stderr.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Iterable, Mapping
+from contextlib import suppress
+from dataclasses import replace
+from math import isfinite
+from typing import Any
+
+from factory.support.errors import Diagnostic, FactoryError
+
+SCHEMA = 1
+
+
+def emit(document: Mapping[str, Any]) -> None:
+    """One JSON document on stdout, in ASCII whatever the locale; null for what is not finite."""
+    document = {"schema": SCHEMA, **document}
+    try:
+        text = json.dumps(document, allow_nan=False)
+    except ValueError:
+        text = json.dumps(_finite(document), allow_nan=False)
+    print(text)
+
+
+def _finite(value: Any) -> Any:
+    if isinstance(value, float):
+        return value if isfinite(value) else None
+    if isinstance(value, dict):
+        return {key: _finite(item) for key, item in value.items()}
+    return [_finite(item) for item in value] if isinstance(value, list | tuple) else value
+
+
+def say(text: str = "") -> None:
+    """A line for people on stdout."""
+    print(text)
+
+
+def warn(diagnostics: Iterable[Diagnostic], quiet: bool = False) -> None:
+    """Warnings, on stderr: `file:line:col: CODE warning: message`."""
+    if quiet:
+        return
+    for diagnostic in diagnostics:
+        print(warning(diagnostic), file=sys.stderr)
+
+
+def warning(diagnostic: Diagnostic) -> str:
+    """A diagnostic as it is shown where it is no error."""
+    return str(replace(diagnostic, message=f"warning: {diagnostic.message}"))
+
+
+def fail(error: FactoryError, as_json: bool) -> int:
+    """Report an error where the user looks for it, if it can be written there; its exit status."""
+    with suppress(OSError):
+        if as_json:
+            emit({"errors": [d.as_json() for d in error.diagnostics]})
+    with suppress(OSError):
+        for diagnostic in error.diagnostics:
+            print(diagnostic, file=sys.stderr)
+    return error.exit_status
+
+
+def table(title: str, columns: tuple[str, ...], rows: Iterable[tuple[str, ...]]) -> None:
+    """A table for people on stdout, as wide as it needs to be."""
+    from rich import box
+    from rich.console import Console
+    from rich.markup import escape
+    from rich.table import Table
+    from rich.text import Text
+
+    title = escape(title)
+    made = Table(title=title or None, box=box.SIMPLE_HEAD, title_justify="left", pad_edge=False)
+    for column in columns:
+        made.add_column(escape(column), overflow="fold")
+    for row in rows:
+        made.add_row(*(Text(cell) for cell in row))
+    console = Console(width=None if sys.stdout.isatty() else 160, highlight=False)
+    with console.capture() as printed:
+        console.print(made)
+    print(printed.get(), end="")

@@ -1,0 +1,51 @@
+"""The engine, `mujoco`, imported so that it loads whatever MUJOCO_GL says and whether or not there
+is GL.
+
+MuJoCo binds a window system as soon as it is imported, and fails where MUJOCO_GL names none or its
+library is missing. Nothing but rendering needs one, so a failed import is done again without. Every
+module that needs the engine takes it from here: `from factory.support.engine import mujoco`."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+
+from factory.support.errors import Diagnostic, MissingError
+
+
+@contextmanager
+def environment(name: str, value: str) -> Iterator[None]:
+    """An environment variable set for a while, then as it was."""
+    before = os.environ.get(name)
+    os.environ[name] = value
+    try:
+        yield
+    finally:
+        if before is None:
+            del os.environ[name]
+        else:
+            os.environ[name] = before
+
+
+try:
+    import mujoco
+except Exception:  # a wrong MUJOCO_GL is a RuntimeError, a missing library anything
+    try:
+        with environment("MUJOCO_GL", "disable"):
+            import mujoco
+    except ImportError as error:
+        message = f"the engine cannot be loaded: {error}"
+        raise MissingError(Diagnostic("Engine", message, None, "pip install mujoco")) from error
+
+
+def _warn(words: str) -> None:
+    """Warnings go to stderr; the engine's own way is stdout, and a file in the current folder."""
+    with suppress(BaseException):  # an exception in here would end the process
+        print(f"engine: {words}", file=sys.stderr)
+
+
+mujoco.set_mju_user_warning(_warn)
+
+__all__ = ["environment", "mujoco"]

@@ -1,0 +1,49 @@
+"""What the codes of diagnostics mean: a text each, in this folder.
+
+A text is a title, what it means, an example that provokes it (files, and the command), and how to
+mend it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+
+from factory.support.errors import Diagnostic, InputError, did_you_mean
+
+FOLDER = Path(__file__).resolve().parent
+
+
+@dataclass(frozen=True, slots=True)
+class Explanation:
+    """A code, its meaning in a line, and the whole text for people."""
+
+    code: str
+    title: str
+    text: str
+
+
+@cache
+def codes() -> tuple[str, ...]:
+    """Every code, in the order of the alphabet."""
+    return tuple(sorted(path.stem for path in FOLDER.glob("*.txt")))
+
+
+def explain(code: str) -> Explanation:
+    """The explanation of a code, in upper or lower case. Raises InputError (Usage) with the codes
+    like it where there is none."""
+    known = {name.lower(): name for name in codes()}
+    name = known.get(code.strip().lower())
+    if name is None:
+        raise InputError(Diagnostic("Usage", f"there is no code '{code}'", None, _near(code)))
+    title, _, text = (FOLDER / f"{name}.txt").read_text("utf-8").partition("\n\n")
+    return Explanation(name, title, text.rstrip("\n"))
+
+
+def _near(code: str) -> str:
+    """A few codes that have the word in them, or the one most like it."""
+    inside = [name for name in codes() if len(code) > 2 and code.lower() in name.lower()]
+    if inside:
+        return "there are " + ", ".join(inside) if len(inside) > 1 else f"there is {inside[0]}"
+    return did_you_mean(code, codes(), "codes")

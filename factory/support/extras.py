@@ -1,0 +1,19 @@
+"""Packages that not everybody needs: the extras of this one."""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import Any
+
+from factory.support.errors import Diagnostic, MissingError
+
+
+def optional(module: str, package: str, what: str, extra: str) -> Any:
+    """A module of an optional package, which `what` needs. Raises MissingError with the line that
+    installs it."""
+    try:
+        return import_module(module)
+    except ImportError as error:
+        hint = f"pip install 'klavins-factory[{extra}]'"
+        message = f"{what} needs {package}: {error}"
+        raise MissingError(Diagnostic("Missing", message, None, hint)) from error

@@ -1,0 +1,113 @@
+"""Writing files whole: under another name first, then moved into place."""
+
+from __future__ import annotations
+
+import errno
+import os
+import shutil
+from collections.abc import Iterable, Mapping
+from contextlib import suppress
+from hashlib import sha256
+from pathlib import Path
+
+from factory.support.errors import Diagnostic, InputError
+
+LOG = b"factory-log "
+"""How a log of a run begins, whatever its version."""
+
+
+def write_bytes(path: Path, content: bytes) -> None:
+    """Write a file so that no half of it is ever seen under its name. Raises OSError."""
+    write_all({path: content})
+
+
+def write_text(path: Path, text: str) -> None:
+    """Write a UTF-8 text file whole."""
+    write_bytes(path, text.encode())
+
+
+def write_all(contents: Mapping[Path, bytes]) -> None:
+    """Write files, and the folders they need: all of them or, where one cannot be written, none.
+
+    A link is followed, and what is no plain file (a pipe, a device) is written in place. Who may do
+    what with a file stays as it is. Raises OSError.
+    """
+    made: list[Path] = []
+    partials: dict[Path, Path] = {}
+    try:
+        for path, content in contents.items():
+            if path.exists() and not path.is_file() and not path.is_dir():
+                path.write_bytes(content)
+                continue
+            target = Path(os.path.realpath(path))
+            made += make_folder(target.parent)
+            if target.is_dir():
+                raise IsADirectoryError(errno.EISDIR, "it is a folder", str(path))
+            if target.is_symlink():
+                raise OSError(errno.ELOOP, "it is a link to itself", str(path))
+            partials[target] = partial = partial_of(target)
+            partial.write_bytes(content)
+            if target.exists():
+                shutil.copymode(target, partial)
+        for target, partial in partials.items():
+            partial.replace(target)
+    except BaseException as error:
+        _remove(partials.values(), made)
+        if isinstance(error, OSError) and error.filename is None:
+            error.filename = str(path)
+        raise
+
+
+def make_folder(folder: Path) -> list[Path]:
+    """Make a folder and those above it; gives the ones made, the outermost first."""
+    made: list[Path] = []
+    try:
+        for missing in [f for f in (folder, *folder.parents) if not f.exists()][::-1]:
+            missing.mkdir(exist_ok=True)
+            made.append(missing)
+    except OSError:
+        _remove([], made)
+        raise
+    return made
+
+
+def own_names(folder: Path, paths: Iterable[Path], inputs: Iterable[Path] = ()) -> None:
+    """Files in a folder whose names are our choice: no link that happens to have such a name is
+    followed, and no file that is read is written over. Raises InputError (BadFile)."""
+    paths, read = list(paths), set(map(os.path.realpath, inputs))
+    below = {f for path in paths for f in (path, *path.parents) if folder in f.parents}
+    hint = "remove it, or choose another folder"
+    faults = [
+        Diagnostic("BadFile", f"'{path}' is a link", None, hint)
+        for path in sorted(below)
+        if path.is_symlink()
+    ]
+    faults += [
+        Diagnostic("BadFile", f"'{path}' is read and would be written over", None, "choose another")
+        for path in paths
+        if os.path.realpath(path) in read
+    ]
+    if faults:
+        raise InputError(faults)
+
+
+def user_cache() -> Path:
+    """Where what can be made again is kept for this user: in $XDG_CACHE_HOME, or ~/.cache."""
+    given = os.environ.get("XDG_CACHE_HOME", "")
+    base = Path(given) if os.path.isabs(given) else Path(os.path.expanduser("~")) / ".cache"
+    return base / "klavins-factory"
+
+
+def partial_of(path: Path) -> Path:
+    """The hidden name beside a file under which this process writes it: no other file's, and never
+    longer than a name may be."""
+    digest = sha256(os.fsencode(path.name)).hexdigest()[:16]
+    return path.with_name(f".{digest}.{os.getpid()}.part")
+
+
+def _remove(files: Iterable[Path], folders: list[Path]) -> None:
+    for file in files:
+        file.unlink(missing_ok=True)
+    for folder in reversed(folders):
+        with suppress(OSError):
+            folder.rmdir()

@@ -1,0 +1,156 @@
+"""OpenGL for pictures without a screen: chosen, tried out in another process, and explained where
+missing.
+
+Only rendering needs it. A GL that does not work shows as four different errors, or ends the
+process, so it is tried in a subprocess first."""
+
+from __future__ import annotations
+
+import ctypes
+import os
+import subprocess
+import sys
+from functools import cache
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+from factory.support.errors import Diagnostic, MissingError
+
+APT = "apt-get install -y libegl1 libgl1"
+"""What mends a Debian: these two bring Mesa's EGL and its software renderer along."""
+
+VALID = ("egl", "osmesa", "glfw")
+
+_DEFAULT = ("", "enable", "enabled", "on", "true", "1")
+
+_DETOURS = (
+    "__EGL_VENDOR_LIBRARY_DIRS",
+    "__EGL_VENDOR_LIBRARY_FILENAMES",
+    "LIBGL_DRIVERS_PATH",
+    "MUJOCO_EGL_DEVICE_ID",
+    "PYOPENGL_PLATFORM",
+)
+"""Variables that lead the search for a driver astray."""
+
+
+def prepare() -> str:
+    """Sets MUJOCO_GL to `egl` unless it names something; gives what it names, in lower case."""
+    named = os.environ.get("MUJOCO_GL", "").lower().strip()
+    if named in _DEFAULT:
+        os.environ["MUJOCO_GL"] = named = "egl"
+    return named
+
+
+def context(width: int, height: int) -> Any:
+    """A current GL context without a window. Call `probe` first; raises anything where GL is
+    broken."""
+    module = {"egl": "mujoco.egl", "osmesa": "mujoco.osmesa"}.get(prepare(), "mujoco.glfw")
+    made: Any = import_module(module).GLContext
+    found = made(width, height)
+    found.make_current()
+    return found
+
+
+def probe() -> None:
+    """Renders a tiny picture in a subprocess; nothing more on the next call in the same process.
+
+    Raises MissingError (NoGL) with the line that mends it.
+    """
+    prepare()
+    found = _probed(tuple((name, os.environ.get(name)) for name in ("MUJOCO_GL", *_DETOURS)))
+    if found is not None:
+        raise MissingError(found)
+
+
+@cache
+def _probed(variables: tuple[tuple[str, str | None], ...]) -> Diagnostic | None:
+    """What is wrong with GL under these variables, None where it works."""
+    named = prepare()
+    if named not in VALID:
+        message = f"rendering needs OpenGL, and MUJOCO_GL={named} is no way to get it"
+        return Diagnostic("NoGL", message, None, f"set MUJOCO_GL=egl; valid: {', '.join(VALID)}")
+    reason = _reason()
+    if not reason:
+        return None
+    message = (
+        f"rendering needs OpenGL through MUJOCO_GL={named}, which does not work here: {reason}"
+    )
+    return Diagnostic("NoGL", message, None, _way_out(named, dict(variables)))
+
+
+def _reason() -> str:
+    """Why a tiny picture cannot be rendered in a new process, in its last words; "" if it can."""
+    package = str(Path(__file__).resolve().parents[2])
+    paths = os.pathsep.join([package, *filter(None, [os.environ.get("PYTHONPATH")])])
+    command = [sys.executable, "-c", "from factory.support.gl import trial; trial()"]
+    try:
+        done = subprocess.run(
+            command,
+            env={**os.environ, "PYTHONPATH": paths},
+            capture_output=True,
+            text=True,
+            timeout=120,
+            stdin=subprocess.DEVNULL,
+        )
+    except (OSError, subprocess.TimeoutExpired) as error:
+        return str(error)
+    if done.returncode == 0:
+        return ""
+    lines = [line.strip() for line in done.stderr.splitlines() if line.strip()]
+    last = lines[-1].partition(". ")[0] if lines else ""
+    return last or f"the trial ended with status {done.returncode}"
+
+
+def _way_out(named: str, variables: dict[str, str | None]) -> str:
+    """The one line that mends it."""
+    if named == "glfw":
+        return "set MUJOCO_GL=egl, which needs no screen"
+    if named == "osmesa":
+        return "apt-get install -y libosmesa6, or set MUJOCO_GL=egl"
+    detours = [name for name in _DETOURS if variables.get(name)]
+    if detours and _loads("libEGL.so.1") and _loads("libGL.so.1"):
+        return f"unset {' '.join(detours)}; or {APT}"
+    return APT
+
+
+def _loads(library: str) -> bool:
+    try:
+        ctypes.CDLL(library)
+    except OSError:
+        return False
+    return True
+
+
+def trial() -> None:
+    """Render a red ball on 64 x 64 pixels, or raise whatever goes wrong."""
+    import numpy as np
+
+    from factory.support.engine import mujoco
+
+    ball = '<geom size="1" rgba="1 0 0 1"/>'
+    m = mujoco.MjModel.from_xml_string(f"<mujoco><worldbody>{ball}</worldbody></mujoco>")
+    d = mujoco.MjData(m)
+    held = context(64, 64)
+    drawing = mujoco.MjrContext(m, mujoco.mjtFontScale.mjFONTSCALE_100.value)
+    mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN.value, drawing)
+    mujoco.mj_forward(m, d)
+    scene, camera = mujoco.MjvScene(m, maxgeom=10), mujoco.MjvCamera()
+    mujoco.mjv_defaultFreeCamera(m, camera)
+    everything = mujoco.mjtCatBit.mjCAT_ALL.value
+    mujoco.mjv_updateScene(m, d, mujoco.MjvOption(), None, camera, everything, scene)
+    rectangle, pixels = mujoco.MjrRect(0, 0, 64, 64), np.zeros((64, 64, 3), np.uint8)
+    mujoco.mjr_render(rectangle, scene, drawing)
+    mujoco.mjr_readPixels(pixels, None, rectangle, drawing)
+    red, green = pixels[32, 32, :2]
+    if not red > green:
+        raise RuntimeError("the picture stays empty")
+    drawing.free()
+    held.free()
+
+
+def import_mujoco() -> Any:
+    """The engine, whatever MUJOCO_GL says. Raises MissingError where it cannot be loaded."""
+    from factory.support.engine import mujoco
+
+    return mujoco

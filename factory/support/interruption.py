@@ -1,0 +1,56 @@
+"""An interruption (Ctrl-C, a signal to end) that waits for the end of a tick, so that files are
+closed whole."""
+
+from __future__ import annotations
+
+import signal
+from collections.abc import Callable, Mapping
+from types import FrameType
+from typing import Any, Self
+
+from factory.support.resource import Closing
+
+SIGNALS = [
+    getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)
+]
+
+
+def stop_on_signals(handler: Callable[[int, FrameType | None], Any]) -> Mapping[int, Any]:
+    """Let `handler` take the signals that end a program, save those that the caller has it ignore;
+    gives the handlers there were. Outside the main thread it does nothing."""
+    try:
+        before = {n: signal.getsignal(n) for n in SIGNALS}
+        heard = {n: old for n, old in before.items() if old is not signal.SIG_IGN}
+        for number in heard:
+            signal.signal(number, handler)
+    except ValueError:  # not in the main thread
+        return {}
+    return heard
+
+
+class Interruption(Closing):
+    """While it lasts, the first signal is only noted, and raised as KeyboardInterrupt by `observe`;
+    the second is raised at once."""
+
+    def __init__(self) -> None:
+        self.noted = False
+        self._before: Mapping[int, Any] = {}
+
+    def __enter__(self) -> Self:
+        self._before = stop_on_signals(self._note)
+        return self
+
+    def close(self) -> None:
+        """Give the signals back to who had them."""
+        for number, handler in self._before.items():
+            signal.signal(number, handler)
+
+    def observe(self, world: Any, supervisor: Any) -> None:
+        """Raise a noted interruption, at the end of a tick."""
+        if self.noted:
+            raise KeyboardInterrupt
+
+    def _note(self, number: int, frame: FrameType | None) -> None:
+        if self.noted:
+            raise KeyboardInterrupt
+        self.noted = True

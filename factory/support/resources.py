@@ -1,0 +1,30 @@
+"""Where the shipped templates and MJCF files are: beside the package in a checkout, inside it in a
+wheel."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from factory.support.errors import Diagnostic, MissingError
+
+
+def _folder(name: str) -> Path:
+    package = Path(__file__).resolve().parents[1]
+    for candidate in (package / "assets" / name, package.parent / name):
+        if candidate.is_dir():
+            return candidate
+    raise MissingError(
+        Diagnostic(
+            "Assets", f"the folder '{name}' of factory is missing", None, "install factory again"
+        )
+    )
+
+
+def templates_folder() -> Path:
+    """The folder of the shipped operation templates (`*.op`)."""
+    return _folder("templates")
+
+
+def mjcf_folder() -> Path:
+    """The folder of the shipped robot types and scene (`*.xml`, `catalogue.toml`)."""
+    return _folder("mjcf")

@@ -1,0 +1,129 @@
+"""Defaults of a user's own: the file `factory.toml`.
+
+Options come before the environment, that before the file, that before what is built in. The file is
+the one beside the PAG, or else the one in the current folder.
+"""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+from factory.support.errors import Diagnostic, InputError, Position, did_you_mean
+from factory.support.settings import RANGES, WHOLE, Settings, wrong_type
+
+NAME = "factory.toml"
+
+OPTIONS: Mapping[str, object] = {
+    "world": "mujoco",
+    "units": 1,
+    "seed": 0,
+    "jitter": 0.3,
+    "wip": 2,
+    "floor": "4x3",
+    "templates": ["mine"],
+    "size": "1280x720",
+    "fps": 30,
+    "camera": "overview",
+}
+"""The keys that are options of commands, each with an example; the others are those of Settings."""
+
+_KINDS = {
+    str: "a text in quotes",
+    int: "a whole number",
+    float: "a number",
+    list: "a list of texts",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Defaults:
+    """What a `factory.toml` says: its values by key, the settings and the options apart."""
+
+    path: Path = Path(NAME)
+    text: str = field(default="", repr=False)
+    values: Mapping[str, Any] = field(default_factory=dict)
+
+    def settings(self) -> Settings:
+        """The settings of the file, the built-in ones where it says nothing."""
+        given = {k: v for k, v in self.values.items() if k in RANGES}
+        return Settings().with_options({k: v if k in WHOLE else float(v) for k, v in given.items()})
+
+    def options(self) -> dict[str, Any]:
+        """The values of options; folders are those beside the file."""
+        found = {k: v for k, v in self.values.items() if k in OPTIONS}
+        if "templates" in found:
+            found["templates"] = tuple(self.path.parent / folder for folder in found["templates"])
+        return found
+
+    def at(self, key: str) -> Position:
+        """Where a key stands: its first mention at the start of a line, or in a header."""
+        for number, line in enumerate(self.text.splitlines(), 1):
+            if found := re.match(rf"""\s*\[*\s*["']?({re.escape(key)})\b""", line):
+                return Position(str(self.path), number, found.start(1) + 1, line)
+        return Position(str(self.path), 1, 1)
+
+
+def defaults_for(file: Path) -> Defaults:
+    """The defaults for a PAG. Raises InputError."""
+    beside = file.parent / NAME
+    return load_defaults(beside if beside.is_file() else Path(NAME))
+
+
+def load_defaults(path: Path) -> Defaults:
+    """The defaults in a file; none where there is no such file.
+
+    Raises InputError with every fault: broken TOML, an unknown key, a value of the wrong type or
+    out of its range.
+    """
+    if not path.is_file():
+        return Defaults(path)
+    try:
+        text = path.read_bytes().decode("utf-8-sig")
+        found = Defaults(path, text, tomllib.loads(text))
+    except (OSError, ValueError, RecursionError) as error:
+        raise InputError(_broken(path, error)) from error
+    faults = []
+    for key, value in found.values.items():
+        fault = _fault(key, value)
+        if fault is not None:
+            faults.append(replace(fault, position=found.at(key)))
+    if faults:
+        raise InputError(faults)
+    return found
+
+
+def _fault(key: str, value: object) -> Diagnostic | None:
+    """What is wrong with a key and its value."""
+    if key in RANGES:
+        return wrong_type(key, value)
+    if key not in OPTIONS:
+        hint = did_you_mean(key, [*RANGES, *OPTIONS], "keys")
+        return Diagnostic("UnknownParameter", f"unknown key '{key}'", None, hint)
+    kind = type(OPTIONS[key])
+    right = isinstance(value, int | float if kind is float else kind)
+    if isinstance(value, list):
+        right = right and all(isinstance(item, str) for item in value)
+    if right and not isinstance(value, bool):
+        return None
+    example = repr(OPTIONS[key]).replace("'", '"')
+    message = f"{key} must be {_KINDS[kind]}"
+    return Diagnostic("BadValue", message, None, f"for example {key} = {example}")
+
+
+def _broken(path: Path, error: Exception) -> Diagnostic:
+    """What tomllib says, at the place it speaks of."""
+    words = getattr(error, "strerror", None) or str(error)
+    if isinstance(error, RecursionError):
+        words = "the file is nested too deeply"
+    found = re.search(r" \(at line (\d+), column (\d+)\)", words)
+    if found is None:
+        return Diagnostic("Syntax", words, Position(str(path), 1, 1), "see https://toml.io")
+    line, column = int(found[1]), int(found[2])
+    text = path.read_text("utf-8-sig").splitlines()[line - 1]
+    at = Position(str(path), line, column, text)
+    return Diagnostic("Syntax", words.replace(found[0], ""), at, "see https://toml.io")

@@ -1,0 +1,81 @@
+"""Cycle times: of a gear net by its gears, of any live marked graph by its critical circuit."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from types import MappingProxyType
+
+from factory.nets.cycle_ratio import max_cycle_ratio
+from factory.nets.gears import GearNet
+from factory.nets.marked import MarkedNet, marked
+from factory.plant.factory import Factory
+from factory.support.errors import did_you_mean
+
+Delays = Mapping[str, float] | Sequence[float]
+"""Seconds that a token stays on a place: by the place's name (an operation's is its label), or by
+the numbers of the first places, which are the operations. A place left out takes no time."""
+
+
+@dataclass(frozen=True, slots=True)
+class CycleTime:
+    """The mean time between two products [s], and the robot that allows no less."""
+
+    seconds: float
+    bottleneck: str
+
+
+@dataclass(frozen=True, slots=True)
+class CriticalCircuit:
+    """The greatest quotient of delays [s] and tokens over circuits, and one circuit's places."""
+
+    seconds: float
+    places: tuple[int, ...]
+
+
+def cycle_time(
+    subject: Factory | GearNet,
+    delays: Delays,
+    ways: Mapping[tuple[int, int], float] = MappingProxyType({}),
+) -> CycleTime:
+    """The maximum over robots of the summed delays of its gear, which carries one token. `ways`:
+    what a robot (index) takes to a place [s] while it waits for it (`factory.timing.ways`).
+
+    Holds since the simple circuits of a gear net are its gears. The first robot that attains it is
+    the bottleneck. Raises ValueError where a delay is negative or names no place.
+    """
+    net = subject.net if isinstance(subject, Factory) else subject
+    seconds = _seconds(marked(net), delays)
+    sums = [
+        sum(max(seconds[p], ways.get((robot, p), 0.0)) for p in gear.places)
+        for robot, gear in enumerate(net.gears)
+    ]
+    slowest = max(range(len(sums)), key=sums.__getitem__)
+    return CycleTime(sums[slowest], net.gears[slowest].robot)
+
+
+def _seconds(net: MarkedNet, delays: Delays) -> list[float]:
+    seconds = [0.0] * len(net.tokens)
+    if isinstance(delays, Mapping):
+        for name, delay in delays.items():
+            if name not in net.net.place_index:
+                hint = did_you_mean(name, list(net.net.place_index), "places")
+                raise ValueError(f"no place is called '{name}': {hint}")
+            seconds[net.net.place_index[name]] = float(delay)
+    elif len(delays) > len(seconds):
+        raise ValueError(f"{len(delays)} delays for {len(seconds)} places")
+    else:
+        seconds[: len(delays)] = map(float, delays)
+    if any(not delay >= 0 for delay in seconds):
+        raise ValueError("delays must be numbers, and not negative")
+    return seconds
+
+
+def marked_graph_cycle_time(net: GearNet | MarkedNet, delays: Delays) -> CriticalCircuit:
+    """The maximum cycle ratio of a net (`factory.nets.cycle_ratio`).
+
+    Raises ValueError where the net is no marked graph, has no circuit or is not live.
+    """
+    subject = marked(net)
+    found = max_cycle_ratio(subject, _seconds(subject, delays))
+    return CriticalCircuit(found.seconds, found.circuit)

@@ -1,0 +1,51 @@
+"""How many copies of each part can be in the factory at once, and nets that bound it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from types import MappingProxyType
+
+from factory.nets.marked import MarkedNet, least_tokens, marked
+from factory.nets.petri import PetriNet, Place
+from factory.plant.factory import Factory
+from factory.support.errors import Diagnostic, InputError
+
+
+def part_pool(factory: Factory, wip: int | None = None) -> Mapping[str, int]:
+    """For each part the greatest number of copies inside: from the start of the operation that
+    makes it to the end of dropoff.
+
+    That is the least number of initial tokens on a path from dropoff_e to part_s, for part_s can
+    fire no oftener than that beyond dropoff_e. With `wip`, in the net extended by `with_wip`. One
+    search for all parts. Raises InputError (BadValue) where `wip` is below 1.
+    """
+    net = marked(factory.net) if wip is None else with_wip(factory, wip)
+    found = least_tokens(net, factory.dropoff.end)
+    pool = {part.label: found[part.start] for part in factory.leaves}
+    return MappingProxyType({label: n for label, n in pool.items() if n is not None})
+
+
+def with_wip(factory: Factory, wip: int) -> MarkedNet:
+    """The net with a place [dropoff_e; part_s] of `wip` tokens for each part.
+
+    A marked graph in which every new circuit carries tokens, hence still live; not a gear net, so a
+    `MarkedNet` without gears, for proofs only. Raises InputError (BadValue) where `wip` is below 1.
+    """
+    if wip < 1:
+        hint = "at least one copy of each part must be let in: --wip 1"
+        raise InputError(Diagnostic("BadValue", f"work in process bounded by {wip}", None, hint))
+    net = factory.net.threaded.net
+    extra = tuple(
+        Place(
+            f"wip:{part.label}",
+            (factory.dropoff.end,),
+            (part.start,),
+            "wip",
+            part.label,
+            0,
+            part.position,
+        )
+        for part in factory.leaves
+    )
+    tokens = marked(factory.net).tokens + (wip,) * len(extra)
+    return MarkedNet(PetriNet(net.transitions, net.places + extra), tokens)

@@ -1,0 +1,89 @@
+"""Predict a run before it: the delay of each operation, and the cycle time they give.
+
+A robot starts an operation where the one before has left it, or where it has gone ahead to. In
+either world a transition costs a tick, since those enabled in one tick fire as one set; in MuJoCo
+the drives settle within eps besides.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from types import MappingProxyType
+
+import numpy as np
+
+from factory.control.mode import Limits, Mode
+from factory.control.profile import World, mode_time, trapezoid_time
+from factory.layout.layout import Layout
+from factory.modes.modes import operation_starts
+from factory.modes.staging import Stage, staged
+from factory.support.settings import Settings
+from factory.timing.cycle_time import CycleTime, cycle_time, marked_graph_cycle_time
+from factory.timing.pool import with_wip
+from factory.timing.ways import with_ways
+
+
+def operation_delays(
+    layout: Layout,
+    modes: Sequence[Mode],
+    limits: Limits,
+    settings: Settings,
+    world: World,
+    ahead: Sequence[Stage] = (),
+) -> list[float]:
+    """The time [s] from X_s to X_e of every operation, and the tick until what follows can fire.
+    `ahead`: the ways that robots go while they wait."""
+    factory = layout.factory
+    settle = settings.settle if world == "mujoco" else 0.0
+    delays = []
+    starts = staged(operation_starts(layout), ahead)
+    for operation, mode, start in zip(factory.operations, modes, starts, strict=True):
+        time = mode_time(mode, start, limits.of(factory.axes[operation.index]), world)
+        delays.append(time + settle + settings.tick)
+    return delays
+
+
+def ways_ahead(
+    ahead: Sequence[Stage], limits: Limits, settings: Settings, world: World
+) -> dict[tuple[int, int], float]:
+    """The time [s] from the end of a robot's operation until it is where it has gone ahead to, by
+    the robot and the operation to come. It sets out at once, and stands where it is when all others
+    do."""
+    return {
+        (stage.robot, stage.operation): way_time(
+            stage, stage.start, limits.of((stage.robot,)), settings, world
+        )
+        for stage in ahead
+    }
+
+
+def way_time(stage: Stage, start: float, limits: Limits, settings: Settings, world: World) -> float:
+    """How long a robot with these limits goes ahead from `start` [m], and settles [s]."""
+    settle = settings.settle if world == "mujoco" else 0.0
+    return mode_time(stage.mode, np.array([start]), limits, world) + settle
+
+
+def predict(
+    layout: Layout,
+    delays: Sequence[float],
+    settings: Settings,
+    world: World,
+    wip: int | None = None,
+    ways: Mapping[tuple[int, int], float] = MappingProxyType({}),
+) -> CycleTime:
+    """The cycle time of the compiled net and its bottleneck: the greatest sum along a gear of the
+    operations' `delays`, or of the `ways` that robots go ahead of them where those are longer. Two
+    things may allow no less and be it: in MuJoCo the outfeed, whose tray must be back before the
+    next dropoff, and the bound `wip` on what is inside."""
+    factory = layout.factory
+    found = [cycle_time(factory, delays, ways)]
+    if world == "mujoco":
+        way = trapezoid_time(layout.outfeed_way, settings.outfeed, settings.outfeed_acceleration)
+        found.append(CycleTime(delays[-1] + 2 * (float(way) + settings.tick), "outfeed"))
+    if wip is not None:
+        most = min(wip, len(factory.robots))  # no more are inside without a bound
+        bounded = with_wip(factory, most)
+        seconds = [*delays, *[0.0] * (len(bounded.tokens) - len(delays)), *ways.values()]
+        bound = marked_graph_cycle_time(with_ways(bounded, factory, ways), seconds).seconds
+        found.append(CycleTime(bound * (1 - 1e-9), f"wip {wip}"))
+    return max(found, key=lambda time: time.seconds)

@@ -1,0 +1,280 @@
+"""The laws of the house, as functions from a source tree to its breaches.
+
+A tree is a folder that holds the package `factory`; so a law can be tried on a planted breach.
+"""
+
+from __future__ import annotations
+
+import ast
+import graphlib
+from collections import Counter
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import chain
+from pathlib import Path
+
+FLOORS = (
+    ("support",),
+    ("problem",),
+    ("lang", "geometry", "nets", "control"),
+    ("plant", "importing", "foreign_nets"),
+    ("compiler",),
+    ("layout",),
+    ("modes", "mjcf"),
+    ("timing", "pipeline"),
+    ("record",),
+    ("simulation",),
+    ("export", "study", "render"),
+    ("show",),
+    ("commands",),
+)
+"""Rooms from the ground up. A room imports itself and the floors below it, nothing beside it."""
+
+ENTRANCES = ("__init__", "__main__")
+"""Loose modules above all floors."""
+
+ENGINE_ROOMS = (
+    "support",
+    "mjcf",
+    "record",
+    "simulation/mujoco",
+    "export",
+    "study/fidelity",
+    "render",
+    "show/report",
+)
+"""Rooms, or parts of rooms, that may import the engine."""
+
+ENGINE_WRITERS = ("simulation/mujoco",)
+"""Where the engine's model and data are written."""
+
+ENGINE_FIELDS = frozenset(
+    "qpos qvel qacc_warmstart act ctrl xfrc_applied qfrc_applied mocap_pos mocap_quat eq_active"
+    " eq_obj1id eq_obj2id eq_data eq_solref eq_solimp body_mass body_inertia body_contype"
+    " body_conaffinity geom_contype geom_conaffinity dof_armature dof_frictionloss dof_damping"
+    " actuator_biasprm actuator_gainprm actuator_forcerange exclude_signature"
+    " tree_sleep_policy history".split()
+)
+"""Fields of MjModel and MjData that a run may write."""
+
+MOST_ROOMS, MOST_LINES, MOST_ATTRIBUTES, MOST_PARAMETERS = 22, 350, 12, 8
+
+
+@dataclass(frozen=True)
+class Module:
+    """A module of the package: its name below `factory` (dotted, "" for the package itself), its
+    text and syntax."""
+
+    name: str
+    text: str
+
+    @property
+    def room(self) -> str:
+        return self.name.split(".")[0] or "__init__"
+
+    @cached_property
+    def tree(self) -> ast.Module:
+        return ast.parse(self.text)
+
+    def within(self, folders: Iterable[str]) -> bool:
+        """Whether it lies in one of these folders (`simulation/mujoco`)."""
+        path = self.name.replace(".", "/") + "/"
+        return any(path.startswith(f"{folder}/") for folder in folders)
+
+
+class House:
+    """All modules of a package `factory` below `root`, by name."""
+
+    def __init__(self, root: Path) -> None:
+        self.modules: dict[str, Module] = {}
+        for path in sorted((root / "factory").rglob("*.py")):
+            parts = path.relative_to(root / "factory").with_suffix("").parts
+            loose = len(parts) == 1 and parts[0] != "__init__"
+            name = ".".join(parts if loose or parts[-1] != "__init__" else parts[:-1])
+            self.modules[name] = Module(name, path.read_text("utf-8"))
+
+    def imports(self, module: Module) -> set[str]:
+        """Modules of the house that a module imports: at run time, inside functions, for typing.
+        `from factory.room import x` is resolved to the module x where there is one."""
+        found: set[str] = set()
+        for node in ast.walk(module.tree):
+            if isinstance(node, ast.Import):
+                names = [a.name for a in node.names]
+            elif isinstance(node, ast.ImportFrom) and node.level == 0:
+                names = [f"{node.module}.{a.name}" for a in node.names]
+            else:
+                names = []
+            for name in names:
+                top, _, inside = name.partition(".")
+                if top == "factory":
+                    parent = inside.rpartition(".")[0]
+                    found.add(inside if inside in self.modules else parent)
+        return found - {module.name}
+
+
+def floor(room: str) -> int:
+    """The number of a room's floor from the ground up; entrances are above all."""
+    if room in ENTRANCES:
+        return len(FLOORS)
+    return next((n for n, rooms in enumerate(FLOORS) if room in rooms), -1)
+
+
+def strangers(house: House) -> Iterator[str]:
+    """Rooms and loose modules that no floor names; more rooms than there may be."""
+    rooms = {module.room for module in house.modules.values()} - {*ENTRANCES}
+    yield from (f"{room}: on no floor" for room in sorted(rooms) if floor(room) < 0)
+    if len(rooms) > MOST_ROOMS:
+        yield f"{len(rooms)} rooms; at most {MOST_ROOMS}"
+
+
+def upward_imports(house: House) -> Iterator[str]:
+    """Imports of a room on the same floor or above."""
+    for module in house.modules.values():
+        for other in sorted(house.imports(module)):
+            room = house.modules[other].room
+            if room != module.room and floor(room) >= floor(module.room):
+                yield f"{module.name} imports {other or 'factory'}"
+
+
+def circles(house: House) -> Iterator[str]:
+    """Modules that import each other in a circle."""
+    graph = {name: house.imports(module) for name, module in house.modules.items()}
+    try:
+        graphlib.TopologicalSorter(graph).prepare()
+    except graphlib.CycleError as error:
+        yield " -> ".join(error.args[1])
+
+
+def engine_imports(house: House) -> Iterator[str]:
+    """Modules outside the engine's rooms that import `mujoco` or its door."""
+    for module in house.modules.values():
+        direct = {
+            name.split(".")[0]
+            for node in ast.walk(module.tree)
+            for name in (
+                [a.name for a in node.names]
+                if isinstance(node, ast.Import)
+                else [node.module or ""]
+                if isinstance(node, ast.ImportFrom)
+                else []
+            )
+        }
+        reaches = "mujoco" in direct or "support.engine" in house.imports(module)
+        if reaches and not module.within(ENGINE_ROOMS):
+            yield f"{module.name} imports the engine"
+        if "mujoco" in direct and module.name != "support.engine":
+            yield f"{module.name} imports mujoco past support.engine"
+
+
+def engine_writes(house: House) -> Iterator[str]:
+    """Assignments to the engine's model or data outside the rooms that may write them."""
+    for module in house.modules.values():
+        if module.within(ENGINE_WRITERS):
+            continue
+        for node in ast.walk(module.tree):
+            targets: list[ast.expr] = []
+            if isinstance(node, ast.Assign):
+                targets = node.targets
+            elif isinstance(node, ast.AugAssign):
+                targets = [node.target]
+            for target in chain.from_iterable(ast.walk(t) for t in targets):
+                written = target.value if isinstance(target, ast.Subscript) else None
+                if isinstance(written, ast.Attribute) and written.attr in ENGINE_FIELDS:
+                    yield f"{module.name}:{node.lineno} writes {ast.unparse(target)}"
+
+
+def classes(house: House) -> Iterator[tuple[Module, ast.ClassDef]]:
+    for module in house.modules.values():
+        for node in ast.walk(module.tree):
+            if isinstance(node, ast.ClassDef):
+                yield module, node
+
+
+def attributes(node: ast.ClassDef) -> set[str]:
+    """Names of a class's fields: annotated in its body, or assigned to self anywhere in it."""
+    fields = {
+        item.target.id
+        for item in node.body
+        if isinstance(item, ast.AnnAssign)
+        and isinstance(item.target, ast.Name)
+        and "ClassVar" not in ast.unparse(item.annotation)
+    }
+    for inner in ast.walk(node):
+        if (
+            isinstance(inner, ast.Attribute)
+            and isinstance(inner.ctx, ast.Store)
+            and isinstance(inner.value, ast.Name)
+            and inner.value.id == "self"
+        ):
+            fields.add(inner.attr)
+    return fields
+
+
+RECORDS = frozenset({"dataclass", "NamedTuple"})
+
+
+def is_record(node: ast.ClassDef) -> bool:
+    """Whether a class is a frozen record of figures or settings, which a table prints whole."""
+    return any("frozen=True" in ast.unparse(d) for d in node.decorator_list) or any(
+        ast.unparse(base) in RECORDS for base in node.bases
+    )
+
+
+def crowded_classes(house: House) -> Iterator[str]:
+    """Classes with more attributes than there may be. Frozen records are documents, not machines:
+    they are left out."""
+    for module, node in classes(house):
+        if not is_record(node) and len(found := attributes(node)) > MOST_ATTRIBUTES:
+            yield f"{module.name}.{node.name}: {len(found)} attributes"
+
+
+def crowded_functions(house: House) -> Iterator[str]:
+    """Functions with more parameters than there may be (self and cls are not counted)."""
+    for module in house.modules.values():
+        for node in ast.walk(module.tree):
+            if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
+                a = node.args
+                every = [p.arg for p in (*a.posonlyargs, *a.args, *a.kwonlyargs)]
+                count = len([p for p in every if p not in ("self", "cls")])
+                if count > MOST_PARAMETERS and not is_command(node):
+                    yield f"{module.name}.{node.name}: {count} parameters"
+
+
+def is_command(node: ast.FunctionDef | ast.AsyncFunctionDef) -> bool:
+    """Whether click calls it, with a parameter an option."""
+    return any(
+        ast.unparse(d).startswith(("click.", "command", "cli.")) for d in node.decorator_list
+    )
+
+
+def twins(house: House) -> Iterator[str]:
+    """Public class names that two modules define."""
+    where: dict[str, list[str]] = {}
+    for module, node in classes(house):
+        if not node.name.startswith("_"):
+            where.setdefault(node.name, []).append(module.name)
+    yield from (f"{name}: {', '.join(m)}" for name, m in where.items() if len(m) > 1)
+
+
+def long_modules(house: House) -> Iterator[str]:
+    """Modules longer than a module may be."""
+    for module in house.modules.values():
+        lines = len(module.text.splitlines())
+        if lines > MOST_LINES:
+            yield f"{module.name}: {lines} lines"
+
+
+def anys(house: House, name: str) -> Iterator[str]:
+    """Uses of `Any` in a module."""
+    for node in ast.walk(house.modules[name].tree):
+        if isinstance(node, ast.Name) and node.id == "Any":
+            yield f"{name}:{node.lineno} says Any"
+
+
+def lines(house: House) -> Counter[str]:
+    """Lines of each room."""
+    found: Counter[str] = Counter()
+    for module in house.modules.values():
+        found[module.room] += len(module.text.splitlines())
+    return found
