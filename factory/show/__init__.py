@@ -1,0 +1,1 @@
+"""Runs shown to people: the report and the live page."""
