@@ -3,6 +3,7 @@ pages and pictures that are linked are there, and the site is built without warn
 
 from __future__ import annotations
 
+import ast
 import re
 import shlex
 import shutil
@@ -149,15 +150,70 @@ def test_every_page_of_the_reference_is_in_its_index(reference: dict[str, str]) 
     assert sorted(re.findall(r"^(\w+)$", index, re.M)) == sorted(reference)
 
 
-def test_every_command_and_example_is_in_the_readme_or_the_gallery() -> None:
-    readme, gallery = (
-        (ROOT / "README.md").read_text("utf-8"),
+def test_every_command_and_example_is_in_the_guide_or_the_gallery() -> None:
+    guide, gallery = (
+        (DOCS / "guide" / "commands.md").read_text("utf-8"),
         (DOCS / "gallery.md").read_text("utf-8"),
     )
     for name in cli.commands:
-        assert re.search(rf"`factory {name}\b", readme), name
+        assert re.search(rf"`factory {name}\b", guide), name
     for name in EXAMPLES:
         assert f"examples/{name}.pag" in gallery, name
+
+
+def test_the_readme_is_a_page_that_names_the_two_commands() -> None:
+    readme = (ROOT / "README.md").read_text("utf-8")
+    assert len(readme.splitlines()) <= 130
+    targets = re.findall(r"^([\w-]+):", (ROOT / "Makefile").read_text("utf-8"), re.M)
+    named = re.findall(r"^ {4}make ([\w-]+)", readme, re.M)
+    assert named == ["demo", "test"] and set(named) <= set(targets)
+
+
+# --- the map --------------------------------------------------------------------------------------
+
+WAY = re.compile(r"^\| (\d+) \| `([\w/]+\.py)` ((?:`\w+(?:\.\w+)?`(?:, )?)+) \|", re.M)
+"""A row of the way from text to film: its number, a file, and functions or classes in it."""
+
+
+def test_the_way_from_text_to_film_is_there_and_short() -> None:
+    rows = WAY.findall((DOCS / "design.md").read_text("utf-8"))
+    assert [int(number) for number, _, _ in rows] == list(range(1, len(rows) + 1))
+    assert 10 <= len(rows) <= 15
+    package = ROOT / "factory"
+    for _, file, names in rows:
+        found = set(defined(ast.parse((package / file).read_text("utf-8"))))
+        missing = [name for name in re.findall(r"`([\w.]+)`", names) if name not in found]
+        assert not missing, f"{file} has no {missing}"
+
+
+def defined(tree: ast.Module) -> Iterator[str]:
+    """Functions and classes of a module, and methods, alone and as `Class.method`."""
+    for node in tree.body:
+        if isinstance(node, ast.FunctionDef | ast.ClassDef):
+            yield node.name
+        for inner in node.body if isinstance(node, ast.ClassDef) else ():
+            if isinstance(inner, ast.FunctionDef):
+                yield inner.name
+                yield f"{node.name}.{inner.name}"
+
+
+def test_files_that_the_map_and_the_decisions_name_are_there() -> None:
+    package = ROOT / "factory"
+    for page in (DOCS / "design.md", *sorted((DOCS / "decisions").glob("*.md"))):
+        folders = re.findall(r"`([\w]+(?:/[\w]+)*/)`", page.read_text("utf-8"))
+        files = re.findall(r"`([\w]+(?:/[\w]+)+\.(?:py|op))`", page.read_text("utf-8"))
+        for name in (*folders, *files):
+            assert (package / name).exists() or (ROOT / name).exists(), f"{page.name}: {name}"
+
+
+def test_every_decision_is_in_the_index() -> None:
+    index = (DOCS / "decisions" / "index.md").read_text("utf-8")
+    pages = {page.stem for page in (DOCS / "decisions").glob("*.md")} - {"index"}
+    assert set(re.findall(r"\]\(([\w-]+)\.md\)", index)) == pages
+    for page in pages:
+        text = (DOCS / "decisions" / f"{page}.md").read_text("utf-8")
+        headings_of = re.findall(r"^## (.*)$", text, re.M)
+        assert headings_of[:3] == ["Context", "Decision", "Figures"], page
 
 
 # --- links and pictures ---------------------------------------------------------------------------

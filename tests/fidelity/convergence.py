@@ -44,9 +44,9 @@ def section(results: dict[str, Any]) -> str:
         "## Convergence",
         f"Seed 0 at jitter 0.3, {results['units']} units, with the timestep and then the time"
         " constant of the welds (at half the timestep) multiplied by the factors. A figure has"
-        " converged if it changes by at most 5 %, or by what nobody would notice, between the two"
-        " finest. The welds' time constant is kept at two timesteps, the least the engine allows:"
-        " what goes with their give, goes with the timestep.",
+        " converged if it changes by at most 5 %, or by less than is noticeable, between the two"
+        " finest. The welds' time constant is kept at two timesteps, the least the engine allows,"
+        " so figures that depend on the compliance of welds depend on the timestep.",
     ]
     for name, studied in results["products"].items():
         for series in studied["series"]:

@@ -316,17 +316,17 @@ def section(results: dict) -> str:
         [
             "## Disturbances",
             f"Runs of {results['units']} units at jitter {JITTER}, {results['seeds']} seeds, or one"
-            " run for each robot where it is one robot that is disturbed. Survived: all units made,"
+            " run for each robot where a single robot is disturbed. Survived: all units made,"
             " the replay refines the net, no unintended contact, product error at most"
             f" {ERROR_MM} mm. Time is lost against the same run undisturbed; the worst seed"
-            " counts. The factory knows nothing of the disturbance, but for a robot slowed, whose"
-            " drive is told to be slow; one held back is not.",
-            "What must be survived: " + ("**all of it is.**" if good else "**not all of it is.**"),
+            " counts. The factory does not know of the disturbance, except for a slowed robot, whose"
+            " drive is set to be slow; the drive of a robot held back is not.",
+            "Disturbances that must be survived: " + ("**all are.**" if good else "**not all are.**"),
             table(
                 ("product", "disturbance", "magnitude", "", "products", *costs, "survived"), must
             ),
-            "The largest of each kind that is survived, on a grid (the next point is not, for the"
-            " reason given). Pushes come every half second, on a robot or part drawn at random."
+            "The largest disturbance of each kind that is survived, on a grid (the next point is not,"
+            " for the reason given). Pushes come every half second, on a robot or part drawn at random."
             " Noise is white, 500 times a second, its standard deviation given; noise and delay are"
             " in what the supervisor sees and in the drive's own loop.",
             table(

@@ -88,7 +88,7 @@ def section(results: dict[str, Any]) -> str:
     return "\n\n".join(
         [
             "## Paces",
-            "The cycle times of a product that takes too long to be watched for so many units and"
+            "The cycle times of a product that takes too long for both worlds with so many units and"
             f" seeds: jitter {results['jitter']:g}, the physical run alone, by `factory sweep`. The"
             " prediction is made from the net before each run, with the speeds that are drawn for"
             f" it; at most {LIMIT:g} % is accepted.",
