@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 
@@ -21,37 +20,7 @@ from factory.nets.petri import Marking
 from factory.nets.threads import Threads
 from factory.plant.factory import Factory, Operation
 from factory.simulation.run import Event
-
-
-class World(Protocol):
-    """Where a factory runs: the ideal one or MuJoCo.
-
-    `supplied`: whether an operation may have become prepared since somebody asked, who then sets it
-    back."""
-
-    time: float
-    supplied: bool
-
-    def sense(self) -> tuple[Array, Array]:
-        """Positions x [m] and speeds [m/s] of all axes: in arc length of all carriages, then the
-        heights of all lifts."""
-
-    def prepared(self, operation: Operation, unit: int) -> bool:
-        """Whether the world is in the domain of an operation's mode as far as parts go: a feeder
-        has a part to give, the outfeed is free."""
-
-    def apply(
-        self, started: Sequence[tuple[Operation, int]], ended: Sequence[tuple[Operation, int]]
-    ) -> None:
-        """Operations that start or end now, each with the number of the unit it works on."""
-
-    def step(self, bundle: Bundle | None, axes: Index, ticks: int = 1) -> bool:
-        """A tick, or some as long as nothing can come of them that asks for the supervisor: the
-        axes of the active modes follow their field, all others stand. Whether any mode may have
-        come to its goal."""
-
-    def delivered(self) -> int:
-        """Products that have left the factory."""
+from factory.simulation.world import World
 
 
 KEPT = 500
