@@ -88,7 +88,7 @@ class IdealWorld:
         """Nothing settles in an ideal world."""
 
     def _before_step(self) -> None:
-        for act in self.hooks.before_step:
+        for act in tuple(self.hooks.before_step):
             act()
 
     def delivered(self) -> int:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from factory.control.mode import Mode
+from factory.control.mode import Limits, Mode
 from factory.layout.layout import Layout
 from factory.modes.modes import operation_modes, robot_limits
 from factory.modes.staging import stages_of
@@ -30,6 +30,7 @@ from factory.timing.prediction import operation_delays, predict, ways_ahead
 
 if TYPE_CHECKING:
     from factory.mjcf.model import Model
+    from factory.simulation.mujoco.world import MujocoWorld
 
 Observer = Callable[[Any, Any], None]
 """Called after every tick with the world and the supervisor: to render, to log, to show
@@ -114,7 +115,9 @@ class Simulation:
             self.model = self.model or physical_model(
                 layout, units, self.settings, catalogue, wip, self.under_way(), fuse, shown
             )
-            self.world = _mujoco(self.model, positions, gains, units, self.counts, wip, loaded, fast)
+            self.world = _mujoco(
+                self.model, positions, gains, units, self.counts, wip, loaded, fast
+            )
         self.before = self.world.delivered()
         self.supervisor = self._distributed() if distributed else self._central()
 
@@ -145,6 +148,19 @@ class Simulation:
             self.seed,
             self.stages,
         )
+
+    @property
+    def physical(self) -> MujocoWorld:
+        """The world, where it is MuJoCo's; asked for in the ideal one, an AssertionError."""
+        from factory.simulation.mujoco.world import MujocoWorld
+
+        assert isinstance(self.world, MujocoWorld), "the ideal world has no bodies"
+        return self.world
+
+    def limit(self, limits: Limits) -> None:
+        """From now on axes have these limits."""
+        self.limits = limits
+        self.supervisor.limit(limits)
 
     def under_way(self) -> dict[str, int]:
         """How many copies of each part are in the factory in the marking where the run starts,
@@ -291,7 +307,7 @@ def start_positions(layout: Layout, marking: Marking) -> np.ndarray:
     return positions
 
 
-def _mujoco(*arguments: Any) -> Any:
+def _mujoco(*arguments: Any) -> World:
     from factory.simulation.mujoco.world import MujocoWorld
 
     return MujocoWorld(*arguments)

@@ -31,8 +31,9 @@ class ContactMasks:
     """The masks and exclusions of a model, for parts whose bodies are given by label and copy.
 
     `code` and `unit` (nbody,): the holder of each part's body, or the code of a holder itself
-    (`own`), and the unit that a part belongs to, -1 for none. `solid`: the geoms of each part's body
-    that collide. `fresh`: holders that have been given something. `excluded`: pairs of labels whose parts of one unit do not collide.
+    (`own`), and the unit that a part belongs to, -1 for none. `solid`: the geoms of each part's
+    body that collide. `fresh`: holders that have been given something. `excluded`: pairs of labels
+    whose parts of one unit do not collide.
     """
 
     def __init__(
@@ -58,7 +59,7 @@ class ContactMasks:
     def own(self, trees: Mapping[int, int], last: int) -> int:
         """Give what collides and is no part a code: that of its kinematic tree, or one of its own
         after the `last` where it is fixed to the floor. Gives the greatest code."""
-        for body in self._masks.any(axis=0).nonzero()[0].tolist():
+        for body in np.flatnonzero(self._masks.any(axis=0)).tolist():
             if body not in self.solid:
                 tree = int(self._m.body_treeid[body])
                 last += tree not in trees

@@ -44,7 +44,8 @@ class Drives:
         self._head = np.concatenate([[samples - 1.0], self.timestep * early])
 
     def sampled(self, axes: Index, x: Array, v: Array, a: Array, steps: int) -> Array:
-        """Setpoints (n, legs * steps + 1, 3) in every step of legs of so many steps, and after them.
+        """Setpoints (n, legs * steps + 1, 3) in every step of legs of so many steps, and after
+        them.
 
         `x` [m], `v` [m/s] (legs + 1, n): where each leg begins, and where the last ends; `a`
         [m/s²] (legs, n).

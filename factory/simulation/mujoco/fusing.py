@@ -34,7 +34,7 @@ class Fusion:
         self._d, self._mass, self._places, self._radii = d, m.body_mass.copy(), places, radii
         self._qpos = m.jnt_qposadr[m.body_jntadr][:, None] + np.arange(7)
         self._dof = m.jnt_dofadr[m.body_jntadr][:, None] + np.arange(6)
-        axes = _matrices(m.body_iquat)
+        axes = rotations(m.body_iquat)
         back, least = axes.transpose(0, 2, 1), np.finfo(float).tiny
         self._inertia = (axes * m.body_inertia[:, None]) @ back
         self._yields = (axes / np.maximum(m.body_inertia, least)[:, None]) @ back
@@ -50,7 +50,8 @@ class Fusion:
         shift, tilt = away[:, 0] - belongs, d.xmat[bodies] - d.xmat[first]
         apart = np.sqrt((shift * shift).sum(axis=1))
         apart += np.sqrt((tilt * tilt).sum(axis=1)) * self._radii[bodies]
-        return np.maximum.reduceat(apart, np.cumsum(sizes) - sizes)
+        starts = np.cumsum(sizes, dtype=np.intp) - sizes
+        return np.asarray(np.maximum.reduceat(apart, starts))
 
     def fuse(self, bodies: Sequence[int], whole: int) -> None:
         """Put the body `whole` in the place of others, with their momentum and angular momentum.
@@ -60,7 +61,7 @@ class Fusion:
         share = mass / mass.sum()
         pose, speed = d.qpos[self._qpos[chosen]], d.qvel[self._dof[chosen]]
         x, v = share @ pose[:, :3], share @ speed[:, :3]
-        turns = _matrices(pose[:, 3:])
+        turns = rotations(pose[:, 3:])
         spin = turns @ (self._inertia[chosen] @ speed[:, 3:, None])
         orbit = _cross(pose[:, :3] - x, speed[:, :3] - v)
         momentum = spin[:, :, 0].sum(axis=0) + mass @ orbit
@@ -72,8 +73,7 @@ class Fusion:
         d.xquat[whole], d.xmat[whole] = d.xquat[chosen[heaviest]], d.xmat[chosen[heaviest]]
 
 
-
-def _matrices(quaternions: Array) -> Array:
+def rotations(quaternions: Array) -> Array:
     """Rotation matrices (n, 3, 3) of unit quaternions (n, 4)."""
     return np.asarray(Rotation.from_quat(quaternions, scalar_first=True).as_matrix())
 

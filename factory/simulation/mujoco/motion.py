@@ -10,9 +10,9 @@ from factory.control.mode import Array, Index
 from factory.control.navigation import Bundle
 from factory.mjcf.model import GRAVITY, HEAD_MASS, Model
 from factory.simulation.mujoco.axes import Axes
+from factory.simulation.mujoco.courses import Follower, along, planned
 from factory.simulation.mujoco.drives import Drives
 from factory.simulation.mujoco.outfeed import Outfeed
-from factory.simulation.mujoco.courses import Follower, along, planned
 from factory.simulation.mujoco.sleep import Sleep
 from factory.simulation.mujoco.stepping import Stepping
 from factory.support.engine import mujoco
@@ -87,17 +87,25 @@ class Motion:
                 if self.outfeed.moves:  # its courses end with those of the robots
                     self.outfeed.follower.course = None
             ticks = min(ticks, self.robots.left)
-        if self.outfeed.follower.course is not None and not self.outfeed.moves:
-            self.outfeed.follower.stop(self.outfeed.axis)
-            self.sleep.may_sleep(self.outfeed.axis)
-        if self.outfeed.moves:
-            if not self.outfeed.follower.left:
-                self._plan_tray()
-            ticks = min(ticks, self.outfeed.follower.left)
-            self.outfeed.follower.show(ticks)
+        ticks = self.move_tray(ticks)
         if bundle is not None:
             self.robots.show(ticks)
         self.stepping.advance(ticks * self.settings.substeps)
+        return ticks
+
+    def move_tray(self, ticks: int) -> int:
+        """The tray follows its way for some ticks, but not past the end of a course; gives how
+        many. Come to its goal, it stands."""
+        outfeed, follower = self.outfeed, self.outfeed.follower
+        if not outfeed.moves:
+            if follower.course is not None:
+                follower.stop(outfeed.axis)
+                self.sleep.may_sleep(outfeed.axis)
+            return ticks
+        if not follower.left:
+            follower.begin(outfeed.axis, self.stepping.course(outfeed.beginning, outfeed.course))
+        ticks = min(ticks, follower.left)
+        follower.show(ticks)
         return ticks
 
     def _plan(self, bundle: Bundle) -> None:
@@ -120,11 +128,6 @@ class Motion:
         """The tray goes away with a product, or home without."""
         self.outfeed.send(loaded)
         self.sleep.stay_awake(self.outfeed.axis)
-
-    def _plan_tray(self) -> None:
-        outfeed = self.outfeed
-        course = self.stepping.course(outfeed.beginning, outfeed.course)
-        outfeed.follower.begin(outfeed.axis, course)
 
     def move(self, axes: Index, x: Array, v: Array, a: Array) -> None:
         """From now on `axes` run from x [m] at speed v [m/s] under acceleration a [m/s²], for as

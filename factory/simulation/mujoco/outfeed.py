@@ -11,8 +11,8 @@ from factory.control.mode import ROUNDING, Array
 from factory.control.profile import landing_speed
 from factory.mjcf.model import Model
 from factory.simulation.mujoco.axes import Axes
-from factory.simulation.mujoco.drives import Drives
 from factory.simulation.mujoco.courses import AHEAD, Course, Follower, Move, planned
+from factory.simulation.mujoco.drives import Drives
 from factory.support.engine import mujoco
 
 NEAR = 1e-3

@@ -54,4 +54,3 @@ class Sleep:
         asleep[trees[awake]] = FRESH
         dofs = self._m.tree_dofadr[trees[~awake]]
         speed[dofs[speed[dofs] == 0.0]] = AWAKE
-

@@ -7,8 +7,8 @@ from time import perf_counter
 from typing import Protocol
 
 from factory.control.mode import Index
-from factory.simulation.mujoco.inspection import Inspection
 from factory.simulation.mujoco.courses import Course
+from factory.simulation.mujoco.inspection import Inspection
 from factory.simulation.world import Hooks
 from factory.support.engine import mujoco
 from factory.support.settings import Settings
@@ -58,7 +58,7 @@ class SingleSteps:
         for number in range(steps):
             if number and number % self._substeps == 0:
                 self.inspection.tick()
-            for act in self.hooks.before_step:
+            for act in tuple(self.hooks.before_step):
                 act()
             self.step(1)
             if self.d.ncon:

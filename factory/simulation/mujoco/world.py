@@ -10,8 +10,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from copy import copy
 
-import numpy as np
-
 from factory.control.mode import Array, Index
 from factory.control.navigation import Bundle
 from factory.mjcf.loading import load
@@ -139,8 +137,9 @@ class MujocoWorld:
         self.motion.stepping.advance(steps)
 
     def settle(self) -> None:
-        """A tick's timesteps are over."""
+        """A tick's timesteps are over, and the tray's next tick begins."""
         self._settle(1)
+        self.motion.move_tray(1)
 
     def _settle(self, ticks: int) -> None:
         """After some ticks: at the end of a course look at what is not looked at in every tick, and

@@ -11,9 +11,9 @@ from __future__ import annotations
 from collections.abc import Callable, Hashable
 
 from factory.control.mode import Index
+from factory.simulation.mujoco.courses import Course
 from factory.simulation.mujoco.fast.neighbours import Neighbours
 from factory.simulation.mujoco.inspection import Inspection
-from factory.simulation.mujoco.courses import Course
 from factory.simulation.mujoco.stepping import SingleSteps
 from factory.simulation.world import Hooks
 from factory.support.engine import mujoco
