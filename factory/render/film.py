@@ -39,7 +39,7 @@ class _Observer(Closing):
         camera = camera_named(camera, [part.label for part in factory.leaves])
         shared(size, panels)
         subject = subject_of_run(simulation)
-        product, m = product_name(factory), simulation.world.m
+        product, m = product_name(factory), simulation.physical.m
         self.take = Take(
             m, product, simulation.units, size, camera, caption, subject, panels, title
         )
@@ -54,7 +54,7 @@ class _Observer(Closing):
         raise NotImplementedError
 
     def _moment(self) -> Moment:
-        world, events = self.simulation.world, self.simulation.supervisor.events
+        world, events = self.simulation.physical, self.simulation.supervisor.events
         for event in events[len(self.history.events) :]:
             self.history.fire(event.t, self.number[event.transition])
         made = world.delivered() - self.simulation.before

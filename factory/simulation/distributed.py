@@ -4,15 +4,14 @@ Robots share a cell each, for the label they carry, and the continuous state of 
 in; nothing else. Each has its own control rate and phase. Reads of labels alone would race: a
 tool's label never changes, and a slow robot may see a label of the next unit. So a cell counts,
 beside its label, the operations its robot has finished, and a condition asks for a count; the
-carrier alone ends an operation, and goes on when all others have followed. Why, is in
-docs/design.md.
+carrier alone ends an operation, and goes on when all others have followed. The reasons are in
+docs/decisions/distributed.md.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
-from typing import Any
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -22,40 +21,14 @@ from factory.control.navigation import Bundle
 from factory.modes.staging import Stage
 from factory.plant.factory import Factory, Operation
 from factory.plant.programs import Program, Step, program_of
+from factory.simulation.bundles import Bundles
+from factory.simulation.cells import Cells, Link
 from factory.simulation.run import Event
+from factory.simulation.supervisor import Active
+from factory.simulation.world import World
 
 RATES = (3, 11)
 """Control periods are drawn from these, in timesteps of the engine."""
-
-
-@dataclass(slots=True)
-class Cell:
-    """What a robot shows to all others: the label it carries and how many operations it has
-    finished."""
-
-    label: str
-    turn: int = 0
-
-
-class Link:
-    """The continuous state that the robots of one mode share; reading any other robot is an
-    error."""
-
-    def __init__(self, world: Any, axes: Sequence[tuple[int, ...]]) -> None:
-        self.world, self.axes = world, axes
-
-    def read(self, operation: Operation, robot: int) -> tuple[Array, Array]:
-        """Positions and speeds of an operation's axes, for one of its robots."""
-        if robot not in operation.robots:
-            raise AssertionError(f"robot {robot} is not in the mode of {operation.label}")
-        x, v = self.world.sense()
-        axes = list(self.axes[operation.index])
-        return x[axes], v[axes]
-
-
-@dataclass(slots=True)
-class _Active:
-    operations: tuple[int, ...] = ()
 
 
 @dataclass(slots=True)
@@ -70,7 +43,6 @@ class Process:
     axes: Index
     reference: Array
     speed: Array
-    position: int = 0
     stage: str = "wait"
     clock: float = 0.0
     turns: int = 0
@@ -79,85 +51,123 @@ class Process:
     @property
     def step(self) -> Step:
         """The step it is at."""
-        return self.program.steps[self.position]
+        return self.program.steps[self.turns % len(self.program.steps)]
+
+    @property
+    def unit(self) -> int:
+        """Which time round its loop a robot is: the number of the unit it works on."""
+        return self.turns // len(self.program.steps)
 
 
-@dataclass(slots=True)
 class Record:
     """The record of a distributed run, in the terms of the net: X_s when the first robot enters an
-    operation, X_e when its carrier ends it."""
+    operation, X_e when its carrier ends it. `last`: when something fired last, at first `time`
+    [s]."""
 
-    events: list[Event] = field(default_factory=list)
-    started: set[tuple[int, int]] = field(default_factory=set)
-    under_way: list[int] = field(default_factory=list)
+    def __init__(self, factory: Factory, time: float) -> None:
+        self._net, self.last, self.events = factory.net.threaded, time, list[Event]()
+        self._marked = {*factory.net.initial_marking}
+        self._started: set[tuple[int, int]] = set()
+        self._under_way: list[int] = []
+
+    @property
+    def active(self) -> Active:
+        """The operations under way."""
+        return Active(tuple(self._under_way))
+
+    def marking(self) -> tuple[str, ...]:
+        """The names of the places that are marked."""
+        places = enumerate(self._net.places)
+        return tuple(place.name for number, place in places if number in self._marked)
+
+    def has_started(self, operation: Operation, unit: int) -> bool:
+        """Whether some robot has entered an operation for a unit."""
+        return (operation.index, unit) in self._started
+
+    def start(self, operation: Operation, unit: int, time: float) -> None:
+        """The first robot enters an operation."""
+        self._started.add((operation.index, unit))
+        self._under_way.append(operation.index)
+        self._fire(operation.start, time)
+
+    def end(self, operation: Operation, unit: int, time: float) -> None:
+        """The carrier ends an operation."""
+        self._fire(operation.end, time)
+        self._started.discard((operation.index, unit - 1))
+        self._under_way.remove(operation.index)
+
+    def _fire(self, transition: int, time: float) -> None:
+        net = self._net.net
+        self._marked.difference_update(net.preset[transition])
+        self._marked.update(net.postset[transition])
+        self.events.append(Event(time, self._net.transitions[transition].name))
+        self.last = time
 
 
 class DistributedSupervisor:
     """No supervisor at all: it only lets the robots' processes tick, each at its own rate and
-    phase."""
+    phase, in steps of the world of `timestep` [s], `ticks` of which are one step here."""
 
     def __init__(
         self,
         factory: Factory,
         modes: Sequence[Mode],
         limits: Limits,
-        world: Any,
+        world: World,
         timestep: float,
         ticks: int,
-        seed: int = 0,
-        stages: Sequence[Stage] = (),
+        seed: int,
+        stages: Sequence[Stage],
     ) -> None:
-        self.stages = {(stage.robot, stage.operation): stage for stage in stages}
-        self.factory, self.modes, self.limits = factory, modes, limits
-        self.world, self.timestep, self.ticks = world, timestep, ticks
+        self.factory, self.world, self.timestep, self.ticks = factory, world, timestep, ticks
+        count = len(factory.operations)
+        self.stages = {(s.robot, s.operation): (n, s) for n, s in enumerate(stages, start=count)}
+        axes_of = [*factory.axes, *((stage.robot,) for stage in stages)]
+        self.bundles = Bundles([*modes, *(stage.mode for stage in stages)], axes_of, limits)
         self.random = np.random.default_rng([seed, 7])
-        self.net = factory.net.threaded
-        self.marked = bytearray(
-            p in factory.net.initial_marking for p in range(len(self.net.places))
-        )
+        programs = [program_of(factory, robot.index) for robot in factory.robots]
         self.link = Link(world, factory.axes)
-        self.programs = [program_of(factory, r.index) for r in factory.robots]
-        self.cells = [Cell(p.steps[0].label) for p in self.programs]
-        periods = self.random.integers(*RATES, size=len(self.programs))
-        x = world.sense()[0]
-        lifts = {robot: len(self.programs) + n for n, robot in enumerate(factory.strokes)}
-        self.processes = []
-        for p, n in zip(self.programs, periods, strict=True):
+        self.cells = Cells(factory, [program.steps[0].label for program in programs])
+        self.processes = self._processes(programs)
+        self.record = Record(factory, world.time)
+        self.count = 0
+
+    def _processes(self, programs: Sequence[Program]) -> list[Process]:
+        periods, x = self.random.integers(*RATES, size=len(programs)), self.world.sense()[0]
+        lifts = {robot: len(programs) + n for n, robot in enumerate(self.factory.strokes)}
+        found = []
+        for p, n in zip(programs, periods, strict=True):
             axes = np.array([p.robot, *([lifts[p.robot]] if p.robot in lifts else [])])
             phase = int(self.random.integers(n))
-            self.processes.append(
-                Process(p, int(n), phase, axes, np.array(x[axes]), np.zeros(len(axes)))
-            )
-        self.place_in_gear = {
-            (robot.index, number): position
-            for robot in factory.robots
-            for position, number in enumerate(robot.operations)
-        }
-        self.bundles: dict[int, Bundle] = {}
-        self.alone: dict[tuple[int, int], Bundle] = {}
-        self.record = Record()
-        self.last_event = world.time
-        self.active = _Active()
-        self.count = 0
+            found.append(Process(p, int(n), phase, axes, np.array(x[axes]), np.zeros(len(axes))))
+        return found
 
     @property
     def events(self) -> list[Event]:
         """The record so far."""
         return self.record.events
 
+    @property
+    def last_event(self) -> float:
+        """When something fired last, or when the run began [s]."""
+        return self.record.last
+
+    @property
+    def active(self) -> Active:
+        """The operations under way."""
+        return self.record.active
+
     def marking(self) -> tuple[str, ...]:
         """The names of the places that the record marks."""
-        return tuple(p.name for p, m in zip(self.net.places, self.marked, strict=True) if m)
+        return self.record.marking()
 
     def awaited(self) -> list[Operation]:
-        """Nobody sees all the robots of an operation wait for it."""
+        """None: no robot sees whether all robots of an operation wait for it."""
         return []
 
     def limit(self, limits: Limits) -> None:
         """From now on axes have these limits."""
-        self.limits = limits
-        self.bundles.clear()
-        self.alone.clear()
+        self.bundles.limit(limits)
 
     def step(self, ticks: int = 1) -> None:
         """As many timesteps of the world as a supervisor's tick has; robots tick in between."""
@@ -176,7 +186,7 @@ class DistributedSupervisor:
         if process.stage == "wait":
             if self._may_enter(process, step):
                 process.stage, process.clock, process.goes_ahead = "run", 0.0, False
-                self._entered(step.operation, self._unit(process))
+                self._enter(step.operation, process.unit)
             else:
                 self._go_ahead(process, step)
         if process.stage == "run":
@@ -187,13 +197,10 @@ class DistributedSupervisor:
     def _may_enter(self, process: Process, step: Step) -> bool:
         """Every other robot of the operation has finished all that it does before this, and shows
         what it must bring; the world is prepared; all are in the domain."""
-        operation = step.operation
-        unit = self._unit(process)
-        for other, label in step.until:
-            cell, wanted = self.cells[other], self._turn(other, operation, unit)
-            if cell.turn < wanted or (cell.turn == wanted and cell.label != label):
-                return False
-        started = (operation.index, unit) in self.record.started
+        operation, unit = step.operation, process.unit
+        if not all(self.cells.waits(r, label, operation, unit) for r, label in step.until):
+            return False
+        started = self.record.has_started(operation, unit)
         if step.is_carrier and not started and not self.world.prepared(operation, unit):
             return False
         x, _ = self.link.read(operation, process.program.robot)
@@ -201,16 +208,16 @@ class DistributedSupervisor:
 
     def _run(self, process: Process, step: Step) -> None:
         operation, me = step.operation, process.program.robot
-        carrier = self.cells[operation.carrier]
         if not step.is_carrier:
-            if carrier.turn > self._turn(operation.carrier, operation, self._unit(process)):
+            if self.cells.has_left(operation.carrier, operation, process.unit):
                 self._stop(process)
                 self._finish(process, step)
                 self._advance(process)
                 return
         elif self._at_goal(process, step):
             self._stop(process)
-            self._ended(operation, self._unit(process))
+            self.record.end(operation, process.unit, self.world.time)
+            self.world.apply([], [(operation, process.unit)])
             self._finish(process, step)
             process.stage = "leave"
             return
@@ -225,12 +232,12 @@ class DistributedSupervisor:
         self._drive(process, mine, self._bundle(operation).field(x, dt)[slots])
 
     def _go_ahead(self, process: Process, step: Step) -> None:
-        """While it waits, a robot may go where it is needed next; it reads nobody's state for
-        that."""
-        key = process.program.robot, step.operation.index
-        stage = self.stages.get(key)
-        if stage is None:
+        """While it waits, a robot may go where it is needed next; it reads no other robot's state
+        for that."""
+        found = self.stages.get((process.program.robot, step.operation.index))
+        if found is None:
             return
+        number, stage = found
         dt, mine = process.period * self.timestep, np.zeros(1, np.intp)
         at, speed = process.reference[mine], process.speed[mine]
         if abs(at[0] - stage.goal) < ROUNDING and abs(speed[0]) < ROUNDING:
@@ -239,15 +246,14 @@ class DistributedSupervisor:
                 process.goes_ahead = False
             return
         process.goes_ahead = True
-        if key not in self.alone:
-            self.alone[key] = Bundle.of([stage.mode], [self.limits.of((stage.robot,))])
-        self._drive(process, mine, self.alone[key].field(at + speed * dt / 2, dt))
+        bundle, _ = self.bundles.of((number,))
+        self._drive(process, mine, bundle.field(at + speed * dt / 2, dt))
 
     def _drive(self, process: Process, mine: Index, wanted: Array) -> None:
         """One tick of a robot's own axes towards the `wanted` speeds [m/s]."""
         axes, at, speed = process.axes[mine], process.reference[mine], process.speed[mine]
         dt = process.period * self.timestep
-        x1, v1, a = govern(at, speed, wanted, self.limits.acceleration[axes], dt)
+        x1, v1, a = govern(at, speed, wanted, self.bundles.limits.acceleration[axes], dt)
         self.world.move(axes, at, speed, a)
         process.reference[mine], process.speed[mine] = x1, v1
 
@@ -275,58 +281,19 @@ class DistributedSupervisor:
 
     def _followed(self, process: Process, step: Step) -> bool:
         """Whether all other robots have left the operation."""
-        unit = self._unit(process)
         return all(
-            self.cells[other].turn > self._turn(other, step.operation, unit)
-            for other, _ in step.until
+            self.cells.has_left(other, step.operation, process.unit) for other, _ in step.until
         )
 
     def _advance(self, process: Process) -> None:
         process.stage = "wait"
         process.turns += 1
-        process.position = (process.position + 1) % len(process.program.steps)
-
-    def _unit(self, process: Process) -> int:
-        """Which time round its loop a robot is: the number of the unit it works on."""
-        return process.turns // len(process.program.steps)
-
-    def _turn(self, robot: int, operation: Operation, unit: int) -> int:
-        """How many operations a robot has finished when it comes to this one for that unit."""
-        length = len(self.factory.robots[robot].operations)
-        return unit * length + self.place_in_gear[robot, operation.index]
 
     def _bundle(self, operation: Operation) -> Bundle:
-        found = self.bundles.get(operation.index)
-        if found is None:
-            limits = self.limits.of(self.factory.axes[operation.index])
-            found = self.bundles[operation.index] = Bundle.of(
-                [self.modes[operation.index]], [limits]
-            )
-        return found
+        return self.bundles.of((operation.index,))[0]
 
-    # --- the record ----------------------------------------------------------------------------
-
-    def _entered(self, operation: Operation, unit: int) -> None:
-        if (operation.index, unit) in self.record.started:
-            return
-        self.record.started.add((operation.index, unit))
-        self.record.under_way.append(operation.index)
-        self.world.apply([(operation, unit)], [])
-        self._log(operation.start)
-
-    def _ended(self, operation: Operation, unit: int) -> None:
-        """Parts change hands when the carrier says so."""
-        self._log(operation.end)
-        self.record.started.discard((operation.index, unit - 1))
-        self.record.under_way.remove(operation.index)
-        self.world.apply([], [(operation, unit)])
-
-    def _log(self, event: int) -> None:
-        name = self.net.transitions[event].name
-        for place in self.net.net.preset[event]:
-            self.marked[place] = 0
-        for place in self.net.net.postset[event]:
-            self.marked[place] = 1
-        self.record.events.append(Event(self.world.time, name))
-        self.last_event = self.world.time
-        self.active.operations = tuple(self.record.under_way)
+    def _enter(self, operation: Operation, unit: int) -> None:
+        """The first robot that enters starts the operation."""
+        if not self.record.has_started(operation, unit):
+            self.world.apply([(operation, unit)], [])
+            self.record.start(operation, unit, self.world.time)

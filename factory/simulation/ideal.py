@@ -10,6 +10,8 @@ import numpy as np
 from factory.control.mode import Array, Index
 from factory.control.navigation import Bundle
 from factory.plant.factory import Operation
+from factory.simulation.run import PhysicsFigures
+from factory.simulation.world import Hooks, Job
 
 
 class IdealWorld:
@@ -26,7 +28,7 @@ class IdealWorld:
         wip: int | None = None,
         timestep: float = 0.002,
     ) -> None:
-        self.time, self.supplied = 0.0, True
+        self.time, self.supplied, self.physics_time, self.hooks = 0.0, True, 0.0, Hooks()
         self.x = np.array(start, float)
         self.v = np.zeros_like(self.x)
         self.dropoff, self.units, self.tick = dropoff, units, tick
@@ -37,17 +39,17 @@ class IdealWorld:
 
     def sense(self) -> tuple[Array, Array]:
         """Positions; speeds count as zero, since ẋ = F has no inertia."""
-        return self.x, self.v
+        return self.hooks.sensed(self.x, self.v)
 
     def prepared(self, operation: Operation, unit: int) -> bool:
         """A feeder gives a part for every unit asked for, and that may be let in."""
+        if not self.hooks.admit(operation, unit):
+            return False
         if operation.inputs:
             return True
         return unit < self.units and (self.wip is None or unit < self.count + self.wip)
 
-    def apply(
-        self, started: Sequence[tuple[Operation, int]], ended: Sequence[tuple[Operation, int]]
-    ) -> None:
+    def apply(self, started: Sequence[Job], ended: Sequence[Job]) -> None:
         """Parts follow labels; only finished products are counted."""
         for operation, _ in ended:
             if operation.index == self.dropoff:
@@ -57,6 +59,7 @@ class IdealWorld:
 
     def step(self, bundle: Bundle | None, axes: Index, ticks: int = 1) -> bool:
         """ẋ = F_p(x) for one tick. Whether any mode has come to its goal."""
+        self._before_step()
         near = False
         if bundle is not None:
             x = self.x[axes]
@@ -73,9 +76,10 @@ class IdealWorld:
         self._plan[axes, 0] = self.time
         self._plan[axes, 1], self._plan[axes, 2], self._plan[axes, 3] = x, v, a
 
-    def advance(self, substeps: int) -> None:
+    def advance(self, steps: int) -> None:
         """Timesteps of robots that move on their own (a distributed run)."""
-        self.time += substeps * self.timestep
+        self._before_step()
+        self.time += steps * self.timestep
         begun, x, v, a = self._plan.T
         tau = self.time - begun
         self.x = x + tau * (v + 0.5 * tau * a)
@@ -83,6 +87,18 @@ class IdealWorld:
     def settle(self) -> None:
         """Nothing settles in an ideal world."""
 
+    def _before_step(self) -> None:
+        for act in tuple(self.hooks.before_step):
+            act()
+
     def delivered(self) -> int:
         """Products dropped off."""
         return self.count
+
+    def unstable(self) -> str:
+        """It is always stable."""
+        return ""
+
+    def figures(self) -> PhysicsFigures | None:
+        """There are no bodies."""
+        return None

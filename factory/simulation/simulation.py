@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from factory.control.mode import Mode
+from factory.control.mode import Limits, Mode
 from factory.layout.layout import Layout
 from factory.modes.modes import operation_modes, robot_limits
 from factory.modes.staging import stages_of
@@ -20,8 +20,9 @@ from factory.plant.fused_bodies import bodies_of, fused_copies
 from factory.problem.robot_types import Catalogue, load_catalogue
 from factory.simulation.distributed import DistributedSupervisor
 from factory.simulation.ideal import IdealWorld
-from factory.simulation.run import PhysicsFigures, Run, busy_times
+from factory.simulation.run import Run, busy_times
 from factory.simulation.supervisor import Supervisor
+from factory.simulation.world import World
 from factory.support.errors import Diagnostic, InputError, RunError
 from factory.support.settings import MOST, Settings
 from factory.timing.pool import part_pool
@@ -29,6 +30,7 @@ from factory.timing.prediction import operation_delays, predict, ways_ahead
 
 if TYPE_CHECKING:
     from factory.mjcf.model import Model
+    from factory.simulation.mujoco.world import MujocoWorld
 
 Observer = Callable[[Any, Any], None]
 """Called after every tick with the world and the supervisor: to render, to log, to show
@@ -78,6 +80,7 @@ class Simulation:
         compiled: Compiled | None = None,
         fuse: bool = False,
         shown: bool = True,
+        fast: bool = True,
     ) -> None:
         self.layout, self.kind, self.units = layout, world, units
         self.seed, self.jitter, self.wip = seed, jitter, wip
@@ -94,7 +97,7 @@ class Simulation:
         self.counts = firings(factory.net, self.start)
         positions = start_positions(layout, self.start)
         self.model: Model | None = None
-        self.world: Any
+        self.world: World
         if world == "ideal":
             done = self.counts.get(factory.dropoff.end, 0)
             self.world = IdealWorld(
@@ -112,7 +115,9 @@ class Simulation:
             self.model = self.model or physical_model(
                 layout, units, self.settings, catalogue, wip, self.under_way(), fuse, shown
             )
-            self.world = _mujoco(self.model, positions, gains, units, self.counts, wip, loaded)
+            self.world = _mujoco(
+                self.model, positions, gains, units, self.counts, wip, loaded, fast
+            )
         self.before = self.world.delivered()
         self.supervisor = self._distributed() if distributed else self._central()
 
@@ -144,6 +149,19 @@ class Simulation:
             self.stages,
         )
 
+    @property
+    def physical(self) -> MujocoWorld:
+        """The world, where it is MuJoCo's; asked for in the ideal one, an AssertionError."""
+        from factory.simulation.mujoco.world import MujocoWorld
+
+        assert isinstance(self.world, MujocoWorld), "the ideal world has no bodies"
+        return self.world
+
+    def limit(self, limits: Limits) -> None:
+        """From now on axes have these limits."""
+        self.limits = limits
+        self.supervisor.limit(limits)
+
     def under_way(self) -> dict[str, int]:
         """How many copies of each part are in the factory in the marking where the run starts,
         those included that are being taken."""
@@ -167,7 +185,7 @@ class Simulation:
         while world.delivered() < goal and trouble is None:
             before = world.time
             supervisor.step(1 if observers else self._unseen(max_time))
-            if self.model is not None and (reason := world.unstable()):
+            if reason := world.unstable():
                 trouble = self._trouble("Unstable", f"{reason}, after {before:.2f} s", SMALLER)
                 return self._record(perf_counter() - begin - watched, before, trouble)
             if observers or glances:
@@ -192,12 +210,9 @@ class Simulation:
 
     def _record(self, wall: float, time: float, trouble: Diagnostic | None) -> Run:
         supervisor, world, factory = self.supervisor, self.world, self.layout.factory
-        physics = getattr(world, "physics_time", 0.0)
+        physics = world.physics_time
         predicted = predict(self.layout, self.delays, self.settings, self.kind, self.wip, self.ways)
         verdict = replay(factory.net, [e.transition for e in supervisor.events], self.start)
-        figures: PhysicsFigures | None = None
-        if self.model is not None:
-            figures = world.inspection.figures()
         return Run(
             self.kind,
             self.units,
@@ -213,7 +228,7 @@ class Simulation:
             tuple(supervisor.events),
             tuple(world.dropoffs),
             busy_times(factory, supervisor.events),
-            figures,
+            world.figures(),
             self.seed,
             self.jitter,
             trouble,
@@ -292,7 +307,7 @@ def start_positions(layout: Layout, marking: Marking) -> np.ndarray:
     return positions
 
 
-def _mujoco(*arguments: Any) -> Any:
+def _mujoco(*arguments: Any) -> World:
     from factory.simulation.mujoco.world import MujocoWorld
 
     return MujocoWorld(*arguments)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from html import escape
-from typing import Any
 
 import numpy as np
 
@@ -85,11 +84,14 @@ def page(session: Session) -> bytes:
 def stage_of(simulation: Simulation) -> Stage:
     """What there is to be drawn of a simulation that has not begun; bodies are where they are in
     the world."""
-    layout, world = simulation.layout, simulation.world
-    m, d, factory = world.m, world.d, layout.factory
+    layout, world = simulation.layout, simulation.physical
+    m, d, factory, address = world.m, world.d, layout.factory, world.motion.axes.qpos
     low, high = d.xpos.copy(), d.xpos.copy()
     for robot in factory.robots:
-        body, x = m.body(names.carriage(robot.name)).id, float(d.qpos[world.qpos[robot.index]])
+        body, x = (
+            m.body(names.carriage(robot.name)).id,
+            float(d.qpos[address[robot.index]]),
+        )
         ends = [layout.home(robot.index, o) for o in robot.operations]
         heading = np.array([*layout.guidepaths[robot.index].heading, 0.0])
         for end in (min(ends), max(ends)):
@@ -108,10 +110,10 @@ def stage_of(simulation: Simulation) -> Stage:
 
 def _ends(simulation: Simulation) -> Iterator[tuple[Operation, Floats]]:
     """The state of the engine with the robots of an operation where it ends."""
-    layout, world = simulation.layout, simulation.world
-    start: Any = world.d.qpos
+    layout, world = simulation.layout, simulation.physical
+    start, address = world.d.qpos, world.motion.axes.qpos
     for operation in layout.factory.operations:
         qpos = start.copy()
         for slot, robot in enumerate(operation.robots):
-            qpos[world.qpos[robot]] = layout.goal(operation.index, slot)
+            qpos[address[robot]] = layout.goal(operation.index, slot)
         yield operation, qpos

@@ -24,7 +24,7 @@ from factory.show.live.commands import (
     Speed,
     Step,
 )
-from factory.simulation.disturbance.hands import Hands
+from factory.simulation.disturbance.interventions import Interventions
 from factory.simulation.simulation import Observer, Simulation
 
 RATE = 30.0
@@ -79,10 +79,10 @@ class Session:
 
     def _begin(self) -> None:
         self.simulation = made = self._make()
-        self.hands = Hands(made)
+        self.interventions = Interventions(made)
         net = made.layout.factory.net.threaded
         self._numbers = {t.name: n for n, t in enumerate(net.transitions)}
-        m = made.world.m
+        m = made.physical.m
         self.bodies = np.flatnonzero(m.body_treeid >= 0)
         self._quiet = QUIET * max(made.delays)
         self._trouble = ""
@@ -137,7 +137,6 @@ class Session:
                 break
             before = len(supervisor.events)
             supervisor.step()
-            self.hands.let_go()
             observe(world, supervisor)
             count += 1
             if reason := world.unstable():
@@ -172,11 +171,11 @@ class Session:
             case Speed(factor):
                 self._speed = factor
             case Push(robot, share):
-                self.hands.push(robot, share, PUSH)
+                self.interventions.push(robot, share, PUSH)
             case Slow(robot, factor):
-                self.hands.slow(robot, factor)
+                self.interventions.slow(robot, factor)
             case Block(part, blocked):
-                (self.hands.block if blocked else self.hands.free)(part)
+                (self.interventions.block if blocked else self.interventions.free)(part)
         self._anchor()
 
     def _anchor(self) -> None:
@@ -185,7 +184,7 @@ class Session:
         self._paces: deque[tuple[float, float]] = deque([self._start], maxlen=int(RATE))
 
     def _publish(self) -> None:
-        world, supervisor = self.simulation.world, self.simulation.supervisor
+        world, supervisor = self.simulation.physical, self.simulation.supervisor
         poses = np.hstack([world.d.xpos[self.bodies], world.d.xquat[self.bodies]])
         (wall, time), (now, reached) = self._paces[0], self._paces[-1]
         self._number += 1
@@ -201,8 +200,8 @@ class Session:
             self._playing or self._stepping,
             self._speed,
             (reached - time) / (now - wall) if now > wall else 0.0,
-            dict(self.hands.slowed),
-            tuple(sorted(self.hands.blocked)),
+            dict(self.interventions.slowed),
+            tuple(sorted(self.interventions.blocked)),
             self._trouble or self._waits(),
         )
         with self._changed:

@@ -1,20 +1,13 @@
-"""Disturbances put to work in a simulation that is ready to run.
-
-Masses, friction and limits are written into the engine's model at once. Pushes, noise, delay and
-weak drives act in every timestep: `advance` and `sense` of that one world are wrapped. A drive's
-force is kp (reference - measured) + ...; a measurement that is off by e enters the engine's own
-feedback as the constant -kp e - kv e', which is added to its bias."""
+"""Disturbances put to work in a simulation that is ready to run."""
 
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Iterable
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterable
 
 import numpy as np
 
 from factory.control.mode import Array, Index, Limits
-from factory.mjcf import names
 from factory.simulation.disturbance.values import (
     Delay,
     Disturbance,
@@ -26,19 +19,10 @@ from factory.simulation.disturbance.values import (
     Push,
     Slowed,
 )
-from factory.simulation.mujoco.drives import INPUTS
-from factory.support.engine import mujoco
+from factory.simulation.mujoco.interference import Interference, Measure
+from factory.simulation.mujoco.world import MujocoWorld
+from factory.simulation.simulation import Simulation
 from factory.support.errors import Diagnostic, InputError, did_you_mean
-
-if TYPE_CHECKING:
-    from factory.simulation.simulation import Simulation
-
-Measure = Callable[[Array, Array], tuple[Array, Array]]
-"""True positions [m] and speeds [m/s] of the axes -> measured ones; called once a timestep."""
-
-HARD = 0.9999
-"""Impedance of dry friction: at the engine's default of 0.9 a robot creeps under forces far below
-it, and nothing ever sticks."""
 
 
 def disturb(simulation: Simulation, *disturbances: Disturbance) -> Simulation:
@@ -50,149 +34,82 @@ def disturb(simulation: Simulation, *disturbances: Disturbance) -> Simulation:
     """
     if not disturbances:
         return simulation
-    if simulation.model is None:
+    world = simulation.world
+    if not isinstance(world, MujocoWorld):
         raise _bad("the ideal world has nothing to disturb", "take the world mujoco")
-    acting = _Acting(simulation)
+    acting = _Acting(simulation, world)
     for disturbance in disturbances:
         acting.add(disturbance)
-    acting.begin()
+    if acting.pushes:
+        world.hooks.before_step.insert(0, acting.push)
     return simulation
 
 
 class _Acting:
-    """The disturbances of one world: what they have written, and what acts in every timestep."""
+    """The disturbances of one world, by names; `pushes`: bodies that are pushed at some time."""
 
-    def __init__(self, simulation: Simulation) -> None:
-        self.simulation, self.world = simulation, simulation.world
-        world, m = self.world, self.world.m
-        self.m, self.d = m, world.d
-        self.axes = np.arange(world.tray)
-        self.qpos, self.dof = world.qpos[self.axes], world.dof[self.axes]
-        number = {int(adr): n for n, adr in enumerate(m.actuator_ctrladr)}
-        self.actuator = np.array([number[int(adr)] for adr in world.control[self.axes]])
-        self.gain = np.ones(len(self.axes))
+    def __init__(self, simulation: Simulation, world: MujocoWorld) -> None:
+        self.simulation, self.world = simulation, world
+        self.interference = Interference(world)
         self.pushes: list[tuple[int, Push]] = []
-        self.measures: list[Measure] = []
-        self.measured: tuple[Array, Array] | None = None
 
     def add(self, disturbance: Disturbance) -> None:
+        act, count = self.interference, len(self.world.motion.axes) - 1
         match disturbance:
             case Push():
                 self.pushes.append((self._body(disturbance.body), disturbance))
-                self.world.vicinity.everything()
             case Mass():
-                self._weigh(disturbance)
+                act.weigh(self._parts(disturbance.parts), disturbance.factor)
             case Gain():
-                self.gain[self._of(disturbance.robots)] *= disturbance.factor
+                act.weaken(self._axes(disturbance.robots), disturbance.factor)
             case Friction():
-                dofs = self.dof[self._of(disturbance.robots)]
-                self.m.dof_frictionloss[dofs] = disturbance.newtons
-                self.m.dof_solimp[dofs, :2] = HARD
+                act.rub(self._axes(disturbance.robots), disturbance.newtons)
             case Noise():
-                self.measures.append(_noise(disturbance, len(self.axes)))
+                act.mismeasure(_noise(disturbance, count))
             case Delay():
-                late = round(disturbance.seconds / self.m.opt.timestep)
-                self.measures.append(_late(deque(maxlen=late + 1)))
+                late = round(disturbance.seconds / self.world.model.settings.timestep)
+                act.mismeasure(_late(deque(maxlen=late + 1)))
             case Slowed():
-                self._slow(disturbance)
+                limits, axes = self.simulation.limits, self._axes((disturbance.robot,))
+                speed = np.array(limits.speed)
+                speed[axes] *= disturbance.factor
+                self.simulation.limit(Limits(speed, limits.acceleration))
             case Dragged():
-                self._drag(disturbance)
+                axes = self._axes((disturbance.robot,))
+                act.drag(axes, disturbance.factor * self.simulation.limits.speed[axes])
 
-    def begin(self) -> None:
-        """Write the gains, and wrap the world where something acts as it goes."""
-        m, touched = self.m, self.actuator[self.gain != 1.0]
-        factor = self.gain[self.gain != 1.0][:, None]
-        m.actuator_biasprm[touched, 1:3] *= factor
-        m.actuator_forcerange[touched] *= factor
-        if not (self.pushes or self.measures or len(touched)):
-            return
-        advance, sense = self.world.advance, self.world.sense
-
-        def disturbed(substeps: int) -> None:
-            for _ in range(substeps):
-                self._act()
-                advance(1)
-
-        def sensed() -> tuple[Array, Array]:
-            return sense() if self.measured is None else self.measured
-
-        self.world.advance, self.world.sense = disturbed, sensed
-        self.world.at_once = 1
-        self._measure()
-
-    def _act(self) -> None:
-        """Before a timestep."""
-        now, half = self.d.time, self.m.opt.timestep / 2
-        for body, _ in self.pushes:
-            self.d.xfrc_applied[body, :3] = 0.0
+    def push(self) -> None:
+        """Before a timestep: the sum of the forces that act on each body in it."""
+        now, half = self.world.time, self.world.model.settings.timestep / 2
+        forces = {body: np.zeros(3) for body, _ in self.pushes}
         for body, push in self.pushes:
             if push.at - half <= now < push.at + push.duration - half:
-                self.d.xfrc_applied[body, :3] += push.force
-        self._measure()
-        bias = np.zeros(len(self.gain))
-        for axis in np.flatnonzero(self.gain != 1.0).tolist():
-            bias[axis] = (self.gain[axis] - 1.0) * self._told(axis)[2]
-        if self.measured is not None:
-            q, v = self.measured
-            kp, kv = self.m.actuator_biasprm[self.actuator, 1:3].T
-            bias += kp * (q - self.d.qpos[self.qpos]) + kv * (v - self.d.qvel[self.dof])
-            self.world.rouse(self.axes)  # or the engine lets sleep what stands
-        self.m.actuator_biasprm[self.actuator, 0] = bias
+                forces[body] += push.force
+        for body, force in forces.items():
+            self.interference.push(body, force)
 
-    def _told(self, axis: int) -> Array:
-        """What a drive reads in this step: position [m], speed [m/s], force [N]."""
-        m, d, read = self.m, self.d, np.zeros((INPUTS, 1))
-        return np.asarray(mujoco.mj_readCtrl(m, d, self.actuator[axis], d.time, read, -1))
-
-    def _measure(self) -> None:
-        if not self.measures:
-            return
-        q, v = self.d.qpos[self.qpos].copy(), self.d.qvel[self.dof].copy()
-        for measure in self.measures:
-            q, v = measure(q, v)
-        self.measured = q, v
-
-    def _weigh(self, mass: Mass) -> None:
-        copies = self.simulation.model.copies  # type: ignore[union-attr]
-        for label in mass.parts:
+    def _parts(self, labels: Iterable[str]) -> list[int]:
+        """The bodies of all copies of some labels, of all for none."""
+        copies = self.world.parts.copies.body
+        for label in labels:
             _known(label, copies, "part")
-        for label in mass.parts or copies:
-            for number in range(1, copies[label] + 1):
-                body = self.m.body(names.part(label, number)).id
-                self.m.body_mass[body] *= mass.factor
-                self.m.body_inertia[body] *= mass.factor
-        mujoco.mj_setConst(self.m, mujoco.MjData(self.m))
-        self.world.stock.weigh()
+        return [int(body) for label in labels or copies for body in copies[label]]
 
-    def _slow(self, slowed: Slowed) -> None:
-        limits = self.simulation.limits
-        speed = np.array(limits.speed)
-        speed[self._of((slowed.robot,))] *= slowed.factor
-        changed = Limits(speed, limits.acceleration)
-        self.simulation.limits = changed
-        self.simulation.supervisor.limit(changed)
-
-    def _drag(self, dragged: Dragged) -> None:
-        axes = self._of((dragged.robot,))
-        force = self.m.actuator_forcerange[self.actuator[axes], 1]
-        top = dragged.factor * self.simulation.limits.speed[axes]
-        self.m.dof_damping[self.dof[axes]] = force / top
-
-    def _of(self, robots: Iterable[str]) -> Index:
+    def _axes(self, robots: Iterable[str]) -> Index:
         """The axes of some robots, of all for none."""
         chosen = dict.fromkeys(robots)
         if not chosen:
-            return self.axes
+            return np.arange(len(self.world.motion.axes) - 1)
         known = {robot.name: robot.index for robot in self.simulation.layout.factory.robots}
         for name in chosen:
             _known(name, known, "robot")
-        axes = (axis for name in chosen for axis in self.world.axes_of(known[name]))
-        return np.array(sorted(axes), np.intp)
+        of_robot = self.world.motion.axes.of_robot
+        return np.array(sorted(axis for name in chosen for axis in of_robot(known[name])), np.intp)
 
     def _body(self, name: str) -> int:
-        known = [self.m.body(n).name for n in range(1, self.m.nbody)]
-        _known(name, known, "body")
-        return int(self.m.body(name).id)
+        m = self.world.m
+        _known(name, [m.body(n).name for n in range(1, m.nbody)], "body")
+        return int(m.body(name).id)
 
 
 def _noise(noise: Noise, axes: int) -> Measure:
@@ -220,5 +137,5 @@ def _known(name: str, known: Iterable[str], kind: str) -> None:
         raise _bad(f"there is no {kind} '{name}' to disturb", hint)
 
 
-def _bad(message: str, hint: Any) -> InputError:
+def _bad(message: str, hint: str) -> InputError:
     return InputError(Diagnostic("BadValue", message, None, hint))

@@ -1,61 +1,36 @@
-"""How far apart frames were when a grip joined them. What is needed to tell is noted at once; it is
-worked out when somebody asks."""
+"""The frames that welds join, and how far apart they are."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 
-from factory.control.mode import Index
-from factory.geometry.meshes import Array
+from factory.control.mode import Array, Index
 from factory.support.engine import mujoco
 
-MANY = 1000
-"""So many notes are worked out at once, asked or not."""
 
+class WeldFrames:
+    """The welds of a model whose first body only slides, and whose second is free.
 
-class Gaps:
-    """Of the welds of a model whose first body only slides, and whose second is free.
-
-    The engine has bodies where its last step began: positions are worked out from those of the
-    slides, of which a body has two at most, the one that carries it and that one's.
+    The engine has the bodies where its last step began: frames are worked out from the positions of
+    the slides, of which a body has two at most, the one that carries it and that one's.
     """
 
     def __init__(self, m: mujoco.MjModel, d: mujoco.MjData) -> None:
-        self.d = d
+        self._d = d
         mujoco.mj_kinematics(m, d)
-        holder, slides = m.eq_obj1id, _slides(m)
-        joint = slides[holder]
+        joint = _slides(m)[m.eq_obj1id]
         self._slides = m.jnt_qposadr[joint]
         self._ways = np.where(joint[:, :, None] < 0, 0.0, d.xaxis[joint])
         gone = (self._ways * d.qpos[self._slides][:, :, None]).sum(axis=1)
         self._frame = held_at(m, d, np.arange(m.neq)) - gone
         self._free = m.jnt_qposadr[m.body_jntadr][:, None] + np.arange(3)
-        self._notes: list[tuple[Index, Array, Array]] = []
-        self._largest = 0.0
 
-    def note(self, welds: Sequence[int], bodies: Sequence[int]) -> None:
-        """Welds are about to join bodies."""
-        q = self.d.qpos
-        self._notes.append((np.array(welds), q[self._slides[welds]], q[self._free[bodies]]))
-        if len(self._notes) >= MANY:
-            self.largest()
-
-    def largest(self) -> float:
-        """The largest gap of all that has been noted since `forget` [m]."""
-        if self._notes:
-            welds, slides, there = map(np.concatenate, zip(*self._notes, strict=True))
-            self._notes.clear()
-            gone = (self._ways[welds] * slides[:, :, None]).sum(axis=1)
-            apart = there - (self._frame[welds] + gone)
-            self._largest = max(self._largest, float(np.sqrt((apart * apart).sum(axis=1).max())))
-        return self._largest
-
-    def forget(self) -> None:
-        """Begin anew."""
-        self._notes.clear()
-        self._largest = 0.0
+    def apart(self, welds: Index, bodies: Index) -> float:
+        """The largest distance [m] between where welds hold bodies and where those are."""
+        q = self._d.qpos
+        gone = (self._ways[welds] * q[self._slides[welds]][:, :, None]).sum(axis=1)
+        offset = q[self._free[bodies]] - (self._frame[welds] + gone)
+        return float(np.sqrt((offset * offset).sum(axis=1).max()))
 
 
 def held_at(m: mujoco.MjModel, d: mujoco.MjData, welds: Index) -> Array:

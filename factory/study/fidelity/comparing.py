@@ -111,7 +111,7 @@ def measure_seed(case: Case, seed: int) -> SeedRecord:
     ideal = Simulation(layout, "ideal", units, seed, case.jitter, case.settings)
     physical = Simulation(layout, "mujoco", units, seed, case.jitter, case.settings)
     if case.alter is not None:
-        case.alter(physical.world.m)
+        case.alter(physical.physical.m)
     measurement = Measurement(physical)
     begin = perf_counter()
     thought, run = ideal.run(max_time=case.max_time), measurement.run(case.max_time)

@@ -28,8 +28,9 @@ class Drives:
 
     def tick(self, v: Array, force: Array) -> None:
         """The steps of a tick: speeds (n + 1, nv), forces (n, nu)."""
-        d, control = self.world.d, self.world.control
-        error = np.abs(d.qpos[self.world.qpos] - d.ctrl[control])
+        d, motion = self.world.d, self.world.motion
+        control = motion.drives.control
+        error = np.abs(d.qpos[motion.axes.qpos] - d.ctrl[control])
         self.error = max(self.error, float(error.max()))
         self.tracking.add(error[d.ctrl[control + 1] != 0.0])
         share = np.abs(force) / self.limit

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from factory.control.mode import Array, Index
-from factory.simulation.mujoco.fusing import turns
+from factory.simulation.mujoco.fusing import rotations
 from factory.study.fidelity.record import HandOff
 from factory.study.fidelity.welds import Velocities, Welds
 from factory.support.engine import mujoco
@@ -23,7 +23,7 @@ class HandOffs:
 
     def __init__(self, m: mujoco.MjModel, welds: Welds, velocities: Velocities) -> None:
         self.m, self.welds, self.velocities = m, welds, velocities
-        self.turn = turns(m.body_iquat)
+        self.turn = rotations(m.body_iquat)
         self.done: list[HandOff] = []
         self._watched: list[_Watched] = []
         self._join()

@@ -32,9 +32,10 @@ class Measurement:
     """Measures the simulation it is made for; `run` goes through it."""
 
     def __init__(self, simulation: Simulation) -> None:
-        world, model = simulation.world, simulation.model
+        model = simulation.model
         if model is None:
             raise ValueError("only a run in MuJoCo can be measured")
+        world = simulation.physical
         self.simulation, self.m, self.d = simulation, world.m, world.d
         layout = simulation.layout
         self.shadow = Shadow(self.m, self.d, layout.clearance + BEYOND)
@@ -105,7 +106,7 @@ class Measurement:
         handoffs, misplaced = self.handoffs.all(), self.finished.found()
         drives, payload = self.drives, self.payload
         moved = self.m.body_mass[self.m.body_treeid >= 0]
-        physics = self.simulation.world.inspection.figures()
+        physics = self.simulation.physical.figures()
         return {
             "tracking_error_max_mm": 1e3 * drives.error,
             "tracking_error_p99_mm": 1e3 * drives.tracking.quantile(0.99),

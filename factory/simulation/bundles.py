@@ -1,0 +1,42 @@
+"""The bundles of modes that are active together, made once each."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from factory.control.mode import Index, Limits, Mode
+from factory.control.navigation import Bundle
+from factory.control.obstacles import ranges
+
+KEPT = 500
+"""So many bundles are kept: in steady production the same modes come together again."""
+
+
+class Bundles:
+    """Bundles of `modes`, each on the axes that `axes_of` has for it, under the limits of axes."""
+
+    def __init__(
+        self, modes: Sequence[Mode], axes_of: Sequence[tuple[int, ...]], limits: Limits
+    ) -> None:
+        self.modes, self._axes_of = tuple(modes), tuple(axes_of)
+        self._axes = np.array([axis for axes in axes_of for axis in axes], np.intp)
+        self._kept: dict[tuple[int, ...], tuple[Bundle, Index]] = {}
+        self.limit(limits)
+
+    def limit(self, limits: Limits) -> None:
+        """From now on axes have these limits."""
+        self.limits = limits
+        self._all = Bundle.of(self.modes, [limits.of(axes) for axes in self._axes_of])
+        self._kept.clear()
+
+    def of(self, numbers: tuple[int, ...]) -> tuple[Bundle, Index]:
+        """The bundle of some modes, by number, and their axes, a mode after the other."""
+        if numbers not in self._kept:
+            if len(self._kept) == KEPT:
+                self._kept.clear()
+            chosen = np.array(numbers, np.intp)
+            slots = ranges(self._all.starts[chosen], self._all.sizes[chosen])
+            self._kept[numbers] = self._all.select(numbers), self._axes[slots]
+        return self._kept[numbers]

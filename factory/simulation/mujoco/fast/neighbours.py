@@ -1,0 +1,129 @@
+"""Which holders can meet at all, and what the engine's broad phase looks at for that.
+
+The engine boxes every body that can collide in every step. Most of a factory rests, far from what
+moves. A holder (a robot, a feeder, the tray) sweeps one box with all that it ever holds, seen from
+above; those whose boxes are apart never meet. So the broad phase looks at what moves and its
+neighbours. No pair that could touch is left out: a run is the same to the last bit. Once anything
+touches, everything is looked at until other modes begin.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+
+from factory.control.mode import Array, Index, Truth
+from factory.simulation.mujoco.axes import Axes
+from factory.simulation.mujoco.contacts import NOBODY, ContactMasks
+from factory.simulation.mujoco.gaps import held_at
+from factory.simulation.mujoco.parts import Parts
+from factory.support.engine import mujoco
+
+MARGIN = 5e-3
+"""Nothing is further from its way than this, or from its place in the hand, unless it is touched
+[m]."""
+
+FEW = 120
+"""Where there are fewer holders all bodies are looked at: choosing takes as long as it saves."""
+
+
+class Neighbours:
+    """The holders of a model's parts, by their codes, where the run begins; `culls`: some may be
+    left out."""
+
+    def __init__(self, m: mujoco.MjModel, d: mujoco.MjData, parts: Parts, axes: Axes) -> None:
+        self._masks, self._holder = parts.masks, _holders(parts, axes)
+        trees = dict(zip(axes.tree.tolist(), self._holder.tolist(), strict=True))
+        self._count = parts.masks.own(trees, parts.tray + len(parts.feeders.welds)) + 1
+        self.culls = self._count > FEW
+        self._seen, self._before = np.ones(self._count, bool), np.zeros(self._count, bool)
+        self._met: dict[int, Truth] = {}
+        if self.culls:
+            mujoco.mj_kinematics(m, d)
+            self._low, self._high = _swept(m, d, parts, axes, self._holder, self._count)
+
+    def turn(self, active: Index) -> None:
+        """These axes move from now on; what has moved until now comes to rest."""
+        if not self.culls:
+            return
+        before = self._before
+        moves = np.zeros(self._count, bool)
+        moves[self._holder[active]] = True
+        self._seen, self._before = np.zeros(self._count, bool), moves
+        self._include((moves | before).nonzero()[0].tolist())
+
+    def notice(self) -> None:
+        """Look at holders that have been given something, too."""
+        if self._masks.fresh:
+            if self.culls:
+                self._include(self._masks.fresh - {NOBODY})
+            self._masks.fresh.clear()
+
+    def _include(self, holders: Iterable[int]) -> None:
+        """Look at holders and all that they can meet, too."""
+        for holder in holders:
+            self._seen |= self._meets(holder)
+        self._masks.look(self._seen)
+
+    def everything(self) -> None:
+        """Look at everything until other modes begin."""
+        if not self._seen.all():
+            self._seen[:] = True
+            self._masks.look(self._seen)
+
+    def _meets(self, holder: int) -> Truth:
+        """The holders whose boxes come near that of one."""
+        found = self._met.get(holder)
+        if found is None:
+            low, high = self._low[holder], self._high[holder]
+            found = ((self._low <= high) & (self._high >= low)).all(axis=1)
+            found[holder] = True
+            self._met[holder] = found
+        return found
+
+
+def _holders(parts: Parts, axes: Axes) -> Index:
+    """The code of the holder that each axis (axes,) is of."""
+    robots = len(parts.model.factory.robots)
+    return np.array([*range(1, robots + 1), *(robot + 1 for robot in axes.lift), parts.tray])
+
+
+def _swept(
+    m: mujoco.MjModel, d: mujoco.MjData, parts: Parts, axes: Axes, holder: Index, count: int
+) -> tuple[Array, Array]:
+    """The corners (count, 2) [m] of the box that each holder sweeps, with all that it ever holds,
+    from one end of its way to the other."""
+    masks = parts.masks
+    low, high = boxes(m, d, masks)
+    bodies = np.flatnonzero(masks.code != NOBODY)
+    welds, codes = np.array([*parts.grips()]).T
+    held = m.eq_obj2id[welds]
+    code = np.concatenate([masks.code[bodies], codes])
+    place = np.concatenate([d.xpos[bodies], held_at(m, d, welds)])[:, :2]
+    which = np.concatenate([bodies, held])
+    least, most = np.full((count, 2), np.inf), np.full((count, 2), -np.inf)
+    np.minimum.at(least, code, place + low[which])
+    np.maximum.at(most, code, place + high[which])
+    layout = parts.model.layout
+    lengths = [path.length for path in layout.guidepaths]
+    slides = np.r_[: len(lengths), axes.tray]
+    at, way = d.qpos[axes.qpos[slides]], d.xaxis[m.body_jntadr[axes.body[slides]], :2]
+    ends = np.array([-at, [*lengths, layout.outfeed_way] - at])[:, :, None] * way
+    least[holder[slides]] += ends.min(axis=0)
+    most[holder[slides]] += ends.max(axis=0)
+    return least - MARGIN, most + MARGIN
+
+
+def boxes(m: mujoco.MjModel, d: mujoco.MjData, masks: ContactMasks) -> tuple[Array, Array]:
+    """The corners of each body's box from its origin, seen from above (nbody, 2) [m]: of what can
+    collide of it, as it is turned now."""
+    turn, body = d.geom_xmat.reshape(-1, 3, 3), m.geom_bodyid
+    middle = d.geom_xpos + (turn @ m.geom_aabb[:, :3, None])[:, :, 0] - d.xpos[body]
+    half = (np.abs(turn) @ m.geom_aabb[:, 3:, None])[:, :, 0]
+    low, high = np.full((m.nbody, 2), np.inf), np.full((m.nbody, 2), -np.inf)
+    solid = (m.geom_contype | m.geom_conaffinity) != 0
+    solid[np.concatenate([*masks.solid.values()])] = True
+    np.minimum.at(low, body[solid], (middle - half)[solid, :2])
+    np.maximum.at(high, body[solid], (middle + half)[solid, :2])
+    return low, high

@@ -1,0 +1,57 @@
+"""What robots hold, and the welds by which they hold it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from factory.mjcf import names
+from factory.mjcf.model import Model
+from factory.simulation.mujoco.welds import Welds
+from factory.support.engine import mujoco
+
+
+@dataclass(slots=True)
+class Hand:
+    """The `bodies` that a robot holds, by label, and the `unit` that they are for."""
+
+    unit: int
+    bodies: dict[str, int]
+
+
+class Hands:
+    """The hands of all robots: `of[robot]` for each that holds something (index); `grip`: the weld
+    by which a robot holds a label."""
+
+    def __init__(self, m: mujoco.MjModel, model: Model, welds: Welds) -> None:
+        self.of: dict[int, Hand] = {}
+        self._welds, self._mass = welds, model.carried.mass
+        self.grip = {
+            (robot.index, label): m.equality(names.grip(robot.name, label)).id
+            for robot in model.factory.robots
+            for label in model.carried.handled(model.factory, robot.index)
+        }
+
+    def take(self, robot: int, unit: int, bodies: Mapping[str, int]) -> None:
+        """A robot takes bodies over: their gaps are measured."""
+        self._welds.grip({self.grip[robot, label]: body for label, body in bodies.items()})
+        self._hold(robot, unit, bodies)
+
+    def begin_with(self, robot: int, unit: int, bodies: Mapping[str, int]) -> None:
+        """A robot has bodies that come from no other hand."""
+        self._welds.join({self.grip[robot, label]: body for label, body in bodies.items()})
+        self._hold(robot, unit, bodies)
+
+    def _hold(self, robot: int, unit: int, bodies: Mapping[str, int]) -> None:
+        self._welds.hold(bodies.values(), robot + 1)
+        self.of.setdefault(robot, Hand(unit, {})).bodies.update(bodies)
+
+    def let_go(self, robot: int) -> Hand:
+        """A robot lets go of all that it holds, and says what that was."""
+        hand = self.of.pop(robot)
+        self._welds.loose([self.grip[robot, label] for label in hand.bodies])
+        return hand
+
+    def loads(self) -> dict[int, float]:
+        """What each robot that holds something carries [kg]."""
+        return {r: sum(self._mass[label] for label in hand.bodies) for r, hand in self.of.items()}

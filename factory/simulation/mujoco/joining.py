@@ -1,0 +1,85 @@
+"""Joined sub-assemblies become one body each, once their parts have settled."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from types import MappingProxyType
+
+import numpy as np
+
+from factory.mjcf.model import Model
+from factory.simulation.mujoco.copies import Copies
+from factory.simulation.mujoco.feeders import Feeders
+from factory.simulation.mujoco.fusing import RIGID, SETTLING, Fusion
+from factory.simulation.mujoco.hands import Hands
+from factory.simulation.mujoco.welds import Welds
+from factory.support.engine import mujoco
+
+NOTHING: Mapping[int, float] = MappingProxyType({})
+
+
+class Joining:
+    """Where the model has bodies for sub-assemblies: `waiting`, the label that each robot (index)
+    has joined and since when [s]; `misfit`: how far out of place any vertex of a unit's parts was
+    when they became one [m]."""
+
+    def __init__(
+        self, model: Model, hands: Hands, copies: Copies, feeders: Feeders, welds: Welds
+    ) -> None:
+        self._model, self._hands, self._copies = model, hands, copies
+        self._feeders, self._welds = feeders, welds
+        self.waiting: dict[int, tuple[str, float]] = {}
+        self.misfit: dict[int, float] = {}
+
+    def weigh(self, m: mujoco.MjModel, d: mujoco.MjData) -> None:
+        """From now on bodies have the masses that the model has."""
+        places, radii = np.zeros((m.nbody, 3)), np.zeros(m.nbody)
+        for label, ids in self._copies.body.items():
+            places[ids] = self._model.carried.centre[label]
+            radii[ids] = self._model.carried.radius[label]
+        self.fusion = Fusion(m, d, places, radii)
+
+    def joined(self, robot: int, label: str, now: float) -> None:
+        """A robot has joined the parts of a sub-assembly."""
+        if label in self._model.carried.wholes:
+            self.waiting[robot] = label, now
+
+    def settle(self, now: float) -> None:
+        """Let one body take the place of those that a robot has joined, once they have settled."""
+        late = [robot for robot, (_, since) in self.waiting.items() if now - since > SETTLING]
+        if late:
+            apart = dict(zip(late, self._misfits(late), strict=True))
+            self.fuse([robot for robot in late if apart[robot] < RIGID], apart)
+            self._welds.write()
+
+    def fuse(self, robots: Iterable[int], apart: Mapping[int, float] = NOTHING) -> None:
+        """Let one body each take the place of those that robots (index) have joined, if it has not
+        yet. Where no copy of that body is free, its holder's bodies become one first. `apart`:
+        misfits that are known [m]."""
+        for robot in robots:
+            if robot not in self.waiting:
+                continue
+            label, _ = self.waiting.pop(robot)
+            if not self._copies.free[label]:
+                holders = (r for r in self.waiting if label in self._hands.of[r].bodies)
+                self.fuse([next(holders)])
+            misfit = apart[robot] if robot in apart else self._misfits([robot])[0]
+            self._become_one(robot, label, misfit)
+
+    def _misfits(self, robots: Sequence[int]) -> list[float]:
+        """How far out of place anything is of what each robot holds [m]."""
+        held = [[*self._hands.of[robot].bodies.values()] for robot in robots]
+        return list(map(float, self.fusion.misfits(held)))
+
+    def _become_one(self, robot: int, label: str, misfit: float) -> None:
+        """A robot gets one body, of this label, for all that it holds. A body that has just become
+        free may be that one, so it is put away first."""
+        self._welds.write()
+        hand = self._hands.of[robot]
+        unit, bodies = hand.unit, [*hand.bodies.values()]
+        self.misfit[unit] = max(self.misfit.get(unit, 0.0), misfit)
+        whole = self._copies.take(label, unit)
+        self.fusion.fuse(bodies, whole)
+        self._hands.let_go(robot)
+        self._feeders.retire(hand.bodies, unit)
+        self._hands.begin_with(robot, unit, {label: whole})

@@ -1,0 +1,147 @@
+"""How the axes of a factory move in the engine: references, drives, sleep, and the steps."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from factory.control.mode import Array, Index
+from factory.control.navigation import Bundle
+from factory.mjcf.model import GRAVITY, HEAD_MASS, Model
+from factory.simulation.mujoco.axes import Axes
+from factory.simulation.mujoco.courses import Follower, along, planned
+from factory.simulation.mujoco.drives import Drives
+from factory.simulation.mujoco.outfeed import Outfeed
+from factory.simulation.mujoco.sleep import Sleep
+from factory.simulation.mujoco.stepping import Stepping
+from factory.support.engine import mujoco
+
+
+class Motion:
+    """The axes of a model and their motion from `start` (axes without the tray,) [m] on.
+
+    `robots`: follows the active modes, on the axes `active`. `stepping` is set before the first
+    step.
+    """
+
+    stepping: Stepping
+
+    def __init__(
+        self, m: mujoco.MjModel, d: mujoco.MjData, model: Model, start: Array, gains: Array
+    ) -> None:
+        self.axes, self.settings = Axes.of(m, model.factory), model.settings
+        m.actuator_biasprm[self.axes.actuator[:-1], 1:3] *= np.asarray(gains)[:, None]
+        body, dof = self.axes.body, self.axes.dof
+        own = m.body_subtreemass[body] + m.dof_armature[dof]
+        self.drives = Drives(m, d, self.axes.actuator, own.round(9))
+        self.sleep = Sleep(m, d, self.axes.tree)
+        x, v = np.append(start, 0.0), np.zeros(len(self.axes))
+        d.qpos[self.axes.qpos] = x
+        self.robots = Follower(x, v, self.drives, self.settings.substeps)
+        tray = Follower(x, v, self.drives, self.settings.substeps)
+        self.outfeed = Outfeed(d, model, self.axes, tray, self.drives)
+        self.active: Index = np.empty(0, np.intp)
+
+    def begin(self, loads: Mapping[int, float]) -> None:
+        """All axes stand, and each robot (index) carries its load [kg]."""
+        every = np.arange(len(self.axes))
+        self.load([*self.axes.lift], [0.0] * len(self.axes.lift))
+        self.load([*loads], [*loads.values()])
+        self.robots.stop(every)
+
+    def load(self, robots: Sequence[int], loads: Sequence[float]) -> None:
+        """From their next courses on robots (index) carry so much [kg]."""
+        if not robots:
+            return
+        lift, mass = self.axes.lift, np.array(loads)
+        self.drives.load(np.array(robots), mass, np.zeros(len(mass)))
+        lifts = [n for n, robot in enumerate(robots) if robot in lift]
+        if lifts:
+            axes = np.array([lift[robots[n]] for n in lifts])
+            self.drives.load(axes, mass[lifts], (HEAD_MASS + mass[lifts]) * GRAVITY)
+
+    def turn(self, active: Index) -> None:
+        """Other modes are active. Robots whose operation has ended stop where their reference is:
+        they may hand over at a low speed, which would carry them out of the goal, and of the next
+        domain."""
+        left = np.zeros(len(self.axes), bool)
+        left[self.active] = True
+        left[active] = False
+        (over,) = left.nonzero()
+        if len(over):
+            self.robots.stop(over)
+            self.sleep.may_sleep(over)
+        self.sleep.stay_awake(active)
+        self.active, self.robots.course = active, None
+        moving = [active, self.outfeed.axis] if self.outfeed.moves else [active]
+        self.stepping.turn(np.concatenate(moving))
+
+    def step(self, bundle: Bundle | None, ticks: int) -> int:
+        """Follow the modes of a bundle, and the tray's way, for some ticks, but not past the end of
+        a course; gives how many."""
+        ticks = min(ticks, self.stepping.at_once)
+        if bundle is not None:
+            if not self.robots.left:
+                self._plan(bundle)
+                if self.outfeed.moves:  # its courses end with those of the robots
+                    self.outfeed.follower.course = None
+            ticks = min(ticks, self.robots.left)
+        ticks = self.move_tray(ticks)
+        if bundle is not None:
+            self.robots.show(ticks)
+        self.stepping.advance(ticks * self.settings.substeps)
+        return ticks
+
+    def move_tray(self, ticks: int) -> int:
+        """The tray follows its way for some ticks, but not past the end of a course; gives how
+        many. Come to its goal, it stands."""
+        outfeed, follower = self.outfeed, self.outfeed.follower
+        if not outfeed.moves:
+            if follower.course is not None:
+                follower.stop(outfeed.axis)
+                self.sleep.may_sleep(outfeed.axis)
+            return ticks
+        if not follower.left:
+            follower.begin(outfeed.axis, self.stepping.course(outfeed.beginning, outfeed.course))
+        ticks = min(ticks, follower.left)
+        follower.show(ticks)
+        return ticks
+
+    def _plan(self, bundle: Bundle) -> None:
+        """The next stride of the active modes. The load of each robot is that of its operation."""
+        axes, robots, settings = self.active, self.robots, self.settings
+        x, v = robots.x[axes], robots.v[axes]
+        course = self.stepping.course(
+            (bundle, x.tobytes(), v.tobytes()),
+            lambda: planned(
+                self.drives,
+                axes,
+                (x, v),
+                (settings.stride, settings.substeps),
+                along(bundle, settings.tick),
+            ),
+        )
+        robots.begin(axes, course)
+
+    def send_tray(self, loaded: bool) -> None:
+        """The tray goes away with a product, or home without."""
+        self.outfeed.send(loaded)
+        self.sleep.stay_awake(self.outfeed.axis)
+
+    def move(self, axes: Index, x: Array, v: Array, a: Array) -> None:
+        """From now on `axes` run from x [m] at speed v [m/s] under acceleration a [m/s²], for as
+        long as setpoints can be written ahead, or until they are told otherwise."""
+        self.robots.x[axes], self.robots.v[axes] = x, v
+        moves = (np.asarray(v) != 0.0) | (np.asarray(a) != 0.0)
+        if not moves.any():
+            self.robots.stop(axes)
+            self.sleep.may_sleep(axes)
+            return
+        most = self.drives.most
+        seconds = most * self.settings.timestep
+        v1 = v + seconds * a
+        ends = np.stack([x, x + seconds / 2 * (v + v1)]), np.stack([v, v1])
+        setpoints = self.drives.sampled(axes, *ends, np.asarray(a)[None], most)
+        self.drives.follow(axes, setpoints)
+        self.sleep.stay_awake(axes)

@@ -1,0 +1,56 @@
+"""Sleep: the engine leaves out what has been slow for a while, until it is woken."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+
+from factory.control.mode import Index
+from factory.support.engine import mujoco
+
+MAY_SLEEP, STAYS_AWAKE = (
+    int(getattr(mujoco.mjtSleepPolicy, f"mjSLEEP_{name}")) for name in ("ALLOWED", "NEVER")
+)
+
+AWAKE = -0.0
+"""Written over a speed of zero it wakes a sleeping body and changes nothing else."""
+
+FRESH = -1 - int(mujoco.mjMINAWAKE)
+"""The engine's number of a tree that has just begun to be slow."""
+
+
+class Sleep:
+    """Which axes stay awake, by their kinematic `trees` (axes,), and how bodies are woken."""
+
+    def __init__(self, m: mujoco.MjModel, d: mujoco.MjData, trees: Index) -> None:
+        self._m, self._d, self._trees = m, d, trees
+        self._tree = np.where(m.body_dofnum > 0, m.body_treeid, -1)
+        self._awake = np.zeros(len(trees), bool)
+
+    def stay_awake(self, axes: Index) -> None:
+        """Axes of an active mode do not sleep: a robot that fell asleep before its next setpoint
+        would never move again."""
+        new = axes[~self._awake[axes]]
+        if len(new):
+            self._awake[new] = True
+            self._m.tree_sleep_policy[self._trees[new]] = STAYS_AWAKE
+            self._rouse(self._trees[new])
+
+    def may_sleep(self, axes: Index) -> None:
+        """Axes are in no active mode any more; but what an awake axis belongs to stays awake."""
+        self._awake[axes] = False
+        self._m.tree_sleep_policy[self._trees[axes]] = MAY_SLEEP
+        self._m.tree_sleep_policy[self._trees[self._awake]] = STAYS_AWAKE
+
+    def wake(self, bodies: Iterable[int]) -> None:
+        """Wake bodies that sleep, and keep those awake that are about to fall asleep."""
+        trees = self._tree[np.fromiter(bodies, np.intp)]
+        self._rouse(trees[trees >= 0])
+
+    def _rouse(self, trees: Index) -> None:
+        asleep, speed = self._d.tree_asleep, self._d.qvel
+        awake = asleep[trees] < 0
+        asleep[trees[awake]] = FRESH
+        dofs = self._m.tree_dofadr[trees[~awake]]
+        speed[dofs[speed[dofs] == 0.0]] = AWAKE

@@ -1,0 +1,99 @@
+"""What a factory runs in: the interface of the ideal world and of MuJoCo."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from typing import Protocol
+
+from factory.control.mode import Array, Index
+from factory.control.navigation import Bundle
+from factory.plant.factory import Operation
+from factory.simulation.run import PhysicsFigures
+
+Job = tuple[Operation, int]
+"""An operation with the number of the unit that it works on."""
+
+
+@dataclass(slots=True)
+class Hooks:
+    """Where others take part in a world.
+
+    `before_step`: called before every timestep. `sensors`: from positions [m] and speeds [m/s] of
+    all axes to what is sensed. `gates`: an operation may start only where all say so.
+    """
+
+    before_step: list[Callable[[], None]] = field(default_factory=list)
+    sensors: list[Callable[[Array, Array], tuple[Array, Array]]] = field(default_factory=list)
+    gates: list[Callable[[Operation, int], bool]] = field(default_factory=list)
+
+    def sensed(self, x: Array, v: Array) -> tuple[Array, Array]:
+        """What sensors make of positions and speeds."""
+        for sensor in self.sensors:
+            x, v = sensor(x, v)
+        return x, v
+
+    def admit(self, operation: Operation, unit: int) -> bool:
+        """Whether all gates are open for an operation."""
+        return all(gate(operation, unit) for gate in self.gates)
+
+
+class World(Protocol):
+    """Where a factory runs: the ideal one or MuJoCo.
+
+    A supervisor calls `step`; robots that run their own programs are driven by `move`, `advance`
+    and `settle`. `supplied`: an operation may have become prepared since the last question; the
+    questioner resets it. `dropoffs`: when each product left the factory [s].
+    """
+
+    supplied: bool
+
+    @property
+    def time(self) -> float:
+        """[s]"""
+
+    @property
+    def hooks(self) -> Hooks:
+        """Where others take part."""
+
+    @property
+    def dropoffs(self) -> Sequence[float]:
+        """When each product left the factory [s]."""
+
+    @property
+    def physics_time(self) -> float:
+        """Wall time spent in the engine [s]."""
+
+    def sense(self) -> tuple[Array, Array]:
+        """Positions x [m] and speeds [m/s] of all axes: in arc length of all carriages, then the
+        heights of all lifts."""
+
+    def prepared(self, operation: Operation, unit: int) -> bool:
+        """Whether the world is in the domain of an operation's mode as far as parts go: a feeder
+        has a part to give, the outfeed is free."""
+
+    def apply(self, started: Sequence[Job], ended: Sequence[Job]) -> None:
+        """Operations start and end now."""
+
+    def step(self, bundle: Bundle | None, axes: Index, ticks: int = 1) -> bool:
+        """A tick, or as many as `ticks` where nothing in between asks for the supervisor: the axes
+        of the active modes follow their field, all others stand. Whether any mode may have come to
+        its goal."""
+
+    def move(self, axes: Index, x: Array, v: Array, a: Array) -> None:
+        """From now on `axes` run from x [m] at speed v [m/s] under acceleration a [m/s²]."""
+
+    def advance(self, steps: int) -> None:
+        """Some timesteps, the axes as `move` has set them going."""
+
+    def settle(self) -> None:
+        """A tick's timesteps are over."""
+
+    def delivered(self) -> int:
+        """Products that have left the factory, since the beginning of time."""
+
+    def unstable(self) -> str:
+        """Why the world cannot go on, "" while it can."""
+
+    def figures(self) -> PhysicsFigures | None:
+        """What only bodies can tell, None where there are none."""
