@@ -7,7 +7,7 @@ import re
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
-from factory.importing.draft import Faults
+from factory.importing.draft import ImportFaults
 from factory.lang.source import Source, quoted
 from factory.support.errors import Diagnostic, InputError, Position
 
@@ -33,7 +33,7 @@ EXAMPLE = "level,name,quantity,mesh,x,y,z"
 
 
 @dataclass(slots=True)
-class Row:
+class BillRow:
     """A line of the bill: cells by column, and the place of each. `parent`: the index of the row
     that it goes into, -1 for none."""
 
@@ -56,16 +56,16 @@ class Header:
     units: dict[str, float]
 
 
-class Table:
+class BillTable:
     """Reads a bill row by row; what is wrong goes to the faults."""
 
-    def __init__(self, source: Source, faults: Faults) -> None:
+    def __init__(self, source: Source, faults: ImportFaults) -> None:
         self.source, self.faults = source, faults
         header = next((line for line in source.lines if line.strip()), "")
         self.delimiter = max(",;\t", key=header.count)
         self.header = Header({}, {})
 
-    def rows(self) -> list[Row]:
+    def rows(self) -> list[BillRow]:
         """Every row below the header. Raises InputError where the text is no CSV, or the header
         lacks a column (Syntax, BadLevel, MissingPart)."""
         found = []
@@ -76,7 +76,7 @@ class Table:
                 continue
             columns = self.header.columns.items()
             row = {name: cells[i].strip() for name, i in columns if i < len(cells)}
-            found.append(Row(row, {name: _place(at, starts, i) for name, i in columns}, at))
+            found.append(BillRow(row, {name: _place(at, starts, i) for name, i in columns}, at))
         return found
 
     def _lines(self) -> Iterator[tuple[list[str], Position]]:

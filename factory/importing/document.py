@@ -15,7 +15,7 @@ NAMES = {"object": "an object", "list": "a list"}
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class Value:
+class DocumentNode:
     """A value where it stands. `content`: pairs of key and value of an object, the values of a
     list, else a str, float, bool or None. Values may nest without end, so they are not compared
     or printed."""

@@ -19,7 +19,7 @@ SHOWN = 20
 
 
 @dataclass(slots=True)
-class Draft:
+class DraftNode:
     """One node. `inputs` are indices in the list of drafts, of which the first is the product; a
     part has none. `name` is what the file calls it, "" for nothing; a `kept` name is a label that
     the user has chosen, so no other node may have it."""
@@ -37,7 +37,7 @@ class Draft:
 
 
 @dataclass(slots=True)
-class Faults(Findings):
+class ImportFaults(Findings):
     """The errors found in one product's files, and the warnings."""
 
     warnings: list[Diagnostic] = field(default_factory=list)
@@ -72,7 +72,7 @@ def _place(diagnostic: Diagnostic) -> tuple[str, int, int]:
     return (at.file, at.line, at.column) if at else ("", 0, 0)
 
 
-def postorder(drafts: Sequence[Draft]) -> list[int]:
+def postorder(drafts: Sequence[DraftNode]) -> list[int]:
     """Every node that the first one is made of after its inputs, itself last."""
     order, stack = [], [(0, False)]
     while stack:

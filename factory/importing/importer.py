@@ -8,7 +8,7 @@ from pathlib import Path
 
 from factory.importing.assembling import Mates, assemble
 from factory.importing.bill import BillReader
-from factory.importing.draft import Draft, Faults
+from factory.importing.draft import DraftNode, ImportFaults
 from factory.importing.json_reader import read_json
 from factory.importing.labels import file_stem
 from factory.importing.ldraw import read_ldraw
@@ -62,7 +62,7 @@ def import_product(
     InputError with every fault found."""
     options = options or Options()
     file = _file(path)
-    faults = Faults()
+    faults = ImportFaults()
     store = MeshStore("bricks" if file.suffix.lower() in LDRAW else "meshes")
     drafts = _drafts(file, templates, options, store, faults)
     pag = assemble(drafts, faults, options.mates)
@@ -76,8 +76,8 @@ def _drafts(
     templates: Mapping[str, Template],
     options: Options,
     store: MeshStore,
-    faults: Faults,
-) -> list[Draft]:
+    faults: ImportFaults,
+) -> list[DraftNode]:
     kind = file.suffix.lower()
     if kind in LDRAW:
         return read_ldraw(file, options.library, options.boxes, store, faults)

@@ -9,7 +9,7 @@ from typing import Any
 from lark import Lark, Token, Transformer
 from lark.exceptions import UnexpectedCharacters, UnexpectedInput, UnexpectedToken
 
-from factory.importing.document import Kind, Value, syntax_error
+from factory.importing.document import DocumentNode, Kind, syntax_error
 from factory.lang.source import Source, quoted
 from factory.support.errors import InputError
 
@@ -29,9 +29,9 @@ WORD: /(?:true|false|null)\b/
 HINT = "JSON has objects { }, lists [ ], texts in double quotes, numbers, true, false and null"
 
 
-def read_json(source: Source) -> Value:
+def read_json(source: Source) -> DocumentNode:
     """The value of a JSON text (RFC 8259). Raises InputError (Syntax) at the first fault."""
-    values: Transformer[Token, Value] = _Values(source)
+    values: Transformer[Token, DocumentNode] = _Values(source)
     parser = Lark(GRAMMAR, parser="lalr", transformer=values)
     try:
         found: Any = parser.parse(source.text)
@@ -40,36 +40,36 @@ def read_json(source: Source) -> Value:
     return found  # type: ignore[no-any-return]
 
 
-class _Values(Transformer[Token, Value]):
+class _Values(Transformer[Token, DocumentNode]):
     """Makes values while the text is parsed, so nothing recurses."""
 
     def __init__(self, source: Source) -> None:
         super().__init__()
         self.source = source
 
-    def object(self, children: list[Any]) -> Value:
+    def object(self, children: list[Any]) -> DocumentNode:
         return self._value("object", tuple(children[1:]), children[0])
 
-    def array(self, children: list[Any]) -> Value:
+    def array(self, children: list[Any]) -> DocumentNode:
         return self._value("list", tuple(children[1:]), children[0])
 
-    def pair(self, children: list[Any]) -> tuple[Value, Value]:
+    def pair(self, children: list[Any]) -> tuple[DocumentNode, DocumentNode]:
         return self.text(children[:1]), children[1]
 
-    def text(self, children: list[Any]) -> Value:
+    def text(self, children: list[Any]) -> DocumentNode:
         # pairs of surrogates are one character; a single one is none
         spelled = json.loads(children[0]).encode("utf-16", "surrogatepass")
         return self._value("text", spelled.decode("utf-16", "replace"), children[0])
 
-    def number(self, children: list[Any]) -> Value:
+    def number(self, children: list[Any]) -> DocumentNode:
         return self._value("number", float(children[0]), children[0])
 
-    def word(self, children: list[Any]) -> Value:
+    def word(self, children: list[Any]) -> DocumentNode:
         content = json.loads(children[0])
         return self._value("null" if content is None else "boolean", content, children[0])
 
-    def _value(self, kind: Kind, content: Any, token: Token) -> Value:
-        return Value(kind, content, self.source.at(token))
+    def _value(self, kind: Kind, content: Any, token: Token) -> DocumentNode:
+        return DocumentNode(kind, content, self.source.at(token))
 
 
 def _fault(source: Source, error: UnexpectedInput) -> InputError:

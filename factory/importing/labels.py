@@ -1,4 +1,4 @@
-"""Labels and file names made of whatever a file calls its parts."""
+"""Labeller and file names made of whatever a file calls its parts."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import re
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 
-from factory.importing.draft import Draft
+from factory.importing.draft import DraftNode
 from factory.lang.words import is_label
 from factory.problem.pag import RESERVED
 
@@ -35,18 +35,18 @@ def file_stem(name: str) -> str:
     return re.sub(r"[^A-Za-z0-9_.\-]+", "-", name)[:_LONGEST].strip("-.") or "mesh"
 
 
-class Labels:
+class Labeller:
     """Gives every node a label of its own: a kept name as it is, a name that several have with a
     number, and `part1`, `sub1` where there is none."""
 
-    def __init__(self, drafts: Sequence[Draft], order: Iterable[int]) -> None:
+    def __init__(self, drafts: Sequence[DraftNode], order: Iterable[int]) -> None:
         self.drafts = drafts
         self.taken = {drafts[index].name for index in order if drafts[index].kept}
         named = (label_of(drafts[index].name) for index in order if not drafts[index].kept)
         self.shared = Counter(named)
         self.numbers: dict[str, Iterator[int]] = {}
 
-    def of(self, draft: Draft) -> str:
+    def of(self, draft: DraftNode) -> str:
         """The label of a node; asked for once each."""
         if draft.kept:
             return draft.name

@@ -7,7 +7,7 @@ from pathlib import Path, PurePosixPath
 
 import numpy as np
 
-from factory.importing.draft import Faults
+from factory.importing.draft import ImportFaults
 from factory.importing.mesh_store import MeshStore
 from factory.lang.operations import MESHES
 from factory.lang.source import near_file, quoted
@@ -17,7 +17,7 @@ from factory.support.errors import Position
 class MeshFolder:
     """Finds meshes by name, reads each once, and puts them in the store."""
 
-    def __init__(self, folder: Path, store: MeshStore, faults: Faults) -> None:
+    def __init__(self, folder: Path, store: MeshStore, faults: ImportFaults) -> None:
         self.folder, self.store, self.faults = folder, store, faults
         self.found: dict[str, str | None] = {}
 

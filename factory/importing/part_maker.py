@@ -6,9 +6,9 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from factory.importing.draft import Faults
+from factory.importing.draft import ImportFaults
 from factory.importing.mesh_folder import MeshFolder
-from factory.importing.places import Place
+from factory.importing.places import Placement
 from factory.lang.source import quoted
 from factory.lang.values import SHAPES, Kind
 from factory.problem.pag import Parameter, Value
@@ -24,11 +24,11 @@ class PartMaker:
 
     meshes: MeshFolder
     unit: float
-    faults: Faults
+    faults: ImportFaults
     there: dict[tuple[Parameter, ...], list[Position]] = field(default_factory=dict)
 
     def parameters(
-        self, given: Mapping[str, Value], place: Place, position: Position
+        self, given: Mapping[str, Value], place: Placement, position: Position
     ) -> tuple[Parameter, ...]:
         """The parameters of a part in a frame; its mesh is fetched, its lengths are in metres.
         What is wrong is noted: two shapes, an unknown mesh, a mesh twice in the same place."""

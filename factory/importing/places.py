@@ -12,14 +12,14 @@ from factory.problem.pag import Parameter
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Place:
+class Placement:
     """A frame in the product: a vertex v in it stands at turn · v + at [m]."""
 
     turn: Array = field(default_factory=lambda: np.eye(3))
     at: Array = field(default_factory=lambda: np.zeros(3))
     moved: bool = False
 
-    def inside(self, at: tuple[float, ...] | None, quat: tuple[float, ...] | None) -> Place:
+    def inside(self, at: tuple[float, ...] | None, quat: tuple[float, ...] | None) -> Placement:
         """The frame at `at`, turned by `quat`, in this one; this very one where neither is
         given."""
         if at is None and quat is None:
@@ -27,7 +27,7 @@ class Place:
         there = self.turn @ np.array(at or (0.0, 0.0, 0.0)) + self.at
         unit = np.array(quat or (1.0, 0.0, 0.0, 0.0))
         unit /= np.abs(unit).max()
-        return Place(self.turn @ rotation(unit / np.linalg.norm(unit)), there, True)
+        return Placement(self.turn @ rotation(unit / np.linalg.norm(unit)), there, True)
 
     def parameters(
         self, at: tuple[float, ...] | None, quat: tuple[float, ...] | None

@@ -6,11 +6,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import PurePosixPath
 
-from factory.importing.document import Value as Node
-from factory.importing.draft import MATE, MOST_NODES, PART, Draft, Faults, too_many
+from factory.importing.document import DocumentNode as Node
+from factory.importing.draft import MATE, MOST_NODES, PART, DraftNode, ImportFaults, too_many
 from factory.importing.labels import label_of
 from factory.importing.part_maker import PartMaker, fits
-from factory.importing.places import Place
+from factory.importing.places import Placement
 from factory.lang.operations import MESHES, Signature
 from factory.lang.source import quoted
 from factory.lang.values import GEOMETRY, SHAPES, Kind
@@ -34,14 +34,14 @@ class TreeReader:
 
     operations: Mapping[str, Signature]
     parts: PartMaker
-    faults: Faults
-    drafts: list[Draft] = field(default_factory=list)
+    faults: ImportFaults
+    drafts: list[DraftNode] = field(default_factory=list)
 
-    def read(self, root: Node, name: str) -> list[Draft]:
+    def read(self, root: Node, name: str) -> list[DraftNode]:
         """The drafts of a tree; a root without a name is called `name`. Raises InputError with
         every fault."""
-        self.drafts.append(Draft(name, root.position))
-        stack = [(root, 0, Place())]
+        self.drafts.append(DraftNode(name, root.position))
+        stack = [(root, 0, Placement())]
         while stack:
             node, index, place = stack.pop()
             children, inside = self._node(node, self.drafts[index], place)
@@ -49,7 +49,7 @@ class TreeReader:
             for child in children:
                 if len(self.drafts) > MOST_NODES:
                     raise too_many(child.position)
-                self.drafts.append(Draft("", child.position))
+                self.drafts.append(DraftNode("", child.position))
             below = range(first, len(self.drafts))
             self.drafts[index].inputs = list(below)
             entries = zip(children, below, strict=True)
@@ -58,7 +58,9 @@ class TreeReader:
         self.faults.raise_if_any()
         return self.drafts
 
-    def _node(self, node: Node, draft: Draft, place: Place) -> tuple[tuple[Node, ...], Place]:
+    def _node(
+        self, node: Node, draft: DraftNode, place: Placement
+    ) -> tuple[tuple[Node, ...], Placement]:
         """Fills in a draft; its children, and the frame that they are in."""
         if node.kind == "text":
             self._part({"part": node}, draft, place)
@@ -98,7 +100,7 @@ class TreeReader:
                 fields[known] = value
         return fields
 
-    def _name(self, fields: dict[str, Node], draft: Draft) -> None:
+    def _name(self, fields: dict[str, Node], draft: DraftNode) -> None:
         name = fields.pop("name", None)
         if name is None:
             return
@@ -109,14 +111,14 @@ class TreeReader:
             draft.name, draft.position = label_of(name.content), name.position
             draft.kept = True
 
-    def _empty(self, draft: Draft, why: str) -> None:
+    def _empty(self, draft: DraftNode, why: str) -> None:
         what = quoted(draft.name) if draft.name else "a node"
         hint = BARE if "neither" in why else f"for example {EXAMPLE}"
         self.faults.add("EmptyNode", f"{what} is empty: {why}", draft.position, hint)
 
     def _group(
-        self, fields: dict[str, Node], draft: Draft, place: Place
-    ) -> tuple[tuple[Node, ...], Place]:
+        self, fields: dict[str, Node], draft: DraftNode, place: Placement
+    ) -> tuple[tuple[Node, ...], Placement]:
         children = fields.get("children")
         if children is None or children.kind != "list" or not children.content:
             none = children is None or children.kind in ("list", "null")
@@ -126,7 +128,7 @@ class TreeReader:
         self._operation(fields, draft, len(children.content))
         return children.content, inside
 
-    def _operation(self, fields: dict[str, Node], draft: Draft, count: int) -> None:
+    def _operation(self, fields: dict[str, Node], draft: DraftNode, count: int) -> None:
         node = fields.get("operation")
         if node is not None and node.kind != "text":
             message = f"'operation' takes a text, not {node.words}"
@@ -166,7 +168,7 @@ class TreeReader:
                     made.append(Parameter(key.content, found))
         return tuple(made)
 
-    def _part(self, fields: dict[str, Node], draft: Draft, place: Place) -> None:
+    def _part(self, fields: dict[str, Node], draft: DraftNode, place: Placement) -> None:
         draft.operation = PART
         part = fields.pop("part", None)
         given: dict[str, Value] = {}

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from factory.importing.document import Value, syntax_error
+from factory.importing.document import DocumentNode, syntax_error
 from factory.lang.source import Source, quoted
 from factory.lang.words import is_number
 from factory.support.errors import Diagnostic, InputError, MissingError, Position
@@ -18,7 +18,7 @@ _WORDS = {"true": True, "false": False, "null": None, "~": None, "": None}
 HINT = "one YAML document of mappings, sequences and scalars"
 
 
-def read_yaml(source: Source) -> Value:
+def read_yaml(source: Source) -> DocumentNode:
     """The value of a YAML text. Raises InputError (Syntax) at the first fault, MissingError where
     PyYAML is not installed."""
     try:
@@ -46,9 +46,9 @@ class _Values:
 
     def __init__(self, source: Source) -> None:
         self.source = source
-        self.open: list[tuple[Any, list[Value]]] = []
-        self.done: list[Value] = []
-        self.anchors: dict[str, Value] = {}
+        self.open: list[tuple[Any, list[DocumentNode]]] = []
+        self.done: list[DocumentNode] = []
+        self.anchors: dict[str, DocumentNode] = {}
 
     def take(self, kind: str, event: Any) -> None:
         if kind in ("MappingStartEvent", "SequenceStartEvent"):
@@ -64,33 +64,37 @@ class _Values:
                 raise self._error(event, f"there is no anchor {quoted(event.anchor)} before here")
             self._add(None, self.anchors[event.anchor])
 
-    def document(self) -> Value:
+    def document(self) -> DocumentNode:
         """The only one there is."""
         if len(self.done) != 1:
             what = "is empty" if not self.done else f"has {len(self.done)} documents"
             raise syntax_error(self.source, 1, 1, f"the file {what}", HINT)
         return self.done[0]
 
-    def _add(self, event: Any, value: Value) -> None:
+    def _add(self, event: Any, value: DocumentNode) -> None:
         if event is not None and event.anchor:
             self.anchors[event.anchor] = value
         (self.open[-1][1] if self.open else self.done).append(value)
 
-    def _collected(self, start: Any, kind: str, values: list[Value]) -> Value:
+    def _collected(self, start: Any, kind: str, values: list[DocumentNode]) -> DocumentNode:
         if kind == "SequenceEndEvent":
-            return Value("list", tuple(values), self._at(start))
+            return DocumentNode("list", tuple(values), self._at(start))
         pairs = tuple(zip(values[::2], values[1::2], strict=True))
-        return Value("object", pairs, self._at(start))
+        return DocumentNode("object", pairs, self._at(start))
 
-    def _scalar(self, event: Any) -> Value:
+    def _scalar(self, event: Any) -> DocumentNode:
         self._tag(event)
         at, text = self._at(event), event.value
         if not event.implicit[0]:
-            return Value("text", text, at)
+            return DocumentNode("text", text, at)
         if text in _WORDS:
             content = _WORDS[text]
-            return Value("null" if content is None else "boolean", content, at)
-        return Value("number", float(text), at) if is_number(text) else Value("text", text, at)
+            return DocumentNode("null" if content is None else "boolean", content, at)
+        return (
+            DocumentNode("number", float(text), at)
+            if is_number(text)
+            else DocumentNode("text", text, at)
+        )
 
     def _tag(self, event: Any) -> None:
         if event.tag not in (None, "!", "tag:yaml.org,2002:str"):

@@ -52,7 +52,7 @@ class Equation(NamedTuple):
     right: Token
 
 
-class Pair(NamedTuple):
+class WordPair(NamedTuple):
     """`6 parts`."""
 
     first: Token
@@ -60,7 +60,7 @@ class Pair(NamedTuple):
 
 
 @dataclass(slots=True)
-class Draft:
+class Statements:
     """The statements of a text; `broken` are the words of those that did not parse, `nameless`
     tells that one of those does not even start with the label it defines."""
 
@@ -84,8 +84,8 @@ class _Builder(Transformer[Token, Any]):
     def equation(self, children: list[Any]) -> Equation:
         return Equation(children[0], children[1])
 
-    def pair(self, children: list[Any]) -> Pair:
-        return Pair(children[0], children[1])
+    def pair(self, children: list[Any]) -> WordPair:
+        return WordPair(children[0], children[1])
 
     def arguments(self, children: list[Any]) -> list[Any]:
         return children
@@ -142,9 +142,9 @@ def spelled(token: Token) -> Vector:
     return Vector(opening, [part for part in rest if part.type == "WORD"])
 
 
-def draft_of(source: Source, findings: Findings) -> Draft:
+def draft_of(source: Source, findings: Findings) -> Statements:
     """The statements of a text; its syntax errors go to `findings`."""
-    draft = Draft()
+    draft = Statements()
     try:
         statements = cast("list[Any]", _lark().parse(source.text, start="start"))
     except UnexpectedInput:
@@ -154,7 +154,7 @@ def draft_of(source: Source, findings: Findings) -> Draft:
     return draft
 
 
-def _sort_in(statement: Any, draft: Draft, source: Source, findings: Findings) -> None:
+def _sort_in(statement: Any, draft: Statements, source: Source, findings: Findings) -> None:
     """Put a statement where it belongs; `pair` and `equation` may yet lack a sign."""
     if isinstance(statement, Definition):
         draft.definitions.append(statement)
@@ -162,14 +162,14 @@ def _sort_in(statement: Any, draft: Draft, source: Source, findings: Findings) -
     first, second = statement
     if isinstance(statement, Equation) and first == "root":
         draft.roots.append(second)
-    elif isinstance(statement, Pair) and second == "parts":
+    elif isinstance(statement, WordPair) and second == "parts":
         draft.counts.append(first)
     else:
         draft.broken.update((str(first), str(second)))
         _report_incomplete(statement, source, findings)
 
 
-def _report_incomplete(statement: Equation | Pair, source: Source, findings: Findings) -> None:
+def _report_incomplete(statement: Equation | WordPair, source: Source, findings: Findings) -> None:
     first, second = statement
     if isinstance(statement, Equation):
         message = f"missing '(' after the operation {quoted(second)}"
@@ -183,7 +183,7 @@ def _report_incomplete(statement: Equation | Pair, source: Source, findings: Fin
         findings.add("Syntax", f"missing '=' after {quoted(first)}", source.after(first), hint)
 
 
-def _recover(source: Source, findings: Findings, draft: Draft) -> list[Any]:
+def _recover(source: Source, findings: Findings, draft: Statements) -> list[Any]:
     """The statements of a broken text that do parse; an error for each of the others."""
     statements: list[Any] = []
     for piece, ended in _pieces(_lex(source.text)):

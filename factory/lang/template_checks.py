@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 from lark import Token
 
 from factory.lang.source import Findings, Source, quoted
-from factory.lang.template_syntax import Defaults, Labels, RawLaw, TemplateDraft, Words
+from factory.lang.template_syntax import Labels, ParameterClause, RawLaw, TemplateDraft, Words
 from factory.lang.values import GEOMETRY, ValueReader
 from factory.lang.words import LABEL_HINT, is_label, is_number, number
 from factory.problem.pag import NOPART, RESERVED, Value
@@ -174,7 +174,7 @@ class TemplateMaker:
             self._bad(f"{quoted(found)} {what}", found, hint)
         return str(found)
 
-    def _parameters(self, raw: Defaults | None) -> dict[str, Value]:
+    def _parameters(self, raw: ParameterClause | None) -> dict[str, Value]:
         made: dict[str, Value] = {}
         values = ValueReader(self.source, self.findings)
         for name, found in raw.values if raw else ():
@@ -199,7 +199,7 @@ class TemplateMaker:
             hint = "leave this clause out: it is for operations that take and make something"
             self._bad(message, further, hint)
 
-    def _geometry(self, raw: Defaults | None, labels: Labels | None) -> bool:
+    def _geometry(self, raw: ParameterClause | None, labels: Labels | None) -> bool:
         """Whether the operation makes a part; then it takes no sub-assembly."""
         taken = [label for label in labels.before if label != NOPART] if labels else []
         if raw and raw.geometry and taken:

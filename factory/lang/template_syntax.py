@@ -52,7 +52,7 @@ class RawLaw(NamedTuple):
     dwell: Token | None
 
 
-class Defaults(NamedTuple):
+class ParameterClause(NamedTuple):
     """`parameters = geometry and ( name = value )`."""
 
     geometry: bool
@@ -104,11 +104,11 @@ class _Builder(Transformer[Token, Any]):
     def dwell(self, children: list[Any]) -> Token | None:
         return children[0] if children else None
 
-    def geometry(self, children: list[Any]) -> Defaults:
-        return Defaults(True, children[0] if children else [])
+    def geometry(self, children: list[Any]) -> ParameterClause:
+        return ParameterClause(True, children[0] if children else [])
 
-    def plain(self, children: list[Any]) -> Defaults:
-        return Defaults(False, children[0])
+    def plain(self, children: list[Any]) -> ParameterClause:
+        return ParameterClause(False, children[0])
 
     def default(self, children: list[Any]) -> tuple[Token, Any]:
         return children[0], children[1]

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 
 from lark import Token
 
-from factory.lang.pag_syntax import Draft
+from factory.lang.pag_syntax import Statements
 from factory.lang.source import Findings, Source, quoted
 from factory.lang.words import LABEL_HINT, is_label, is_number
 from factory.problem.pag import RESERVED, Assembly
@@ -28,7 +28,7 @@ class TreeCheck:
     doubt: they may well be defined or used there.
     """
 
-    draft: Draft
+    draft: Statements
     nodes: Sequence[Assembly]
     source: Source
     findings: Findings
@@ -226,12 +226,12 @@ def _cut(path: dict[str, None], label: str) -> Iterator[str]:
             yield step
 
 
-def root_of(draft: Draft) -> str:
+def root_of(draft: Statements) -> str:
     """The product of a draft without errors."""
     return str(draft.roots[0])
 
 
-def count_of(draft: Draft) -> int | None:
+def count_of(draft: Statements) -> int | None:
     """The number in `N parts` of a draft without errors."""
     token: Token | None = next(iter(draft.counts), None)
     return None if token is None else int(token.lstrip("0") or 0)

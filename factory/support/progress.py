@@ -16,7 +16,7 @@ PERIOD = 0.1
 """The bar is redrawn so often [s]."""
 
 
-class Shown(Closing):
+class ProgressBar(Closing):
     """A bar that is there for as long as its context; silent where `quiet`, or where stderr is no
     terminal."""
 
@@ -64,7 +64,7 @@ def counter(after: str, before: str = "") -> Bar:
     )
 
 
-class Progress(Shown):
+class Progress(ProgressBar):
     """An observer of a run."""
 
     def __init__(self, units: int, quiet: bool = False) -> None:

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
-from factory.importing.draft import Faults
+from factory.importing.draft import ImportFaults
 from factory.lang.source import Source, quoted
 from factory.lang.words import number
 from factory.support.errors import Position
@@ -63,7 +63,7 @@ def key_of(name: str) -> str:
     return name.replace("\\", "/").strip().lower()
 
 
-def read_lines(source: Source, name: str, faults: Faults) -> list[LDrawFile]:
+def read_lines(source: Source, name: str, faults: ImportFaults) -> list[LDrawFile]:
     """The files in a text, the main one first; what is wrong goes to `faults`."""
     reader = _Reader(source, name, faults)
     for line, text in enumerate(source.lines, 1):
@@ -74,7 +74,7 @@ def read_lines(source: Source, name: str, faults: Faults) -> list[LDrawFile]:
 class _Reader:
     """Goes through the lines, keeping what they set for those that follow."""
 
-    def __init__(self, source: Source, name: str, faults: Faults) -> None:
+    def __init__(self, source: Source, name: str, faults: ImportFaults) -> None:
         self.file, self.faults = source.file, faults
         self.files = [LDrawFile(name, source.start())]
         self.current: LDrawFile | None = self.files[0]

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from factory.geometry.meshes import Array
-from factory.importing.draft import MATE, MOST_NODES, PART, Draft, Faults, too_many
+from factory.importing.draft import MATE, MOST_NODES, PART, DraftNode, ImportFaults, too_many
 from factory.importing.ldraw.colours import INHERITED, direct_colour
 from factory.importing.ldraw.lines import LDrawFile, Reference, key_of
 from factory.importing.ldraw.shapes import LDU, LIBRARY, UPRIGHT, Shapes, matrix, mesh_of
@@ -43,8 +43,8 @@ class _Place:
 
 
 def read_ldraw(
-    path: Path, library: Path | None, boxes: bool, store: MeshStore, faults: Faults
-) -> list[Draft]:
+    path: Path, library: Path | None, boxes: bool, store: MeshStore, faults: ImportFaults
+) -> list[DraftNode]:
     """The drafts of a model, its main file first. Parts whose shape is nowhere are an error
     (MissingPart), or with `boxes` a box. Raises InputError with every fault found."""
     shelf = Shelf(path, library, faults)
@@ -59,7 +59,7 @@ def read_ldraw(
 
 class _ModelReader:
     def __init__(
-        self, shelf: Shelf, shapes: Shapes, boxes: bool, store: MeshStore, faults: Faults
+        self, shelf: Shelf, shapes: Shapes, boxes: bool, store: MeshStore, faults: ImportFaults
     ) -> None:
         self.shelf, self.shapes, self.boxes = shelf, shapes, boxes
         self.store, self.faults = store, faults
@@ -125,10 +125,10 @@ class _ModelReader:
             if trouble is not None:
                 self.faults.diagnostics.append(trouble)
 
-    def expand(self) -> list[Draft]:
+    def expand(self) -> list[DraftNode]:
         """A draft for every model, step and part of the product."""
         main = self.shelf.main
-        drafts = [Draft(_name(main), main.position)]
+        drafts = [DraftNode(_name(main), main.position)]
         stack = [(main, 0, _Place(np.eye(3), np.zeros(3), INHERITED[0]))]
         while stack:
             model, index, place = stack.pop()
@@ -138,14 +138,14 @@ class _ModelReader:
                 drafts[index].inputs = [entry for entry, _ in entries]
                 stack += [(file, entry, at) for entry, (file, at) in entries if file is not None]
                 if number > 0:
-                    drafts.append(Draft("", step[0].position))
+                    drafts.append(DraftNode("", step[0].position))
                     drafts[index].inputs.insert(0, len(drafts) - 1)
                     index = len(drafts) - 1
         self._refuse_twice()
         return drafts
 
     def _enter(
-        self, reference: Reference, place: _Place, drafts: list[Draft]
+        self, reference: Reference, place: _Place, drafts: list[DraftNode]
     ) -> tuple[int, tuple[LDrawFile | None, _Place]]:
         """Adds the draft of one line; its number, and the model that it stands for, if any."""
         turn = place.turn @ matrix(reference)
@@ -154,11 +154,13 @@ class _ModelReader:
         here = _Place(turn, at, colour)
         file = self.shelf.find(reference.file, reference.position)
         if file is not None and not file.is_part:
-            drafts.append(Draft(_name(file), reference.position, MATE))
+            drafts.append(DraftNode(_name(file), reference.position, MATE))
             return len(drafts) - 1, (file, here)
         where = np.round(np.concatenate([turn.ravel(), at]), 3) + 0.0
         self.there.setdefault((key_of(reference.file), where.tobytes()), []).append(reference)
-        drafts.append(Draft("", reference.position, PART, [], self._look(reference, file, here)))
+        drafts.append(
+            DraftNode("", reference.position, PART, [], self._look(reference, file, here))
+        )
         return len(drafts) - 1, (None, here)
 
     def _refuse_twice(self) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path, PurePosixPath
 
-from factory.importing.draft import Faults
+from factory.importing.draft import ImportFaults
 from factory.importing.ldraw.colours import common_colours
 from factory.importing.ldraw.lines import LDrawFile, key_of, read_lines
 from factory.lang.source import quoted, read_text, source_of
@@ -17,7 +17,7 @@ ROOMS = ("parts", "p", "models", "unofficial/parts", "unofficial/p")
 class Shelf:
     """The files that a model can refer to. Each is read once, when it is asked for."""
 
-    def __init__(self, path: Path, library: Path | None, faults: Faults) -> None:
+    def __init__(self, path: Path, library: Path | None, faults: ImportFaults) -> None:
         self.library, self.faults = library, faults
         self.folders = [path.parent, *([library / room for room in ROOMS] if library else [])]
         self.files: dict[str, LDrawFile | None] = {}

@@ -16,7 +16,7 @@ FOLDER = Path(__file__).resolve().parent
 
 
 @dataclass(frozen=True, slots=True)
-class Explanation:
+class CodeExplanation:
     """A code, its meaning in a line, and the whole text for people."""
 
     code: str
@@ -30,7 +30,7 @@ def codes() -> tuple[str, ...]:
     return tuple(sorted(path.stem for path in FOLDER.glob("*.txt")))
 
 
-def explain(code: str) -> Explanation:
+def explain(code: str) -> CodeExplanation:
     """The explanation of a code, in upper or lower case. Raises InputError (Usage) with the codes
     like it where there is none."""
     known = {name.lower(): name for name in codes()}
@@ -38,7 +38,7 @@ def explain(code: str) -> Explanation:
     if name is None:
         raise InputError(Diagnostic("Usage", f"there is no code '{code}'", None, _near(code)))
     title, _, text = (FOLDER / f"{name}.txt").read_text("utf-8").partition("\n\n")
-    return Explanation(name, title, text.rstrip("\n"))
+    return CodeExplanation(name, title, text.rstrip("\n"))
 
 
 def _near(code: str) -> str:
