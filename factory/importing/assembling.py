@@ -8,6 +8,7 @@ from typing import Literal
 
 from factory.importing.draft import MATE, DraftNode, ImportFaults, postorder
 from factory.importing.labels import Labeller
+from factory.lang.source import where
 from factory.problem.pag import PAG, Assembly
 
 Mates = Literal["many", "chain"]
@@ -44,11 +45,8 @@ def _refuse_twice(drafts: Sequence[DraftNode], made: Sequence[int], faults: Impo
     first: dict[str, DraftNode] = {}
     for draft in (drafts[index] for index in sorted(made) if drafts[index].kept):
         if draft.name in first:
-            before, at = first[draft.name].position, draft.position
-            where = f"in line {before.line}"
-            if before.line == at.line:
-                where = f"at column {before.column}"
-            message = f"the name '{draft.name}' is used twice, first {where}"
+            before = where(first[draft.name].position, draft.position)
+            message = f"the name '{draft.name}' is used twice, first {before}"
             hint = "a part is in the product once: give each node a name of its own"
             faults.add("DuplicateLabel", message, draft.position, hint)
         first.setdefault(draft.name, draft)

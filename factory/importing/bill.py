@@ -6,7 +6,7 @@ import re
 
 from factory.importing.bill_rows import BillRow, BillTable
 from factory.importing.draft import MATE, MOST_NODES, PART, DraftNode, ImportFaults, too_many
-from factory.importing.part_maker import PartMaker, fits
+from factory.importing.part_maker import PartMaker
 from factory.importing.places import Placement
 from factory.importing.tree_file import mesh_name
 from factory.lang.source import Source, quoted
@@ -149,7 +149,7 @@ class BillReader:
         text = row.cells.get(column, "")
         value = _number(text)
         kind = GEOMETRY.get(column)
-        if text and (value is None or (kind is not None and not fits(kind, (value,)))):
+        if text and (value is None or (kind is not None and not kind.fits((value,)))):
             message = f"'{column}' takes {kind.wanted if kind else 'a number'}, not {quoted(text)}"
             self.faults.add("BadValue", message, row.at(column), "for example 0.25")
         return value

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
-from factory.lang.source import Findings
 from factory.problem.pag import Parameter
 from factory.support.errors import Diagnostic, InputError, Position
 
@@ -37,10 +36,15 @@ class DraftNode:
 
 
 @dataclass(slots=True)
-class ImportFaults(Findings):
+class ImportFaults:
     """The errors found in one product's files, and the warnings."""
 
+    diagnostics: list[Diagnostic] = field(default_factory=list)
     warnings: list[Diagnostic] = field(default_factory=list)
+
+    def add(self, code: str, message: str, position: Position, hint: str) -> None:
+        """Note an error: what was found, where, and what would have been valid."""
+        self.diagnostics.append(Diagnostic(code, message, position, hint))
 
     def warn(self, code: str, message: str, position: Position, hint: str) -> None:
         """Note something that does not keep the product from being made."""

@@ -18,8 +18,8 @@ from factory.importing.part_maker import PartMaker
 from factory.importing.tree_file import TreeReader
 from factory.importing.yaml_reader import read_yaml
 from factory.lang.operations import signature
-from factory.lang.pag_writer import write_pag
 from factory.lang.source import quoted, read_text, source_of
+from factory.lang.writer import write_pag
 from factory.problem.pag import PAG
 from factory.problem.template import Template
 from factory.support.collector import collector_paused

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
@@ -10,7 +9,7 @@ from factory.importing.draft import ImportFaults
 from factory.importing.mesh_folder import MeshFolder
 from factory.importing.places import Placement
 from factory.lang.source import quoted
-from factory.lang.values import SHAPES, Kind
+from factory.lang.values import SHAPES
 from factory.problem.pag import Parameter, Value
 from factory.support.errors import Position
 
@@ -72,12 +71,3 @@ class PartMaker:
 
 def _vector(value: Value | None) -> tuple[float, ...] | None:
     return value if isinstance(value, tuple) else None
-
-
-def fits(kind: Kind, numbers: tuple[float, ...]) -> bool:
-    """Whether numbers are what a parameter of this kind takes."""
-    if len(numbers) != kind.length or not all(map(math.isfinite, numbers)):
-        return False
-    if not (all(kind.low <= x <= kind.high for x in numbers) and (kind.zero or any(numbers))):
-        return False
-    return not kind.positive or min(numbers) > 0

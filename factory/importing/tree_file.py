@@ -9,7 +9,7 @@ from pathlib import PurePosixPath
 from factory.importing.document import DocumentNode as Node
 from factory.importing.draft import MATE, MOST_NODES, PART, DraftNode, ImportFaults, too_many
 from factory.importing.labels import label_of
-from factory.importing.part_maker import PartMaker, fits
+from factory.importing.part_maker import PartMaker
 from factory.importing.places import Placement
 from factory.lang.operations import MESHES, Signature
 from factory.lang.source import quoted
@@ -204,7 +204,7 @@ class TreeReader:
         numbers = (node,) if node.kind == "number" else node.content
         if (node.kind == "list") == (kind.length > 1) and node.kind in ("list", "number"):
             found = tuple(n.content for n in numbers if n.kind == "number")
-            if len(found) == len(numbers) and fits(kind, found):
+            if len(found) == len(numbers) and kind.fits(found):
                 return found if kind.length > 1 else found[0]
         message = f"{quoted(name)} takes {kind.wanted}, not {_shown(node)}"
         listed = kind.example.replace("( ", "[").replace(" )", "]")

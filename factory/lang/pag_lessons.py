@@ -17,18 +17,8 @@ FALLBACK = Lesson("unexpected {found}", FORM, "found", "")
 FALSE_ROOT = Lesson("unexpected {found} after the root", "write: root = label;", "found", "")
 
 LESSONS = (
-    Lesson(
-        "{found} is no statement",
-        FORM,
-        "found",
-        '( a ) | ) a | , a | "a"',
-    ),
-    Lesson(
-        "'{first}' alone is no statement",
-        FORM,
-        "first",
-        'a | a "b" | a , b | a )',
-    ),
+    Lesson("{found} is no statement", FORM, "found", '( a ) | ) a | , a | "a"'),
+    Lesson("'{first}' alone is no statement", FORM, "first", 'a | a "b" | a , b | a )'),
     Lesson(
         "missing label before '='",
         "name what the operation makes: label = operation ( ... );",
@@ -53,12 +43,7 @@ LESSONS = (
         "behind",
         'a = | a = ( b ) | a = ) | a = , b | a = "b"',
     ),
-    Lesson(
-        "one '=' is enough",
-        FORM,
-        "found",
-        "a = = b ( ) | a = m ( b = = 1 )",
-    ),
+    Lesson("one '=' is enough", FORM, "found", "a = = b ( ) | a = m ( b = = 1 )"),
     Lesson(
         "missing '(' after the operation {before}",
         "write the inputs in parentheses: {first} = operation ( input, ... );",

@@ -12,10 +12,9 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
-from lark import Lark, Token, UnexpectedToken
-from lark.parsers.lalr_interactive_parser import InteractiveParser
+from lark import Lark, Token, Transformer, UnexpectedToken
 
-from factory.lang.source import quoted
+from factory.lang.source import Findings, quoted
 
 END = "$END"
 UNLAWFUL = frozenset({"STRAY", "UNCLOSED"})
@@ -45,24 +44,31 @@ class Lesson:
     examples: str
 
 
+def open_grammar(name: str, start: list[str], builder: Transformer[Token, Any]) -> Lark:
+    """The parser of a grammar in this folder, whose rules `builder` takes while it parses."""
+    return Lark.open(
+        name,
+        rel_to=__file__,
+        parser="lalr",
+        lexer="basic",
+        start=start,
+        transformer=builder,
+        maybe_placeholders=False,
+    )
+
+
 def drive(lark: Lark, start: str, tokens: Sequence[Token]) -> Any | Stuck:
     """Parse tokens from the symbol `start`: what the tree builder makes of them, or a Stuck."""
     parser = lark.parse_interactive(None, start=start)
     last = tokens[-1] if tokens else Token(END, "", 0, 1, 1)
-    end = Token.new_borrow_pos(END, "", last)
     result: Any = None
-    for index, token in enumerate([*tokens, end]):
+    for index, token in enumerate([*tokens, Token.new_borrow_pos(END, "", last)]):
         try:
             result = parser.feed_token(token)
         except UnexpectedToken as error:
-            accepted = frozenset(_accepted(parser))
+            accepted = frozenset(parser.accepts())  # type: ignore[no-untyped-call]
             return Stuck(index, token, error.state.position, accepted)
     return result
-
-
-def _accepted(parser: InteractiveParser) -> Iterable[str]:
-    kinds: Iterable[str] = parser.accepts()  # type: ignore[no-untyped-call]
-    return kinds
 
 
 def learn(
@@ -79,27 +85,26 @@ def learn(
     return table
 
 
-def unlawful_words(token: Token) -> tuple[str, str]:
-    """What to say of a character that no statement contains, or of a text that is not closed."""
+def report_unlawful(token: Token, findings: Findings) -> None:
+    """Note a character that no statement contains, or a text that is not closed."""
+    message, hint = f"{quoted(token)} has no meaning here", _way_out(token[0])
     if token.type == "UNCLOSED":
-        return "the text is not closed", 'close it with " on the same line'
-    return f"{quoted(token)} has no meaning here", _way_out(token)
+        message, hint = "the text is not closed", 'close it with " on the same line'
+    findings.add("Syntax", message, token, hint)
 
 
-def _way_out(token: Token) -> str:
-    first = token[0]
-    plain = _plain(first)
+def _way_out(character: str) -> str:
+    plain = _plain(character)
     if plain:
         return f"write {plain} instead"
-    if first == "/":
-        return "no word contains it; a comment runs from // to the end of the line"
-    if first == "#":
-        return "a comment runs from // to the end of the line"
-    if first in "'`":
+    if character in "'`":
         return 'write texts in double quotes, as in "base.stl"'
-    if first == ":":
-        return "write = between a name and what it is"
-    return "remove it, or put it in a comment: // ..."
+    hints = {
+        "/": "no word contains it; a comment runs from // to the end of the line",
+        "#": "a comment runs from // to the end of the line",
+        ":": "write = between a name and what it is",
+    }
+    return hints.get(character, "remove it, or put it in a comment: // ...")
 
 
 def _plain(character: str) -> str:

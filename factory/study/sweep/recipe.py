@@ -12,8 +12,7 @@ from typing import Any
 import numpy as np
 
 from factory.geometry.solids import Product
-from factory.lang.pag_writer import write_pag
-from factory.lang.template_writer import write_template
+from factory.lang.writer import write_pag, write_template
 from factory.layout.request import Ground
 from factory.plant.factory import Factory
 from factory.study.sweep.grid import DEFAULTS, SETTINGS, Axis, Point, Value
