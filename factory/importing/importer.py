@@ -8,15 +8,13 @@ from pathlib import Path
 
 from factory.importing.assembling import Mates, assemble
 from factory.importing.bill import BillReader
+from factory.importing.document import read_json, read_yaml
 from factory.importing.draft import DraftNode, ImportFaults
-from factory.importing.json_reader import read_json
 from factory.importing.labels import file_stem
 from factory.importing.ldraw import read_ldraw
-from factory.importing.mesh_folder import MeshFolder
-from factory.importing.mesh_store import MeshStore
+from factory.importing.mesh_files import MeshFolder, MeshStore
 from factory.importing.part_maker import PartMaker
 from factory.importing.tree_file import TreeReader
-from factory.importing.yaml_reader import read_yaml
 from factory.lang.operations import signature
 from factory.lang.source import quoted, read_text, source_of
 from factory.lang.writer import write_pag

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from factory.importing.draft import ImportFaults
-from factory.importing.mesh_folder import MeshFolder
+from factory.importing.mesh_files import MeshFolder
 from factory.importing.places import Placement
 from factory.lang.source import quoted
 from factory.lang.values import SHAPES

@@ -4,6 +4,7 @@ there."""
 from __future__ import annotations
 
 import re
+from collections.abc import Set
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -14,8 +15,8 @@ from factory.importing.draft import MATE, MOST_NODES, PART, DraftNode, ImportFau
 from factory.importing.ldraw.colours import INHERITED, direct_colour
 from factory.importing.ldraw.lines import LDrawFile, Reference, key_of
 from factory.importing.ldraw.shapes import LDU, LIBRARY, UPRIGHT, Shapes, matrix, mesh_of
-from factory.importing.ldraw.shelf import Shelf
-from factory.importing.mesh_store import MeshStore
+from factory.importing.ldraw.shelf import Shelf, children_first
+from factory.importing.mesh_files import MeshStore
 from factory.importing.places import quaternion, rounded
 from factory.lang.source import quoted
 from factory.problem.pag import Parameter
@@ -70,24 +71,13 @@ class _ModelReader:
     def survey(self) -> None:
         """Goes through every model once: nothing missing, empty, made of itself or too large."""
         size: dict[int, int] = {}
-        stack, path = [(self.shelf.main, False)], dict[int, None]()
-        while stack:
-            model, expanded = stack.pop()
-            if expanded:
-                path.pop(id(model))
-                size[id(model)] = 1 + sum(self._size(r, size) for r in model.references)
-                if size[id(model)] > MOST_NODES:
-                    raise too_many(model.position)
-            elif id(model) not in size and id(model) not in path:
-                path[id(model)] = None
-                stack.append((model, True))
-                stack += [(below, False) for below in self._models_in(model, path)]
+        for model in children_first(self.shelf.main, self._models_in, size):
+            entries = [self.shelf.find(reference) for reference in model.references]
+            size[id(model)] = 1 + sum(size.get(id(entry), 1) for entry in entries)
+            if size[id(model)] > MOST_NODES:
+                raise too_many(model.position)
 
-    def _size(self, reference: Reference, size: dict[int, int]) -> int:
-        below = self.shelf.find(reference.file, reference.position)
-        return 1 if below is None else size.get(id(below), 1)
-
-    def _models_in(self, model: LDrawFile, path: dict[int, None]) -> list[LDrawFile]:
+    def _models_in(self, model: LDrawFile, path: Set[int]) -> list[LDrawFile]:
         if not any(model.steps):
             message = f"the model {quoted(model.name)} has no parts"
             hint = "a model places parts and other models by lines of type 1"
@@ -98,7 +88,7 @@ class _ModelReader:
             self.faults.warn("BadMesh", message, model.position, hint)
         found = []
         for reference in model.references:
-            below = self.shelf.find(reference.file, reference.position)
+            below = self.shelf.find(reference)
             if below is not None and id(below) in path:
                 message = f"the model {quoted(reference.file)} is made of itself"
                 hint = "remove this line, or the one that leads here"
@@ -120,10 +110,8 @@ class _ModelReader:
         if file is None and key_of(reference.file) not in self.shelf.refused:
             message = f"there is no part file {quoted(reference.file)}"
             self.faults.add("MissingPart", message, reference.position, LIBRARY)
-        elif file is not None and self.shapes.of(file) is None:
-            trouble = self.shapes.troubles.get(id(file))
-            if trouble is not None:
-                self.faults.diagnostics.append(trouble)
+        elif file is not None and isinstance(trouble := self.shapes.of(file), Diagnostic):
+            self.faults.diagnostics.append(trouble)
 
     def expand(self) -> list[DraftNode]:
         """A draft for every model, step and part of the product."""
@@ -152,7 +140,7 @@ class _ModelReader:
         at = place.turn @ np.array(reference.place[:3]) + place.at
         colour = place.colour if reference.colour in INHERITED else reference.colour
         here = _Place(turn, at, colour)
-        file = self.shelf.find(reference.file, reference.position)
+        file = self.shelf.find(reference)
         if file is not None and not file.is_part:
             drafts.append(DraftNode(_name(file), reference.position, MATE))
             return len(drafts) - 1, (file, here)
@@ -193,7 +181,7 @@ class _ModelReader:
     def _mesh(self, reference: Reference, file: LDrawFile | None, turn: Array) -> str:
         """The path of a part's mesh; "" where it has none."""
         triangles = self.shapes.of(file) if file is not None else None
-        if file is None or triangles is None:
+        if file is None or triangles is None or isinstance(triangles, Diagnostic):
             return ""
         key = (id(file), np.round(turn, 6).tobytes())
         if key not in self.meshes:
