@@ -14,7 +14,8 @@ from lark.exceptions import UnexpectedCharacters, UnexpectedInput, UnexpectedTok
 
 from factory.lang.source import Source, quoted
 from factory.lang.words import is_number
-from factory.support.errors import Diagnostic, InputError, MissingError, Position
+from factory.support.errors import Diagnostic, InputError, Position
+from factory.support.extras import optional
 
 Kind = Literal["object", "list", "text", "number", "boolean", "null"]
 
@@ -116,12 +117,7 @@ class _JsonNodes(Transformer[Token, DocumentNode]):
 def read_yaml(source: Source) -> DocumentNode:
     """The value of a YAML text, from the events of PyYAML. Raises InputError (Syntax) at the first
     fault, MissingError where PyYAML is not installed."""
-    try:
-        import yaml
-    except ImportError:
-        hint = "pip install 'klavins-factory[yaml]', or write the tree as JSON"
-        message = "reading YAML takes the package PyYAML"
-        raise MissingError(Diagnostic("Missing", message, None, hint)) from None
+    yaml = optional("yaml", "PyYAML", "reading YAML", "yaml", "write the tree as JSON")
     nodes = _YamlNodes(source)
     try:
         for event in yaml.parse(source.text, Loader=getattr(yaml, "CSafeLoader", yaml.SafeLoader)):

@@ -1,7 +1,6 @@
-"""What the codes of diagnostics mean: a text each, in this folder.
+"""Explanations of the codes of diagnostics: a text each, in this folder.
 
-A text is a title, what it means, an example that provokes it (files, and the command), and how to
-mend it.
+A text is a title, the meaning, an example that causes it (files, and the command), and a remedy.
 """
 
 from __future__ import annotations
@@ -17,7 +16,7 @@ FOLDER = Path(__file__).resolve().parent
 
 @dataclass(frozen=True, slots=True)
 class CodeExplanation:
-    """A code, its meaning in a line, and the whole text for people."""
+    """A code, its meaning in a line, and the whole text."""
 
     code: str
     title: str
