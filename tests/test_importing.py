@@ -273,7 +273,7 @@ def test_what_stands_around_a_model_is_left_out(bring: Importer) -> None:
         ("0 FILE", ["1:1 Syntax 0 FILE has no name"]),
         (
             f"1 4 0 0 0 {PLAIN} tile.dat\n1 1 0 0 0 {PLAIN} TILE.dat\n{TILE}",
-            ["2:29 UsedTwice 'TILE.dat' is in the place where line 1 has put it"],
+            ["2:29 UsedTwice 'tile.dat' is where line 1 has put it already"],
         ),
         (b"0 Brick\n0 Author: M\xfcller", ["2:12 Syntax byte 0xfc is not UTF-8 text"]),
     ],

@@ -52,14 +52,9 @@ class PartMaker:
 
     def check_places(self) -> None:
         """Notes each mesh that stands where the same one stands already (UsedTwice)."""
-        hint = "a part is used once: give each a place of its own, or remove one"
         for (mesh, *_), positions in self.there.items():
-            first, *others = sorted(positions, key=lambda at: (at.line, at.column))
-            for position in others:
-                where = f"line {first.line}" if first.line != position.line else "this line"
-                name = quoted(str(mesh.value).partition("/")[2])
-                message = f"the mesh {name} is where {where} has put it already"
-                self.faults.add("UsedTwice", message, position, hint)
+            name = quoted(str(mesh.value).partition("/")[2])
+            self.faults.check_used_once(f"the mesh {name}", positions)
 
     def _metres(self, name: str, value: Value) -> Value:
         if name not in LENGTHS or self.unit == 1 or isinstance(value, str):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import re
 from collections.abc import Mapping
 
@@ -268,7 +267,5 @@ def _multiple(match: re.Match[str]) -> float | None:
     """The offset of a point in radii; None if it is no finite number."""
     if match[3] is None:
         return 0.0
-    size = 1.0 if not match[4] else number(match[4])
-    if size is None or not math.isfinite(size):
-        return None
-    return -size if match[3] == "-" else size
+    size = number(match[4]) if match[4] else 1.0
+    return -size if size is not None and match[3] == "-" else size

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from factory.problem.pag import PAG, Assembly, Value
-from factory.problem.template import Law, Point, Template
+from factory.problem.template import Law, Template
 
 
 def write_pag(pag: PAG) -> str:
@@ -44,7 +44,7 @@ def write_template(template: Template) -> str:
     clauses = [
         f"R = < {', '.join(template.robots)} >",
         f"j = {template.carrier}",
-        f"~ = {_braces([' = '.join(map(write_point, c)) for c in template.identifications])}",
+        f"~ = {_braces([' = '.join(map(str, c)) for c in template.identifications])}",
         f"<a; b> = < {', '.join(template.before)}; {', '.join(template.after)} >",
         f"F = {_law(template.law)}",
         *([f"further = {template.further}"] if template.further else []),
@@ -54,21 +54,13 @@ def write_template(template: Template) -> str:
     return "\n".join(lines) + "\n"
 
 
-def write_point(point: Point) -> str:
-    """A point: `A1`, `A1 + 2r`."""
-    if not point.multiple:
-        return f"{point.end}{point.robot}"
-    size = "" if abs(point.multiple) == 1 else write_number(abs(point.multiple))
-    return f"{point.end}{point.robot} {'+' if point.multiple > 0 else '-'} {size}r"
-
-
 def _braces(items: list[str]) -> str:
     return "{ " + ", ".join(items) + " }" if items else "{}"
 
 
 def _law(law: Law) -> str:
     eps = law.eps if isinstance(law.eps, str) else write_number(law.eps)
-    goals = ", ".join(map(write_point, law.goals))
+    goals = ", ".join(map(str, law.goals))
     text = f"{law.name} on W to ( {goals} ) within {eps}"
     if law.dwell is None:
         return text

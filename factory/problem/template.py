@@ -25,10 +25,11 @@ class Point:
     position: Position | None = field(default=None, compare=False)
 
     def __str__(self) -> str:
+        """The point as the language writes it: `A1`, `A1 + 2r`."""
         if not self.multiple:
             return f"{self.end}{self.robot}"
-        sign = "+" if self.multiple > 0 else "-"
-        return f"{self.end}{self.robot} {sign} {abs(self.multiple):g}r"
+        size = "" if abs(self.multiple) == 1 else repr(abs(float(self.multiple))).removesuffix(".0")
+        return f"{self.end}{self.robot} {'+' if self.multiple > 0 else '-'} {size}r"
 
 
 @dataclass(frozen=True, slots=True)

@@ -129,7 +129,9 @@ class _ModelReader:
                     drafts.append(DraftNode("", step[0].position))
                     drafts[index].inputs.insert(0, len(drafts) - 1)
                     index = len(drafts) - 1
-        self._refuse_twice()
+        for references in self.there.values():
+            places = [reference.position for reference in references]
+            self.faults.check_used_once(quoted(references[0].file), places)
         return drafts
 
     def _enter(
@@ -150,15 +152,6 @@ class _ModelReader:
             DraftNode("", reference.position, PART, [], self._look(reference, file, here))
         )
         return len(drafts) - 1, (None, here)
-
-    def _refuse_twice(self) -> None:
-        for references in self.there.values():
-            first, *others = sorted(references, key=lambda r: (r.position.file, r.position.line))
-            for reference in others:
-                line = first.position.line
-                message = f"{quoted(reference.file)} is in the place where line {line} has put it"
-                hint = "a part is used once: remove one of the two lines, or move one"
-                self.faults.add("UsedTwice", message, reference.position, hint)
 
     def _look(
         self, reference: Reference, file: LDrawFile | None, place: _Place
