@@ -1,4 +1,4 @@
-"""The PAG language: what is accepted, what it means, and what is said of everything else."""
+"""The PAG language: accepted texts, their values, and the errors of all others."""
 
 from __future__ import annotations
 

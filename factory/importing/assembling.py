@@ -12,7 +12,7 @@ from factory.lang.source import where
 from factory.problem.pag import PAG, Assembly
 
 Mates = Literal["many", "chain"]
-"""How three inputs and more are mated: in one operation, or two at a time in their order."""
+"""How three or more inputs are mated: in one operation, or one after the other."""
 
 
 def assemble(drafts: Sequence[DraftNode], faults: ImportFaults, mates: Mates = "many") -> PAG:
@@ -54,7 +54,7 @@ def _refuse_twice(drafts: Sequence[DraftNode], made: Sequence[int], faults: Impo
 
 
 def _chain(label: str, inputs: list[str], labels: Labeller) -> list[Assembly]:
-    """Mates of two inputs, each but the last labelled by how much is together."""
+    """Mates of two inputs; each label but the last counts the inputs that are together."""
     piles = [inputs[0], *(labels.within(label, n) for n in range(2, len(inputs))), label]
     steps = zip(pairwise(piles), inputs[1:], strict=True)
     return [Assembly(made, MATE, (pile, new)) for (pile, made), new in steps]

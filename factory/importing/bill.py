@@ -1,4 +1,4 @@
-"""Bills of materials with levels: how rows become drafts."""
+"""From the rows of a bill of materials to drafts."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ MOST_COPIES = 10_000
 
 
 class BillReader:
-    """Makes drafts of rows; what is wrong goes to the faults."""
+    """Makes drafts of rows; errors go to the faults."""
 
     def __init__(self, source: Source, parts: PartMaker, faults: ImportFaults) -> None:
         self.source, self.parts, self.faults = source, parts, faults
@@ -46,7 +46,7 @@ class BillReader:
         return drafts
 
     def _level_parents(self, rows: list[BillRow]) -> None:
-        """Levels 0, 1, 2: a row goes into the last one above it that is one level higher."""
+        """Levels 0, 1, 2: the parent of a row is the last one before it that is one level above."""
         above: list[tuple[int, int]] = []
         top: int | None = None
         for index, row in enumerate(rows):
@@ -70,7 +70,7 @@ class BillReader:
             above.append((level, index))
 
     def _number_parents(self, rows: list[BillRow]) -> None:
-        """Numbers 1, 1.1, 1.2: a row goes into the one that has its number but the last."""
+        """Numbers 1, 1.1, 1.2: the parent of a row has its number without the last part."""
         seen: dict[str, int] = {}
         for index, row in enumerate(rows):
             text = _level(row).rstrip(".")
@@ -140,7 +140,7 @@ class BillReader:
         return DraftNode(name, row.at("name"), PART, [], made)
 
     def _length(self, row: BillRow, axis: str) -> float:
-        """In the unit of the bill, whatever that of its column is."""
+        """A length of a row, from the unit of its column to that of the bill."""
         value = self._value(row, axis) or 0.0
         unit = self.table.header.units.get(axis)
         return value if unit is None else round(value * unit / self.parts.unit, 12)
@@ -156,7 +156,7 @@ class BillReader:
 
 
 def _level(row: BillRow) -> str:
-    """What a row says of its level; leading dots, as some programs print them, do not count."""
+    """The level of a row, without the leading dots that some programs print."""
     return (row.cells.get("level") or row.cells.get("item", "")).lstrip(". ")
 
 

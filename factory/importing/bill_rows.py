@@ -23,8 +23,7 @@ COLUMNS = {
     "mass": ("mass", "mass [kg]", "weight"),
     "density": ("density",),
 }
-"""The columns that mean something, and the headers that they may have, the likeliest first; others
-are left out."""
+"""The columns that are read, and the headers that they may have, the likeliest first."""
 
 UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254}
 """Units of length that a header may have, as `x [mm]` [m]."""
@@ -34,8 +33,8 @@ EXAMPLE = "level,name,quantity,mesh,x,y,z"
 
 @dataclass(slots=True)
 class BillRow:
-    """A line of the bill: cells by column, and the place of each. `parent`: the index of the row
-    that it goes into, -1 for none."""
+    """A line of the bill: cells by column, and the place of each; `parent`: the index of the row
+    that it is a part of, -1 for none."""
 
     cells: dict[str, str]
     places: dict[str, Position]
@@ -50,14 +49,14 @@ class BillRow:
 
 @dataclass(frozen=True, slots=True)
 class Header:
-    """The index of each column that means something, and the unit of those that state one [m]."""
+    """The index of each column that is read, and the units in headers [m]."""
 
     columns: dict[str, int]
     units: dict[str, float]
 
 
 class BillTable:
-    """Reads a bill row by row; what is wrong goes to the faults."""
+    """Reads a bill row by row; errors go to the faults."""
 
     def __init__(self, source: Source, faults: ImportFaults) -> None:
         self.source, self.faults = source, faults
@@ -141,7 +140,7 @@ class BillTable:
 
 
 def _rank(title: str) -> int:
-    """How unlikely it is that a title means its column."""
+    """The rank of a title among the headers of its column; 0 is the likeliest."""
     return next((headers.index(title) for headers in COLUMNS.values() if title in headers), 0)
 
 

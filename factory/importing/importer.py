@@ -1,4 +1,4 @@
-"""From a file to an `Imported`: which reader it takes, and the files that come out."""
+"""From a file to an `Imported`: the choice of the reader, and the files to be written."""
 
 from __future__ import annotations
 
@@ -43,8 +43,8 @@ class Options:
 
 @dataclass(frozen=True, slots=True)
 class Imported:
-    """A product and the files that it comes in: contents by their paths in the output folder.
-    `name` is that of the PAG's file, without `.pag`."""
+    """A product and the contents of its files, by path in the output folder. `name` is that of the
+    PAG's file, without `.pag`."""
 
     pag: PAG
     name: str

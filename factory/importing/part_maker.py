@@ -1,4 +1,4 @@
-"""What a tree or a bill says of a part, made into the parameters of `atomic`."""
+"""From the description of a part in a tree or a bill to the parameters of `atomic`."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from factory.problem.pag import Parameter, Value
 from factory.support.errors import Position
 
 LENGTHS = ("scale", "pos", "box", "cylinder", "sphere")
-"""What is in the unit of the file."""
+"""Parameters in the unit of the file."""
 
 
 @dataclass(slots=True)
@@ -29,8 +29,8 @@ class PartMaker:
     def parameters(
         self, given: Mapping[str, Value], place: Placement, position: Position
     ) -> tuple[Parameter, ...]:
-        """The parameters of a part in a frame; its mesh is fetched, its lengths are in metres.
-        What is wrong is noted: two shapes, an unknown mesh, a mesh twice in the same place."""
+        """The parameters of a part in a frame; its mesh is fetched, its lengths are in metres. Two
+        shapes and an unknown mesh are noted."""
         shapes = [name for name in SHAPES if name in given]
         if len(shapes) > 1:
             message = f"a part has one shape, but '{shapes[0]}' and '{shapes[1]}' are given"
@@ -51,7 +51,7 @@ class PartMaker:
         return made
 
     def check_places(self) -> None:
-        """Notes each mesh that stands where the same one stands already (UsedTwice)."""
+        """Note each mesh in the place of an equal one (UsedTwice)."""
         for (mesh, *_), positions in self.there.items():
             name = quoted(str(mesh.value).partition("/")[2])
             self.faults.check_used_once(f"the mesh {name}", positions)

@@ -1,4 +1,4 @@
-"""Places in the product: where a sub-assembly or a part stands, turned and moved."""
+"""Placements: the frames of sub-assemblies and parts in the product."""
 
 from __future__ import annotations
 
@@ -20,8 +20,7 @@ class Placement:
     moved: bool = False
 
     def inside(self, at: tuple[float, ...] | None, quat: tuple[float, ...] | None) -> Placement:
-        """The frame at `at`, turned by `quat`, in this one; this very one where neither is
-        given."""
+        """The frame at `at`, turned by `quat`, in this one; this one where neither is given."""
         if at is None and quat is None:
             return self
         there = self.turn @ np.array(at or (0.0, 0.0, 0.0)) + self.at
@@ -32,8 +31,8 @@ class Placement:
     def parameters(
         self, at: tuple[float, ...] | None, quat: tuple[float, ...] | None
     ) -> list[Parameter]:
-        """What a PAG says of a part at `at`, turned by `quat`, in this frame: those numbers
-        themselves where the frame is the product's."""
+        """The parameters of a part at `at`, turned by `quat`, in this frame; these numbers
+        unchanged where the frame is that of the product."""
         if self.moved:
             whole = self.inside(at, quat)
             at, quat = rounded(whole.at), quaternion(whole.turn)

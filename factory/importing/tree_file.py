@@ -1,4 +1,4 @@
-"""Trees of parts as nested JSON or YAML: what the nodes may say, and how they become drafts."""
+"""From trees of parts, as nested JSON or YAML, to drafts."""
 
 from __future__ import annotations
 
@@ -27,10 +27,7 @@ BARE = '"part": true is a part with no shape of its own'
 
 @dataclass(slots=True)
 class TreeReader:
-    """Makes drafts of nodes; what is wrong goes to the faults.
-
-    `operations`: the templates that nodes may name.
-    """
+    """Makes drafts of nodes; errors go to the faults. `operations`: those that nodes may name."""
 
     operations: Mapping[str, Signature]
     parts: PartMaker
@@ -61,7 +58,7 @@ class TreeReader:
     def _node(
         self, node: Node, draft: DraftNode, place: Placement
     ) -> tuple[tuple[Node, ...], Placement]:
-        """Fills in a draft; its children, and the frame that they are in."""
+        """Complete a draft; gives its children and their frame."""
         if node.kind == "text":
             self._part({"part": node}, draft, place)
             return (), place
@@ -81,7 +78,7 @@ class TreeReader:
         return (), place
 
     def _fields(self, node: Node, keys: tuple[str, ...]) -> dict[str, Node]:
-        """The values of a node by their keys, of which each is known and there once."""
+        """The values of a node by their keys; unknown and repeated keys are noted."""
         fields: dict[str, Node] = {}
         for key, value in node.content:
             known = {"mesh": "part", "pos": "at"}.get(str(key.content), str(key.content))
@@ -198,7 +195,7 @@ class TreeReader:
         return found if isinstance(found, tuple) else None
 
     def _value(self, name: str, kind: Kind, node: Node) -> Value | None:
-        """What a parameter of this kind takes; None after a fault."""
+        """The value of a parameter; None after a fault."""
         if kind.length == 0 and node.kind == "text" and node.content.isprintable():
             return str(node.content)
         numbers = (node,) if node.kind == "number" else node.content
@@ -213,13 +210,13 @@ class TreeReader:
 
 
 def mesh_name(path: str) -> str:
-    """What a part is called after its mesh: the file's name without folder and ending."""
+    """The name of a part from its mesh: the file's name without folder and suffix."""
     name = PurePosixPath(path.replace("\\", "/"))
     return name.stem if name.suffix.lower() in MESHES else name.name
 
 
 def _shown(node: Node) -> str:
-    """What was found, for a message: a list with what is in it."""
+    """A node in a message; a list with its items."""
     if node.kind != "list":
         return node.words
     inside = ", ".join(item.words for item in node.content[:6])

@@ -1,4 +1,4 @@
-"""What one statement of a PAG says, checked against its operation's template."""
+"""From a statement to a node of a PAG, checked against the template of its operation."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ MESHES = (".obj", ".stl", ".ply", ".glb")
 
 @dataclass(frozen=True, slots=True)
 class Signature:
-    """What an operation takes: how many inputs at least, whether more, and which parameters."""
+    """What an operation takes: the least number of inputs, whether more, and its parameters."""
 
     name: str
     inputs: int
@@ -47,10 +47,8 @@ def signature(template: Template) -> Signature:
 
 
 class AssemblyReader:
-    """Makes assemblies of definitions; what is wrong goes to the findings.
-
-    `folder` is where mesh paths start; None: they are not followed.
-    """
+    """Makes assemblies of definitions; errors go to the findings. `folder` is where mesh paths
+    start; they are not followed where it is None."""
 
     def __init__(
         self, findings: Findings, signatures: Mapping[str, Signature], folder: str | None
@@ -60,7 +58,7 @@ class AssemblyReader:
         self.meshes: dict[str, tuple[str, str] | None] = {}
 
     def read(self, definition: Definition) -> Assembly:
-        """The assembly a definition stands for (incomplete if errors were noted)."""
+        """The assembly of a definition; incomplete where errors were noted."""
         label, operation, arguments = definition
         at = self.findings.source.at
         inputs = [argument for argument in arguments if isinstance(argument, Token)]
@@ -167,8 +165,7 @@ class AssemblyReader:
 
 
 def _mesh_problem(folder: str | None, path: str) -> tuple[str, str] | None:
-    """What is wrong with a mesh path, and a way out; whether it is there only where it starts at a
-    folder."""
+    """The message and hint for a bad mesh path; without a folder only its suffix is checked."""
     if os.path.splitext(path)[1].lower() not in MESHES:
         return f"{quoted(path)} is not a mesh file", f"mesh files end in {', '.join(MESHES)}"
     full = os.path.join(folder or "", path)

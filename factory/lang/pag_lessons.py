@@ -1,6 +1,6 @@
-"""The mistakes made in PAGs, taught by example: malformed statements and what to say of them.
+"""Mistakes in PAGs: malformed statements, and the message for each.
 
-In a message or hint `{found}` is the token the parser stuck at, `{before}` the one before it,
+In a message or hint `{found}` is the token at which the parser stops, `{before}` the one before it,
 `{first}` the statement's first and `{operation}` the word before its first parenthesis.
 """
 

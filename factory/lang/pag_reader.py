@@ -1,6 +1,6 @@
-"""From text to PAG: what `check` sees first.
+"""From text to PAG, the first stage.
 
-The stage reports every error of a text at once, in the order of the text; a PAG it returns is one
+It reports every error of a text at once, in the order of the text. A PAG that it returns is one
 tree over its labels, each made by a known operation with the inputs and values that it takes.
 """
 
@@ -22,8 +22,8 @@ from factory.support.collector import collector_paused
 def read_pag(
     text: str, templates: Mapping[str, Template], file: str = "<text>", folder: str | None = "."
 ) -> PAG:
-    """The PAG a text stands for; mesh paths start at `folder`, or are not followed where that is
-    None. Raises InputError."""
+    """The PAG of a text. Mesh paths start at `folder`; they are not followed where that is None.
+    Raises InputError."""
     findings = Findings(source_of(text, file))
     statements = read_statements(findings)
     signatures = {name: signature(template) for name, template in templates.items()}

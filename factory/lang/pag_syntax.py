@@ -113,7 +113,7 @@ def _lex(text: str) -> list[Token]:
 
 
 def _apart(token: Token) -> Iterator[Token]:
-    """The tokens of `= ( 0, 0, 1 )`, which the lexer takes at one stroke."""
+    """The tokens of `= ( 0, 0, 1 )`, which is one token of the lexer."""
     for match in _SIGN_OR_WORD.finditer(token):
         kind = _SIGNS.get(match[0], "WORD")
         offset = match.start()
@@ -170,7 +170,7 @@ def _report_incomplete(statement: Equation | WordPair, findings: Findings) -> No
 
 
 def _recover(findings: Findings, made: Statements) -> list[Any]:
-    """The statements of a broken text that do parse; an error for each of the others."""
+    """The statements of a broken text that do parse; each of the others is noted as an error."""
     statements: list[Any] = []
     for piece, ended in _pieces(_lex(findings.source.text)):
         statement = _parse_piece(piece, findings)

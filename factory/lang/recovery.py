@@ -1,8 +1,8 @@
 """Reading on after a syntax error: a text is cut into pieces, each parsed alone.
 
-What to say about a piece that does not parse is taught by example, as Lark's own
-`match_examples` does: a `Lesson` lists malformed pieces, and the parser's state and the token it
-stuck at in each of them recall the lesson when a user's piece gets stuck in the same way.
+The message about a malformed piece is found by example, as in Lark's `match_examples`: a `Lesson`
+lists malformed pieces, each of which stops the parser in some state at some kind of token. A piece
+that stops it in the same state at the same kind gets the message of that lesson.
 """
 
 from __future__ import annotations
@@ -24,7 +24,8 @@ SIGNS = frozenset(";,()=<>{}~.+-")
 
 @dataclass(frozen=True, slots=True)
 class Stuck:
-    """Where a parse of one piece stopped: the token's index, the token, the parser's state."""
+    """Where the parse of a piece stopped: the token, its index, the parser's state, and the kinds
+    of token that it would have taken."""
 
     index: int
     token: Token
@@ -34,8 +35,8 @@ class Stuck:
 
 @dataclass(frozen=True, slots=True)
 class Lesson:
-    """A mistake: what to say, the way out, the place to show, and malformed pieces (between bars)
-    that show it. Places: the token `found`, the `last` good one or `behind` it, the `first` one or
+    """A mistake: its message, its hint, the place to show, and malformed pieces that make it,
+    between bars. Places: the token `found`, the `last` good one or `behind` it, the `first` one or
     behind it (`second`)."""
 
     message: str
@@ -58,7 +59,7 @@ def open_grammar(name: str, start: list[str], builder: Transformer[Token, Any]) 
 
 
 def drive(lark: Lark, start: str, tokens: Sequence[Token]) -> Any | Stuck:
-    """Parse tokens from the symbol `start`: what the tree builder makes of them, or a Stuck."""
+    """The value of tokens parsed from the symbol `start`, or where the parse stopped."""
     parser = lark.parse_interactive(None, start=start)
     last = tokens[-1] if tokens else Token(END, "", 0, 1, 1)
     result: Any = None
@@ -74,7 +75,7 @@ def drive(lark: Lark, start: str, tokens: Sequence[Token]) -> Any | Stuck:
 def learn(
     lark: Lark, start: str, lessons: Iterable[Lesson], lex: Callable[[str], list[Token]]
 ) -> Mapping[tuple[object, str], Lesson]:
-    """The lessons by the parser's state and the kind of token it stuck at."""
+    """The lessons by the state of the parser and the kind of token at which it stops."""
     table: dict[tuple[object, str], Lesson] = {}
     for lesson in lessons:
         for example in lesson.examples.split(" | ") if lesson.examples else ():
@@ -86,7 +87,7 @@ def learn(
 
 
 def report_unlawful(token: Token, findings: Findings) -> None:
-    """Note a character that no statement contains, or a text that is not closed."""
+    """Note a character that no statement contains, or a text without its closing quote."""
     message, hint = f"{quoted(token)} has no meaning here", _way_out(token[0])
     if token.type == "UNCLOSED":
         message, hint = "the text is not closed", 'close it with " on the same line'

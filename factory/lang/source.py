@@ -1,4 +1,4 @@
-"""A text being read: its lines, the places in it, and what is wrong with it."""
+"""A text that is read: its lines, the places in it, and the errors found in it."""
 
 from __future__ import annotations
 
@@ -11,7 +11,8 @@ from lark import Token
 from factory.support.errors import Diagnostic, InputError, Position, did_you_mean
 from factory.support.files import LOG
 
-FILES = 1000  # at most so many names of a folder are compared with a missing one
+FILES = 1000
+"""The most names of a folder that are compared with a missing one."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,7 +39,7 @@ class Source:
 
 
 def source_of(text: str, file: str) -> Source:
-    """The source of a text as it was given: without byte-order mark, line ends made alike."""
+    """The source of a text: without byte-order mark, every line end `\\n`."""
     text = text.removeprefix("\ufeff").replace("\r\n", "\n").replace("\r", "\n")
     return Source(text, file, tuple(text.split("\n")))
 

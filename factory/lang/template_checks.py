@@ -1,4 +1,4 @@
-"""From the clauses of a template to its value, checked: what would break Theorem 5.1 is refused."""
+"""From the clauses of a template to its value: what would break Theorem 5.1 is refused."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _LABELS_HINT = "<a; b> = < LAB1, LAB2, nopart; nopart, nopart, LAB3 >;"
 
 
 class TemplateMaker:
-    """Makes the template of a draft; what is wrong goes to the findings."""
+    """Makes the template of a draft; errors go to the findings."""
 
     def __init__(self, draft: TemplateDraft, findings: Findings) -> None:
         self.draft, self.findings = draft, findings

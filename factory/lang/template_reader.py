@@ -23,10 +23,8 @@ Folder = str | os.PathLike[str]
 
 
 def read_template(text: str, file: str = "<text>") -> Template:
-    """The template a text stands for. Raises InputError with every error of the text.
-
-    Whether the template named by `further` exists is seen only among others: `load_templates`.
-    """
+    """The template of a text. Raises InputError with every error of the text. `load_templates`
+    checks that the template named by `further` exists."""
     findings = Findings(source_of(text, file))
     template = TemplateMaker(read_clauses(findings), findings).make()
     findings.raise_if_any()

@@ -1,7 +1,6 @@
 """The syntax of templates: a text becomes a header and clauses, and every syntax error is found.
 
-Texts are short, so there is one path: the text is cut at its semicolons, and each piece is parsed
-alone.
+The text is cut at its semicolons, and each piece is parsed alone.
 """
 
 from __future__ import annotations
@@ -173,7 +172,7 @@ def _has_unlawful(piece: list[Token], findings: Findings) -> bool:
 
 
 def _parse(piece: list[Token], start: str, form: str, findings: Findings) -> Any | None:
-    """What a piece says, or None after its error has been noted."""
+    """The content of a piece, or None after its error has been noted."""
     if _has_unlawful(piece, findings):
         return None
     result = drive(_lark(), start, piece)

@@ -1,4 +1,4 @@
-"""Whether the assemblies of a text are one tree under the root: a PAG (paper, section 4.1).
+"""Whether the assemblies of a text are a PAG: one tree under the root (paper, section 4.1).
 
 Every check is linear in the number of labels, and none recurses.
 """
@@ -23,7 +23,7 @@ CANDIDATES = 1000
 
 @dataclass(slots=True)
 class TreeCheck:
-    """Checks nodes against each other; what is wrong goes to the findings.
+    """Checks nodes against each other; errors go to the findings.
 
     A label in a statement that did not parse (`statements.broken`) may be defined or used there, so
     nothing is said of it. `users`: the node that uses each label, and as which input; `excused`:
@@ -120,7 +120,7 @@ class TreeCheck:
         self.findings.add("Root", message, start, hint)
 
     def _check_undefined(self, free: Sequence[str]) -> None:
-        """Labels that are used only; the likeliest meant are those that are defined only."""
+        """Labels that are used but not defined; suggestions are those defined but not used."""
         broken = self.statements.broken
         known = [label for label in free if label not in broken]
         known += sorted(broken - self.users.keys())
@@ -156,7 +156,7 @@ class TreeCheck:
                 self.findings.add("UnreachableLabel", message, _place(self.defined[label]), hint)
 
     def _check_cycles(self) -> None:
-        """A label that, followed to its user and on, comes back to itself is made from itself."""
+        """A label is made from itself if the chain from user to user leads back to it."""
         done: set[str] = set()
         for start in self.defined:
             path: dict[str, None] = {}

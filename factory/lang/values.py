@@ -1,4 +1,4 @@
-"""Values of parameters: what each takes, and the geometry a part may have."""
+"""Values of parameters: the kind that each takes, and the geometry of a part."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ from factory.support.errors import Position
 
 @dataclass(frozen=True, slots=True)
 class Kind:
-    """What a parameter takes: `length` 0 is a text, 1 a number, n a vector of n numbers.
+    """The kind of a parameter: `length` 0 is a text, 1 a number, n a vector of n numbers.
 
-    Each number lies in [low, high], `positive` ones above 0; `zero` tells whether a vector may be
-    all zero. `example` is shown with an error.
+    Each number lies in [low, high], and above 0 where `positive`; `zero`: a vector may be all zero.
+    `example` is shown with an error.
     """
 
     length: int
@@ -32,7 +32,7 @@ class Kind:
     zero: bool = True
 
     def allows(self, number: float) -> bool:
-        """Whether a number may be one of its numbers."""
+        """Whether one number lies within the bounds."""
         return self.low <= number <= self.high and (number > 0 or not self.positive)
 
     def fits(self, numbers: tuple[float, ...]) -> bool:
@@ -44,7 +44,7 @@ class Kind:
         return finite and self.allows(small) and self.allows(large)
 
     def glimpse(self, token: Token) -> tuple[float, ...] | None:
-        """The value of a VECTOR token if all is plainly well with it."""
+        """The value of a VECTOR token; None where it needs a closer look."""
         words = [word.strip() for word in token[token.index("(") + 1 : -1].split(",")]
         if self.length < 2 or not all(map(is_number, words)):
             return None
@@ -83,7 +83,7 @@ SHAPES = ("mesh", "box", "cylinder", "sphere")
 
 
 def kind_of(default: Value) -> Kind:
-    """The kind a template's parameter has, read off its default; numbers like it stay >= 0."""
+    """The kind of a template's parameter, from its default: one >= 0 has no negative values."""
     if isinstance(default, str):
         return Kind(0, f'"{default}"')
     if isinstance(default, tuple):
@@ -92,12 +92,12 @@ def kind_of(default: Value) -> Kind:
 
 
 def text_of(token: Token) -> str:
-    """What a quoted text says: a doubled quote in it is one."""
+    """The content of a quoted text, in which a quote is doubled."""
     return token[1:-1].replace('""', '"')
 
 
 class ValueReader:
-    """Reads values of one source; what is wrong goes to its findings."""
+    """Reads values of one source; errors go to its findings."""
 
     def __init__(self, findings: Findings) -> None:
         self.findings = findings
@@ -122,7 +122,7 @@ class ValueReader:
         return self._number(name, kind, raw)
 
     def any(self, name: str, raw: Token | Vector) -> Value | None:
-        """A value of whatever kind it is: a template's default."""
+        """A value of any kind: a template's default."""
         if isinstance(raw, Vector):
             length = len(raw.words)
             return self._vector(name, Kind(length, "( 0, 0, 1 )" if length > 1 else "1.0"), raw)

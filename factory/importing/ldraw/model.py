@@ -1,5 +1,5 @@
-"""LDraw models as drafts: sub-models are sub-assemblies, each building step adds to what is
-there."""
+"""From LDraw models to drafts: sub-models are sub-assemblies; each building step adds to the steps
+before."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from factory.problem.pag import Parameter
 from factory.support.errors import Diagnostic
 
 DENSITY = 1050.0
-"""Of ABS [kg/m³]."""
+"""Density of ABS [kg/m³]."""
 
 BRICK = (0.008, 0.008, 0.0096)
 """The box that stands for a part of unknown shape: a brick with one stud [m]."""
@@ -36,7 +36,7 @@ Colour = tuple[float, float, float, float] | None
 
 @dataclass(frozen=True, slots=True)
 class _Place:
-    """Where a model stands in the product [LDU], and the colour that it hands down."""
+    """The frame of a model in the product [LDU], and the colour of its parts without one."""
 
     turn: Array
     at: Array
@@ -69,7 +69,7 @@ class _ModelReader:
         self.greys: set[int] = set()
 
     def survey(self) -> None:
-        """Goes through every model once: nothing missing, empty, made of itself or too large."""
+        """Check every model once: none is missing, empty, made of itself or too large."""
         size: dict[int, int] = {}
         for model in children_first(self.shelf.main, self._models_in, size):
             entries = [self.shelf.find(reference) for reference in model.references]
@@ -137,7 +137,7 @@ class _ModelReader:
     def _enter(
         self, reference: Reference, place: _Place, drafts: list[DraftNode]
     ) -> tuple[int, tuple[LDrawFile | None, _Place]]:
-        """Adds the draft of one line; its number, and the model that it stands for, if any."""
+        """Add the draft of a line; gives its index, and the model that the line places, if any."""
         turn = place.turn @ matrix(reference)
         at = place.turn @ np.array(reference.place[:3]) + place.at
         colour = place.colour if reference.colour in INHERITED else reference.colour

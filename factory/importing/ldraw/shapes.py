@@ -19,10 +19,10 @@ UPRIGHT = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
 """From LDraw's axes, -y up, to the factory's, z up."""
 
 MOST_TRIANGLES = 1_000_000
-"""Of one part; sub-files of sub-files can multiply without end."""
+"""The most triangles of a part: files within files multiply them."""
 
 LIBRARY = "--library DIR names a parts library (or LDRAWDIR does); --boxes does without"
-"""The way out where a part file is missing."""
+"""The hint where a part file is missing."""
 
 
 def matrix(reference: Reference) -> Array:
@@ -31,14 +31,14 @@ def matrix(reference: Reference) -> Array:
 
 
 class Shapes:
-    """Triangles (n, 3, 3) of files [LDU], each found once, or what is missing for them."""
+    """Triangles (n, 3, 3) of files [LDU], each made once, or the error that prevents them."""
 
     def __init__(self, shelf: Shelf) -> None:
         self.shelf = shelf
         self.found: dict[int, Array | Diagnostic] = {}
 
     def of(self, file: LDrawFile) -> Array | Diagnostic:
-        """The triangles of a part, or why they are not to be had."""
+        """The triangles of a part, or the error that prevents them."""
         for current in children_first(file, self._below, self.found):
             if id(current) not in self.found:
                 self._join(current)
@@ -81,7 +81,7 @@ class Shapes:
 
 
 def _placed(triangles: Array, reference: Reference) -> Array:
-    """Triangles as a reference places them; a mirror turns them round."""
+    """Triangles as a reference places them; a mirror reverses their corners."""
     turn = matrix(reference)
     moved = triangles @ turn.T + np.array(reference.place[:3])
     inside_out = reference.inverted != (np.linalg.det(turn) < 0)

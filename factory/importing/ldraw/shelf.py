@@ -1,4 +1,4 @@
-"""Where LDraw files are found: packed in the model, beside it, or in a parts library."""
+"""The search for LDraw files: packed in the model, beside it, or in a parts library."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from factory.importing.mesh_files import first_file, path_inside
 from factory.lang.source import quoted, read_text, source_of
 
 ROOMS = ("parts", "p", "models", "unofficial/parts", "unofficial/p")
-"""Where a library keeps files, in the order in which they are looked for."""
+"""The folders of a library, in the order of the search."""
 
 
 class Shelf:
-    """The files that a model can refer to. Each is read once, when it is asked for."""
+    """The files that a model can refer to, each read once, at the first reference."""
 
     def __init__(self, path: Path, library: Path | None, faults: ImportFaults) -> None:
         self.library, self.faults = library, faults
