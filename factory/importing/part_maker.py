@@ -35,20 +35,19 @@ class PartMaker:
         if len(shapes) > 1:
             message = f"a part has one shape, but '{shapes[0]}' and '{shapes[1]}' are given"
             self.faults.add("BadValue", message, position, f"keep one of {', '.join(SHAPES)}")
-        metres = {name: self._metres(name, value) for name, value in given.items()}
+        metres = self.metres(given)
         if "mesh" in given:
             path = self.meshes.path(str(given["mesh"]), position)
             metres |= {"mesh": path or ""}
             if self.unit != 1:
                 metres.setdefault("scale", self.unit)
-        at, quat = metres.pop("pos", None), metres.pop("quat", None)
-        stands = place.parameters(_vector(at), _vector(quat)) if shapes or at or quat else []
+        placed = shapes or "pos" in given or "quat" in given
+        stands = place.parameters(metres) if placed else []
         first = [Parameter(name, metres.pop(name)) for name in shapes]
-        rest = [Parameter(name, value) for name, value in metres.items()]
-        made = (*first, *stands, *rest)
+        rest = [Parameter(name, metres[name]) for name in metres if name not in ("pos", "quat")]
         if self.meshes.found.get(str(given.get("mesh"))):
             self.there.setdefault((*first, *stands), []).append(position)
-        return made
+        return (*first, *stands, *rest)
 
     def check_places(self) -> None:
         """Note each mesh in the place of an equal one (UsedTwice)."""
@@ -56,13 +55,13 @@ class PartMaker:
             name = quoted(str(mesh.value).partition("/")[2])
             self.faults.check_used_once(f"the mesh {name}", positions)
 
-    def _metres(self, name: str, value: Value) -> Value:
-        if name not in LENGTHS or self.unit == 1 or isinstance(value, str):
-            return value
-        if isinstance(value, tuple):
-            return tuple(x * self.unit for x in value)
-        return value * self.unit
-
-
-def _vector(value: Value | None) -> tuple[float, ...] | None:
-    return value if isinstance(value, tuple) else None
+    def metres(self, given: Mapping[str, Value]) -> dict[str, Value]:
+        """These parameters with lengths in metres."""
+        made = dict(given)
+        for name in LENGTHS:
+            value = given.get(name)
+            if self.unit != 1 and isinstance(value, tuple):
+                made[name] = tuple(x * self.unit for x in value)
+            elif self.unit != 1 and isinstance(value, float):
+                made[name] = value * self.unit
+        return made

@@ -121,7 +121,8 @@ class TreeReader:
             none = children is None or children.kind in ("list", "null")
             self._empty(draft, "it has no children" if none else "its children are no list")
             return (), place
-        inside = place.inside(self._length("at", fields), self._numbers("quat", fields))
+        stands = {name: node for name, node in fields.items() if name in ("at", "quat")}
+        inside = place.inside(self.parts.metres(self._geometry(stands)))
         self._operation(fields, draft, len(children.content))
         return children.content, inside
 
@@ -175,24 +176,19 @@ class TreeReader:
         elif part is not None and not (part.kind == "boolean" and part.content):
             message = f"'part' takes the name of a mesh file, or true, not {part.words}"
             self.faults.add("BadValue", message, part.position, f"for example {EXAMPLE}")
+        given |= self._geometry(fields)
+        at = draft.position if part is None else part.position
+        draft.parameters = self.parts.parameters(given, place, at)
+
+    def _geometry(self, fields: dict[str, Node]) -> dict[str, Value]:
+        """The values of parameters of a part's geometry or of a sub-assembly's place."""
+        given: dict[str, Value] = {}
         for name, node in fields.items():
             of = "pos" if name == "at" else name
             value = self._value(name, GEOMETRY[of], node)
             if value is not None:
                 given[of] = value
-        at = draft.position if part is None else part.position
-        draft.parameters = self.parts.parameters(given, place, at)
-
-    def _length(self, name: str, fields: dict[str, Node]) -> tuple[float, ...] | None:
-        found = self._numbers(name, fields)
-        return None if found is None else tuple(x * self.parts.unit for x in found)
-
-    def _numbers(self, name: str, fields: dict[str, Node]) -> tuple[float, ...] | None:
-        if name not in fields:
-            return None
-        kind = GEOMETRY["pos" if name == "at" else name]
-        found = self._value(name, kind, fields[name])
-        return found if isinstance(found, tuple) else None
+        return given
 
     def _value(self, name: str, kind: Kind, node: Node) -> Value | None:
         """The value of a parameter; None after a fault."""

@@ -77,9 +77,6 @@ class Progress(ProgressBar):
         bar = counter("units, {task.fields[speed]}, left", "{task.fields[time]}")
         return bar, bar.add_task("", total=self.units, time="0.0 s", speed="")
 
-    def __call__(self, world: Any, supervisor: Any) -> None:
-        self.observe(world, supervisor)
-
     def observe(self, world: Any, supervisor: Any) -> None:
         """Update the bar, at most once a period."""
         if self.bar is None:
