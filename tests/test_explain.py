@@ -1,4 +1,4 @@
-"""Explanations: one for every code that the package can raise, and what they show is true."""
+"""Explanations: one for every code that the package can raise, with examples that raise it."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ NOT_PROVOKED = {
     *("Dropped", "Early", "Exchanged", "Frame", "Order", "Start", "Stuck", "TwoHolders"),
     *("NotProved", "Stalled", "Unstable"),
 }
-"""Codes that take a broken machine, a broken run or a broken factory; other tests plant those."""
+"""Codes that need a broken machine, run or factory, which other tests make."""
 
 
 def takers(trees: list[ast.Module]) -> dict[str, set[int]]:
@@ -52,7 +52,7 @@ def _is_field(node: ast.stmt) -> bool:
 
 
 def constants(node: ast.expr) -> Iterator[str]:
-    """The texts that an expression can be, as far as it shows."""
+    """The constant texts that an expression can have."""
     if isinstance(node, ast.Constant) and isinstance(node.value, str):
         yield node.value
     elif isinstance(node, ast.IfExp):
@@ -91,7 +91,7 @@ def test_every_code_is_explained_and_every_explained_code_is_there() -> None:
 
 
 def test_the_search_for_codes_sees_them() -> None:
-    """One a way in which the package passes codes on."""
+    """One code for each way in which the package passes codes on."""
     seen = {"Syntax", "GearNotClosed", "TwoHolders", "Timeout", "MissingPart", "Blocked", "Stuck"}
     assert seen <= raised_anywhere()
     takes = {"Diagnostic": {0}}

@@ -1,5 +1,4 @@
-"""Importing: LDraw models, trees, bills of materials; what comes out, and what is said of bad
-ones."""
+"""Importing LDraw models, trees and bills of materials: products, and the errors of bad files."""
 
 from __future__ import annotations
 
@@ -38,7 +37,7 @@ PLAIN = "1 0 0 0 1 0 0 0 1"
 
 
 class Importer:
-    """Imports texts as files of a folder of their own, which has a good mesh and two bad ones."""
+    """Imports texts as files of a new folder with a good mesh and two bad ones."""
 
     def __init__(self, folder: Path, templates: Mapping[str, Template]) -> None:
         self.folder, self.templates = folder, templates
@@ -52,7 +51,7 @@ class Importer:
         return import_product(file, self.templates, Options(**options))
 
     def pag(self, name: str, text: str, **options: Any) -> PAG:
-        """What the PAG's text says, read back."""
+        """The PAG, read back from its text."""
         made = self.product(name, text, **options)
         written = made.files[f"{made.name}.pag"].decode()
         for path, content in made.files.items():
@@ -130,7 +129,7 @@ def test_the_cart_runs(run: Terminal, tmp_path: Path) -> None:
 
 
 def test_bricks_face_outwards_whichever_way_round_they_are_written(bring: Importer) -> None:
-    """BFC: clockwise, counterclockwise, mirrored, inverted; and a closed one that says nothing."""
+    """BFC: clockwise, counterclockwise, mirrored, inverted; and a closed part without BFC."""
     tile = TILE.partition("\n")[2]
     corner = r"(\S+ \S+ \S+)"
     turned = re.sub(rf"(?m)^3 16 {corner} {corner} {corner}$", r"3 16 \1 \3 \2", tile)
@@ -273,7 +272,7 @@ def test_what_stands_around_a_model_is_left_out(bring: Importer) -> None:
         ("0 FILE", ["1:1 Syntax 0 FILE has no name"]),
         (
             f"1 4 0 0 0 {PLAIN} tile.dat\n1 1 0 0 0 {PLAIN} TILE.dat\n{TILE}",
-            ["2:29 UsedTwice 'TILE.dat' is in the place where line 1 has put it"],
+            ["2:29 UsedTwice 'tile.dat' is where line 1 has put it already"],
         ),
         (b"0 Brick\n0 Author: M\xfcller", ["2:12 Syntax byte 0xfc is not UTF-8 text"]),
     ],
@@ -311,7 +310,7 @@ def tree_of(pag: PAG, label: str) -> dict[str, Any]:
 
 
 def plain(pag: PAG) -> dict[str, tuple[Any, ...]]:
-    """What a PAG says, whatever the order of its statements and parameters."""
+    """The content of a PAG, in which the order of statements and parameters does not count."""
     return {
         node.label: (
             node.operation,
@@ -595,7 +594,7 @@ def test_bad_bills_are_told_by_line_and_column(
 
 
 def test_import_warns_of_what_build_will(bring: Importer, run: Terminal, out: Path) -> None:
-    """The header has the unit of the places, not of the meshes; and nothing is so far away."""
+    """The unit in the header is that of the places, not of the meshes: parts are far apart."""
     (bring.folder / "leg.stl").write_bytes(trimesh.creation.box((10, 10, 60)).export(None, "stl"))
     bill = bring.folder / "b.csv"
     bill.write_text("level,name,mesh,x [mm]\n0,table,,\n1,leg,leg.stl,0\n1,leg,leg.stl,50\n")
@@ -675,7 +674,7 @@ def test_sub_models_nest_without_end(bring: Importer) -> None:
     ],
 )  # fmt: skip
 def test_what_multiplies_without_end_is_refused(bring: Importer, name: str, text: str) -> None:
-    """A few lines that stand for 2^60 parts, or triangles."""
+    """A few lines for 2^60 parts, or triangles."""
     head = {"t": "children:\n- &a0 {part: true}\n", "b": "level,name,qty\n"}.get(name[0], "")
     lines = "".join(text.format(n=n, m=n + 1) for n in range(60))
     if ".dat" in text:
@@ -688,7 +687,7 @@ def test_what_multiplies_without_end_is_refused(bring: Importer, name: str, text
 
 
 def test_names_never_lead_out_of_the_folder(bring: Importer, run: Terminal, out: Path) -> None:
-    """Names of packed bricks are made plain; links in the way are not followed."""
+    """Names of packed bricks become plain; links of the same name are not followed."""
     name = "..\\..\\evil\\x y.dat"
     text = f"1 4 0 0 0 {PLAIN} {name}\n1 4 9 9 9 {PLAIN} sub/../tile.dat\n{TILE}".replace(
         "0 FILE tile.dat", f"0 FILE {name}"

@@ -20,7 +20,7 @@ from tests.command_line import PAPER, Terminal, files_in, spawn
 
 
 def test_a_new_product_runs_at_once(run: Terminal, tmp_path: Path) -> None:
-    """Nothing to warn about, nothing in the way, and the physics makes it."""
+    """Without warnings and clashes; the physics makes it."""
     folder = tmp_path / "handbell"
     assert run("new", folder).status == 0
     assert set(files_in(folder)) == {
@@ -53,7 +53,7 @@ def test_the_commands_that_its_readme_tells_are_right(
 
 
 def test_its_factory_toml_tells_every_key_and_its_default(run: Terminal, tmp_path: Path) -> None:
-    """Commented out, all of them; taken at their word, they change nothing."""
+    """All are commented out; without the comment signs they change nothing."""
     run("new", tmp_path / "x")
     text = (tmp_path / "x" / "factory.toml").read_text()
     assert tomllib.loads(text) == {}
@@ -171,8 +171,8 @@ def test_faults_of_options_in_the_file(
 def test_each_command_takes_what_it_has_an_option_for(
     run: Terminal, pag: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Folders are those beside the file, wherever one is; a file beside the PAG beats the one in
-    the current folder."""
+    """Folders are relative to the file; a file beside the PAG takes precedence over the one in the
+    current folder."""
     mine = pag.parent / "mine"
     mine.mkdir()
     (mine / "join.op").write_text("nonsense")
@@ -197,7 +197,7 @@ def test_values_of_picture_options(run: Terminal, pag: Path) -> None:
 
 
 def completions(words: str, cwd: Path) -> list[str]:
-    """What a shell would offer for the last word."""
+    """The completions of the last word in a shell."""
     number = str(len(words.split(" ")) - 1)
     variables = {"_FACTORY_COMPLETE": "bash_complete", "COMP_WORDS": words, "COMP_CWORD": number}
     done = spawn(cwd=cwd, **variables)

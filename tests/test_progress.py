@@ -1,4 +1,4 @@
-"""The progress bar: silent unless it is looked at, and no stumbling block for a run."""
+"""The progress bar: shown on a terminal only, and harmless to a run."""
 
 from __future__ import annotations
 

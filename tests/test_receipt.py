@@ -1,4 +1,4 @@
-"""A second build of what has not changed is left out, and nothing else is."""
+"""A build is left out if and only if nothing has changed since the one before."""
 
 from __future__ import annotations
 
@@ -118,7 +118,7 @@ def test_warnings_are_given_again(run: Terminal, out: Path, tmp_path: Path) -> N
 def test_names_count_from_where_they_are_given(
     run: Terminal, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The same words elsewhere mean other files, and other templates."""
+    """In another folder the same arguments name other files and templates."""
     (tmp_path / "p.pag").write_bytes(PAPER.read_bytes())
     weld = (ROOT / "templates" / "weld.op").read_text()
     cycles = []

@@ -1,4 +1,4 @@
-"""The language of templates: what is accepted, what it means, and what is said of the rest."""
+"""The language of templates: accepted texts, their values, and the errors of all others."""
 
 from __future__ import annotations
 

@@ -11,7 +11,6 @@ from typing import Any
 
 import click
 
-from factory import __version__
 from factory.commands.analyze import analyze
 from factory.commands.build import build
 from factory.commands.check import check, programs
@@ -29,6 +28,7 @@ from factory.commands.view import view
 from factory.support.console import emit, fail, say
 from factory.support.errors import Diagnostic, FactoryError, InputError, MissingError, did_you_mean
 from factory.support.interruption import stop_on_signals
+from factory.support.version import __version__
 
 CONTEXT = {"help_option_names": ["-h", "--help"], "max_content_width": 100}
 

@@ -17,7 +17,7 @@ from factory.support.console import emit, say, table
 @OUTPUT
 def templates(folders: tuple[Path, ...], as_json: bool, quiet: bool, verbose: bool) -> int:
     """List the operations and robot types there are."""
-    from factory.lang.template_writer import write_template
+    from factory.lang.writer import write_template
     from factory.pipeline import all_templates
     from factory.problem.robot_types import load_catalogue
 

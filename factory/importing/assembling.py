@@ -6,15 +6,16 @@ from collections.abc import Sequence
 from itertools import pairwise
 from typing import Literal
 
-from factory.importing.draft import MATE, Draft, Faults, postorder
-from factory.importing.labels import Labels
+from factory.importing.draft import MATE, DraftNode, ImportFaults, postorder
+from factory.importing.labels import Labeller
+from factory.lang.source import where
 from factory.problem.pag import PAG, Assembly
 
 Mates = Literal["many", "chain"]
-"""How three inputs and more are mated: in one operation, or two at a time in their order."""
+"""How three or more inputs are mated: in one operation, or one after the other."""
 
 
-def assemble(drafts: Sequence[Draft], faults: Faults, mates: Mates = "many") -> PAG:
+def assemble(drafts: Sequence[DraftNode], faults: ImportFaults, mates: Mates = "many") -> PAG:
     """The PAG of drafts, of which the first is the product; sub-assemblies first, then parts.
 
     A mate of one input is that input. Raises InputError (DuplicateLabel) where two nodes have the
@@ -23,7 +24,7 @@ def assemble(drafts: Sequence[Draft], faults: Faults, mates: Mates = "many") -> 
     order = postorder(drafts)
     made = [i for i in order if not (drafts[i].operation == MATE and len(drafts[i].inputs) == 1)]
     _refuse_twice(drafts, made, faults)
-    labels = Labels(drafts, made)
+    labels = Labeller(drafts, made)
     label = {index: labels.of(drafts[index]) for index in made}
     for index in order:
         if index not in label:
@@ -40,23 +41,20 @@ def assemble(drafts: Sequence[Draft], faults: Faults, mates: Mates = "many") -> 
     return PAG(label[0], tuple(nodes), len(nodes))
 
 
-def _refuse_twice(drafts: Sequence[Draft], made: Sequence[int], faults: Faults) -> None:
-    first: dict[str, Draft] = {}
+def _refuse_twice(drafts: Sequence[DraftNode], made: Sequence[int], faults: ImportFaults) -> None:
+    first: dict[str, DraftNode] = {}
     for draft in (drafts[index] for index in sorted(made) if drafts[index].kept):
         if draft.name in first:
-            before, at = first[draft.name].position, draft.position
-            where = f"in line {before.line}"
-            if before.line == at.line:
-                where = f"at column {before.column}"
-            message = f"the name '{draft.name}' is used twice, first {where}"
+            before = where(first[draft.name].position, draft.position)
+            message = f"the name '{draft.name}' is used twice, first {before}"
             hint = "a part is in the product once: give each node a name of its own"
             faults.add("DuplicateLabel", message, draft.position, hint)
         first.setdefault(draft.name, draft)
     faults.raise_if_any()
 
 
-def _chain(label: str, inputs: list[str], labels: Labels) -> list[Assembly]:
-    """Mates of two inputs, each but the last labelled by how much is together."""
+def _chain(label: str, inputs: list[str], labels: Labeller) -> list[Assembly]:
+    """Mates of two inputs; each label but the last counts the inputs that are together."""
     piles = [inputs[0], *(labels.within(label, n) for n in range(2, len(inputs))), label]
     steps = zip(pairwise(piles), inputs[1:], strict=True)
     return [Assembly(made, MATE, (pile, new)) for (pile, made), new in steps]

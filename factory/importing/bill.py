@@ -1,13 +1,13 @@
-"""Bills of materials with levels: how rows become drafts."""
+"""From the rows of a bill of materials to drafts."""
 
 from __future__ import annotations
 
 import re
 
-from factory.importing.bill_rows import Row, Table
-from factory.importing.draft import MATE, MOST_NODES, PART, Draft, Faults, too_many
-from factory.importing.part_maker import PartMaker, fits
-from factory.importing.places import Place
+from factory.importing.bill_rows import BillRow, BillTable
+from factory.importing.draft import MATE, MOST_NODES, PART, DraftNode, ImportFaults, too_many
+from factory.importing.part_maker import PartMaker
+from factory.importing.places import Placement
 from factory.importing.tree_file import mesh_name
 from factory.lang.source import Source, quoted
 from factory.lang.values import GEOMETRY
@@ -20,13 +20,13 @@ MOST_COPIES = 10_000
 
 
 class BillReader:
-    """Makes drafts of rows; what is wrong goes to the faults."""
+    """Makes drafts of rows; errors go to the faults."""
 
-    def __init__(self, source: Source, parts: PartMaker, faults: Faults) -> None:
+    def __init__(self, source: Source, parts: PartMaker, faults: ImportFaults) -> None:
         self.source, self.parts, self.faults = source, parts, faults
-        self.table = Table(source, faults)
+        self.table = BillTable(source, faults)
 
-    def read(self, name: str) -> list[Draft]:
+    def read(self, name: str) -> list[DraftNode]:
         """The drafts of a bill; the product of several rows at the top is called `name`. Raises
         InputError with every fault."""
         rows = self.table.rows()
@@ -45,8 +45,8 @@ class BillReader:
         self.faults.raise_if_any()
         return drafts
 
-    def _level_parents(self, rows: list[Row]) -> None:
-        """Levels 0, 1, 2: a row goes into the last one above it that is one level higher."""
+    def _level_parents(self, rows: list[BillRow]) -> None:
+        """Levels 0, 1, 2: the parent of a row is the last one before it that is one level above."""
         above: list[tuple[int, int]] = []
         top: int | None = None
         for index, row in enumerate(rows):
@@ -69,8 +69,8 @@ class BillReader:
             row.parent = above[-1][1] if above else -1
             above.append((level, index))
 
-    def _number_parents(self, rows: list[Row]) -> None:
-        """Numbers 1, 1.1, 1.2: a row goes into the one that has its number but the last."""
+    def _number_parents(self, rows: list[BillRow]) -> None:
+        """Numbers 1, 1.1, 1.2: the parent of a row has its number without the last part."""
         seen: dict[str, int] = {}
         for index, row in enumerate(rows):
             text = _level(row).rstrip(".")
@@ -88,11 +88,11 @@ class BillReader:
             row.parent = seen.get(above, -1)
             seen.setdefault(text, index)
 
-    def _bad_level(self, row: Row, message: str, hint: str) -> None:
+    def _bad_level(self, row: BillRow, message: str, hint: str) -> None:
         column = "level" if "level" in row.cells else "item"
         self.faults.add("BadLevel", message, row.at(column), hint)
 
-    def _check(self, row: Row) -> None:
+    def _check(self, row: BillRow) -> None:
         if not row.cells.get("name") and not row.cells.get("mesh"):
             hint = "write its name, or its mesh"
             self.faults.add("MissingPart", "the row names no part", row.at("name"), hint)
@@ -105,12 +105,12 @@ class BillReader:
         else:
             row.quantity = int(value)
 
-    def _expand(self, rows: list[Row], name: str) -> list[Draft]:
+    def _expand(self, rows: list[BillRow], name: str) -> list[DraftNode]:
         """A draft for each copy of each row, below one for the product."""
         below: dict[int, list[int]] = {}
         for index, row in enumerate(rows):
             below.setdefault(row.parent, []).append(index)
-        drafts = [Draft(name, rows[0].position)]
+        drafts = [DraftNode(name, rows[0].position)]
         stack = [(0, -1)]
         while stack:
             parent, of = stack.pop()
@@ -124,11 +124,11 @@ class BillReader:
                     drafts.append(self._draft(rows[index], index in below))
         return drafts
 
-    def _draft(self, row: Row, is_group: bool) -> Draft:
+    def _draft(self, row: BillRow, is_group: bool) -> DraftNode:
         mesh = row.cells.get("mesh", "")
         name = row.cells.get("name") or mesh_name(mesh)
         if is_group:
-            return Draft(name, row.at("name"), MATE)
+            return DraftNode(name, row.at("name"), MATE)
         given: dict[str, Value] = {"mesh": mesh} if mesh else {}
         if any(row.cells.get(axis) for axis in "xyz"):
             given["pos"] = tuple(self._length(row, axis) for axis in "xyz")
@@ -136,27 +136,27 @@ class BillReader:
             value = self._value(row, column)
             if value is not None:
                 given[column] = value
-        made = self.parts.parameters(given, Place(), row.at("mesh"))
-        return Draft(name, row.at("name"), PART, [], made)
+        made = self.parts.parameters(given, Placement(), row.at("mesh"))
+        return DraftNode(name, row.at("name"), PART, [], made)
 
-    def _length(self, row: Row, axis: str) -> float:
-        """In the unit of the bill, whatever that of its column is."""
+    def _length(self, row: BillRow, axis: str) -> float:
+        """A length of a row, from the unit of its column to that of the bill."""
         value = self._value(row, axis) or 0.0
         unit = self.table.header.units.get(axis)
         return value if unit is None else round(value * unit / self.parts.unit, 12)
 
-    def _value(self, row: Row, column: str) -> float | None:
+    def _value(self, row: BillRow, column: str) -> float | None:
         text = row.cells.get(column, "")
         value = _number(text)
         kind = GEOMETRY.get(column)
-        if text and (value is None or (kind is not None and not fits(kind, (value,)))):
+        if text and (value is None or (kind is not None and not kind.fits((value,)))):
             message = f"'{column}' takes {kind.wanted if kind else 'a number'}, not {quoted(text)}"
             self.faults.add("BadValue", message, row.at(column), "for example 0.25")
         return value
 
 
-def _level(row: Row) -> str:
-    """What a row says of its level; leading dots, as some programs print them, do not count."""
+def _level(row: BillRow) -> str:
+    """The level of a row, without the leading dots that some programs print."""
     return (row.cells.get("level") or row.cells.get("item", "")).lstrip(". ")
 
 

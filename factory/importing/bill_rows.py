@@ -7,7 +7,7 @@ import re
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
-from factory.importing.draft import Faults
+from factory.importing.draft import ImportFaults
 from factory.lang.source import Source, quoted
 from factory.support.errors import Diagnostic, InputError, Position
 
@@ -23,8 +23,7 @@ COLUMNS = {
     "mass": ("mass", "mass [kg]", "weight"),
     "density": ("density",),
 }
-"""The columns that mean something, and the headers that they may have, the likeliest first; others
-are left out."""
+"""The columns that are read, and the headers that they may have, the likeliest first."""
 
 UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254}
 """Units of length that a header may have, as `x [mm]` [m]."""
@@ -33,9 +32,9 @@ EXAMPLE = "level,name,quantity,mesh,x,y,z"
 
 
 @dataclass(slots=True)
-class Row:
-    """A line of the bill: cells by column, and the place of each. `parent`: the index of the row
-    that it goes into, -1 for none."""
+class BillRow:
+    """A line of the bill: cells by column, and the place of each; `parent`: the index of the row
+    that it is a part of, -1 for none."""
 
     cells: dict[str, str]
     places: dict[str, Position]
@@ -50,22 +49,22 @@ class Row:
 
 @dataclass(frozen=True, slots=True)
 class Header:
-    """The index of each column that means something, and the unit of those that state one [m]."""
+    """The index of each column that is read, and the units in headers [m]."""
 
     columns: dict[str, int]
     units: dict[str, float]
 
 
-class Table:
-    """Reads a bill row by row; what is wrong goes to the faults."""
+class BillTable:
+    """Reads a bill row by row; errors go to the faults."""
 
-    def __init__(self, source: Source, faults: Faults) -> None:
+    def __init__(self, source: Source, faults: ImportFaults) -> None:
         self.source, self.faults = source, faults
         header = next((line for line in source.lines if line.strip()), "")
         self.delimiter = max(",;\t", key=header.count)
         self.header = Header({}, {})
 
-    def rows(self) -> list[Row]:
+    def rows(self) -> list[BillRow]:
         """Every row below the header. Raises InputError where the text is no CSV, or the header
         lacks a column (Syntax, BadLevel, MissingPart)."""
         found = []
@@ -76,7 +75,7 @@ class Table:
                 continue
             columns = self.header.columns.items()
             row = {name: cells[i].strip() for name, i in columns if i < len(cells)}
-            found.append(Row(row, {name: _place(at, starts, i) for name, i in columns}, at))
+            found.append(BillRow(row, {name: _place(at, starts, i) for name, i in columns}, at))
         return found
 
     def _lines(self) -> Iterator[tuple[list[str], Position]]:
@@ -141,7 +140,7 @@ class Table:
 
 
 def _rank(title: str) -> int:
-    """How unlikely it is that a title means its column."""
+    """The rank of a title among the headers of its column; 0 is the likeliest."""
     return next((headers.index(title) for headers in COLUMNS.values() if title in headers), 0)
 
 

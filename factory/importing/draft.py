@@ -1,27 +1,26 @@
-"""A product as a file describes it, before it is a PAG: nodes that point at their inputs."""
+"""A product as a file describes it, before it is a PAG: nodes with the indices of their inputs."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 
-from factory.lang.source import Findings
 from factory.problem.pag import Parameter
 from factory.support.errors import Diagnostic, InputError, Position
 
 PART, MATE = "atomic", "mate"
 
 MOST_NODES = 100_000
-"""A product of more parts and sub-assemblies is refused: its file is a mistake, or a bomb."""
+"""The most parts and sub-assemblies of a product; a larger file is a mistake, or an attack."""
 
 SHOWN = 20
-"""At most so many faults of one file are told."""
+"""The most errors of one product that are told."""
 
 
 @dataclass(slots=True)
-class Draft:
-    """One node. `inputs` are indices in the list of drafts, of which the first is the product; a
-    part has none. `name` is what the file calls it, "" for nothing; a `kept` name is a label that
+class DraftNode:
+    """A part or sub-assembly. `inputs` are indices in the list of drafts, of which the first is the
+    product; a part has none. `name` is that in the file, "" for none; a `kept` name is a label that
     the user has chosen, so no other node may have it."""
 
     name: str
@@ -37,20 +36,34 @@ class Draft:
 
 
 @dataclass(slots=True)
-class Faults(Findings):
+class ImportFaults:
     """The errors found in one product's files, and the warnings."""
 
+    diagnostics: list[Diagnostic] = field(default_factory=list)
     warnings: list[Diagnostic] = field(default_factory=list)
+
+    def add(self, code: str, message: str, position: Position, hint: str) -> None:
+        """Note an error: what was found, where, and what would have been valid."""
+        self.diagnostics.append(Diagnostic(code, message, position, hint))
 
     def warn(self, code: str, message: str, position: Position, hint: str) -> None:
         """Note something that does not keep the product from being made."""
         self.warnings.append(Diagnostic(code, message, position, hint))
 
+    def check_used_once(self, what: str, places: Iterable[Position]) -> None:
+        """Note every place but the first that puts the same part in the same place (UsedTwice)."""
+        first, *others = sorted(places, key=_key)
+        for position in others:
+            where = f"line {first.line}" if first.line != position.line else "this line"
+            message = f"{what} is where {where} has put it already"
+            hint = "a part is used once: give each a place of its own, or remove one"
+            self.add("UsedTwice", message, position, hint)
+
     def raise_if_any(self) -> None:
-        """Raise one InputError with the first errors found, if there is any; what is said of
-        several places is said once."""
+        """Raise one InputError with the first errors found, if there is any; errors that differ in
+        their places alone are one."""
         found: dict[tuple[str, str], list[Diagnostic]] = {}
-        for diagnostic in sorted(self.diagnostics, key=_place):
+        for diagnostic in sorted(self.diagnostics, key=lambda d: _key(d.position)):
             found.setdefault((diagnostic.code, diagnostic.message), []).append(diagnostic)
         told = [_once(alike) for alike in found.values()]
         if len(told) > SHOWN:
@@ -67,13 +80,13 @@ def _once(alike: list[Diagnostic]) -> Diagnostic:
     return replace(alike[0], message=alike[0].message + more)
 
 
-def _place(diagnostic: Diagnostic) -> tuple[str, int, int]:
-    at = diagnostic.position
+def _key(at: Position | None) -> tuple[str, int, int]:
+    """The order of places: by file, line and column."""
     return (at.file, at.line, at.column) if at else ("", 0, 0)
 
 
-def postorder(drafts: Sequence[Draft]) -> list[int]:
-    """Every node that the first one is made of after its inputs, itself last."""
+def postorder(drafts: Sequence[DraftNode]) -> list[int]:
+    """The indices of all nodes that the first is made of, each after its inputs."""
     order, stack = [], [(0, False)]
     while stack:
         index, expanded = stack.pop()
@@ -86,7 +99,7 @@ def postorder(drafts: Sequence[Draft]) -> list[int]:
 
 
 def too_many(position: Position) -> InputError:
-    """The refusal of a product that is larger than any."""
+    """The refusal of a product that is too large."""
     message = f"the product has more than {MOST_NODES} parts and sub-assemblies"
     hint = "import its sub-assemblies one by one"
     return InputError(Diagnostic("TooLarge", message, position, hint))

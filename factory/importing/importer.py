@@ -1,4 +1,4 @@
-"""From a file to an `Imported`: which reader it takes, and the files that come out."""
+"""From a file to an `Imported`: the choice of the reader, and the files to be written."""
 
 from __future__ import annotations
 
@@ -8,18 +8,16 @@ from pathlib import Path
 
 from factory.importing.assembling import Mates, assemble
 from factory.importing.bill import BillReader
-from factory.importing.draft import Draft, Faults
-from factory.importing.json_reader import read_json
+from factory.importing.document import read_json, read_yaml
+from factory.importing.draft import DraftNode, ImportFaults
 from factory.importing.labels import file_stem
 from factory.importing.ldraw import read_ldraw
-from factory.importing.mesh_folder import MeshFolder
-from factory.importing.mesh_store import MeshStore
+from factory.importing.mesh_files import MeshFolder, MeshStore
 from factory.importing.part_maker import PartMaker
 from factory.importing.tree_file import TreeReader
-from factory.importing.yaml_reader import read_yaml
 from factory.lang.operations import signature
-from factory.lang.pag_writer import write_pag
 from factory.lang.source import quoted, read_text, source_of
+from factory.lang.writer import write_pag
 from factory.problem.pag import PAG
 from factory.problem.template import Template
 from factory.support.collector import collector_paused
@@ -45,8 +43,8 @@ class Options:
 
 @dataclass(frozen=True, slots=True)
 class Imported:
-    """A product and the files that it comes in: contents by their paths in the output folder.
-    `name` is that of the PAG's file, without `.pag`."""
+    """A product and the contents of its files, by path in the output folder. `name` is that of the
+    PAG's file, without `.pag`."""
 
     pag: PAG
     name: str
@@ -62,7 +60,7 @@ def import_product(
     InputError with every fault found."""
     options = options or Options()
     file = _file(path)
-    faults = Faults()
+    faults = ImportFaults()
     store = MeshStore("bricks" if file.suffix.lower() in LDRAW else "meshes")
     drafts = _drafts(file, templates, options, store, faults)
     pag = assemble(drafts, faults, options.mates)
@@ -76,8 +74,8 @@ def _drafts(
     templates: Mapping[str, Template],
     options: Options,
     store: MeshStore,
-    faults: Faults,
-) -> list[Draft]:
+    faults: ImportFaults,
+) -> list[DraftNode]:
     kind = file.suffix.lower()
     if kind in LDRAW:
         return read_ldraw(file, options.library, options.boxes, store, faults)

@@ -1,4 +1,4 @@
-"""Labels and file names made of whatever a file calls its parts."""
+"""Labels and file names from the names in a file."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import re
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 
-from factory.importing.draft import Draft
+from factory.importing.draft import DraftNode
 from factory.lang.words import is_label
 from factory.problem.pag import RESERVED
 
@@ -15,7 +15,7 @@ _LONGEST = 80
 
 
 def label_of(name: str) -> str:
-    """The label most like a name: what a label cannot have becomes `-`; "" if nothing is left.
+    """The label most like a name: other characters become `-`; "" if nothing is left.
 
     >>> label_of("Left wing (2x4).ldr")
     'Left-wing-2x4-.ldr'
@@ -27,7 +27,7 @@ def label_of(name: str) -> str:
 
 
 def file_stem(name: str) -> str:
-    """A name that is a plain file's on every system: ASCII letters, digits, `_`, `-` and `.`.
+    """A file name that is valid on every system: ASCII letters, digits, `_`, `-` and `.`.
 
     >>> file_stem("../../s\\\\3001 b")
     's-3001-b'
@@ -35,19 +35,19 @@ def file_stem(name: str) -> str:
     return re.sub(r"[^A-Za-z0-9_.\-]+", "-", name)[:_LONGEST].strip("-.") or "mesh"
 
 
-class Labels:
-    """Gives every node a label of its own: a kept name as it is, a name that several have with a
-    number, and `part1`, `sub1` where there is none."""
+class Labeller:
+    """Gives every node a label of its own: a kept name unchanged, a name of several nodes with a
+    number, and `part1`, `sub1` without a name."""
 
-    def __init__(self, drafts: Sequence[Draft], order: Iterable[int]) -> None:
+    def __init__(self, drafts: Sequence[DraftNode], order: Iterable[int]) -> None:
         self.drafts = drafts
         self.taken = {drafts[index].name for index in order if drafts[index].kept}
         named = (label_of(drafts[index].name) for index in order if not drafts[index].kept)
         self.shared = Counter(named)
         self.numbers: dict[str, Iterator[int]] = {}
 
-    def of(self, draft: Draft) -> str:
-        """The label of a node; asked for once each."""
+    def of(self, draft: DraftNode) -> str:
+        """The label of a node; to be called once for each."""
         if draft.kept:
             return draft.name
         stem = label_of(draft.name)
@@ -65,7 +65,7 @@ class Labels:
         return label
 
     def within(self, label: str, number: int) -> str:
-        """The label of a pile on the way to `label`."""
+        """The label of the first `number` inputs of `label`, mated."""
         name = f"{label}.{number}"
         if name in self.taken:
             return self._numbered(f"{name}-")

@@ -1,21 +1,20 @@
-"""What a tree or a bill says of a part, made into the parameters of `atomic`."""
+"""From the description of a part in a tree or a bill to the parameters of `atomic`."""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from factory.importing.draft import Faults
-from factory.importing.mesh_folder import MeshFolder
-from factory.importing.places import Place
+from factory.importing.draft import ImportFaults
+from factory.importing.mesh_files import MeshFolder
+from factory.importing.places import Placement
 from factory.lang.source import quoted
-from factory.lang.values import SHAPES, Kind
+from factory.lang.values import SHAPES
 from factory.problem.pag import Parameter, Value
 from factory.support.errors import Position
 
 LENGTHS = ("scale", "pos", "box", "cylinder", "sphere")
-"""What is in the unit of the file."""
+"""Parameters in the unit of the file."""
 
 
 @dataclass(slots=True)
@@ -24,60 +23,45 @@ class PartMaker:
 
     meshes: MeshFolder
     unit: float
-    faults: Faults
+    faults: ImportFaults
     there: dict[tuple[Parameter, ...], list[Position]] = field(default_factory=dict)
 
     def parameters(
-        self, given: Mapping[str, Value], place: Place, position: Position
+        self, given: Mapping[str, Value], place: Placement, position: Position
     ) -> tuple[Parameter, ...]:
-        """The parameters of a part in a frame; its mesh is fetched, its lengths are in metres.
-        What is wrong is noted: two shapes, an unknown mesh, a mesh twice in the same place."""
+        """The parameters of a part in a frame; its mesh is fetched, its lengths are in metres. Two
+        shapes and an unknown mesh are noted."""
         shapes = [name for name in SHAPES if name in given]
         if len(shapes) > 1:
             message = f"a part has one shape, but '{shapes[0]}' and '{shapes[1]}' are given"
             self.faults.add("BadValue", message, position, f"keep one of {', '.join(SHAPES)}")
-        metres = {name: self._metres(name, value) for name, value in given.items()}
+        metres = self.metres(given)
         if "mesh" in given:
             path = self.meshes.path(str(given["mesh"]), position)
             metres |= {"mesh": path or ""}
             if self.unit != 1:
                 metres.setdefault("scale", self.unit)
-        at, quat = metres.pop("pos", None), metres.pop("quat", None)
-        stands = place.parameters(_vector(at), _vector(quat)) if shapes or at or quat else []
+        placed = shapes or "pos" in given or "quat" in given
+        stands = place.parameters(metres) if placed else []
         first = [Parameter(name, metres.pop(name)) for name in shapes]
-        rest = [Parameter(name, value) for name, value in metres.items()]
-        made = (*first, *stands, *rest)
+        rest = [Parameter(name, metres[name]) for name in metres if name not in ("pos", "quat")]
         if self.meshes.found.get(str(given.get("mesh"))):
             self.there.setdefault((*first, *stands), []).append(position)
-        return made
+        return (*first, *stands, *rest)
 
     def check_places(self) -> None:
-        """Notes each mesh that stands where the same one stands already (UsedTwice)."""
-        hint = "a part is used once: give each a place of its own, or remove one"
+        """Note each mesh in the place of an equal one (UsedTwice)."""
         for (mesh, *_), positions in self.there.items():
-            first, *others = sorted(positions, key=lambda at: (at.line, at.column))
-            for position in others:
-                where = f"line {first.line}" if first.line != position.line else "this line"
-                name = quoted(str(mesh.value).partition("/")[2])
-                message = f"the mesh {name} is where {where} has put it already"
-                self.faults.add("UsedTwice", message, position, hint)
+            name = quoted(str(mesh.value).partition("/")[2])
+            self.faults.check_used_once(f"the mesh {name}", positions)
 
-    def _metres(self, name: str, value: Value) -> Value:
-        if name not in LENGTHS or self.unit == 1 or isinstance(value, str):
-            return value
-        if isinstance(value, tuple):
-            return tuple(x * self.unit for x in value)
-        return value * self.unit
-
-
-def _vector(value: Value | None) -> tuple[float, ...] | None:
-    return value if isinstance(value, tuple) else None
-
-
-def fits(kind: Kind, numbers: tuple[float, ...]) -> bool:
-    """Whether numbers are what a parameter of this kind takes."""
-    if len(numbers) != kind.length or not all(map(math.isfinite, numbers)):
-        return False
-    if not (all(kind.low <= x <= kind.high for x in numbers) and (kind.zero or any(numbers))):
-        return False
-    return not kind.positive or min(numbers) > 0
+    def metres(self, given: Mapping[str, Value]) -> dict[str, Value]:
+        """These parameters with lengths in metres."""
+        made = dict(given)
+        for name in LENGTHS:
+            value = given.get(name)
+            if self.unit != 1 and isinstance(value, tuple):
+                made[name] = tuple(x * self.unit for x in value)
+            elif self.unit != 1 and isinstance(value, float):
+                made[name] = value * self.unit
+        return made

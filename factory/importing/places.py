@@ -1,45 +1,44 @@
-"""Places in the product: where a sub-assembly or a part stands, turned and moved."""
+"""Placements: the frames of sub-assemblies and parts in the product."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from factory.geometry.meshes import Array
 from factory.geometry.solids import rotation
-from factory.problem.pag import Parameter
+from factory.problem.pag import Parameter, Value
+
+UNTURNED = (1.0, 0.0, 0.0, 0.0)
+"""The quaternion of no rotation."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Place:
+class Placement:
     """A frame in the product: a vertex v in it stands at turn · v + at [m]."""
 
     turn: Array = field(default_factory=lambda: np.eye(3))
     at: Array = field(default_factory=lambda: np.zeros(3))
     moved: bool = False
 
-    def inside(self, at: tuple[float, ...] | None, quat: tuple[float, ...] | None) -> Place:
-        """The frame at `at`, turned by `quat`, in this one; this very one where neither is
-        given."""
-        if at is None and quat is None:
+    def inside(self, given: Mapping[str, Value]) -> Placement:
+        """The frame at `pos` [m], turned by `quat`, in this one; this one without either."""
+        if not given.keys() & {"pos", "quat"}:
             return self
-        there = self.turn @ np.array(at or (0.0, 0.0, 0.0)) + self.at
-        unit = np.array(quat or (1.0, 0.0, 0.0, 0.0))
+        there = self.turn @ np.array(given.get("pos", (0.0, 0.0, 0.0))) + self.at
+        unit = np.array(given.get("quat", UNTURNED))
         unit /= np.abs(unit).max()
-        return Place(self.turn @ rotation(unit / np.linalg.norm(unit)), there, True)
+        return Placement(self.turn @ rotation(unit / np.linalg.norm(unit)), there, True)
 
-    def parameters(
-        self, at: tuple[float, ...] | None, quat: tuple[float, ...] | None
-    ) -> list[Parameter]:
-        """What a PAG says of a part at `at`, turned by `quat`, in this frame: those numbers
-        themselves where the frame is the product's."""
+    def parameters(self, given: Mapping[str, Value]) -> list[Parameter]:
+        """`pos` and `quat` of a part in this frame; unchanged where that is the product's."""
         if self.moved:
-            whole = self.inside(at, quat)
-            at, quat = rounded(whole.at), quaternion(whole.turn)
-            quat = None if quat == (1.0, 0.0, 0.0, 0.0) else quat
-        given = (("pos", at), ("quat", quat))
-        return [Parameter(name, value) for name, value in given if value is not None]
+            whole = self.inside(given)
+            turn = quaternion(whole.turn)
+            given = {"pos": rounded(whole.at)} | ({} if turn == UNTURNED else {"quat": turn})
+        return [Parameter(name, given[name]) for name in ("pos", "quat") if name in given]
 
 
 def rounded(numbers: Array) -> tuple[float, ...]:

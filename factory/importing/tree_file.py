@@ -1,4 +1,4 @@
-"""Trees of parts as nested JSON or YAML: what the nodes may say, and how they become drafts."""
+"""From trees of parts, as nested JSON or YAML, to drafts."""
 
 from __future__ import annotations
 
@@ -6,11 +6,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import PurePosixPath
 
-from factory.importing.document import Value as Node
-from factory.importing.draft import MATE, MOST_NODES, PART, Draft, Faults, too_many
+from factory.importing.document import DocumentNode as Node
+from factory.importing.draft import MATE, MOST_NODES, PART, DraftNode, ImportFaults, too_many
 from factory.importing.labels import label_of
-from factory.importing.part_maker import PartMaker, fits
-from factory.importing.places import Place
+from factory.importing.part_maker import PartMaker
+from factory.importing.places import Placement
 from factory.lang.operations import MESHES, Signature
 from factory.lang.source import quoted
 from factory.lang.values import GEOMETRY, SHAPES, Kind
@@ -27,21 +27,18 @@ BARE = '"part": true is a part with no shape of its own'
 
 @dataclass(slots=True)
 class TreeReader:
-    """Makes drafts of nodes; what is wrong goes to the faults.
-
-    `operations`: the templates that nodes may name.
-    """
+    """Makes drafts of nodes; errors go to the faults. `operations`: those that nodes may name."""
 
     operations: Mapping[str, Signature]
     parts: PartMaker
-    faults: Faults
-    drafts: list[Draft] = field(default_factory=list)
+    faults: ImportFaults
+    drafts: list[DraftNode] = field(default_factory=list)
 
-    def read(self, root: Node, name: str) -> list[Draft]:
+    def read(self, root: Node, name: str) -> list[DraftNode]:
         """The drafts of a tree; a root without a name is called `name`. Raises InputError with
         every fault."""
-        self.drafts.append(Draft(name, root.position))
-        stack = [(root, 0, Place())]
+        self.drafts.append(DraftNode(name, root.position))
+        stack = [(root, 0, Placement())]
         while stack:
             node, index, place = stack.pop()
             children, inside = self._node(node, self.drafts[index], place)
@@ -49,7 +46,7 @@ class TreeReader:
             for child in children:
                 if len(self.drafts) > MOST_NODES:
                     raise too_many(child.position)
-                self.drafts.append(Draft("", child.position))
+                self.drafts.append(DraftNode("", child.position))
             below = range(first, len(self.drafts))
             self.drafts[index].inputs = list(below)
             entries = zip(children, below, strict=True)
@@ -58,8 +55,10 @@ class TreeReader:
         self.faults.raise_if_any()
         return self.drafts
 
-    def _node(self, node: Node, draft: Draft, place: Place) -> tuple[tuple[Node, ...], Place]:
-        """Fills in a draft; its children, and the frame that they are in."""
+    def _node(
+        self, node: Node, draft: DraftNode, place: Placement
+    ) -> tuple[tuple[Node, ...], Placement]:
+        """Complete a draft; gives its children and their frame."""
         if node.kind == "text":
             self._part({"part": node}, draft, place)
             return (), place
@@ -79,7 +78,7 @@ class TreeReader:
         return (), place
 
     def _fields(self, node: Node, keys: tuple[str, ...]) -> dict[str, Node]:
-        """The values of a node by their keys, of which each is known and there once."""
+        """The values of a node by their keys; unknown and repeated keys are noted."""
         fields: dict[str, Node] = {}
         for key, value in node.content:
             known = {"mesh": "part", "pos": "at"}.get(str(key.content), str(key.content))
@@ -98,7 +97,7 @@ class TreeReader:
                 fields[known] = value
         return fields
 
-    def _name(self, fields: dict[str, Node], draft: Draft) -> None:
+    def _name(self, fields: dict[str, Node], draft: DraftNode) -> None:
         name = fields.pop("name", None)
         if name is None:
             return
@@ -109,24 +108,25 @@ class TreeReader:
             draft.name, draft.position = label_of(name.content), name.position
             draft.kept = True
 
-    def _empty(self, draft: Draft, why: str) -> None:
+    def _empty(self, draft: DraftNode, why: str) -> None:
         what = quoted(draft.name) if draft.name else "a node"
         hint = BARE if "neither" in why else f"for example {EXAMPLE}"
         self.faults.add("EmptyNode", f"{what} is empty: {why}", draft.position, hint)
 
     def _group(
-        self, fields: dict[str, Node], draft: Draft, place: Place
-    ) -> tuple[tuple[Node, ...], Place]:
+        self, fields: dict[str, Node], draft: DraftNode, place: Placement
+    ) -> tuple[tuple[Node, ...], Placement]:
         children = fields.get("children")
         if children is None or children.kind != "list" or not children.content:
             none = children is None or children.kind in ("list", "null")
             self._empty(draft, "it has no children" if none else "its children are no list")
             return (), place
-        inside = place.inside(self._length("at", fields), self._numbers("quat", fields))
+        stands = {name: node for name, node in fields.items() if name in ("at", "quat")}
+        inside = place.inside(self.parts.metres(self._geometry(stands)))
         self._operation(fields, draft, len(children.content))
         return children.content, inside
 
-    def _operation(self, fields: dict[str, Node], draft: Draft, count: int) -> None:
+    def _operation(self, fields: dict[str, Node], draft: DraftNode, count: int) -> None:
         node = fields.get("operation")
         if node is not None and node.kind != "text":
             message = f"'operation' takes a text, not {node.words}"
@@ -166,7 +166,7 @@ class TreeReader:
                     made.append(Parameter(key.content, found))
         return tuple(made)
 
-    def _part(self, fields: dict[str, Node], draft: Draft, place: Place) -> None:
+    def _part(self, fields: dict[str, Node], draft: DraftNode, place: Placement) -> None:
         draft.operation = PART
         part = fields.pop("part", None)
         given: dict[str, Value] = {}
@@ -176,33 +176,28 @@ class TreeReader:
         elif part is not None and not (part.kind == "boolean" and part.content):
             message = f"'part' takes the name of a mesh file, or true, not {part.words}"
             self.faults.add("BadValue", message, part.position, f"for example {EXAMPLE}")
+        given |= self._geometry(fields)
+        at = draft.position if part is None else part.position
+        draft.parameters = self.parts.parameters(given, place, at)
+
+    def _geometry(self, fields: dict[str, Node]) -> dict[str, Value]:
+        """The values of parameters of a part's geometry or of a sub-assembly's place."""
+        given: dict[str, Value] = {}
         for name, node in fields.items():
             of = "pos" if name == "at" else name
             value = self._value(name, GEOMETRY[of], node)
             if value is not None:
                 given[of] = value
-        at = draft.position if part is None else part.position
-        draft.parameters = self.parts.parameters(given, place, at)
-
-    def _length(self, name: str, fields: dict[str, Node]) -> tuple[float, ...] | None:
-        found = self._numbers(name, fields)
-        return None if found is None else tuple(x * self.parts.unit for x in found)
-
-    def _numbers(self, name: str, fields: dict[str, Node]) -> tuple[float, ...] | None:
-        if name not in fields:
-            return None
-        kind = GEOMETRY["pos" if name == "at" else name]
-        found = self._value(name, kind, fields[name])
-        return found if isinstance(found, tuple) else None
+        return given
 
     def _value(self, name: str, kind: Kind, node: Node) -> Value | None:
-        """What a parameter of this kind takes; None after a fault."""
+        """The value of a parameter; None after a fault."""
         if kind.length == 0 and node.kind == "text" and node.content.isprintable():
             return str(node.content)
         numbers = (node,) if node.kind == "number" else node.content
         if (node.kind == "list") == (kind.length > 1) and node.kind in ("list", "number"):
             found = tuple(n.content for n in numbers if n.kind == "number")
-            if len(found) == len(numbers) and fits(kind, found):
+            if len(found) == len(numbers) and kind.fits(found):
                 return found if kind.length > 1 else found[0]
         message = f"{quoted(name)} takes {kind.wanted}, not {_shown(node)}"
         listed = kind.example.replace("( ", "[").replace(" )", "]")
@@ -211,13 +206,13 @@ class TreeReader:
 
 
 def mesh_name(path: str) -> str:
-    """What a part is called after its mesh: the file's name without folder and ending."""
+    """The name of a part from its mesh: the file's name without folder and suffix."""
     name = PurePosixPath(path.replace("\\", "/"))
     return name.stem if name.suffix.lower() in MESHES else name.name
 
 
 def _shown(node: Node) -> str:
-    """What was found, for a message: a list with what is in it."""
+    """A node in a message; a list with its items."""
     if node.kind != "list":
         return node.words
     inside = ", ".join(item.words for item in node.content[:6])

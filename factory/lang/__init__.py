@@ -1,9 +1,8 @@
 """The two languages, PAGs and operation templates: text to value and value to canonical text."""
 
 from factory.lang.pag_reader import load_pag, read_pag
-from factory.lang.pag_writer import write_pag
 from factory.lang.template_reader import load_templates, read_template
-from factory.lang.template_writer import write_template
+from factory.lang.writer import write_pag, write_template
 
 __all__ = [
     "load_pag",

@@ -1,15 +1,16 @@
-"""What one statement of a PAG says, checked against its operation's template."""
+"""From a statement to a node of a PAG, checked against the template of its operation."""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from itertools import dropwhile
 
 from lark import Token
 
 from factory.lang.pag_syntax import Definition, Keyword
-from factory.lang.source import Findings, Source, near_file, quoted
+from factory.lang.source import Findings, near_file, quoted, where
 from factory.lang.values import GEOMETRY, SHAPES, Kind, ValueReader, kind_of
 from factory.lang.words import LABEL_HINT, is_label, is_number
 from factory.problem.pag import RESERVED, Assembly, Parameter
@@ -21,7 +22,7 @@ MESHES = (".obj", ".stl", ".ply", ".glb")
 
 @dataclass(frozen=True, slots=True)
 class Signature:
-    """What an operation takes: how many inputs at least, whether more, and which parameters."""
+    """What an operation takes: the least number of inputs, whether more, and its parameters."""
 
     name: str
     inputs: int
@@ -45,27 +46,21 @@ def signature(template: Template) -> Signature:
     return Signature(template.name, len(template.inputs), bool(template.further), kinds)
 
 
-@dataclass(slots=True)
 class AssemblyReader:
-    """Makes assemblies of definitions; what is wrong goes to the findings.
+    """Makes assemblies of definitions; errors go to the findings. `folder` is where mesh paths
+    start; they are not followed where it is None."""
 
-    `folder` is where mesh paths start; None: they are not followed.
-    """
-
-    source: Source
-    findings: Findings
-    signatures: Mapping[str, Signature]
-    folder: str | None
-    values: ValueReader = field(init=False)
-    meshes: dict[str, tuple[str, str] | None] = field(default_factory=dict)
-
-    def __post_init__(self) -> None:
-        self.values = ValueReader(self.source, self.findings)
+    def __init__(
+        self, findings: Findings, signatures: Mapping[str, Signature], folder: str | None
+    ) -> None:
+        self.findings, self.signatures, self.folder = findings, signatures, folder
+        self.values = ValueReader(findings)
+        self.meshes: dict[str, tuple[str, str] | None] = {}
 
     def read(self, definition: Definition) -> Assembly:
-        """The assembly a definition stands for (incomplete if errors were noted)."""
+        """The assembly of a definition; incomplete where errors were noted."""
         label, operation, arguments = definition
-        at = self.source.at
+        at = self.findings.source.at
         inputs = [argument for argument in arguments if isinstance(argument, Token)]
         keywords: list[Keyword] = []
         if len(inputs) < len(arguments):
@@ -89,25 +84,21 @@ class AssemblyReader:
 
     def _check_label(self, label: Token) -> None:
         if not is_label(label):
-            message = f"{quoted(label)} is no label"
-            self.findings.add("Syntax", message, self.source.at(label), LABEL_HINT)
+            self.findings.add("Syntax", f"{quoted(label)} is no label", label, LABEL_HINT)
         elif label in RESERVED:
-            taken = ", ".join(sorted(RESERVED))
-            hint = f"choose another label; reserved are {taken}"
+            hint = f"choose another label; reserved are {', '.join(sorted(RESERVED))}"
             if label == "root":
                 hint = "write: root = label; and define that label in a statement of its own"
             message = f"{quoted(label)} is reserved and cannot be a label"
-            self.findings.add("ReservedLabel", message, self.source.at(label), hint)
+            self.findings.add("ReservedLabel", message, label, hint)
 
-    def _check_order(self, arguments: list[Token | Keyword]) -> None:
-        named = False
-        for argument in arguments:
-            if isinstance(argument, Keyword):
-                named = True
-            elif named:
+    def _check_order(self, arguments: Sequence[Token | Keyword]) -> None:
+        behind = dropwhile(lambda argument: isinstance(argument, Token), arguments)
+        for argument in behind:
+            if isinstance(argument, Token):
                 message = f"the input {quoted(argument)} stands behind a parameter"
                 hint = "write the inputs first, then the parameters"
-                self.findings.add("Syntax", message, self.source.at(argument), hint)
+                self.findings.add("Syntax", message, argument, hint)
 
     def _unknown(self, operation: Token) -> None:
         hint = did_you_mean(operation, sorted({*self.signatures} - RESERVED), "operations")
@@ -115,22 +106,22 @@ class AssemblyReader:
         if operation == "dropoff":
             message = "'dropoff' is not an operation of a PAG"
             hint = "the factory drops the product off by itself: name it with root = label;"
-        self.findings.add("UnknownOperation", message, self.source.at(operation), hint)
+        self.findings.add("UnknownOperation", message, operation, hint)
 
     def _check_inputs(self, entry: Signature, operation: Token, inputs: list[Token]) -> None:
         count = len(inputs)
         if count == entry.inputs or (count > entry.inputs and entry.further):
             return
-        at = self.source.at(inputs[entry.inputs] if count > entry.inputs else operation)
+        odd = inputs[entry.inputs] if count > entry.inputs else None
         names = ", ".join(f"input{i}" for i in range(1, entry.inputs + 1))
         hint = f"write: {entry.name} ( {names}{', ...' * entry.further} )"
         if not entry.inputs:
             hint = f"write: {entry.name}(); it makes a part out of nothing else"
-        elif count > entry.inputs and is_number(inputs[entry.inputs]) and entry.parameters:
+        elif odd and is_number(odd) and entry.parameters:
             name = next(iter(entry.parameters))
-            hint = f"a parameter needs its name, for example: {name} = {inputs[entry.inputs]}"
+            hint = f"a parameter needs its name, for example: {name} = {odd}"
         message = f"{quoted(entry.name)} takes {entry.takes}, not {count or 'none'}"
-        self.findings.add("WrongInputs", message, at, hint)
+        self.findings.add("WrongInputs", message, odd or operation, hint)
 
     def _parameters(self, entry: Signature, keywords: list[Keyword]) -> tuple[Parameter, ...]:
         seen: dict[str, Token] = {}
@@ -140,7 +131,9 @@ class AssemblyReader:
             if kind is None:
                 self._unknown_parameter(entry, name)
             elif name in seen:
-                self._twice(name, seen[name])
+                at = self.findings.source.at
+                message = f"{quoted(name)} is given twice, first {where(at(seen[name]), at(name))}"
+                self.findings.add("BadValue", message, name, "remove one of the two")
             elif (value := self.values.read(name, kind, raw)) is not None:
                 position = self.values.place(raw)
                 made.append(Parameter(str(name), value, position))
@@ -156,18 +149,12 @@ class AssemblyReader:
         hint = did_you_mean(name, list(entry.parameters), "parameters")
         if not entry.parameters:
             hint = "remove it: that operation has no parameters"
-        self.findings.add("UnknownParameter", message, self.source.at(name), hint)
-
-    def _twice(self, name: Token, first: Token) -> None:
-        where = f"line {first.line}" if first.line != name.line else f"column {first.column}"
-        message = f"{quoted(name)} is given twice, first at {where}"
-        self.findings.add("BadValue", message, self.source.at(name), "remove one of the two")
+        self.findings.add("UnknownParameter", message, name, hint)
 
     def _check_shapes(self, shapes: list[Token]) -> None:
         for shape in shapes[1:]:
             message = f"a part has one shape, but {quoted(shapes[0])} and {quoted(shape)} are given"
-            hint = f"keep one of {', '.join(SHAPES)}"
-            self.findings.add("BadValue", message, self.source.at(shape), hint)
+            self.findings.add("BadValue", message, shape, f"keep one of {', '.join(SHAPES)}")
 
     def _check_mesh(self, path: str, position: Position) -> None:
         if path not in self.meshes:
@@ -178,14 +165,11 @@ class AssemblyReader:
 
 
 def _mesh_problem(folder: str | None, path: str) -> tuple[str, str] | None:
-    """What is wrong with a mesh path, and a way out; whether it is there only where it starts at a
-    folder."""
+    """The message and hint for a bad mesh path; without a folder only its suffix is checked."""
     if os.path.splitext(path)[1].lower() not in MESHES:
         return f"{quoted(path)} is not a mesh file", f"mesh files end in {', '.join(MESHES)}"
-    if folder is None:
-        return None
-    full = os.path.join(folder, path)
-    if os.path.isfile(full):
+    full = os.path.join(folder or "", path)
+    if folder is None or os.path.isfile(full):
         return None
     if os.path.isdir(full):
         return f"{quoted(path)} is a folder", "name a mesh file in it"

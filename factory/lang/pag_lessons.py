@@ -1,6 +1,6 @@
-"""The mistakes made in PAGs, taught by example: malformed statements and what to say of them.
+"""Mistakes in PAGs: malformed statements, and the message for each.
 
-In a message or hint `{found}` is the token the parser stuck at, `{before}` the one before it,
+In a message or hint `{found}` is the token at which the parser stops, `{before}` the one before it,
 `{first}` the statement's first and `{operation}` the word before its first parenthesis.
 """
 
@@ -17,18 +17,8 @@ FALLBACK = Lesson("unexpected {found}", FORM, "found", "")
 FALSE_ROOT = Lesson("unexpected {found} after the root", "write: root = label;", "found", "")
 
 LESSONS = (
-    Lesson(
-        "{found} is no statement",
-        FORM,
-        "found",
-        '( a ) | ) a | , a | "a"',
-    ),
-    Lesson(
-        "'{first}' alone is no statement",
-        FORM,
-        "first",
-        'a | a "b" | a , b | a )',
-    ),
+    Lesson("{found} is no statement", FORM, "found", '( a ) | ) a | , a | "a"'),
+    Lesson("'{first}' alone is no statement", FORM, "first", 'a | a "b" | a , b | a )'),
     Lesson(
         "missing label before '='",
         "name what the operation makes: label = operation ( ... );",
@@ -53,12 +43,7 @@ LESSONS = (
         "behind",
         'a = | a = ( b ) | a = ) | a = , b | a = "b"',
     ),
-    Lesson(
-        "one '=' is enough",
-        FORM,
-        "found",
-        "a = = b ( ) | a = m ( b = = 1 )",
-    ),
+    Lesson("one '=' is enough", FORM, "found", "a = = b ( ) | a = m ( b = = 1 )"),
     Lesson(
         "missing '(' after the operation {before}",
         "write the inputs in parentheses: {first} = operation ( input, ... );",

@@ -1,6 +1,6 @@
-"""From text to PAG: what `check` sees first.
+"""From text to PAG, the first stage.
 
-The stage reports every error of a text at once, in the order of the text; a PAG it returns is one
+It reports every error of a text at once, in the order of the text. A PAG that it returns is one
 tree over its labels, each made by a known operation with the inputs and values that it takes.
 """
 
@@ -10,9 +10,9 @@ import os
 from collections.abc import Mapping
 
 from factory.lang.operations import AssemblyReader, signature
-from factory.lang.pag_syntax import draft_of
+from factory.lang.pag_syntax import read_statements
 from factory.lang.source import Findings, read_text, source_of
-from factory.lang.tree import TreeCheck, count_of, root_of
+from factory.lang.tree import TreeCheck
 from factory.problem.pag import PAG
 from factory.problem.template import Template
 from factory.support.collector import collector_paused
@@ -22,16 +22,17 @@ from factory.support.collector import collector_paused
 def read_pag(
     text: str, templates: Mapping[str, Template], file: str = "<text>", folder: str | None = "."
 ) -> PAG:
-    """The PAG a text stands for; mesh paths start at `folder`, or are not followed where that is
-    None. Raises InputError."""
-    source, findings = source_of(text, file), Findings()
-    draft = draft_of(source, findings)
+    """The PAG of a text. Mesh paths start at `folder`; they are not followed where that is None.
+    Raises InputError."""
+    findings = Findings(source_of(text, file))
+    statements = read_statements(findings)
     signatures = {name: signature(template) for name, template in templates.items()}
-    reader = AssemblyReader(source, findings, signatures, folder)
-    nodes = tuple([reader.read(definition) for definition in draft.definitions])
-    TreeCheck(draft, nodes, source, findings).run()
+    reader = AssemblyReader(findings, signatures, folder)
+    nodes = tuple([reader.read(definition) for definition in statements.definitions])
+    TreeCheck(statements, nodes, findings).run()
     findings.raise_if_any()
-    return PAG(root_of(draft), nodes, count_of(draft), folder or ".", file)
+    count = next((int(token.lstrip("0") or 0) for token in statements.counts), None)
+    return PAG(str(statements.roots[0]), nodes, count, folder or ".", file)
 
 
 def load_pag(path: str | os.PathLike[str], templates: Mapping[str, Template]) -> PAG:

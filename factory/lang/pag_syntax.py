@@ -11,13 +11,21 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache
 from itertools import pairwise
-from typing import Any, NamedTuple, cast
+from typing import Any, NamedTuple
 
-from lark import Lark, Token, Transformer, UnexpectedInput
+from lark import Lark, Token, Transformer, UnexpectedInput, v_args
 
 from factory.lang.pag_lessons import FALLBACK, FALSE_ROOT, LESSONS
-from factory.lang.recovery import UNLAWFUL, Lesson, Stuck, drive, learn, unlawful_words
-from factory.lang.source import Findings, Source, quoted
+from factory.lang.recovery import (
+    UNLAWFUL,
+    Lesson,
+    Stuck,
+    drive,
+    learn,
+    open_grammar,
+    report_unlawful,
+)
+from factory.lang.source import Findings, quoted
 
 _SIGN_OR_WORD = re.compile(r"[=(),]|[^\s=(),]+")
 _SIGNS = {"=": "EQUAL", "(": "LPAR", ")": "RPAR", ",": "COMMA"}
@@ -42,7 +50,7 @@ class Definition(NamedTuple):
 
     label: Token
     operation: Token
-    arguments: list[Token | Keyword]
+    arguments: Sequence[Token | Keyword] = ()
 
 
 class Equation(NamedTuple):
@@ -52,7 +60,7 @@ class Equation(NamedTuple):
     right: Token
 
 
-class Pair(NamedTuple):
+class WordPair(NamedTuple):
     """`6 parts`."""
 
     first: Token
@@ -60,9 +68,9 @@ class Pair(NamedTuple):
 
 
 @dataclass(slots=True)
-class Draft:
-    """The statements of a text; `broken` are the words of those that did not parse, `nameless`
-    tells that one of those does not even start with the label it defines."""
+class Statements:
+    """The statements of a text. `broken`: the words of those that did not parse; `nameless`: one
+    of those does not even start with the label it defines."""
 
     definitions: list[Definition] = field(default_factory=list)
     roots: list[Token] = field(default_factory=list)
@@ -71,47 +79,24 @@ class Draft:
     nameless: bool = False
 
 
+@v_args(inline=True)
 class _Builder(Transformer[Token, Any]):
-    """Makes statements as the parser goes; methods are named after the grammar's rules."""
+    """Makes statements while the text is parsed; attributes are named after the grammar's rules."""
 
-    def start(self, children: list[Any]) -> list[Any]:
-        return children
+    definition, equation, pair, keyword = Definition, Equation, WordPair, Keyword
 
-    def definition(self, children: list[Any]) -> Definition:
-        arguments = children[2] if len(children) > 2 else []
-        return Definition(children[0], children[1], arguments)
+    def start(self, *statements: Any) -> tuple[Any, ...]:
+        return statements
 
-    def equation(self, children: list[Any]) -> Equation:
-        return Equation(children[0], children[1])
+    arguments = start
 
-    def pair(self, children: list[Any]) -> Pair:
-        return Pair(children[0], children[1])
-
-    def arguments(self, children: list[Any]) -> list[Any]:
-        return children
-
-    def positional(self, children: list[Any]) -> Token:
-        token: Token = children[0]
-        return token
-
-    def keyword(self, children: list[Any]) -> Keyword:
-        return Keyword(children[0], children[1])
-
-    def vector(self, children: list[Any]) -> Vector:
-        return Vector(children[0], [token for token in children if token.type == "WORD"])
+    def vector(self, opening: Token, *rest: Token) -> Vector:
+        return Vector(opening, [token for token in rest if token.type == "WORD"])
 
 
 @cache
 def _lark() -> Lark:
-    return Lark.open(
-        "pag.lark",
-        rel_to=__file__,
-        parser="lalr",
-        lexer="basic",
-        start=["start", "statement", "unlawful"],
-        transformer=_Builder(),
-        maybe_placeholders=False,
-    )
+    return open_grammar("pag.lark", ["start", "statement", "unlawful"], _Builder())
 
 
 @cache
@@ -128,7 +113,7 @@ def _lex(text: str) -> list[Token]:
 
 
 def _apart(token: Token) -> Iterator[Token]:
-    """The tokens of `= ( 0, 0, 1 )`, which the lexer takes at one stroke."""
+    """The tokens of `= ( 0, 0, 1 )`, which is one token of the lexer."""
     for match in _SIGN_OR_WORD.finditer(token):
         kind = _SIGNS.get(match[0], "WORD")
         offset = match.start()
@@ -142,60 +127,62 @@ def spelled(token: Token) -> Vector:
     return Vector(opening, [part for part in rest if part.type == "WORD"])
 
 
-def draft_of(source: Source, findings: Findings) -> Draft:
+def read_statements(findings: Findings) -> Statements:
     """The statements of a text; its syntax errors go to `findings`."""
-    draft = Draft()
+    made = Statements()
     try:
-        statements = cast("list[Any]", _lark().parse(source.text, start="start"))
+        statements: Any = _lark().parse(findings.source.text, start="start")
     except UnexpectedInput:
-        statements = _recover(source, findings, draft)
+        statements = _recover(findings, made)
     for statement in statements:
-        _sort_in(statement, draft, source, findings)
-    return draft
+        _sort_in(statement, made, findings)
+    return made
 
 
-def _sort_in(statement: Any, draft: Draft, source: Source, findings: Findings) -> None:
+def _sort_in(statement: Any, made: Statements, findings: Findings) -> None:
     """Put a statement where it belongs; `pair` and `equation` may yet lack a sign."""
     if isinstance(statement, Definition):
-        draft.definitions.append(statement)
+        made.definitions.append(statement)
         return
     first, second = statement
     if isinstance(statement, Equation) and first == "root":
-        draft.roots.append(second)
-    elif isinstance(statement, Pair) and second == "parts":
-        draft.counts.append(first)
+        made.roots.append(second)
+    elif isinstance(statement, WordPair) and second == "parts":
+        made.counts.append(first)
     else:
-        draft.broken.update((str(first), str(second)))
-        _report_incomplete(statement, source, findings)
+        made.broken.update((str(first), str(second)))
+        _report_incomplete(statement, findings)
 
 
-def _report_incomplete(statement: Equation | Pair, source: Source, findings: Findings) -> None:
+def _report_incomplete(statement: Equation | WordPair, findings: Findings) -> None:
     first, second = statement
+    message = f"missing '=' after {quoted(first)}"
+    hint = f"write: {first} = {second}" + (";" if first == "root" else " ( ... );")
+    at = findings.source.after(first)
     if isinstance(statement, Equation):
         message = f"missing '(' after the operation {quoted(second)}"
         hint = f"an operation has parentheses, even around nothing: {first} = {second} ();"
-        findings.add("Syntax", message, source.after(second), hint)
+        at = findings.source.after(second)
     elif first == "parts":
         message = "the number of parts stands before the word"
-        findings.add("Syntax", message, source.at(second), f"write: {second} parts;")
-    else:
-        hint = f"write: {first} = {second}" + (";" if first == "root" else " ( ... );")
-        findings.add("Syntax", f"missing '=' after {quoted(first)}", source.after(first), hint)
+        hint, at = f"write: {second} parts;", findings.source.at(second)
+    findings.add("Syntax", message, at, hint)
 
 
-def _recover(source: Source, findings: Findings, draft: Draft) -> list[Any]:
-    """The statements of a broken text that do parse; an error for each of the others."""
+def _recover(findings: Findings, made: Statements) -> list[Any]:
+    """The statements of a broken text that do parse; each of the others is noted as an error."""
     statements: list[Any] = []
-    for piece, ended in _pieces(_lex(source.text)):
-        statement = _parse_piece(piece, source, findings)
+    for piece, ended in _pieces(_lex(findings.source.text)):
+        statement = _parse_piece(piece, findings)
         if statement is None:
-            draft.broken.update(_words(piece))
-            draft.nameless |= not _is_named(piece)
+            made.broken.update(_words(piece))
+            named = piece[0].type == "WORD" and len(piece) > 1 and piece[1].type != "LPAR"
+            made.nameless |= not named
             continue
         statements.append(statement)
         if not ended:
             hint = "every statement but the last one ends with a semicolon"
-            findings.add("Syntax", "missing ';'", source.after(piece[-1]), hint)
+            findings.add("Syntax", "missing ';'", findings.source.after(piece[-1]), hint)
     return statements
 
 
@@ -204,50 +191,40 @@ def _words(piece: Sequence[Token]) -> Iterator[str]:
         yield from token.strip('"').replace(",", " ").replace(")", " ").split()
 
 
-def _is_named(piece: Sequence[Token]) -> bool:
-    return piece[0].type == "WORD" and len(piece) > 1 and piece[1].type != "LPAR"
-
-
-def _parse_piece(piece: list[Token], source: Source, findings: Findings) -> Any | None:
+def _parse_piece(piece: list[Token], findings: Findings) -> Any | None:
     """The statement a piece is, or None after its error has been noted."""
     result = drive(_lark(), "statement", piece)
     if not isinstance(result, Stuck):
         return result
     if result.token.type in UNLAWFUL:
-        message, hint = unlawful_words(result.token)
-        findings.add("Syntax", message, source.at(result.token), hint)
+        report_unlawful(result.token, findings)
     else:
-        _report_stuck(result, piece, source, findings)
+        _report_stuck(result, piece, findings)
     return None
 
 
-def _report_stuck(stuck: Stuck, piece: list[Token], source: Source, findings: Findings) -> None:
+def _report_stuck(stuck: Stuck, piece: list[Token], findings: Findings) -> None:
     lesson = _lessons().get((stuck.state, stuck.token.type), FALLBACK)
     if piece[0] == "root" and stuck.index >= 3 and piece[1].type == "EQUAL":
         lesson = FALSE_ROOT
+    pairs = pairwise(piece)
+    operation = next((word for word, sign in pairs if sign.type == "LPAR"), piece[0])
     words = {
         "found": quoted(stuck.token) if stuck.token else "the end of the statement",
         "before": quoted(piece[stuck.index - 1]) if stuck.index else "",
         "first": piece[0],
-        "operation": quoted(_operation(piece)),
+        "operation": quoted(operation),
     }
-    last = piece[max(stuck.index - 1, 0)]
-    place = lesson.place if stuck.token or lesson.place != "found" else "behind"
+    last, source = piece[max(stuck.index - 1, 0)], findings.source
     places = {
-        "found": source.at(stuck.token),
+        "found": source.at(stuck.token) if stuck.token else source.after(last),
         "last": source.at(last),
         "behind": source.after(last),
         "first": source.at(piece[0]),
         "second": source.after(piece[0]),
     }
-    at = places[place]
-    findings.add("Syntax", lesson.message.format(**words), at, lesson.hint.format(**words))
-
-
-def _operation(piece: Sequence[Token]) -> str:
-    """The word before the first parenthesis of a piece, or its first token."""
-    pairs = pairwise(piece)
-    return str(next((word for word, sign in pairs if sign.type == "LPAR"), piece[0]))
+    message, hint = lesson.message.format(**words), lesson.hint.format(**words)
+    findings.add("Syntax", message, places[lesson.place], hint)
 
 
 def _pieces(tokens: list[Token]) -> Iterator[tuple[list[Token], bool]]:

@@ -1,8 +1,8 @@
 """Reading on after a syntax error: a text is cut into pieces, each parsed alone.
 
-What to say about a piece that does not parse is taught by example, as Lark's own
-`match_examples` does: a `Lesson` lists malformed pieces, and the parser's state and the token it
-stuck at in each of them recall the lesson when a user's piece gets stuck in the same way.
+The message about a malformed piece is found by example, as in Lark's `match_examples`: a `Lesson`
+lists malformed pieces, each of which stops the parser in some state at some kind of token. A piece
+that stops it in the same state at the same kind gets the message of that lesson.
 """
 
 from __future__ import annotations
@@ -12,10 +12,9 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
-from lark import Lark, Token, UnexpectedToken
-from lark.parsers.lalr_interactive_parser import InteractiveParser
+from lark import Lark, Token, Transformer, UnexpectedToken
 
-from factory.lang.source import quoted
+from factory.lang.source import Findings, quoted
 
 END = "$END"
 UNLAWFUL = frozenset({"STRAY", "UNCLOSED"})
@@ -25,7 +24,8 @@ SIGNS = frozenset(";,()=<>{}~.+-")
 
 @dataclass(frozen=True, slots=True)
 class Stuck:
-    """Where a parse of one piece stopped: the token's index, the token, the parser's state."""
+    """Where the parse of a piece stopped: the token, its index, the parser's state, and the kinds
+    of token that it would have taken."""
 
     index: int
     token: Token
@@ -35,8 +35,8 @@ class Stuck:
 
 @dataclass(frozen=True, slots=True)
 class Lesson:
-    """A mistake: what to say, the way out, the place to show, and malformed pieces (between bars)
-    that show it. Places: the token `found`, the `last` good one or `behind` it, the `first` one or
+    """A mistake: its message, its hint, the place to show, and malformed pieces that make it,
+    between bars. Places: the token `found`, the `last` good one or `behind` it, the `first` one or
     behind it (`second`)."""
 
     message: str
@@ -45,30 +45,37 @@ class Lesson:
     examples: str
 
 
+def open_grammar(name: str, start: list[str], builder: Transformer[Token, Any]) -> Lark:
+    """The parser of a grammar in this folder, whose rules `builder` takes while it parses."""
+    return Lark.open(
+        name,
+        rel_to=__file__,
+        parser="lalr",
+        lexer="basic",
+        start=start,
+        transformer=builder,
+        maybe_placeholders=False,
+    )
+
+
 def drive(lark: Lark, start: str, tokens: Sequence[Token]) -> Any | Stuck:
-    """Parse tokens from the symbol `start`: what the tree builder makes of them, or a Stuck."""
+    """The value of tokens parsed from the symbol `start`, or where the parse stopped."""
     parser = lark.parse_interactive(None, start=start)
     last = tokens[-1] if tokens else Token(END, "", 0, 1, 1)
-    end = Token.new_borrow_pos(END, "", last)
     result: Any = None
-    for index, token in enumerate([*tokens, end]):
+    for index, token in enumerate([*tokens, Token.new_borrow_pos(END, "", last)]):
         try:
             result = parser.feed_token(token)
         except UnexpectedToken as error:
-            accepted = frozenset(_accepted(parser))
+            accepted = frozenset(parser.accepts())  # type: ignore[no-untyped-call]
             return Stuck(index, token, error.state.position, accepted)
     return result
-
-
-def _accepted(parser: InteractiveParser) -> Iterable[str]:
-    kinds: Iterable[str] = parser.accepts()  # type: ignore[no-untyped-call]
-    return kinds
 
 
 def learn(
     lark: Lark, start: str, lessons: Iterable[Lesson], lex: Callable[[str], list[Token]]
 ) -> Mapping[tuple[object, str], Lesson]:
-    """The lessons by the parser's state and the kind of token it stuck at."""
+    """The lessons by the state of the parser and the kind of token at which it stops."""
     table: dict[tuple[object, str], Lesson] = {}
     for lesson in lessons:
         for example in lesson.examples.split(" | ") if lesson.examples else ():
@@ -79,27 +86,26 @@ def learn(
     return table
 
 
-def unlawful_words(token: Token) -> tuple[str, str]:
-    """What to say of a character that no statement contains, or of a text that is not closed."""
+def report_unlawful(token: Token, findings: Findings) -> None:
+    """Note a character that no statement contains, or a text without its closing quote."""
+    message, hint = f"{quoted(token)} has no meaning here", _way_out(token[0])
     if token.type == "UNCLOSED":
-        return "the text is not closed", 'close it with " on the same line'
-    return f"{quoted(token)} has no meaning here", _way_out(token)
+        message, hint = "the text is not closed", 'close it with " on the same line'
+    findings.add("Syntax", message, token, hint)
 
 
-def _way_out(token: Token) -> str:
-    first = token[0]
-    plain = _plain(first)
+def _way_out(character: str) -> str:
+    plain = _plain(character)
     if plain:
         return f"write {plain} instead"
-    if first == "/":
-        return "no word contains it; a comment runs from // to the end of the line"
-    if first == "#":
-        return "a comment runs from // to the end of the line"
-    if first in "'`":
+    if character in "'`":
         return 'write texts in double quotes, as in "base.stl"'
-    if first == ":":
-        return "write = between a name and what it is"
-    return "remove it, or put it in a comment: // ..."
+    hints = {
+        "/": "no word contains it; a comment runs from // to the end of the line",
+        "#": "a comment runs from // to the end of the line",
+        ":": "write = between a name and what it is",
+    }
+    return hints.get(character, "remove it, or put it in a comment: // ...")
 
 
 def _plain(character: str) -> str:

@@ -1,4 +1,4 @@
-"""A text being read: its lines, the places in it, and what is wrong with it."""
+"""A text that is read: its lines, the places in it, and the errors found in it."""
 
 from __future__ import annotations
 
@@ -11,7 +11,8 @@ from lark import Token
 from factory.support.errors import Diagnostic, InputError, Position, did_you_mean
 from factory.support.files import LOG
 
-FILES = 1000  # at most so many names of a folder are compared with a missing one
+FILES = 1000
+"""The most names of a folder that are compared with a missing one."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,7 +39,7 @@ class Source:
 
 
 def source_of(text: str, file: str) -> Source:
-    """The source of a text as it was given: without byte-order mark, line ends made alike."""
+    """The source of a text: without byte-order mark, every line end `\\n`."""
     text = text.removeprefix("\ufeff").replace("\r\n", "\n").replace("\r", "\n")
     return Source(text, file, tuple(text.split("\n")))
 
@@ -47,10 +48,12 @@ def source_of(text: str, file: str) -> Source:
 class Findings:
     """The errors found so far in one text; raised all at once, in the order of the text."""
 
+    source: Source
     diagnostics: list[Diagnostic] = field(default_factory=list)
 
-    def add(self, code: str, message: str, position: Position, hint: str) -> None:
+    def add(self, code: str, message: str, at: Token | Position, hint: str) -> None:
         """Note an error: what was found, where, and what would have been valid."""
+        position = self.source.at(at) if isinstance(at, Token) else at
         self.diagnostics.append(Diagnostic(code, message, position, hint))
 
     def raise_if_any(self) -> None:
@@ -64,40 +67,48 @@ def _place(diagnostic: Diagnostic) -> tuple[int, int]:
     return (at.line, at.column) if at else (0, 0)
 
 
+def where(first: Position, second: Position) -> str:
+    """Where the first of two places is, as seen from the second: `in line 3`, `at column 5`."""
+    return f"in line {first.line}" if first.line != second.line else f"at column {first.column}"
+
+
 def read_text(path: str | os.PathLike[str]) -> str:
     """The text of a UTF-8 file. Raises InputError (BadFile, Syntax where it is not UTF-8, or Usage
     for a log)."""
     name = os.fspath(path)
     try:
         data = Path(name).read_bytes()
-    except (OSError, ValueError) as error:
-        raise InputError(_unreadable(name, error)) from None
-    if data.startswith(LOG):
-        raise InputError(_log(name))
-    try:
-        return data.decode("utf-8")
+        if not data.startswith(LOG):
+            return data.decode("utf-8")
     except UnicodeDecodeError as error:
         raise InputError(_not_utf8(name, data, error.start)) from None
+    except (OSError, ValueError) as error:
+        raise InputError(_unreadable(name, error)) from None
+    message = f"{quoted(name)} is a log of a run, not the PAG of a product"
+    hint = "logs are for `monitor`, `report`, `render`, `export` and `analyze --measured`"
+    raise InputError(Diagnostic("Usage", message, None, hint))
 
 
 def _unreadable(name: str, error: Exception) -> Diagnostic:
-    at = Position(name, 1, 1)
+    why = getattr(error, "strerror", None) or str(error)
+    message = f"{quoted(name)} cannot be read: {why}"
     hint = "give a file that exists and that you may read"
     if isinstance(error, FileNotFoundError):
-        return Diagnostic(
-            "BadFile", f"there is no file {quoted(name)}", at, near_file("", name) or hint
-        )
-    if isinstance(error, IsADirectoryError):
-        message = f"{quoted(name)} is a folder, not a file"
-        return Diagnostic("BadFile", message, at, "name a file in it")
-    why = getattr(error, "strerror", None) or str(error)
-    return Diagnostic("BadFile", f"{quoted(name)} cannot be read: {why}", at, hint)
+        message, hint = f"there is no file {quoted(name)}", near_file("", name) or hint
+    elif isinstance(error, IsADirectoryError):
+        message, hint = f"{quoted(name)} is a folder, not a file", "name a file in it"
+    return Diagnostic("BadFile", message, Position(name, 1, 1), hint)
 
 
-def _log(name: str) -> Diagnostic:
-    message = f"{quoted(name)} is a log of a run, not the PAG of a product"
-    hint = "logs are for `monitor`, `report`, `render`, `export` and `analyze --measured`"
-    return Diagnostic("Usage", message, None, hint)
+def _not_utf8(name: str, data: bytes, offset: int) -> Diagnostic:
+    before = source_of(data[:offset].decode("utf-8"), name).lines
+    line, column = len(before), len(before[-1]) + 1
+    shown = source_of(data.decode("utf-8", "replace"), name).lines[line - 1]
+    binary = any(c < " " and c != "\t" for c in shown)
+    at = Position(name, line, column, "" if binary else shown)
+    wide = data[:2] in (b"\xff\xfe", b"\xfe\xff")
+    hint = "this is UTF-16: save the file as UTF-8" if wide else "save the file as UTF-8"
+    return Diagnostic("Syntax", f"byte 0x{data[offset]:02x} is not UTF-8 text", at, hint)
 
 
 def near_file(folder: str, path: str) -> str:
@@ -112,21 +123,6 @@ def near_file(folder: str, path: str) -> str:
     alike = [name for name in names if os.path.splitext(name)[1].lower() == suffix]
     shown = [os.path.join(inside, name) for name in alike]
     return did_you_mean(path, shown, f"'{suffix}' files there") if alike else ""
-
-
-def _not_utf8(name: str, data: bytes, offset: int) -> Diagnostic:
-    before = data[:offset].decode("utf-8").removeprefix("\ufeff").replace("\r\n", "\n")
-    line = before.count("\n") + 1
-    start = data.rfind(b"\n", 0, offset) + 1
-    end = data.find(b"\n", offset)
-    shown = data[start : end if end >= 0 else len(data)].decode("utf-8", "replace")
-    column = len(before) - (before.rfind("\n") + 1) + 1
-    shown = shown.removeprefix("\ufeff").rstrip("\r")
-    binary = any(c < " " and c != "\t" for c in shown)
-    at = Position(name, line, column, "" if binary else shown)
-    wide = data[:2] in (b"\xff\xfe", b"\xfe\xff")
-    hint = "this is UTF-16: save the file as UTF-8" if wide else "save the file as UTF-8"
-    return Diagnostic("Syntax", f"byte 0x{data[offset]:02x} is not UTF-8 text", at, hint)
 
 
 def quoted(found: str, width: int = 60) -> str:

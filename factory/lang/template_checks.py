@@ -1,20 +1,19 @@
-"""From the clauses of a template to its value, checked: what would break Theorem 5.1 is refused."""
+"""From the clauses of a template to its value: what would break Theorem 5.1 is refused."""
 
 from __future__ import annotations
 
-import math
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 
 from lark import Token
 
-from factory.lang.source import Findings, Source, quoted
-from factory.lang.template_syntax import Defaults, Labels, RawLaw, TemplateDraft, Words
+from factory.lang.source import Findings, quoted
+from factory.lang.template_syntax import Labels, ParameterClause, RawLaw, TemplateDraft, Words
 from factory.lang.values import GEOMETRY, ValueReader
 from factory.lang.words import LABEL_HINT, is_label, is_number, number
 from factory.problem.pag import NOPART, RESERVED, Value
 from factory.problem.template import Law, Point, Template
-from factory.support.errors import Position, did_you_mean
+from factory.support.errors import did_you_mean
 
 _POINT = re.compile(r"([ABS])([0-9]+)(?:([+-])([0-9.]*(?:[eE][+-]?[0-9]+)?)r)?")
 _VARIABLE = re.compile(r"LAB([1-9][0-9]{0,8})")
@@ -22,33 +21,33 @@ _LABELS_HINT = "<a; b> = < LAB1, LAB2, nopart; nopart, nopart, LAB3 >;"
 
 
 class TemplateMaker:
-    """Makes the template of a draft; what is wrong goes to the findings."""
+    """Makes the template of a draft; errors go to the findings."""
 
-    def __init__(self, draft: TemplateDraft, source: Source, findings: Findings) -> None:
-        self.draft = draft
-        self.source = source
-        self.findings = findings
+    def __init__(self, draft: TemplateDraft, findings: Findings) -> None:
+        self.draft, self.findings = draft, findings
 
     def make(self) -> Template | None:
         """The template, or None where its header or a clause is missing."""
         contents = {kind: clause.content for kind, clause in self.draft.clauses.items()}
         name, robots = self.draft.name, contents.get("R")
+        labels: Labels | None = contents.get("<a; b>")
         count = self._robots(robots)
         carrier = self._carrier(contents.get("j"), count)
-        classes = [self._class(points, count) for points in contents.get("~", ())]
-        labels: Labels | None = contents.get("<a; b>")
-        parameters = self._parameters(contents.get("parameters"))
+        classes = [
+            [self._point(words, count) for words in points] for points in contents.get("~", ())
+        ]
+        given: ParameterClause = contents.get("parameters", ParameterClause(False))
+        parameters = self._parameters(given)
         law = self._law(contents.get("F"), count, parameters)
         further: Token | None = contents.get("further")
         if name is not None:
             self._check_name(name)
         if labels is not None:
             self._check_labels(labels, count, carrier)
-        geometry = self._geometry(contents.get("parameters"), labels)
-        if further is not None:
-            self._check_further(further, labels)
+            self._check_kind(labels, given.geometry, further)
         if name is None or robots is None or carrier is None or labels is None or law is None:
             return None
+        at = self.findings.source.at
         return Template(
             str(name),
             tuple(map(str, robots)),
@@ -59,26 +58,24 @@ class TemplateMaker:
             law,
             str(further or ""),
             tuple(parameters.items()),
-            geometry,
-            self.source.at(name),
-            self.source.at(further) if further else None,
-            tuple(map(self.source.at, robots)),
+            given.geometry,
+            at(name),
+            at(further) if further else None,
+            tuple(map(at, robots)),
         )
 
-    def _bad(self, message: str, at: Token | Position, hint: str) -> None:
-        place = self.source.at(at) if isinstance(at, Token) else at
-        self.findings.add("BadTemplate", message, place, hint)
+    def _bad(self, message: str, at: Token, hint: str) -> None:
+        self.findings.add("BadTemplate", message, at, hint)
 
     def _head(self, kind: str) -> Token:
         return self.draft.clauses[kind].head
 
     def _check_name(self, name: Token) -> None:
-        at = self.source.at(name)
         if not is_label(name):
-            self.findings.add("Syntax", f"{quoted(name)} is no name", at, LABEL_HINT)
+            self.findings.add("Syntax", f"{quoted(name)} is no name", name, LABEL_HINT)
         elif name in RESERVED - {"dropoff"}:
             message = f"{quoted(name)} is reserved and cannot name a template"
-            self.findings.add("ReservedLabel", message, at, "choose another name")
+            self.findings.add("ReservedLabel", message, name, "choose another name")
 
     def _robots(self, robots: Words | None) -> int | None:
         """k, the number of robots, if it is known."""
@@ -105,9 +102,6 @@ class TemplateMaker:
             return None
         return j
 
-    def _class(self, points: Sequence[Words], count: int | None) -> list[Point | None]:
-        return [self._point(words, count) for words in points]
-
     def _point(self, words: Words, count: int | None) -> Point | None:
         """A point from its words; its robot is one of the k."""
         text, first = "".join(words), words[0]
@@ -116,7 +110,7 @@ class TemplateMaker:
         if match is None or multiple is None:
             hint = "a point is A1, B1 or S1 (start, end or a station of robot 1's path), or A1 + 2r"
             message = f"{quoted(' '.join(words))} is no point"
-            self.findings.add("Syntax", message, self.source.at(first), hint)
+            self.findings.add("Syntax", message, first, hint)
             return None
         robot = int(match[2]) if len(match[2]) < 9 else 0
         if robot < 1 or (count is not None and robot > count):
@@ -124,7 +118,7 @@ class TemplateMaker:
             hint = f"R has {most}; points are named {match[1]}1 to {match[1]}{count or 'k'}"
             self._bad(f"{quoted(' '.join(words))} names robot {match[2]}", first, hint)
             return None
-        return Point(match[1], robot, multiple, self.source.at(first))
+        return Point(match[1], robot, multiple, self.findings.source.at(first))
 
     def _law(
         self, raw: RawLaw | None, count: int | None, parameters: Mapping[str, Value]
@@ -140,7 +134,7 @@ class TemplateMaker:
         eps = self._radius(raw.eps)
         dwell = self._dwell(raw.dwell, parameters) if raw.dwell else None
         reached = tuple(point for point in points if point)
-        return Law(str(raw.name), reached, eps, dwell, self.source.at(raw.name))
+        return Law(str(raw.name), reached, eps, dwell, self.findings.source.at(raw.name))
 
     def _radius(self, found: Token) -> float | str:
         """eps: a positive number, or the word."""
@@ -174,39 +168,33 @@ class TemplateMaker:
             self._bad(f"{quoted(found)} {what}", found, hint)
         return str(found)
 
-    def _parameters(self, raw: Defaults | None) -> dict[str, Value]:
+    def _parameters(self, given: ParameterClause) -> dict[str, Value]:
         made: dict[str, Value] = {}
-        values = ValueReader(self.source, self.findings)
-        for name, found in raw.values if raw else ():
+        values = ValueReader(self.findings)
+        for name, found in given.values:
             if not is_label(name):
-                self.findings.add(
-                    "Syntax", f"{quoted(name)} is no name", self.source.at(name), LABEL_HINT
-                )
+                self.findings.add("Syntax", f"{quoted(name)} is no name", name, LABEL_HINT)
             elif name in made:
                 self._bad(f"{quoted(name)} is given twice", name, "remove one of the two")
-            elif raw and raw.geometry and name in GEOMETRY:
+            elif given.geometry and name in GEOMETRY:
                 hint = "choose another name: geometry brings " + ", ".join(GEOMETRY)
                 self._bad(f"{quoted(name)} is a parameter of geometry", name, hint)
             elif (value := values.any(name, found)) is not None:
                 made[str(name)] = value
         return made
 
-    def _check_further(self, further: Token, labels: Labels | None) -> None:
-        """Further inputs come after first ones, and are added to a result."""
-        taken = [label for label in labels.before if label != NOPART] if labels else [further]
-        if not taken or self.draft.name == "dropoff":
-            message = f"{self.draft.name} cannot pass further inputs on"
-            hint = "leave this clause out: it is for operations that take and make something"
-            self._bad(message, further, hint)
-
-    def _geometry(self, raw: Defaults | None, labels: Labels | None) -> bool:
-        """Whether the operation makes a part; then it takes no sub-assembly."""
-        taken = [label for label in labels.before if label != NOPART] if labels else []
-        if raw and raw.geometry and taken:
+    def _check_kind(self, labels: Labels, geometry: bool, further: Token | None) -> None:
+        """Geometry belongs to operations that take nothing, further inputs to those that take and
+        make something."""
+        taken = any(label != NOPART for label in labels.before)
+        if geometry and taken:
             hint = "leave out 'geometry', or let every robot come with nopart"
             message = "geometry belongs to parts, but the operation takes sub-assemblies"
             self._bad(message, self._head("parameters"), hint)
-        return bool(raw and raw.geometry)
+        if further is not None and (not taken or self.draft.name == "dropoff"):
+            message = f"{self.draft.name} cannot pass further inputs on"
+            hint = "leave this clause out: it is for operations that take and make something"
+            self._bad(message, further, hint)
 
     def _check_labels(self, labels: Labels, count: int | None, carrier: int | None) -> None:
         """The conditions on <a; b>, each with its code."""
@@ -229,21 +217,21 @@ class TemplateMaker:
     def _check_inputs(self, before: Words) -> None:
         """The variables of a are LAB1 to LABm, each once."""
         seen: dict[int, Token] = {}
+        odd = False
         for word in before:
             match = _VARIABLE.fullmatch(word)
-            if match and int(match[1]) in seen:
+            if match is None:
+                odd = odd or word != NOPART
+            elif int(match[1]) in seen:
                 hint = "a sub-assembly is brought by one robot: give the other a label of its own"
-                message = f"{quoted(word)} is brought twice"
-                self.findings.add("DuplicateInput", message, self.source.at(word), hint)
-            elif match:
+                self.findings.add("DuplicateInput", f"{quoted(word)} is brought twice", word, hint)
+            else:
                 seen[int(match[1])] = word
         wanted = next(i for i in range(1, len(seen) + 2) if i not in seen)
-        odd = any(word != NOPART and not _VARIABLE.fullmatch(word) for word in before)
         if not odd and any(found > wanted for found in seen):
-            last = seen[max(seen)]
             message = f"no robot brings LAB{wanted}: that sub-assembly would be lost"
             hint = f"number the labels in a from LAB1 to LAB{len(seen)}"
-            self.findings.add("LostSubtree", message, self.source.at(last), hint)
+            self.findings.add("LostSubtree", message, seen[max(seen)], hint)
 
     def _check_dropoff(self, labels: Labels) -> None:
         if [list(map(str, words)) for words in labels] != [["LAB1"], [NOPART]]:
@@ -256,19 +244,19 @@ class TemplateMaker:
         if result == NOPART:
             message = f"the carrier, robot {carrier}, is left with nothing"
             hint = "b_j is the label of what has been made; the others are nopart"
-            self.findings.add("GearNotClosed", message, self.source.at(result), hint)
+            self.findings.add("GearNotClosed", message, result, hint)
         elif str(result) in map(str, labels.before):
             message = f"the result {quoted(result)} is also an input"
             brought = {str(label) for label in labels.before} - {NOPART}
             hint = f"give the result a new label: LAB{len(brought) + 1}"
-            self.findings.add("LabelReuse", message, self.source.at(result), hint)
+            self.findings.add("LabelReuse", message, result, hint)
         for index, word in enumerate(labels.after, 1):
             if index != carrier and word != NOPART:
                 message = (
                     f"robot {index} is not the carrier (j = {carrier}) but keeps {quoted(word)}"
                 )
                 hint = "only the carrier holds something afterwards: write nopart"
-                self.findings.add("GearNotClosed", message, self.source.at(word), hint)
+                self.findings.add("GearNotClosed", message, word, hint)
 
 
 def _counted(count: int, noun: str) -> str:
@@ -279,7 +267,5 @@ def _multiple(match: re.Match[str]) -> float | None:
     """The offset of a point in radii; None if it is no finite number."""
     if match[3] is None:
         return 0.0
-    size = 1.0 if not match[4] else number(match[4])
-    if size is None or not math.isfinite(size):
-        return None
-    return -size if match[3] == "-" else size
+    size = number(match[4]) if match[4] else 1.0
+    return -size if size is not None and match[3] == "-" else size

@@ -14,7 +14,7 @@ from types import MappingProxyType
 
 from factory.lang.source import Findings, quoted, read_text, source_of
 from factory.lang.template_checks import TemplateMaker
-from factory.lang.template_syntax import template_draft_of
+from factory.lang.template_syntax import read_clauses
 from factory.problem.pag import NOPART
 from factory.problem.template import Template
 from factory.support.errors import Diagnostic, InputError, Position, did_you_mean
@@ -23,13 +23,10 @@ Folder = str | os.PathLike[str]
 
 
 def read_template(text: str, file: str = "<text>") -> Template:
-    """The template a text stands for. Raises InputError with every error of the text.
-
-    Whether the template named by `further` exists is seen only among others: `load_templates`.
-    """
-    source, findings = source_of(text, file), Findings()
-    draft = template_draft_of(source, findings)
-    template = TemplateMaker(draft, source, findings).make()
+    """The template of a text. Raises InputError with every error of the text. `load_templates`
+    checks that the template named by `further` exists."""
+    findings = Findings(source_of(text, file))
+    template = TemplateMaker(read_clauses(findings), findings).make()
     findings.raise_if_any()
     if template is None:
         raise AssertionError("a draft without errors gives a template")
@@ -50,7 +47,7 @@ def load_templates(folders: Sequence[Folder]) -> Mapping[str, Template]:
             if template.name in found:
                 diagnostics.append(_twice(template, found[template.name]))
             found.setdefault(template.name, template)
-        merged = {**merged, **{name: t for name, t in found.items() if name not in merged}}
+        merged |= {name: t for name, t in found.items() if name not in merged}
     if not diagnostics:
         diagnostics.extend(_check_further(merged))
     if diagnostics:

@@ -1,7 +1,6 @@
 """The syntax of templates: a text becomes a header and clauses, and every syntax error is found.
 
-Texts are short, so there is one path: the text is cut at its semicolons, and each piece is parsed
-alone.
+The text is cut at its semicolons, and each piece is parsed alone.
 """
 
 from __future__ import annotations
@@ -12,14 +11,14 @@ from functools import cache
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
-from lark import Lark, Token, Transformer
+from lark import Lark, Token, Transformer, v_args
 
 from factory.lang.pag_syntax import Vector
-from factory.lang.recovery import END, UNLAWFUL, Stuck, drive, unlawful_words
-from factory.lang.source import Findings, Source, quoted
+from factory.lang.recovery import END, UNLAWFUL, Stuck, drive, open_grammar, report_unlawful
+from factory.lang.source import Findings, quoted, where
 from factory.support.errors import did_you_mean
 
-Words = list[Token]
+Words = Sequence[Token]
 
 FORMS: Mapping[str, str] = MappingProxyType(
     {
@@ -47,22 +46,21 @@ class RawLaw(NamedTuple):
     """`F = name on W to goals within eps for dwell`; each goal is the words of a point."""
 
     name: Token
-    goals: list[Words]
+    goals: Sequence[Words]
     eps: Token
-    dwell: Token | None
+    dwell: Token | None = None
 
 
-class Defaults(NamedTuple):
+class ParameterClause(NamedTuple):
     """`parameters = geometry and ( name = value )`."""
 
     geometry: bool
-    values: list[tuple[Token, Token | Vector]]
+    values: Sequence[tuple[Token, Token | Vector]] = ()
 
 
 class Clause(NamedTuple):
-    """What stands behind the `=` of a clause, and its place."""
+    """The first token of a clause, and what stands behind its `=`."""
 
-    kind: str
     head: Token
     content: Any
 
@@ -76,155 +74,114 @@ class TemplateDraft:
     broken: set[str] = field(default_factory=set)
 
 
+@v_args(inline=True)
 class _Builder(Transformer[Token, Any]):
-    """Makes the contents of clauses; methods are named after the grammar's rules."""
+    """Makes the contents of clauses; attributes are named after the grammar's rules."""
 
-    def header(self, children: list[Any]) -> Any:
-        return children[0]
+    labels, law = Labels, RawLaw
 
-    def robots(self, children: list[Any]) -> Any:
-        return children[0]
+    def header(self, content: Any) -> Any:
+        return content
 
-    carrier = further = name = value = parameters = identifications = robots
+    robots = carrier = further = parameters = identifications = header
 
-    def labels(self, children: list[Any]) -> Labels:
-        return Labels(children[0], children[1])
+    def names(self, *items: Any) -> tuple[Any, ...]:
+        return items
 
-    def law(self, children: list[Any]) -> RawLaw:
-        return RawLaw(*children)
+    classes = same = point = goals = defaults = default = names
 
-    def names(self, children: list[Any]) -> list[Any]:
-        return children
+    def geometry(self, *values: Any) -> ParameterClause:
+        return ParameterClause(True, *values)
 
-    def point(self, children: list[Any]) -> Words:
-        return children
+    def plain(self, values: Any) -> ParameterClause:
+        return ParameterClause(False, values)
 
-    classes = goals = defaults = names
-
-    def dwell(self, children: list[Any]) -> Token | None:
-        return children[0] if children else None
-
-    def geometry(self, children: list[Any]) -> Defaults:
-        return Defaults(True, children[0] if children else [])
-
-    def plain(self, children: list[Any]) -> Defaults:
-        return Defaults(False, children[0])
-
-    def default(self, children: list[Any]) -> tuple[Token, Any]:
-        return children[0], children[1]
-
-    def vector(self, children: list[Any]) -> Vector:
-        words = [token for token in children if token.type not in ("LPAR", "COMMA", "RPAR")]
-        return Vector(children[0], words)
-
-
-# `class` is a keyword of Python, so that rule's method cannot be written as the others are.
-setattr(_Builder, "class", _Builder.names)
+    def vector(self, opening: Token, *rest: Token) -> Vector:
+        return Vector(opening, [t for t in rest if t.type not in ("COMMA", "RPAR")])
 
 
 @cache
 def _lark() -> Lark:
-    return Lark.open(
-        "template.lark",
-        rel_to=__file__,
-        parser="lalr",
-        lexer="basic",
-        start=["header", "clause", "unlawful"],
-        transformer=_Builder(),
-        maybe_placeholders=False,
-    )
+    return open_grammar("template.lark", ["header", "clause", "unlawful"], _Builder())
 
 
-def template_draft_of(source: Source, findings: Findings) -> TemplateDraft:
+def read_clauses(findings: Findings) -> TemplateDraft:
     """The clauses of a text; its syntax errors go to `findings`."""
-    draft = TemplateDraft()
+    draft, source = TemplateDraft(), findings.source
     tokens = list(_lark().lex(source.text))
+    hint = f"a template starts: {HEADER}"
     if not tokens:
-        message = "there is no template: the text is empty"
-        findings.add("Syntax", message, source.start(), f"a template starts: {HEADER}")
+        findings.add("Syntax", "there is no template: the text is empty", source.start(), hint)
         return draft
     end = _header_end(tokens)
     if end:
-        draft.name = _parse(tokens[:end], "header", HEADER, source, findings)
+        draft.name = _parse(tokens[:end], "header", HEADER, findings)
     else:
         message = "missing header: the clauses belong to no template"
-        findings.add("Syntax", message, source.at(tokens[0]), f"a template starts: {HEADER}")
+        findings.add("Syntax", message, tokens[0], hint)
     for piece, ended in _pieces(tokens[end:]):
         if [str(token) for token in piece[1:4]] == ["=", "(", "R"]:
             message, hint = "a second template in one file", "give each template a file of its own"
-            findings.add("Syntax", message, source.at(piece[0]), hint)
+            findings.add("Syntax", message, piece[0], hint)
             break
-        _take(piece, draft, source, findings)
+        _take(piece, draft, findings)
         if not ended:
             hint = "every clause but the last one ends with a semicolon"
             findings.add("Syntax", "missing ';'", source.after(piece[-1]), hint)
-    _report_missing(tokens[-1], draft, source, findings)
-    return draft
-
-
-def _report_missing(last: Token, draft: TemplateDraft, source: Source, findings: Findings) -> None:
     for kind in NEEDED:
         if kind not in draft.clauses and kind not in draft.broken:
             hint = f"add it, for example: {FORMS[kind]}"
-            findings.add("Syntax", f"missing clause {kind}", source.after(last), hint)
+            findings.add("Syntax", f"missing clause {kind}", source.after(tokens[-1]), hint)
+    return draft
 
 
-def _take(piece: list[Token], draft: TemplateDraft, source: Source, findings: Findings) -> None:
+def _take(piece: list[Token], draft: TemplateDraft, findings: Findings) -> None:
     """Parse one clause into the draft."""
-    head, kind = piece[0], _kind(piece)
-    if kind is None:
-        _report_unknown(piece, draft, source, findings)
+    head = piece[0]
+    kind = "<a; b>" if head == "<" else str(head)
+    if kind not in FORMS:
+        _report_unknown(piece, draft, findings)
         return
-    content = _parse(piece, "clause", FORMS[kind], source, findings)
+    content = _parse(piece, "clause", FORMS[kind], findings)
     if content is None:
         draft.broken.add(kind)
     elif kind in draft.clauses:
-        where = f"in line {draft.clauses[kind].head.line}"
-        message = f"the clause {kind} is given twice, first {where}"
-        findings.add("Syntax", message, source.at(head), "remove one of the two")
+        first = findings.source.at(draft.clauses[kind].head)
+        before = where(first, findings.source.at(head))
+        message = f"the clause {kind} is given twice, first {before}"
+        findings.add("Syntax", message, head, "remove one of the two")
     else:
-        draft.clauses[kind] = Clause(kind, head, content)
+        draft.clauses[kind] = Clause(head, content)
 
 
-def _kind(piece: Sequence[Token]) -> str | None:
-    """The kind of clause a piece starts as; None if it is none."""
-    if piece[0] == "<":
-        return "<a; b>"
-    return str(piece[0]) if piece[0] in FORMS else None
-
-
-def _report_unknown(
-    piece: list[Token], draft: TemplateDraft, source: Source, findings: Findings
-) -> None:
-    head = piece[0]
-    unlawful = next((token for token in piece if token.type in UNLAWFUL), None)
-    if unlawful:
-        message, hint = unlawful_words(unlawful)
-        findings.add("Syntax", message, source.at(unlawful), hint)
+def _report_unknown(piece: list[Token], draft: TemplateDraft, findings: Findings) -> None:
+    if _has_unlawful(piece, findings):
         draft.broken.update(NEEDED)
         return
-    hint = did_you_mean(head, list(FORMS), "clauses")
+    hint = did_you_mean(piece[0], list(FORMS), "clauses")
     draft.broken.update(kind for kind in FORMS if hint == f"did you mean '{kind}'?")
-    message = f"there is no clause {quoted(head)}"
-    findings.add("Syntax", message, source.at(head), hint)
+    findings.add("Syntax", f"there is no clause {quoted(piece[0])}", piece[0], hint)
 
 
-def _parse(
-    piece: list[Token], start: str, form: str, source: Source, findings: Findings
-) -> Any | None:
-    """What a piece says, or None after its error has been noted."""
-    hint = f"it is written like this: {form}"
-    unlawful = next((token for token in piece if token.type in UNLAWFUL), None)
-    if unlawful:
-        message, way_out = unlawful_words(unlawful)
-        findings.add("Syntax", message, source.at(unlawful), way_out)
+def _has_unlawful(piece: list[Token], findings: Findings) -> bool:
+    """Whether a token that no template contains is in a piece; the first one is noted."""
+    found = next((token for token in piece if token.type in UNLAWFUL), None)
+    if found is not None:
+        report_unlawful(found, findings)
+    return found is not None
+
+
+def _parse(piece: list[Token], start: str, form: str, findings: Findings) -> Any | None:
+    """The content of a piece, or None after its error has been noted."""
+    if _has_unlawful(piece, findings):
         return None
     result = drive(_lark(), start, piece)
     if not isinstance(result, Stuck):
         return result
     at_end = result.token.type == END
     found = "the end" if at_end else quoted(result.token)
-    at = source.after(piece[-1]) if at_end and piece else source.at(result.token)
+    at = findings.source.after(piece[-1]) if at_end else result.token
+    hint = f"it is written like this: {form}"
     findings.add("Syntax", f"expected {_names(result.expected)}, not {found}", at, hint)
     return None
 

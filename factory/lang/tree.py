@@ -1,36 +1,37 @@
-"""Whether the assemblies of a text are one tree under the root: a PAG (paper, section 4.1).
+"""Whether the assemblies of a text are a PAG: one tree under the root (paper, section 4.1).
 
 Every check is linear in the number of labels, and none recurses.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from lark import Token
-
-from factory.lang.pag_syntax import Draft
-from factory.lang.source import Findings, Source, quoted
+from factory.lang.pag_syntax import Statements
+from factory.lang.source import Findings, quoted, where
 from factory.lang.words import LABEL_HINT, is_label, is_number
 from factory.problem.pag import RESERVED, Assembly
 from factory.support.errors import Position, did_you_mean
 
 SUGGESTIONS = 20
+"""Undefined labels that get a suggestion."""
+
 CANDIDATES = 1000
+"""Defined labels that a suggestion is chosen from."""
 
 
 @dataclass(slots=True)
 class TreeCheck:
-    """Checks nodes against each other; what is wrong goes to the findings.
+    """Checks nodes against each other; errors go to the findings.
 
-    Labels that occur in statements that did not parse (`draft.broken`) get the benefit of the
-    doubt: they may well be defined or used there.
+    A label in a statement that did not parse (`statements.broken`) may be defined or used there, so
+    nothing is said of it. `users`: the node that uses each label, and as which input; `excused`:
+    labels suggested for undefined ones.
     """
 
-    draft: Draft
+    statements: Statements
     nodes: Sequence[Assembly]
-    source: Source
     findings: Findings
     defined: dict[str, Assembly] = field(default_factory=dict)
     users: dict[str, tuple[Assembly, int]] = field(default_factory=dict)
@@ -42,7 +43,8 @@ class TreeCheck:
         self._define()
         self._use()
         self._check_roots()
-        free = self._free()
+        roots = {str(root) for root in self.statements.roots}
+        free = [label for label in self.defined if label not in self.users and label not in roots]
         self._check_undefined(free)
         self._check_unreachable(free)
         self._check_cycles()
@@ -51,11 +53,11 @@ class TreeCheck:
     def _define(self) -> None:
         for node in self.nodes:
             first = self.defined.setdefault(node.label, node)
-            if first is not node and first.position and node.position:
-                where = _whereabouts(first.position, node.position)
-                message = f"{quoted(node.label)} is defined twice, first {where}"
+            if first is not node:
+                before, at = _place(first), _place(node)
+                message = f"{quoted(node.label)} is defined twice, first {where(before, at)}"
                 hint = "every label is defined once: rename one of the two"
-                self.findings.add("DuplicateLabel", message, node.position, hint)
+                self.findings.add("DuplicateLabel", message, at, hint)
 
     def _use(self) -> None:
         for node in self.nodes:
@@ -73,64 +75,55 @@ class TreeCheck:
     def _use_undefined(self, label: str, position: Position) -> None:
         if label in RESERVED:
             message = f"{quoted(label)} is reserved: it is no sub-assembly"
-            hint = "use the label of a sub-assembly"
-            self.findings.add("ReservedLabel", message, position, hint)
+            self.findings.add("ReservedLabel", message, position, "use the label of a sub-assembly")
         elif not is_label(label):
             self.findings.add("Syntax", f"{quoted(label)} is no label", position, LABEL_HINT)
-        elif label not in self.draft.broken and not self.draft.nameless:
+        elif label not in self.statements.broken and not self.statements.nameless:
             self.undefined.setdefault(label, []).append(position)
 
     def _report_second_use(self, label: str, position: Position) -> None:
         user, index = self.users[label]
         first = user.input_positions[index]
-        message = f"{quoted(label)} is used twice, first {_whereabouts(first, position)}"
+        message = f"{quoted(label)} is used twice, first {where(first, position)}"
         hint = f"a sub-assembly goes into one other: define a second one, say {label}-2"
         self.findings.add("PagNotTree", message, position, hint)
 
     def _check_roots(self) -> None:
-        roots = self.draft.roots
+        roots, at = self.statements.roots, self.findings.source.at
         for root in roots[1:]:
-            message = f"the root is given twice, first in line {roots[0].line}"
-            if roots[0].line == root.line:
-                message = f"the root is given twice, first at column {roots[0].column}"
+            message = f"the root is given twice, first {where(at(roots[0]), at(root))}"
             hint = "a factory makes one product: remove one of the two"
-            self.findings.add("Root", message, self.source.at(root), hint)
-        for root in roots[:1]:
-            if root not in self.defined:
-                self._use_undefined(str(root), self.source.at(root))
-        if not roots and "root" not in self.draft.broken and "root" not in self.defined:
+            self.findings.add("Root", message, root, hint)
+        if roots and roots[0] not in self.defined:
+            self._use_undefined(str(roots[0]), at(roots[0]))
+        if not roots and "root" not in self.statements.broken and "root" not in self.defined:
             self._report_missing_root()
 
     def _report_missing_root(self) -> None:
+        start = self.findings.source.start()
         if not self.nodes:
-            if not self.draft.broken:
+            if not self.statements.broken:
                 message = "there is no product: nothing is defined"
                 hint = "the shortest text: root = part; part = atomic();"
-                self.findings.add("Root", message, self.source.start(), hint)
+                self.findings.add("Root", message, start, hint)
             return
-        known = self.users.keys() | self.draft.broken
+        known = self.users.keys() | self.statements.broken
         tops = [label for label in self.defined if label not in known]
-        at = self.defined[tops[0]].position if len(tops) == 1 else None
         hint = "name the finished product: root = label;"
-        if tops:
+        if len(tops) == 1:
             hint = f"name the finished product, which no other uses: root = {tops[0]};"
-        if len(tops) > 1:
+            start = _place(self.defined[tops[0]])
+        elif tops:
             shown = ", ".join(tops[:5]) + ", ..." * (len(tops) > 5)
             hint = f"name the finished product: root = label; no other uses {shown}"
         message = "missing root: the text does not say which label is the product"
-        self.findings.add("Root", message, at or self.source.start(), hint)
-
-    def _free(self) -> list[str]:
-        """The labels that nothing uses, the root aside."""
-        roots = {str(root) for root in self.draft.roots}
-        return [label for label in self.defined if label not in self.users and label not in roots]
+        self.findings.add("Root", message, start, hint)
 
     def _check_undefined(self, free: Sequence[str]) -> None:
-        """Labels that are used only; the likeliest meant are those that are defined only."""
-        if not self.undefined:
-            return
-        known = sorted(self.draft.broken - self.users.keys())
-        known = [*(label for label in free if label not in self.draft.broken), *known]
+        """Labels that are used but not defined; suggestions are those defined but not used."""
+        broken = self.statements.broken
+        known = [label for label in free if label not in broken]
+        known += sorted(broken - self.users.keys())
         taken = {diagnostic.position for diagnostic in self.findings.diagnostics}
         for number, (label, positions) in enumerate(self.undefined.items()):
             near: list[str] = []
@@ -143,28 +136,27 @@ class TreeCheck:
                 hint = f"define that label, or name the parameter it is a value of: name = {label}"
             else:
                 hint = f"define it, for example: {label} = atomic();"
-            for position in (place for place in positions if place not in taken):
-                message = f"{quoted(label)} is not defined"
-                self.findings.add("UndefinedLabel", message, position, hint)
+            for position in positions:
+                if position not in taken:
+                    message = f"{quoted(label)} is not defined"
+                    self.findings.add("UndefinedLabel", message, position, hint)
 
     def _check_unreachable(self, free: Sequence[str]) -> None:
-        doubtful = self.draft.broken | self.excused
-        roots = self.draft.roots
-        if not roots or roots[0] not in self.defined.keys() | self.draft.broken:
+        doubtful = self.statements.broken | self.excused | RESERVED
+        roots = self.statements.roots
+        if not roots or roots[0] not in self.defined.keys() | self.statements.broken:
             return
         root = str(roots[0])
+        hint = f"use it in the making of {quoted(root)}, or remove it"
         for label in free:
-            position = self.defined[label].position
-            if label in doubtful or position is None or label in RESERVED:
-                continue
-            message = f"{quoted(label)} is not part of the product: nothing uses it"
-            hint = f"use it in the making of {quoted(root)}, or remove it"
-            if root in self.users:
-                hint = f"{quoted(root)} goes into another: did you mean root = {label};"
-            self.findings.add("UnreachableLabel", message, position, hint)
+            if label not in doubtful:
+                message = f"{quoted(label)} is not part of the product: nothing uses it"
+                if root in self.users:
+                    hint = f"{quoted(root)} goes into another: did you mean root = {label};"
+                self.findings.add("UnreachableLabel", message, _place(self.defined[label]), hint)
 
     def _check_cycles(self) -> None:
-        """A label that, followed to its user and on, comes back to itself is made from itself."""
+        """A label is made from itself if the chain from user to user leads back to it."""
         done: set[str] = set()
         for start in self.defined:
             path: dict[str, None] = {}
@@ -174,64 +166,39 @@ class TreeCheck:
                 path[label] = None
                 label = self.users[label][0].label
             if label in path:
-                self._report_cycle(list(_cut(path, label)))
+                steps = list(path)
+                self._report_cycle(steps[steps.index(label) :])
             done.update(path)
 
     def _report_cycle(self, cycle: list[str]) -> None:
-        first = min(range(len(cycle)), key=lambda i: self._rank(cycle[i]))
-        turned = [*cycle[first:], *cycle[:first]]
-        position = self.defined[turned[0]].position
-        way = [turned[0], *reversed(turned)]
+        places = [_place(self.defined[label]) for label in cycle]
+        first = min(range(len(cycle)), key=lambda i: (places[i].line, places[i].column))
+        start = cycle[first]
+        way = [start, *reversed([*cycle[first:], *cycle[:first]])]
         if len(way) > 8:
             way[4:-3] = ["..."]
-        shown = " from ".join(way)
-        message = f"{quoted(turned[0])} is made from itself: {shown}"
+        message = f"{quoted(start)} is made from itself: {' from '.join(way)}"
         hint = "a product is a tree: use another sub-assembly in one of these statements"
-        if position:
-            self.findings.add("PagNotTree", message, position, hint)
-
-    def _rank(self, label: str) -> tuple[int, int]:
-        at = self.defined[label].position
-        return (at.line, at.column) if at else (0, 0)
+        self.findings.add("PagNotTree", message, places[first], hint)
 
     def _check_counts(self) -> None:
-        counts = self.draft.counts
+        counts = self.statements.counts
         for count in counts[1:]:
             message = "the number of parts is given twice"
-            hint = "remove one of the two"
-            self.findings.add("Syntax", message, self.source.at(count), hint)
-        if not counts or self.draft.broken or not RESERVED.isdisjoint(self.defined):
+            self.findings.add("Syntax", message, count, "remove one of the two")
+        if not counts or self.statements.broken or not RESERVED.isdisjoint(self.defined):
             return
-        found = counts[0]
-        right = len(self.defined)
-        if str(right) == found.lstrip("0") or len(self.defined) < len(self.nodes):
+        found, right = counts[0], len(self.defined)
+        if str(right) == found.lstrip("0") or right < len(self.nodes):
             return
         if self.undefined and str(right + len(self.undefined)) == found:
             return
         message = f"the text says {quoted(found)} parts, but defines {right} labels"
         hint = f"write: {right} parts; (every label counts) or leave the number out"
-        self.findings.add("WrongPartCount", message, self.source.at(found), hint)
+        self.findings.add("WrongPartCount", message, found, hint)
 
 
-def _whereabouts(first: Position, second: Position) -> str:
-    return f"in line {first.line}" if first.line != second.line else f"at column {first.column}"
-
-
-def _cut(path: dict[str, None], label: str) -> Iterator[str]:
-    """The end of a path from `label` on."""
-    found = False
-    for step in path:
-        found = found or step == label
-        if found:
-            yield step
-
-
-def root_of(draft: Draft) -> str:
-    """The product of a draft without errors."""
-    return str(draft.roots[0])
-
-
-def count_of(draft: Draft) -> int | None:
-    """The number in `N parts` of a draft without errors."""
-    token: Token | None = next(iter(draft.counts), None)
-    return None if token is None else int(token.lstrip("0") or 0)
+def _place(node: Assembly) -> Position:
+    """Where a node that was read is defined."""
+    assert node.position is not None
+    return node.position

@@ -1,4 +1,4 @@
-"""Values of parameters: what each takes, and the geometry a part may have."""
+"""Values of parameters: the kind that each takes, and the geometry of a part."""
 
 from __future__ import annotations
 
@@ -10,20 +10,18 @@ from types import MappingProxyType
 from lark import Token
 
 from factory.lang.pag_syntax import Vector, spelled
-from factory.lang.source import Findings, Source, quoted
+from factory.lang.source import Findings, quoted
 from factory.lang.words import is_number, number
 from factory.problem.pag import Value
 from factory.support.errors import Position
 
-HUGE = 1e150  # a vector within is safe to normalise
-
 
 @dataclass(frozen=True, slots=True)
 class Kind:
-    """What a parameter takes: `length` 0 is a text, 1 a number, n a vector of n numbers.
+    """The kind of a parameter: `length` 0 is a text, 1 a number, n a vector of n numbers.
 
-    Each number lies in [low, high], `positive` ones above 0; `zero` tells whether a vector may be
-    all zero. `example` is shown with an error.
+    Each number lies in [low, high], and above 0 where `positive`; `zero`: a vector may be all zero.
+    `example` is shown with an error.
     """
 
     length: int
@@ -33,18 +31,25 @@ class Kind:
     positive: bool = False
     zero: bool = True
 
+    def allows(self, number: float) -> bool:
+        """Whether one number lies within the bounds."""
+        return self.low <= number <= self.high and (number > 0 or not self.positive)
+
+    def fits(self, numbers: tuple[float, ...]) -> bool:
+        """Whether these finite numbers are a value of this kind."""
+        if not 0 < len(numbers) == self.length or not (self.zero or any(numbers)):
+            return False
+        small, large = min(numbers), max(numbers)
+        finite = math.isfinite(small) and math.isfinite(large)
+        return finite and self.allows(small) and self.allows(large)
+
     def glimpse(self, token: Token) -> tuple[float, ...] | None:
-        """The value of a VECTOR token if all is plainly well with it."""
+        """The value of a VECTOR token; None where it needs a closer look."""
         words = [word.strip() for word in token[token.index("(") + 1 : -1].split(",")]
-        if self.length < 2 or len(words) != self.length or not all(map(is_number, words)):
+        if self.length < 2 or not all(map(is_number, words)):
             return None
         numbers = tuple(map(float, words))
-        small, large = min(numbers), max(numbers)
-        if not (self.low <= small and large <= self.high and small > -HUGE and large < HUGE):
-            return None
-        if (self.positive and small <= 0) or not (self.zero or any(numbers)):
-            return None
-        return numbers
+        return numbers if self.fits(numbers) else None
 
     @property
     def wanted(self) -> str:
@@ -78,7 +83,7 @@ SHAPES = ("mesh", "box", "cylinder", "sphere")
 
 
 def kind_of(default: Value) -> Kind:
-    """The kind a template's parameter has, read off its default; numbers like it stay >= 0."""
+    """The kind of a template's parameter, from its default: one >= 0 has no negative values."""
     if isinstance(default, str):
         return Kind(0, f'"{default}"')
     if isinstance(default, tuple):
@@ -87,23 +92,21 @@ def kind_of(default: Value) -> Kind:
 
 
 def text_of(token: Token) -> str:
-    """What a quoted text says: a doubled quote in it is one."""
+    """The content of a quoted text, in which a quote is doubled."""
     return token[1:-1].replace('""', '"')
 
 
 class ValueReader:
-    """Reads values of one source; what is wrong goes to its findings."""
+    """Reads values of one source; errors go to its findings."""
 
-    def __init__(self, source: Source, findings: Findings) -> None:
-        self.source = source
+    def __init__(self, findings: Findings) -> None:
         self.findings = findings
 
     def place(self, raw: Token | Vector) -> Position:
         """Where a value starts."""
-        if isinstance(raw, Vector):
-            return self.source.at(raw.opening)
-        at = self.source.at(raw)
-        return replace(at, column=at.column + raw.index("(")) if raw.type == "VECTOR" else at
+        at = self.findings.source.at(raw.opening if isinstance(raw, Vector) else raw)
+        whole = isinstance(raw, Token) and raw.type == "VECTOR"
+        return replace(at, column=at.column + raw.index("(")) if whole else at
 
     def read(self, name: str, kind: Kind, raw: Token | Vector) -> Value | None:
         """The value of the parameter `name`, or None after an error (BadValue) has been noted."""
@@ -119,9 +122,7 @@ class ValueReader:
         return self._number(name, kind, raw)
 
     def any(self, name: str, raw: Token | Vector) -> Value | None:
-        """A value of whatever kind it is: a template's default."""
-        if isinstance(raw, Token) and raw.type == "VECTOR":
-            raw = spelled(raw)
+        """A value of any kind: a template's default."""
         if isinstance(raw, Vector):
             length = len(raw.words)
             return self._vector(name, Kind(length, "( 0, 0, 1 )" if length > 1 else "1.0"), raw)
@@ -143,19 +144,20 @@ class ValueReader:
 
     def _number(self, name: str, kind: Kind, word: Token) -> float | None:
         value = number(word)
-        if value is None:
-            why = "overflows" if is_number(word) else "is not a number"
-            if word.lower().lstrip("+-") in ("inf", "infinity", "nan"):
-                why = "is not a finite number"
-            self._refuse(name, kind, word, f"takes {kind.wanted}; {quoted(word)} {why}")
-        elif not kind.low <= value <= kind.high or (kind.positive and value <= 0):
-            self._refuse(name, kind, word, f"takes {kind.wanted}, not {quoted(word)}")
-        else:
+        if value is not None and kind.allows(value):
             return value
+        why = f"takes {kind.wanted}, not {quoted(word)}"
+        if value is None:
+            why = f"takes {kind.wanted}; {quoted(word)} is not a number"
+            if is_number(word):
+                why = f"takes {kind.wanted}; {quoted(word)} overflows"
+            elif word.lower().lstrip("+-") in ("inf", "infinity", "nan"):
+                why = f"takes {kind.wanted}; {quoted(word)} is not a finite number"
+        self._refuse(name, kind, word, why)
         return None
 
     def _refuse(self, name: str, kind: Kind, token: Token, problem: str) -> None:
         hint = f"for example: {name} = {kind.example}"
         if kind.length == 0 and token.type == "WORD":
             hint = f'in quotes: {name} = "{token}"'
-        self.findings.add("BadValue", f"{quoted(name)} {problem}", self.source.at(token), hint)
+        self.findings.add("BadValue", f"{quoted(name)} {problem}", token, hint)

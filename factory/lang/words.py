@@ -17,7 +17,7 @@ def is_number(word: str) -> bool:
 
 
 def number(word: str) -> float | None:
-    """The finite number a word stands for; None if it is none or overflows."""
+    """The finite number that a word is; None if it is none or overflows."""
     if not is_number(word):
         return None
     value = float(word)
@@ -25,5 +25,5 @@ def number(word: str) -> float | None:
 
 
 def is_label(word: str) -> bool:
-    """Whether a word (already cut out by a lexer) may be a label."""
+    """Whether a word of the lexer may be a label."""
     return _LABEL.fullmatch(word) is not None

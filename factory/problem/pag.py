@@ -29,7 +29,7 @@ class Assembly:
     """One node of a PAG: `label = operation(inputs, parameters)`. A part has no inputs.
 
     Positions are those of the label, of the operation's name and of each input; they do not count
-    in comparisons, so two texts that say the same give equal values.
+    in comparisons.
     """
 
     label: str
@@ -47,11 +47,9 @@ class Assembly:
 
 @dataclass(frozen=True)
 class PAG:
-    """A product assembly graph: one tree over its labels, in the order of the text.
-
-    `count` is the number in `N parts`, None where the text leaves it out. `folder` is where mesh
-    paths start. Made by `factory.lang.read_pag`, which checks that it is a tree.
-    """
+    """A product assembly graph: one tree over its labels, in the order of the text, which
+    `factory.lang.read_pag` checks. `count` is the number in `N parts`, None without it; `folder` is
+    where mesh paths start."""
 
     root: str
     nodes: tuple[Assembly, ...]

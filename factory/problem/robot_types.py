@@ -1,5 +1,4 @@
-"""Robot types (paper, section 4.2): an MJCF file and an entry in a catalogue,
-`mjcf/catalogue.toml`."""
+"""Robot types (paper, section 4.2): each is an MJCF file and an entry in `mjcf/catalogue.toml`."""
 
 from __future__ import annotations
 
@@ -15,10 +14,8 @@ from factory.support.resources import mjcf_folder
 
 @dataclass(frozen=True, slots=True)
 class RobotType:
-    """T: its name, MJCF file, the type it extends ("" for none) and what it is for.
-
-    `stretches` names the directions in which its workspace may be made longer (`along`).
-    """
+    """T: its name, MJCF file, the type it extends ("" for none) and its purpose. `stretches`: the
+    directions in which its workspace may be made longer (`along`)."""
 
     name: str
     mjcf: Path
@@ -29,7 +26,7 @@ class RobotType:
 
 @dataclass(frozen=True)
 class Catalogue:
-    """The robot types at our disposal, by name."""
+    """Robot types by name."""
 
     types: Mapping[str, RobotType]
 
@@ -40,8 +37,8 @@ class Catalogue:
         return self.types[name]
 
     def fits(self, name: str, wanted: str) -> bool:
-        """Whether a robot of type `name` can take a role that asks for `wanted`: it is that type
-        or extends it, directly or not."""
+        """Whether a robot of type `name` can take the role of a `wanted` one: it is that type or
+        extends it, directly or not."""
         while name != wanted:
             known = self.types.get(name)
             if known is None or not known.extends:

@@ -25,10 +25,11 @@ class Point:
     position: Position | None = field(default=None, compare=False)
 
     def __str__(self) -> str:
+        """The point as the language writes it: `A1`, `A1 + 2r`."""
         if not self.multiple:
             return f"{self.end}{self.robot}"
-        sign = "+" if self.multiple > 0 else "-"
-        return f"{self.end}{self.robot} {sign} {abs(self.multiple):g}r"
+        size = "" if abs(self.multiple) == 1 else repr(abs(float(self.multiple))).removesuffix(".0")
+        return f"{self.end}{self.robot} {'+' if self.multiple > 0 else '-'} {size}r"
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,16 +72,16 @@ class Template:
 
     @property
     def inputs(self) -> tuple[str, ...]:
-        """The distinct label variables of a, in the order of the robots: the sub-assemblies."""
+        """The sub-assemblies: the distinct label variables of a, in the order of the robots."""
         return tuple(dict.fromkeys(label for label in self.before if label != NOPART))
 
     def robot_position(self, slot: int) -> Position | None:
-        """Where the type of a robot is written; else the template."""
+        """The place of a robot's type; else that of the template."""
         return self.robot_positions[slot] if self.robot_positions else self.position
 
     @property
     def law_position(self) -> Position | None:
-        """Where F is written; else the template."""
+        """The place of F; else that of the template."""
         return self.law.position or self.position
 
     @property
@@ -96,6 +97,6 @@ class Template:
 
 
 def variable_number(variable: str) -> tuple[int, str]:
-    """What orders the label variables of a template: their number, `LAB10` after `LAB2`."""
+    """The sort key of a label variable: its number, so that `LAB10` comes after `LAB2`."""
     digits = "".join(c for c in variable if c.isdigit())
     return int(digits or 0), variable

@@ -1,8 +1,7 @@
-"""What was built before: a receipt with the digests of all that went in and came out.
+"""Receipts of builds, in the user's cache: the digests of all inputs and outputs.
 
-Where every one of them is still right, building again would write the same files, and is left out.
-A receipt is kept in the user's cache; one that is missing, damaged or out of date costs a build,
-never a wrong file.
+A build whose receipt still holds is left out: it would write the same files. A receipt that is
+missing, damaged or out of date costs a build, never a wrong file.
 """
 
 from __future__ import annotations
@@ -19,22 +18,26 @@ from typing import Any
 from factory.support.files import user_cache, write_text
 
 KEPT = 200
-"""So many receipts are kept: the oldest go first."""
+"""The most receipts that are kept; the oldest are removed first."""
 
 ENGINES = ("klavins-factory", "mujoco", "numpy", "scipy", "shapely", "trimesh")
-"""Packages that what is built depends on."""
+"""Packages that a build depends on."""
 
 
 def request(file: Path, wanted: Mapping[str, Any]) -> str:
-    """The name of a receipt: the PAG and all that was asked for, and by which program. Paths are
-    named as they are given, and from where."""
+    """The name of a receipt: a digest of the PAG's path, the options and the program's own files.
+    A path counts as it is given and as it is resolved."""
     own = Path(__file__).resolve().parents[1]
     program = sorted(
         (str(path.relative_to(own)), path.stat().st_size, path.stat().st_mtime_ns)
         for path in own.rglob("*.py")
     )
+    versions = []
+    for package in ENGINES:
+        with suppress(PackageNotFoundError):
+            versions.append(f"{package} {version(package)}")
     given = {key: _named(value) for key, value in wanted.items()}
-    parts = [_named(file), _versions(), program, given]
+    parts = [_named(file), versions, program, given]
     return hashlib.sha256(json.dumps(parts).encode()).hexdigest()
 
 
@@ -45,7 +48,7 @@ def _named(value: object) -> object:
 
 
 def find(name: str) -> dict[str, Any] | None:
-    """The document of a build that is still true, None where there is none."""
+    """The document of a build whose receipt still holds; None where there is none."""
     try:
         receipt = json.loads(_place(name).read_text("utf-8"))
         files = {**receipt["inputs"], **receipt["outputs"]}
@@ -60,7 +63,7 @@ def find(name: str) -> dict[str, Any] | None:
 def keep(
     name: str, inputs: Iterable[Path], outputs: Iterable[Path], document: Mapping[str, Any]
 ) -> None:
-    """Keep the receipt of a build, if it can be; not of one into what is no plain file."""
+    """Keep the receipt of a build if it can be written and all outputs are plain files."""
     written = list(outputs)
     if not written or not all(path.is_file() for path in written):
         return
@@ -70,12 +73,15 @@ def keep(
         "document": dict(document),
     }
     with suppress(OSError):
-        write_text(_place(name), json.dumps(receipt) + "\n")
-        _trim(_place(name).parent)
+        place = _place(name)
+        write_text(place, json.dumps(receipt) + "\n")
+        receipts = sorted(place.parent.glob("*.json"), key=lambda path: path.stat().st_mtime)
+        for path in receipts[:-KEPT]:
+            path.unlink(missing_ok=True)
 
 
 def _digest(path: Path) -> str:
-    """Of a file's content, or of the names in a folder. Raises OSError."""
+    """The digest of a file's content, or of the names in a folder. Raises OSError."""
     if path.is_dir():
         names = sorted(entry.name for entry in path.iterdir())
         return hashlib.sha256(json.dumps(names).encode()).hexdigest()
@@ -85,17 +91,3 @@ def _digest(path: Path) -> str:
 
 def _place(name: str) -> Path:
     return user_cache() / "builds" / f"{name}.json"
-
-
-def _trim(folder: Path) -> None:
-    receipts = sorted(folder.glob("*.json"), key=lambda path: path.stat().st_mtime)
-    for path in receipts[:-KEPT]:
-        path.unlink(missing_ok=True)
-
-
-def _versions() -> list[str]:
-    found = []
-    for package in ENGINES:
-        with suppress(PackageNotFoundError):
-            found.append(f"{package} {version(package)}")
-    return found

@@ -1,4 +1,4 @@
-"""Python's cycle collector, held off where many values are made and no cycles."""
+"""A pause of Python's cycle collector, for stages that make many values and no cycles."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ from contextlib import contextmanager
 
 @contextmanager
 def collector_paused() -> Iterator[None]:
-    """No collection inside, or inside a function that this decorates: walking over all that has
-    been made, again and again, would make a stage that is linear take three times as long."""
+    """No collection inside, or inside a function that this decorates. Repeated walks over all
+    values would make a linear stage take three times as long."""
     enabled = gc.isenabled()
     gc.disable()
     try:

@@ -1,4 +1,4 @@
-"""What the command line prints, and the status it ends with.
+"""The output of the command line, and its exit status.
 
 With `--json`, stdout is one JSON document and nothing else; diagnostics and progress go to stderr.
 """
@@ -42,20 +42,20 @@ def say(text: str = "") -> None:
 
 
 def warn(diagnostics: Iterable[Diagnostic], quiet: bool = False) -> None:
-    """Warnings, on stderr: `file:line:col: CODE warning: message`."""
-    if quiet:
-        return
-    for diagnostic in diagnostics:
-        print(warning(diagnostic), file=sys.stderr)
+    """Print warnings to stderr: `file:line:col: CODE warning: message`."""
+    if not quiet:
+        for diagnostic in diagnostics:
+            print(warning(diagnostic), file=sys.stderr)
 
 
 def warning(diagnostic: Diagnostic) -> str:
-    """A diagnostic as it is shown where it is no error."""
+    """The text of a diagnostic that is a warning."""
     return str(replace(diagnostic, message=f"warning: {diagnostic.message}"))
 
 
 def fail(error: FactoryError, as_json: bool) -> int:
-    """Report an error where the user looks for it, if it can be written there; its exit status."""
+    """Print an error to stderr, with `as_json` also to stdout, as far as they can be written; gives
+    the exit status."""
     with suppress(OSError):
         if as_json:
             emit({"errors": [d.as_json() for d in error.diagnostics]})
@@ -66,7 +66,7 @@ def fail(error: FactoryError, as_json: bool) -> int:
 
 
 def table(title: str, columns: tuple[str, ...], rows: Iterable[tuple[str, ...]]) -> None:
-    """A table for people on stdout, as wide as it needs to be."""
+    """A table on stdout, as wide as the terminal, 160 columns elsewhere."""
     from rich import box
     from rich.console import Console
     from rich.markup import escape

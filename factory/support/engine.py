@@ -1,9 +1,9 @@
-"""The engine, `mujoco`, imported so that it loads whatever MUJOCO_GL says and whether or not there
-is GL.
+"""The engine, `mujoco`, imported so that it loads whatever MUJOCO_GL says, with or without GL.
 
-MuJoCo binds a window system as soon as it is imported, and fails where MUJOCO_GL names none or its
-library is missing. Nothing but rendering needs one, so a failed import is done again without. Every
-module that needs the engine takes it from here: `from factory.support.engine import mujoco`."""
+MuJoCo binds a window system when it is imported, and fails where MUJOCO_GL names none or its
+library is missing. Only rendering needs one, so a failed import is repeated without it. Every
+module that needs the engine imports it from here: `from factory.support.engine import mujoco`.
+"""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ except Exception:  # a wrong MUJOCO_GL is a RuntimeError, a missing library anyt
 
 
 def _warn(words: str) -> None:
-    """Warnings go to stderr; the engine's own way is stdout, and a file in the current folder."""
+    """Print a warning to stderr; the engine's own handler writes to stdout and to a file."""
     with suppress(BaseException):  # an exception in here would end the process
         print(f"engine: {words}", file=sys.stderr)
 

@@ -1,4 +1,4 @@
-"""One tree of errors, with codes and places in the user's file.
+"""Errors, with codes and places in the user's file.
 
 A `Diagnostic` says where, what was found and what would have been valid; a `FactoryError`
 carries every diagnostic of one stage. The command line prints them and takes its exit status

@@ -1,4 +1,4 @@
-"""Packages that not everybody needs: the extras of this one."""
+"""Optional packages: the extras of this one."""
 
 from __future__ import annotations
 
@@ -8,12 +8,14 @@ from typing import Any
 from factory.support.errors import Diagnostic, MissingError
 
 
-def optional(module: str, package: str, what: str, extra: str) -> Any:
-    """A module of an optional package, which `what` needs. Raises MissingError with the line that
-    installs it."""
+def optional(module: str, package: str, what: str, extra: str, otherwise: str = "") -> Any:
+    """A module of an optional package, which `what` needs. Raises MissingError with the command
+    that installs it, or how to do without."""
     try:
         return import_module(module)
     except ImportError as error:
-        hint = f"pip install 'klavins-factory[{extra}]'"
+        hint = f"pip install 'klavins-factory[{extra}]'" + (
+            f", or {otherwise}" if otherwise else ""
+        )
         message = f"{what} needs {package}: {error}"
         raise MissingError(Diagnostic("Missing", message, None, hint)) from error

@@ -1,4 +1,4 @@
-"""Writing files whole: under another name first, then moved into place."""
+"""Atomic writing: each file is written under another name, then moved into place."""
 
 from __future__ import annotations
 
@@ -13,24 +13,24 @@ from pathlib import Path
 from factory.support.errors import Diagnostic, InputError
 
 LOG = b"factory-log "
-"""How a log of a run begins, whatever its version."""
+"""The first bytes of a log of a run, in every version."""
 
 
 def write_bytes(path: Path, content: bytes) -> None:
-    """Write a file so that no half of it is ever seen under its name. Raises OSError."""
+    """Write a file atomically. Raises OSError."""
     write_all({path: content})
 
 
 def write_text(path: Path, text: str) -> None:
-    """Write a UTF-8 text file whole."""
+    """Write a UTF-8 text file atomically. Raises OSError."""
     write_bytes(path, text.encode())
 
 
 def write_all(contents: Mapping[Path, bytes]) -> None:
     """Write files, and the folders they need: all of them or, where one cannot be written, none.
 
-    A link is followed, and what is no plain file (a pipe, a device) is written in place. Who may do
-    what with a file stays as it is. Raises OSError.
+    A link is followed; a pipe or a device is written in place. The permissions of a file stay as
+    they are. Raises OSError.
     """
     made: list[Path] = []
     partials: dict[Path, Path] = {}
@@ -59,7 +59,7 @@ def write_all(contents: Mapping[Path, bytes]) -> None:
 
 
 def make_folder(folder: Path) -> list[Path]:
-    """Make a folder and those above it; gives the ones made, the outermost first."""
+    """Make a folder and those above it; gives those that were missing, the outermost first."""
     made: list[Path] = []
     try:
         for missing in [f for f in (folder, *folder.parents) if not f.exists()][::-1]:
@@ -72,8 +72,8 @@ def make_folder(folder: Path) -> list[Path]:
 
 
 def own_names(folder: Path, paths: Iterable[Path], inputs: Iterable[Path] = ()) -> None:
-    """Files in a folder whose names are our choice: no link that happens to have such a name is
-    followed, and no file that is read is written over. Raises InputError (BadFile)."""
+    """Check paths in a folder whose names the program chooses: none is a link, and none is an input
+    that would be written over. Raises InputError (BadFile)."""
     paths, read = list(paths), set(map(os.path.realpath, inputs))
     below = {f for path in paths for f in (path, *path.parents) if folder in f.parents}
     hint = "remove it, or choose another folder"
@@ -92,15 +92,15 @@ def own_names(folder: Path, paths: Iterable[Path], inputs: Iterable[Path] = ()) 
 
 
 def user_cache() -> Path:
-    """Where what can be made again is kept for this user: in $XDG_CACHE_HOME, or ~/.cache."""
+    """The user's folder for files that can be made again: in $XDG_CACHE_HOME, or ~/.cache."""
     given = os.environ.get("XDG_CACHE_HOME", "")
     base = Path(given) if os.path.isabs(given) else Path(os.path.expanduser("~")) / ".cache"
     return base / "klavins-factory"
 
 
 def partial_of(path: Path) -> Path:
-    """The hidden name beside a file under which this process writes it: no other file's, and never
-    longer than a name may be."""
+    """The hidden name beside a file under which this process writes it: unique, and no longer than
+    a name may be."""
     digest = sha256(os.fsencode(path.name)).hexdigest()[:16]
     return path.with_name(f".{digest}.{os.getpid()}.part")
 

@@ -1,8 +1,7 @@
-"""OpenGL for pictures without a screen: chosen, tried out in another process, and explained where
-missing.
+"""OpenGL for rendering without a screen: chosen, tested in a subprocess, diagnosed where missing.
 
-Only rendering needs it. A GL that does not work shows as four different errors, or ends the
-process, so it is tried in a subprocess first."""
+A GL that does not work raises one of four errors, or ends the process; so a subprocess tests it.
+"""
 
 from __future__ import annotations
 
@@ -18,7 +17,7 @@ from typing import Any
 from factory.support.errors import Diagnostic, MissingError
 
 APT = "apt-get install -y libegl1 libgl1"
-"""What mends a Debian: these two bring Mesa's EGL and its software renderer along."""
+"""On Debian, these two packages bring Mesa's EGL and its software renderer."""
 
 VALID = ("egl", "osmesa", "glfw")
 
@@ -31,11 +30,11 @@ _DETOURS = (
     "MUJOCO_EGL_DEVICE_ID",
     "PYOPENGL_PLATFORM",
 )
-"""Variables that lead the search for a driver astray."""
+"""Variables that change where drivers are looked for."""
 
 
 def prepare() -> str:
-    """Sets MUJOCO_GL to `egl` unless it names something; gives what it names, in lower case."""
+    """Set MUJOCO_GL to `egl` unless it names a backend; gives the name in lower case."""
     named = os.environ.get("MUJOCO_GL", "").lower().strip()
     if named in _DEFAULT:
         os.environ["MUJOCO_GL"] = named = "egl"
@@ -53,10 +52,8 @@ def context(width: int, height: int) -> Any:
 
 
 def probe() -> None:
-    """Renders a tiny picture in a subprocess; nothing more on the next call in the same process.
-
-    Raises MissingError (NoGL) with the line that mends it.
-    """
+    """Render a tiny picture in a subprocess, once in this process for the same environment. Raises
+    MissingError (NoGL) with the command that helps."""
     prepare()
     found = _probed(tuple((name, os.environ.get(name)) for name in ("MUJOCO_GL", *_DETOURS)))
     if found is not None:
@@ -80,7 +77,7 @@ def _probed(variables: tuple[tuple[str, str | None], ...]) -> Diagnostic | None:
 
 
 def _reason() -> str:
-    """Why a tiny picture cannot be rendered in a new process, in its last words; "" if it can."""
+    """The last line of output of a process that fails to render a tiny picture; "" if it can."""
     package = str(Path(__file__).resolve().parents[2])
     paths = os.pathsep.join([package, *filter(None, [os.environ.get("PYTHONPATH")])])
     command = [sys.executable, "-c", "from factory.support.gl import trial; trial()"]
@@ -103,7 +100,7 @@ def _reason() -> str:
 
 
 def _way_out(named: str, variables: dict[str, str | None]) -> str:
-    """The one line that mends it."""
+    """The command that helps."""
     if named == "glfw":
         return "set MUJOCO_GL=egl, which needs no screen"
     if named == "osmesa":

@@ -1,5 +1,4 @@
-"""An interruption (Ctrl-C, a signal to end) that waits for the end of a tick, so that files are
-closed whole."""
+"""Interruptions (Ctrl-C, a signal to end) wait for the end of a tick: files stay complete."""
 
 from __future__ import annotations
 
@@ -16,8 +15,8 @@ SIGNALS = [
 
 
 def stop_on_signals(handler: Callable[[int, FrameType | None], Any]) -> Mapping[int, Any]:
-    """Let `handler` take the signals that end a program, save those that the caller has it ignore;
-    gives the handlers there were. Outside the main thread it does nothing."""
+    """Install a handler of the signals that end a program, except those that are ignored; gives the
+    handlers from before. Outside the main thread it does nothing."""
     try:
         before = {n: signal.getsignal(n) for n in SIGNALS}
         heard = {n: old for n, old in before.items() if old is not signal.SIG_IGN}
@@ -29,7 +28,7 @@ def stop_on_signals(handler: Callable[[int, FrameType | None], Any]) -> Mapping[
 
 
 class Interruption(Closing):
-    """While it lasts, the first signal is only noted, and raised as KeyboardInterrupt by `observe`;
+    """Within its context the first signal is noted, and `observe` raises it as KeyboardInterrupt;
     the second is raised at once."""
 
     def __init__(self) -> None:
@@ -41,7 +40,7 @@ class Interruption(Closing):
         return self
 
     def close(self) -> None:
-        """Give the signals back to who had them."""
+        """Restore the handlers from before."""
         for number, handler in self._before.items():
             signal.signal(number, handler)
 

@@ -1,4 +1,4 @@
-"""Values whose mappings are locked go to other processes, which pickle does not do by itself."""
+"""Pickling of values with locked mappings, which go to other processes."""
 
 from __future__ import annotations
 
@@ -11,5 +11,5 @@ def _locked(contents: dict[object, object]) -> MappingProxyType[object, object]:
 
 
 def pickle_locked_mappings() -> None:
-    """From now on pickle takes a locked mapping, as a copy."""
+    """From now on pickle copies a locked mapping."""
     copyreg.pickle(MappingProxyType, lambda proxy: (_locked, (dict(proxy),)))

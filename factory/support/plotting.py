@@ -1,11 +1,11 @@
-"""What all plots for people share. They need matplotlib, an optional part."""
+"""Style and output of all plots. They need matplotlib, an optional package."""
 
 from __future__ import annotations
 
 from io import BytesIO
 from typing import Any
 
-from factory.support.errors import Diagnostic, MissingError
+from factory.support.extras import optional
 
 BLUE, ORANGE, RED, GREY, PALE = "#2f5d9b", "#e08a1e", "#c0392b", "#8a9099", "#e3e6ea"
 
@@ -23,14 +23,9 @@ STYLE: dict[str, Any] = {
 
 
 def require_matplotlib(what: str, otherwise: str) -> None:
-    """Raises MissingError where there is no matplotlib: `what` needs it; `otherwise` is what can be
-    done without."""
-    try:
-        import matplotlib.figure  # noqa: F401
-    except ImportError as error:
-        hint = f"pip install 'klavins-factory[plots]', or {otherwise}"
-        message = f"{what} matplotlib: {error}"
-        raise MissingError(Diagnostic("Missing", message, None, hint)) from error
+    """Raises MissingError where there is no matplotlib, which `what` needs; `otherwise`: how to do
+    without."""
+    optional("matplotlib.figure", "matplotlib", what, "plots", otherwise)
 
 
 def figure_and_axes(columns: int = 1, height: float = 3.4, rows: int = 1) -> tuple[Any, Any]:

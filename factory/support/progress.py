@@ -1,4 +1,4 @@
-"""Bars on stderr; that of a run shows simulated time, units made, speed, time left."""
+"""Progress bars on stderr; that of a run shows simulated time, units made, speed, time left."""
 
 from __future__ import annotations
 
@@ -13,12 +13,11 @@ if TYPE_CHECKING:
     from rich.progress import TaskID
 
 PERIOD = 0.1
-"""The bar is redrawn so often [s]."""
+"""Least time between two updates of the bar [s]."""
 
 
-class Shown(Closing):
-    """A bar that is there for as long as its context; silent where `quiet`, or where stderr is no
-    terminal."""
+class ProgressBar(Closing):
+    """A bar that is shown within its context; not where `quiet`, or where stderr is no terminal."""
 
     def __init__(self, quiet: bool) -> None:
         self.shown = not quiet and sys.stderr.isatty()
@@ -32,18 +31,18 @@ class Shown(Closing):
         return self
 
     def close(self) -> None:
-        """Take the bar away."""
+        """Remove the bar."""
         if self.bar is not None:
             self.bar.stop()
             self.bar = None
 
     def drawn(self) -> tuple[Bar, TaskID]:
-        """The bar, and what it is to show."""
+        """The bar and its task."""
         raise NotImplementedError
 
 
 def counter(after: str, before: str = "") -> Bar:
-    """A bar between words, with how many of how many and the time that is left."""
+    """A bar between words, with the number done, the number in all and the time left."""
     from rich.console import Console
     from rich.progress import (
         BarColumn,
@@ -64,8 +63,8 @@ def counter(after: str, before: str = "") -> Bar:
     )
 
 
-class Progress(Shown):
-    """An observer of a run."""
+class Progress(ProgressBar):
+    """The bar of a run, which it observes."""
 
     def __init__(self, units: int, quiet: bool = False) -> None:
         super().__init__(quiet)
@@ -74,15 +73,12 @@ class Progress(Shown):
         self.before: int | None = None
 
     def drawn(self) -> tuple[Bar, TaskID]:
-        """Simulated time before, units and speed behind."""
+        """Simulated time before the bar, units and speed behind."""
         bar = counter("units, {task.fields[speed]}, left", "{task.fields[time]}")
         return bar, bar.add_task("", total=self.units, time="0.0 s", speed="")
 
-    def __call__(self, world: Any, supervisor: Any) -> None:
-        self.observe(world, supervisor)
-
     def observe(self, world: Any, supervisor: Any) -> None:
-        """Redraw the bar if it is time to."""
+        """Update the bar, at most once a period."""
         if self.bar is None:
             return
         if self.before is None:

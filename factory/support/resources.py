@@ -1,5 +1,5 @@
-"""Where the shipped templates and MJCF files are: beside the package in a checkout, inside it in a
-wheel."""
+"""The folders of the shipped templates and MJCF files: beside the package in a checkout, inside it
+in a wheel."""
 
 from __future__ import annotations
 
@@ -13,11 +13,8 @@ def _folder(name: str) -> Path:
     for candidate in (package / "assets" / name, package.parent / name):
         if candidate.is_dir():
             return candidate
-    raise MissingError(
-        Diagnostic(
-            "Assets", f"the folder '{name}' of factory is missing", None, "install factory again"
-        )
-    )
+    message = f"the folder '{name}' of factory is missing"
+    raise MissingError(Diagnostic("Assets", message, None, "install factory again"))
 
 
 def templates_folder() -> Path:

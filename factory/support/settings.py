@@ -1,5 +1,4 @@
-"""What a user may set, by option, by environment or in `factory.toml`: speeds, timestep,
-clearance."""
+"""Settings by option, environment or `factory.toml`: speeds, timestep, clearance."""
 
 from __future__ import annotations
 
@@ -21,13 +20,13 @@ RANGES = {
     "outfeed": (1e-3, 10.0),
     "stage": (0, 1),
 }
-"""Least and greatest value of each setting: beyond lie nothing but overflows and endless runs."""
+"""Least and greatest value of each setting; beyond them a run overflows or never ends."""
 
 LOOK = 0.1
-"""What need not be looked at in every tick is looked at again within this [s], or in the next."""
+"""Longest time between two checks of what is not checked in every tick [s]."""
 
 MOST = 10
-"""Ticks, and no more, that go to the engine at once."""
+"""The most ticks that the engine takes at once."""
 
 WHOLE = ("substeps", "stage")
 """Settings that are whole numbers."""
@@ -55,7 +54,7 @@ class Settings:
 
     @property
     def outfeed_acceleration(self) -> float:
-        """Of the outfeed's tray: twice that of a robot [m/s²]."""
+        """Acceleration of the outfeed's tray: twice that of a robot [m/s²]."""
         return 2 * self.acceleration
 
     @property
@@ -65,18 +64,18 @@ class Settings:
 
     @property
     def stride(self) -> int:
-        """Ticks from one look at what need not be looked at in each to the next; so many go to the
-        engine at once, at most."""
+        """Ticks between two checks of what is not checked in every tick; the engine takes no more
+        at once."""
         return min(max(1, int(LOOK / self.tick * (1 + 1e-9))), MOST)
 
     @property
     def samples(self) -> int:
-        """Setpoints that a drive's buffer holds: for the steps of a stride, for ever after, and one
-        to spare."""
+        """Setpoints in a drive's buffer: one for each step of a stride, the last one, which holds
+        from then on, and one to spare."""
         return self.stride * self.substeps + 2
 
     def with_options(self, options: Mapping[str, float | int | None]) -> Settings:
-        """These settings with every option that is not None put in place.
+        """These settings with every option that is not None.
 
         Raises InputError (BadValue) with every number that is not within its range.
         """
@@ -88,8 +87,8 @@ class Settings:
 
 
 def environment() -> dict[str, float]:
-    """The settings that the environment states: `FACTORY_SPEED` and so on; an empty variable states
-    none. Raises InputError (BadValue) with every one that is no number within its range."""
+    """The settings in the environment: `FACTORY_SPEED` and so on; an empty variable sets nothing.
+    Raises InputError (BadValue) with every one that is no number within its range."""
     found, faults = {}, []
     for name in RANGES:
         variable = f"FACTORY_{name.upper()}"

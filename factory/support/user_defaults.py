@@ -1,7 +1,6 @@
-"""Defaults of a user's own: the file `factory.toml`.
+"""The user's own defaults: the file `factory.toml`, beside the PAG or else in the current folder.
 
-Options come before the environment, that before the file, that before what is built in. The file is
-the one beside the PAG, or else the one in the current folder.
+Options take precedence over the environment, that over the file, and that over what is built in.
 """
 
 from __future__ import annotations
@@ -42,14 +41,14 @@ _KINDS = {
 
 @dataclass(frozen=True, slots=True)
 class Defaults:
-    """What a `factory.toml` says: its values by key, the settings and the options apart."""
+    """The values of a `factory.toml` by key, settings and options apart."""
 
     path: Path = Path(NAME)
     text: str = field(default="", repr=False)
     values: Mapping[str, Any] = field(default_factory=dict)
 
     def settings(self) -> Settings:
-        """The settings of the file, the built-in ones where it says nothing."""
+        """The settings of the file, and the built-in ones where it has none."""
         given = {k: v for k, v in self.values.items() if k in RANGES}
         return Settings().with_options({k: v if k in WHOLE else float(v) for k, v in given.items()})
 
@@ -61,7 +60,7 @@ class Defaults:
         return found
 
     def at(self, key: str) -> Position:
-        """Where a key stands: its first mention at the start of a line, or in a header."""
+        """The place of a key: its first mention at the start of a line, or in a header."""
         for number, line in enumerate(self.text.splitlines(), 1):
             if found := re.match(rf"""\s*\[*\s*["']?({re.escape(key)})\b""", line):
                 return Position(str(self.path), number, found.start(1) + 1, line)
@@ -116,7 +115,7 @@ def _fault(key: str, value: object) -> Diagnostic | None:
 
 
 def _broken(path: Path, error: Exception) -> Diagnostic:
-    """What tomllib says, at the place it speaks of."""
+    """The error of tomllib, at the place that it names."""
     words = getattr(error, "strerror", None) or str(error)
     if isinstance(error, RecursionError):
         words = "the file is nested too deeply"

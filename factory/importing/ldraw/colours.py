@@ -21,7 +21,7 @@ _CLEAR = """
 33 0020A0  34 237841  35 56E646  36 C91A09  40 635F52  41 559AB7  42 C0FF00  43 AEE9EF
 46 F5CD2F  47 FCFCFC  57 F08F1C
 """
-"""Codes and values of LDraw's own LDConfig.ldr; a library's replaces them."""
+"""Codes and values of LDraw's LDConfig.ldr; a library with its own replaces them."""
 
 
 def common_colours() -> Colours:
@@ -34,7 +34,7 @@ def common_colours() -> Colours:
 
 
 def direct_colour(code: int) -> tuple[float, float, float, float] | None:
-    """The colour that a code 0x2RRGGBB (0x3RRGGBB: half clear) spells out."""
+    """The colour of a code 0x2RRGGBB, or 0x3RRGGBB, which is half clear."""
     if code >> 24 not in (2, 3):
         return None
     return rgba_of(code & 0xFFFFFF, 255 if code < _DIRECT + 0x1000000 else 128)

@@ -7,13 +7,13 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
-from factory.importing.draft import Faults
+from factory.importing.draft import ImportFaults
 from factory.lang.source import Source, quoted
 from factory.lang.words import number
 from factory.support.errors import Position
 
 FURTHEST = 1e7
-"""No number of a line is larger [LDU]; that is 4 km."""
+"""The largest number of a line [LDU]: 4 km."""
 
 Triangle = tuple[float, ...]
 Colours = dict[int, tuple[float, float, float, float]]
@@ -24,8 +24,8 @@ _PART = re.compile(r"(Unofficial_)?(Part|Subpart|Primitive|8_Primitive|48_Primit
 
 @dataclass(frozen=True, slots=True)
 class Reference:
-    """A line of type 1: a file placed by x y z and a matrix a..i [LDU] in a colour. `inverted`
-    turns its surfaces inside out."""
+    """A line of type 1: a file placed by x y z and a matrix a..i [LDU] in a colour; `inverted`:
+    with its surfaces inside out."""
 
     colour: int
     place: tuple[float, ...]
@@ -59,11 +59,11 @@ class LDrawFile:
 
 
 def key_of(name: str) -> str:
-    """File names that differ in case or slashes are the same."""
+    """The key of a file name: names that differ in case or slashes are the same."""
     return name.replace("\\", "/").strip().lower()
 
 
-def read_lines(source: Source, name: str, faults: Faults) -> list[LDrawFile]:
+def read_lines(source: Source, name: str, faults: ImportFaults) -> list[LDrawFile]:
     """The files in a text, the main one first; what is wrong goes to `faults`."""
     reader = _Reader(source, name, faults)
     for line, text in enumerate(source.lines, 1):
@@ -72,9 +72,9 @@ def read_lines(source: Source, name: str, faults: Faults) -> list[LDrawFile]:
 
 
 class _Reader:
-    """Goes through the lines, keeping what they set for those that follow."""
+    """Reads line by line; winding and inversion hold for the lines that follow."""
 
-    def __init__(self, source: Source, name: str, faults: Faults) -> None:
+    def __init__(self, source: Source, name: str, faults: ImportFaults) -> None:
         self.file, self.faults = source.file, faults
         self.files = [LDrawFile(name, source.start())]
         self.current: LDrawFile | None = self.files[0]

@@ -1,28 +1,29 @@
-"""LDraw models as drafts: sub-models are sub-assemblies, each building step adds to what is
-there."""
+"""From LDraw models to drafts: sub-models are sub-assemblies; each building step adds to the steps
+before."""
 
 from __future__ import annotations
 
 import re
+from collections.abc import Set
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
 from factory.geometry.meshes import Array
-from factory.importing.draft import MATE, MOST_NODES, PART, Draft, Faults, too_many
+from factory.importing.draft import MATE, MOST_NODES, PART, DraftNode, ImportFaults, too_many
 from factory.importing.ldraw.colours import INHERITED, direct_colour
 from factory.importing.ldraw.lines import LDrawFile, Reference, key_of
 from factory.importing.ldraw.shapes import LDU, LIBRARY, UPRIGHT, Shapes, matrix, mesh_of
-from factory.importing.ldraw.shelf import Shelf
-from factory.importing.mesh_store import MeshStore
+from factory.importing.ldraw.shelf import Shelf, children_first
+from factory.importing.mesh_files import MeshStore
 from factory.importing.places import quaternion, rounded
 from factory.lang.source import quoted
 from factory.problem.pag import Parameter
 from factory.support.errors import Diagnostic
 
 DENSITY = 1050.0
-"""Of ABS [kg/m³]."""
+"""Density of ABS [kg/m³]."""
 
 BRICK = (0.008, 0.008, 0.0096)
 """The box that stands for a part of unknown shape: a brick with one stud [m]."""
@@ -35,7 +36,7 @@ Colour = tuple[float, float, float, float] | None
 
 @dataclass(frozen=True, slots=True)
 class _Place:
-    """Where a model stands in the product [LDU], and the colour that it hands down."""
+    """The frame of a model in the product [LDU], and the colour of its parts without one."""
 
     turn: Array
     at: Array
@@ -43,8 +44,8 @@ class _Place:
 
 
 def read_ldraw(
-    path: Path, library: Path | None, boxes: bool, store: MeshStore, faults: Faults
-) -> list[Draft]:
+    path: Path, library: Path | None, boxes: bool, store: MeshStore, faults: ImportFaults
+) -> list[DraftNode]:
     """The drafts of a model, its main file first. Parts whose shape is nowhere are an error
     (MissingPart), or with `boxes` a box. Raises InputError with every fault found."""
     shelf = Shelf(path, library, faults)
@@ -59,7 +60,7 @@ def read_ldraw(
 
 class _ModelReader:
     def __init__(
-        self, shelf: Shelf, shapes: Shapes, boxes: bool, store: MeshStore, faults: Faults
+        self, shelf: Shelf, shapes: Shapes, boxes: bool, store: MeshStore, faults: ImportFaults
     ) -> None:
         self.shelf, self.shapes, self.boxes = shelf, shapes, boxes
         self.store, self.faults = store, faults
@@ -68,26 +69,15 @@ class _ModelReader:
         self.greys: set[int] = set()
 
     def survey(self) -> None:
-        """Goes through every model once: nothing missing, empty, made of itself or too large."""
+        """Check every model once: none is missing, empty, made of itself or too large."""
         size: dict[int, int] = {}
-        stack, path = [(self.shelf.main, False)], dict[int, None]()
-        while stack:
-            model, expanded = stack.pop()
-            if expanded:
-                path.pop(id(model))
-                size[id(model)] = 1 + sum(self._size(r, size) for r in model.references)
-                if size[id(model)] > MOST_NODES:
-                    raise too_many(model.position)
-            elif id(model) not in size and id(model) not in path:
-                path[id(model)] = None
-                stack.append((model, True))
-                stack += [(below, False) for below in self._models_in(model, path)]
+        for model in children_first(self.shelf.main, self._models_in, size):
+            entries = [self.shelf.find(reference) for reference in model.references]
+            size[id(model)] = 1 + sum(size.get(id(entry), 1) for entry in entries)
+            if size[id(model)] > MOST_NODES:
+                raise too_many(model.position)
 
-    def _size(self, reference: Reference, size: dict[int, int]) -> int:
-        below = self.shelf.find(reference.file, reference.position)
-        return 1 if below is None else size.get(id(below), 1)
-
-    def _models_in(self, model: LDrawFile, path: dict[int, None]) -> list[LDrawFile]:
+    def _models_in(self, model: LDrawFile, path: Set[int]) -> list[LDrawFile]:
         if not any(model.steps):
             message = f"the model {quoted(model.name)} has no parts"
             hint = "a model places parts and other models by lines of type 1"
@@ -98,7 +88,7 @@ class _ModelReader:
             self.faults.warn("BadMesh", message, model.position, hint)
         found = []
         for reference in model.references:
-            below = self.shelf.find(reference.file, reference.position)
+            below = self.shelf.find(reference)
             if below is not None and id(below) in path:
                 message = f"the model {quoted(reference.file)} is made of itself"
                 hint = "remove this line, or the one that leads here"
@@ -120,15 +110,13 @@ class _ModelReader:
         if file is None and key_of(reference.file) not in self.shelf.refused:
             message = f"there is no part file {quoted(reference.file)}"
             self.faults.add("MissingPart", message, reference.position, LIBRARY)
-        elif file is not None and self.shapes.of(file) is None:
-            trouble = self.shapes.troubles.get(id(file))
-            if trouble is not None:
-                self.faults.diagnostics.append(trouble)
+        elif file is not None and isinstance(trouble := self.shapes.of(file), Diagnostic):
+            self.faults.diagnostics.append(trouble)
 
-    def expand(self) -> list[Draft]:
+    def expand(self) -> list[DraftNode]:
         """A draft for every model, step and part of the product."""
         main = self.shelf.main
-        drafts = [Draft(_name(main), main.position)]
+        drafts = [DraftNode(_name(main), main.position)]
         stack = [(main, 0, _Place(np.eye(3), np.zeros(3), INHERITED[0]))]
         while stack:
             model, index, place = stack.pop()
@@ -138,37 +126,32 @@ class _ModelReader:
                 drafts[index].inputs = [entry for entry, _ in entries]
                 stack += [(file, entry, at) for entry, (file, at) in entries if file is not None]
                 if number > 0:
-                    drafts.append(Draft("", step[0].position))
+                    drafts.append(DraftNode("", step[0].position))
                     drafts[index].inputs.insert(0, len(drafts) - 1)
                     index = len(drafts) - 1
-        self._refuse_twice()
+        for references in self.there.values():
+            places = [reference.position for reference in references]
+            self.faults.check_used_once(quoted(references[0].file), places)
         return drafts
 
     def _enter(
-        self, reference: Reference, place: _Place, drafts: list[Draft]
+        self, reference: Reference, place: _Place, drafts: list[DraftNode]
     ) -> tuple[int, tuple[LDrawFile | None, _Place]]:
-        """Adds the draft of one line; its number, and the model that it stands for, if any."""
+        """Add the draft of a line; gives its index, and the model that the line places, if any."""
         turn = place.turn @ matrix(reference)
         at = place.turn @ np.array(reference.place[:3]) + place.at
         colour = place.colour if reference.colour in INHERITED else reference.colour
         here = _Place(turn, at, colour)
-        file = self.shelf.find(reference.file, reference.position)
+        file = self.shelf.find(reference)
         if file is not None and not file.is_part:
-            drafts.append(Draft(_name(file), reference.position, MATE))
+            drafts.append(DraftNode(_name(file), reference.position, MATE))
             return len(drafts) - 1, (file, here)
         where = np.round(np.concatenate([turn.ravel(), at]), 3) + 0.0
         self.there.setdefault((key_of(reference.file), where.tobytes()), []).append(reference)
-        drafts.append(Draft("", reference.position, PART, [], self._look(reference, file, here)))
+        drafts.append(
+            DraftNode("", reference.position, PART, [], self._look(reference, file, here))
+        )
         return len(drafts) - 1, (None, here)
-
-    def _refuse_twice(self) -> None:
-        for references in self.there.values():
-            first, *others = sorted(references, key=lambda r: (r.position.file, r.position.line))
-            for reference in others:
-                line = first.position.line
-                message = f"{quoted(reference.file)} is in the place where line {line} has put it"
-                hint = "a part is used once: remove one of the two lines, or move one"
-                self.faults.add("UsedTwice", message, reference.position, hint)
 
     def _look(
         self, reference: Reference, file: LDrawFile | None, place: _Place
@@ -191,7 +174,7 @@ class _ModelReader:
     def _mesh(self, reference: Reference, file: LDrawFile | None, turn: Array) -> str:
         """The path of a part's mesh; "" where it has none."""
         triangles = self.shapes.of(file) if file is not None else None
-        if file is None or triangles is None:
+        if file is None or triangles is None or isinstance(triangles, Diagnostic):
             return ""
         key = (id(file), np.round(turn, 6).tobytes())
         if key not in self.meshes:

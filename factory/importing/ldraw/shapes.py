@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Set
+
 import numpy as np
 
 from factory.geometry.meshes import Array
 from factory.importing.ldraw.lines import LDrawFile, Reference
-from factory.importing.ldraw.shelf import Shelf
+from factory.importing.ldraw.shelf import Shelf, children_first
 from factory.lang.source import quoted
 from factory.support.errors import Diagnostic
 
@@ -17,10 +19,10 @@ UPRIGHT = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
 """From LDraw's axes, -y up, to the factory's, z up."""
 
 MOST_TRIANGLES = 1_000_000
-"""Of one part; sub-files of sub-files can multiply without end."""
+"""The most triangles of a part: files within files multiply them."""
 
 LIBRARY = "--library DIR names a parts library (or LDRAWDIR does); --boxes does without"
-"""The way out where a part file is missing."""
+"""The hint where a part file is missing."""
 
 
 def matrix(reference: Reference) -> Array:
@@ -29,34 +31,23 @@ def matrix(reference: Reference) -> Array:
 
 
 class Shapes:
-    """Triangles (n, 3, 3) of files [LDU], each found once. What cannot be found is in `troubles`,
-    by the file that lacks it."""
+    """Triangles (n, 3, 3) of files [LDU], each made once, or the error that prevents them."""
 
     def __init__(self, shelf: Shelf) -> None:
         self.shelf = shelf
-        self.done: dict[int, Array] = {}
-        self.troubles: dict[int, Diagnostic] = {}
+        self.found: dict[int, Array | Diagnostic] = {}
 
-    def of(self, file: LDrawFile) -> Array | None:
-        """The triangles of a part; None, with its trouble noted, where they are not to be had."""
-        stack, path = [(file, False)], dict[int, None]()
-        while stack:
-            current, expanded = stack.pop()
-            if id(current) in self.done or id(current) in self.troubles:
-                continue
-            if expanded:
-                path.pop(id(current))
+    def of(self, file: LDrawFile) -> Array | Diagnostic:
+        """The triangles of a part, or the error that prevents them."""
+        for current in children_first(file, self._below, self.found):
+            if id(current) not in self.found:
                 self._join(current)
-                continue
-            path[id(current)] = None
-            stack.append((current, True))
-            stack += [(below, False) for below in self._below(current, path)]
-        return self.done.get(id(file))
+        return self.found[id(file)]
 
-    def _below(self, file: LDrawFile, path: dict[int, None]) -> list[LDrawFile]:
+    def _below(self, file: LDrawFile, path: Set[int]) -> list[LDrawFile]:
         found = []
         for reference in file.references:
-            below = self.shelf.find(reference.file, reference.position)
+            below = self.shelf.find(reference)
             if below is not None and id(below) in path:
                 message = f"{quoted(reference.file)} is made of itself"
                 self._lacks(file, "CyclicModel", message, reference, "remove the line")
@@ -65,33 +56,32 @@ class Shapes:
         return found
 
     def _lacks(self, file: LDrawFile, code: str, message: str, at: Reference, hint: str) -> None:
-        self.troubles.setdefault(id(file), Diagnostic(code, message, at.position, hint))
+        self.found.setdefault(id(file), Diagnostic(code, message, at.position, hint))
 
     def _join(self, file: LDrawFile) -> None:
         """The triangles of a file whose sub-files are done."""
         pieces, count = [np.array(file.triangles).reshape(-1, 3, 3)], len(file.triangles)
         for reference in file.references:
-            below = self.shelf.find(reference.file, reference.position)
+            below = self.shelf.find(reference)
             if below is None:
                 message = f"there is no part file {quoted(reference.file)}"
                 self._lacks(file, "MissingPart", message, reference, LIBRARY)
                 return
-            if id(below) in self.troubles:
-                self.troubles.setdefault(id(file), self.troubles[id(below)])
+            triangles = self.found[id(below)]
+            if isinstance(triangles, Diagnostic):
+                self.found[id(file)] = triangles
                 return
-            if id(below) not in self.done:
-                return
-            count += len(self.done[id(below)])
+            count += len(triangles)
             if count > MOST_TRIANGLES:
                 message = f"{quoted(file.name)} has more than {MOST_TRIANGLES} triangles"
                 self._lacks(file, "TooLarge", message, reference, "use a simpler part")
                 return
-            pieces.append(_placed(self.done[id(below)], reference))
-        self.done[id(file)] = np.concatenate(pieces)
+            pieces.append(_placed(triangles, reference))
+        self.found[id(file)] = np.concatenate(pieces)
 
 
 def _placed(triangles: Array, reference: Reference) -> Array:
-    """Triangles as a reference places them; a mirror turns them round."""
+    """Triangles as a reference places them; a mirror reverses their corners."""
     turn = matrix(reference)
     moved = triangles @ turn.T + np.array(reference.place[:3])
     inside_out = reference.inverted != (np.linalg.det(turn) < 0)

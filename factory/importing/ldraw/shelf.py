@@ -1,23 +1,24 @@
-"""Where LDraw files are found: packed in the model, beside it, or in a parts library."""
+"""The search for LDraw files: packed in the model, beside it, or in a parts library."""
 
 from __future__ import annotations
 
-from pathlib import Path, PurePosixPath
+from collections.abc import Callable, Container, Iterable, Iterator, Set
+from pathlib import Path
 
-from factory.importing.draft import Faults
+from factory.importing.draft import ImportFaults
 from factory.importing.ldraw.colours import common_colours
-from factory.importing.ldraw.lines import LDrawFile, key_of, read_lines
+from factory.importing.ldraw.lines import LDrawFile, Reference, key_of, read_lines
+from factory.importing.mesh_files import first_file, path_inside
 from factory.lang.source import quoted, read_text, source_of
-from factory.support.errors import Position
 
 ROOMS = ("parts", "p", "models", "unofficial/parts", "unofficial/p")
-"""Where a library keeps files, in the order in which they are looked for."""
+"""The folders of a library, in the order of the search."""
 
 
 class Shelf:
-    """The files that a model can refer to. Each is read once, when it is asked for."""
+    """The files that a model can refer to, each read once, at the first reference."""
 
-    def __init__(self, path: Path, library: Path | None, faults: Faults) -> None:
+    def __init__(self, path: Path, library: Path | None, faults: ImportFaults) -> None:
         self.library, self.faults = library, faults
         self.folders = [path.parent, *([library / room for room in ROOMS] if library else [])]
         self.files: dict[str, LDrawFile | None] = {}
@@ -30,27 +31,24 @@ class Shelf:
         for file in list(self.files.values()):
             self.colours |= file.colours if file else {}
 
-    def find(self, name: str, position: Position) -> LDrawFile | None:
-        """The file of this name; None if there is none. A name that leads out of the folders is
-        noted as a fault (BadPath)."""
-        key = key_of(name)
+    def find(self, reference: Reference) -> LDrawFile | None:
+        """The file that a line refers to; None if there is none. A name that leads out of the
+        folders is noted as a fault (BadPath)."""
+        key = key_of(reference.file)
         if key not in self.files:
-            self.files[key] = self._search(name, position)
+            self.files[key] = self._search(reference)
         return self.files[key]
 
-    def _search(self, name: str, position: Position) -> LDrawFile | None:
-        inside = PurePosixPath(name.replace("\\", "/"))
-        if inside.is_absolute() or ".." in inside.parts or ":" in name or "\0" in name:
-            message = f"{quoted(name)} leads out of the model's folder and the library"
-            self.faults.add("BadPath", message, position, "name a file in one of them")
-            self.refused.add(key_of(name))
+    def _search(self, reference: Reference) -> LDrawFile | None:
+        inside = path_inside(reference.file)
+        if inside is None:
+            message = f"{quoted(reference.file)} leads out of the model's folder and the library"
+            self.faults.add("BadPath", message, reference.position, "name a file in one of them")
+            self.refused.add(key_of(reference.file))
             return None
-        for folder in self.folders:
-            for spelled in dict.fromkeys((str(inside), str(inside).lower())):
-                path = folder / spelled
-                if _is_file(path):
-                    return self._read(path, name)
-        return None
+        names = dict.fromkeys((str(inside), str(inside).lower()))
+        path = first_file(folder / name for folder in self.folders for name in names)
+        return None if path is None else self._read(path, reference.file)
 
     def _read(self, path: Path, name: str) -> LDrawFile:
         files = read_lines(source_of(read_text(path), str(path)), name, self.faults)
@@ -59,8 +57,21 @@ class Shelf:
         return files[0]
 
 
-def _is_file(path: Path) -> bool:
-    try:
-        return path.is_file()
-    except (OSError, ValueError):
-        return False
+def children_first(
+    root: LDrawFile,
+    below: Callable[[LDrawFile, Set[int]], Iterable[LDrawFile]],
+    done: Container[int],
+) -> Iterator[LDrawFile]:
+    """Every file that `below` leads to from the root, after those that it leads to itself; without
+    recursion. `below` is given the ids of the files on the way down, none of which may come again;
+    files whose ids are `done` are left out."""
+    stack, path = [(root, False)], set[int]()
+    while stack:
+        file, expanded = stack.pop()
+        if expanded:
+            path.remove(id(file))
+            yield file
+        elif id(file) not in done:
+            path.add(id(file))
+            stack.append((file, True))
+            stack += [(found, False) for found in below(file, path)]

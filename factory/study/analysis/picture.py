@@ -41,7 +41,7 @@ def check_picture(path: Path | None) -> None:
     if path.suffix.lower() not in FORMATS:
         message = f"'{path}' is no name for a picture"
         raise InputError(Diagnostic("BadFile", message, None, "let it end in .svg or .png"))
-    plotting.require_matplotlib("a picture needs", "leave out -o")
+    plotting.require_matplotlib("a picture", "leave out -o")
 
 
 def picture(found: Analysis, suffix: str) -> bytes:

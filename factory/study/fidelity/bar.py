@@ -5,13 +5,13 @@ from __future__ import annotations
 import sys
 from typing import TYPE_CHECKING
 
-from factory.support.progress import Shown
+from factory.support.progress import ProgressBar
 
 if TYPE_CHECKING:
     from rich.progress import Progress, TaskID
 
 
-class Bar(Shown):
+class Bar(ProgressBar):
     """Counts runs that are done."""
 
     def __init__(self, runs: int, quiet: bool = False) -> None:

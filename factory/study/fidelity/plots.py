@@ -29,7 +29,7 @@ LEAST = 1e-5
 
 def check_plots() -> None:
     """Raises MissingError where there is no matplotlib."""
-    require_matplotlib("plots need", "-o REPORT.json for figures alone")
+    require_matplotlib("a plot", "-o REPORT.json for figures alone")
 
 
 def plots(found: Fidelity, study: Study | None = None) -> dict[str, bytes]:

@@ -5,13 +5,13 @@ from __future__ import annotations
 from time import perf_counter
 from typing import TYPE_CHECKING
 
-from factory.support.progress import Shown, counter
+from factory.support.progress import ProgressBar, counter
 
 if TYPE_CHECKING:
     from rich.progress import Progress, TaskID
 
 
-class Bar(Shown):
+class Bar(ProgressBar):
     """Counts the runs of a sweep, of which some may be there already."""
 
     def __init__(self, total: int, there: int = 0, quiet: bool = False) -> None:

@@ -36,7 +36,7 @@ MOST = 10
 def plots(found: Summary) -> dict[str, bytes]:
     """The plots by file name, FIGURE.png each. Raises MissingError where there is no
     matplotlib."""
-    require_matplotlib("plots need", "-o REPORT.json for figures alone")
+    require_matplotlib("a plot", "-o REPORT.json for figures alone")
     import matplotlib
 
     with matplotlib.rc_context(STYLE):

@@ -1,7 +1,6 @@
-"""What the codes of diagnostics mean: a text each, in this folder.
+"""Explanations of the codes of diagnostics: a text each, in this folder.
 
-A text is a title, what it means, an example that provokes it (files, and the command), and how to
-mend it.
+A text is a title, the meaning, an example that causes it (files, and the command), and a remedy.
 """
 
 from __future__ import annotations
@@ -16,8 +15,8 @@ FOLDER = Path(__file__).resolve().parent
 
 
 @dataclass(frozen=True, slots=True)
-class Explanation:
-    """A code, its meaning in a line, and the whole text for people."""
+class CodeExplanation:
+    """A code, its meaning in a line, and the whole text."""
 
     code: str
     title: str
@@ -30,7 +29,7 @@ def codes() -> tuple[str, ...]:
     return tuple(sorted(path.stem for path in FOLDER.glob("*.txt")))
 
 
-def explain(code: str) -> Explanation:
+def explain(code: str) -> CodeExplanation:
     """The explanation of a code, in upper or lower case. Raises InputError (Usage) with the codes
     like it where there is none."""
     known = {name.lower(): name for name in codes()}
@@ -38,7 +37,7 @@ def explain(code: str) -> Explanation:
     if name is None:
         raise InputError(Diagnostic("Usage", f"there is no code '{code}'", None, _near(code)))
     title, _, text = (FOLDER / f"{name}.txt").read_text("utf-8").partition("\n\n")
-    return Explanation(name, title, text.rstrip("\n"))
+    return CodeExplanation(name, title, text.rstrip("\n"))
 
 
 def _near(code: str) -> str:

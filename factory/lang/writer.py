@@ -1,0 +1,73 @@
+"""From PAG or template to its canonical text, such that read ∘ write is the identity."""
+
+from __future__ import annotations
+
+from factory.problem.pag import PAG, Assembly, Value
+from factory.problem.template import Law, Template
+
+
+def write_pag(pag: PAG) -> str:
+    """The canonical text of a PAG: one statement a line, numbers at full precision."""
+    count = [] if pag.count is None else [f"{pag.count} parts;"]
+    lines = [*count, f"root = {pag.root};", *map(write_assembly, pag.nodes)]
+    return "\n".join(lines) + "\n"
+
+
+def write_assembly(node: Assembly) -> str:
+    """One statement: `label = operation ( inputs, parameters );`."""
+    arguments = [*node.inputs, *(f"{p.name} = {write_value(p.value)}" for p in node.parameters)]
+    inside = f" ( {', '.join(arguments)} )" if arguments else "()"
+    return f"{node.label} = {node.operation}{inside};"
+
+
+def write_value(value: Value) -> str:
+    """A value as the language writes it. Raises ValueError for a text of several lines."""
+    if isinstance(value, tuple):
+        return f"( {', '.join(map(write_number, value))} )"
+    return write_text(value) if isinstance(value, str) else write_number(value)
+
+
+def write_number(value: float) -> str:
+    """The shortest number that reads back as the same: 2 for 2.0, else Python's repr."""
+    return repr(float(value)).removesuffix(".0")
+
+
+def write_text(text: str) -> str:
+    """A text in double quotes, a quote in it doubled."""
+    if "\n" in text or "\r" in text:
+        raise ValueError(f"a text of a PAG is one line, not {text!r}")
+    return '"' + text.replace('"', '""') + '"'
+
+
+def write_template(template: Template) -> str:
+    """The canonical text of a template: one clause a line, written as the paper does."""
+    clauses = [
+        f"R = < {', '.join(template.robots)} >",
+        f"j = {template.carrier}",
+        f"~ = {_braces([' = '.join(map(str, c)) for c in template.identifications])}",
+        f"<a; b> = < {', '.join(template.before)}; {', '.join(template.after)} >",
+        f"F = {_law(template.law)}",
+        *([f"further = {template.further}"] if template.further else []),
+        *_parameters(template),
+    ]
+    lines = [f"{template.name} = (R, j, ~, <a; b>, F) where", *(f"  {c};" for c in clauses)]
+    return "\n".join(lines) + "\n"
+
+
+def _braces(items: list[str]) -> str:
+    return "{ " + ", ".join(items) + " }" if items else "{}"
+
+
+def _law(law: Law) -> str:
+    eps = law.eps if isinstance(law.eps, str) else write_number(law.eps)
+    goals = ", ".join(map(str, law.goals))
+    text = f"{law.name} on W to ( {goals} ) within {eps}"
+    if law.dwell is None:
+        return text
+    return f"{text} for {law.dwell if isinstance(law.dwell, str) else write_number(law.dwell)}"
+
+
+def _parameters(template: Template) -> list[str]:
+    defaults = ", ".join(f"{name} = {write_value(value)}" for name, value in template.parameters)
+    parts = ["geometry"] * template.geometry + [f"( {defaults} )"] * bool(defaults)
+    return [f"parameters = {' and '.join(parts)}"] if parts else []
