@@ -33,7 +33,7 @@ from factory.show.live.commands import (
     command_of,
 )
 from factory.show.live.page import page, stage_of
-from factory.show.report.floor import floor_plan
+from factory.show.report.drawings import floor_plan
 from factory.show.report.links import labels_of
 from factory.simulation.disturbance.hands import Hands
 from factory.simulation.simulation import Simulation
