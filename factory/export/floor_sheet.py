@@ -3,17 +3,18 @@ bar and legend. The same layout gives the same bytes."""
 
 from __future__ import annotations
 
-from math import floor, sqrt
+from math import dist, floor, sqrt
 
 import numpy as np
 
 from factory.export.floor_plan import Flat, flat_shapes, stations
 from factory.layout.dimensions import CARRIAGE
-from factory.layout.layout import Guidepath, Layout
+from factory.layout.layout import Layout
 from factory.support.canvas import (
     LETTER,
     Box,
     Canvas,
+    Point,
     legend_rows,
     millimetres,
     page_box,
@@ -22,8 +23,8 @@ from factory.support.canvas import (
 FONT = 17.0
 """Size of a label on the floor [mm]."""
 
-ARROWS = 0.6
-"""A guidepath has an arrow about every so many metres."""
+ARROWS = 600.0
+"""A guidepath has an arrow about every so far [mm]."""
 
 RIM = 60.0
 """Round the floor labels keep off so much [mm]."""
@@ -101,13 +102,6 @@ class _Sheet:
                 for shape in shapes:
                     if shape.style in styles:
                         self._draw(shape)
-                if name == "floor":
-                    self._grid()
-                elif name == "outfeed":
-                    self._chevrons()
-                elif name == "guidepaths":
-                    for path in self.layout.guidepaths:
-                        self._arrows(path)
         with self.canvas.group(id="labels"):
             self._labels()
         with self.canvas.group(id="sheet"):
@@ -133,10 +127,16 @@ class _Sheet:
         more = {"title": shape.name, "fill": shape.paint if shape.style == "part" else None}
         if shape.box:
             self.canvas.rectangle(around, shape.style, 8.0 * (shape.style in ("dot", "tool")))
+            if shape.style == "floor":
+                self._grid()
+            elif shape.style == "belt":
+                self._chevrons(around)
         elif shape.radius:
             self.canvas.circle(points[0], reach, shape.style, **more)
         elif len(points) == 2:
             self.canvas.line(shape.style, *points)
+            if shape.style == "path":
+                self._arrows(points[0], points[1])
         else:
             self.canvas.polygon(points, shape.style, **more)
 
@@ -156,9 +156,9 @@ class _Sheet:
         ):
             self.canvas.block(box)
 
-    def _chevrons(self) -> None:
+    def _chevrons(self, belt: Box) -> None:
         """The way the belt runs."""
-        left, right, top, bottom = page_box(self.layout.outfeed)
+        left, right, top, bottom = belt
         middle, half = (top + bottom) / 2, min((bottom - top) / 4, 40.0)
         steps = max(1, floor((right - left) / (4 * half)))
         for n in range(steps):
@@ -166,13 +166,15 @@ class _Sheet:
             wings = (x - half / 2, middle - half), (x - half / 2, middle + half)
             self.canvas.line("chevron", wings[0], (x + half / 2, middle), wings[1])
 
-    def _arrows(self, path: Guidepath) -> None:
-        """Arrowheads towards A."""
-        count = max(1, round(path.travel / ARROWS))
+    def _arrows(self, start: Point, end: Point) -> None:
+        """Arrowheads on a guidepath, towards A."""
+        length = max(dist(start, end), 1e-9)
+        u, v = ((b - a) / length for a, b in zip(start, end, strict=True))
+        count = max(1, round(length / ARROWS))
         for n in range(count):
-            at = path.carriage(path.reach + path.travel * (n + 0.5) / count)
-            (x, y), (u, v) = millimetres(at), path.heading
-            self.canvas.head((x + 14 * u, y - 14 * v), (x - 7 * u, y + 7 * v), 8.0, "tip")
+            way = length * (n + 0.5) / count
+            x, y = start[0] + u * way, start[1] + v * way
+            self.canvas.head((x + 14 * u, y + 14 * v), (x - 7 * u, y - 7 * v), 8.0, "tip")
 
     def _labels(self) -> None:
         """Robots on their carriages, operations at their junctions, parts at their feeders."""
