@@ -30,7 +30,7 @@ CALM = 0.25
 
 
 @dataclass(frozen=True, slots=True)
-class Row:
+class PanelRow:
     """A robot's row: `at` which height, in rows from the top; `alpha`: how far it has come or
     gone."""
 
@@ -49,7 +49,7 @@ class Rows:
         robots = len(self.factory.robots)
         self.reduced = robots > LIMIT
         self.count = NEIGHBOURS if self.reduced else robots
-        self.shown = [] if self.reduced else [Row(r, float(r)) for r in range(robots)]
+        self.shown = [] if self.reduced else [PanelRow(r, float(r)) for r in range(robots)]
         self.columns = min(COLUMNS, self.width) if self.reduced else self.width
         self.named = robots
         self.first = 0.0
@@ -79,16 +79,16 @@ class Rows:
         place = {robot: float(number) for number, robot in enumerate(near)}
         self.named = len(near)
         old = {row.robot: row for row in self.shown}
-        fresh = [Row(r, at, 0.0) for r, at in place.items() if r not in old]
+        fresh = [PanelRow(r, at, 0.0) for r, at in place.items() if r not in old]
         moved = (_moved(row, place, share) for row in (*self.shown, *fresh))
         self.shown = sorted((row for row in moved if row), key=lambda row: row.robot)
 
 
-def _moved(row: Row, place: dict[int, float], share: float) -> Row | None:
+def _moved(row: PanelRow, place: dict[int, float], share: float) -> PanelRow | None:
     """A row on its way to its place, or out."""
     at, there = place.get(row.robot, row.at), float(row.robot in place)
     alpha = row.alpha + share * (there - row.alpha)
-    return Row(row.robot, row.at + share * (at - row.at), alpha) if alpha > 0.02 else None
+    return PanelRow(row.robot, row.at + share * (at - row.at), alpha) if alpha > 0.02 else None
 
 
 def neighbourhood(factory: Factory, focus: Operation, most: int = NEIGHBOURS) -> list[int]:
