@@ -22,7 +22,7 @@ from factory.render.caption import FADES, SHOWN, draw_title, strength
 from factory.render.colours import GROUND, operation_colours, robot_colours
 from factory.render.following import Followed
 from factory.render.gantt_panel import GanttPanel
-from factory.render.history import History, UnitProgress, depths, followed
+from factory.render.history import History, OperationProgress, depths, followed
 from factory.render.ink import Ink, fitted, width
 from factory.render.net_panel import NetPanel
 from factory.render.picture import PANELS, shared
@@ -108,7 +108,7 @@ def test_a_firing_left_out_would_be_noticed(paper: Log) -> None:
 
 def test_operations_go_on_and_reach_their_end(paper: Log) -> None:
     history = told(paper)
-    progress = UnitProgress(history.subject)
+    progress = OperationProgress(history.subject)
     slides = [0, 1, 2, 3, 4, 5]
     weld = history.factory.by_label["sub2"]
     spell = next(s for s in history.spells[2] if s.operation and s.step // 2 == 1)

@@ -14,7 +14,7 @@ import numpy as np
 from factory.compiler.mating import Mating, Matings
 from factory.geometry.meshes import Array
 from factory.geometry.solids import Product, Solid
-from factory.support.canvas import Box, Canvas, Point, legend_rows, shortened
+from factory.support.canvas import Box, Canvas, Point, shortened
 
 WIDTH, VIEWS, EDGE, HEAD, GAP, FOOT = 900.0, 640.0, 50.0, 150.0, 74.0, 92.0
 """Of the sheet: the width of a view and height of both together, the margin, the room for
@@ -112,9 +112,8 @@ class _Picture:
         entries = [("struck", "stands"), ("striking", "comes"), ("place", "its place")]
         entries += [("clash", "in both"), ("standing", shortened(standing))]
         entries += [("coming", shortened(coming))]
-        rows = legend_rows(entries, (EDGE, y + 34), EDGE + WIDTH, UNIT)
-        self.canvas.legend(rows, UNIT)
-        page = 0.0, 2 * EDGE + WIDTH, 0.0, y + 36.3 + 1.2 * UNIT * len(rows)
+        below = self.canvas.legend(entries, (EDGE, y + 34), EDGE + WIDTH, UNIT)
+        page = 0.0, 2 * EDGE + WIDTH, 0.0, below + 2
         return self.canvas.document(f"{self.mating.label}: blocked", page, STYLE)
 
     def _title(self) -> None:

@@ -10,15 +10,7 @@ import numpy as np
 from factory.export.floor_plan import Flat, flat_shapes, stations
 from factory.layout.dimensions import CARRIAGE
 from factory.layout.layout import Layout
-from factory.support.canvas import (
-    LETTER,
-    Box,
-    Canvas,
-    Point,
-    legend_rows,
-    millimetres,
-    page_box,
-)
+from factory.support.canvas import LETTER, Box, Canvas, Point, millimetres, page_box
 
 FONT = 17.0
 """Size of a label on the floor [mm]."""
@@ -209,21 +201,15 @@ class _Sheet:
         self._dimensions()
         types = {robot.type for robot in layout.factory.robots}
         entries = [entry for entry in LEGEND if entry[0] != "tool" or "tool" in types]
+        below = bottom + (3.2 if self.upright else 5.6) * unit
         if self.upright:
             x = right + 1.5 * unit
             self.canvas.scale_bar((x, bottom - 1.2 * unit), 13 * unit, 0.7 * unit)
-            start = bottom - (2.5 + 1.3 * len(entries)) * unit
-            rows = [
-                [(style, words, (x, start + 1.3 * unit * number))]
-                for number, (style, words) in enumerate(entries)
-            ]
-            foot = 3.2
+            self.canvas.legend(entries, (x, bottom - (2.5 + 1.2 * len(entries)) * unit), x, unit)
         else:
             self.canvas.scale_bar((left, bottom + 3.0 * unit), self.wide / 3, 0.7 * unit)
-            rows = legend_rows(entries, (left, bottom + 5.6 * unit), edge, unit)
-            foot = 5.6 + 1.2 * len(rows)
-        self.canvas.legend(rows, unit)
-        return left - 3.2 * unit, edge, top - 7.2 * unit, bottom + foot * unit
+            below = self.canvas.legend(entries, (left, below), edge, unit)
+        return left - 3.2 * unit, edge, top - 7.2 * unit, below
 
     def _dimensions(self) -> None:
         """The floor's width below it and its depth to its left."""

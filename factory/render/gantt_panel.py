@@ -14,7 +14,7 @@ from factory.render.colours import (
     pale,
     template_colours,
 )
-from factory.render.history import History, Spell, UnitProgress
+from factory.render.history import History, OperationProgress, Spell
 from factory.render.ink import Ink, Pixels, fitted, width
 from factory.render.rows import PanelRow, Rows
 from factory.render.sheet import PanelSheet
@@ -31,7 +31,7 @@ STEPS = (1.0, 2.0, 5.0, 10.0)
 
 def _window(history: History) -> float:
     """How much time is shown [s]."""
-    progress, factory = UnitProgress(history.subject), history.factory
+    progress, factory = OperationProgress(history.subject), history.factory
     times = [progress.expected(operation) for operation in factory.operations]
     busiest = max(sum(times[n] for n in robot.operations) for robot in factory.robots)
     return float(round(min(max(CYCLES * busiest, SHORTEST), LONGEST)))

@@ -102,7 +102,7 @@ class History:
         return found
 
 
-class UnitProgress:
+class OperationProgress:
     """How far operations are, by what their robots have still to go.
 
     An operation with a dwell takes the time it would take to get there, then the dwell; what its

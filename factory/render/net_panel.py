@@ -26,7 +26,7 @@ from factory.render.colours import (
     pale,
     robot_colours,
 )
-from factory.render.history import History, Spell, UnitProgress
+from factory.render.history import History, OperationProgress, Spell
 from factory.render.ink import Colour, Ink, Pixels, fitted, mixed
 from factory.render.rings import Rings
 from factory.render.rows import PanelRow, Rows
@@ -49,7 +49,7 @@ class NetPanel:
         self.history, self.factory, self.rows = history, history.factory, rows
         self.rings = Rings(size, scale, rows)
         self.sheet = self.rings.sheet
-        self.progress = UnitProgress(history.subject)
+        self.progress = OperationProgress(history.subject)
         self.paints, self.colours = robot_colours(self.factory), operation_colours(self.factory)
         self.tokens: dict[int, float] = {}
         self.ground: tuple[object, Pixels] | None = None

@@ -245,10 +245,16 @@ class Canvas:
         for x, shown in ((0.0, "0"), (whole * scale, words)):
             self.text((at[0] + x, at[1] + 1.14 * size), shown, size, "measure", "middle")
 
-    def legend(self, rows: Iterable[Iterable[tuple[str, str, Point]]], unit: float) -> None:
-        """Samples of styles with what they stand for, where `legend_rows` puts them."""
-        half = 0.4 * unit
-        for style, words, (x, y) in (entry for row in rows for entry in row):
+    def legend(
+        self, entries: Iterable[tuple[str, str]], at: Point, right: float, unit: float
+    ) -> float:
+        """Samples of styles with what they stand for (style, words), from a point on, as many to a
+        row as there is room for up to `right`, in multiples of a unit; gives y below them."""
+        (x, y), half = at, 0.4 * unit
+        for style, words in entries:
+            needed = (1.5 + 0.7 * LETTER * len(words)) * unit
+            if x > at[0] and x + needed > right:
+                x, y = at[0], y + 1.2 * unit
             if style in LINES:
                 self.line(style, (x, y), (x + 2 * half, y))
             elif style in DISCS:
@@ -256,23 +262,8 @@ class Canvas:
             else:
                 self.rectangle((x, x + 2 * half, y - half, y + half), style)
             self.text((x + 1.2 * unit, y), words, 0.7 * unit)
-
-
-def legend_rows(
-    entries: Iterable[tuple[str, str]], at: Point, right: float, unit: float
-) -> list[list[tuple[str, str, Point]]]:
-    """The entries of a legend (style, words) with their places, from a point on, as many to a row
-    as there is room for up to `right`; `unit` is what its sizes are multiples of."""
-    rows: list[list[tuple[str, str, Point]]] = [[]]
-    (x, y) = at
-    for style, words in entries:
-        needed = (1.5 + 0.7 * LETTER * len(words)) * unit
-        if rows[-1] and x + needed > right:
-            rows.append([])
-            x, y = at[0], y + 1.2 * unit
-        rows[-1].append((style, words, (x, y)))
-        x += needed + 1.5 * unit
-    return rows
+            x += needed + 1.5 * unit
+        return y + 1.2 * unit
 
 
 def _attributes(given: dict[str, object]) -> str:
