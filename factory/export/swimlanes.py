@@ -18,7 +18,7 @@ from factory.support.canvas import Point
 COLOURS = (
     "#0072b2", "#d55e00", "#009e73", "#cc79a7", "#8c6d00", "#56b4e9", "#7f3c8d", "#e73f74",
 )  # fmt: skip
-"""Of gears, told apart by people who see few (Okabe and Ito)."""
+"""Of gears, which the colour-blind can tell apart (Okabe and Ito)."""
 
 SHARED = "#333333"
 """The colour of what belongs to several robots, or to none."""
@@ -134,7 +134,7 @@ def _lane_order(net: MarkedNet, owners: Sequence[Sequence[int]], x: Sequence[flo
 def _heights(
     owners: Sequence[Sequence[int]], across: Sequence[float], lanes: Sequence[float]
 ) -> list[float]:
-    """The height of each place: its lane, else a row below with nobody in that column."""
+    """The height of each place: its lane, else a row below that is free in that column."""
     below = max(lanes, default=TOP - LANE) + LANE
     taken: dict[float, int] = {}
     found = []

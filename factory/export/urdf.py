@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
 from math import atan2, hypot
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
 
@@ -111,7 +111,7 @@ class _Writer:
         at, turn = m.body_pos[body], m.body_quat[body]
         if slides:
             axis = m.jnt_axis[joint]
-            at = at - _turned(turn, axis) * m.qpos0[m.jnt_qposadr[joint]]
+            at = at - rotation(turn) @ axis * m.qpos0[m.jnt_qposadr[joint]]
         _origin(element, at, turn)
         add(element, "parent", link=m.body(m.body_parentid[body]).name)
         add(element, "child", link=name)
@@ -163,7 +163,7 @@ class _Writer:
         """A shape of a link, where its geom is and the offset along."""
         turn = self.m.geom_quat[geom]
         element = add(link, tag)
-        _origin(element, self.m.geom_pos[geom] + _turned(turn, offset), turn)
+        _origin(element, self.m.geom_pos[geom] + rotation(turn) @ offset, turn)
         add(element, "geometry").append(shape)
         return element
 
@@ -189,11 +189,3 @@ def roll_pitch_yaw(quaternion: Array) -> tuple[float, float, float]:
     if abs(turn[2, 0]) > 1 - 1e-12:  # only roll and yaw together are determined
         return atan2(-turn[1, 2], turn[1, 1]), pitch, 0.0
     return atan2(turn[2, 1], turn[2, 2]), pitch, atan2(turn[1, 0], turn[0, 0])
-
-
-def _turned(quaternion: Array, vector: Array) -> Array:
-    from factory.support.engine import mujoco
-
-    found: Any = np.zeros(3)
-    mujoco.mju_rotVecQuat(found, np.asarray(vector, float), np.asarray(quaternion, float))
-    return np.asarray(found)

@@ -1,9 +1,7 @@
-"""Where the camera stands: as near as it can with everything that is to be seen still in the
-picture.
+"""Cameras and their views: a view is as near as it can be with a set of points inside the frame.
 
-A view is fitted, not set: for a direction of sight and an aspect ratio the nearest position from
-which a set of points lies inside the frame has a closed form. So the factory fills a picture of any
-shape."""
+For a direction of sight and an aspect ratio that position has a closed form, so the factory fills a
+picture of any shape."""
 
 from __future__ import annotations
 
@@ -34,7 +32,7 @@ TURN = 8.0
 """How fast `orbit` goes round [degrees/s]."""
 
 FIELD = 24.0
-"""Angle of view across the shorter side of the picture [degrees]: narrow, for a calm
+"""Angle of view across the shorter side of the picture [degrees]: narrow, for little
 perspective."""
 
 

@@ -34,9 +34,6 @@ class _Observer(Closing):
         self.number = factory.net.threaded.net.transition_index
         self.last = self._moment()
 
-    def __call__(self, world: Any, supervisor: Any) -> None:
-        self.observe(world, supervisor)
-
     def observe(self, world: Any, supervisor: Any) -> None:
         raise NotImplementedError
 

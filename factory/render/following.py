@@ -152,7 +152,7 @@ class Followed:
 
     def _same(self, d: mujoco.MjData, seen: dict[int, float]) -> int | None:
         """The body that has been followed, or has taken its place; else one that has just come. A
-        product that nobody holds any more is left when another copy is on its way."""
+        product that no robot holds any more is left when another copy is on its way."""
         fresh = min(seen, key=lambda b: seen[b], default=None)
         if self.last is None or fresh is None:
             return fresh

@@ -30,7 +30,7 @@ from factory.render.history import History, OperationProgress, Spell
 from factory.render.ink import Colour, Ink, Pixels, fitted, mixed
 from factory.render.rings import Rings
 from factory.render.rows import PanelRow, Rows
-from factory.render.sheet import whose
+from factory.render.sheet import robots_shown
 
 GLIDE = 0.09
 """Time constant with which a token follows its place [s]."""
@@ -98,9 +98,10 @@ class NetPanel:
         return self.ground[1]
 
     def _drawn(self) -> Pixels:
-        net = self.factory.net.threaded
-        sizes = f"{whose(self.rows)}, {len(net.places)} places, {len(net.transitions)} transitions"
-        ink = self.sheet.blank("Net", whose(self.rows) if self.rows.reduced else sizes)
+        net, detail = self.factory.net.threaded, robots_shown(self.rows)
+        if not self.rows.reduced:
+            detail += f", {len(net.places)} places, {len(net.transitions)} transitions"
+        ink = self.sheet.blank("Net", detail)
         for row in self.rows.shown:
             self._ring(ink, row)
         for operation in self._operations():

@@ -60,7 +60,7 @@ class Painter(Closing):
 
     def paint(self, shown: Snapshot, elapsed: float = 0.0, time: float = 0.0) -> Pixels:
         """One picture (height, width, 3) at a time [s]. `elapsed` [s] since the last one: a camera
-        that follows glides; with 0 it is where it wants to be."""
+        that follows glides; with 0 it is at its goal at once."""
         self.replica.place(shown.qpos)
         mujoco.mj_camlight(self.replica.m, self.replica.d)
         view = self.viewpoint.view(shown, elapsed, time)

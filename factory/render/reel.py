@@ -39,7 +39,7 @@ class Reel(Closing):
         return self.file.frames
 
     def until(self, now: Moment) -> None:
-        """Write the frames whose time has come."""
+        """Write the frames due by now."""
         if self.poster is not None:
             self.poster.see(now)
         while self.frames / self.fps <= now.time + 1e-9:

@@ -1,8 +1,8 @@
 """Which robots the panels show, each in a row of its own, and where the rows are.
 
 Up to LIMIT robots all are shown, in the order of their numbers. Beyond, those in the neighbourhood
-of the product that is furthest on its way: who has it now, whom it will meet next. Their rows come,
-go and change places calmly.
+of the product that is furthest on its way: the robots that have it now and those it meets next.
+Their rows fade in and out, and glide to their places.
 """
 
 from __future__ import annotations
@@ -40,9 +40,9 @@ class PanelRow:
 
 
 class Rows:
-    """The rows at present. `reduced`: whether not all robots have one; `named`: how
-    many have, those not counted that go; `first`: the leftmost column
-    of operations to be seen, and `columns` how many are."""
+    """The rows at present. `reduced`: whether not all robots have one; `named`: how many have,
+    without those that fade out; `first`: the leftmost column of operations to be seen, and
+    `columns` how many are."""
 
     def __init__(self, history: History) -> None:
         self.history, self.factory = history, history.factory

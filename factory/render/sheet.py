@@ -90,7 +90,7 @@ class PanelSheet:
             ink.words(left, y, name, self.name_points, INK, "l", row.alpha)
 
 
-def whose(rows: Rows) -> str:
+def robots_shown(rows: Rows) -> str:
     """Which robots are shown, in words."""
     robots = len(rows.factory.robots)
     if not rows.reduced or rows.focus is None:
