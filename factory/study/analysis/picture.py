@@ -1,4 +1,4 @@
-"""An analysis as a picture: schedule with the critical circuit, times, sensitivity, work in process.
+"""An analysis as a picture: schedule with the critical circuit, times, sensitivity, copies in work.
 
 It needs matplotlib, an optional part.
 """
