@@ -11,12 +11,11 @@ import pytest
 from layout_values import many_layouts, paper_layout, random_layout, row_of_inserts, table_pag
 from pag_values import factory_of
 
+from factory.export.floor_sheet import write_svg
 from factory.geometry.solids import product_geometry
-from factory.layout.drawing import outline, write_svg
 from factory.layout.embedding import lay_out
 from factory.layout.layout import Layout
-from factory.layout.lettering import Lettering
-from factory.layout.svg import LONGEST, clean, label, number
+from factory.support.canvas import LONGEST, Canvas, clean, hull, number
 
 SVG = "{http://www.w3.org/2000/svg}"
 
@@ -114,21 +113,25 @@ def test_a_tall_floor_has_its_legend_beside_it() -> None:
 
 
 def test_labels_make_room_for_each_other() -> None:
-    letters = Lettering()
-    places = {letters.place((0.0, 0.0), "word", 10.0, 5.0, "j") for _ in range(8)}
+    canvas = Canvas()
+    places = {canvas.place((0.0, 0.0), "word", 10.0, 5.0, "j") for _ in range(8)}
     assert len(places) == 8
 
 
 def test_numbers_and_texts() -> None:
     assert [number(v) for v in (0.0, -0.01, 1.0, -2.25, 1200.04)] == ["0", "0", "1", "-2.2", "1200"]
     assert clean("a<b>&\n") == "a&lt;b&gt;&amp; "
-    assert "<title>" not in label((0, 0), "short", 10, "j")
+    canvas = Canvas()
+    canvas.label((0, 0), "short", 10, "j")
+    canvas.label((0, 0), "so long that it is cut", 10, "j")
+    short, long = canvas.elements
+    assert "<title>" not in short and "<title>so long that it is cut</title>" in long
 
 
 def test_outlines_are_convex_hulls() -> None:
     layout = random_layout(20, 3, "any", "medium")
     for solid in layout.product.solids.values():
-        found = np.array(outline(solid))
+        found = np.array(hull(np.round(solid.corners[:, :2], 6)))
         low, high = solid.corners[:, :2].min(axis=0), solid.corners[:, :2].max(axis=0)
         assert found.min(axis=0) == pytest.approx(low, abs=1e-5)
         assert found.max(axis=0) == pytest.approx(high, abs=1e-5)

@@ -19,7 +19,6 @@ from hypothesis import strategies as st
 from scipy.spatial import ConvexHull
 
 import factory.commands.check_product
-from factory.commands.clashes import draw, picture_names
 from factory.compiler.compiler import expand
 from factory.compiler.mating import (
     BLOCKED,
@@ -36,6 +35,7 @@ from factory.compiler.mating import (
 from factory.compiler.mating.contacts import CHUNK
 from factory.compiler.mating.depth import deepest, exact, polytope, rough
 from factory.compiler.mating.meetings import meetings
+from factory.export.clash_picture import draw, picture_names
 from factory.geometry.solids import Product, product_geometry
 from factory.lang import read_pag
 from factory.pipeline import all_templates

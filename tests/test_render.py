@@ -9,6 +9,7 @@ import signal
 import subprocess
 import sys
 import time
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 
@@ -23,8 +24,8 @@ import factory
 from factory.geometry.solids import Mesh
 from factory.mjcf.mesh_files import corner_normals, face_normals, mesh_file
 from factory.record.log import LogWriter, read_log
-from factory.render import Film, Still, camera_named, check_output, render_log, still
-from factory.render.camera import Frame, fit, from_above, overview, towards
+from factory.render import Film, Picture, Still, camera_named, check_output, render_log
+from factory.render.camera import Framing, fit, from_above, overview, towards
 from factory.render.video import VideoFile
 from factory.simulation.simulation import Simulation
 from factory.support import gl
@@ -33,6 +34,7 @@ from factory.support.errors import InputError, MissingError
 ROOT = Path(__file__).parent.parent
 PAPER = ROOT / "examples" / "paper.pag"
 SIZE, FPS = (160, 96), 10.0
+SMALL, PRODUCT = Picture(SIZE), Picture((240, 136), "product")
 
 
 def why_no_gl() -> str:
@@ -59,8 +61,8 @@ def taken(layout, tmp_path_factory: pytest.TempPathFactory):
     simulation = Simulation(layout, "mujoco", 1)
     with (
         LogWriter(folder / "run.log", simulation) as log,
-        Film(simulation, folder / "run.mp4", SIZE, FPS) as film,
-        Still(simulation, folder / "end.png", (240, 136), "product") as end,
+        Film(simulation, folder / "run.mp4", SMALL, FPS) as film,
+        Still(simulation, folder / "end.png", PRODUCT) as end,
     ):
         run = simulation.run([log.observe, film.observe, end.observe])
     return folder, run, film, simulation
@@ -110,7 +112,7 @@ def test_the_same_pictures_are_encoded_the_same_every_time(taken, tmp_path: Path
     log = read_log(taken[0] / "run.log")
     films = set()
     for _ in range(8):
-        render_log(log, tmp_path / "again.mp4", SIZE, 5.0)
+        render_log(log, tmp_path / "again.mp4", SMALL, 5.0)
         films.add((tmp_path / "again.mp4").read_bytes())
     assert len(films) == 1
 
@@ -119,14 +121,14 @@ def test_the_same_pictures_are_encoded_the_same_every_time(taken, tmp_path: Path
 def test_a_log_gives_the_same_pictures_as_its_run(taken, tmp_path: Path) -> None:
     folder = taken[0]
     log = read_log(folder / "run.log")
-    count = render_log(log, tmp_path / "log.mp4", SIZE, FPS)
+    count = render_log(log, tmp_path / "log.mp4", SMALL, FPS)
     one, other = film_of(folder / "run.mp4"), film_of(tmp_path / "log.mp4")
     assert count == len(one) == len(other)
     assert np.abs(one.astype(int) - other).max() <= 2
-    assert render_log(log, tmp_path / "log.png", (240, 136), camera="product") == 1
+    assert render_log(log, tmp_path / "log.png", PRODUCT) == 1
     pictures = [iio.imread(p).astype(int) for p in (folder / "end.png", tmp_path / "log.png")]
     assert np.abs(pictures[0] - pictures[1]).max() <= 2
-    assert render_log(log, tmp_path / "then.png", SIZE, at=1.0) == 1
+    assert render_log(log, tmp_path / "then.png", SMALL, at=1.0) == 1
     assert iio.imread(tmp_path / "then.png").shape == (SIZE[1], SIZE[0], 3)
 
 
@@ -140,7 +142,7 @@ def test_an_interruption_leaves_a_film_of_what_was(layout, tmp_path: Path, error
             raise error
 
     path = tmp_path / "cut.mp4"
-    with pytest.raises(error), Film(simulation, path, SIZE, FPS) as film:
+    with pytest.raises(error), Film(simulation, path, SMALL, FPS) as film:
         simulation.run([film.observe, interrupt])
     assert len(film_of(path)) == film.frames == 11
     assert [p.name for p in tmp_path.iterdir()] == ["cut.mp4"]
@@ -231,7 +233,8 @@ def test_an_invisible_part_would_be_noticed(taken, layout, tmp_path: Path) -> No
     for g in range(m.ngeom):
         if m.geom(g).name.startswith("part/part2#"):
             m.geom_rgba[g, 3] = 0.0
-    with Still(simulation, tmp_path / "end.png", (240, 136), "product", caption=False) as end:
+    plain = replace(PRODUCT, caption=False)
+    with Still(simulation, tmp_path / "end.png", plain) as end:
         simulation.run([end.observe])
     assert missing_parts(layout, iio.imread(tmp_path / "end.png")) == ["part2"]
 
@@ -241,7 +244,7 @@ def test_an_invisible_part_would_be_noticed(taken, layout, tmp_path: Path) -> No
 @pytest.mark.parametrize("camera", ["overview", "top"])
 def test_the_factory_fills_pictures_of_any_shape(layout, tmp_path: Path, size, camera) -> None:
     simulation = Simulation(layout, "mujoco", 1)
-    still(simulation, tmp_path / "a.png", size, camera, caption=False)
+    Still(simulation, tmp_path / "a.png", Picture(size, camera, caption=False)).close()
     picture = iio.imread(tmp_path / "a.png").astype(int)
     floor = np.median(picture.reshape(-1, 3), axis=0)
     rows, columns = np.nonzero(np.abs(picture - floor).sum(axis=-1) > 90)
@@ -259,17 +262,17 @@ def test_a_fitted_view_has_all_points_in_the_frame_and_one_at_its_edge(
     points, aspect, azimuth, elevation
 ) -> None:
     points = points + np.eye(12, 3)
-    frame = Frame(aspect, below=0.1)
-    view = fit(points, towards(azimuth, elevation), frame)
+    framing = Framing(aspect, below=0.1)
+    view = fit(points, towards(azimuth, elevation), framing)
     right, up, ahead = view.axes @ (points - view.position).T
     assert (ahead > 0).all()
     x, y = right / ahead / view.tall, up / ahead / view.tall
-    side = aspect - 2 * frame.beside
+    side = aspect - 2 * framing.beside
     edges = [
         side - x.max(),
         x.min() + side,
-        1 - 2 * frame.above - y.max(),
-        y.min() + 1 - 2 * frame.below,
+        1 - 2 * framing.above - y.max(),
+        y.min() + 1 - 2 * framing.below,
     ]
     assert min(edges) > -1e-6
     assert max(abs(edges[0]), abs(edges[1])) < 1e-6 or max(abs(edges[2]), abs(edges[3])) < 1e-6
@@ -278,8 +281,8 @@ def test_a_fitted_view_has_all_points_in_the_frame_and_one_at_its_edge(
 @pytest.mark.parametrize("look", [overview, from_above])
 def test_a_long_factory_is_not_looked_at_from_further_than_a_short_side_asks(look) -> None:
     long = np.array([(x, y, z) for x in (-3, 3) for y in (-0.5, 0.5) for z in (0, 0.2)], float)
-    upright = look(long, Frame(9 / 16))
-    turned = look(long[:, [1, 0, 2]], Frame(9 / 16))
+    upright = look(long, Framing(9 / 16))
+    turned = look(long[:, [1, 0, 2]], Framing(9 / 16))
     assert upright.distance < 1.5 * turned.distance
 
 

@@ -15,21 +15,21 @@ from factory.pipeline import all_templates
 from factory.record.log import Log, LogWriter, read_log
 from factory.record.monitor.record import recorded_subject
 from factory.record.monitor.subject import subject_of_run
-from factory.render import Film, camera_named, panels_named, render_log
-from factory.render.area import PANELS, shared
-from factory.render.camera import Frame, orbit
-from factory.render.camerawork import Moment, Take
+from factory.render import Film, Picture, camera_named, panels_named, render_log
+from factory.render.camera import Framing, orbit
+from factory.render.camerawork import Moment
+from factory.render.caption import FADES, SHOWN, draw_title, strength
 from factory.render.colours import GROUND, operation_colours, robot_colours
 from factory.render.following import Followed
 from factory.render.gantt_panel import GanttPanel
-from factory.render.history import History, Progress, depths, followed
+from factory.render.history import History, OperationProgress, depths, followed
 from factory.render.ink import Ink, fitted, width
 from factory.render.net_panel import NetPanel
-from factory.render.poster import Poster
-from factory.render.replay import moment_of
+from factory.render.picture import PANELS, shared
+from factory.render.reel import Poster
+from factory.render.replay import moment_of, take_of
 from factory.render.rows import NEIGHBOURS, Rows, neighbourhood
 from factory.render.subject import Snapshot
-from factory.render.title import FADES, SHOWN, draw_title, strength
 from factory.simulation.simulation import Simulation
 from factory.support.errors import InputError
 from tests.command_line import PAPER, Terminal, files_in
@@ -57,6 +57,14 @@ def told(log: Log) -> History:
     history = History(recorded_subject(log.header))
     history.catch_up(list(zip(log.fired_t.tolist(), log.fired.tolist(), strict=True)), np.inf)
     return history
+
+
+def marking(history: History, time: float) -> frozenset[int]:
+    """The marked places at a time."""
+    return frozenset(
+        gear.places[history.at(robot, time).step]
+        for robot, gear in enumerate(history.factory.net.gears)
+    )
 
 
 @pytest.fixture(scope="module")
@@ -87,7 +95,7 @@ def test_tokens_are_where_the_log_has_its_marking(seed: int, tmp_path: Path) -> 
     for row in range(0, len(log), max(1, len(log) // 40)):
         time = float(log.time[row])
         marked = set(log.marking[row].tolist())
-        assert history.marking(time) == marked
+        assert marking(history, time) == marked
         active = dict(panel._active(time, log.qpos[row]))
         places = {
             gear.places[int(panel.target(robot, time, active)) % len(gear.places)]
@@ -102,13 +110,13 @@ def test_a_firing_left_out_would_be_noticed(paper: Log) -> None:
     history = History(recorded_subject(paper.header))
     firings = list(zip(paper.fired_t.tolist(), paper.fired.tolist(), strict=True))
     history.catch_up(firings[:5] + firings[6:], np.inf)
-    shown = [history.marking(t) for t in paper.time[1:].tolist()]
+    shown = [marking(history, t) for t in paper.time[1:].tolist()]
     assert shown != [frozenset(paper.marking[row].tolist()) for row in range(1, len(paper))]
 
 
 def test_operations_go_on_and_reach_their_end(paper: Log) -> None:
     history = told(paper)
-    progress = Progress(history.subject)
+    progress = OperationProgress(history.subject)
     slides = [0, 1, 2, 3, 4, 5]
     weld = history.factory.by_label["sub2"]
     spell = next(s for s in history.spells[2] if s.operation and s.step // 2 == 1)
@@ -255,8 +263,7 @@ def test_a_part_is_followed_from_its_feeder_to_the_dropoff(fuse: bool) -> None:
 
 def test_orbit_has_everything_in_the_frame_all_the_way_round() -> None:
     points = np.random.default_rng(3).uniform((-3, -1, 0), (3, 1, 0.4), (60, 3))
-    frame = Frame(16 / 9, below=0.08)
-    look = orbit(points, frame)
+    look = orbit(points, Framing(16 / 9, below=0.08))
     distances, edges = [], []
     for time in range(0, 46, 5):
         view = look(float(time))
@@ -333,17 +340,13 @@ def test_ink_is_where_it_is_put_to_a_fraction_of_a_pixel() -> None:
 
 
 def test_the_poster_is_when_the_product_has_become_whole_and_most_is_there(paper: Log) -> None:
-    subject = recorded_subject(paper.header)
-    history = History(subject)
-    from factory.render.replay import _model
-
-    take = Take(_model(paper), "paper", 3, SIZE, "overview", True, subject)
-    poster = Poster(take, history, Path("poster.png"))
+    take = take_of(paper, Picture(SIZE))
+    poster = Poster(take, Path("poster.png"))
     firings = list(zip(paper.fired_t.tolist(), paper.fired.tolist(), strict=True))
     for row in range(len(paper)):
-        history.catch_up(firings, float(paper.time[row]))
+        take.history.catch_up(firings, float(paper.time[row]))
         poster.see(moment_of(paper, row))
-    root = subject.factory.by_label["sub3"]
+    root = take.subject.factory.by_label["sub3"]
     ends = [t for t, event in firings if event == root.end]
     assert isinstance(poster.moment, Moment)
     assert min(abs(poster.moment.time - t) for t in ends) < 0.02 and len(ends) == 3
@@ -356,19 +359,18 @@ def test_the_poster_is_when_the_product_has_become_whole_and_most_is_there(paper
 @needs_gl
 def test_a_film_with_everything(tmp_path: Path) -> None:
     simulation, size = Simulation(laid_out("paper"), "mujoco", 1), (560, 490)
+    picture = Picture(size, "part:part2", True, PANELS, "Title")
     log, film = tmp_path / "run.log", tmp_path / "run.mp4"
     with (
         LogWriter(log, simulation) as writer,
-        Film(
-            simulation, film, size, 2, "part:part2", True, PANELS, "Title", tmp_path / "p.png"
-        ) as filming,
+        Film(simulation, film, picture, 2, tmp_path / "p.png") as filming,
     ):
         run = simulation.run([writer.observe, filming.observe])
     frames = iio.imread(film, plugin="pyav").astype(int)
     assert frames.shape == (int(run.sim_time_s * 2 + 1e-6) + 1, 490, 560, 3)
     assert iio.imread(tmp_path / "p.png").shape == (490, 560, 3)
     again = tmp_path / "again.mp4"
-    render_log(read_log(log), again, size, 2, "part:part2", panels=PANELS, title="Title")
+    render_log(read_log(log), again, picture, 2)
     assert np.abs(frames - iio.imread(again, plugin="pyav")).max() <= 2
     panels = shared(size, PANELS)[1]
     for area in panels.values():

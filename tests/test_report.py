@@ -18,8 +18,8 @@ from factory.problem.pag import PAG, Assembly
 from factory.record.log import LogWriter, read_log
 from factory.record.log.blocks import LENGTH, MAGIC
 from factory.show.report import page, recording_of
+from factory.show.report.drawings import floor_plan
 from factory.show.report.fidelity import fidelity
-from factory.show.report.floor import floor_plan
 from factory.show.report.links import labels_of, links
 from factory.show.report.measured import measured
 from factory.show.report.packing import json_inside

@@ -106,10 +106,10 @@ def test_a_film_changes_nothing(here: str, tmp_path: Path) -> None:
         probe()
     except MissingError:
         pytest.skip("no GL here")
-    from factory.render import Film
+    from factory.render import Film, Picture
 
     made = simulated()
-    with Film(made, tmp_path / "f.mp4", (64, 48), 2.0) as film:
+    with Film(made, tmp_path / "f.mp4", Picture((64, 48)), 2.0) as film:
         assert digest(made, [film.observe]) == here
 
 

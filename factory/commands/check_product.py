@@ -75,7 +75,7 @@ class Checked:
         """The files that `check --clashes` writes, one for each blocked operation."""
         if self.matings is None or self.product is None:
             return {}
-        from factory.commands.clashes import pictures
+        from factory.export.clash_picture import pictures
 
         return pictures(folder, self.matings, self.product)
 

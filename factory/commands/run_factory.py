@@ -23,7 +23,7 @@ from factory.support.settings import Settings
 
 if TYPE_CHECKING:
     from factory.record.monitor import Report
-    from factory.render import PanelName
+    from factory.render import Picture
 
 Size = tuple[int, int]
 
@@ -108,7 +108,7 @@ def run_file(
             from factory.render import Film
 
             assert shown is not None
-            film = Film(made, video, size or SIZE, options["fps"], **shown.options)
+            film = Film(made, video, shown.picture, options["fps"], shown.poster)
             observers.append(stack.enter_context(film).observe)
         glances.append(stack.enter_context(Progress(made.units, quiet)).observe)
         record = made.run(observers, options.get("max_time"), glances)
@@ -158,14 +158,14 @@ def render_file(
     probe()
     if is_log(file):
         log = read_log(file)
-        frames = render_log(log, output, size, options["fps"], at=moment, **shown.options)
+        frames = render_log(log, output, shown.picture, options["fps"], moment, shown.poster)
         return _picture(output, frames, size, options["fps"], is_still)
     made = prepare()
     with ExitStack() as stack:
         picture: Any = (
-            Still(made, output, size, at=moment, **shown.still)
+            Still(made, output, shown.picture, moment)
             if is_still
-            else Film(made, output, size, options["fps"], **shown.options)
+            else Film(made, output, shown.picture, options["fps"], shown.poster)
         )
         observers = [
             stack.enter_context(Interruption()).observe,
@@ -179,35 +179,23 @@ def render_file(
 
 @dataclass(frozen=True, slots=True)
 class Shown:
-    """What a picture shows, as the command line asks for it: the camera, the `panels` beside it, a
-    `title`, and where a `poster` goes."""
+    """What a film or a still shows, as the command line asks for it, and where a `poster` goes."""
 
-    camera: str
-    panels: tuple[PanelName, ...] = ()
-    title: str = ""
+    picture: Picture
     poster: Path | None = None
 
     @classmethod
     def of(cls, options: dict[str, Any], size: Size, parts: list[str] | None = None) -> Shown:
         """Raises InputError (BadValue) for names that don't exist, or a size with no room."""
-        from factory.render import camera_named, check_output, panels_named
-        from factory.render.area import shared
+        from factory.render import Picture, camera_named, check_output, panels_named
+        from factory.render.picture import shared
 
         camera, panels = camera_named(options["camera"], parts), panels_named(options["panels"])
         shared(size, panels)
         if options["poster"] is not None:
             check_output(options["poster"], size, still=True)
-        return cls(camera, panels, options["title"], options["poster"])
-
-    @property
-    def still(self) -> dict[str, Any]:
-        """As arguments of a still."""
-        return {"camera": self.camera, "panels": self.panels, "title": self.title}
-
-    @property
-    def options(self) -> dict[str, Any]:
-        """As arguments of a film."""
-        return {**self.still, "poster": self.poster}
+        picture = Picture(size, camera, panels=panels, title=options["title"])
+        return cls(picture, options["poster"])
 
 
 def _moment(at: str) -> float | Literal["end"]:

@@ -5,10 +5,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from factory.export.palette import colour
 from factory.export.subject import Subject
-from factory.export.swimlanes import owners_of
-from factory.export.views import pag_of, view_of
+from factory.export.swimlanes import colour, owners_of
+from factory.export.tree_drawing import pag_of, view_of
 from factory.nets.gears import GearNet
 from factory.nets.marked import MarkedNet, marked
 from factory.problem.pag import PAG

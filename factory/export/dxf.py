@@ -4,17 +4,14 @@ sweeps, feeders, guidepaths, robots, parts, junctions, labels."""
 from __future__ import annotations
 
 import io
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
 
+from factory.export.floor_plan import Flat, flat_shapes, stations
 from factory.export.subject import Subject
-from factory.geometry.solids import Solid
-from factory.layout.dimensions import ARM_WIDTH, CARRIAGE
-from factory.layout.drawing import outline
-from factory.layout.layout import Box, Extent, Layout, Point2
-from factory.layout.sweeps import ALWAYS, PAYLOAD_BODY, piles, regions
-from factory.plant.factory import Factory
+from factory.layout.dimensions import CARRIAGE
+from factory.layout.layout import Box, Layout, Point2
 from factory.support.extras import optional
 
 FORMAT, TAKES = "dxf", "pag"
@@ -23,20 +20,22 @@ VERSION, MILLIMETRES = "R2013", 4
 """Of DXF; the code of the unit in its header."""
 
 LAYERS = {
-    "FLOOR": 8,
-    "OUTFEED": 9,
-    "SWEEPS": 30,
-    "FEEDERS": 40,
-    "GUIDEPATHS": 5,
-    "ROBOTS": 150,
-    "PARTS": 3,
-    "JUNCTIONS": 1,
-    "LABELS": 7,
+    "FLOOR": (8, ("floor",)),
+    "OUTFEED": (9, ("belt",)),
+    "SWEEPS": (30, ("uncoupled",)),
+    "FEEDERS": (40, ("boom", "post")),
+    "GUIDEPATHS": (5, ("path",)),
+    "ROBOTS": (150, ("arm", "dot", "tool")),
+    "PARTS": (3, ("part",)),
+    "JUNCTIONS": (1, ("junction",)),
+    "LABELS": (7, ()),
 }
-"""The layers with their colours (AutoCAD colour index)."""
+"""The layers with their colours (AutoCAD colour index) and the shapes on each."""
 
-LETTER, JUNCTION = 17.0, 8.0
-"""Height of letters, radius of the circle at a junction [mm]."""
+LAYER_OF = {style: layer for layer, (_, styles) in LAYERS.items() for style in styles}
+
+LETTER = 17.0
+"""Height of letters [mm]."""
 
 
 def export(subject: Subject) -> str:
@@ -49,9 +48,15 @@ def write_dxf(layout: Layout) -> str:
     ezdxf = optional("ezdxf", "ezdxf", "DXF", "export")
     with _undated(ezdxf):
         document = ezdxf.new(VERSION, units=MILLIMETRES)
-        for name, colour in LAYERS.items():
+        for name, (colour, _) in LAYERS.items():
             document.layers.add(name, color=colour)
-        _Plan(layout, document.modelspace()).draw()
+        space = document.modelspace()
+        for shape in flat_shapes(layout):
+            if shape.style in LAYER_OF:
+                _shape(space, shape)
+        for words, at in _labels(layout):
+            attributes = {"layer": "LABELS", "insert": _point(at)}
+            space.add_text(words, height=LETTER, dxfattribs=attributes)
         _frame(document, layout.floor)
         for kind in sorted(document.entitydb.dxf_types_in_use()):
             document.classes.add_class(kind)  # which ezdxf would do in an order of its own
@@ -79,86 +84,31 @@ def _frame(document: Any, floor: Box) -> None:
     document.set_modelspace_vport(height=1.1 * max(yhi - ylo, (xhi - xlo) / 1.6), center=middle)
 
 
-class _Plan:
-    """What stands on the floor, drawn in millimetres, x and y as in the layout."""
+def _shape(space: Any, shape: Flat) -> None:
+    """A shape of the floor plan on its layer."""
+    points, attributes = [_point(p) for p in shape.points], {"layer": LAYER_OF[shape.style]}
+    if shape.radius:
+        space.add_circle(points[0], 1e3 * shape.radius, dxfattribs=attributes)
+    elif shape.box:
+        (xlo, ylo), (xhi, yhi) = points
+        corners = (xlo, ylo), (xhi, ylo), (xhi, yhi), (xlo, yhi)
+        space.add_lwpolyline(corners, close=True, dxfattribs=attributes)
+    elif len(points) == 2:
+        space.add_line(*points, dxfattribs=attributes)
+    else:
+        space.add_lwpolyline(points, close=True, dxfattribs=attributes)
 
-    def __init__(self, layout: Layout, space: Any) -> None:
-        self.layout, self.space = layout, space
-        self.factory: Factory = layout.factory
 
-    def draw(self) -> None:
-        """Everything."""
-        self._box(self.layout.floor, "FLOOR")
-        self._box(self.layout.outfeed, "OUTFEED")
-        self._sweeps()
-        for leaf in self.factory.leaves:
-            self._feeder(leaf.label, leaf.carrier, leaf.index, leaf.template.carrier - 1)
-        for robot in self.factory.robots:
-            self._robot(robot.index, robot.name)
-        self._junctions()
-
-    def _sweeps(self) -> None:
-        """Where a payload may be in any mode."""
-        swept = regions(self.layout, piles(self.factory, self.layout.product))
-        found = (r.box for r in swept if r.kind == PAYLOAD_BODY and r.mode == ALWAYS)
-        for box in dict.fromkeys(found):
-            self._box(box, "SWEEPS")
-
-    def _feeder(self, label: str, robot: int, operation: int, slot: int) -> None:
-        feeder, path = self.layout.feeder(label), self.layout.guidepaths[robot]
-        self._box(feeder.post, "FEEDERS")
-        self._box(feeder.boom, "FEEDERS")
-        self._solid(
-            self.layout.product.solids[label], path.middle(self.layout.goal(operation, slot))
-        )
-        xlo, _, _, yhi = feeder.post
-        self._text(label, (xlo, yhi + 0.005))
-
-    def _solid(self, solid: Solid, at: Point2) -> None:
-        """The outline of a part for a product whose middle is at a point."""
-        x, y = (at[k] - float(self.layout.product.middle[k]) for k in (0, 1))
-        if solid.kind == "sphere":
-            middle = float(solid.position[0]) + x, float(solid.position[1]) + y
-            self._circle(middle, 1e3 * solid.size[0], "PARTS")
-        else:
-            self._loop([(px + x, py + y) for px, py in outline(solid)], "PARTS")
-
-    def _robot(self, index: int, name: str) -> None:
-        path, half = self.layout.guidepaths[index], CARRIAGE / 2
-        foot = path.carriage(path.length)
-        ends = _point(foot), _point(path.carriage(path.reach))
-        self.space.add_line(*ends, dxfattribs={"layer": "GUIDEPATHS"})
-        self._box(path.world((-half, half, -half, half), foot), "ROBOTS")
-        arm: Extent = (0.0, path.reach - path.arm, -ARM_WIDTH / 2, ARM_WIDTH / 2)
-        self._box(path.world(arm, foot), "ROBOTS")
-        self._text(name, (foot[0] - half + 0.003, foot[1] + 0.3 * half))
-
-    def _junctions(self) -> None:
-        """Where robots meet, and for which operations."""
-        found: dict[Point2, list[str]] = {}
-        for operation in self.factory.operations:
-            if len(operation.robots) > 1:
-                path = self.layout.guidepaths[operation.carrier]
-                at = path.middle(path.length - self.layout.stations[operation.index])
-                found.setdefault((round(at[0], 6), round(at[1], 6)), []).append(operation.label)
-        for at, labels in found.items():
-            self._circle(at, JUNCTION, "JUNCTIONS")
-            self._text(", ".join(reversed(labels)), (at[0] + 0.01, at[1] + 0.01))
-
-    def _box(self, box: Box, layer: str) -> None:
-        xlo, xhi, ylo, yhi = box
-        self._loop([(xlo, ylo), (xhi, ylo), (xhi, yhi), (xlo, yhi)], layer)
-
-    def _loop(self, corners: Sequence[Point2], layer: str) -> None:
-        points = [_point(corner) for corner in corners]
-        self.space.add_lwpolyline(points, close=True, dxfattribs={"layer": layer})
-
-    def _circle(self, middle: Point2, radius: float, layer: str) -> None:
-        self.space.add_circle(_point(middle), radius, dxfattribs={"layer": layer})
-
-    def _text(self, words: str, at: Point2) -> None:
-        attributes = {"layer": "LABELS", "insert": _point(at)}
-        self.space.add_text(words, height=LETTER, dxfattribs=attributes)
+def _labels(layout: Layout) -> Iterator[tuple[str, Point2]]:
+    """Parts at their feeders, robots on their carriages, operations where robots meet."""
+    for leaf in layout.factory.leaves:
+        xlo, _, _, yhi = layout.feeder(leaf.label).post
+        yield leaf.label, (xlo, yhi + 0.005)
+    for robot, path in zip(layout.factory.robots, layout.guidepaths, strict=True):
+        x, y = path.carriage(path.length)
+        yield robot.name, (x - CARRIAGE / 2 + 0.003, y + 0.15 * CARRIAGE)
+    for (x, y), labels in stations(layout).items():
+        yield ", ".join(labels), (x + 0.01, y + 0.01)
 
 
 def _point(at: Point2) -> Point2:

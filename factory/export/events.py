@@ -15,7 +15,7 @@ from factory.support.errors import InputError
 
 
 @dataclass(frozen=True, slots=True)
-class Row:
+class EventRow:
     """A transition that fired: at `time_s` [s]; `kind` is start or end; `operation` the label it
     makes; `unit` how often it has fired by then; `robots` those of the operation."""
 
@@ -32,7 +32,7 @@ class Row:
     column: int
 
 
-COLUMNS = tuple(Row.__dataclass_fields__)
+COLUMNS = tuple(EventRow.__dataclass_fields__)
 """The names of the columns."""
 
 
@@ -46,14 +46,14 @@ def compiled(subject: Subject) -> Factory:
         raise InputError(bad_log(subject.file, words)) from error
 
 
-def rows(log: Log, factory: Factory) -> Iterator[Row]:
+def rows(log: Log, factory: Factory) -> Iterator[EventRow]:
     """The events in the order in which they were recorded."""
     units: Counter[int] = Counter()
     for time, number in zip(log.fired_t.tolist(), log.fired.tolist(), strict=True):
         units[number] += 1
         operation = factory.operations[number // 2]
         at = operation.position
-        yield Row(
+        yield EventRow(
             round(time, 9),
             factory.net.threaded.transitions[number].name,
             "end" if number % 2 else "start",

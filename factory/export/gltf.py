@@ -4,9 +4,6 @@ the ending of the file; into a folder, a .glb for every label."""
 
 from __future__ import annotations
 
-import base64
-import json
-import struct
 from collections.abc import Mapping
 from typing import Any
 
@@ -31,14 +28,16 @@ WORLD, PRODUCT = "/world", "/product"
 def export(subject: Subject) -> bytes | Mapping[str, bytes]:
     """The file, or those of a folder."""
     pag, product = subject.source.pag, subject.product
-    made = {name: write_glb(pag, product, label) for label, name in wanted(subject, ".glb")}
-    if subject.whole:
-        return made
-    return made[""] if subject.name.lower().endswith(".glb") else as_gltf(made[""])
+    binary = subject.whole or subject.name.lower().endswith(".glb")
+    made = {
+        name: write_gltf(pag, product, label, binary) for label, name in wanted(subject, ".glb")
+    }
+    return made if subject.whole else made[""]
 
 
-def write_glb(pag: PAG, product: Product, label: str) -> bytes:
-    """A sub-assembly as a binary glTF; parts of equal shape and colour share a mesh."""
+def write_gltf(pag: PAG, product: Product, label: str, binary: bool) -> bytes:
+    """A sub-assembly as a glTF, binary or as JSON with its buffer inside (section 4.4); parts of
+    equal shape and colour share a mesh."""
     import trimesh
 
     scene = trimesh.Scene(base_frame=WORLD)
@@ -58,8 +57,11 @@ def write_glb(pag: PAG, product: Product, label: str) -> bytes:
             shared[key] = f"mesh{len(shared)}"
             scene.geometry[shared[key]] = _shaded(solid)
         scene.graph.update(name, parent, matrix=_pose(solid), geometry=shared[key])
-    made = trimesh.exchange.gltf.export_glb(scene, include_normals=True)
-    return bytes(made)
+    gltf = trimesh.exchange.gltf
+    if binary:
+        return bytes(gltf.export_glb(scene, include_normals=True))
+    inside = {"merge_buffers": True, "embed_buffers": True}
+    return bytes(gltf.export_gltf(scene, include_normals=True, **inside)["model.gltf"])
 
 
 def _pose(solid: Solid) -> Array:
@@ -94,16 +96,3 @@ def _unwelded(mesh: Mesh) -> tuple[Array, Indices, Array]:
     ).reshape(-1, 6)
     found, index = np.unique(corners, axis=0, return_inverse=True)
     return found[:, :3], index.reshape(-1, 3).astype(np.int64), found[:, 3:]
-
-
-def as_gltf(glb: bytes) -> bytes:
-    """A binary glTF as the JSON form with its buffer inside (glTF 2.0, section 4.4)."""
-    (length,) = struct.unpack_from("<I", glb, 12)
-    document = json.loads(glb[20 : 20 + length])
-    (size,) = struct.unpack_from("<I", glb, 20 + length)
-    content = glb[28 + length : 28 + length + size]
-    data = base64.b64encode(content).decode()
-    document["buffers"] = [
-        {"byteLength": size, "uri": f"data:application/octet-stream;base64,{data}"}
-    ]
-    return (json.dumps(document, indent=1) + "\n").encode()

@@ -7,14 +7,13 @@ Frames and joints are named as the links and joints of the URDF, and have the sa
 from __future__ import annotations
 
 import io
-from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from factory.control.mode import Truth
-from factory.export.events import Row, compiled, rows
-from factory.export.motion import Motion, motion_of
+from factory.export.events import EventRow, compiled, rows
+from factory.export.motion import BodyMotion, motion_of
 from factory.export.subject import Subject
 from factory.geometry.meshes import Array
 from factory.record.log import Log
@@ -24,9 +23,6 @@ if TYPE_CHECKING:
     from factory.support.engine import mujoco
 
 FORMAT, TAKES, BINARY = "mcap", "log", True
-
-DRAWN = 3
-"""Geoms of groups below this one are drawn."""
 
 
 def export(subject: Subject) -> bytes:
@@ -45,7 +41,7 @@ def export(subject: Subject) -> bytes:
 class _Recorder:
     """Writes a motion and events to the channels of a context, in the order of time."""
 
-    def __init__(self, context: Any, motion: Motion, log: Log) -> None:
+    def __init__(self, context: Any, motion: BodyMotion, log: Log) -> None:
         self.channels = optional("foxglove.channels", "foxglove-sdk", "MCAP", "export")
         self.schemas = optional("foxglove.messages", "foxglove-sdk", "MCAP", "export")
         self.motion, self.log = motion, log
@@ -55,7 +51,7 @@ class _Recorder:
         self.joints = self.channels.JointStatesChannel("/joints", context=context)
         self.events = self.channels.LogChannel("/events", context=context)
 
-    def record(self, events: list[Row]) -> None:
+    def record(self, events: list[EventRow]) -> None:
         """Everything."""
         parked, coming = self.motion.parked(), iter([*events, None])
         event = next(coming)
@@ -124,7 +120,7 @@ class _Recorder:
         message = self.schemas.JointStates(timestamp=self._stamp(time), joints=found)
         self.joints.log(message, log_time=_nanoseconds(time))
 
-    def _event(self, event: Row) -> None:
+    def _event(self, event: EventRow) -> None:
         what = f"{event.template}({event.operation}) {event.kind}, unit {event.unit}"
         message = self.schemas.Log(
             timestamp=self._stamp(event.time_s),
@@ -149,49 +145,40 @@ class Looks:
 
     def of(self, body: int) -> dict[str, list[Any]]:
         """The primitives of a body by the field of the entity that they belong to."""
+        from factory.mjcf.replica import half_sizes, paint, shown
         from factory.support.engine import mujoco
 
         found: dict[str, list[Any]] = {"cubes": [], "cylinders": [], "spheres": [], "triangles": []}
-        for geom in self._drawn(body):
-            kind = mujoco.mjtGeom(self.m.geom_type[geom])
-            size, pose = self.m.geom_size[geom], {"pose": self._pose(geom)}
-            paint = {"color": self._colour(geom)}
+        for geom in shown(self.m, body):
+            red, green, blue, alpha = (round(float(c), 4) for c in paint(self.m, geom))
+            look = {
+                "pose": self._pose(geom),
+                "color": self.schemas.Color(r=red, g=green, b=blue, a=alpha),
+            }
+            kind, size = mujoco.mjtGeom(self.m.geom_type[geom]), self.m.geom_size[geom]
             if kind == mujoco.mjtGeom.mjGEOM_MESH:
-                found["triangles"].append(self._triangles(geom, pose, paint))
+                found["triangles"].append(self._triangles(geom, look))
             elif kind == mujoco.mjtGeom.mjGEOM_SPHERE:
                 ball = self._vector(size[[0, 0, 0]])
-                found["spheres"].append(self.schemas.SpherePrimitive(size=ball, **pose, **paint))
+                found["spheres"].append(self.schemas.SpherePrimitive(size=ball, **look))
             elif kind == mujoco.mjtGeom.mjGEOM_CYLINDER:
-                whole = {
-                    "size": self._vector(size[[0, 0, 1]]),
-                    "bottom_scale": 1.0,
-                    "top_scale": 1.0,
-                }
-                found["cylinders"].append(self.schemas.CylinderPrimitive(**whole, **pose, **paint))
+                ends = {"bottom_scale": 1.0, "top_scale": 1.0}
+                whole = self._vector(size[[0, 0, 1]])
+                found["cylinders"].append(
+                    self.schemas.CylinderPrimitive(size=whole, **ends, **look)
+                )
             else:
-                half = size if kind == mujoco.mjtGeom.mjGEOM_BOX else self.m.geom_aabb[geom, 3:]
-                cube = self._vector(half)
-                found["cubes"].append(self.schemas.CubePrimitive(size=cube, **pose, **paint))
+                cube = self._vector(half_sizes(self.m, geom))
+                found["cubes"].append(self.schemas.CubePrimitive(size=cube, **look))
         return found
 
-    def _drawn(self, body: int) -> Iterator[int]:
-        from factory.support.engine import mujoco
+    def _triangles(self, geom: int, look: dict[str, Any]) -> Any:
+        from factory.mjcf.replica import mesh_of
 
-        first = int(self.m.body_geomadr[body])
-        for geom in range(first, first + int(self.m.body_geomnum[body])):
-            plane = self.m.geom_type[geom] == mujoco.mjtGeom.mjGEOM_PLANE
-            if self.m.geom_group[geom] < DRAWN and not plane:
-                yield geom
-
-    def _triangles(self, geom: int, pose: dict[str, Any], paint: dict[str, Any]) -> Any:
-        m, mesh = self.m, self.m.geom_dataid[geom]
-        first, count = m.mesh_vertadr[mesh], m.mesh_vertnum[mesh]
-        points = [
-            self.schemas.Point3(x=x, y=y, z=z) for x, y, z in m.mesh_vert[first:][:count].tolist()
-        ]
-        first, count = m.mesh_faceadr[mesh], m.mesh_facenum[mesh]
-        indices = m.mesh_face[first : first + count].ravel().tolist()
-        return self.schemas.TriangleListPrimitive(points=points, indices=indices, **pose, **paint)
+        vertices, faces = mesh_of(self.m, geom)
+        points = [self.schemas.Point3(x=x, y=y, z=z) for x, y, z in vertices.tolist()]
+        indices = faces.ravel().tolist()
+        return self.schemas.TriangleListPrimitive(points=points, indices=indices, **look)
 
     def _pose(self, geom: int) -> Any:
         x, y, z = self.m.geom_pos[geom].tolist()
@@ -200,12 +187,6 @@ class Looks:
             position=self.schemas.Vector3(x=x, y=y, z=z),
             orientation=self.schemas.Quaternion(x=i, y=j, z=k, w=w),
         )
-
-    def _colour(self, geom: int) -> Any:
-        paint = self.m.geom_matid[geom]
-        rgba = self.m.mat_rgba[paint] if paint >= 0 else self.m.geom_rgba[geom]
-        red, green, blue, alpha = (round(float(c), 4) for c in rgba)
-        return self.schemas.Color(r=red, g=green, b=blue, a=alpha)
 
     def _vector(self, half: Array) -> Any:
         """Full lengths from half lengths."""

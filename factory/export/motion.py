@@ -26,7 +26,7 @@ STILL = 1e-6
 
 
 @dataclass(frozen=True)
-class Motion:
+class BodyMotion:
     """A log's motion: `rows` of the log that are frames; for each its bodies' positions (n, bodies,
     3) [m] and quaternions (n, bodies, 4), each relative to its parent."""
 
@@ -59,10 +59,10 @@ class Motion:
         return np.asarray(self.position[:, :, 2] < HIDDEN)
 
 
-def motion_of(subject: Subject) -> Motion:
+def motion_of(subject: Subject) -> BodyMotion:
     """The motion of a log. Raises InputError for a log of the ideal world or one without a tick."""
+    from factory.mjcf.replica import Replica
     from factory.record.log.model import model_of
-    from factory.support.engine import mujoco
 
     log = subject.log
     if not log.xml:
@@ -72,17 +72,17 @@ def motion_of(subject: Subject) -> Motion:
     if not len(log):
         raise InputError(Diagnostic("BadLog", "the log has no tick", None, "run for longer"))
     m = model_of(log)
-    d, rows = mujoco.MjData(m), _frames(log)
+    replica, rows = Replica(m), _frames(log)
+    d = replica.d
     position = np.empty((len(rows), m.nbody, 3))
     quaternion = np.empty((len(rows), m.nbody, 4))
     for frame, row in enumerate(rows):
-        d.qpos[:] = log.qpos[row]
-        mujoco.mj_kinematics(m, d)
+        replica.place(log.qpos[row])
         position[frame], quaternion[frame] = d.xpos, d.xquat
         for body in np.flatnonzero(m.body_parentid):
             place = position[frame, body], quaternion[frame, body]
             _relative(d, int(m.body_parentid[body]), int(body), *place)
-    return Motion(m, rows, position, quaternion)
+    return BodyMotion(m, rows, position, quaternion)
 
 
 def _relative(d: mujoco.MjData, parent: int, body: int, position: Array, turn: Array) -> None:

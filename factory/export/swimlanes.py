@@ -1,4 +1,5 @@
-"""Where the nodes of a net are drawn: a lane for each robot's gear, time from left to right.
+"""Where the nodes of a net are drawn, and in which colour: a lane for each robot's gear, time from
+left to right.
 
 A transition is a bar across the lanes of its robots; a place lies in the lane of its robot, that of
 an operation in the middle one of its robots. The columns are the lengths of the longest paths
@@ -11,8 +12,16 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from factory.layout.layout import Point2
 from factory.nets.marked import MarkedNet, token_free
+from factory.support.canvas import Point
+
+COLOURS = (
+    "#0072b2", "#d55e00", "#009e73", "#cc79a7", "#8c6d00", "#56b4e9", "#7f3c8d", "#e73f74",
+)  # fmt: skip
+"""Of gears, which the colour-blind can tell apart (Okabe and Ito)."""
+
+SHARED = "#333333"
+"""The colour of what belongs to several robots, or to none."""
 
 PITCH, LANE = 120.0, 64.0
 """Distance of columns, and of lanes."""
@@ -29,19 +38,19 @@ class Swimlanes:
     """Coordinates on a page, y downwards: the middle of each place, the `x` of each transition and
     from where to where its bar goes (`spans`), the `lanes` of the gears, the size of the page."""
 
-    places: tuple[Point2, ...]
+    places: tuple[Point, ...]
     x: tuple[float, ...]
-    spans: tuple[Point2, ...]
+    spans: tuple[Point, ...]
     lanes: tuple[float, ...]
     width: float
     height: float
 
-    def middle(self, event: int) -> Point2:
+    def middle(self, event: int) -> Point:
         """The middle of a transition's bar."""
         low, high = self.spans[event]
         return self.x[event], (low + high) / 2
 
-    def touch(self, event: int, y: float) -> Point2:
+    def touch(self, event: int, y: float) -> Point:
         """The point of a transition's bar that is nearest to a height."""
         low, high = self.spans[event]
         return self.x[event], min(max(y, low), high)
@@ -49,6 +58,11 @@ class Swimlanes:
     def forward(self, place: int, before: int) -> bool:
         """Whether a place is to the right of a transition that marks it."""
         return self.x[before] < self.places[place][0]
+
+
+def colour(owners: Sequence[int]) -> str:
+    """The colour of what belongs to these gears (indices)."""
+    return COLOURS[owners[0] % len(COLOURS)] if len(owners) == 1 else SHARED
 
 
 def owners_of(net: MarkedNet) -> list[list[int]]:
@@ -120,7 +134,7 @@ def _lane_order(net: MarkedNet, owners: Sequence[Sequence[int]], x: Sequence[flo
 def _heights(
     owners: Sequence[Sequence[int]], across: Sequence[float], lanes: Sequence[float]
 ) -> list[float]:
-    """The height of each place: its lane, else a row below with nobody in that column."""
+    """The height of each place: its lane, else a row below that is free in that column."""
     below = max(lanes, default=TOP - LANE) + LANE
     taken: dict[float, int] = {}
     found = []
@@ -139,7 +153,7 @@ def _spans(
     owners: Sequence[Sequence[int]],
     down: Sequence[float],
     lanes: Sequence[float],
-) -> list[Point2]:
+) -> list[Point]:
     """From where to where each transition's bar goes."""
     rows: list[list[float]] = [[] for _ in net.net.transitions]
     for number, gear in enumerate(net.gears):

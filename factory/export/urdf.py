@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
 from math import atan2, hypot
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
 
@@ -28,9 +28,6 @@ if TYPE_CHECKING:
     from factory.support.engine import mujoco
 
 FORMAT, TAKES = "urdf", "pag"
-
-DRAWN = 3
-"""Geoms of groups below this one are drawn."""
 
 
 def export(subject: Subject) -> str | Mapping[str, bytes]:
@@ -73,9 +70,10 @@ class _Writer:
         return '<?xml version="1.0"?>\n' + ElementTree.tostring(root, encoding="unicode") + "\n"
 
     def _link(self, root: Element, body: int) -> None:
+        from factory.mjcf.replica import paint, shown
         from factory.support.engine import mujoco
 
-        m = self.m
+        m, seen = self.m, set(shown(self.m, body))
         link = add(root, "link", name=m.body(body).name)
         if m.body_jntnum[body]:
             self._inertial(link, body)
@@ -83,9 +81,12 @@ class _Writer:
         for geom in range(first, first + m.body_geomnum[body]):
             if m.geom_type[geom] == mujoco.mjtGeom.mjGEOM_PLANE:
                 continue  # the floor has no end, and URDF no word for that
-            if m.geom_group[geom] < DRAWN:
+            if geom in seen:
                 for offset, shape in self._shapes(geom, False):
-                    self._paint(self._shape(link, "visual", geom, offset, shape), geom)
+                    visual = self._shape(link, "visual", geom, offset, shape)
+                    material = add(visual, "material", name=f"geom{geom}")
+                    rgba = (round(float(c), 4) for c in paint(m, geom))
+                    add(material, "color", rgba=numbers(rgba))
             if m.geom_contype[geom] or m.geom_conaffinity[geom]:
                 for offset, shape in self._shapes(geom, True):
                     self._shape(link, "collision", geom, offset, shape)
@@ -110,7 +111,7 @@ class _Writer:
         at, turn = m.body_pos[body], m.body_quat[body]
         if slides:
             axis = m.jnt_axis[joint]
-            at = at - _turned(turn, axis) * m.qpos0[m.jnt_qposadr[joint]]
+            at = at - rotation(turn) @ axis * m.qpos0[m.jnt_qposadr[joint]]
         _origin(element, at, turn)
         add(element, "parent", link=m.body(m.body_parentid[body]).name)
         add(element, "child", link=name)
@@ -123,12 +124,13 @@ class _Writer:
 
     def _shapes(self, geom: int, colliding: bool) -> Iterator[tuple[Array, Element]]:
         """The shapes of a geom, and how far along its axis each is."""
+        from factory.mjcf.replica import half_sizes
         from factory.support.engine import mujoco
 
         m, size, here = self.m, self.m.geom_size[geom], np.zeros(3)
         kind = mujoco.mjtGeom(m.geom_type[geom])
         if kind == mujoco.mjtGeom.mjGEOM_MESH:
-            yield here, self._mesh(int(m.geom_dataid[geom]), colliding)
+            yield here, self._mesh(geom, colliding)
         elif kind == mujoco.mjtGeom.mjGEOM_SPHERE:
             yield here, Element("sphere", {"radius": numbers([size[0]])})
         elif kind in (mujoco.mjtGeom.mjGEOM_CYLINDER, mujoco.mjtGeom.mjGEOM_CAPSULE):
@@ -139,19 +141,17 @@ class _Writer:
                     ball = Element("sphere", {"radius": numbers([size[0]])})
                     yield np.array([0.0, 0.0, end]), ball
         else:
-            half = size if kind == mujoco.mjtGeom.mjGEOM_BOX else m.geom_aabb[geom, 3:]
-            yield here, Element("box", {"size": numbers(2 * half)})
+            yield here, Element("box", {"size": numbers(2 * half_sizes(m, geom))})
 
-    def _mesh(self, mesh: int, colliding: bool) -> Element:
+    def _mesh(self, geom: int, colliding: bool) -> Element:
         """A mesh as a file; of one that collides the hull, as which it does."""
         import trimesh
 
-        m = self.m
-        first, count = m.mesh_vertadr[mesh], m.mesh_vertnum[mesh]
-        vertices = np.asarray(m.mesh_vert[first : first + count], float)
-        first, count = m.mesh_faceadr[mesh], m.mesh_facenum[mesh]
-        faces = np.asarray(m.mesh_face[first : first + count], np.int64)
-        name = f"{m.mesh(mesh).name}{'.hull' if colliding else ''}.stl"
+        from factory.mjcf.replica import mesh_of
+
+        vertices, faces = mesh_of(self.m, geom)
+        name = self.m.mesh(int(self.m.geom_dataid[geom])).name
+        name = f"{name}{'.hull' if colliding else ''}.stl"
         if name not in self.files:
             if colliding:
                 hull = trimesh.convex.convex_hull(vertices)
@@ -159,18 +159,11 @@ class _Writer:
             self.files[name] = stl(Mesh(name, vertices, faces))
         return Element("mesh", {"filename": f"{self.folder}/{name}"})
 
-    def _paint(self, element: Element, geom: int) -> None:
-        m = self.m
-        paint = m.geom_matid[geom]
-        rgba = m.mat_rgba[paint] if paint >= 0 else m.geom_rgba[geom]
-        material = add(element, "material", name=f"geom{geom}")
-        add(material, "color", rgba=numbers(round(float(c), 4) for c in rgba))
-
     def _shape(self, link: Element, tag: str, geom: int, offset: Array, shape: Element) -> Element:
         """A shape of a link, where its geom is and the offset along."""
         turn = self.m.geom_quat[geom]
         element = add(link, tag)
-        _origin(element, self.m.geom_pos[geom] + _turned(turn, offset), turn)
+        _origin(element, self.m.geom_pos[geom] + rotation(turn) @ offset, turn)
         add(element, "geometry").append(shape)
         return element
 
@@ -196,11 +189,3 @@ def roll_pitch_yaw(quaternion: Array) -> tuple[float, float, float]:
     if abs(turn[2, 0]) > 1 - 1e-12:  # only roll and yaw together are determined
         return atan2(-turn[1, 2], turn[1, 1]), pitch, 0.0
     return atan2(turn[2, 1], turn[2, 2]), pitch, atan2(turn[1, 0], turn[0, 0])
-
-
-def _turned(quaternion: Array, vector: Array) -> Array:
-    from factory.support.engine import mujoco
-
-    found: Any = np.zeros(3)
-    mujoco.mju_rotVecQuat(found, np.asarray(vector, float), np.asarray(quaternion, float))
-    return np.asarray(found)

@@ -5,17 +5,14 @@ from __future__ import annotations
 import tempfile
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-from factory.export.motion import Motion, motion_of
+from factory.export.motion import BodyMotion, motion_of
 from factory.export.subject import Subject
 from factory.record.log import Log
 from factory.support.extras import optional
-
-if TYPE_CHECKING:
-    pass
 
 FORMAT, TAKES, BINARY = "usd", "log", True
 
@@ -38,25 +35,26 @@ def export(subject: Subject) -> Mapping[str, bytes]:
     return found
 
 
-def _record(motion: Motion, log: Log, folder: str) -> None:
+def _record(motion: BodyMotion, log: Log, folder: str) -> None:
     """Every frame, by MuJoCo's exporter."""
+    from factory.mjcf.replica import Replica
     from factory.support.engine import mujoco
 
     exporter = optional("mujoco.usd.exporter", "usd-core", "USD", "usd")
-    m, d = motion.m, mujoco.MjData(motion.m)
+    replica = Replica(motion.m)
+    m, d = replica.m, replica.d
     scene = exporter.USDExporter(
         model=m, output_directory=NAME, output_directory_root=folder, verbose=False
     )
     for row in motion.rows:
-        d.qpos[:] = log.qpos[row]
-        mujoco.mj_kinematics(m, d)
+        replica.place(log.qpos[row])
         mujoco.mj_comPos(m, d)
         mujoco.mj_camlight(m, d)
         scene.update_scene(d)
     scene.save_scene("usdc")
 
 
-def _finish(usd: Any, path: Path, motion: Motion, log: Log, textures: str) -> None:
+def _finish(usd: Any, path: Path, motion: BodyMotion, log: Log, textures: str) -> None:
     """Frames as fast as they are in the log; textures beside the file."""
     utilities = optional("pxr.UsdUtils", "usd-core", "USD", "usd")
     stage = usd.Stage.Open(str(path))

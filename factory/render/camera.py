@@ -1,9 +1,7 @@
-"""Where the camera stands: as near as it can with everything that is to be seen still in the
-picture.
+"""Cameras and their views: a view is as near as it can be with a set of points inside the frame.
 
-A view is fitted, not set: for a direction of sight and an aspect ratio the nearest position from
-which a set of points lies inside the frame has a closed form. So the factory fills a picture of any
-shape."""
+For a direction of sight and an aspect ratio that position has a closed form, so the factory fills a
+picture of any shape."""
 
 from __future__ import annotations
 
@@ -34,12 +32,12 @@ TURN = 8.0
 """How fast `orbit` goes round [degrees/s]."""
 
 FIELD = 24.0
-"""Angle of view across the shorter side of the picture [degrees]: narrow, for a calm
+"""Angle of view across the shorter side of the picture [degrees]: narrow, for little
 perspective."""
 
 
 @dataclass(frozen=True, slots=True)
-class Frame:
+class Framing:
     """What of a picture may be used: `aspect` = width / height, and the margins as fractions of
     height."""
 
@@ -98,60 +96,50 @@ def towards(azimuth: float, elevation: float) -> Array:
     return np.array([right, up, ahead])
 
 
-def fit(points: Array, axes: Array, frame: Frame) -> View:
-    """The nearest view along `axes` that has all points (n, 3) in the frame."""
-    tall = tan(radians(FIELD / 2)) / min(1.0, frame.aspect)
-    side = tall * (frame.aspect - 2 * frame.beside)
-    low, high = tall * (1 - 2 * frame.below), tall * (1 - 2 * frame.above)
+def fit(points: Array, axes: Array, framing: Framing) -> View:
+    """The nearest view along `axes` that has all points (n, 3) in the frame.
+
+    The positions (a, c) from which points (r, f) are seen between two rays of tangents s and t are
+    a wedge, -(f - c) s <= r - a <= (f - c) t, that opens backwards from its tip."""
+    tall, side, low, high = _tangents(framing)
     r, u, f = axes @ points.T
-    across, upright = _Wedge(r, f, side, side), _Wedge(u, f, low, high)
-    c = min(across.nearest, upright.nearest)
-    position = axes.T @ np.array([across.middle(c), upright.middle(c), c])
-    middle = float(f.min() + f.max()) / 2
-    return View(position, axes, tall * frame.aspect, tall, middle - c, float(f.max() - f.min()) / 2)
+    wedges = [
+        (float((x - f * t).max()), float((x + f * s).min()), s, t)
+        for x, s, t in ((r, side, side), (u, low, high))
+    ]
+    c = min((right - left) / (s + t) for left, right, s, t in wedges)
+    a, b = ((left + c * t + right - c * s) / 2 for left, right, s, t in wedges)
+    middle, depth = float(f.min() + f.max()) / 2, float(f.max() - f.min()) / 2
+    position = axes.T @ np.array([a, b, c])
+    return View(position, axes, tall * framing.aspect, tall, middle - c, depth)
 
 
-class _Wedge:
-    """The positions (a, c) from which all points (r, f) are seen between two rays of tangents `low`
-    and `high`: -(f - c) low <= r - a <= (f - c) high, a wedge that opens backwards from its tip."""
-
-    def __init__(self, r: Array, f: Array, low: float, high: float) -> None:
-        self.low, self.high = low, high
-        self.left, self.right = float((r - f * high).max()), float((r + f * low).min())
-
-    @property
-    def nearest(self) -> float:
-        """c of the tip."""
-        return (self.right - self.left) / (self.low + self.high)
-
-    def middle(self, c: float) -> float:
-        """a half way between the wedge's sides at c."""
-        return (self.left + c * self.high + self.right - c * self.low) / 2
+def _tangents(framing: Framing) -> tuple[float, float, float, float]:
+    """Tangents of half the angle of view upwards, and of what may be used of it beside, below and
+    above."""
+    tall = tan(radians(FIELD / 2)) / min(1.0, framing.aspect)
+    side = tall * (framing.aspect - 2 * framing.beside)
+    return tall, side, tall * (1 - 2 * framing.below), tall * (1 - 2 * framing.above)
 
 
-def overview(points: Array, frame: Frame) -> View:
+def overview(points: Array, framing: Framing) -> View:
     """From the south, aslant, or from where the factory fills the picture better by a tenth; an
     upright picture may see a long factory lengthwise, and from higher up."""
-    best: View | None = None
-    azimuths = (
-        (-62.0, -118.0, -28.0, -152.0) if frame.aspect >= 1 else (-62.0, -118.0, -8.0, -172.0)
-    )
-    for azimuth in azimuths:
-        view = fit(points, towards(azimuth, 40.0 if frame.aspect >= 1 else 52.0), frame)
-        if best is None or view.distance < 0.9 * best.distance:
+    wide = framing.aspect >= 1
+    azimuths = (-62.0, -118.0, -28.0, -152.0) if wide else (-62.0, -118.0, -8.0, -172.0)
+    best, *others = (fit(points, towards(a, 40.0 if wide else 52.0), framing) for a in azimuths)
+    for view in others:
+        if view.distance < 0.9 * best.distance:
             best = view
-    assert best is not None
     return best
 
 
-def orbit(points: Array, frame: Frame) -> Callable[[float], View]:
+def orbit(points: Array, framing: Framing) -> Callable[[float], View]:
     """The view at each time [s] from a camera that goes round at an even height and distance, the
     nearest from which everything is in the frame all the way."""
-    elevation = 36.0 if frame.aspect >= 1 else 50.0
+    elevation = 36.0 if framing.aspect >= 1 else 50.0
     middle = (points.min(axis=0) + points.max(axis=0)) / 2
-    tall = tan(radians(FIELD / 2)) / min(1.0, frame.aspect)
-    side = tall * (frame.aspect - 2 * frame.beside)
-    low, high = tall * (1 - 2 * frame.below), tall * (1 - 2 * frame.above)
+    tall, side, low, high = _tangents(framing)
     away = 0.0
     for azimuth in range(0, 360, 5):
         r, u, f = towards(azimuth, elevation) @ (points - middle).T
@@ -161,12 +149,12 @@ def orbit(points: Array, frame: Frame) -> Callable[[float], View]:
 
     def view(time: float) -> View:
         axes = towards(-62.0 + TURN * time, elevation)
-        return View(middle - away * axes[2], axes, tall * frame.aspect, tall, away, depth)
+        return View(middle - away * axes[2], axes, tall * framing.aspect, tall, away, depth)
 
     return view
 
 
-def from_above(points: Array, frame: Frame) -> View:
+def from_above(points: Array, framing: Framing) -> View:
     """Straight down, north up, or turned by a quarter where that fills the picture better."""
-    upright, turned = (fit(points, towards(a, 90.0), frame) for a in (-90.0, 180.0))
+    upright, turned = (fit(points, towards(a, 90.0), framing) for a in (-90.0, 180.0))
     return turned if turned.distance < 0.9 * upright.distance else upright

@@ -1,33 +1,21 @@
-"""The line under a picture: the product, the units made, the time."""
+"""The words on a picture: a caption below (product, units made, time), and at the beginning of a
+film a title in the upper left corner, which fades away."""
 
 from __future__ import annotations
-
-from dataclasses import dataclass
 
 import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
-from factory.render.painter import Pixels
+from factory.render.colours import FAINT, FLASH, INK, WHITE
+from factory.render.ink import Ink, Pixels, fitted, width
 
-INK, HALO = (38, 44, 54), (250, 250, 251)
+HALO = (250, 250, 251)
 
 SMALLEST = 100
 """Pictures lower than this many pixels have no caption."""
 
-
-@dataclass(frozen=True, slots=True)
-class Words:
-    """What a caption says."""
-
-    product: str
-    made: int
-    units: int
-    seconds: float
-
-    @property
-    def count(self) -> str:
-        """`2 of 3 units`"""
-        return f"{self.made} of {self.units} unit{'' if self.units == 1 else 's'}"
+SHOWN, FADES = 3.5, 0.7
+"""How long a title is shown, and then fades [s]."""
 
 
 class Caption:
@@ -41,40 +29,57 @@ class Caption:
         self.share = self.strip / height
         self.font = ImageFont.load_default(self.points)
 
-    def draw(self, pixels: Pixels, words: Words) -> Pixels:
-        """The picture with its caption."""
+    def draw(self, pixels: Pixels, product: str, made: int, units: int, time: float) -> Pixels:
+        """The picture with its caption; `made` of the `units` by a time [s]."""
         if not self.strip:
             return pixels
         below = Image.fromarray(pixels[-self.strip :])
-        draw = ImageDraw.Draw(below)
+        draw, halo = ImageDraw.Draw(below), max(1, self.points // 9)
+        count = f"{made} of {units} unit{'' if units == 1 else 's'}"
         edge, middle = round(1.2 * self.points), self.strip // 2
-        time = f"{words.seconds:.1f} s"
-        room = self.width - 2 * edge - draw.textlength(f"{words.count}   000.0 s", self.font)
-        self._write(draw, (edge, middle), _shortened(words.product, draw, self.font, room), "lm")
         right = self.width - edge
-        self._write(draw, (right, middle), time, "rm")
         left = right - round(draw.textlength("0000.0 s", self.font)) - self.points
-        self._write(draw, (left, middle), words.count, "rm")
+        room = self.width - 2 * edge - draw.textlength(f"{count}   000.0 s", self.font)
+        name = self._shortened(product, draw, room)
+        for x, words, anchor in (
+            (edge, name, "lm"),
+            (right, f"{time:.1f} s", "rm"),
+            (left, count, "rm"),
+        ):
+            at = x, middle
+            draw.text(at, words, INK, self.font, anchor, stroke_width=halo, stroke_fill=HALO)
         found = pixels.copy()
         found[-self.strip :] = np.asarray(below)
         return found
 
-    def _write(
-        self, draw: ImageDraw.ImageDraw, at: tuple[int, int], text: str, anchor: str
-    ) -> None:
-        halo = max(1, self.points // 9)
-        draw.text(at, text, INK, self.font, anchor, stroke_width=halo, stroke_fill=HALO)
+    def _shortened(self, text: str, draw: ImageDraw.ImageDraw, room: float) -> str:
+        """The beginning of a text that fits."""
+        if draw.textlength(text, self.font) <= room:
+            return text
+        while text and draw.textlength(f"{text}…", self.font) > room:
+            text = text[:-1]
+        return f"{text}…" if text else ""
 
 
-def _shortened(
-    text: str,
-    draw: ImageDraw.ImageDraw,
-    font: ImageFont.FreeTypeFont | ImageFont.ImageFont,
-    room: float,
-) -> str:
-    """The beginning of a text that fits."""
-    if draw.textlength(text, font) <= room:
-        return text
-    while text and draw.textlength(f"{text}…", font) > room:
-        text = text[:-1]
-    return f"{text}…" if text else ""
+def strength(time: float) -> float:
+    """How much of the title is to be seen at a time."""
+    share = min(max((SHOWN + FADES - time) / FADES, 0.0), 1.0)
+    return share * share * (3 - 2 * share)
+
+
+def draw_title(pixels: Pixels, title: str, detail: str, time: float) -> None:
+    """Put the title on a picture, in place."""
+    alpha = strength(time)
+    height, room = pixels.shape[0], 0.9 * pixels.shape[1]
+    points, small = max(14, round(height / 22)), max(10, round(height / 44))
+    while points > small and width(title, points) > room - 3 * small:
+        points -= 1
+    title = fitted(title, points, room - 3 * small)
+    wide = max(width(title, points), width(detail, small)) + 2.4 * small
+    edge, ink = 1.4 * small, Ink(pixels)
+    tall = 1.5 * points + (1.6 * small if detail else 0) + small
+    ink.box(edge, edge, edge + wide, edge + tall, WHITE, 0.86 * alpha, 0.4 * small)
+    ink.box(edge, edge, edge + max(3, small / 3.5), edge + tall, FLASH, alpha)
+    left, top = edge + 1.2 * small, edge + 0.5 * small
+    ink.words(left, top + 0.75 * points, title, points, INK, "l", alpha)
+    ink.words(left, top + 1.5 * points + 0.8 * small, detail, small, FAINT, "l", alpha)

@@ -5,14 +5,14 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from factory.mjcf.model import product_name
 from factory.record.monitor.subject import subject_of_run
-from factory.render.area import PanelName, shared
-from factory.render.camera import camera_named
-from factory.render.camerawork import FPS, SIZE, Moment, Reel, Size, Take, When, pictureless, save
+from factory.render.camerawork import Moment, Take, When, pictureless
 from factory.render.history import History
-from factory.render.poster import Poster
+from factory.render.picture import USUAL, Picture
+from factory.render.reel import Reel, save
 from factory.render.subject import Snapshot, held
-from factory.render.video import check_output
+from factory.render.video import FPS, check_output
 from factory.support.resource import Closing
 
 if TYPE_CHECKING:
@@ -22,33 +22,17 @@ if TYPE_CHECKING:
 class _Observer(Closing):
     """What films and stills of a run have in common: an observer, and a context manager."""
 
-    def __init__(
-        self,
-        simulation: Simulation,
-        size: Size,
-        camera: str,
-        caption: bool,
-        panels: tuple[PanelName, ...],
-        title: str,
-    ) -> None:
+    def __init__(self, simulation: Simulation, picture: Picture) -> None:
         if simulation.model is None:
             raise pictureless()
-        from factory.mjcf.model import product_name
-
         self.simulation, factory = simulation, simulation.layout.factory
-        camera = camera_named(camera, [part.label for part in factory.leaves])
-        shared(size, panels)
+        picture.check([part.label for part in factory.leaves])
         subject = subject_of_run(simulation)
-        product, m = product_name(factory), simulation.physical.m
-        self.take = Take(
-            m, product, simulation.units, size, camera, caption, subject, panels, title
-        )
-        self.history = History(subject)
+        m, self.history = simulation.physical.m, History(subject)
+        name, units = product_name(factory), simulation.units
+        self.take = Take(m, subject, name, units, picture, self.history)
         self.number = factory.net.threaded.net.transition_index
         self.last = self._moment()
-
-    def __call__(self, world: Any, supervisor: Any) -> None:
-        self.observe(world, supervisor)
 
     def observe(self, world: Any, supervisor: Any) -> None:
         raise NotImplementedError
@@ -65,31 +49,20 @@ class Film(_Observer):
     """Films a run: a frame whenever simulated time reaches the next, from the run itself.
 
     Frame k is at k / fps seconds, so T seconds have ⌊T fps⌋ + 1 frames. Closed after an
-    interruption too, the file holds what happened until then. `panels` are beside the 3-D; `title`
-    is shown at the beginning; `poster`: a still (PNG) of the moment that shows most. Raises
-    InputError for a size, rate, ending or camera that will not do, MissingError where there is no
-    GL."""
+    interruption too, the file holds what happened until then. `poster`: a still (PNG) of the moment
+    that shows most. Raises InputError for a size, rate, ending or camera that will not do,
+    MissingError where there is no GL."""
 
     def __init__(
         self,
         simulation: Simulation,
         path: Path | str,
-        size: Size = SIZE,
+        picture: Picture = USUAL,
         fps: float = FPS,
-        camera: str = "overview",
-        caption: bool = True,
-        panels: tuple[PanelName, ...] = (),
-        title: str = "",
         poster: Path | str | None = None,
     ) -> None:
-        check_output(path, size, fps)
-        super().__init__(simulation, size, camera, caption, panels, title)
-        self.poster = None
-        if poster is not None:
-            check_output(poster, size, still=True)
-            self.poster = Poster(self.take, self.history, Path(poster))
-            self.poster.see(self.last)
-        self.reel = Reel(self.take, Path(path), fps, self.history)
+        super().__init__(simulation, picture)
+        self.reel = Reel(self.take, Path(path), fps, None if poster is None else Path(poster))
         self.reel.until(self.last)
 
     @property
@@ -99,16 +72,11 @@ class Film(_Observer):
 
     def observe(self, world: Any, supervisor: Any) -> None:
         """Take the frames that are due."""
-        now = self._moment()
-        if self.poster is not None:
-            self.poster.see(now)
-        self.reel.until(now)
+        self.reel.until(self._moment())
 
     def close(self) -> None:
         """Finish the file, and write the poster."""
         self.reel.close()
-        if self.poster is not None:
-            self.poster.save()
 
 
 class Still(_Observer):
@@ -121,15 +89,11 @@ class Still(_Observer):
         self,
         simulation: Simulation,
         path: Path | str,
-        size: Size = SIZE,
-        camera: str = "overview",
+        picture: Picture = USUAL,
         at: When = "end",
-        caption: bool = True,
-        panels: tuple[PanelName, ...] = (),
-        title: str = "",
     ) -> None:
-        check_output(path, size, still=True)
-        super().__init__(simulation, size, camera, caption, panels, title)
+        check_output(path, picture.size, still=True)
+        super().__init__(simulation, picture)
         self.path, self.at, self.held = Path(path), at, False
 
     def observe(self, world: Any, supervisor: Any) -> None:
@@ -137,20 +101,11 @@ class Still(_Observer):
         if self.at != "end" and self.last.time >= self.at:
             return
         now = self._moment()
-        if self.at != "end" or not self.take.best or held(world.m, now.shown) or not self.held:
-            self.last, self.held = now, self.held or held(world.m, now.shown)
+        holds = held(world.m, now.shown)
+        follows = self.take.picture.camera == "product"
+        if self.at != "end" or not follows or holds or not self.held:
+            self.last, self.held = now, self.held or holds
 
     def close(self) -> None:
         """Take the picture."""
-        save(self.take, self.last, self.path, self.history)
-
-
-def still(
-    simulation: Simulation,
-    path: Path | str,
-    size: Size = SIZE,
-    camera: str = "overview",
-    caption: bool = True,
-) -> None:
-    """A still of the state a simulation is in now."""
-    Still(simulation, path, size, camera, "end", caption).close()
+        save(self.take, self.last, self.path)

@@ -1,4 +1,4 @@
-"""Which product a camera follows, and where it is.
+"""Where the camera stands, moment by moment, and which product it follows.
 
 Bodies never turn and have their places in the finished product, so any body that has become part
 of a product tells where that product's frame is; and it stays the same frame when parts that are
@@ -10,13 +10,85 @@ from __future__ import annotations
 import numpy as np
 
 from factory.mjcf import names
+from factory.mjcf.replica import Replica
 from factory.record.monitor.subject import Subject
-from factory.render.camera import Array
-from factory.render.subject import SIGNS, Snapshot, corners
+from factory.render.camera import (
+    PART,
+    Array,
+    Camera,
+    Framing,
+    View,
+    fit,
+    from_above,
+    orbit,
+    overview,
+    towards,
+)
+from factory.render.subject import SIGNS, Snapshot, corners, extent
 from factory.support.engine import mujoco
+
+LAG = 0.25
+"""Time in which the camera goes from one product to the next [s]."""
 
 NEAR = 0.02
 """A body in the place of one that is gone is the same product where it is no further [m]."""
+
+
+class Viewpoint:
+    """Where the camera is in pictures of a replica, in their order. Cameras that follow a product
+    need to know the factory."""
+
+    def __init__(
+        self, replica: Replica, camera: Camera, framing: Framing, subject: Subject
+    ) -> None:
+        self.d, self.camera, self.framing = replica.d, camera, framing
+        self.points = extent(replica.m, replica.d)
+        self.orbit = orbit(self.points, framing)
+        self.followed: Followed | None = None
+        if camera == "product" or camera.startswith(PART):
+            part = camera.removeprefix(PART) if ":" in camera else ""
+            self.followed = Followed(replica.m, subject, part)
+        self.wanted: Array | None = None
+        self.body = -1
+        self.away, self.glide = np.zeros(3), np.zeros(3)
+
+    def view(self, shown: Snapshot, elapsed: float, time: float) -> View:
+        """The view at a time, `elapsed` [s] after the last, of the replica's state."""
+        if self.followed is not None:
+            return self._following(self.followed, shown, elapsed)
+        if self.camera == "top":
+            return from_above(self.points, self.framing)
+        if self.camera == "orbit":
+            return self.orbit(time)
+        return overview(self.points, self.framing)
+
+    def _following(self, followed: Followed, shown: Snapshot, elapsed: float) -> View:
+        """From an even distance; after a change of body the way still to go glides to 0, by a
+        critically damped spring."""
+        wanted, body = self._wanted(followed, shown)
+        if elapsed <= 0.0 or self.wanted is None:
+            self.away, self.glide = np.zeros(3), np.zeros(3)
+        else:
+            if body != self.body:
+                self.away = self.away + self.wanted - wanted
+            decay, push = np.exp(-elapsed / LAG), (self.glide + self.away / LAG) * elapsed
+            self.away = (self.away + push) * decay
+            self.glide = (self.glide - push / LAG) * decay
+        self.wanted, self.body = wanted, body
+        middle = followed.box.mean(axis=0)
+        about = middle + 1.45 * (followed.box - middle)
+        return fit(wanted + self.away + about, towards(-122.0, 44.0), self.framing)
+
+    def _wanted(self, followed: Followed, shown: Snapshot) -> tuple[Array, int]:
+        """Where the camera should look, and the body it follows there. A product that no robot
+        holds any more is let go: the camera stays until it is gone."""
+        found = followed.furthest(self.d, shown)
+        if found is None:
+            return (self.points.mean(axis=0) if self.wanted is None else self.wanted), self.body
+        body, rank = found
+        if rank == np.inf and body == self.body and self.wanted is not None:
+            return self.wanted, body
+        return followed.origin(self.d, body), body
 
 
 class Followed:
@@ -80,7 +152,7 @@ class Followed:
 
     def _same(self, d: mujoco.MjData, seen: dict[int, float]) -> int | None:
         """The body that has been followed, or has taken its place; else one that has just come. A
-        product that nobody holds any more is left when another copy is on its way."""
+        product that no robot holds any more is left when another copy is on its way."""
         fresh = min(seen, key=lambda b: seen[b], default=None)
         if self.last is None or fresh is None:
             return fresh

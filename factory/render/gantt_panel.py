@@ -14,11 +14,10 @@ from factory.render.colours import (
     pale,
     template_colours,
 )
-from factory.render.history import History, Progress, Spell
-from factory.render.ink import Ink, fitted, width
-from factory.render.painter import Pixels
-from factory.render.rows import Row, Rows
-from factory.render.sheet import Sheet
+from factory.render.history import History, OperationProgress, Spell
+from factory.render.ink import Ink, Pixels, fitted, width
+from factory.render.rows import PanelRow, Rows
+from factory.render.sheet import PanelSheet
 
 CYCLES = 2.2
 """How many rounds of the busiest robot are shown."""
@@ -32,7 +31,7 @@ STEPS = (1.0, 2.0, 5.0, 10.0)
 
 def _window(history: History) -> float:
     """How much time is shown [s]."""
-    progress, factory = Progress(history.subject), history.factory
+    progress, factory = OperationProgress(history.subject), history.factory
     times = [progress.expected(operation) for operation in factory.operations]
     busiest = max(sum(times[n] for n in robot.operations) for robot in factory.robots)
     return float(round(min(max(CYCLES * busiest, SHORTEST), LONGEST)))
@@ -43,7 +42,7 @@ class GanttPanel:
 
     def __init__(self, size: tuple[int, int], scale: float, history: History, rows: Rows) -> None:
         self.history, self.factory, self.rows = history, history.factory, rows
-        self.sheet = Sheet(size, scale, rows, 22 * scale)
+        self.sheet = PanelSheet(size, scale, rows, 22 * scale)
         self.colours = operation_colours(self.factory)
         self.window = _window(history)
         self.step = next((s for s in STEPS if self.window / s <= 8), STEPS[-1])
@@ -90,7 +89,7 @@ class GanttPanel:
             number += 1
         ink.words(self.right, y, "now", small, FLASH, "r")
 
-    def _spell(self, ink: Ink, row: Row, spell: Spell, now: float) -> None:
+    def _spell(self, ink: Ink, row: PanelRow, spell: Spell, now: float) -> None:
         """A bar for an operation, a thin one where a robot waits with a part; empty-handed it has
         none."""
         if spell.start > now or not spell.step:

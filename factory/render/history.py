@@ -1,4 +1,4 @@
-"""Which robot was in which mode when: what the panels show, from the firings alone."""
+"""The mode of each robot over time, from the firings alone: what the panels show."""
 
 from __future__ import annotations
 
@@ -84,16 +84,6 @@ class History:
         last = bisect_right(self.times, time - TIE)
         return list(zip(self.times[first:last], self.events[first:last], strict=True))
 
-    def place(self, robot: int, spell: Spell) -> int:
-        """The place of the net that a spell is at."""
-        return self.factory.net.gears[robot].places[spell.step]
-
-    def marking(self, time: float) -> frozenset[int]:
-        """The marked places at a time."""
-        return frozenset(
-            self.place(robot, self.at(robot, time)) for robot in range(len(self.spells))
-        )
-
     def counts(self, time: float) -> Counter[int]:
         """How often each transition has fired before a time."""
         found = Counter(self.fired)
@@ -102,8 +92,8 @@ class History:
         return found
 
 
-class Progress:
-    """How far operations are, by what their robots have still to go.
+class OperationProgress:
+    """How far each operation is, by the way its robots have still to go.
 
     An operation with a dwell takes the time it would take to get there, then the dwell; what its
     robots still have to go shows the one, the clock the other. Goes up to 1, and never back in a

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 
-from factory.render.painter import Pixels
+Pixels = NDArray[np.uint8]
 
 Colour = tuple[int, int, int]
 

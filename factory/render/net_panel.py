@@ -26,12 +26,11 @@ from factory.render.colours import (
     pale,
     robot_colours,
 )
-from factory.render.history import History, Progress, Spell
-from factory.render.ink import Colour, Ink, fitted, mixed
-from factory.render.painter import Pixels
+from factory.render.history import History, OperationProgress, Spell
+from factory.render.ink import Colour, Ink, Pixels, fitted, mixed
 from factory.render.rings import Rings
-from factory.render.rows import Row, Rows
-from factory.render.sheet import whose
+from factory.render.rows import PanelRow, Rows
+from factory.render.sheet import robots_shown
 
 GLIDE = 0.09
 """Time constant with which a token follows its place [s]."""
@@ -50,7 +49,7 @@ class NetPanel:
         self.history, self.factory, self.rows = history, history.factory, rows
         self.rings = Rings(size, scale, rows)
         self.sheet = self.rings.sheet
-        self.progress = Progress(history.subject)
+        self.progress = OperationProgress(history.subject)
         self.paints, self.colours = robot_colours(self.factory), operation_colours(self.factory)
         self.tokens: dict[int, float] = {}
         self.ground: tuple[object, Pixels] | None = None
@@ -99,9 +98,10 @@ class NetPanel:
         return self.ground[1]
 
     def _drawn(self) -> Pixels:
-        net = self.factory.net.threaded
-        sizes = f"{whose(self.rows)}, {len(net.places)} places, {len(net.transitions)} transitions"
-        ink = self.sheet.blank("Net", whose(self.rows) if self.rows.reduced else sizes)
+        net, detail = self.factory.net.threaded, robots_shown(self.rows)
+        if not self.rows.reduced:
+            detail += f", {len(net.places)} places, {len(net.transitions)} transitions"
+        ink = self.sheet.blank("Net", detail)
         for row in self.rows.shown:
             self._ring(ink, row)
         for operation in self._operations():
@@ -126,7 +126,7 @@ class NetPanel:
             if self.rings.span(number)[1] > sight[0] and self.rings.span(number)[0] < sight[1]
         ]
 
-    def _ring(self, ink: Ink, row: Row) -> None:
+    def _ring(self, ink: Ink, row: PanelRow) -> None:
         """The way of a robot's token."""
         gear, y = self.factory.robots[row.robot].operations, self.sheet.height(row)
         left, right = self.rings.rest(gear[0]), self.rings.span(gear[-1])[1] - self.rings.radius
@@ -176,7 +176,7 @@ class NetPanel:
             reach = self.rings.half + 2 * self.sheet.scale
             ink.box(x - thick, y - reach, x + thick, y + reach, colour, row.alpha * alpha, thick)
 
-    def _rests(self, ink: Ink, row: Row, number: int) -> None:
+    def _rests(self, ink: Ink, row: PanelRow, number: int) -> None:
         """The place before an operation."""
         x, y, radius = (
             self.rings.rest(number),
@@ -187,7 +187,7 @@ class NetPanel:
         line = 1.3 * self.sheet.scale
         ink.box(x - radius, y - radius, x + radius, y + radius, FAINT, row.alpha, radius, line)
 
-    def _rows_of(self, operation: Operation) -> list[Row]:
+    def _rows_of(self, operation: Operation) -> list[PanelRow]:
         return [row for row in self.rows.shown if row.robot in operation.robots]
 
     def _work(self, ink: Ink, operation: Operation, age: float) -> None:
@@ -203,7 +203,7 @@ class NetPanel:
             thin, alpha = 1.3 * self.sheet.scale, min(1.0, age / GLIDE) * min(r.alpha for r in rows)
             ink.box(x - thin, min(y), x + thin, max(y), colour, alpha)
 
-    def _note(self, ink: Ink, row: Row, time: float) -> None:
+    def _note(self, ink: Ink, row: PanelRow, time: float) -> None:
         """What a robot is doing, beside its name."""
         spell = self.history.at(row.robot, time)
         if spell.operation:
@@ -233,11 +233,11 @@ class NetPanel:
             moved[row.robot] = last + share * (target - last)
         self.tokens = moved
 
-    def _at(self, row: Row) -> Point2:
+    def _at(self, row: PanelRow) -> Point2:
         """Where the token of a row is."""
         return self.rings.point(row.robot, self.tokens[row.robot], self.sheet.height(row))
 
-    def _token(self, ink: Ink, row: Row) -> None:
+    def _token(self, ink: Ink, row: PanelRow) -> None:
         x, y = self._at(row)
         if x > self.sheet.gutter - self.rings.radius:
             ink.disc(x, y, self.rings.radius, WHITE, row.alpha)

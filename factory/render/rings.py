@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from factory.layout.layout import Point2
 from factory.render.rows import Rows
-from factory.render.sheet import Sheet
+from factory.render.sheet import PanelSheet
 
 WORK = 0.66
 """Share of a column that an operation takes; the rest is for the place before it."""
@@ -20,9 +20,9 @@ class Rings:
 
     def __init__(self, size: tuple[int, int], scale: float, rows: Rows) -> None:
         self.factory, self.rows = rows.factory, rows
-        self.sheet = Sheet(size, scale, rows)
+        self.sheet = PanelSheet(size, scale, rows)
         if WORK * self.pitch < NARROW * scale:
-            self.sheet = Sheet(size, scale, rows, notes=NOTES * scale)
+            self.sheet = PanelSheet(size, scale, rows, notes=NOTES * scale)
 
     @property
     def radius(self) -> float:

@@ -1,8 +1,8 @@
 """Which robots the panels show, each in a row of its own, and where the rows are.
 
 Up to LIMIT robots all are shown, in the order of their numbers. Beyond, those in the neighbourhood
-of the product that is furthest on its way: who has it now, whom it will meet next. Their rows come,
-go and change places calmly.
+of the product that is furthest on its way: the robots that have it now and those it meets next.
+Their rows fade in and out, and glide to their places.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ CALM = 0.25
 
 
 @dataclass(frozen=True, slots=True)
-class Row:
+class PanelRow:
     """A robot's row: `at` which height, in rows from the top; `alpha`: how far it has come or
     gone."""
 
@@ -40,16 +40,16 @@ class Row:
 
 
 class Rows:
-    """The rows at present. `reduced`: whether not all robots have one; `named`: how
-    many have, those not counted that go; `first`: the leftmost column
-    of operations to be seen, and `columns` how many are."""
+    """The rows at present. `reduced`: whether not all robots have one; `named`: how many have,
+    without those that fade out; `first`: the leftmost column of operations to be seen, and
+    `columns` how many are."""
 
     def __init__(self, history: History) -> None:
         self.history, self.factory = history, history.factory
         robots = len(self.factory.robots)
         self.reduced = robots > LIMIT
         self.count = NEIGHBOURS if self.reduced else robots
-        self.shown = [] if self.reduced else [Row(r, float(r)) for r in range(robots)]
+        self.shown = [] if self.reduced else [PanelRow(r, float(r)) for r in range(robots)]
         self.columns = min(COLUMNS, self.width) if self.reduced else self.width
         self.named = robots
         self.first = 0.0
@@ -79,16 +79,16 @@ class Rows:
         place = {robot: float(number) for number, robot in enumerate(near)}
         self.named = len(near)
         old = {row.robot: row for row in self.shown}
-        fresh = [Row(r, at, 0.0) for r, at in place.items() if r not in old]
+        fresh = [PanelRow(r, at, 0.0) for r, at in place.items() if r not in old]
         moved = (_moved(row, place, share) for row in (*self.shown, *fresh))
         self.shown = sorted((row for row in moved if row), key=lambda row: row.robot)
 
 
-def _moved(row: Row, place: dict[int, float], share: float) -> Row | None:
+def _moved(row: PanelRow, place: dict[int, float], share: float) -> PanelRow | None:
     """A row on its way to its place, or out."""
     at, there = place.get(row.robot, row.at), float(row.robot in place)
     alpha = row.alpha + share * (there - row.alpha)
-    return Row(row.robot, row.at + share * (at - row.at), alpha) if alpha > 0.02 else None
+    return PanelRow(row.robot, row.at + share * (at - row.at), alpha) if alpha > 0.02 else None
 
 
 def neighbourhood(factory: Factory, focus: Operation, most: int = NEIGHBOURS) -> list[int]:

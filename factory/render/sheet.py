@@ -8,14 +8,14 @@ import numpy as np
 
 from factory.render.colours import EDGE, FAINT, GROUND, INK, robot_colours
 from factory.render.ink import Ink, width
-from factory.render.rows import Row, Rows
+from factory.render.rows import PanelRow, Rows
 
 TALLEST = 62.0
 """Distance of rows at 1280x720, at the most [px]."""
 
 
 @dataclass(frozen=True)
-class Sheet:
+class PanelSheet:
     """The measures of a panel of a size, at a scale (1 at 1280x720), over some rows; `below`: what
     is kept free at the bottom [px], and `notes` right of the robots' names."""
 
@@ -63,7 +63,7 @@ class Sheet:
         """Height of the robots' names."""
         return max(9, min(self.points, int(self.pitch * 0.85)))
 
-    def height(self, row: Row) -> float:
+    def height(self, row: PanelRow) -> float:
         """The middle of a row."""
         return self.top + (row.at + 0.5) * self.pitch
 
@@ -90,7 +90,7 @@ class Sheet:
             ink.words(left, y, name, self.name_points, INK, "l", row.alpha)
 
 
-def whose(rows: Rows) -> str:
+def robots_shown(rows: Rows) -> str:
     """Which robots are shown, in words."""
     robots = len(rows.factory.robots)
     if not rows.reduced or rows.focus is None:

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from factory.mjcf import names
+from factory.mjcf.replica import mesh_of
 from factory.render.camera import Array
 from factory.support.engine import mujoco
 
@@ -54,9 +55,7 @@ def extent(m: mujoco.MjModel, d: mujoco.MjData) -> Array:
 def corners(m: mujoco.MjModel, geom: int) -> Array:
     """The corners (8, 3) of a geom's box in its own frame, or the vertices of its mesh."""
     if m.geom_type[geom] == mujoco.mjtGeom.mjGEOM_MESH:
-        mesh = m.mesh(int(m.geom_dataid[geom]))
-        first = int(mesh.vertadr[0])
-        return np.asarray(m.mesh_vert[first : first + int(mesh.vertnum[0])], float)
+        return mesh_of(m, geom)[0]
     box = m.geom_aabb[geom]
     return np.asarray(box[:3] + SIGNS * box[3:])
 

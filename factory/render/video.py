@@ -3,7 +3,11 @@
 Frames go to the file itself in fragments of a quarter of a second, each whole in itself: as
 fragmented MP4, or Matroska for `.mkv`. So what a killed process leaves is a film of that name that
 plays up to its last second. Closed, an MP4 is rewrapped, its index first, and takes the place of
-the fragments in one move."""
+the fragments in one move.
+
+This is PyAV itself, not imageio's plugin for it: that sets neither the encoder's lookahead and
+B-frames nor the colours, and writes through a buffer, so a killed process leaves more than a second
+less (docs/decisions/films.md)."""
 
 from __future__ import annotations
 
@@ -13,10 +17,12 @@ from math import isfinite
 from pathlib import Path
 from typing import Any
 
-from factory.render.painter import Pixels
+from factory.render.ink import Pixels
 from factory.support.errors import Diagnostic, InputError, MissingError
 from factory.support.files import partial_of
 from factory.support.resource import Closing
+
+FPS = 30.0
 
 FILMS, STILLS = (".mp4", ".mkv"), (".png",)
 

@@ -11,9 +11,13 @@ from typing import Any
 
 import numpy as np
 
-from factory.render.camera import camera_named
-from factory.render.camerawork import FPS, SIZE, Camerawork, Moment, Reel, Take
+from factory.record.monitor.subject import subject_of_run
+from factory.render.camerawork import Camerawork, Moment, Take
+from factory.render.history import History
+from factory.render.picture import Picture
+from factory.render.reel import Reel
 from factory.render.subject import Snapshot
+from factory.render.video import FPS
 from factory.simulation.simulation import Simulation
 from factory.support import gl
 from factory.support.engine import mujoco
@@ -26,6 +30,8 @@ ROBOTS = (6, 40, 100)
 
 FRAMES = 60
 
+SIZE = (1280, 720)
+
 
 def work(robots: int, frames: int) -> dict[str, Any]:
     """Pictures a second of the same moments: the bare renderer's, ours, and ours into a video."""
@@ -36,7 +42,8 @@ def work(robots: int, frames: int) -> dict[str, Any]:
     simulation = Case(robots, 0.002).simulation(layout, shown=True)
     run_until(simulation, Steady.of(layout, None).since)
     moments = recorded(simulation, frames)
-    take = Take(simulation.world.m, "product", 1, SIZE, camera_named("overview"), True)
+    subject = subject_of_run(simulation)
+    take = Take(simulation.world.m, subject, "product", 1, Picture(SIZE), History(subject))
     return {
         "robots": len(layout.factory.robots),
         "bodies": simulation.world.m.nbody,

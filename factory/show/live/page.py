@@ -9,17 +9,17 @@ import numpy as np
 
 from factory.mjcf import names
 from factory.mjcf.parts import HIDDEN
+from factory.mjcf.replica import Floats
 from factory.plant.factory import Operation
 from factory.record.monitor.subject import subject_of_run
 from factory.show.live.commands import FACTORS, SPEEDS
 from factory.show.live.session import Session
-from factory.show.report.floor import floor_plan
+from factory.show.report.drawings import floor_plan, net_drawing
 from factory.show.report.links import data, labels_of
-from factory.show.report.net_drawing import net_drawing
 from factory.show.report.packing import Pack
 from factory.show.report.page import filled, options
 from factory.show.report.scene import scene
-from factory.show.report.stage import Floats, Stage, stations
+from factory.show.report.stage import DrawnFactory, stations
 from factory.show.report.tree import assembly_tree
 from factory.simulation.simulation import Simulation
 
@@ -81,7 +81,7 @@ def page(session: Session) -> bytes:
     return text.encode()
 
 
-def stage_of(simulation: Simulation) -> Stage:
+def stage_of(simulation: Simulation) -> DrawnFactory:
     """What there is to be drawn of a simulation that has not begun; bodies are where they are in
     the world."""
     layout, world = simulation.layout, simulation.physical
@@ -97,7 +97,7 @@ def stage_of(simulation: Simulation) -> Stage:
         for end in (min(ends), max(ends)):
             place = d.xpos[body] - heading * (end - x)
             low[body], high[body] = np.minimum(low[body], place), np.maximum(high[body], place)
-    return Stage(
+    return DrawnFactory(
         factory,
         m,
         d.xpos.copy(),
@@ -113,7 +113,6 @@ def _ends(simulation: Simulation) -> Iterator[tuple[Operation, Floats]]:
     layout, world = simulation.layout, simulation.physical
     start, address = world.d.qpos, world.motion.axes.qpos
     for operation in layout.factory.operations:
-        qpos = start.copy()
-        for slot, robot in enumerate(operation.robots):
-            qpos[address[robot]] = layout.goal(operation.index, slot)
+        qpos, slides = start.copy(), address[[*operation.robots]]
+        qpos[slides] = [layout.goal(operation.index, n) for n in range(slides.size)]
         yield operation, qpos

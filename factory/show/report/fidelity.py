@@ -4,12 +4,12 @@ where there is a layout."""
 from __future__ import annotations
 
 from collections.abc import Iterator
-from copy import copy
 from dataclasses import dataclass
 
 import numpy as np
 
 from factory.mjcf.parts import HIDDEN
+from factory.mjcf.replica import Replica
 from factory.nets.replay import replay
 from factory.record.monitor.record import watch_log
 from factory.record.monitor.report import Report
@@ -20,7 +20,6 @@ from factory.study.analysis.recorded import conditions
 from factory.study.fidelity.causality import duration_differences, process
 from factory.study.fidelity.quantities import QUANTITIES
 from factory.study.fidelity.welds import GRIP, HOLD, Welds
-from factory.support.engine import mujoco
 from factory.support.errors import InputError
 
 EVERY = 5
@@ -85,22 +84,22 @@ def _tracking(recording: Recording) -> float | None:
 
 def _welds(recording: Recording) -> dict[str, float | None]:
     """Hand-offs, the gap that each finds, what welds leave open, how products turn out [mm]."""
-    log, m = recording.log, copy(recording.motion.m)
-    d = mujoco.MjData(m)
-    _aim(recording, m, d, 0)
+    log, replica = recording.log, Replica(recording.motion.m)
+    m, d = replica.m, replica.d
+    replica.switch(log.active[0])
     welds = Welds(m, d)
     gap = residual = product = 0.0
     handoffs, finished = 0, bool(log.delivered[-1])
     for row, switched in _rows(recording):
         if switched:
-            _pose(recording, m, d, row - 1)
-            _aim(recording, m, d, row)
+            replica.place(log.qpos[row - 1])
+            replica.switch(log.active[row])
             fresh = welds.scan()
             fresh = fresh[d.xpos[m.eq_obj2id[fresh], 2] > HIDDEN]  # none that replaces others
             handoffs += len(fresh)
             gap = max(gap, float(welds.gaps(fresh, d.xpos, d.xmat).max(initial=0.0)))
             continue
-        _pose(recording, m, d, row)
+        replica.place(log.qpos[row])
         on = np.flatnonzero(welds.active & (welds.kinds >= GRIP))
         residual = max(residual, float(welds.gaps(on, d.xpos, d.xmat).max(initial=0.0)))
         held = np.flatnonzero(welds.active & (welds.kinds == HOLD))
@@ -123,19 +122,6 @@ def _rows(recording: Recording) -> Iterator[tuple[int, bool]]:
             yield row, True
         elif row % EVERY == 0:
             yield row, False
-
-
-def _pose(recording: Recording, m: mujoco.MjModel, d: mujoco.MjData, row: int) -> None:
-    d.qpos[:] = recording.log.qpos[row]
-    mujoco.mj_kinematics(m, d)
-
-
-def _aim(recording: Recording, m: mujoco.MjModel, d: mujoco.MjData, row: int) -> None:
-    """Switch the constraints as they are in a row."""
-    on = recording.log.active[row]
-    d.eq_active[:] = 0
-    d.eq_active[on[:, 0]] = 1
-    m.eq_obj1id[on[:, 0]], m.eq_obj2id[on[:, 0]] = on[:, 1], on[:, 2]
 
 
 def _ideal(recording: Recording) -> dict[str, float | None]:

@@ -9,12 +9,11 @@ from html import escape
 from importlib.resources import files
 from typing import Any
 
+from factory.show.report.drawings import floor_plan, net_drawing
 from factory.show.report.fidelity import fidelity
-from factory.show.report.floor import floor_plan
 from factory.show.report.frames import frames
 from factory.show.report.links import data, labels_of
 from factory.show.report.measured import measured
-from factory.show.report.net_drawing import net_drawing
 from factory.show.report.packing import Pack, json_inside
 from factory.show.report.prediction import predicted
 from factory.show.report.recording import Recording

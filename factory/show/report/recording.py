@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from factory.export.events import compiled
-from factory.export.motion import Motion, motion_of
+from factory.export.motion import BodyMotion, motion_of
 from factory.export.subject import Subject
 from factory.geometry.meshes import Array
 from factory.lang import read_pag, read_template
@@ -26,7 +26,7 @@ from factory.problem.robot_types import load_catalogue
 from factory.problem.template import Template
 from factory.record.log import Log
 from factory.record.monitor import subject_of
-from factory.show.report.stage import Stage, stations
+from factory.show.report.stage import DrawnFactory, stations
 from factory.study.analysis.recorded import conditions
 from factory.support.errors import InputError, RunError
 
@@ -38,7 +38,7 @@ class Recording:
 
     file: str
     log: Log = field(repr=False)
-    motion: Motion = field(repr=False)
+    motion: BodyMotion = field(repr=False)
     factory: Factory = field(repr=False)
     layout: Layout | None = field(default=None, repr=False)
     missing: str = ""
@@ -69,10 +69,10 @@ class Recording:
         return float(self.log.time[-1])
 
     @cached_property
-    def stage(self) -> Stage:
+    def stage(self) -> DrawnFactory:
         """What there is to be drawn."""
         m, seen = self.motion.m, self.motion
-        return Stage(
+        return DrawnFactory(
             self.factory,
             m,
             seen.position[0],

@@ -13,17 +13,13 @@ from numpy.typing import NDArray
 
 from factory.geometry.solids import rotation
 from factory.mjcf import names
+from factory.mjcf.replica import Floats, half_sizes, mesh_of, paint, shown
 from factory.show.report.packing import Pack
-from factory.show.report.stage import Stage
+from factory.show.report.stage import DrawnFactory
 from factory.support.engine import mujoco
-
-DRAWN = 3
-"""Geoms of groups below this one are drawn."""
 
 ROUND = 28
 """Sides of a cylinder."""
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -37,36 +33,20 @@ class Look:
     alpha: float = 1.0
 
 
-def drawn(m: mujoco.MjModel, body: int) -> list[int]:
-    """The geoms of a body that are to be seen."""
-    first = int(m.body_geomadr[body])
-    plane = mujoco.mjtGeom.mjGEOM_PLANE
-    return [
-        g
-        for g in range(first, first + int(m.body_geomnum[body]))
-        if m.geom_group[g] < DRAWN and m.geom_type[g] != plane
-    ]
-
-
 def triangles(m: mujoco.MjModel, geom: int) -> tuple[Floats, NDArray[np.int64]]:
     """A geom's vertices, in the frame of its body [m], and faces."""
     from trimesh import creation
 
     kind, size = mujoco.mjtGeom(m.geom_type[geom]), m.geom_size[geom]
     if kind == mujoco.mjtGeom.mjGEOM_MESH:
-        mesh = m.mesh(int(m.geom_dataid[geom]))
-        start, count = int(mesh.vertadr[0]), int(mesh.vertnum[0])
-        first, faces = int(mesh.faceadr[0]), int(mesh.facenum[0])
-        points = np.asarray(m.mesh_vert[start : start + count], float)
-        corners = np.asarray(m.mesh_face[first : first + faces], np.int64)
+        points, corners = mesh_of(m, geom)
     else:
         if kind == mujoco.mjtGeom.mjGEOM_SPHERE:
             made = creation.icosphere(subdivisions=2, radius=size[0])
         elif kind == mujoco.mjtGeom.mjGEOM_CYLINDER:
             made = creation.cylinder(size[0], 2 * size[1], sections=ROUND)
         else:
-            half = size if kind == mujoco.mjtGeom.mjGEOM_BOX else m.geom_aabb[geom, 3:]
-            made = creation.box(extents=2 * np.asarray(half))
+            made = creation.box(extents=2 * half_sizes(m, geom))
         points, corners = np.asarray(made.vertices, float), np.asarray(made.faces, np.int64)
     return points @ rotation(m.geom_quat[geom]).T + m.geom_pos[geom], corners
 
@@ -74,9 +54,7 @@ def triangles(m: mujoco.MjModel, geom: int) -> tuple[Floats, NDArray[np.int64]]:
 def look(m: mujoco.MjModel, geoms: Sequence[int]) -> Look:
     """Several geoms of a body as one."""
     found = [triangles(m, geom) for geom in geoms]
-    paints = [
-        m.mat_rgba[m.geom_matid[g]] if m.geom_matid[g] >= 0 else m.geom_rgba[g] for g in geoms
-    ]
+    paints = [paint(m, geom) for geom in geoms]
     starts = np.cumsum([0, *(len(points) for points, _ in found)])
     return Look(
         np.concatenate([points for points, _ in found]),
@@ -91,7 +69,7 @@ def look(m: mujoco.MjModel, geoms: Sequence[int]) -> Look:
     )
 
 
-def scene(stage: Stage, labels: dict[str, int], pack: Pack) -> dict[str, Any]:
+def scene(stage: DrawnFactory, labels: dict[str, int], pack: Pack) -> dict[str, Any]:
     """The geometry, into the pack, and the list of things: each a shape, the body it moves with,
     and what it stands for (`robot` or `label`, by number)."""
     m = stage.m
@@ -117,12 +95,12 @@ def scene(stage: Stage, labels: dict[str, int], pack: Pack) -> dict[str, Any]:
 def _groups(m: mujoco.MjModel) -> Iterator[tuple[int, list[int]]]:
     """The geoms that make one thing: those of a body; of the world those of a robot or a feeder."""
     owned: dict[str, list[int]] = {}
-    for geom in drawn(m, 0):
+    for geom in shown(m, 0):
         owned.setdefault(owner(m.geom(geom).name), []).append(geom)
     for geoms in owned.values():
         yield 0, geoms
     for body in range(1, m.nbody):
-        if geoms := drawn(m, body):
+        if geoms := list(shown(m, body)):
             yield body, geoms
 
 
@@ -143,7 +121,7 @@ def stands_for(name: str, robots: dict[str, int], labels: dict[str, int]) -> dic
     return {}
 
 
-def _places(stage: Stage, labels: dict[str, int]) -> dict[str, list[float]]:
+def _places(stage: DrawnFactory, labels: dict[str, int]) -> dict[str, list[float]]:
     """Where the body of each part, by its label's number, is in the finished product [m]."""
     places = stage.places.items()
     return {str(labels[k]): [round(x, 6) for x in v] for k, v in places if k in labels}

@@ -6,19 +6,15 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 
-import numpy as np
-from numpy.typing import NDArray
-
 from factory.mjcf import names
+from factory.mjcf.replica import Floats, Replica
 from factory.mjcf.robots import ROLES
 from factory.plant.factory import Factory, Operation
 from factory.support.engine import mujoco
 
-Floats = NDArray[np.float64]
-
 
 @dataclass(frozen=True)
-class Stage:
+class DrawnFactory:
     """A factory and the engine's model `m` of it. `position` (bodies, 3) [m] and `quaternion`
     (bodies, 4) of each body at the start, of one that has a parent relative to that or, of a run
     that is not over, to the world; `reach` (2, bodies, 3): the least and the greatest position;
@@ -53,15 +49,14 @@ def stations(
     factory: Factory, m: mujoco.MjModel, ends: Iterable[tuple[Operation, Floats]]
 ) -> dict[tuple[float, float], list[str]]:
     """The stations of operations, each with the state of the engine (nq,) as it ends."""
-    d = mujoco.MjData(m)
+    replica = Replica(m)
     found: dict[tuple[float, float], list[str]] = {}
     for operation, qpos in ends:
         nest = f"{factory.robots[operation.carrier].name}/nest"
         if len(operation.robots) < 2 or not _has_site(m, nest):
             continue
-        d.qpos[:] = qpos
-        mujoco.mj_kinematics(m, d)
-        x, y = (round(float(v), 3) for v in d.site_xpos[m.site(nest).id][:2])
+        replica.place(qpos)
+        x, y = (round(float(v), 3) for v in replica.d.site_xpos[m.site(nest).id][:2])
         found.setdefault((x, y), []).append(operation.label)
     return found
 

@@ -135,13 +135,12 @@ class Motion:
         self.robots.x[axes], self.robots.v[axes] = x, v
         moves = (np.asarray(v) != 0.0) | (np.asarray(a) != 0.0)
         if not moves.any():
+            self.going.pop(tuple(axes.tolist()), None)
             self.robots.stop(axes)
             self.sleep.may_sleep(axes)
             return
-        most = self.drives.most
-        seconds = most * self.settings.timestep
-        v1 = v + seconds * a
-        ends = np.stack([x, x + seconds / 2 * (v + v1)]), np.stack([v, v1])
-        setpoints = self.drives.sampled(axes, *ends, np.asarray(a)[None], most)
-        self.drives.follow(axes, setpoints)
+        steps = np.arange(self.drives.most + 1)[:, None] * self.settings.timestep
+        course = x + steps * (v + steps / 2 * a), v + steps * a
+        force = np.broadcast_to(np.asarray(a), (self.drives.most, len(axes)))
+        self.going[tuple(axes.tolist())] = self.robots.begin_with(axes, *course, force)
         self.sleep.stay_awake(axes)

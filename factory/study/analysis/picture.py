@@ -1,4 +1,4 @@
-"""An analysis as a picture: schedule with the critical circuit, sensitivity, time, copies let in.
+"""An analysis as a picture: schedule with the critical circuit, times, sensitivity, copies in work.
 
 It needs matplotlib, an optional part.
 """
@@ -22,10 +22,10 @@ LIGHT = "#9db8db"
 FORMATS = (".svg", ".png")
 
 ROWS = 24
-"""So many robots are drawn; of more, the busiest."""
+"""At most so many robots are drawn, the busiest."""
 
 BARS = 8
-"""So many robots have bars of what they buy."""
+"""At most so many robots have bars of what a change of them alone saves."""
 
 CYCLES = 2.2
 """So many cycles of the schedule are drawn."""
@@ -120,8 +120,8 @@ def _schedule(axes: Any, found: Analysis, shown: list[int]) -> None:
 
 
 def _begin(found: Analysis, length: float) -> float:
-    """A moment from which on that long everything that fires is known, at the beginning of an
-    operation of the critical circuit."""
+    """A moment [s] at which an operation of the critical circuit begins and after which all firings
+    are known for `length` [s]."""
     dates, net = found.flow.firings.dates, found.net
     last = float(dates[-1].min()) - length
     count = len(found.timing.factory.operations)
@@ -166,7 +166,7 @@ def _time(axes: Any, found: Analysis, shown: list[int]) -> None:
 
 
 def _gains(axes: Any, found: Analysis) -> None:
-    """What the robots that buy most buy, each alone."""
+    """What a change of one robot alone saves, for the robots that save most."""
     kinds = (
         ("speed +10 %", "faster", BLUE),
         ("acceleration +10 %", "quicker", LIGHT),
@@ -178,7 +178,7 @@ def _gains(axes: Any, found: Analysis) -> None:
     axes.set_xlabel("share of the cycle time [%]")
     axes.grid(axis="y", visible=False)
     if not chosen:
-        axes.text(0.5, 0.5, "no robot alone buys anything", ha="center", transform=axes.transAxes)
+        axes.text(0.5, 0.5, "no robot alone saves time", ha="center", transform=axes.transAxes)
         axes.set_xticks([])
         axes.set_yticks([])
         return
@@ -194,7 +194,7 @@ def _gains(axes: Any, found: Analysis) -> None:
 
 
 def _changes(axes: Any, found: Analysis) -> None:
-    """The cycle time with each of the changes that were looked at."""
+    """The cycle time with each of the changes examined."""
     rows = [("as it is", found.net.pace), *((s.words, s.pace) for s in found.scenarios)]
     paces = [pace for _, pace in rows]
     bars = axes.barh(range(len(rows)), paces, 0.7, color=[GREY] + [LIGHT] * (len(rows) - 1))

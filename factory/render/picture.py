@@ -1,4 +1,4 @@
-"""How a picture is shared between the 3-D and the panels beside it."""
+"""What a picture shows, and how it is shared between the 3-D and the panels beside it."""
 
 from __future__ import annotations
 
@@ -6,7 +6,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal, get_args
 
+from factory.render.camera import Camera, camera_named
 from factory.support.errors import Diagnostic, InputError, did_you_mean
+
+Size = tuple[int, int]
+"""Width and height [px]."""
 
 PanelName = Literal["net", "gantt"]
 """`net`: the net with its tokens; `gantt`: what each robot did in the last seconds."""
@@ -18,6 +22,27 @@ SHARE = 0.44
 
 LEAST = 240
 """Pixels that a panel is wide and high at least."""
+
+
+@dataclass(frozen=True, slots=True)
+class Picture:
+    """How a still or a film is taken: its `size`, the `camera`, whether it has a `caption`, the
+    `panels` beside the 3-D, and a `title` shown at the beginning."""
+
+    size: Size = (1280, 720)
+    camera: Camera = "overview"
+    caption: bool = True
+    panels: tuple[PanelName, ...] = ()
+    title: str = ""
+
+    def check(self, parts: Sequence[str]) -> None:
+        """Raises InputError (BadValue) for a camera that follows none of the parts, and where there
+        is no room for the panels."""
+        camera_named(self.camera, parts)
+        shared(self.size, self.panels)
+
+
+USUAL = Picture()
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,9 +65,7 @@ def panels_named(text: str | None) -> tuple[PanelName, ...]:
     return tuple(panel for panel in PANELS if panel in words)
 
 
-def shared(
-    size: tuple[int, int], panels: Sequence[PanelName]
-) -> tuple[Area, dict[PanelName, Area]]:
+def shared(size: Size, panels: Sequence[PanelName]) -> tuple[Area, dict[PanelName, Area]]:
     """The area of the 3-D and those of the panels: beside it, or below it in an upright picture.
 
     Raises InputError (BadValue) where there is no room."""

@@ -1,0 +1,115 @@
+"""What stands on the floor of a layout, as flat shapes in metres that its drawings share."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from factory.geometry.solids import Solid
+from factory.layout.dimensions import ARM_WIDTH, CARRIAGE
+from factory.layout.layout import Box, Extent, Guidepath, Layout, Point2
+from factory.layout.sweeps import ALWAYS, PAYLOAD_BODY, piles, regions
+from factory.support.canvas import hexadecimal, hull
+
+JUNCTION = 0.008
+"""Radius of the circle where robots meet [m]."""
+
+
+@dataclass(frozen=True, slots=True)
+class Flat:
+    """A shape in plan: `style` says what it is. Of a box `points` are two opposite corners, of a
+    circle of `radius` [m] they are its middle, of a line its ends, else the corners of an area;
+    `name` and `paint` (`#rrggbb`) are a part's."""
+
+    style: str
+    points: tuple[Point2, ...]
+    radius: float = 0.0
+    box: bool = False
+    name: str = ""
+    paint: str = ""
+
+    @classmethod
+    def of_box(cls, style: str, box: Box) -> Flat:
+        """A box."""
+        return cls(style, ((box[0], box[2]), (box[1], box[3])), box=True)
+
+
+def flat_shapes(layout: Layout) -> Iterator[Flat]:
+    """All of them, from the ground up: `floor`, `coupled` and `uncoupled` sweeps, `belt` with the
+    `product` on it, `boom` and `post` of feeders, `path` (where carriages go) and `last` (from
+    there to A) of guidepaths, `finger`, `arm` and carriage (`dot` or `tool`) of robots at home,
+    `part`, `junction`."""
+    yield Flat.of_box("floor", layout.floor)
+    yield from _sweeps(layout)
+    yield Flat.of_box("belt", layout.outfeed)
+    leaves = layout.factory.leaves
+    for leaf in leaves:
+        yield part_outline(layout, leaf.label, layout.guidepaths[0].a, "product")
+    for leaf in leaves:
+        feeder = layout.feeder(leaf.label)
+        yield Flat.of_box("boom", feeder.boom)
+        yield Flat.of_box("post", feeder.post)
+    for path in layout.guidepaths:
+        stop = path.carriage(path.reach)
+        yield Flat("path", (path.carriage(path.length), stop))
+        yield Flat("last", (stop, path.a))
+    for robot, path in zip(layout.factory.robots, layout.guidepaths, strict=True):
+        yield from _robot(path, "tool" if robot.type == "tool" else "dot")
+    for leaf in leaves:
+        goal = layout.goal(leaf.index, leaf.template.carrier - 1)
+        at = layout.guidepaths[leaf.carrier].middle(goal)
+        yield part_outline(layout, leaf.label, at, "part")
+    for at in stations(layout):
+        yield Flat("junction", (at,), JUNCTION)
+
+
+def stations(layout: Layout) -> dict[Point2, list[str]]:
+    """Where robots meet (x, y) [m], and the operations for which they do, the last first."""
+    found: dict[Point2, list[str]] = {}
+    for operation in reversed(layout.factory.operations):
+        if len(operation.robots) > 1:
+            path = layout.guidepaths[operation.carrier]
+            x, y = path.middle(path.length - layout.stations[operation.index])
+            found.setdefault((round(x, 6), round(y, 6)), []).append(operation.label)
+    return found
+
+
+def part_outline(layout: Layout, label: str, at: Point2, style: str) -> Flat:
+    """The outline of a part for a product whose middle is at a point: round for a ball and for a
+    cylinder that stands."""
+    solid, middle = layout.product.solids[label], layout.product.middle
+    x, y = at[0] - float(middle[0]), at[1] - float(middle[1])
+    paint = hexadecimal(solid.rgba)
+    if _is_round(solid):
+        centre = float(solid.position[0]) + x, float(solid.position[1]) + y
+        return Flat(style, (centre,), solid.size[0], name=label, paint=paint)
+    corners = hull(np.round(solid.corners[:, :2], 6))
+    return Flat(style, tuple((px + x, py + y) for px, py in corners), name=label, paint=paint)
+
+
+def _sweeps(layout: Layout) -> Iterator[Flat]:
+    """Coupled regions first, so that what is always kept clear lies on top."""
+    swept = regions(layout, piles(layout.factory, layout.product))
+    payloads = [region for region in swept if region.kind == PAYLOAD_BODY]
+    for style in ("coupled", "uncoupled"):
+        found = (r.box for r in payloads if (r.mode == ALWAYS) == (style == "uncoupled"))
+        yield from (Flat.of_box(style, box) for box in dict.fromkeys(found))
+
+
+def _robot(path: Guidepath, style: str) -> Iterator[Flat]:
+    half, rim, foot = CARRIAGE / 2, path.reach - path.arm, path.carriage(path.length)
+    nest = max(path.reach + path.nest, rim)
+    (x, y), (u, v) = foot, path.heading
+    yield Flat("finger", ((x + rim * u, y + rim * v), (x + nest * u, y + nest * v)))
+    arm: Extent = (0.0, rim, -ARM_WIDTH / 2, ARM_WIDTH / 2)
+    yield Flat.of_box("arm", path.world(arm, foot))
+    yield Flat.of_box(style, path.world((-half, half, -half, half), foot))
+
+
+def _is_round(solid: Solid) -> bool:
+    if solid.kind == "cylinder":
+        _, x, y, _ = solid.quaternion
+        return bool(abs(1 - 2 * (x * x + y * y)) > 1 - 1e-9)
+    return solid.kind == "sphere"
