@@ -43,6 +43,11 @@ class Drives:
         early = np.arange(samples) - samples - self.most - 0.5
         self._head = np.concatenate([[samples - 1.0], self.timestep * early])
 
+    @property
+    def time(self) -> float:
+        """[s]"""
+        return float(self._d.time)
+
     def sampled(self, axes: Index, x: Array, v: Array, a: Array, steps: int) -> Array:
         """Setpoints (n, legs * steps + 1, 3) in every step of legs of so many steps, and after
         them.
@@ -66,7 +71,7 @@ class Drives:
         held."""
         samples = setpoints.shape[1]
         drives, head = self._actuators[axes], self._head.copy()
-        head[1:] += float(self._d.time) + samples * self.timestep
+        head[1:] += self.time + samples * self.timestep
         self._buffers[drives, 1 : 1 + len(head)] = head
         self._buffers[drives, -INPUTS * samples :] = setpoints.reshape(len(axes), -1)
         self.show(axes, setpoints[:, -1])

@@ -21,8 +21,9 @@ from factory.support.engine import mujoco
 class Motion:
     """The axes of a model and their motion from `start` (axes without the tray,) [m] on.
 
-    `robots`: follows the active modes, on the axes `active`. `stepping` is set before the first
-    step.
+    `robots`: follows the active modes, on the axes `active`. `plan` (4, axes): since when [s], from
+    where [m], how fast [m/s] and under which acceleration [m/s²] axes run that `move` has set
+    going. `stepping` is set before the first step.
     """
 
     stepping: Stepping
@@ -42,6 +43,7 @@ class Motion:
         tray = Follower(x, v, self.drives, self.settings.substeps)
         self.outfeed = Outfeed(d, model, self.axes, tray, self.drives)
         self.active: Index = np.empty(0, np.intp)
+        self.plan = np.zeros((4, len(self.axes)))
 
     def begin(self, loads: Mapping[int, float]) -> None:
         """All axes stand, and each robot (index) carries its load [kg]."""
@@ -133,14 +135,29 @@ class Motion:
         """From now on `axes` run from x [m] at speed v [m/s] under acceleration a [m/s²], for as
         long as setpoints can be written ahead, or until they are told otherwise."""
         self.robots.x[axes], self.robots.v[axes] = x, v
-        moves = (np.asarray(v) != 0.0) | (np.asarray(a) != 0.0)
-        if not moves.any():
-            self.going.pop(tuple(axes.tolist()), None)
+        self.plan[0, axes] = self.drives.time
+        self.plan[1:, axes] = x, v, a
+        if not self.plan[2:, axes].any():
             self.robots.stop(axes)
             self.sleep.may_sleep(axes)
             return
-        steps = np.arange(self.drives.most + 1)[:, None] * self.settings.timestep
-        course = x + steps * (v + steps / 2 * a), v + steps * a
-        force = np.broadcast_to(np.asarray(a), (self.drives.most, len(axes)))
-        self.going[tuple(axes.tolist())] = self.robots.begin_with(axes, *course, force)
+        most = self.drives.most
+        ends = self._planned(axes, np.array([[0.0], [most * self.settings.timestep]]))
+        self.drives.follow(axes, self.drives.sampled(axes, *ends, self.plan[3:, axes], most))
         self.sleep.stay_awake(axes)
+
+    def show_moves(self) -> None:
+        """The references of axes that `move` has set going are where they are now."""
+        axes = np.flatnonzero(self.plan[2:].any(axis=0))
+        if len(axes):
+            begun, *_, a = self.plan[:, axes]
+            reach = self.drives.most * self.settings.timestep
+            x, v = self._planned(axes, np.minimum(self.drives.time - begun, reach))
+            self.robots.x[axes], self.robots.v[axes] = x, v
+            force = self.drives.mass[axes] * a + self.drives.weight[axes]
+            self.drives.show(axes, np.stack([x, v, force], axis=-1))
+
+    def _planned(self, axes: Index, t: Array) -> tuple[Array, Array]:
+        """Where axes are on their plans, and how fast, some time [s] after those began."""
+        _, x, v, a = self.plan[:, axes]
+        return x + t * (v + t / 2 * a), v + t * a

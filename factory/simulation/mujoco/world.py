@@ -138,6 +138,7 @@ class MujocoWorld:
 
     def settle(self) -> None:
         """A tick's timesteps are over, and the tray's next tick begins."""
+        self.motion.show_moves()
         self._settle(1)
         self.motion.move_tray(1)
 
