@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from factory.nets.behaviour import behaviour
+from factory.foreign_nets.behaviour import behaviour
 from factory.nets.marked import MarkedNet, marked
 from factory.plant.factory import Factory
 from factory.support.errors import InputError

@@ -2,8 +2,7 @@
 
 Nodes stand where the SVG of the net has them. What the standard has no place for (the gears, modes,
 labels, slots and redistribution functions) stands in `toolspecific` elements of tool `factory`,
-version 1. `read_pnml` of what `write_pnml` gives for a legally marked gear net is equal to that
-net.
+version 1. What `foreign_nets.pnml_reader` reads of a legally marked gear net is equal to that net.
 """
 
 from __future__ import annotations
@@ -14,7 +13,6 @@ from xml.sax.saxutils import escape, quoteattr
 
 from factory.export.subject import Subject
 from factory.export.swimlanes import Swimlanes, swimlanes
-from factory.foreign_nets.pnml_reader import NET_TYPE, PNML, TOOL, VERSION, read_pnml
 from factory.layout.layout import Point2
 from factory.nets.gears import Gear, GearNet
 from factory.nets.marked import MarkedNet, marked
@@ -22,9 +20,10 @@ from factory.nets.petri import Place, Transition
 from factory.nets.threaded import Redistribution
 from factory.support.errors import Position
 
-__all__ = ["FORMAT", "export", "read_pnml", "write_pnml"]
-
 FORMAT, TAKES = "pnml", "net"
+
+PNML = "http://www.pnml.org/version-2009/grammar/pnml"
+NET_TYPE = "http://www.pnml.org/version-2009/grammar/ptnet"
 
 BELOW, ABOVE = (0.0, 22.0), (0.0, -26.0)
 """Where names are drawn."""
@@ -70,7 +69,7 @@ def _lines(net: GearNet | MarkedNet) -> Iterator[str]:
 
 def _tool(content: Iterable[str]) -> str:
     inner = "".join(content)
-    return f'<toolspecific tool="{TOOL}" version="{VERSION}">{inner}</toolspecific>'
+    return f'<toolspecific tool="factory" version="1">{inner}</toolspecific>'
 
 
 def _attribute(name: str, value: object) -> str:
