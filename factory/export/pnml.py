@@ -72,8 +72,13 @@ def _tool(content: Iterable[str]) -> str:
     return f'<toolspecific tool="factory" version="1">{inner}</toolspecific>'
 
 
+def legal(text: str) -> str:
+    """A text with ? for each character that XML does not allow."""
+    return _ILLEGAL.sub("?", text)
+
+
 def _attribute(name: str, value: object) -> str:
-    return f" {name}={quoteattr(_ILLEGAL.sub('?', str(value)))}"
+    return f" {name}={quoteattr(legal(str(value)))}"
 
 
 def _gear(gear: Gear) -> str:
@@ -89,7 +94,7 @@ def _gear(gear: Gear) -> str:
 def _name(name: str, offset: Point2) -> str:
     """A node's name, and where it is drawn relative to the node."""
     place = f'<graphics><offset x="{offset[0]:.0f}" y="{offset[1]:.0f}"/></graphics>'
-    return f"<name>{place}<text>{escape(_ILLEGAL.sub('?', name))}</text></name>"
+    return f"<name>{place}<text>{escape(legal(name))}</text></name>"
 
 
 def _source(at: Position | None) -> str:
