@@ -117,7 +117,7 @@ def test_the_cycle_time_is_the_maximum_cycle_ratio(factory: Factory, data: st.Da
     found = marked_graph_cycle_time(factory.net, seconds)
     assert found.seconds == pytest.approx(cycle_time(factory.net, seconds).seconds)
     gears = {frozenset(gear.places) for gear in factory.net.gears}
-    assert frozenset(found.places) in gears
+    assert frozenset(found.circuit) in gears
 
 
 @given(st.integers(0, 10**9))
