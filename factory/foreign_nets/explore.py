@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import networkx as nx
+import numpy as np
+from scipy.sparse import csr_array
+from scipy.sparse.csgraph import connected_components
 
 from factory.nets.marked import MarkedNet
 
@@ -91,8 +93,17 @@ class StateSpace:
 
     def bottoms(self) -> list[list[int]]:
         """The strongly connected components that nothing leaves, by their first markings."""
-        graph = nx.DiGraph({n: [m for _, m in out] for n, out in enumerate(self.edges)})
-        return sorted(sorted(part) for part in nx.attracting_components(graph))
+        size = len(self.edges)
+        before = np.repeat(np.arange(size), [len(out) for out in self.edges])
+        after = np.fromiter((m for out in self.edges for _, m in out), np.intp)
+        graph = csr_array((np.ones(len(after), bool), (before, after)), (size, size))
+        _, part = connected_components(graph, connection="strong")
+        left = {*part[before[part[before] != part[after]]].tolist()}
+        bottoms: dict[int, list[int]] = {}
+        for number, component in enumerate(part.tolist()):
+            if component not in left:
+                bottoms.setdefault(component, []).append(number)
+        return list(bottoms.values())
 
 
 def explore(net: MarkedNet, limit: int = LIMIT) -> Exploration:
