@@ -237,7 +237,7 @@ def test_gears_without_slots_are_certified() -> None:
     assert all(document[claim]["holds"] is True for claim in _CLAIMS)
 
 
-def test_a_marked_place_of_nobody_is_not_legal() -> None:
+def test_a_marked_place_without_robots_is_not_legal() -> None:
     subject = marked(factory_of(paper()).net)
     places = (*subject.net.places, Place("spare", (), (), size=0))
     net = replace(subject.net, places=places)

@@ -16,7 +16,7 @@ import networkx as nx
 from factory.foreign_nets.explore import LIMIT, Exploration, explore
 from factory.nets.composition import cover
 from factory.nets.marked import NONE, MarkedNet, dead_ends, token_free
-from factory.nets.verdict import Violation, listing
+from factory.nets.verdict import Defect, listing
 
 WORK = 5_000_000
 """How many places the search for an unsafe one may look at."""
@@ -29,7 +29,7 @@ class Behaviour:
     live: bool | None
     safe: bool | None
     reversible: bool | None
-    violations: tuple[Violation, ...]
+    defects: tuple[Defect, ...]
     method: str
 
 
@@ -47,7 +47,7 @@ def behaviour(net: MarkedNet, closed: Sequence[bool] = (), limit: int = LIMIT) -
     return Behaviour(not dying, safe, not one_way, (*dying, *overfull, *one_way), "structure")
 
 
-def _dying(net: MarkedNet, stuck: tuple[int, ...]) -> Iterable[Violation]:
+def _dying(net: MarkedNet, stuck: tuple[int, ...]) -> Iterable[Defect]:
     """Why a marked graph is not live: a circuit free of tokens, or a place without producer."""
     names = net.net.places
     if stuck:
@@ -60,11 +60,11 @@ def _dying(net: MarkedNet, stuck: tuple[int, ...]) -> Iterable[Violation]:
         elif events[0] in net.blocked:
             text = f"place {shown} is before and after its transition, which is dead (Def. 3.4)"
             kind = "1-gear"
-        yield Violation("live", kind, text, (), circuit, events)
+        yield Defect("live", kind, text, (), circuit, events)
         return
     for p in dead_ends(net)[:1]:
         text = f"nothing marks place {names[p].name} again once its tokens are gone"
-        yield Violation("live", "missing producer", text, (), (p,), (net.right[p],))
+        yield Defect("live", "missing producer", text, (), (p,), (net.right[p],))
 
 
 def stuck_circuit(net: MarkedNet, stuck: Iterable[int]) -> tuple[int, ...]:
@@ -82,7 +82,7 @@ def stuck_circuit(net: MarkedNet, stuck: Iterable[int]) -> tuple[int, ...]:
     return tuple(waits.edges[edge]["place"] for edge in nx.find_cycle(waits))
 
 
-def _unsafe(net: MarkedNet, closed: Sequence[bool], stuck: frozenset[int]) -> Iterable[Violation]:
+def _unsafe(net: MarkedNet, closed: Sequence[bool], stuck: frozenset[int]) -> Iterable[Defect]:
     """A place of a marked graph that can hold two tokens, with the firings that put them there."""
     covered = cover(net, closed)
     work = 0
@@ -94,14 +94,14 @@ def _unsafe(net: MarkedNet, closed: Sequence[bool], stuck: frozenset[int]) -> It
             firing = play(net, bound.firings)
             when = f"after {len(firing)} firings" if firing else "initially"
             text = f"place {net.net.places[place].name} holds two tokens {when}"
-            yield Violation("safe", "two tokens", text, (), (place,), firing)
+            yield Defect("safe", "two tokens", text, (), (place,), firing)
             return
         work += bound.work
         for other in bound.circuit:
             covered[other] = max(covered[other], 0)
         if work > WORK:
             text = f"the search for a place with two tokens stopped after {WORK} steps"
-            yield Violation("safe", "undecided", text)
+            yield Defect("safe", "undecided", text)
             return
 
 
@@ -185,7 +185,7 @@ def play(net: MarkedNet, firings: Mapping[int, int]) -> tuple[int, ...]:
     return tuple(sequence)
 
 
-def _one_way(net: MarkedNet, stuck: tuple[int, ...]) -> Iterable[Violation]:
+def _one_way(net: MarkedNet, stuck: tuple[int, ...]) -> Iterable[Defect]:
     """An enabled transition connected to something that fires finitely often: in a component that
     repeats at all, all fire equally often."""
     graph, finite = nx.Graph(), set(stuck)
@@ -198,7 +198,7 @@ def _one_way(net: MarkedNet, stuck: tuple[int, ...]) -> Iterable[Violation]:
         if all(net.tokens[p] for p in net.net.preset[event]):
             name = net.net.transitions[event].name
             text = f"{name} can fire, but not so often that the initial marking returns"
-            yield Violation("reversible", "no way back", text, transitions=(event,))
+            yield Defect("reversible", "no way back", text, transitions=(event,))
             return
 
 
@@ -206,7 +206,7 @@ def _explored(net: MarkedNet, limit: int) -> Behaviour:
     """The properties of a net with choice, by its markings."""
     found = explore(net, limit)
     against = tuple(_found(net, found))
-    named = {violation.property for violation in against if violation.kind != "undecided"}
+    named = {defect.property for defect in against if defect.kind != "undecided"}
     live, safe, reversible = (
         False if name in named else True if found.complete else None
         for name in ("live", "safe", "reversible")
@@ -214,27 +214,27 @@ def _explored(net: MarkedNet, limit: int) -> Behaviour:
     return Behaviour(live, safe, reversible, against, "exploration")
 
 
-def _found(net: MarkedNet, found: Exploration) -> Iterable[Violation]:
+def _found(net: MarkedNet, found: Exploration) -> Iterable[Defect]:
     """What an exploration shows, or leaves undecided, of each property."""
     names, events = net.net.places, net.net.transitions
     text = f"undecided: {found.markings} markings were explored, and there are more"
     if found.deadlock is not None:
         reason = f"after {len(found.deadlock)} firings nothing is enabled any more"
-        yield Violation("live", "deadlock", reason, transitions=found.deadlock)
+        yield Defect("live", "deadlock", reason, transitions=found.deadlock)
     elif found.starved is not None:
         firing, event = found.starved
         reason = f"after {len(firing)} firings {events[event].name} can never fire again"
-        yield Violation("live", "dead transition", reason, transitions=firing or (event,))
+        yield Defect("live", "dead transition", reason, transitions=firing or (event,))
     elif not found.complete:
-        yield Violation("live", "undecided", text)
+        yield Defect("live", "undecided", text)
     if found.unsafe is not None:
         firing, place = found.unsafe
         reason = f"place {names[place].name} holds two tokens after {len(firing)} firings"
-        yield Violation("safe", "two tokens", reason, (), (place,), firing)
+        yield Defect("safe", "two tokens", reason, (), (place,), firing)
     elif not found.complete:
-        yield Violation("safe", "undecided", text)
+        yield Defect("safe", "undecided", text)
     if one_way := found.one_way or found.deadlock:
         reason = f"after {len(one_way)} firings the initial marking is out of reach"
-        yield Violation("reversible", "no way back", reason, transitions=one_way)
+        yield Defect("reversible", "no way back", reason, transitions=one_way)
     elif not found.complete:
-        yield Violation("reversible", "undecided", text)
+        yield Defect("reversible", "undecided", text)

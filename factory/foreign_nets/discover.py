@@ -15,10 +15,10 @@ import networkx as nx
 from factory.nets.composition import MOST, no_gear_net, notation
 from factory.nets.gears import Gear
 from factory.nets.marked import MANY, NONE, MarkedNet
-from factory.nets.verdict import Violation, listing
+from factory.nets.verdict import Defect, listing
 
 
-def discover(net: MarkedNet) -> tuple[tuple[Gear, ...], tuple[Violation, ...]]:
+def discover(net: MarkedNet) -> tuple[tuple[Gear, ...], tuple[Defect, ...]]:
     """The gears of a gear net, named g1, g2, ..., or the exact reasons why it is none."""
     if not net.net.places:
         return (), (no_gear_net("no gear", "the net has no places"),)
@@ -57,7 +57,7 @@ def _shared(net: MarkedNet) -> frozenset[int]:
     )
 
 
-def _local(net: MarkedNet, shared: frozenset[int]) -> Iterator[Violation]:
+def _local(net: MarkedNet, shared: frozenset[int]) -> Iterator[Defect]:
     """What around a single place or transition cannot be part of a gear net."""
     for place, (before, after) in enumerate(zip(net.left, net.right, strict=True)):
         called = f"place {net.net.places[place].name} = {notation(net, place)}"
@@ -95,7 +95,7 @@ def _contracted(net: MarkedNet, shared: frozenset[int]) -> nx.DiGraph:
     return graph
 
 
-def _no_circuit(net: MarkedNet, part: nx.DiGraph) -> Violation:
+def _no_circuit(net: MarkedNet, part: nx.DiGraph) -> Defect:
     """Why a biconnected component is no circuit: some of it lies on none, or on several."""
     for strong in nx.strongly_connected_components(part):
         if len(strong) == 1 and (place := ~next(iter(strong))) >= 0:

@@ -10,8 +10,8 @@ from factory.foreign_nets.explore import LIMIT
 from factory.nets.composition import compose
 from factory.nets.gears import GearNet
 from factory.nets.marked import MarkedNet, marked
-from factory.nets.verdict import Verdict, Violation, testify
-from factory.nets.verify import gear_net_violations, legality_violations
+from factory.nets.verdict import Verdict, Defect, testify
+from factory.nets.verify import gear_net_defects, legality_defects
 from factory.support.collector import collector_paused
 from factory.support.errors import Position
 
@@ -28,7 +28,7 @@ def analyse(
     gears there is no legal marking to speak of: `legal` is None. Linear in the net; only a net with
     choice is explored, up to `limit` markings. `sources`: as for `verify`.
     """
-    against: tuple[Violation, ...] = ()
+    against: tuple[Defect, ...] = ()
     if isinstance(net, MarkedNet) and not net.gears:
         gears, against = discover(net)
         net = net.with_gears(gears) if gears else net
@@ -36,14 +36,14 @@ def analyse(
     if against:
         text = "undecided: a legal marking marks each gear once, and the net has no gears"
         found, legal = behaviour(subject, (), limit), None
-        illegal: tuple[Violation, ...] = (Violation("legal", "undecided", text),)
+        illegal: tuple[Defect, ...] = (Defect("legal", "undecided", text),)
     else:
         composition = compose(subject)
-        against = gear_net_violations(net, composition)
+        against = gear_net_defects(net, composition)
         found = behaviour(subject, composition.closed, limit)
-        illegal = legality_violations(net, subject)
+        illegal = legality_defects(net, subject)
         legal = not illegal
-    witness = testify(subject, (*against, *found.violations, *illegal), sources)
+    witness = testify(subject, (*against, *found.defects, *illegal), sources)
     return Verdict(
         not against,
         found.live,

@@ -57,7 +57,7 @@ def claimed(notes: NetNotes, document: XmlDocument) -> GearNet | MarkedNet:
     try:
         return GearNet(ThreadedNet(notes.net, redistribution), gears, initial, slots)
     except ValueError as error:
-        if not compose(loose).violations:
+        if not compose(loose).defects:
             hint = "name each slot before and after it once, or leave the notes out"
             document.fault(notes.gears[0], str(error), hint)
             document.stop()

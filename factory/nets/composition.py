@@ -20,10 +20,10 @@ from itertools import islice
 
 from factory.nets.gears import Gear
 from factory.nets.marked import MANY, NONE, MarkedNet
-from factory.nets.verdict import Violation, listing
+from factory.nets.verdict import Defect, listing
 
 MOST = 10
-"""How many violations of one kind are listed."""
+"""How many defects of one kind are listed."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,13 +43,13 @@ class Joint:
 
 @dataclass(frozen=True, slots=True)
 class Composition:
-    """The gears in the order in which they compose the net, or the violations that forbid it.
+    """The gears in the order in which they compose the net, or the defects that forbid it.
 
     `closed`: for each gear whether it is a cycle of the net.
     """
 
     joints: tuple[Joint, ...]
-    violations: tuple[Violation, ...]
+    defects: tuple[Defect, ...]
     closed: tuple[bool, ...]
 
 
@@ -89,9 +89,9 @@ def no_gear_net(
     gears: Iterable[int] = (),
     places: Iterable[int] = (),
     transitions: Iterable[int] = (),
-) -> Violation:
-    """A violation of the property gear_net; each gear is named once."""
-    return Violation(
+) -> Defect:
+    """A defect that makes a net no gear net. Each gear is named once."""
+    return Defect(
         "gear_net", kind, reason, tuple(dict.fromkeys(gears)), tuple(places), tuple(transitions)
     )
 
@@ -109,7 +109,7 @@ def _is_cycle(net: MarkedNet, gear: Gear) -> bool:
     )
 
 
-def _unclosed(net: MarkedNet, number: int) -> Violation:
+def _unclosed(net: MarkedNet, number: int) -> Defect:
     """The exact reason why a gear is none."""
     gear, called = net.gears[number], f"the gear of {net.gears[number].robot}"
     places, events = gear.places, gear.transitions
@@ -144,7 +144,7 @@ def notation(net: MarkedNet, place: int) -> str:
     return f"[{before}; {listing(net.net.transitions[e].name for e in at.right)}]"
 
 
-def _uncovered(net: MarkedNet, passing: list[int]) -> Iterator[Violation]:
+def _uncovered(net: MarkedNet, passing: list[int]) -> Iterator[Defect]:
     """Places and transitions that are part of no gear."""
     for place, own in enumerate(net.owners):
         if not own:
@@ -159,7 +159,7 @@ def _uncovered(net: MarkedNet, passing: list[int]) -> Iterator[Violation]:
             yield no_gear_net("transition in no gear", text, transitions=[event])
 
 
-def _misplaced(net: MarkedNet) -> Iterator[Violation]:
+def _misplaced(net: MarkedNet) -> Iterator[Defect]:
     """Places whose slots belong to other robots than the gears through them."""
     for place, slots in enumerate(net.slots):
         own, at = net.owners[place], net.net.places[place]
@@ -177,7 +177,7 @@ def named(net: MarkedNet, gears: Iterable[int]) -> str:
     return listing(names) or "none"
 
 
-def _shared(net: MarkedNet, passing: list[int]) -> Iterator[Violation]:
+def _shared(net: MarkedNet, passing: list[int]) -> Iterator[Defect]:
     """Definition 3.6 (a) around each transition: gears that share it share one of its places, and
     just one."""
     owners = net.owners
@@ -202,7 +202,7 @@ def _shared(net: MarkedNet, passing: list[int]) -> Iterator[Violation]:
         yield no_gear_net(kind, text, gears, places, [event])
 
 
-def _tree(net: MarkedNet) -> tuple[tuple[Joint, ...], list[Violation]]:
+def _tree(net: MarkedNet) -> tuple[tuple[Joint, ...], list[Defect]]:
     """A breadth-first search over gears and shared places, which must form a tree."""
     if not net.gears:
         return (), [no_gear_net("no gear", "the net has no gears")]
@@ -226,7 +226,7 @@ def _tree(net: MarkedNet) -> tuple[tuple[Joint, ...], list[Violation]]:
     return _joints(net, order, entry)
 
 
-def _ring(net: MarkedNet) -> Violation:
+def _ring(net: MarkedNet) -> Defect:
     """A cycle in the incidence graph of gears (from 0) and shared places (from -1 down)."""
     import networkx as nx  # only a net that is none pays for it
 
@@ -242,7 +242,7 @@ def _ring(net: MarkedNet) -> Violation:
 
 def _joints(
     net: MarkedNet, order: list[int], entry: list[int]
-) -> tuple[tuple[Joint, ...], list[Violation]]:
+) -> tuple[tuple[Joint, ...], list[Defect]]:
     """Condition (b) for each gear after the first: some [c; a] in it with c not yet in the net."""
     there = bytearray(len(net.net.transitions))
     joints: list[Joint] = []

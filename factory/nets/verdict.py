@@ -15,7 +15,7 @@ PROPERTIES = ("gear_net", "live", "safe", "reversible", "legal")
 
 
 @dataclass(frozen=True, slots=True)
-class Violation:
+class Defect:
     """Why a property fails, or is undecided, by indices of gears, places and transitions.
 
     `kind` is one of a few fixed phrases (`lost token`, `unclosed gear`, ...); `reason` says it in
@@ -32,7 +32,7 @@ class Violation:
 
 @dataclass(frozen=True, slots=True)
 class Witness:
-    """A violation by names: robots, labels, places and transitions, and where they come from."""
+    """A defect by names: robots, labels, places and transitions, and where they come from."""
 
     property: str
     kind: str
@@ -91,13 +91,13 @@ class Verdict:
 
 
 def testify(
-    net: MarkedNet, violations: Iterable[Violation], sources: Mapping[str, Position] | None
+    net: MarkedNet, defects: Iterable[Defect], sources: Mapping[str, Position] | None
 ) -> tuple[Witness, ...]:
-    """The violations by names. `sources` adds the source positions of robots, by their names."""
-    return tuple(_witness(net, violation, sources or {}) for violation in violations)
+    """The defects by names. `sources` adds the source positions of robots, by their names."""
+    return tuple(_witness(net, defect, sources or {}) for defect in defects)
 
 
-def _witness(net: MarkedNet, against: Violation, sources: Mapping[str, Position]) -> Witness:
+def _witness(net: MarkedNet, against: Defect, sources: Mapping[str, Position]) -> Witness:
     places, events = net.net.places, net.net.transitions
     concerned = against.gears or _owners(net, against.places)
     robots = [net.gears[g].robot for g in concerned]

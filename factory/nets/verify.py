@@ -16,7 +16,7 @@ from itertools import islice
 from factory.nets.composition import MOST, Composition, compose, named
 from factory.nets.gears import GearNet
 from factory.nets.marked import MarkedNet, marked, token_free
-from factory.nets.verdict import Verdict, Violation, listing, testify
+from factory.nets.verdict import Verdict, Defect, listing, testify
 from factory.support.collector import collector_paused
 from factory.support.errors import Diagnostic, Position, RunError
 
@@ -42,12 +42,12 @@ def verify(net: GearNet | MarkedNet, sources: Mapping[str, Position] | None = No
     """
     subject = marked(net)
     composition = compose(subject)
-    against = gear_net_violations(net, composition)
-    illegal = legality_violations(net, subject)
+    against = gear_net_defects(net, composition)
+    illegal = legality_defects(net, subject)
     holds = True if not against + illegal and not token_free(subject).stuck else None
     text = "undecided: it is proved of gear nets with a legal marking only"
     behaviour = ("live", "safe", "reversible") if holds is None else ()
-    undecided = [Violation(name, "undecided", text) for name in behaviour]
+    undecided = [Defect(name, "undecided", text) for name in behaviour]
     return Verdict(
         not against,
         holds,
@@ -59,20 +59,18 @@ def verify(net: GearNet | MarkedNet, sources: Mapping[str, Position] | None = No
     )
 
 
-def gear_net_violations(
-    net: GearNet | MarkedNet, composition: Composition
-) -> tuple[Violation, ...]:
+def gear_net_defects(net: GearNet | MarkedNet, composition: Composition) -> tuple[Defect, ...]:
     """What speaks against a gear net: its composition, and slots that change their robot."""
     moved = _changed_slots(net) if isinstance(net, GearNet) else ()
-    return *composition.violations, *islice(moved, MOST)
+    return *composition.defects, *islice(moved, MOST)
 
 
-def legality_violations(net: GearNet | MarkedNet, subject: MarkedNet) -> tuple[Violation, ...]:
+def legality_defects(net: GearNet | MarkedNet, subject: MarkedNet) -> tuple[Defect, ...]:
     """What speaks against a legal initial marking of a net, and of the same as a marked net."""
     return tuple(islice(_illegal(net, subject), MOST))
 
 
-def _changed_slots(net: GearNet) -> Iterator[Violation]:
+def _changed_slots(net: GearNet) -> Iterator[Defect]:
     """Events that move a robot into another robot's slot."""
     slots = net.slots
     for event, pairs in enumerate(net.threaded.redistribution):
@@ -83,22 +81,22 @@ def _changed_slots(net: GearNet) -> Iterator[Violation]:
                     f"{net.threaded.transitions[event].name} moves slot {i + 1} of {names[p].name}"
                     f" to slot {j + 1} of {names[q].name}, which belongs to another robot"
                 )
-                yield Violation("gear_net", "slots", text, (), (p, q), (event,))
+                yield Defect("gear_net", "slots", text, (), (p, q), (event,))
 
 
-def _illegal(net: GearNet | MarkedNet, subject: MarkedNet) -> Iterator[Violation]:
+def _illegal(net: GearNet | MarkedNet, subject: MarkedNet) -> Iterator[Defect]:
     """Gears that are not marked exactly once, and what keeps f_m from being a bijection."""
     miscounted = tuple(_miscounted(subject))
     yield from miscounted
     if isinstance(net, GearNet) and len(net.initial) != len(net.gears):
         text = f"{len(net.initial)} initial places are given for {len(net.gears)} robots"
         kind = "lost token" if len(net.initial) < len(net.gears) else "doubled token"
-        yield Violation("legal", kind, text)
+        yield Defect("legal", kind, text)
     elif subject.slots and not miscounted:
         yield from _unthreaded(net, subject)
 
 
-def _miscounted(subject: MarkedNet) -> Iterator[Violation]:
+def _miscounted(subject: MarkedNet) -> Iterator[Defect]:
     """Gears that are not marked exactly once, and marked places in none."""
     tokens, names = subject.tokens, subject.net.places
     for number, gear in enumerate(subject.gears):
@@ -106,18 +104,18 @@ def _miscounted(subject: MarkedNet) -> Iterator[Violation]:
         count = sum(tokens[p] for p in on)
         if count == 0:
             text = f"the gear of {gear.robot} carries no token: it never moves"
-            yield Violation("legal", "lost token", text, (number,), gear.places[:1])
+            yield Defect("legal", "lost token", text, (number,), gear.places[:1])
         elif count > 1:
             where = listing(names[p].name for p in on)
             text = f"the gear of {gear.robot} carries {count} tokens, at {where}"
-            yield Violation("legal", "doubled token", text, (number,), tuple(on))
+            yield Defect("legal", "doubled token", text, (number,), tuple(on))
     for place, own in enumerate(subject.owners):
         if tokens[place] and not own:
             text = f"place {names[place].name} is marked and in no gear"
-            yield Violation("legal", "place in no gear", text, (), (place,))
+            yield Defect("legal", "place in no gear", text, (), (place,))
 
 
-def _unthreaded(net: GearNet | MarkedNet, subject: MarkedNet) -> Iterator[Violation]:
+def _unthreaded(net: GearNet | MarkedNet, subject: MarkedNet) -> Iterator[Defect]:
     """Marked places whose slots are not those of the robots that start there."""
     if isinstance(net, GearNet):
         initial = net.initial
@@ -134,4 +132,4 @@ def _unthreaded(net: GearNet | MarkedNet, subject: MarkedNet) -> Iterator[Violat
                 f" {named(subject, slots)}, but the robots that start there are"
                 f" {named(subject, robots)}"
             )
-            yield Violation("legal", "slots", text, tuple(robots), (place,))
+            yield Defect("legal", "slots", text, tuple(robots), (place,))

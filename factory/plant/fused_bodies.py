@@ -127,9 +127,9 @@ def fusing_pays(factory: Factory, product: Product) -> bool:
 
 
 def fused_copies(bodies: FusedBodies, factory: Factory, units: int | None) -> dict[str, int]:
-    """How many copies of each body a fused run needs: a part is in its feeder and in the hands of
-    its robot, or not yet fused; a sub-assembly in the hands of one robot; the product on the
-    outfeed's tray too; and what is relayed in the hands of each further robot."""
+    """How many copies of each body a fused run needs: of a part one in its feeder and one with its
+    robot, or not yet fused; of a sub-assembly one with its robot; of the product a further one on
+    the outfeed's tray; of what is relayed a further one with each further robot."""
     copies = {operation.label: 2 for operation in factory.leaves}
     (root,) = bodies.carried[factory.pag.root]
     copies |= {label: 2 if label == root else 1 for label in bodies.wholes}

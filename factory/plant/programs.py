@@ -32,7 +32,7 @@ class ProgramStep:
 
 @dataclass(frozen=True, slots=True)
 class Program:
-    """What a robot does for ever: its steps in the order of its gear."""
+    """What a robot repeats without end: its steps in the order of its gear."""
 
     robot: int
     name: str
@@ -72,7 +72,7 @@ def write_program(program: Program) -> str:
 
 
 def _condition(step: ProgramStep) -> str:
-    """What it waits for; with nobody to wait for, what the world must provide."""
+    """What it waits for: other robots, or where there are none, what the world must provide."""
     if step.until:
         return " ∧ ".join(f"state_{robot + 1} = {label}" for robot, label in step.until)
     return "a part is at the feeder" if step.label == NOPART else "the outfeed is free"
