@@ -19,7 +19,7 @@ ASIDE = ("foreign_nets", "networkx")
 OFF_THE_ROAD = {"foreign_nets", "export", "study", "commands"}
 """Rooms that may import `foreign_nets`: commands when they are given a net in PNML."""
 
-PLANTED = "import factory.nets.gears; import factory.foreign_nets.explore"
+PLANTED = "import factory.foreign_nets.behaviour"
 
 
 def entered(words: list[str], first: str = "") -> set[str]:

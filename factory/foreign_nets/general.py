@@ -10,7 +10,7 @@ from factory.foreign_nets.explore import LIMIT
 from factory.nets.composition import compose
 from factory.nets.gears import GearNet
 from factory.nets.marked import MarkedNet, marked
-from factory.nets.verdict import Verdict, Defect, testify
+from factory.nets.verdict import Defect, Verdict, testify
 from factory.nets.verify import gear_net_defects, legality_defects
 from factory.support.collector import collector_paused
 from factory.support.errors import Position

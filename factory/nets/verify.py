@@ -16,7 +16,7 @@ from itertools import islice
 from factory.nets.composition import MOST, Composition, compose, named
 from factory.nets.gears import GearNet
 from factory.nets.marked import MarkedNet, marked, token_free
-from factory.nets.verdict import Verdict, Defect, listing, testify
+from factory.nets.verdict import Defect, Verdict, listing, testify
 from factory.support.collector import collector_paused
 from factory.support.errors import Diagnostic, Position, RunError
 
