@@ -28,6 +28,8 @@ from factory.support.settings import Settings
 from factory.support.version import __version__ as __version__
 
 if TYPE_CHECKING:
+    import networkx as nx
+
     from factory.layout.layout import Layout
     from factory.nets.verdict import Verdict
     from factory.plant.factory import Factory
@@ -46,6 +48,7 @@ __all__ = [
     "lay_out",
     "load_pag",
     "run",
+    "to_networkx",
     "verify",
 ]
 
@@ -75,6 +78,26 @@ def verify(plan: Factory) -> Verdict:
     from factory.nets.verify import verify as prove
 
     return prove(plan.net)
+
+
+def to_networkx(subject: PAG | Factory) -> nx.DiGraph:
+    """The assembly tree of a PAG, or the net of a factory, as a digraph of networkx.
+
+    Nodes of a tree are labels, with `kind` (`part` or `assembly`), `operation` and `source`. Nodes
+    of a net are places p0, p1, ... and transitions t0, t1, ..., with `kind`, `name` and `source`;
+    places also with `mode`, `label`, `size`, `tokens` and `robots`.
+
+    >>> import factory, networkx
+    >>> pag = factory.load_pag("examples/paper.pag")
+    >>> sorted(networkx.ancestors(factory.to_networkx(pag), "sub2"))
+    ['part1', 'part2', 'sub1']
+    >>> net = factory.to_networkx(factory.compile(pag))
+    >>> [net.nodes[p]["name"] for p in net.predecessors("t0")]
+    ['r1:nopart', 'r2:part3', 'r3:sub2']
+    """
+    from factory.plant.graphs import to_networkx as graph_of
+
+    return graph_of(subject)
 
 
 def lay_out(

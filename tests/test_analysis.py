@@ -24,14 +24,14 @@ from factory.control.mode import Limits
 from factory.layout.layout import Layout
 from factory.modes.modes import robot_limits
 from factory.nets.cycle_ratio import max_cycle_ratio
-from factory.nets.firing import earliest_firings, settled_firings
 from factory.nets.marked import MarkedNet
-from factory.nets.slack import circuits, slacks
 from factory.simulation.run import Run
 from factory.simulation.simulation import Simulation
 from factory.study.analysis import Change, Timing, analyse
 from factory.study.analysis.bounds import wip_curve
+from factory.study.analysis.firing import earliest_firings, settled_firings
 from factory.study.analysis.flow import flow
+from factory.study.analysis.slack import circuits, slacks
 from factory.study.analysis.steady import reached
 from factory.study.analysis.timed import timed_net
 from factory.study.analysis.what_if import scenarios

@@ -16,11 +16,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-import factory.nets
-from factory.export.pnml import read_pnml, write_pnml
+import factory.export.certificate
+from factory.export.certificate.check import check_certificate
+from factory.export.certificate.listing import digest
+from factory.export.certificate.writer import certificate
+from factory.export.pnml import write_pnml
 from factory.foreign_nets.general import analyse
-from factory.nets.certificate import certificate, check_certificate
-from factory.nets.certificate_net import digest
+from factory.foreign_nets.pnml_reader import read_pnml
 from factory.nets.gears import GearNet
 from factory.nets.marked import MarkedNet, marked
 from factory.nets.petri import Place
@@ -235,7 +237,7 @@ def test_gears_without_slots_are_certified() -> None:
     assert all(document[claim]["holds"] is True for claim in _CLAIMS)
 
 
-def test_a_marked_place_of_nobody_is_not_legal() -> None:
+def test_a_marked_place_without_robots_is_not_legal() -> None:
     subject = marked(factory_of(paper()).net)
     places = (*subject.net.places, Place("spare", (), (), size=0))
     net = replace(subject.net, places=places)
@@ -268,9 +270,14 @@ def test_junk_is_no_certificate(junk: object) -> None:
 
 
 def test_the_checker_uses_nothing_that_made_the_certificate() -> None:
-    folder = Path(factory.nets.__file__ or "").parent
-    for name in ("certificate_check", "certificate_net", "certificate_refute"):
-        tree = ast.parse((folder / f"{name}.py").read_text("utf-8"))
-        froms = [n.module or "" for n in ast.walk(tree) if isinstance(n, ast.ImportFrom)]
-        inside = {module for module in froms if module.startswith("factory")}
-        assert all(module.startswith("factory.nets.certificate_") for module in inside)
+    folder = Path(factory.export.certificate.__file__ or "").parent
+    checker = {path.stem: path for path in folder.glob("*.py")}
+    assert set(checker) == {"__init__", "writer", "check", "listing", "refute"}
+    allowed = {f"factory.export.certificate.{name}" for name in ("check", "listing", "refute")}
+    for name in ("check", "listing", "refute"):
+        tree = ast.parse(checker[name].read_text("utf-8"))
+        froms = {n.module or "" for n in ast.walk(tree) if isinstance(n, ast.ImportFrom)}
+        plain = {a.name for n in ast.walk(tree) if isinstance(n, ast.Import) for a in n.names}
+        inside = {module for module in froms | plain if module.split(".")[0] == "factory"}
+        assert inside <= allowed, name
+    assert not (folder / "__init__.py").read_text("utf-8").strip()

@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 import trimesh
 
-from factory.nets.certificate_check import check_certificate
+from factory.export.certificate.check import check_certificate
 from tests.command_line import PAPER, ROOT, Terminal, files_in, spawn
 
 NUMBER = (int, float)

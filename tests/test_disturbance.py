@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from factory.simulation.mujoco.fast.reference_cache import Courses
 
 from factory.simulation.disturbance import (
     Delay,
@@ -16,7 +17,6 @@ from factory.simulation.disturbance import (
     Slowed,
     disturb,
 )
-from factory.simulation.mujoco.fast.reference_cache import Courses
 from factory.simulation.simulation import Simulation
 from factory.support.engine import mujoco
 from factory.support.errors import InputError

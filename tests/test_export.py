@@ -19,15 +19,18 @@ from typing import Any
 from xml.etree import ElementTree
 
 import lark
+import networkx as nx
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import factory.export
+from factory import to_networkx
 from factory.export import exporters
 from factory.export.bodies import file_name
 from factory.export.events import COLUMNS
+from factory.export.graphml import write_graphml
 from factory.export.svg import draw_net
 from factory.export.swimlanes import owners_of, swimlanes
 from factory.export.tina import write_tina
@@ -40,10 +43,10 @@ from factory.nets.petri import PetriNet, Place, Transition
 from factory.plant.factory import Factory
 from tests.command_line import PAPER, ROOT, Terminal, files_in
 from tests.export_values import LAMP, MESHES, kept_log, made, subject
-from tests.net_values import planted
+from tests.net_values import net_from, planted
 from tests.pag_values import factories
 
-TEXTS = ("pnml", "tina", "dot", "svg", "dxf", "st")
+TEXTS = ("pnml", "tina", "dot", "graphml", "svg", "dxf", "st")
 
 
 @pytest.fixture(scope="module")
@@ -202,7 +205,7 @@ def test_a_folder_gets_every_label(run: Terminal, out: Path) -> None:
 
 def test_nets_from_elsewhere(run: Terminal, out: Path) -> None:
     assert run("export", PAPER, "--format", "pnml", "-o", out / "net.pnml").status == 0
-    for form in ("dot", "svg"):
+    for form in ("dot", "svg", "graphml"):
         shown = run("export", out / "net.pnml", "--format", form).out
         assert shown.replace("net: 6 robots", "paper: 6 robots") == run(
             "export", PAPER, "--format", form
@@ -275,6 +278,29 @@ def test_tina_names() -> None:
         "tr a_s' {x\\{y\\}\\\\ z} -> a_s\ntr b' a_s -> {x\\{y\\}\\\\ z}\n"
     )
     assert read_tina(write_tina(net, "n"))[0] == {"a_s": 2, "x{y}\\ z": 0}
+
+
+@given(factories(12))
+@settings(max_examples=20, deadline=None)
+def test_graphs_of_networkx_are_the_net_and_the_tree(made_factory: Factory) -> None:
+    net, graph = marked(made_factory.net), to_networkx(made_factory)
+    arcs = {(f"t{e}", f"p{p}") for p, at in enumerate(net.net.places) for e in at.left}
+    arcs |= {(f"p{p}", f"t{e}") for p, at in enumerate(net.net.places) for e in at.right}
+    assert set(graph.edges) == arcs
+    assert len(graph) == len(net.net.places) + len(net.net.transitions)
+    assert nx.is_strongly_connected(graph)
+    tree = to_networkx(made_factory.pag)
+    assert tree.graph["root"] == made_factory.pag.root
+    assert list(nx.topological_sort(tree))[-1] == made_factory.pag.root
+    assert set(tree) == {node.label for node in made_factory.pag.nodes}
+
+
+def test_graphml_has_no_sign_that_xml_forbids() -> None:
+    net = net_from([("a", "b", 1), ("b", "a", 0)])
+    odd = replace(net.net, transitions=(Transition("<&\x01>"), Transition("b")))
+    text = write_graphml(replace(net, net=odd))
+    assert nx.parse_graphml(text).nodes["t0"]["name"] == "<&?>"
+    assert write_graphml(replace(net, net=odd)) == text
 
 
 @given(factories(20), st.randoms(use_true_random=False), st.integers(-1, 4))

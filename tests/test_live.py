@@ -16,6 +16,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pytest
+from factory.simulation.disturbance.hands import Hands
 
 from factory.nets.replay import replay
 from factory.record.monitor import beside
@@ -35,7 +36,6 @@ from factory.show.live.commands import (
 from factory.show.live.page import page, stage_of
 from factory.show.report.drawings import floor_plan
 from factory.show.report.links import labels_of
-from factory.simulation.disturbance.hands import Hands
 from factory.simulation.simulation import Simulation
 from factory.support.errors import InputError
 from tests.command_line import PAPER, Terminal, started

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from factory.nets.behaviour import behaviour
+from factory.foreign_nets.behaviour import behaviour
 from factory.nets.marked import MarkedNet, marked
 from factory.plant.factory import Factory
 from factory.support.errors import InputError
@@ -117,7 +117,7 @@ def test_the_cycle_time_is_the_maximum_cycle_ratio(factory: Factory, data: st.Da
     found = marked_graph_cycle_time(factory.net, seconds)
     assert found.seconds == pytest.approx(cycle_time(factory.net, seconds).seconds)
     gears = {frozenset(gear.places) for gear in factory.net.gears}
-    assert frozenset(found.places) in gears
+    assert frozenset(found.circuit) in gears
 
 
 @given(st.integers(0, 10**9))

@@ -9,9 +9,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from factory.foreign_nets.behaviour import play
 from factory.nets.gears import Gear, GearNet
 from factory.nets.history import firings, legal_marking
-from factory.nets.marked import marked, play
+from factory.nets.marked import marked
 from factory.nets.replay import replay
 from factory.nets.threaded import ThreadedNet
 from factory.plant.factory import Factory

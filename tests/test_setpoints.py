@@ -9,14 +9,14 @@ from typing import Any
 
 import numpy as np
 import pytest
+from factory.simulation.mujoco.fast.checkpoint import Rewind, tell_who_is_awake
+from factory.simulation.mujoco.fast.reference_cache import Course, Courses
 
 from factory.control.governor import follow
 from factory.mjcf.model import GRAVITY, HEAD_MASS
 from factory.simulation import supervisor
 from factory.simulation.mujoco import world as physics
 from factory.simulation.mujoco.drives import INPUTS, Told
-from factory.simulation.mujoco.fast.checkpoint import Rewind, tell_who_is_awake
-from factory.simulation.mujoco.fast.reference_cache import Course, Courses
 from factory.simulation.simulation import Simulation
 from factory.support.engine import mujoco
 from factory.support.settings import Settings

@@ -29,7 +29,6 @@ from factory.modes import staging
 from factory.modes.modes import operation_modes, robot_limits
 from factory.modes.staging import stages
 from factory.nets.cycle_ratio import max_cycle_ratio
-from factory.nets.firing import earliest_firings
 from factory.nets.marked import MarkedNet
 from factory.nets.petri import PetriNet, Place, Transition
 from factory.problem.pag import NOPART
@@ -38,6 +37,7 @@ from factory.simulation import simulation as simulations
 from factory.simulation.simulation import Simulation
 from factory.study.analysis import Timing
 from factory.study.analysis.analysing import operation_slacks
+from factory.study.analysis.firing import earliest_firings
 from factory.study.analysis.flow import flow
 from factory.study.analysis.timed import timed_net
 from factory.study.analysis.timing import Change

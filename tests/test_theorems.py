@@ -10,9 +10,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from factory.foreign_nets.behaviour import play
 from factory.foreign_nets.general import analyse
 from factory.nets.history import firings
-from factory.nets.marked import MarkedNet, marked, play
+from factory.nets.marked import MarkedNet, marked
 from factory.nets.petri import Marking
 from factory.nets.verify import verify
 from factory.plant.factory import Factory

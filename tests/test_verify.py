@@ -14,8 +14,9 @@ from factory.foreign_nets.general import analyse
 from factory.nets.gears import Gear, GearNet
 from factory.nets.marked import MarkedNet, marked
 from factory.nets.verdict import Verdict, Witness
-from factory.nets.verify import verify
+from factory.nets.verify import proved, verify
 from factory.plant.factory import Factory
+from factory.support.errors import RunError
 from tests.net_values import (
     crossed_twice,
     doubled_token,
@@ -101,7 +102,7 @@ def test_broken_factories_agree_with_brute_force(
     net = factory.net
     broken = planted(net, rng, which)
     truth = explored(broken, 1_500, 3)
-    verdict = verify(broken)
+    verdict = analyse(broken)
     assert not verdict.holds
     if truth is None:
         return
@@ -112,10 +113,34 @@ def test_broken_factories_agree_with_brute_force(
     )
 
 
+@given(factories(20), st.randoms(use_true_random=False), st.integers(0, 4))
+def test_the_linear_proof_claims_nothing_else(
+    factory: Factory, rng: random.Random, which: int
+) -> None:
+    """Of a broken factory it proves no more than that: the rest is undecided, with a witness."""
+    broken = planted(factory.net, rng, which)
+    proof, truth = verify(broken), analyse(broken)
+    assert not proof.holds
+    assert (proof.gear_net, proof.legal) == (truth.gear_net, truth.legal)
+    assert (proof.live, proof.safe, proof.reversible) == (None, None, None)
+    undecided = [w for w in proof.witness if w.kind == "undecided"]
+    assert [w.property for w in undecided] == ["live", "safe", "reversible"]
+    decided = [w for w in truth.witness if w.property in ("gear_net", "legal")]
+    assert [w for w in proof.witness if w not in undecided] == decided
+
+
+def test_what_is_not_proved_is_refused() -> None:
+    net = factory_of(paper()).net
+    assert proved(net) == verify(net)
+    with pytest.raises(RunError, match="NotProved") as caught:
+        proved(replace(net, initial=net.initial[1:]))
+    assert "5 initial places are given for 6 robots" in str(caught.value)
+
+
 @given(factories(), st.randoms(use_true_random=False))
 def test_a_lost_token_is_named(factory: Factory, rng: random.Random) -> None:
     robot = rng.randrange(len(factory.robots))
-    verdict = verify(lost_token(factory.net, robot))
+    verdict = analyse(lost_token(factory.net, robot))
     assert (verdict.gear_net, verdict.live, verdict.safe, verdict.legal) == (
         True,
         False,
@@ -133,7 +158,7 @@ def test_a_lost_token_is_named(factory: Factory, rng: random.Random) -> None:
 @given(factories(), st.randoms(use_true_random=False))
 def test_a_doubled_token_is_named(factory: Factory, rng: random.Random) -> None:
     robot = rng.randrange(len(factory.robots))
-    verdict = verify(doubled_token(factory.net, robot))
+    verdict = analyse(doubled_token(factory.net, robot))
     assert (verdict.gear_net, verdict.safe, verdict.legal) == (True, False, False)
     assert witness(verdict, "doubled token").robots == (factory.robots[robot].name,)
     assert witness(verdict, "two tokens").lines
@@ -148,7 +173,7 @@ def test_an_unclosed_gear_is_named(factory: Factory, rng: random.Random) -> None
     event = (after + 1 + rng.randrange(len(net.threaded.transitions) - 1)) % len(
         net.threaded.transitions
     )
-    verdict = verify(unclosed_gear(net, robot, step, event))
+    verdict = analyse(unclosed_gear(net, robot, step, event))
     assert verdict.gear_net is False
     found = witness(verdict, "unclosed gear")
     assert factory.robots[robot].name in {r for w in verdict.witness for r in w.robots}
@@ -160,7 +185,7 @@ def test_an_unclosed_gear_is_named(factory: Factory, rng: random.Random) -> None
 def test_a_missing_producer_is_named(factory: Factory, rng: random.Random) -> None:
     net = factory.net
     place = rng.randrange(len(net.threaded.places))
-    verdict = verify(missing_producer(net, place))
+    verdict = analyse(missing_producer(net, place))
     assert (verdict.gear_net, verdict.live) == (False, False)
     found = witness(verdict, "missing producer")
     assert found.places == (net.threaded.places[place].name,)
@@ -176,7 +201,7 @@ def test_gears_that_cross_twice_are_named(factory: Factory, rng: random.Random) 
     one, other = rng.choice(pairs)
     broken = crossed_twice(net, one, other)
     assert broken is not None
-    verdict = verify(broken)
+    verdict = analyse(broken)
     assert verdict.gear_net is False
     found = witness(verdict, "two gears cross twice")
     assert set(found.robots) == {net.gears[one].robot, net.gears[other].robot}
@@ -204,7 +229,7 @@ def test_a_ring_of_three_gears() -> None:
             ("r3", (2, 7, 0, 8), "c0 c1 a0 a1"),
         )
     )
-    verdict = verify(replace(net, gears=gears))
+    verdict = analyse(replace(net, gears=gears))
     found = witness(verdict, "two gears cross twice")
     assert set(found.robots) == {"r1", "r2", "r3"}
     assert set(found.places) == {"p0", "p1", "p2"}
@@ -214,7 +239,7 @@ def test_a_ring_of_three_gears() -> None:
 def test_gears_apart() -> None:
     net = net_from([("a", "b", 1), ("b", "a", 0), ("c", "d", 1), ("d", "c", 0)])
     gears = (Gear("r1", "dot", (0, 1), (0, 1)), Gear("r2", "dot", (2, 3), (2, 3)))
-    verdict = verify(replace(net, gears=gears))
+    verdict = analyse(replace(net, gears=gears))
     assert witness(verdict, "gears apart").robots == ("r2",)
     assert (verdict.live, verdict.safe, verdict.reversible) == (True, True, True)
     assert analyse(net).gear_net is False
@@ -222,7 +247,7 @@ def test_gears_apart() -> None:
 
 def test_a_gear_of_one_place() -> None:
     net = net_from([("a", "a", 1)])
-    for verdict in (verify(replace(net, gears=(Gear("r1", "", (0,), (0,)),))), analyse(net)):
+    for verdict in (analyse(replace(net, gears=(Gear("r1", "", (0,), (0,)),))), analyse(net)):
         assert (verdict.gear_net, verdict.live, verdict.reversible) == (False, False, True)
         assert witness(verdict, "1-gear").reason
 
@@ -230,7 +255,7 @@ def test_a_gear_of_one_place() -> None:
 def test_a_place_in_no_gear() -> None:
     subject = marked(factory_of(paper()).net)
     net = replace(subject, gears=subject.gears[:-1])
-    verdict = verify(net)
+    verdict = analyse(net)
     assert verdict.gear_net is False
     assert witness(verdict, "place in no gear").labels
 
@@ -238,14 +263,14 @@ def test_a_place_in_no_gear() -> None:
 def test_gears_that_share_a_transition_only() -> None:
     net = net_from([("a", "b", 1), ("b", "a", 0), ("a", "c", 1), ("c", "a", 0)])
     gears = (Gear("r1", "", (0, 1), (0, 1)), Gear("r2", "", (2, 3), (0, 2)))
-    assert witness(verify(replace(net, gears=gears)), "no shared place").transitions == ("a",)
+    assert witness(analyse(replace(net, gears=gears)), "no shared place").transitions == ("a",)
     assert witness(analyse(net), "no shared place").transitions == ("a",)
 
 
 def test_initial_places_of_a_gear_net() -> None:
     net = factory_of(paper()).net
     for initial in (net.initial[1:], net.initial[:1] + net.initial, (net.initial[1],) * 6):
-        verdict = verify(replace(net, initial=initial))
+        verdict = analyse(replace(net, initial=initial))
         assert verdict.legal is False
         assert verdict.gear_net
 
@@ -254,36 +279,36 @@ def test_a_robot_in_another_robots_slot() -> None:
     net = factory_of(paper()).net
     slots = list(net.slots)
     slots[0] = slots[0][::-1]
-    verdict = verify(replace(net, slots=tuple(slots)))
+    verdict = analyse(replace(net, slots=tuple(slots)))
     assert verdict.gear_net is False
     assert "belongs to another robot" in witness(verdict, "slots").reason
     slots[0] = (0, 1)
-    assert "acts on 3 robots" in witness(verify(replace(net, slots=tuple(slots))), "slots").reason
+    assert "acts on 3 robots" in witness(analyse(replace(net, slots=tuple(slots))), "slots").reason
 
 
 @pytest.mark.parametrize("slots", [(), (-1,), (1,), (2, 2), (2, -1)])
-def test_slots_of_a_marked_place_that_are_not_of_who_starts_there(slots: tuple[int, ...]) -> None:
+def test_slots_of_a_marked_place_that_are_not_of_the_robots_there(slots: tuple[int, ...]) -> None:
     net = factory_of(paper()).net
     place = net.initial[2]
     changed = (*net.slots[:place], slots, *net.slots[place + 1 :])
     for subject in (replace(net, slots=changed), replace(marked(net), slots=changed)):
-        verdict = verify(subject)
+        verdict = analyse(subject)
         assert verdict.legal is False
         last = verdict.witness[-1]
         assert (last.property, last.kind) == ("legal", "slots")
-        assert "who starts there is r3" in last.reason
+        assert "the robots that start there are r3" in last.reason
 
 
 def test_a_marked_place_of_another_size() -> None:
     subject = marked(factory_of(paper()).net)
     places = tuple(replace(p, size=2) if "nopart" in p.name else p for p in subject.net.places)
-    verdict = verify(replace(subject, net=replace(subject.net, places=places)))
+    verdict = analyse(replace(subject, net=replace(subject.net, places=places)))
     assert verdict.legal is False
     assert "acts on 2 robots with slots for r1" in witness(verdict, "slots").reason
 
 
 def test_the_verdict_as_json() -> None:
-    verdict = verify(lost_token(factory_of(paper()).net, 4))
+    verdict = analyse(lost_token(factory_of(paper()).net, 4))
     document = verdict.as_json()
     assert document["live"] is False
     first = verdict.witness[0].as_json()

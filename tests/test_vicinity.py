@@ -9,16 +9,16 @@ from typing import Any
 
 import numpy as np
 import pytest
-
-from factory.layout.layout import Layout
-from factory.simulation.disturbance import Push, disturb
 from factory.simulation.disturbance.hands import Hands
-from factory.simulation.mujoco import parts as stock
-from factory.simulation.mujoco.contacts import NOBODY
-from factory.simulation.mujoco.fast import broad_phase as vicinity
 from factory.simulation.mujoco.fast.broad_phase import CALM, SWAY, Vicinity
 from factory.simulation.mujoco.fast.swept_boxes import CELL, Reach
 from factory.simulation.mujoco.loads import Load, loads
+
+from factory.layout.layout import Layout
+from factory.simulation.disturbance import Push, disturb
+from factory.simulation.mujoco import parts as stock
+from factory.simulation.mujoco.contacts import NOBODY
+from factory.simulation.mujoco.fast import broad_phase as vicinity
 from factory.simulation.mujoco.parts import Stock
 from factory.simulation.simulation import Simulation
 from factory.study.fidelity.shadow import Shadow

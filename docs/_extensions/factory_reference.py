@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 ROOT = Path(__file__).resolve().parents[2]
 PACKAGE = ROOT / "factory"
 
-CALLS = ("load_pag", "compile", "verify", "lay_out", "run")
+CALLS = ("load_pag", "compile", "verify", "lay_out", "run", "to_networkx")
 VALUES = (
     *("support.settings.Settings", "problem.pag.PAG", "problem.pag.Assembly"),
     *("problem.template.Template", "plant.factory.Factory", "plant.factory.Operation"),

@@ -66,7 +66,7 @@ def analyze(
     **options: Any,
 ) -> int:
     """Say what sets the pace of FILE.pag (or of a net in FILE.pnml), and what would change it."""
-    from factory.commands.check_product import is_net
+    from factory.support.files import is_net
 
     if is_net(file):
         for_a_pag(file, "a net in PNML", "delays", "output")
@@ -80,7 +80,7 @@ def analyze(
 def _analyze_net(
     file: Path, delays: Path | None, output: Path | None, as_json: bool, quiet: bool, verbose: bool
 ) -> int:
-    from factory.export.pnml import read_pnml
+    from factory.foreign_nets.pnml_reader import read_pnml
     from factory.lang.source import read_text
     from factory.study.analysis.general import analyse_net, net_document, net_tables, read_delays
 

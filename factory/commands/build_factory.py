@@ -96,10 +96,10 @@ def _stem(source: Source) -> str:
 
 def _documents(layout: Layout, clear: Certificate, verdict: Verdict) -> dict[str, str]:
     """Everything about the factory but the model, as texts by the endings of their files."""
+    from factory.export.certificate.writer import certificate
     from factory.export.dot import write_dot
     from factory.export.floor_sheet import write_svg
     from factory.export.pnml import write_pnml
-    from factory.nets.certificate import certificate
     from factory.plant.programs import program_of, write_program
 
     factory = layout.factory

@@ -24,6 +24,7 @@ from factory.commands.options import (
 from factory.support.collector import collector_paused
 from factory.support.console import emit, say, warn
 from factory.support.errors import Diagnostic, InputError, did_you_mean
+from factory.support.files import is_net
 
 if TYPE_CHECKING:
     from factory.plant.factory import Factory
@@ -49,7 +50,7 @@ def check(
     **options: Any,
 ) -> int:
     """Parse, compile and prove FILE.pag (or a net in FILE.pnml)."""
-    from factory.commands.check_product import check_file, describe, is_net
+    from factory.commands.check_product import check_file, describe
 
     if is_net(file):
         for_a_pag(file, "a net in PNML", "certificate")

@@ -15,6 +15,7 @@ from factory.nets.petri import Place
 from factory.nets.verdict import Verdict
 from factory.plant.factory import Factory
 from factory.support.console import say, table
+from factory.support.files import is_net
 
 if TYPE_CHECKING:
     from factory.compiler.mating import Matings
@@ -42,7 +43,7 @@ class Checked:
 
     def certificate(self) -> str:
         """The proof as a document that another program can check."""
-        from factory.nets.certificate import certificate
+        from factory.export.certificate.writer import certificate
 
         return json.dumps(certificate(self.net, self.verdict), ensure_ascii=False) + "\n"
 
@@ -125,23 +126,10 @@ def check_file(
     )
 
 
-def is_net(file: Path) -> bool:
-    """Whether a file is meant as PNML: by its ending, or because it begins as XML does."""
-    if file.suffix.lower() == ".pnml":
-        return True
-    try:
-        if not file.is_file():
-            return False
-        with file.open("rb") as stream:
-            return stream.read(100).lstrip(b"\xef\xbb\xbf \t\r\n").startswith(b"<")
-    except OSError:
-        return False
-
-
 def check_net(file: Path) -> Checked:
     """Check a net from elsewhere; it may well fail. Raises InputError."""
-    from factory.export.pnml import read_pnml
     from factory.foreign_nets.general import analyse
+    from factory.foreign_nets.pnml_reader import read_pnml
     from factory.lang.source import read_text
 
     net = read_pnml(read_text(file), str(file))

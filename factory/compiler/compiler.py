@@ -283,11 +283,11 @@ def gear_net(robots: tuple[Robot, ...], operations: tuple[Operation, ...]) -> Ge
     Operation i has transitions 2i and 2i + 1 and place i; the wait places follow, robot by robot.
     """
     transitions = tuple(
-        Transition(f"{o.name}_{end}", o.position) for o in operations for end in ("s", "e")
+        Transition(f"{o.label}_{end}", o.position) for o in operations for end in ("s", "e")
     )
     places = [
         Place(
-            o.name,
+            o.label,
             (o.start,),
             (o.end,),
             o.template.name,

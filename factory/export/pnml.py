@@ -2,8 +2,7 @@
 
 Nodes stand where the SVG of the net has them. What the standard has no place for (the gears, modes,
 labels, slots and redistribution functions) stands in `toolspecific` elements of tool `factory`,
-version 1. `read_pnml` of what `write_pnml` gives for a legally marked gear net is equal to that
-net.
+version 1. What `foreign_nets.pnml_reader` reads of a legally marked gear net is equal to that net.
 """
 
 from __future__ import annotations
@@ -14,7 +13,6 @@ from xml.sax.saxutils import escape, quoteattr
 
 from factory.export.subject import Subject
 from factory.export.swimlanes import Swimlanes, swimlanes
-from factory.foreign_nets.pnml_reader import NET_TYPE, PNML, TOOL, VERSION, read_pnml
 from factory.layout.layout import Point2
 from factory.nets.gears import Gear, GearNet
 from factory.nets.marked import MarkedNet, marked
@@ -22,9 +20,10 @@ from factory.nets.petri import Place, Transition
 from factory.nets.threaded import Redistribution
 from factory.support.errors import Position
 
-__all__ = ["FORMAT", "export", "read_pnml", "write_pnml"]
-
 FORMAT, TAKES = "pnml", "net"
+
+PNML = "http://www.pnml.org/version-2009/grammar/pnml"
+NET_TYPE = "http://www.pnml.org/version-2009/grammar/ptnet"
 
 BELOW, ABOVE = (0.0, 22.0), (0.0, -26.0)
 """Where names are drawn."""
@@ -70,11 +69,16 @@ def _lines(net: GearNet | MarkedNet) -> Iterator[str]:
 
 def _tool(content: Iterable[str]) -> str:
     inner = "".join(content)
-    return f'<toolspecific tool="{TOOL}" version="{VERSION}">{inner}</toolspecific>'
+    return f'<toolspecific tool="factory" version="1">{inner}</toolspecific>'
+
+
+def legal(text: str) -> str:
+    """A text with ? for each character that XML does not allow."""
+    return _ILLEGAL.sub("?", text)
 
 
 def _attribute(name: str, value: object) -> str:
-    return f" {name}={quoteattr(_ILLEGAL.sub('?', str(value)))}"
+    return f" {name}={quoteattr(legal(str(value)))}"
 
 
 def _gear(gear: Gear) -> str:
@@ -90,7 +94,7 @@ def _gear(gear: Gear) -> str:
 def _name(name: str, offset: Point2) -> str:
     """A node's name, and where it is drawn relative to the node."""
     place = f'<graphics><offset x="{offset[0]:.0f}" y="{offset[1]:.0f}"/></graphics>'
-    return f"<name>{place}<text>{escape(_ILLEGAL.sub('?', name))}</text></name>"
+    return f"<name>{place}<text>{escape(legal(name))}</text></name>"
 
 
 def _source(at: Position | None) -> str:

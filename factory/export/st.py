@@ -19,7 +19,7 @@ from factory.control.mode import REST, Mode
 from factory.export.subject import Subject
 from factory.layout.layout import Layout
 from factory.modes.modes import operation_modes
-from factory.plant.programs import Program, Step, program_of
+from factory.plant.programs import Program, ProgramStep, program_of
 from factory.problem.pag import NOPART
 
 FORMAT, TAKES = "st", "pag"
@@ -117,7 +117,7 @@ class _Writer:
         yield f"    Cells : ARRAY [1..{len(self.layout.guidepaths)}] OF CELL;"
         yield f"    Axes : ARRAY [1..{self.axes}] OF AXIS;"
 
-    def _step(self, program: Program, number: int, step: Step) -> Iterator[str]:
+    def _step(self, program: Program, number: int, step: ProgramStep) -> Iterator[str]:
         """Wait for the others, run until the label changes; the carrier waits till they follow."""
         base = 3 * number
         yield f"    {base + WAIT}: (* {_comment(f'{step.wait} {step.label}')} *)"
@@ -133,11 +133,11 @@ class _Writer:
             yield from self._next(program, number)
             yield "        END_IF;"
 
-    def _title(self, step: Step) -> str:
+    def _title(self, step: ProgramStep) -> str:
         names = step.operation.template.name, step.operation.label
         return " ".join(dict.fromkeys(names))
 
-    def _entered(self, step: Step) -> str:
+    def _entered(self, step: ProgramStep) -> str:
         """Every other robot shows what it must bring, or has gone on already."""
         found = []
         for robot, label in step.until:
@@ -152,11 +152,11 @@ class _Writer:
         before = gear.index(operation)
         return f"Unit * {len(gear)}{f' + {before}' if before else ''}"
 
-    def _followed(self, step: Step) -> Iterable[str]:
+    def _followed(self, step: ProgramStep) -> Iterable[str]:
         for robot, _ in step.until:
             yield f"Cells[{robot + 1}].Finished > {self._turn(robot, step.operation.index)}"
 
-    def _motion(self, step: Step, robot: int) -> Iterator[str]:
+    def _motion(self, step: ProgramStep, robot: int) -> Iterator[str]:
         """The set-points of the robot's own axes; behind a gate short of the goal."""
         mode, axes = self.modes[step.operation.index], self._axes(step)
         for slot, axis in enumerate(axes):
@@ -173,7 +173,7 @@ class _Writer:
             yield f"            {target} := {_real(goal + float(mode.standoff[slot]))};"
             yield "        END_IF;"
 
-    def _axes(self, step: Step) -> tuple[int, ...]:
+    def _axes(self, step: ProgramStep) -> tuple[int, ...]:
         return self.layout.factory.axes[step.operation.index]
 
     def _owner(self, axis: int) -> int:
@@ -184,7 +184,7 @@ class _Writer:
     def _at(self, axis: int, goal: float, eps: float) -> str:
         return f"ABS(Axes[{axis + 1}].Position - {_real(goal)}) < {_real(eps)}"
 
-    def _end(self, program: Program, number: int, step: Step) -> Iterator[str]:
+    def _end(self, program: Program, number: int, step: ProgramStep) -> Iterator[str]:
         """The carrier judges whether all are there; the others look at its cell."""
         carrier, condition = step.operation.carrier, "Reached"
         if step.is_carrier:
@@ -208,7 +208,7 @@ class _Writer:
             yield from self._next(program, number)
         yield "        END_IF;"
 
-    def _judge(self, step: Step) -> Iterator[str]:
+    def _judge(self, step: ProgramStep) -> Iterator[str]:
         mode = self.modes[step.operation.index]
         yield "        Reached := TRUE;"
         for slot, axis in enumerate(self._axes(step)):

@@ -6,7 +6,6 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 
-from factory.commands.check_product import is_net
 from factory.geometry.solids import Product
 from factory.layout.layout import Layout
 from factory.layout.request import Ground
@@ -16,6 +15,7 @@ from factory.pipeline import Source, read
 from factory.plant.factory import Factory
 from factory.record.log import Log, is_log, read_log
 from factory.support.errors import Diagnostic, InputError, did_you_mean
+from factory.support.files import is_net
 from factory.support.settings import Settings
 
 SOURCES = {"net": ("a PAG", "a net in PNML"), "pag": ("a PAG",), "log": ("a log",)}

@@ -4,6 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
+from scipy.sparse import csr_array
+from scipy.sparse.csgraph import connected_components
+
 from factory.nets.marked import MarkedNet
 
 LIMIT = 200_000
@@ -88,48 +92,18 @@ class StateSpace:
         return tuple(reversed(events))
 
     def bottoms(self) -> list[list[int]]:
-        """The strongly connected components that nothing leaves (Tarjan, without recursion)."""
-        low = [0] * len(self.edges)
-        order, on_stack = [0] * len(self.edges), bytearray(len(self.edges))
-        component = [-1] * len(self.edges)
-        parts: list[list[int]] = []
-        stack: list[int] = []
-        count = 1
-        calls = [(0, iter(self.edges[0]))]
-        order[0] = low[0] = 1
-        stack.append(0)
-        on_stack[0] = 1
-        while calls:
-            node, rest = calls[-1]
-            for _, after in rest:
-                if not order[after]:
-                    count += 1
-                    order[after] = low[after] = count
-                    stack.append(after)
-                    on_stack[after] = 1
-                    calls.append((after, iter(self.edges[after])))
-                    break
-                if on_stack[after]:
-                    low[node] = min(low[node], order[after])
-            else:
-                calls.pop()
-                if calls:
-                    low[calls[-1][0]] = min(low[calls[-1][0]], low[node])
-                if low[node] == order[node]:
-                    part: list[int] = []
-                    while not part or part[-1] != node:
-                        part.append(stack.pop())
-                        on_stack[part[-1]] = 0
-                        component[part[-1]] = len(parts)
-                    parts.append(part)
-        leaves = (
-            component[n]
-            for n, out in enumerate(self.edges)
-            for _, m in out
-            if component[n] != component[m]
-        )
-        left = set(leaves)
-        return [part for number, part in enumerate(parts) if number not in left]
+        """The strongly connected components that nothing leaves, by their first markings."""
+        size = len(self.edges)
+        before = np.repeat(np.arange(size), [len(out) for out in self.edges])
+        after = np.fromiter((m for out in self.edges for _, m in out), np.intp)
+        graph = csr_array((np.ones(len(after), bool), (before, after)), (size, size))
+        _, part = connected_components(graph, connection="strong")
+        left = {*part[before[part[before] != part[after]]].tolist()}
+        bottoms: dict[int, list[int]] = {}
+        for number, component in enumerate(part.tolist()):
+            if component not in left:
+                bottoms.setdefault(component, []).append(number)
+        return list(bottoms.values())
 
 
 def explore(net: MarkedNet, limit: int = LIMIT) -> Exploration:
@@ -147,7 +121,7 @@ def explore(net: MarkedNet, limit: int = LIMIT) -> Exploration:
         return Exploration(len(space.index), False, deadlock, unsafe)
     bottoms = space.bottoms()
     starved = next(filter(None, (_starved(space, part) for part in bottoms)), None)
-    outside = next((part[0] for part in bottoms if 0 not in set(part)), None)
+    outside = next((part[0] for part in bottoms if part[0]), None)
     one_way = None if outside is None else space.firing(outside)
     return Exploration(len(space.index), True, deadlock, unsafe, starved, one_way)
 
@@ -155,4 +129,4 @@ def explore(net: MarkedNet, limit: int = LIMIT) -> Exploration:
 def _starved(space: StateSpace, part: list[int]) -> tuple[Firing, int] | None:
     fired = {event for number in part for event, _ in space.edges[number]}
     never = set(range(len(space.net.net.transitions))) - fired
-    return (space.firing(part[-1]), min(never)) if never else None
+    return (space.firing(part[0]), min(never)) if never else None

@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
 
+from factory.foreign_nets.behaviour import behaviour
 from factory.foreign_nets.discover import discover
 from factory.foreign_nets.explore import LIMIT
-from factory.nets.behaviour import behaviour
-from factory.nets.gears import Gear, GearNet
-from factory.nets.marked import MarkedNet
-from factory.nets.verdict import Fault, Verdict, testify
-from factory.nets.verify import verify
+from factory.nets.composition import compose
+from factory.nets.gears import GearNet
+from factory.nets.marked import MarkedNet, marked
+from factory.nets.verdict import Defect, Verdict, testify
+from factory.nets.verify import gear_net_defects, legality_defects
+from factory.support.collector import collector_paused
 from factory.support.errors import Position
 
 
+@collector_paused()
 def analyse(
     net: GearNet | MarkedNet,
     sources: Mapping[str, Position] | None = None,
@@ -23,34 +25,32 @@ def analyse(
     """The verdict on a net that may come from elsewhere.
 
     Where it claims gears, these are checked as `verify` does; else they are discovered. Without
-    gears there is no legal marking to speak of: `legal` is None.
+    gears there is no legal marking to speak of: `legal` is None. Linear in the net; only a net with
+    choice is explored, up to `limit` markings. `sources`: as for `verify`.
     """
-    if isinstance(net, GearNet) or net.gears:
-        return verify(net, sources, limit)
-    gears, faults = discover(net)
-    if gears:
-        return verify(with_gears(net, gears), sources, limit)
-    found = behaviour(net, (), limit)
-    text = "undecided: a legal marking marks each gear once, and the net has no gears"
-    every = (*faults, *found.faults, Fault("legal", "undecided", text))
+    against: tuple[Defect, ...] = ()
+    if isinstance(net, MarkedNet) and not net.gears:
+        gears, against = discover(net)
+        net = net.with_gears(gears) if gears else net
+    subject = marked(net)
+    if against:
+        text = "undecided: a legal marking marks each gear once, and the net has no gears"
+        found, legal = behaviour(subject, (), limit), None
+        illegal: tuple[Defect, ...] = (Defect("legal", "undecided", text),)
+    else:
+        composition = compose(subject)
+        against = gear_net_defects(net, composition)
+        found = behaviour(subject, composition.closed, limit)
+        illegal = legality_defects(net, subject)
+        legal = not illegal
+    witness = testify(subject, (*against, *found.defects, *illegal), sources)
     return Verdict(
-        False,
+        not against,
         found.live,
         found.safe,
         found.reversible,
-        None,
-        testify(net, (), every, sources),
-        (),
+        legal,
+        witness,
+        subject.gears,
         found.method,
     )
-
-
-def with_gears(net: MarkedNet, gears: tuple[Gear, ...]) -> MarkedNet:
-    """The net with gears, sizes and slots that fit them."""
-    owners: list[list[int]] = [[] for _ in net.net.places]
-    for number, gear in enumerate(gears):
-        for place in gear.places:
-            owners[place].append(number)
-    pairs = zip(net.net.places, owners, strict=True)
-    places = tuple(replace(place, size=len(own)) for place, own in pairs)
-    return MarkedNet(replace(net.net, places=places), net.tokens, gears, tuple(map(tuple, owners)))

@@ -6,23 +6,22 @@ import re
 from collections import Counter
 from collections.abc import Iterable
 
-from factory.foreign_nets.pnml_gears import Document, claimed
-from factory.foreign_nets.xml_tree import Element, position, read_xml
+from factory.foreign_nets.pnml_gears import NetNotes, claimed
+from factory.foreign_nets.xml_tree import Element, XmlDocument
 from factory.nets.gears import GearNet
 from factory.nets.marked import MarkedNet
 from factory.nets.petri import PetriNet, Place, Transition
 from factory.support.collector import collector_paused
-from factory.support.errors import Diagnostic, InputError, Position, did_you_mean
-
-PNML = "http://www.pnml.org/version-2009/grammar/pnml"
-NET_TYPE = "http://www.pnml.org/version-2009/grammar/ptnet"
-TOOL, VERSION = "factory", "1"
+from factory.support.errors import Position, did_you_mean
 
 DRAWN = frozenset({"graphics"})
 """Elements that say how a net looks, and are not read."""
 
-MOST = 20
-"""How many faults are listed."""
+FORM = (
+    'a net starts <pnml xmlns="http://www.pnml.org/version-2009/grammar/pnml">'
+    '<net id="n" type="http://www.pnml.org/version-2009/grammar/ptnet"><page id="p">'
+)
+WEIGHT = "the paper's nets have arcs of weight 1"
 
 _NODES = ("place", "transition", "referencePlace", "referenceTransition")
 _NUMBER = re.compile(r"[0-9]{1,9}")
@@ -36,26 +35,17 @@ def read_pnml(text: str, file: str = "<text>") -> GearNet | MarkedNet:
     it), else a marked net. Raises InputError: Syntax where it is no XML, BadNet where it is no
     place/transition net with arcs of weight 1.
     """
-    lines = text.split("\n")
-    return _Reader(file, lines).net(read_xml(text, file, lines, DRAWN))
+    document = XmlDocument(file, text.split("\n"))
+    return _Reader(document).net(document.read(text, DRAWN))
 
 
 class _Reader:
-    def __init__(self, file: str, lines: list[str]) -> None:
-        self.file, self.lines = file, lines
-        self.faults: list[Diagnostic] = []
+    """The nodes of a document by their ids, and its arcs."""
+
+    def __init__(self, document: XmlDocument) -> None:
+        self.document, self.fault, self.stop = document, document.fault, document.stop
         self.nodes: dict[str, Element] = {}
         self.arcs: list[Element] = []
-
-    def at(self, element: Element) -> Position:
-        return position(self.file, self.lines, element.line, element.column)
-
-    def fault(self, element: Element, message: str, hint: str) -> None:
-        self.faults.append(Diagnostic("BadNet", message, self.at(element), hint))
-
-    def stop(self) -> None:
-        if self.faults:
-            raise InputError(self.faults[:MOST])
 
     def net(self, root: Element) -> GearNet | MarkedNet:
         """The one net of the document."""
@@ -77,7 +67,7 @@ class _Reader:
             self._place(key, name, left[key], right[key])
             for key, name in self._names(places).items()
         )
-        document = Document(
+        notes = NetNotes(
             PetriNet(transitions, made),
             tokens,
             {name: i for i, name in enumerate(places)},
@@ -86,21 +76,20 @@ class _Reader:
             tuple(tuple(tools(self.nodes[name])) for name in places),
             tuple(tuple(tools(self.nodes[name])) for name in events),
         )
-        return claimed(document, self)
+        return claimed(notes, self.document)
 
     def _only_net(self, root: Element) -> Element:
-        hint = f'a net starts <pnml xmlns="{PNML}"><net id="n" type="{NET_TYPE}"><page id="p">'
         if root.name != "pnml":
-            self.fault(root, f"the root element is <{root.name}>, not <pnml>", hint)
+            self.fault(root, f"the root element is <{root.name}>, not <pnml>", FORM)
             self.stop()
         nets = list(root.all("net"))
         if len(nets) != 1:
-            self.fault(nets[1] if nets else root, f"{len(nets)} nets, where one is wanted", hint)
+            self.fault(nets[1] if nets else root, f"{len(nets)} nets, where one is wanted", FORM)
             self.stop()
         kind = nets[0].attributes.get("type", "")
         if kind.rpartition("/")[2] != "ptnet":
             found = f"of type '{kind}'" if kind else "without a type"
-            self.fault(nets[0], f"a net {found}, not a place/transition net", hint)
+            self.fault(nets[0], f"a net {found}, not a place/transition net", FORM)
         if nets[0].first("page") is None:
             self.fault(nets[0], "the net has no page", 'wrap its nodes in <page id="page">')
         return nets[0]
@@ -113,22 +102,17 @@ class _Reader:
             element = stack.pop()
             self._identify(element, ids)
             stack.extend(reversed(list(element.all("page"))))
-            if element is net:
-                self._stray(net)
-                continue
             for child in element.children:
-                if child.name in _NODES:
-                    self._identify(child, ids)
-                    self.nodes[child.attributes.get("id", "")] = child
-                elif child.name == "arc":
-                    self._identify(child, ids)
-                    self.arcs.append(child)
-
-    def _stray(self, net: Element) -> None:
-        if net.first("page") is not None:
-            for child in net.children:
-                if child.name in (*_NODES, "arc"):
+                if child.name not in (*_NODES, "arc"):
+                    continue
+                if element is net:
                     self.fault(child, f"a <{child.name}> outside every page", "move it into a page")
+                    continue
+                self._identify(child, ids)
+                if child.name == "arc":
+                    self.arcs.append(child)
+                else:
+                    self.nodes[child.attributes.get("id", "")] = child
 
     def _identify(self, element: Element, ids: dict[str, Element]) -> None:
         name = element.attributes.get("id")
@@ -173,8 +157,7 @@ class _Reader:
             if ends is None:
                 continue
             if ends in seen:
-                hint = "the paper's nets have arcs of weight 1"
-                self.fault(arc, f"a second arc from '{ends[0]}' to '{ends[1]}'", hint)
+                self.fault(arc, f"a second arc from '{ends[0]}' to '{ends[1]}'", WEIGHT)
             seen.add(ends)
             if ends[0] in number and ends[1] in left:
                 left[ends[1]].append(number[ends[0]])
@@ -195,19 +178,18 @@ class _Reader:
                 self.fault(arc, f"the {side} of an arc is {what}", self._known(name))
             else:
                 ends.append(targets[name])
-        weight = _content(arc.first("inscription"), "1")
+        weight = arc.content("inscription", "1")
         if weight != "1":
-            hint = "the paper's nets have arcs of weight 1"
-            self.fault(arc, f"an arc of weight '{weight}'", hint)
+            self.fault(arc, f"an arc of weight '{weight}'", WEIGHT)
         kind = arc.first("type")
-        called = "" if kind is None else kind.attributes.get("value") or _content(kind, "")
+        called = "" if kind is None else kind.attributes.get("value") or arc.content("type", "")
         if called not in ("", "normal"):
             self.fault(arc, f"an arc of type '{called}'", "only normal arcs are understood")
         return (ends[0], ends[1]) if len(ends) == 2 else None
 
     def _tokens(self, place: Element) -> int:
         marking = place.first("initialMarking")
-        content = _content(marking, "0")
+        content = place.content("initialMarking", "0")
         if marking is not None and not _NUMBER.fullmatch(content):
             hint = "a number of tokens from 0 to 999999999 as <text>"
             self.fault(marking, f"the initial marking is '{content}'", hint)
@@ -217,7 +199,7 @@ class _Reader:
     def _names(self, ids: Iterable[str]) -> dict[str, str]:
         """A name for each id: its own name where that is not another's, too; else the id. Where
         an id is the name of another, every name is an id."""
-        wanted = {key: _content(self.nodes[key].first("name"), "") or key for key in ids}
+        wanted = {key: self.nodes[key].content("name", "") or key for key in ids}
         count = Counter(wanted.values())
         names = {key: name if count[name] == 1 else key for key, name in wanted.items()}
         return names if len(set(names.values())) == len(names) else {key: key for key in names}
@@ -230,7 +212,7 @@ class _Reader:
                 line, column = notes.get("line", ""), notes.get("column", "")
                 if _NUMBER.fullmatch(line) and _NUMBER.fullmatch(column):
                     return Position(notes.get("file", "?"), int(line), int(column))
-        return self.at(element)
+        return self.document.at(element)
 
     def _place(self, key: str, name: str, left: list[int], right: list[int]) -> Place:
         element = self.nodes[key]
@@ -253,10 +235,4 @@ class _Reader:
 
 def tools(element: Element) -> list[Element]:
     """The toolspecific elements of this project."""
-    return [t for t in element.all("toolspecific") if t.attributes.get("tool") == TOOL]
-
-
-def _content(element: Element | None, default: str) -> str:
-    """The <text> of a label, stripped."""
-    text = None if element is None else element.first("text")
-    return default if text is None else text.text.strip()
+    return [t for t in element.all("toolspecific") if t.attributes.get("tool") == "factory"]

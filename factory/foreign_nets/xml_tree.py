@@ -8,6 +8,9 @@ from xml.parsers import expat
 
 from factory.support.errors import Diagnostic, InputError, Position
 
+MOST = 20
+"""How many faults are listed."""
+
 
 @dataclass(slots=True)
 class Element:
@@ -29,15 +32,65 @@ class Element:
         """The first child of that name."""
         return next(self.all(name), None)
 
+    def content(self, name: str, default: str) -> str:
+        """The <text> of the first child of that name, stripped."""
+        child = self.first(name)
+        text = None if child is None else child.first("text")
+        return default if text is None else text.text.strip()
+
+
+@dataclass
+class XmlDocument:
+    """A file of XML, and the faults found in it as a net."""
+
+    file: str
+    lines: list[str]
+    faults: list[Diagnostic] = field(default_factory=list)
+
+    def position(self, line: int, column: int) -> Position:
+        """A position with the text of its line, where the file has that line."""
+        shown = self.lines[line - 1] if 0 < line <= len(self.lines) else ""
+        return Position(self.file, line, column, shown.rstrip("\r"))
+
+    def at(self, element: Element) -> Position:
+        """Where an element begins."""
+        return self.position(element.line, element.column)
+
+    def fault(self, element: Element, message: str, hint: str) -> None:
+        """Note a fault at an element."""
+        self.faults.append(Diagnostic("BadNet", message, self.at(element), hint))
+
+    def stop(self) -> None:
+        """Raise InputError (BadNet) with the faults noted, if any."""
+        if self.faults:
+            raise InputError(self.faults[:MOST])
+
+    def read(self, text: str, ignored: frozenset[str]) -> Element:
+        """The root element of the text, without the elements that are `ignored`.
+
+        Raises InputError (Syntax) where it is not well-formed or declares a document type.
+        """
+        builder = _Builder(self, ignored)
+        try:
+            builder.parser.Parse(text.encode("utf-8", "surrogatepass"), True)
+        except expat.ExpatError as error:
+            hint = "every element that is opened must be closed, and & and < in text escaped"
+            message = f"not well-formed XML: {expat.ErrorString(error.code)}"
+            at = self.position(error.lineno, error.offset + 1)
+            raise InputError(Diagnostic("Syntax", message, at, hint)) from None
+        finally:
+            del builder.parser  # it holds the builder, so both would wait for the cycle collector
+        return builder.top.children[0]
+
 
 class _Builder:
     """Makes the tree from expat's events; a stack in place of recursion."""
 
-    def __init__(self, file: str, lines: list[str], ignored: frozenset[str]) -> None:
-        self.file, self.lines, self.ignored = file, lines, ignored
+    def __init__(self, document: XmlDocument, ignored: frozenset[str]) -> None:
+        self.document, self.ignored = document, ignored
         self.depth = 0  # within elements that are ignored
-        self.root: Element | None = None
-        self.stack: list[Element] = []
+        self.top = Element("", {}, 0, 0)
+        self.stack = [self.top]
         self.parser = expat.ParserCreate("utf-8", namespace_separator=" ")
         self.parser.buffer_text = True
         self.parser.StartElementHandler = self.start
@@ -47,15 +100,12 @@ class _Builder:
 
     def start(self, name: str, attributes: dict[str, str]) -> None:
         local = name.rpartition(" ")[2]
-        if self.depth or (self.stack and local in self.ignored):
+        if self.depth or (len(self.stack) > 1 and local in self.ignored):
             self.depth += 1
             return
         line, column = self.parser.CurrentLineNumber, self.parser.CurrentColumnNumber + 1
         element = Element(local, attributes, line, column)
-        if self.stack:
-            self.stack[-1].children.append(element)
-        else:
-            self.root = element
+        self.stack[-1].children.append(element)
         self.stack.append(element)
 
     def end(self, name: str) -> None:
@@ -70,34 +120,7 @@ class _Builder:
 
     def doctype(self, *_: object) -> None:
         line, column = self.parser.CurrentLineNumber, self.parser.CurrentColumnNumber + 1
+        at = self.document.position(line, column)
         hint = "leave the <!DOCTYPE ...> out: nothing in a net needs entities"
-        self.refuse("a document type declaration is not accepted", line, column, hint)
-
-    def refuse(self, message: str, line: int, column: int, hint: str) -> None:
-        at = position(self.file, self.lines, line, column)
+        message = "a document type declaration is not accepted"
         raise InputError(Diagnostic("Syntax", message, at, hint))
-
-
-def position(file: str, lines: list[str], line: int, column: int) -> Position:
-    """A position with the text of its line, where the file has that line."""
-    shown = lines[line - 1] if 0 < line <= len(lines) else ""
-    return Position(file, line, column, shown.rstrip("\r"))
-
-
-def read_xml(
-    text: str, file: str, lines: list[str], ignored: frozenset[str] = frozenset()
-) -> Element:
-    """The root element of an XML document, without the elements that are `ignored`.
-
-    Raises InputError (Syntax) where it is not well-formed or declares a document type.
-    """
-    builder = _Builder(file, lines, ignored)
-    try:
-        builder.parser.Parse(text.encode("utf-8", "surrogatepass"), True)
-    except expat.ExpatError as error:
-        hint = "every element that is opened must be closed, and & and < in text escaped"
-        message = f"not well-formed XML: {expat.ErrorString(error.code)}"
-        builder.refuse(message, error.lineno, error.offset + 1, hint)
-    del builder.parser  # it holds the builder, so both would wait for the cycle collector
-    assert builder.root is not None
-    return builder.root

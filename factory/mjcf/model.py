@@ -27,7 +27,7 @@ from factory.mjcf.scene import add_assets, add_follower, add_scene, add_visuals
 from factory.mjcf.unseen import leave_out_what_is_shown
 from factory.mjcf.welds import add_welds, exclusions, held_at
 from factory.plant.factory import Factory
-from factory.plant.fused_bodies import Bodies, bodies_of
+from factory.plant.fused_bodies import FusedBodies, bodies_of
 from factory.problem.robot_types import Catalogue
 from factory.support.settings import Settings
 
@@ -71,7 +71,7 @@ class Model:
 
     layout: Layout
     settings: Settings
-    carried: Bodies = field(repr=False)
+    carried: FusedBodies = field(repr=False)
     copies: Mapping[str, int]
     masses: Mapping[str, float]
     drives: tuple[Drive, ...]
@@ -121,7 +121,7 @@ def build_model(
     catalogue: Catalogue,
     copies: Mapping[str, int],
     settings: Settings,
-    bodies: Bodies | None = None,
+    bodies: FusedBodies | None = None,
     shown: bool = True,
 ) -> Model:
     """The model of a laid-out factory, of one body a part unless other `bodies` are given; without

@@ -13,7 +13,7 @@ from factory.layout.layout import Layout, Point2
 from factory.mjcf.elements import add, exact, numbers
 from factory.mjcf.mesh_files import mesh_file, piece_files
 from factory.mjcf.names import part, piece
-from factory.plant.fused_bodies import Bodies
+from factory.plant.fused_bodies import FusedBodies
 
 PARKED = -0.6
 """Height at which the first spare copy of a part is kept, under the floor [m]."""
@@ -67,7 +67,9 @@ def add_parts(world: Element, layout: Layout, copies: Mapping[str, int]) -> None
             _add_part(world, solid, number, at)
 
 
-def add_wholes(world: Element, layout: Layout, bodies: Bodies, copies: Mapping[str, int]) -> None:
+def add_wholes(
+    world: Element, layout: Layout, bodies: FusedBodies, copies: Mapping[str, int]
+) -> None:
     """The bodies that sub-assemblies become, parked: each has the geoms of all its parts."""
     solids = layout.product.solids
     for label, whole in bodies.wholes.items():

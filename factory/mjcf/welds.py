@@ -10,10 +10,12 @@ from factory.mjcf import names
 from factory.mjcf.elements import add, numbers
 from factory.mjcf.parts import parked_at, place_in
 from factory.mjcf.robots import heading_quaternion
-from factory.plant.fused_bodies import Bodies
+from factory.plant.fused_bodies import FusedBodies
 
 
-def add_welds(equality: Element, layout: Layout, bodies: Bodies, copies: Mapping[str, int]) -> None:
+def add_welds(
+    equality: Element, layout: Layout, bodies: FusedBodies, copies: Mapping[str, int]
+) -> None:
     """Grips, feeders, parking places, and the star that holds a finished product together."""
     factory = layout.factory
     for robot, path in zip(factory.robots, layout.guidepaths, strict=True):
@@ -46,7 +48,7 @@ def _park(equality: Element, layout: Layout, label: str, copies: int, used: int)
         _weld(equality, names.park(label, n), "world", names.part(label, n), at, n > used)
 
 
-def exclusions(layout: Layout, bodies: Bodies, copies: Mapping[str, int]) -> Element:
+def exclusions(layout: Layout, bodies: FusedBodies, copies: Mapping[str, int]) -> Element:
     """The pairs of bodies that pass through each other when they are joined, a slot for each unit
     that can be inside: a run aims them at the copies of one unit."""
     contact = Element("contact")
@@ -68,7 +70,7 @@ def held_at(layout: Layout, robot: int) -> float:
 
 
 def grip_position(
-    layout: Layout, bodies: Bodies, robot: int, label: str
+    layout: Layout, bodies: FusedBodies, robot: int, label: str
 ) -> tuple[float, float, float]:
     """Where a robot holds a body's centre of mass, in the frame of its carriage, or of its head
     [m]."""

@@ -18,11 +18,12 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from itertools import islice
 
+from factory.nets.gears import Gear
 from factory.nets.marked import MANY, NONE, MarkedNet
-from factory.nets.verdict import Fault, listing
+from factory.nets.verdict import Defect, listing
 
 MOST = 10
-"""How many faults of one kind are listed."""
+"""How many defects of one kind are listed."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,88 +43,94 @@ class Joint:
 
 @dataclass(frozen=True, slots=True)
 class Composition:
-    """The gears in the order in which they compose the net, or the faults that forbid it.
+    """The gears in the order in which they compose the net, or the defects that forbid it.
 
-    `closed` says of each gear whether it is a cycle of the net; `owners` lists the gears of each
-    place.
+    `closed`: for each gear whether it is a cycle of the net.
     """
 
     joints: tuple[Joint, ...]
-    faults: tuple[Fault, ...]
+    defects: tuple[Defect, ...]
     closed: tuple[bool, ...]
-    owners: tuple[tuple[int, ...], ...]
 
 
 def compose(net: MarkedNet) -> Composition:
     """Check the claim that `net.gears` compose the net into a gear net."""
-    closed, faults = _closed(net)
-    owners = _owners(net)
-    passing = _passing(net)
-    faults += islice(_uncovered(net, owners, passing), MOST)
-    faults += islice(_misplaced(net, owners), MOST)
+    closed = tuple(_is_cycle(net, gear) for gear in net.gears)
+    passing = [0] * len(net.net.transitions)
+    for gear in net.gears:
+        for event in gear.transitions:
+            if event >= 0:
+                passing[event] += 1
+    broken = (_unclosed(net, number) for number, good in enumerate(closed) if not good)
+    found = [*islice(broken, MOST)]
+    found += islice(_uncovered(net, passing), MOST)
+    found += islice(_misplaced(net), MOST)
     joints: tuple[Joint, ...] = ()
-    if not faults:
-        faults += islice(_shared(net, owners, passing), MOST)
-    if not faults:
-        joints, faults = _tree(net, owners)
-    return Composition(joints, tuple(faults), tuple(closed), tuple(map(tuple, owners)))
+    if not found:
+        found += islice(_shared(net, passing), MOST)
+    if not found:
+        joints, found = _tree(net)
+    return Composition(joints, tuple(found), closed)
 
 
-def fault(kind: str, reason: str, gears: Iterable[int] = (), **ids: Iterable[int]) -> Fault:
-    """A fault of the property gear_net."""
-    places, transitions = tuple(ids.get("places", ())), tuple(ids.get("transitions", ()))
-    return Fault("gear_net", kind, reason, tuple(dict.fromkeys(gears)), places, transitions)
+def cover(net: MarkedNet, closed: Iterable[bool]) -> list[int]:
+    """For each place a gear through it that has at most one token and keeps it, or NONE."""
+    covered = [NONE] * len(net.tokens)
+    for number, (gear, good) in enumerate(zip(net.gears, closed, strict=False)):
+        if good and sum(net.tokens[p] for p in gear.places) <= 1:
+            for place in gear.places:
+                covered[place] = number
+    return covered
 
 
-def _closed(net: MarkedNet) -> tuple[list[bool], list[Fault]]:
-    """Definition 3.5: place i leads from transition i to transition i + 1, and no place repeats."""
-    faults: list[Fault] = []
-    closed = []
-    left, right = net.left, net.right
-    stamp_p, stamp_t = [NONE] * len(left), [NONE] * len(net.net.transitions)
-    for number, gear in enumerate(net.gears):
-        places, events = gear.places, gear.transitions
-        good = len(places) == len(events) >= 2
-        for place, before, after in zip(places, events, events[1:] + events[:1], strict=False):
-            if before < 0 or left[place] != before or right[place] != after:
-                good = False
-                continue
-            if stamp_p[place] == number or stamp_t[before] == number:
-                good = False
-            stamp_p[place] = stamp_t[before] = number
-        closed.append(good)
-        if not good and len(faults) < MOST:
-            faults.append(_unclosed(net, number))
-    return closed, faults
+def no_gear_net(
+    kind: str,
+    reason: str,
+    gears: Iterable[int] = (),
+    places: Iterable[int] = (),
+    transitions: Iterable[int] = (),
+) -> Defect:
+    """A defect that makes a net no gear net. Each gear is named once."""
+    return Defect(
+        "gear_net", kind, reason, tuple(dict.fromkeys(gears)), tuple(places), tuple(transitions)
+    )
 
 
-def _unclosed(net: MarkedNet, number: int) -> Fault:
-    """The exact reason why a gear is no gear."""
-    gear, name = net.gears[number], net.gears[number].robot
-    if len(gear.places) < 2:
-        text = f"the gear of {name} has fewer than two places: such a gear is dead (Definition 3.4)"
-        return fault("1-gear", text, [number], places=gear.places)
-    after = gear.transitions[1:] + gear.transitions[:1]
-    for place, a, b in zip(gear.places, gear.transitions, after, strict=False):
-        if a < 0 or net.left[place] != a or net.right[place] != b:
-            return _broken(net, number, place, a, b)
-    if len(gear.places) != len(gear.transitions):
-        counts = f"{len(gear.places)} places but {len(gear.transitions)} transitions"
-        text = f"the gear of {name} has {counts}"
-        return fault("unclosed gear", text, [number], places=gear.places[:1])
-    twice = [p for p, count in Counter(gear.places).items() if count > 1]
-    text = f"the gear of {name} is no cycle: it runs through a place or a transition twice"
-    return fault("unclosed gear", text, [number], places=twice or gear.places[:1])
+def _is_cycle(net: MarkedNet, gear: Gear) -> bool:
+    """Definition 3.5: place i leads from transition i to transition i + 1, and none repeats."""
+    places, events, left, right = gear.places, gear.transitions, net.left, net.right
+    return (
+        len(places) == len(events) == len({*places}) == len({*events}) >= 2
+        and min(events) >= 0
+        and all(
+            left[p] == a and right[p] == b
+            for p, a, b in zip(places, events, events[1:] + events[:1], strict=True)
+        )
+    )
 
 
-def _broken(net: MarkedNet, number: int, place: int, a: int, b: int) -> Fault:
-    name, called = net.gears[number].robot, net.net.places[place].name
-    wanted = f"the gear of {name} is not closed: place {called} should be [{_event(net, a)};"
-    found = f"{wanted} {_event(net, b)}] and is {notation(net, place)}"
-    if net.left[place] == NONE:
-        return fault("missing producer", f"{found}: nothing marks it", [number], places=[place])
-    kind = "missing consumer" if net.right[place] == NONE else "unclosed gear"
-    return fault(kind, found, [number], places=[place])
+def _unclosed(net: MarkedNet, number: int) -> Defect:
+    """The exact reason why a gear is none."""
+    gear, called = net.gears[number], f"the gear of {net.gears[number].robot}"
+    places, events = gear.places, gear.transitions
+    if len(places) < 2:
+        text = f"{called} has fewer than two places: such a gear is dead (Definition 3.4)"
+        return no_gear_net("1-gear", text, [number], places)
+    for place, a, b in zip(places, events, events[1:] + events[:1], strict=False):
+        if a >= 0 and net.left[place] == a and net.right[place] == b:
+            continue
+        wanted = f"place {net.net.places[place].name} should be [{_event(net, a)};"
+        text = f"{called} is not closed: {wanted} {_event(net, b)}] and is {notation(net, place)}"
+        kind = "missing consumer" if net.right[place] == NONE else "unclosed gear"
+        if net.left[place] == NONE:
+            kind, text = "missing producer", f"{text}: nothing marks it"
+        return no_gear_net(kind, text, [number], [place])
+    if len(places) != len(events):
+        text = f"{called} has {len(places)} places but {len(events)} transitions"
+        return no_gear_net("unclosed gear", text, [number], places[:1])
+    twice = [p for p, count in Counter(places).items() if count > 1]
+    text = f"{called} is no cycle: it runs through a place or a transition twice"
+    return no_gear_net("unclosed gear", text, [number], twice or places[:1])
 
 
 def _event(net: MarkedNet, event: int) -> str:
@@ -137,55 +144,31 @@ def notation(net: MarkedNet, place: int) -> str:
     return f"[{before}; {listing(net.net.transitions[e].name for e in at.right)}]"
 
 
-def _owners(net: MarkedNet) -> list[list[int]]:
-    owners: list[list[int]] = [[] for _ in net.net.places]
-    for number, gear in enumerate(net.gears):
-        for place in gear.places:
-            owners[place].append(number)
-    return owners
-
-
-def _passing(net: MarkedNet) -> list[int]:
-    """For each transition the number of gears through it."""
-    passing = [0] * len(net.net.transitions)
-    for gear in net.gears:
-        for event in gear.transitions:
-            if event >= 0:
-                passing[event] += 1
-    return passing
-
-
-def _uncovered(net: MarkedNet, owners: list[list[int]], passing: list[int]) -> Iterator[Fault]:
+def _uncovered(net: MarkedNet, passing: list[int]) -> Iterator[Defect]:
     """Places and transitions that are part of no gear."""
-    for place, own in enumerate(owners):
+    for place, own in enumerate(net.owners):
         if not own:
-            text = f"place {net.net.places[place].name} = {notation(net, place)} is in no gear"
-            near = _near(net, place, owners)
-            yield fault("place in no gear", text, near, places=[place])
+            at = net.net.places[place]
+            text = f"place {at.name} = {notation(net, place)} is in no gear"
+            beside = [q for e in at.left + at.right for q in net.net.preset[e] + net.net.postset[e]]
+            near = sorted({gear for q in beside for gear in net.owners[q]})
+            yield no_gear_net("place in no gear", text, near, [place])
     for event, count in enumerate(passing):
         if not count:
             text = f"transition {net.net.transitions[event].name} is in no gear"
-            yield fault("transition in no gear", text, transitions=[event])
+            yield no_gear_net("transition in no gear", text, transitions=[event])
 
 
-def _near(net: MarkedNet, place: int, owners: list[list[int]]) -> list[int]:
-    """The gears through the transitions of a place."""
-    at = net.net.places[place]
-    beside = [q for e in at.left + at.right for q in net.net.preset[e] + net.net.postset[e]]
-    return sorted({gear for q in beside for gear in owners[q]})
-
-
-def _misplaced(net: MarkedNet, owners: list[list[int]]) -> Iterator[Fault]:
+def _misplaced(net: MarkedNet) -> Iterator[Defect]:
     """Places whose slots belong to other robots than the gears through them."""
     for place, slots in enumerate(net.slots):
-        own = owners[place]
-        at = net.net.places[place]
-        if at.size != len(own) or (list(slots) != own and sorted(slots) != own):
+        own, at = net.owners[place], net.net.places[place]
+        if at.size != len(own) or (slots != own and tuple(sorted(slots)) != own):
             text = (
                 f"place {at.name} acts on {at.size} robots with slots for {named(net, slots)},"
                 f" but the gears through it are those of {named(net, own)}"
             )
-            yield fault("slots", text, own, places=[place])
+            yield no_gear_net("slots", text, own, [place])
 
 
 def named(net: MarkedNet, gears: Iterable[int]) -> str:
@@ -194,9 +177,10 @@ def named(net: MarkedNet, gears: Iterable[int]) -> str:
     return listing(names) or "none"
 
 
-def _shared(net: MarkedNet, owners: list[list[int]], passing: list[int]) -> Iterator[Fault]:
+def _shared(net: MarkedNet, passing: list[int]) -> Iterator[Defect]:
     """Definition 3.6 (a) around each transition: gears that share it share one of its places, and
     just one."""
+    owners = net.owners
     joint = [NONE] * len(passing)
     for place, own in enumerate(owners):
         if len(own) < 2:
@@ -205,30 +189,24 @@ def _shared(net: MarkedNet, owners: list[list[int]], passing: list[int]) -> Iter
             if passing[event] == len(own):
                 joint[event] = place if joint[event] == NONE else MANY
     for event, count in enumerate(passing):
-        if count > 1 and joint[event] < 0:
-            yield _clash(net, event, owners, joint[event] == MANY)
+        if count < 2 or joint[event] >= 0:
+            continue
+        places, called = net.net.preset[event] + net.net.postset[event], _event(net, event)
+        gears = sorted({gear for p in places for gear in owners[p]})
+        kind = "no shared place"
+        text = f"gears {named(net, gears)} meet at {called} but share no one place [a; b] there"
+        if joint[event] == MANY:
+            kind, places = "two gears cross twice", tuple(p for p in places if len(owners[p]) > 1)
+            both = f"the place before {called} and the one after it"
+            text = f"gears {named(net, gears)} cross twice: they share {both}"
+        yield no_gear_net(kind, text, gears, places, [event])
 
 
-def _clash(net: MarkedNet, event: int, owners: list[list[int]], many: bool) -> Fault:
-    places = net.net.preset[event] + net.net.postset[event]
-    gears = sorted({gear for p in places for gear in owners[p]})
-    called = net.net.transitions[event].name
-    if many:
-        both = [p for p in places if len(owners[p]) > 1]
-        text = (
-            f"gears {named(net, gears)} cross twice: they share the place before {called} and the"
-            " one after it"
-        )
-        return fault("two gears cross twice", text, gears, places=both, transitions=[event])
-    text = f"gears {named(net, gears)} meet at {called} but share no one place [a; b] there"
-    return fault("no shared place", text, gears, places=places, transitions=[event])
-
-
-def _tree(net: MarkedNet, owners: list[list[int]]) -> tuple[tuple[Joint, ...], list[Fault]]:
+def _tree(net: MarkedNet) -> tuple[tuple[Joint, ...], list[Defect]]:
     """A breadth-first search over gears and shared places, which must form a tree."""
     if not net.gears:
-        return (), [fault("no gear", "the net has no gears")]
-    entry, parent = [NONE] * len(net.gears), [NONE] * len(net.gears)
+        return (), [no_gear_net("no gear", "the net has no gears")]
+    owners, entry = net.owners, [NONE] * len(net.gears)
     seen = bytearray(len(net.gears))
     seen[0], order = 1, [0]
     for gear in order:
@@ -237,48 +215,34 @@ def _tree(net: MarkedNet, owners: list[list[int]]) -> tuple[tuple[Joint, ...], l
                 continue
             for other in owners[place]:
                 if seen[other] and other != gear:
-                    return (), [_ring(net, gear, other, place, entry, parent)]
+                    return (), [_ring(net)]
                 if other != gear:
-                    seen[other], entry[other], parent[other] = 1, place, gear
+                    seen[other], entry[other] = 1, place
                     order.append(other)
     if len(order) < len(net.gears):
-        return (), [_apart(net, [g for g, hit in enumerate(seen) if not hit])]
+        apart = [g for g, hit in enumerate(seen) if not hit]
+        text = f"gears {named(net, apart)} share no place with the rest, directly or not"
+        return (), [no_gear_net("gears apart", text, apart)]
     return _joints(net, order, entry)
 
 
-def _ring(
-    net: MarkedNet, one: int, other: int, place: int, entry: list[int], parent: list[int]
-) -> Fault:
-    """The cycle of gears and shared places that a second way from gear to gear closes."""
-    ways: list[list[tuple[str, int]]] = []
-    for gear in (one, other):
-        way = [("gear", gear)]
-        while parent[gear] != NONE:
-            way += [("place", entry[gear]), ("gear", parent[gear])]
-            gear = parent[gear]
-        ways.append(way)
-    while len(ways[0]) > 1 and len(ways[1]) > 1 and ways[0][-2] == ways[1][-2]:
-        ways[0].pop()
-        ways[1].pop()
-    nodes = [*reversed(ways[0]), ("place", place), *ways[1][:-1]]
-    gears = [number for kind, number in nodes if kind == "gear"]
-    places = [number for kind, number in nodes if kind == "place"]
+def _ring(net: MarkedNet) -> Defect:
+    """A cycle in the incidence graph of gears (from 0) and shared places (from -1 down)."""
+    import networkx as nx  # only a net that is none pays for it
+
+    pairs = ((gear, ~place) for place, own in enumerate(net.owners) if own[1:] for gear in own)
+    around = [node for node, _ in nx.find_cycle(nx.Graph(pairs))]
+    gears, places = [n for n in around if n >= 0], [~n for n in around if n < 0]
     names = listing(net.net.places[p].name for p in places)
+    text = f"gears {named(net, gears)} form a ring through {names}: some circuit is no gear"
     if len(gears) == 2:
         text = f"gears {named(net, gears)} cross twice: they share {names}"
-    else:
-        text = f"gears {named(net, gears)} form a ring through {names}: some circuit is no gear"
-    return fault("two gears cross twice", text, gears, places=places)
-
-
-def _apart(net: MarkedNet, others: list[int]) -> Fault:
-    text = f"gears {named(net, others)} share no place with the rest, directly or not"
-    return fault("gears apart", text, others)
+    return no_gear_net("two gears cross twice", text, gears, places)
 
 
 def _joints(
     net: MarkedNet, order: list[int], entry: list[int]
-) -> tuple[tuple[Joint, ...], list[Fault]]:
+) -> tuple[tuple[Joint, ...], list[Defect]]:
     """Condition (b) for each gear after the first: some [c; a] in it with c not yet in the net."""
     there = bytearray(len(net.net.transitions))
     joints: list[Joint] = []
@@ -287,12 +251,11 @@ def _joints(
         if place == NONE:
             joints.append(Joint(number, -1, -1, -1, None))
         else:
-            at = gear.places.index(place)
-            c = gear.transitions[at - 1]
+            c = gear.transitions[gear.places.index(place) - 1]
             a, b = net.left[place], net.right[place]
             if there[c] and len(gear.places) > 2:
                 text = f"no transition c of {gear.robot} alone leads to {_event(net, a)}"
-                return (), [fault("missing producer", text, [number], places=[place])]
+                return (), [no_gear_net("missing producer", text, [number], [place])]
             joints.append(Joint(number, place, a, b, None if there[c] else c))
         for event in gear.transitions:
             there[event] = 1

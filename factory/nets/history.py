@@ -1,4 +1,4 @@
-"""Legal markings of a gear net other than the initial one: by name, and how one gets there."""
+"""Legal markings of a gear net other than the initial one: by name, and the firings to them."""
 
 from __future__ import annotations
 

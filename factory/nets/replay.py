@@ -1,6 +1,6 @@
 """An independent replay of a record of events against a net: does the run refine it?
 
-Tokens are counted and robots followed from place to place; `PetriNet.follower` is not used.
+Tokens are counted and robots followed from place to place, without `PetriNet.follower`.
 """
 
 from __future__ import annotations
@@ -35,13 +35,7 @@ class _Game:
         self.number = {t.name: i for i, t in enumerate(net.threaded.transitions)}
         self.tokens = [0] * len(net.threaded.places)
         self.at = [-1] * len(net.gears)
-        self.needs: list[list[int]] = [[] for _ in net.threaded.transitions]
-        self.gives: list[list[int]] = [[] for _ in net.threaded.transitions]
-        for index, place in enumerate(net.threaded.places):
-            for event in place.right:
-                self.needs[event].append(index)
-            for event in place.left:
-                self.gives[event].append(index)
+        self.needs, self.gives = net.threaded.net.preset, net.threaded.net.postset
         self.fault = self._set_up(initial)
 
     def _set_up(self, initial: Marking) -> str:
@@ -67,15 +61,16 @@ class _Game:
         if fault:
             return f"{name} is not enabled: {fault}"
         moves = self.net.threaded.redistribution[event]
-        robots = [self.net.slots[p][i] for (p, i), _ in moves]
-        for robot, (before, after) in zip(robots, moves, strict=True):
-            name_of = self.net.gears[robot].robot
-            if self.at[robot] != before[0]:
-                return f"{name} moves {name_of}, which is not at its place"
-            if self.net.slots[after[0]][after[1]] != robot:
-                return f"{name} moves {name_of} into another robot's slot"
-        for robot, (_, after) in zip(robots, moves, strict=True):
-            self.at[robot] = after[0]
+        there: dict[int, int] = {}
+        for (p, i), (q, j) in moves:
+            robot = self.net.slots[p][i]
+            if self.at[robot] != p:
+                return f"{name} moves {self.net.gears[robot].robot}, which is not at its place"
+            if self.net.slots[q][j] != robot:
+                return f"{name} moves {self.net.gears[robot].robot} into another robot's slot"
+            there[robot] = q
+        for robot, place in there.items():
+            self.at[robot] = place
         for place in self.needs[event]:
             self.tokens[place] -= 1
         for place in self.gives[event]:

@@ -1,5 +1,5 @@
 """A legal marking that changes as transitions fire (Definitions 3.3 and 3.4). What a detached set
-changes is worked out once."""
+changes is computed once."""
 
 from __future__ import annotations
 
@@ -9,18 +9,17 @@ from itertools import accumulate
 
 from factory.nets.threaded import Slot, ThreadedMarking, ThreadedNet
 
-NOBODY = -1
-"""The robot in a slot of a place that is not marked."""
+VACANT = -1
+"""What stands in a slot of a place that is not marked, in place of a robot."""
 
 KEPT = 2000
-"""So many detached sets are kept: in steady production the same fire again and again."""
+"""The number of detached sets that are kept: in steady production the same ones fire repeatedly."""
 
 
 @dataclass(frozen=True, slots=True)
 class _Firing:
-    """A detached set G: •G, G•, the slots that robots are in `before` and `after`; and of the
-    transitions asked for those that are `robbed` of a token, and those that get one, `fed`, with
-    their presets."""
+    """A detached set G: •G, G•, the slots of its robots `before` and `after`; of the transitions
+    asked for those that lose a token (`robbed`), and those that get one, with presets (`fed`)."""
 
     preset: tuple[int, ...]
     postset: tuple[int, ...]
@@ -41,7 +40,7 @@ class Threads:
         self.net, self._asked = net, frozenset(asked)
         self._first = [*accumulate((place.size for place in net.places), initial=0)]
         self.marked = bytearray(p in start.marked for p in range(len(net.places)))
-        self._robot = [NOBODY] * self._first[-1]
+        self._robot = [VACANT] * self._first[-1]
         for slot, robot in start.threads.items():
             self._robot[self._slot(slot)] = robot
         preset = net.net.preset
@@ -60,14 +59,14 @@ class Threads:
         if not self._all_marked(firing.preset) or any(map(marked.__getitem__, firing.postset)):
             raise AssertionError(f"not all are enabled that fire: {self._names(events)}")
         moved = [robot[slot] for slot in firing.before]
-        if NOBODY in moved or any(robot[slot] != NOBODY for slot in firing.after):
+        if VACANT in moved or any(robot[slot] != VACANT for slot in firing.after):
             raise AssertionError(f"the marking is not legal after {self._names(events)}")
         for place in firing.preset:
             marked[place] = 0
         for place in firing.postset:
             marked[place] = 1
         for slot in firing.before:
-            robot[slot] = NOBODY
+            robot[slot] = VACANT
         for slot, number in zip(firing.after, moved, strict=True):
             robot[slot] = number
         new = [event for event, preset in firing.fed if self._all_marked(preset)]
@@ -79,7 +78,7 @@ class Threads:
         """(m, f_m) now."""
         slots = [(p, i) for p, place in enumerate(self.net.places) for i in range(place.size)]
         held = zip(slots, self._robot, strict=True)
-        return ThreadedMarking({slot: robot for slot, robot in held if robot != NOBODY})
+        return ThreadedMarking({slot: robot for slot, robot in held if robot != VACANT})
 
     def _keep(self, events: tuple[int, ...]) -> _Firing:
         net = self.net.net

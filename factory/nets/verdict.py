@@ -15,8 +15,8 @@ PROPERTIES = ("gear_net", "live", "safe", "reversible", "legal")
 
 
 @dataclass(frozen=True, slots=True)
-class Fault:
-    """Why a property fails, or is undecided, by numbers of gears, places and transitions.
+class Defect:
+    """Why a property fails, or is undecided, by indices of gears, places and transitions.
 
     `kind` is one of a few fixed phrases (`lost token`, `unclosed gear`, ...); `reason` says it in
     full. `transitions` is a firing sequence where the kind speaks of one.
@@ -32,7 +32,7 @@ class Fault:
 
 @dataclass(frozen=True, slots=True)
 class Witness:
-    """A fault by names: robots, labels, places and transitions, and where they come from."""
+    """A defect by names: robots, labels, places and transitions, and where they come from."""
 
     property: str
     kind: str
@@ -49,21 +49,16 @@ class Witness:
         return tuple(dict.fromkeys(f"{at.file}:{at.line}" for at in self.sources))
 
     def __str__(self) -> str:
-        """What it is a witness against, why, and the source lines concerned."""
+        """The property, why it fails, and the source lines concerned."""
         where = f" ({', '.join(self.lines)})" if self.lines else ""
         return f"not {self.property.replace('_', ' ')}: {self.reason}{where}"
 
     def as_json(self) -> dict[str, object]:
         """The witness as the `--json` document lists it."""
+        texts, rows = ("property", "kind", "reason"), ("robots", "labels", "places", "transitions")
         return {
-            "property": self.property,
-            "kind": self.kind,
-            "reason": self.reason,
-            "robots": list(self.robots),
-            "labels": list(self.labels),
-            "places": list(self.places),
-            "transitions": list(self.transitions),
-            "lines": list(self.lines),
+            **{name: getattr(self, name) for name in texts},
+            **{name: list(getattr(self, name)) for name in (*rows, "lines")},
         }
 
 
@@ -96,38 +91,33 @@ class Verdict:
 
 
 def testify(
-    net: MarkedNet,
-    gears: tuple[Gear, ...],
-    faults: Iterable[Fault],
-    sources: Mapping[str, Position] | None,
+    net: MarkedNet, defects: Iterable[Defect], sources: Mapping[str, Position] | None
 ) -> tuple[Witness, ...]:
-    """The faults by names. `sources` adds the source positions of robots, by their names."""
-    return tuple(_witness(net, gears, fault, sources or {}) for fault in faults)
+    """The defects by names. `sources` adds the source positions of robots, by their names."""
+    return tuple(_witness(net, defect, sources or {}) for defect in defects)
 
 
-def _witness(
-    net: MarkedNet, gears: tuple[Gear, ...], fault: Fault, sources: Mapping[str, Position]
-) -> Witness:
+def _witness(net: MarkedNet, against: Defect, sources: Mapping[str, Position]) -> Witness:
     places, events = net.net.places, net.net.transitions
-    concerned = fault.gears or _owners(net, fault.places)
-    robots = [gears[g].robot for g in concerned]
-    subjects = list(fault.places)
+    concerned = against.gears or _owners(net, against.places)
+    robots = [net.gears[g].robot for g in concerned]
+    subjects = list(against.places)
     labels = _labels(net, subjects)
     if not labels:
-        near = [q for e in fault.transitions for q in net.net.preset[e] + net.net.postset[e]]
-        subjects += near or [p for g in concerned for p in gears[g].places]
+        near = [q for e in against.transitions for q in net.net.preset[e] + net.net.postset[e]]
+        subjects += near or [p for g in concerned for p in net.gears[g].places]
         labels = _labels(net, subjects)
     at = [places[p].position for p in subjects]
-    at += [events[e].position for e in fault.transitions]
+    at += [events[e].position for e in against.transitions]
     at += [sources.get(robot) for robot in robots]
     return Witness(
-        fault.property,
-        fault.kind,
-        fault.reason,
+        against.property,
+        against.kind,
+        against.reason,
         tuple(robots),
         labels,
-        tuple(places[p].name for p in fault.places),
-        tuple(events[e].name for e in fault.transitions),
+        tuple(places[p].name for p in against.places),
+        tuple(events[e].name for e in against.transitions),
         tuple(dict.fromkeys(position for position in at if position)),
     )
 

@@ -22,9 +22,10 @@ from factory.support.errors import Position
 class Operation:
     """A template instantiated: O(r_1, ..., r_k) (section 4.3).
 
-    `robots` are indices into `Factory.robots`, in the template's order; `before` and `after` the
-    labels each carries when it starts and ends (NOPART for none); `dwell` [s]; `approach`: how its
-    inputs come together, None where that is free.
+    `label` is that of the result, `dropoff` for the last. `robots` are indices into
+    `Factory.robots`, in the template's order; `before` and `after` the labels each carries when it
+    starts and ends (NOPART for none); `dwell` [s]; `approach`: how its inputs come together, None
+    where that is free.
     """
 
     index: int
@@ -38,11 +39,6 @@ class Operation:
     approach: Approach | None = field(default=None, repr=False)
 
     @property
-    def name(self) -> str:
-        """X: the label of the result, `dropoff` for the last."""
-        return self.label
-
-    @property
     def carrier(self) -> int:
         """The robot that holds the result (index into `Factory.robots`)."""
         return self.robots[self.template.carrier - 1]
@@ -53,7 +49,7 @@ class Operation:
         return tuple(label for label in self.before if label != NOPART)
 
     def awaits_empty(self, slot: int) -> bool:
-        """Whether the robot in a slot waits for others, with nothing in its hands."""
+        """Whether the robot in a slot waits for others and carries nothing."""
         return len(self.robots) > 1 and self.before[slot] == NOPART
 
     @property

@@ -35,7 +35,7 @@ class Whole:
 
 
 @dataclass(frozen=True)
-class Bodies:
+class FusedBodies:
     """What bodies a run has: one a part, or (`wholes` not empty) one a sub-assembly too.
 
     `carried`: for each label that is carried, the labels of the bodies it consists of; of each
@@ -82,7 +82,7 @@ class Bodies:
         return tuple(found)
 
 
-def bodies_of(factory: Factory, product: Product, fuse: bool = False) -> Bodies:
+def bodies_of(factory: Factory, product: Product, fuse: bool = False) -> FusedBodies:
     """The bodies of a factory's run; with `fuse` every operation with two inputs or more makes one
     of its own. Mass and inertia add up from the inputs, so this is linear in the labels, but for
     the lists of parts."""
@@ -94,7 +94,7 @@ def bodies_of(factory: Factory, product: Product, fuse: bool = False) -> Bodies:
         for label, solid in solids.items()
     }
     if not fuse:
-        return Bodies(factory.contents, centre, mass, radius, {})
+        return FusedBodies(factory.contents, centre, mass, radius, {})
     inertia = {label: solid.inertia for label, solid in solids.items()}
     carried: dict[str, tuple[str, ...]] = {}
     wholes: dict[str, Whole] = {}
@@ -115,7 +115,7 @@ def bodies_of(factory: Factory, product: Product, fuse: bool = False) -> Bodies:
         radius[label] = max(radius[i] + r for i, r in zip(inputs, reach, strict=True))
         parts = factory.contents[label]
         wholes[label] = Whole(label, parts, mass[label], centre[label], sound(inertia[label]))
-    return Bodies(carried, centre, mass, radius, wholes)
+    return FusedBodies(carried, centre, mass, radius, wholes)
 
 
 def fusing_pays(factory: Factory, product: Product) -> bool:
@@ -126,10 +126,10 @@ def fusing_pays(factory: Factory, product: Product) -> bool:
     return len(factory.robots) >= FUSE_FROM and geoms <= GEOMS * len(factory.leaves)
 
 
-def fused_copies(bodies: Bodies, factory: Factory, units: int | None) -> dict[str, int]:
-    """How many copies of each body a fused run needs: a part is in its feeder and in the hands of
-    its robot, or not yet fused; a sub-assembly in the hands of one robot; the product on the
-    outfeed's tray too; and what is relayed in the hands of each further robot."""
+def fused_copies(bodies: FusedBodies, factory: Factory, units: int | None) -> dict[str, int]:
+    """How many copies of each body a fused run needs: of a part one in its feeder and one with its
+    robot, or not yet fused; of a sub-assembly one with its robot; of the product a further one on
+    the outfeed's tray; of what is relayed a further one with each further robot."""
     copies = {operation.label: 2 for operation in factory.leaves}
     (root,) = bodies.carried[factory.pag.root]
     copies |= {label: 2 if label == root else 1 for label in bodies.wholes}

@@ -14,7 +14,7 @@ from factory.problem.pag import NOPART
 
 
 @dataclass(frozen=True, slots=True)
-class Step:
+class ProgramStep:
     """One `If` of a program: what the robot carries, the mode it waits in, the cells it waits for
     (robot, label), its operation and its component there, from 0."""
 
@@ -32,11 +32,11 @@ class Step:
 
 @dataclass(frozen=True, slots=True)
 class Program:
-    """What a robot does for ever: its steps in the order of its gear."""
+    """What a robot repeats without end: its steps in the order of its gear."""
 
     robot: int
     name: str
-    steps: tuple[Step, ...]
+    steps: tuple[ProgramStep, ...]
 
 
 def program_of(factory: Factory, robot: int) -> Program:
@@ -53,7 +53,7 @@ def program_of(factory: Factory, robot: int) -> Program:
             if other != robot
         )
         slot = operation.robots.index(robot)
-        steps.append(Step(wait.label, wait.mode, others, operation, slot))
+        steps.append(ProgramStep(wait.label, wait.mode, others, operation, slot))
     return Program(robot, factory.robots[robot].name, tuple(steps))
 
 
@@ -71,21 +71,21 @@ def write_program(program: Program) -> str:
     return "\n".join([*lines, "End Loop"])
 
 
-def _condition(step: Step) -> str:
-    """What it waits for; with nobody to wait for, what the world must provide."""
+def _condition(step: ProgramStep) -> str:
+    """What it waits for: other robots, or where there are none, what the world must provide."""
     if step.until:
         return " ∧ ".join(f"state_{robot + 1} = {label}" for robot, label in step.until)
     return "a part is at the feeder" if step.label == NOPART else "the outfeed is free"
 
 
-def _field(step: Step) -> str:
+def _field(step: ProgramStep) -> str:
     """π_i ∘ F(x_1, ..., x_k)."""
     operation = step.operation
     robots = ", ".join(f"x_{robot + 1}" for robot in operation.robots)
     return f"π_{step.slot + 1} ∘ {operation.template.name}({robots})"
 
 
-def _exit(step: Step, me: int) -> str:
+def _exit(step: ProgramStep, me: int) -> str:
     """Its own label where that changes; a tool watches the carrier's."""
     operation = step.operation
     after = operation.after[step.slot]

@@ -20,7 +20,7 @@ from factory.control.mode import REST, ROUNDING, Array, Index, Limits, Mode
 from factory.control.navigation import Bundle
 from factory.modes.staging import Stage
 from factory.plant.factory import Factory, Operation
-from factory.plant.programs import Program, Step, program_of
+from factory.plant.programs import Program, ProgramStep, program_of
 from factory.simulation.bundles import Bundles
 from factory.simulation.cells import Cells, Link
 from factory.simulation.run import Event
@@ -49,7 +49,7 @@ class Process:
     goes_ahead: bool = False
 
     @property
-    def step(self) -> Step:
+    def step(self) -> ProgramStep:
         """The step it is at."""
         return self.program.steps[self.turns % len(self.program.steps)]
 
@@ -194,7 +194,7 @@ class DistributedSupervisor:
         elif process.stage == "leave" and self._followed(process, step):
             self._advance(process)
 
-    def _may_enter(self, process: Process, step: Step) -> bool:
+    def _may_enter(self, process: Process, step: ProgramStep) -> bool:
         """Every other robot of the operation has finished all that it does before this, and shows
         what it must bring; the world is prepared; all are in the domain."""
         operation, unit = step.operation, process.unit
@@ -206,7 +206,7 @@ class DistributedSupervisor:
         x, _ = self.link.read(operation, process.program.robot)
         return started or bool(self._bundle(operation).in_domain(x)[0])
 
-    def _run(self, process: Process, step: Step) -> None:
+    def _run(self, process: Process, step: ProgramStep) -> None:
         operation, me = step.operation, process.program.robot
         if not step.is_carrier:
             if self.cells.has_left(operation.carrier, operation, process.unit):
@@ -231,7 +231,7 @@ class DistributedSupervisor:
         x[slots] = process.reference[mine] + process.speed[mine] * dt / 2
         self._drive(process, mine, self._bundle(operation).field(x, dt)[slots])
 
-    def _go_ahead(self, process: Process, step: Step) -> None:
+    def _go_ahead(self, process: Process, step: ProgramStep) -> None:
         """While it waits, a robot may go where it is needed next; it reads no other robot's state
         for that."""
         found = self.stages.get((process.program.robot, step.operation.index))
@@ -262,7 +262,7 @@ class DistributedSupervisor:
         process.speed[:] = 0.0
         self.world.move(process.axes, process.reference.copy(), process.speed, process.speed)
 
-    def _at_goal(self, process: Process, step: Step) -> bool:
+    def _at_goal(self, process: Process, step: ProgramStep) -> bool:
         """The carrier judges the goal of the whole mode, and keeps its clock."""
         x, v = self.link.read(step.operation, process.program.robot)
         bundle = self._bundle(step.operation)
@@ -273,13 +273,13 @@ class DistributedSupervisor:
         process.clock += process.period * self.timestep
         return done
 
-    def _finish(self, process: Process, step: Step) -> None:
+    def _finish(self, process: Process, step: ProgramStep) -> None:
         """Write one's own cell: a new label, one more operation finished."""
         cell = self.cells[process.program.robot]
         cell.label = step.operation.after[step.slot]
         cell.turn += 1
 
-    def _followed(self, process: Process, step: Step) -> bool:
+    def _followed(self, process: Process, step: ProgramStep) -> bool:
         """Whether all other robots have left the operation."""
         return all(
             self.cells.has_left(other, step.operation, process.unit) for other, _ in step.until

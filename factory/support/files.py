@@ -91,6 +91,19 @@ def own_names(folder: Path, paths: Iterable[Path], inputs: Iterable[Path] = ()) 
         raise InputError(faults)
 
 
+def is_net(file: Path) -> bool:
+    """Whether a file is meant as PNML: by its ending, or because it begins as XML does."""
+    if file.suffix.lower() == ".pnml":
+        return True
+    try:
+        if not file.is_file():
+            return False
+        with file.open("rb") as stream:
+            return stream.read(100).lstrip(b"\xef\xbb\xbf \t\r\n").startswith(b"<")
+    except OSError:
+        return False
+
+
 def user_cache() -> Path:
     """The user's folder for files that can be made again: in $XDG_CACHE_HOME, or ~/.cache."""
     given = os.environ.get("XDG_CACHE_HOME", "")

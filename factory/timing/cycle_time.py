@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
 
-from factory.nets.cycle_ratio import max_cycle_ratio
+from factory.nets.cycle_ratio import CycleRatio, max_cycle_ratio
 from factory.nets.gears import GearNet
 from factory.nets.marked import MarkedNet, marked
+from factory.nets.petri import PetriNet, Place
 from factory.plant.factory import Factory
 from factory.support.errors import did_you_mean
 
@@ -25,21 +26,13 @@ class CycleTime:
     bottleneck: str
 
 
-@dataclass(frozen=True, slots=True)
-class CriticalCircuit:
-    """The greatest quotient of delays [s] and tokens over circuits, and one circuit's places."""
-
-    seconds: float
-    places: tuple[int, ...]
-
-
 def cycle_time(
     subject: Factory | GearNet,
     delays: Delays,
     ways: Mapping[tuple[int, int], float] = MappingProxyType({}),
 ) -> CycleTime:
     """The maximum over robots of the summed delays of its gear, which carries one token. `ways`:
-    what a robot (index) takes to a place [s] while it waits for it (`factory.timing.ways`).
+    what a robot (index) takes to a place [s] while it waits for it (`with_ways`).
 
     Holds since the simple circuits of a gear net are its gears. The first robot that attains it is
     the bottleneck. Raises ValueError where a delay is negative or names no place.
@@ -71,11 +64,31 @@ def _seconds(net: MarkedNet, delays: Delays) -> list[float]:
     return seconds
 
 
-def marked_graph_cycle_time(net: GearNet | MarkedNet, delays: Delays) -> CriticalCircuit:
-    """The maximum cycle ratio of a net (`factory.nets.cycle_ratio`).
+def marked_graph_cycle_time(net: GearNet | MarkedNet, delays: Delays) -> CycleRatio:
+    """The greatest quotient of delays [s] and tokens over the circuits of a net, and one circuit
+    that attains it.
 
     Raises ValueError where the net is no marked graph, has no circuit or is not live.
     """
     subject = marked(net)
-    found = max_cycle_ratio(subject, _seconds(subject, delays))
-    return CriticalCircuit(found.seconds, found.circuit)
+    return max_cycle_ratio(subject, _seconds(subject, delays))
+
+
+def with_ways(net: MarkedNet, factory: Factory, ways: Iterable[tuple[int, int]]) -> MarkedNet:
+    """`net`, whose first places are the factory's, with a place [Y_e; X_e] for each way: of a robot
+    that goes from where Y has left it to where X, its next operation, needs it (`modes.staging`).
+
+    It is beside the robot's own places from Y_e to X_e, and has as many tokens as its wait for X.
+    So the simple circuits of a gear net still lie in one gear each: one that took a way of a gear
+    and left that gear before X_e would come by X_e a second time. A gear takes the longer of the
+    two at each operation.
+    """
+    places, tokens = list(net.net.places), list(net.tokens)
+    for robot, number in ways:
+        gear, operation = factory.robots[robot], factory.operations[number]
+        step = gear.operations.index(number)
+        before = factory.operations[gear.operations[step - 1]]
+        name = f"way:{gear.name}:{operation.label}"
+        places.append(Place(name, (before.end,), (operation.end,), "way", operation.label))
+        tokens.append(net.tokens[factory.net.gears[robot].places[2 * step]])
+    return MarkedNet(PetriNet(net.net.transitions, tuple(places)), tuple(tokens))

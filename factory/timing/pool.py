@@ -35,16 +35,9 @@ def with_wip(factory: Factory, wip: int) -> MarkedNet:
         hint = "at least one copy of each part must be let in: --wip 1"
         raise InputError(Diagnostic("BadValue", f"work in process bounded by {wip}", None, hint))
     net = factory.net.threaded.net
+    end = (factory.dropoff.end,)
     extra = tuple(
-        Place(
-            f"wip:{part.label}",
-            (factory.dropoff.end,),
-            (part.start,),
-            "wip",
-            part.label,
-            0,
-            part.position,
-        )
+        Place(f"wip:{part.label}", end, (part.start,), "wip", part.label, 0, part.position)
         for part in factory.leaves
     )
     tokens = marked(factory.net).tokens + (wip,) * len(extra)

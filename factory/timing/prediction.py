@@ -18,9 +18,13 @@ from factory.layout.layout import Layout
 from factory.modes.modes import operation_starts
 from factory.modes.staging import Stage, staged
 from factory.support.settings import Settings
-from factory.timing.cycle_time import CycleTime, cycle_time, marked_graph_cycle_time
+from factory.timing.cycle_time import (
+    CycleTime,
+    cycle_time,
+    marked_graph_cycle_time,
+    with_ways,
+)
 from factory.timing.pool import with_wip
-from factory.timing.ways import with_ways
 
 
 def operation_delays(
@@ -35,20 +39,18 @@ def operation_delays(
     `ahead`: the ways that robots go while they wait."""
     factory = layout.factory
     settle = settings.settle if world == "mujoco" else 0.0
-    delays = []
     starts = staged(operation_starts(layout), ahead)
-    for operation, mode, start in zip(factory.operations, modes, starts, strict=True):
-        time = mode_time(mode, start, limits.of(factory.axes[operation.index]), world)
-        delays.append(time + settle + settings.tick)
-    return delays
+    return [
+        mode_time(mode, start, limits.of(axes), world) + settle + settings.tick
+        for axes, mode, start in zip(factory.axes, modes, starts, strict=True)
+    ]
 
 
 def ways_ahead(
     ahead: Sequence[Stage], limits: Limits, settings: Settings, world: World
 ) -> dict[tuple[int, int], float]:
     """The time [s] from the end of a robot's operation until it is where it has gone ahead to, by
-    the robot and the operation to come. It sets out at once, and stands where it is when all others
-    do."""
+    the robot and the operation to come. It sets out at once."""
     return {
         (stage.robot, stage.operation): way_time(
             stage, stage.start, limits.of((stage.robot,)), settings, world

@@ -319,16 +319,17 @@ def section(results: dict) -> str:
             " run for each robot where a single robot is disturbed. Survived: all units made,"
             " the replay refines the net, no unintended contact, product error at most"
             f" {ERROR_MM} mm. Time is lost against the same run undisturbed; the worst seed"
-            " counts. The factory does not know of the disturbance, except for a slowed robot, whose"
-            " drive is set to be slow; the drive of a robot held back is not.",
-            "Disturbances that must be survived: " + ("**all are.**" if good else "**not all are.**"),
+            " counts. The factory does not know of the disturbance, except for a slowed robot,"
+            " whose drive is set to be slow; the drive of a robot held back is not.",
+            "Disturbances that must be survived: "
+            + ("**all are.**" if good else "**not all are.**"),
             table(
                 ("product", "disturbance", "magnitude", "", "products", *costs, "survived"), must
             ),
-            "The largest disturbance of each kind that is survived, on a grid (the next point is not,"
-            " for the reason given). Pushes come every half second, on a robot or part drawn at random."
-            " Noise is white, 500 times a second, its standard deviation given; noise and delay are"
-            " in what the supervisor sees and in the drive's own loop.",
+            "The largest disturbance of each kind that is survived, on a grid (the next point is"
+            " not, for the reason given). Pushes come every half second, on a robot or part drawn"
+            " at random. Noise is white, 500 times a second, its standard deviation given; noise and"
+            " delay are in what the supervisor sees and in the drive's own loop.",
             table(
                 ("product", "disturbance", "survived", "next", "", *costs, "what ends the next"),
                 most,

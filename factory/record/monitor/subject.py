@@ -12,7 +12,7 @@ from factory.layout.layout import Layout
 from factory.nets.history import firings
 from factory.nets.petri import Marking
 from factory.plant.factory import Factory, Operation
-from factory.plant.fused_bodies import Bodies, bodies_of
+from factory.plant.fused_bodies import FusedBodies, bodies_of
 from factory.support.settings import Settings
 
 PATIENCE = 4.0
@@ -96,7 +96,7 @@ def subject_of(
     jitter: float = 0.0,
     start: Marking | None = None,
     wip: int | None = None,
-    bodies: Bodies | None = None,
+    bodies: FusedBodies | None = None,
 ) -> Subject:
     """The subject that a layout is, run with these settings from a marking (m_0 where None), of one
     body a part unless other `bodies` are given."""

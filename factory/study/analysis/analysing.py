@@ -5,11 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from math import inf
 
-from factory.nets.slack import slacks
 from factory.study.analysis.bounds import WipCurve, wip_curve
 from factory.study.analysis.flow import Flow, flow
 from factory.study.analysis.measured import Comparison, Record, compare
 from factory.study.analysis.sensitivity import Sensitivity, sensitivities
+from factory.study.analysis.slack import slacks
 from factory.study.analysis.timed import TimedNet, timed_net
 from factory.study.analysis.timing import AS_IT_IS, Change, Timing
 from factory.study.analysis.what_if import Scenario, scenario, scenarios

@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from factory.nets.firing import Firings, Floats
 from factory.plant.factory import Operation
+from factory.study.analysis.firing import Firings, Floats
 from factory.study.analysis.timed import TimedNet
 from factory.study.analysis.timing import Timing
 

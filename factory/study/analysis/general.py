@@ -12,7 +12,7 @@ from pathlib import Path
 from factory.nets.cycle_ratio import max_cycle_ratio
 from factory.nets.gears import GearNet
 from factory.nets.marked import MarkedNet, marked
-from factory.nets.slack import Slack, circuits, slacks
+from factory.study.analysis.slack import Slack, circuits, slacks
 from factory.study.analysis.tables import SHOWN, Table, cut
 from factory.support.errors import Diagnostic, InputError, Position, did_you_mean
 

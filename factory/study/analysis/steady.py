@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from factory.nets.firing import Floats
+from factory.study.analysis.firing import Floats
 from factory.study.analysis.timed import timed_net
 from factory.study.analysis.timing import Timing
 

@@ -8,13 +8,13 @@ from functools import cached_property
 from math import lcm
 
 from factory.nets.cycle_ratio import CycleRatio, max_cycle_ratio
-from factory.nets.firing import Firings, settled_firings
 from factory.nets.marked import NONE, MarkedNet, marked
 from factory.nets.petri import PetriNet, Place
-from factory.nets.slack import Slack, circuits
+from factory.study.analysis.firing import Firings, settled_firings
+from factory.study.analysis.slack import Slack, circuits
 from factory.study.analysis.timing import AS_IT_IS, Change, Timing
+from factory.timing.cycle_time import with_ways
 from factory.timing.pool import with_wip
-from factory.timing.ways import with_ways
 
 SAME = 1e-9
 """Times that differ by no more than this share are equal."""

@@ -13,28 +13,24 @@ property with `holds`:
   a robot, or, beyond the robots, of a row of `circuits`);
 * `live`: an `order` of the places without token in which each comes after those it waits for;
 * `reversible`: trees of ways from a `root` to every transition, `there` and `back`; `root` is null
-  where the net falls into parts, of which each lives or lies still;
+  where the net falls into parts, each of which is live or never moves;
 * `legal`: the marked place of each robot, whose slots are those of the robots that start there.
 
 A section that does not hold has a `reason` and what shows it (a firing sequence, a circuit). One
 that holds by exploration only has `holds` null, with the reason: it is not certified. `digest` is
-the SHA-256 of the rest. `check_certificate` gives the faults of such a document.
+the SHA-256 of the rest. `check_certificate` (module `check`) gives the faults of such a document.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
-from factory.foreign_nets.general import with_gears
-from factory.nets.behaviour import cover
-from factory.nets.certificate_check import CLAIMS, SCHEMA, check_certificate
-from factory.nets.certificate_net import digest
-from factory.nets.composition import Composition, compose
+from factory.export.certificate.listing import CLAIMS, SCHEMA, digest
+from factory.nets.composition import Composition, compose, cover
 from factory.nets.gears import GearNet
-from factory.nets.marked import NONE, MarkedNet, marked, overfill, token_free
+from factory.nets.marked import NONE, MarkedNet, marked, token_free
 from factory.nets.verdict import Verdict, Witness
-
-__all__ = ["certificate", "check_certificate"]
 
 Json = dict[str, Any]
 
@@ -46,21 +42,19 @@ def certificate(net: GearNet | MarkedNet, verdict: Verdict) -> Json:
     """
     subject = marked(net)
     if verdict.gears and not subject.slots:
-        subject = with_gears(subject, verdict.gears)
+        subject = subject.with_gears(verdict.gears)
     if len(subject.net.place_index) < len(subject.tokens):
         raise ValueError("two places have one name")
     if len(subject.net.transition_index) < len(subject.net.transitions):
         raise ValueError("two transitions have one name")
+    composition = compose(subject)
     document: Json = {
         "schema": SCHEMA,
         "net": _listing(net, subject),
         "robots": _robots(net, subject),
+        **{claim: _section(claim, subject, composition, verdict) for claim in CLAIMS},
     }
-    composition = compose(subject)
-    for claim in CLAIMS:
-        document[claim] = _section(claim, subject, composition, verdict)
-    document["digest"] = digest(document)
-    return document
+    return {**document, "digest": digest(document)}
 
 
 def _listing(net: GearNet | MarkedNet, subject: MarkedNet) -> Json:
@@ -91,40 +85,38 @@ def _listing(net: GearNet | MarkedNet, subject: MarkedNet) -> Json:
 
 
 def _robots(net: GearNet | MarkedNet, subject: MarkedNet) -> list[Json]:
-    found = [_marked_place(subject, gear.places) for gear in subject.gears]
+    initial = _marked_places(subject)
     if isinstance(net, GearNet):
-        found = [*net.initial, *[None] * len(net.gears)][: len(net.gears)]
+        initial = [*net.initial, *[None] * len(net.gears)][: len(net.gears)]
     return [
         {
             "name": gear.robot,
             "type": gear.type,
             "places": list(gear.places),
             "transitions": list(gear.transitions),
-            "initial": initial,
+            "initial": place,
         }
-        for gear, initial in zip(subject.gears, found, strict=True)
+        for gear, place in zip(subject.gears, initial, strict=True)
     ]
 
 
-def _marked_place(net: MarkedNet, places: tuple[int, ...]) -> int | None:
-    return next((p for p in places if net.tokens[p]), None)
+def _marked_places(net: MarkedNet) -> list[int | None]:
+    """The first marked place of each gear."""
+    return [next((p for p in gear.places if net.tokens[p]), None) for gear in net.gears]
 
 
 def _section(claim: str, net: MarkedNet, composition: Composition, verdict: Verdict) -> Json:
     holds = getattr(verdict, claim)
-    if holds is None or (holds and verdict.method != "structure" and claim not in _BY_GEARS):
+    by_gears = claim in ("gear_net", "legal")
+    if holds is None or (holds and verdict.method != "structure" and not by_gears):
         reason = "undecided" if holds is None else "found by exploring every marking: not certified"
         return {"holds": None, "reason": reason}
-    if holds:
-        evidence = _EVIDENCE[claim](net, composition)
-        if evidence is None:
-            return {"holds": None, "reason": "proved, but not by circuits alone: not certified"}
-        return {"holds": True, **evidence}
-    witness = next(w for w in verdict.witness if w.property == claim)
-    return _failure(claim, net, witness)
-
-
-_BY_GEARS = ("gear_net", "legal")
+    if not holds:
+        return _failure(claim, net, next(w for w in verdict.witness if w.property == claim))
+    evidence = _EVIDENCE[claim](net, composition)
+    if evidence is None:
+        return {"holds": None, "reason": "proved, but not by circuits alone: not certified"}
+    return {"holds": True, **evidence}
 
 
 def _gear_net(net: MarkedNet, composition: Composition) -> Json:
@@ -151,10 +143,12 @@ def _gear_net(net: MarkedNet, composition: Composition) -> Json:
 def _safe(net: MarkedNet, composition: Composition) -> Json | None:
     covered = cover(net, composition.closed)
     circuits: list[list[int]] = []
-    for place, gear in enumerate(covered):
-        if gear != NONE:
+    for place in [place for place, gear in enumerate(covered) if gear == NONE]:
+        from factory.foreign_nets.behaviour import overfill  # never for a gear net
+
+        if covered[place] != NONE:
             continue
-        circuit = overfill(net, place, frozenset()).circuit
+        circuit = overfill(net, place).circuit
         if not circuit:
             return None
         for other in circuit:
@@ -202,10 +196,10 @@ def _tree(
 
 
 def _legal(net: MarkedNet, composition: Composition) -> Json:
-    return {"marked": [_marked_place(net, gear.places) for gear in net.gears]}
+    return {"marked": _marked_places(net)}
 
 
-_EVIDENCE = {
+_EVIDENCE: dict[str, Callable[[MarkedNet, Composition], Json | None]] = {
     "gear_net": _gear_net,
     "safe": _safe,
     "live": _live,
@@ -220,7 +214,9 @@ def _failure(claim: str, net: MarkedNet, witness: Witness) -> Json:
     events = [net.net.transition_index[name] for name in witness.transitions]
     section: Json = {"holds": False, "kind": witness.kind, "reason": witness.reason}
     section["robots"] = list(witness.robots)
-    if witness.kind == "dead transition" or (claim == "reversible" and _lasting(net, witness)):
+    structural = net.is_marked_graph
+    lasting = claim == "reversible" and not (structural or _stops(net, events))
+    if witness.kind == "dead transition" or lasting:
         return {"holds": None, "reason": f"{witness.reason}; found by exploring: not certified"}
     if claim == "safe":
         return {**section, "place": places[0], "firing": events}
@@ -228,22 +224,18 @@ def _failure(claim: str, net: MarkedNet, witness: Witness) -> Json:
         dead = witness.kind == "deadlock"
         return {**section, "circuit": None if dead else places, "firing": events if dead else None}
     if claim == "reversible":
-        structural = net.is_marked_graph
         event = events[0] if structural else None
         return {**section, "transition": event, "firing": None if structural else events}
     return {**section, "places": places, "transitions": events}
 
 
-def _lasting(net: MarkedNet, witness: Witness) -> bool:
-    """Whether a net with choice does not come back although it goes on: no deadlock shows it."""
-    if net.is_marked_graph:
-        return False
+def _stops(net: MarkedNet, events: list[int]) -> bool:
+    """Whether a net with choice is in a deadlock after a firing sequence."""
     tokens = list(net.tokens)
-    for name in witness.transitions:
-        event = net.net.transition_index[name]
+    for event in events:
         for p in net.net.preset[event]:
             tokens[p] -= 1
         for p in net.net.postset[event]:
             tokens[p] += 1
     ready = (all(tokens[p] for p in needs) for needs in net.net.preset)
-    return any(on and e not in net.blocked for e, on in enumerate(ready))
+    return not any(on and e not in net.blocked for e, on in enumerate(ready))

@@ -9,11 +9,16 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from typing import Any
 
-from factory.nets.certificate_net import Net, Section, digest, number
-from factory.nets.certificate_refute import one_way, refute
-
-SCHEMA = 1
-CLAIMS = ("gear_net", "safe", "live", "reversible", "legal")
+from factory.export.certificate.listing import (
+    CLAIMS,
+    SCHEMA,
+    Net,
+    Rows,
+    Section,
+    digest,
+    number,
+)
+from factory.export.certificate.refute import one_way, refute
 
 
 def check_certificate(document: object) -> list[str]:
@@ -37,7 +42,7 @@ def _check(document: Any) -> Iterator[str]:
             yield from _claim(net, claim, document)
 
 
-def _claim(net: Net, claim: str, document: dict[str, Any]) -> Iterator[str]:
+def _claim(net: Net, claim: str, document: Section) -> Iterator[str]:
     section = document[claim]
     if section["holds"] is True:
         yield from _PROOFS[claim](net, section, document)
@@ -49,38 +54,38 @@ def _claim(net: Net, claim: str, document: dict[str, Any]) -> Iterator[str]:
 
 def _prove_gear_net(net: Net, section: Section, document: Section) -> Iterator[str]:
     """Definition 3.6: replay the order in which the gears are added."""
-    if not all(net.closed(robot) for robot in range(len(net.gears))):
+    if not all(map(net.closed, net.robots)):
         yield "gear_net: some robot's gear is no cycle (Definition 3.5)"
         return
     order = [number(step["gear"]) for step in section["order"]]
-    if sorted(order) != list(range(len(net.gears))) or not order:
+    if sorted(order) != list(range(len(net.robots))) or not order:
         yield "gear_net: the order does not add every gear once"
         return
-    at_place: list[list[int]] = [[] for _ in net.names]
+    at_place: Rows = [[] for _ in net.names]
     passing = [0] * len(net.events)
-    for turn, step in enumerate(section["order"]):
-        yield from _added(net, step, turn, at_place, passing)
-        for p, e in zip(net.gears[step["gear"]], net.turns[step["gear"]], strict=True):
+    for step in section["order"]:
+        robot = net.robots[step["gear"]]
+        if step is section["order"][0]:
+            if any(step[key] is not None for key in ("place", "a", "b", "c", "exempt")):
+                yield f"gear_net: {robot.name} comes first and is joined to nothing"
+        else:
+            yield from _added(net, step, at_place, passing)
+        for p, e in zip(robot.places, robot.turns, strict=True):
             at_place[p].append(step["gear"])
             passing[e] += 1
     if not all(at_place) or not all(passing):
         yield "gear_net: some place or transition is in no gear"
     if not all(net.fits(p, sorted(own)) for p, own in enumerate(at_place)):
         yield "gear_net: the slots of some place are not its gears'"
-    yield from _prove_moves(net)
+    yield from net.wrong_moves()
 
 
-def _added(
-    net: Net, step: Section, turn: int, at_place: list[list[int]], passing: list[int]
-) -> Iterator[str]:
+def _added(net: Net, step: Section, at_place: Rows, passing: list[int]) -> Iterator[str]:
     """Conditions (a) and (b) for one gear."""
-    gear, name = net.gears[step["gear"]], net.robots[step["gear"]]
+    robot = net.robots[step["gear"]]
+    gear, name = robot.places, robot.name
     old_places = [p for p in gear if at_place[p]]
-    old_events = [e for e in net.turns[step["gear"]] if passing[e]]
-    if turn == 0:
-        if any(step[key] is not None for key in ("place", "a", "b", "c", "exempt")):
-            yield f"gear_net: {name} comes first and is joined to nothing"
-        return
+    old_events = [e for e in robot.turns if passing[e]]
     place, a, b = number(step["place"]), number(step["a"]), number(step["b"])
     if old_places != [place] or net.edge(place) != (a, b) or sorted(old_events) != sorted((a, b)):
         yield f"gear_net: (a) {name} shares more or less than place [a; b] with the gears before"
@@ -97,26 +102,9 @@ def _added(
         yield f"gear_net: (b) fails for {name}: c is not new, or [c; a] not its place"
 
 
-def _prove_moves(net: Net) -> Iterator[str]:
-    """Every redistribution function is a bijection that leaves each robot itself."""
-    for event, moves in enumerate(net.moves):
-        if moves is None:
-            continue
-        before = [(number(p), number(i)) for p, i, _, _ in moves]
-        after = [(number(q), number(j)) for _, _, q, j in moves]
-        here = sorted((p, i) for p in net.preset[event] for i in range(len(net.slots[p])))
-        there = sorted((q, j) for q in net.postset[event] for j in range(len(net.slots[q])))
-        if sorted(before) != here or sorted(after) != there:
-            yield f"gear_net: the redistribution of {net.events[event]} is no bijection"
-        elif any(
-            net.slots[p][i] != net.slots[q][j] for (p, i), (q, j) in zip(before, after, strict=True)
-        ):
-            yield f"gear_net: {net.events[event]} moves a robot into another's slot"
-
-
 def _prove_safe(net: Net, section: Section, document: Section) -> Iterator[str]:
     """Each place lies on a circuit with at most one token: a robot's gear, or one listed."""
-    circuits = [gear if net.closed(robot) else [] for robot, gear in enumerate(net.gears)]
+    circuits = [robot.places if net.closed(robot) else [] for robot in net.robots]
     circuits += [row if net.circuit(row) else [] for row in section["circuits"]]
     good = [set(row) if sum(net.tokens[p] for p in row) <= 1 else set() for row in circuits]
     cover = [number(c) for c in section["cover"]]
@@ -171,7 +159,7 @@ def _prove_reversible(net: Net, section: Section, document: Section) -> Iterator
             if event == root:
                 good = place is None and depth == 0
             else:
-                edge = net.edge(number(place)) if 0 <= number(place) < len(net.names) else None
+                edge = net.edge(place)
                 good = edge is not None and edge[end] == event
                 good = good and tree["depth"][toward[place][0]] == number(depth) - 1 >= 0
             if not good:
@@ -182,12 +170,13 @@ def _prove_reversible(net: Net, section: Section, document: Section) -> Iterator
 def _prove_legal(net: Net, section: Section, document: Section) -> Iterator[str]:
     """Each gear is marked once, and f_m is a bijection onto the robots."""
     marked = [number(p) for p in section["marked"]]
-    if len(marked) != len(net.gears):
+    if len(marked) != len(net.robots):
         yield "legal: not every robot has its place"
         return
-    lost = [r for r, p in enumerate(marked) if net.initial[r] != p or not net.marked_once(r)]
+    pairs = zip(net.robots, marked, strict=True)
+    lost = [robot for robot, p in pairs if robot.initial != p or not net.marked_once(robot)]
     for robot in lost:
-        yield f"legal: {net.robots[robot]} is not marked exactly once, where it says"
+        yield f"legal: {robot.name} is not marked exactly once, where it says"
     if not lost and not net.threaded():
         yield "legal: f_m is no bijection"
 

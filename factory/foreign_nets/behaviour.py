@@ -1,0 +1,240 @@
+"""Live, safe and reversible: from the structure of a marked graph, else by exploring the markings.
+
+Guarantees, for a marked graph: live where no circuit is free of tokens and every place has a
+producer (Commoner et al., Theorem 1); safe where each place lies on a circuit with at most one
+token, or its producer cannot fire often enough (Theorem 2); live implies reversible (Murata 1989,
+Theorem 21: a marking is reachable where it keeps the tokens of every circuit).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+
+import networkx as nx
+
+from factory.foreign_nets.explore import LIMIT, Exploration, explore
+from factory.nets.composition import cover
+from factory.nets.marked import NONE, MarkedNet, dead_ends, token_free
+from factory.nets.verdict import Defect, listing
+
+WORK = 5_000_000
+"""How many places the search for an unsafe one may look at."""
+
+
+@dataclass(frozen=True, slots=True)
+class Behaviour:
+    """Live, safe and reversible, with what speaks against them and how it was found."""
+
+    live: bool | None
+    safe: bool | None
+    reversible: bool | None
+    defects: tuple[Defect, ...]
+    method: str
+
+
+def behaviour(net: MarkedNet, closed: Sequence[bool] = (), limit: int = LIMIT) -> Behaviour:
+    """How the net behaves from m_0. `closed` says which of `net.gears` are cycles of the net; a
+    net with choice is explored up to `limit` markings."""
+    if not net.is_marked_graph:
+        return _explored(net, limit)
+    stuck = token_free(net).stuck
+    dying = tuple(_dying(net, stuck))
+    overfull = tuple(_unsafe(net, closed, frozenset(stuck)))
+    open_ended = NONE in net.left or NONE in net.right
+    one_way = tuple(_one_way(net, stuck) if stuck or open_ended else ())
+    safe = None if any(v.kind == "undecided" for v in overfull) else not overfull
+    return Behaviour(not dying, safe, not one_way, (*dying, *overfull, *one_way), "structure")
+
+
+def _dying(net: MarkedNet, stuck: tuple[int, ...]) -> Iterable[Defect]:
+    """Why a marked graph is not live: a circuit free of tokens, or a place without producer."""
+    names = net.net.places
+    if stuck:
+        circuit = stuck_circuit(net, stuck)
+        events = tuple(net.right[p] for p in circuit)
+        shown = listing(names[p].name for p in circuit)
+        text, kind = f"the circuit through {shown} carries no token", "token-free circuit"
+        if net.left[circuit[0]] == NONE:
+            text, kind = f"nothing ever marks place {shown}", "missing producer"
+        elif events[0] in net.blocked:
+            text = f"place {shown} is before and after its transition, which is dead (Def. 3.4)"
+            kind = "1-gear"
+        yield Defect("live", kind, text, (), circuit, events)
+        return
+    for p in dead_ends(net)[:1]:
+        text = f"nothing marks place {names[p].name} again once its tokens are gone"
+        yield Defect("live", "missing producer", text, (), (p,), (net.right[p],))
+
+
+def stuck_circuit(net: MarkedNet, stuck: Iterable[int]) -> tuple[int, ...]:
+    """The places of a circuit that never carries a token, where transitions are stuck: free of
+    tokens, or one place that its transition both needs and gives back, or alone one that has
+    neither token nor producer."""
+    never, waits = frozenset(stuck), nx.DiGraph()
+    for event in sorted(never):
+        for place in net.net.preset[event]:
+            before = net.left[place]
+            if before == event or (before == NONE and not net.tokens[place]):
+                return (place,)
+            if before in never and not net.tokens[place]:
+                waits.add_edge(before, event, place=place)
+    return tuple(waits.edges[edge]["place"] for edge in nx.find_cycle(waits))
+
+
+def _unsafe(net: MarkedNet, closed: Sequence[bool], stuck: frozenset[int]) -> Iterable[Defect]:
+    """A place of a marked graph that can hold two tokens, with the firings that put them there."""
+    covered = cover(net, closed)
+    work = 0
+    for place, gear in enumerate(covered):
+        if gear != NONE:
+            continue
+        bound = overfill(net, place, stuck)
+        if bound.firings is not None:
+            firing = play(net, bound.firings)
+            when = f"after {len(firing)} firings" if firing else "initially"
+            text = f"place {net.net.places[place].name} holds two tokens {when}"
+            yield Defect("safe", "two tokens", text, (), (place,), firing)
+            return
+        work += bound.work
+        for other in bound.circuit:
+            covered[other] = max(covered[other], 0)
+        if work > WORK:
+            text = f"the search for a place with two tokens stopped after {WORK} steps"
+            yield Defect("safe", "undecided", text)
+            return
+
+
+@dataclass(frozen=True, slots=True)
+class Bound:
+    """Whether a place of a marked graph can hold two tokens.
+
+    `firings`: how often each transition fires to get there, None where that is impossible;
+    `circuit`: where a circuit with at most one token forbids it, the circuit's places; `work` done.
+    """
+
+    firings: Mapping[int, int] | None
+    circuit: tuple[int, ...] = ()
+    work: int = 0
+
+
+def overfill(net: MarkedNet, place: int, stuck: frozenset[int] = frozenset()) -> Bound:
+    """The least firings that put a second token on a place of a marked graph, found backwards.
+
+    To fire its producer k times without its consumer, an event at distance d in tokens upstream
+    must fire k - d times; that fails where the consumer, or a stuck event, is nearer than k.
+    """
+    needed, producer = 2 - net.tokens[place], net.left[place]
+    if needed <= 0:
+        return Bound({})
+    if producer == NONE:
+        return Bound(None)
+    left, tokens, preset = net.left, net.tokens, net.net.preset
+    distance: dict[int, int] = {}
+    onward = {producer: place}
+    levels: list[list[tuple[int, int]]] = [[(producer, place)], []]
+    work = 0
+    for level in range(needed):
+        for event, via in levels[level]:
+            if event in distance:
+                continue
+            distance[event], onward[event] = level, via
+            if event in stuck:
+                return Bound(None, (), work)
+            if event == net.right[place]:
+                return Bound(None, _back(net, onward, event, place), work)
+            for q in preset[event]:
+                work += 1
+                far = level + tokens[q]
+                if far < needed and left[q] == NONE:
+                    return Bound(None, (), work)
+                if far < needed:
+                    levels[far].append((left[q], q))
+    return Bound({event: needed - far for event, far in distance.items()}, (), work)
+
+
+def _back(net: MarkedNet, onward: Mapping[int, int], event: int, place: int) -> tuple[int, ...]:
+    """The circuit from the consumer of a place back to the place."""
+    circuit: list[int] = []
+    while not circuit or circuit[-1] != place:
+        circuit.append(onward[event])
+        event = net.right[onward[event]]
+    return tuple(circuit)
+
+
+def play(net: MarkedNet, firings: Mapping[int, int]) -> tuple[int, ...]:
+    """A sequence from m_0 in which each event fires as often as said (marked graphs).
+
+    Raises ValueError where there is none.
+    """
+    left, tokens, sequence = dict(firings), list(net.tokens), list[int]()
+    ready = [event for event, count in left.items() if count]
+    while ready:
+        event = ready.pop()
+        while left.get(event) and all(tokens[p] for p in net.net.preset[event]):
+            left[event] -= 1
+            sequence.append(event)
+            for p in net.net.preset[event]:
+                tokens[p] -= 1
+            for p in net.net.postset[event]:
+                tokens[p] += 1
+                if left.get(net.right[p]):
+                    ready.append(net.right[p])
+    if any(left.values()):
+        raise ValueError("the events cannot all fire that often")
+    return tuple(sequence)
+
+
+def _one_way(net: MarkedNet, stuck: tuple[int, ...]) -> Iterable[Defect]:
+    """An enabled transition connected to something that fires finitely often: in a component that
+    repeats at all, all fire equally often."""
+    graph, finite = nx.Graph(), set(stuck)
+    for place in net.net.places:
+        nx.add_path(graph, place.left + place.right)
+        if not place.left or not place.right:
+            finite.update(place.left + place.right)
+    ending = {e for part in nx.connected_components(graph) if part & finite for e in part}
+    for event in sorted(ending - net.blocked):
+        if all(net.tokens[p] for p in net.net.preset[event]):
+            name = net.net.transitions[event].name
+            text = f"{name} can fire, but not so often that the initial marking returns"
+            yield Defect("reversible", "no way back", text, transitions=(event,))
+            return
+
+
+def _explored(net: MarkedNet, limit: int) -> Behaviour:
+    """The properties of a net with choice, by its markings."""
+    found = explore(net, limit)
+    against = tuple(_found(net, found))
+    named = {defect.property for defect in against if defect.kind != "undecided"}
+    live, safe, reversible = (
+        False if name in named else True if found.complete else None
+        for name in ("live", "safe", "reversible")
+    )
+    return Behaviour(live, safe, reversible, against, "exploration")
+
+
+def _found(net: MarkedNet, found: Exploration) -> Iterable[Defect]:
+    """What an exploration shows, or leaves undecided, of each property."""
+    names, events = net.net.places, net.net.transitions
+    text = f"undecided: {found.markings} markings were explored, and there are more"
+    if found.deadlock is not None:
+        reason = f"after {len(found.deadlock)} firings nothing is enabled any more"
+        yield Defect("live", "deadlock", reason, transitions=found.deadlock)
+    elif found.starved is not None:
+        firing, event = found.starved
+        reason = f"after {len(firing)} firings {events[event].name} can never fire again"
+        yield Defect("live", "dead transition", reason, transitions=firing or (event,))
+    elif not found.complete:
+        yield Defect("live", "undecided", text)
+    if found.unsafe is not None:
+        firing, place = found.unsafe
+        reason = f"place {names[place].name} holds two tokens after {len(firing)} firings"
+        yield Defect("safe", "two tokens", reason, (), (place,), firing)
+    elif not found.complete:
+        yield Defect("safe", "undecided", text)
+    if one_way := found.one_way or found.deadlock:
+        reason = f"after {len(one_way)} firings the initial marking is out of reach"
+        yield Defect("reversible", "no way back", reason, transitions=one_way)
+    elif not found.complete:
+        yield Defect("reversible", "undecided", text)
