@@ -24,11 +24,11 @@ from layout_values import (
 )
 from pag_values import SHAPES
 
-from factory.layout.certificate import Certificate
+from factory.layout.certificate import ALWAYS, KINDS, PAYLOAD_BODY, STATIONS, Certificate, Region
 from factory.layout.clearance import _Search, certify, separation
 from factory.layout.crossings import touching
+from factory.layout.dimensions import PAYLOADS
 from factory.layout.layout import Layout
-from factory.layout.sweeps import ALWAYS, KINDS, PAYLOAD_BODY, PAYLOADS, STATIONS, Region
 
 
 def broken(layout: Layout, *words: str) -> Certificate:

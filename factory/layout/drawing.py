@@ -13,11 +13,12 @@ import numpy as np
 
 from factory.geometry.solids import Solid
 from factory.layout.dimensions import ARM_WIDTH, CARRIAGE
+from factory.layout.certificate import ALWAYS, PAYLOAD_BODY
 from factory.layout.layout import Box, Extent, Guidepath, Layout, Point2
 from factory.layout.lettering import Lettering
 from factory.layout.sheet import Sheet
 from factory.layout.svg import circle, clean, label, line, number, polygon, rectangle
-from factory.layout.sweeps import ALWAYS, PAYLOAD_BODY, piles, regions
+from factory.layout.sweeps import piles, regions
 
 FONT = 17.0
 """Size of a label on the floor [mm]."""

@@ -13,15 +13,17 @@ from dataclasses import replace
 
 from factory.geometry.solids import Product
 from factory.layout.arranging import arrange
+from factory.layout.certificate import Region
 from factory.layout.dimensions import Clearance
-from factory.layout.drafting import Draft, headings
+from factory.layout.drafting import LayoutDraft
 from factory.layout.durations import Pace, gear_times
-from factory.layout.layout import Box, Layout, Point2
+from factory.layout.guidepath import Box, Point2, hull
+from factory.layout.layout import Layout
 from factory.layout.packing import Task
-from factory.layout.shapes import exact_shapes, payload_boxes, symmetric_shapes
+from factory.layout.shapes import Sides, exact_shapes, headings, payload_boxes, symmetric_shapes
 from factory.layout.sides import admissible
-from factory.layout.stretching import Sides, stretch
-from factory.layout.sweeps import Region, hull, piles, regions
+from factory.layout.stretching import stretch
+from factory.layout.sweeps import piles, regions
 from factory.plant.factory import Factory
 
 EFFORT = 800
@@ -41,8 +43,8 @@ def first_feasible(
     payloads = payload_boxes(factory, product)
     sides = _first_sides(factory, payloads, c)
     shapes = exact_shapes(factory, payloads, headings(factory, sides), c, wide)
-    stretched = stretch(factory, shapes.__getitem__, c, sides)
-    return Draft(factory, product, c, payloads, shapes, stretched).layout()
+    stretched = stretch(factory, shapes, c, sides)
+    return LayoutDraft(factory, product, c, payloads, shapes, stretched).layout()
 
 
 def optimised(
@@ -105,7 +107,7 @@ def _packed(
     task: Task, product: Product, payloads: Mapping[str, Box], sides: Sides | None = None
 ) -> Layout:
     stretched, shapes = arrange(task, payloads, sides)
-    return Draft(task.factory, product, task.clearance, payloads, shapes, stretched).layout()
+    return LayoutDraft(task.factory, product, task.clearance, payloads, shapes, stretched).layout()
 
 
 def _tasks(task: Task, count: int) -> Iterator[Task]:

@@ -7,7 +7,6 @@ from math import cos, hypot, radians, sin, tan
 from xml.etree.ElementTree import Element
 
 from factory.layout.dimensions import CARRIAGE, PAYLOAD, POST, Clearance
-from factory.layout.embedding import project
 from factory.layout.layout import Layout
 from factory.mjcf.elements import add, add_shown, numbers
 from factory.mjcf.names import COMPASS, feeder
@@ -237,7 +236,7 @@ def _feeder(world: Element, layout: Layout, label: str) -> None:
     x, y = middle_at(layout, label)
     body = add(world, "body", name=feeder(label), pos=(x, y, 0.0), quat=heading_quaternion(path))
     u, across = path.heading, path.offset * _handedness(path.heading, path.side)
-    rear, front, _, _ = project(layout.payloads[label], path.heading, path.side)
+    rear, front, _, _ = path.frame(layout.payloads[label])
     back = -Clearance(layout.clearance).post(path.reach, rear)
     raised = layout.elevations[operation.carrier]
     top = PAYLOAD + raised + float(solid.high[2] - product.low[2]) + layout.clearance
