@@ -10,9 +10,9 @@ from typing import Any
 
 from factory.export.subject import Subject
 from factory.geometry.solids import Solid
+from factory.layout.certificate import ALWAYS, PAYLOAD_BODY
 from factory.layout.dimensions import ARM_WIDTH, CARRIAGE
 from factory.layout.drawing import outline
-from factory.layout.certificate import ALWAYS, PAYLOAD_BODY
 from factory.layout.layout import Box, Extent, Layout, Point2
 from factory.layout.sweeps import piles, regions
 from factory.plant.factory import Factory

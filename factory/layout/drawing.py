@@ -12,8 +12,8 @@ from math import floor
 import numpy as np
 
 from factory.geometry.solids import Solid
-from factory.layout.dimensions import ARM_WIDTH, CARRIAGE
 from factory.layout.certificate import ALWAYS, PAYLOAD_BODY
+from factory.layout.dimensions import ARM_WIDTH, CARRIAGE
 from factory.layout.layout import Box, Extent, Guidepath, Layout, Point2
 from factory.layout.lettering import Lettering
 from factory.layout.sheet import Sheet

@@ -9,6 +9,7 @@ from __future__ import annotations
 from bisect import bisect_left
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import accumulate
 from math import inf
 
@@ -28,7 +29,7 @@ Strip = tuple[float, float, float]
 """How far to one side a path takes the floor, by layer [m]; -inf for not at all."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Footprint:
     """`operations`: those after which the robot carries something; the first may be a feeder's.
     `corridor`: whether its way ahead is kept free for its last pile."""
@@ -38,17 +39,17 @@ class Footprint:
     operations: tuple[Operation, ...]
     corridor: bool = False
 
-    @property
+    @cached_property
     def half(self) -> float:
         """Half a clearance [m]."""
         return self.clearance.c / 2
 
-    @property
+    @cached_property
     def fed(self) -> bool:
         """Whether a feeder presents the first pile."""
         return bool(self.operations) and len(self.operations[0].robots) == 1
 
-    @property
+    @cached_property
     def boom(self) -> float:
         """How far ahead the boom of the feeder reaches, over the middle of the part; what is put on
         the part later has to be clear of it [m]."""
@@ -62,6 +63,11 @@ class Footprint:
         """Where along the path, by layer, something may come to it from the side: behind the end of
         the boom."""
         return (-inf, -inf, self.boom + self.half)
+
+    @cached_property
+    def strips(self) -> dict[int, Strip]:
+        """What is taken of the floor on each side, with the last pile."""
+        return {side: self.strip(side, self.shape.last) for side in (-1, +1)}
 
     def strip(self, side: int, pile: Extent) -> Strip:
         """What is taken of the floor on one side, with a pile on the path."""
@@ -100,8 +106,7 @@ class Footprint:
 
     def blocks(self, piles: Sequence[Placed]) -> list[tuple[Block, ...]]:
         """What it takes of each layer: a block as wide as the strips on both sides, or none."""
-        strips = (self.strip(side, self.shape.last) for side in (-1, +1))
-        spans = zip(self.along(piles), *strips, strict=True)
+        spans = zip(self.along(piles), self.strips[-1], self.strips[+1], strict=True)
         return [((*span, -low, high),) if span[0] <= span[1] else () for span, low, high in spans]
 
     def least(self, operation: Operation, station: float) -> float:

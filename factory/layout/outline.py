@@ -76,8 +76,8 @@ class Outline:
 
     def boxed(self) -> Outline:
         """The same with one block a layer."""
-        blocks = tuple((hull(blocks),) if blocks else () for blocks in self.blocks)
-        return replace(self, blocks=blocks)
+        boxes = tuple((hull(found),) if len(found) > 1 else found for found in self.blocks)
+        return replace(self, blocks=boxes) if boxes != self.blocks else self
 
 
 @dataclass(frozen=True, slots=True)
@@ -126,6 +126,7 @@ def outlined(
     own: Footprint, piles: Sequence[Placed], guests: Sequence[Guest], plan: Plan
 ) -> Outline:
     """The outline of a robot with its piles and with those that deliver to it."""
-    blocks = tuple((*own.blocks(piles)[n], *crowns(guests, n)) for n in LAYERS)
+    taken = own.blocks(piles)
+    blocks = tuple((*taken[layer], *crowns(guests, layer)) for layer in LAYERS)
     least = max(TOOL_TRAVEL if own.shape.tool else 0.0, own.clearance.c)
     return Outline(own.shape, plan, blocks, least)

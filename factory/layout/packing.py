@@ -91,7 +91,6 @@ class Packing:
         self.outline, self.admits = outline, admits
         corridor = task.corridor and robot == 0
         self.own = footprint(task.factory, robot, shape, task.clearance, corridor)
-        self.strip = {side: self.own.strip(side, shape.last) for side in (-1, +1)}
 
     def packed(self) -> Outline:
         """The best outline found. Raises InputError where a template asks for what cannot be."""
@@ -144,7 +143,7 @@ class Packing:
         """A robot that delivers from a side, as near as can be, or with its crown so far out that
         robots without one find room before it."""
         outline = self.outline(robot, side)
-        near = Guest(robot, outline, side, outline.clear(self.strip[side]))
+        near = Guest(robot, outline, side, outline.clear(self.own.strips[side]))
         out = up(outline.crown + self._depth(side, number)) if outline.crown > -inf else 0.0
         return [near] if out <= near.travel else [near, replace(near, travel=out, wanted=out)]
 
@@ -154,7 +153,7 @@ class Packing:
         deepest = 0.0
         for where, outline in self._later(self.own.operations[number + 1 :][:SOON]):
             if where == side and outline.crown == -inf:
-                deepest = max(deepest, outline.clear(self.strip[side]) + outline.behind)
+                deepest = max(deepest, outline.clear(self.own.strips[side]) + outline.behind)
         return deepest
 
     def _stations(

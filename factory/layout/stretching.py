@@ -102,8 +102,7 @@ class _Builder:
 
     def _mates(self, guests: list[int]) -> Sides:
         """Of two that meet here, the longer goes away from where this robot delivers."""
-        strip = self.own.strip(-1, self.own.shape.last)
-        outlines = self.outlines
+        strip, outlines = self.own.strips[-1], self.outlines
         outward = {g: outlines[g].clear(strip) + outlines[g].behind for g in guests}
         ordered = sorted(guests, key=lambda g: (outward[g], g), reverse=True)
         return dict(zip(ordered, (-1, +1), strict=False))
