@@ -10,7 +10,8 @@ from functools import cache
 
 from pag_values import SHAPES, factory_of, paper, random_pag
 
-from factory.geometry.solids import Product, Solid, product_geometry
+from factory.geometry.product import product_geometry
+from factory.geometry.solids import Product, Solid
 from factory.layout.embedding import lay_out
 from factory.layout.layout import Layout
 from factory.layout.shapes import carriers, is_tool

@@ -18,7 +18,7 @@ from layout_values import (
 from pag_values import SHAPES, TEMPLATES, catalogue, factory_of, paper
 
 from factory.compiler.compiler import compile_pag
-from factory.geometry.solids import product_geometry
+from factory.geometry.product import product_geometry
 from factory.layout.embedding import lay_out
 from factory.layout.guidepath import hull
 from factory.layout.layout import Layout

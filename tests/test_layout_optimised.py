@@ -14,7 +14,7 @@ from layout_values import STYLES, paper_layout, random_layout, row_of_inserts, t
 from pag_values import SHAPES, factory_of
 
 import factory.layout.optimising as optimising
-from factory.geometry.solids import product_geometry
+from factory.geometry.product import product_geometry
 from factory.layout.bounds import cycle_time_bound
 from factory.layout.dimensions import LAYERS, Clearance
 from factory.layout.durations import Pace, gear_times, operation_times

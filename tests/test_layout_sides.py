@@ -9,7 +9,7 @@ import pytest
 import factory.layout.arranging as arranging
 import factory.layout.optimising as optimising
 from factory.compiler.mating.judged import judged
-from factory.geometry.solids import product_geometry
+from factory.geometry.product import product_geometry
 from factory.layout.embedding import lay_out
 from factory.layout.layout import Layout
 from factory.layout.sides import admissible, admitted

@@ -36,7 +36,8 @@ from factory.compiler.mating import (
 from factory.compiler.mating.contacts import CHUNK
 from factory.compiler.mating.depth import deepest, exact, polytope, rough
 from factory.compiler.mating.meetings import meetings
-from factory.geometry.solids import Product, product_geometry
+from factory.geometry.product import product_geometry
+from factory.geometry.solids import Product
 from factory.lang import read_pag
 from factory.pipeline import all_templates
 from factory.problem.pag import PAG

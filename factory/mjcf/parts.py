@@ -6,8 +6,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from xml.etree.ElementTree import Element
 
-from factory.geometry.meshes import Array
-from factory.geometry.solids import Mesh, Product, Solid
+from factory.geometry.meshes import Array, Mesh
+from factory.geometry.solids import Product, Solid
 from factory.layout.dimensions import PAYLOAD
 from factory.layout.layout import Layout, Point2
 from factory.mjcf.elements import add, exact, numbers
