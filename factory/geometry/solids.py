@@ -39,8 +39,9 @@ class Solid:
     `kind` is box, cylinder, sphere or mesh; `size` its half lengths as MJCF writes them [m];
     `position` (3,) and `quaternion` (4,) place it; `mass` [kg], `centre` (3,) of mass, `inertia`
     (3, 3) about it [kg m²]; `low`, `high` (3,) its bounding box; `corners` (n, 3): points of its
-    surface whose displacement tells that of the whole; `pieces` the vertices (n, 3) of the convex bodies it is made of, as the engine
-    collides them (`factory.geometry.pieces` states how exactly): one for most.
+    surface whose displacement tells that of the whole; `pieces`: the vertices (n, 3) of the convex
+    bodies it is made of, as the engine collides them (`factory.geometry.pieces` states how
+    exactly): one for most.
     """
 
     label: str
