@@ -23,7 +23,7 @@ class Figures:
 
 
 @dataclass(frozen=True, slots=True)
-class Gain:
+class LayoutGain:
     """The figures of a layout and of the first feasible one; the robot that allows no shorter cycle
     and the least cycle time that any layout without relays could have [s]. Where there are relays:
     the figures without them, and how many robots they add."""
@@ -37,10 +37,11 @@ class Gain:
 
     def as_json(self) -> dict[str, object]:
         """As a part of a document."""
-        relays = {"robots_added": self.added, "without": asdict(self.plain)} if self.plain else {}
+        found: dict[str, object] = asdict(self.chosen)
+        if self.plain:
+            found["relays"] = {"robots_added": self.added, "without": asdict(self.plain)}
         return {
-            **asdict(self.chosen),
-            **({"relays": relays} if relays else {}),
+            **found,
             "bottleneck": self.bottleneck,
             "cycle_time_bound_s": round(self.bound, 6),
             "first_feasible": asdict(self.first),
@@ -61,13 +62,13 @@ class Gain:
         )
 
 
-def gain(layout: Layout, pace: Pace) -> Gain:
+def gain(layout: Layout, pace: Pace) -> LayoutGain:
     """Compare a layout for robots of a pace."""
     plain = layout.plain or layout
     factory, product, c = plain.factory, layout.product, layout.clearance
     times = gear_times(layout, pace)
     slowest = max(range(len(times)), key=times.__getitem__)
-    return Gain(
+    return LayoutGain(
         _figures(layout, pace),
         _figures(first_feasible(factory, product, Clearance(c)), pace),
         layout.factory.robots[slowest].name,

@@ -171,9 +171,7 @@ def _stretch(body: Element, path: Guidepath, top: float, stroke: float) -> None:
     """Arm to the rim, finger to the nest, pin up to the payload, or to where the column goes into
     it."""
     rim = path.reach - path.arm
-    u, t = path.heading, path.side
-    left = path.aside * (u[0] * t[1] - u[1] * t[0]) + 0.0
-    nest = (max(path.reach + path.nest, rim + 0.01), left)
+    nest = (max(path.reach + path.nest, rim + 0.01), path.aside * path.left + 0.0)
     for geom in body.iter("geom"):
         kind = (geom.get("name") or "").rpartition("/")[2]
         if kind.startswith("arm"):

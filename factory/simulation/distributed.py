@@ -19,7 +19,7 @@ import numpy as np
 from factory.control.governor import govern
 from factory.control.mode import REST, ROUNDING, Array, Index, Limits, Mode
 from factory.control.navigation import Bundle
-from factory.modes.staging import Stage
+from factory.modes.staging import HeadStart
 from factory.plant.factory import Factory, Operation
 from factory.plant.programs import Program, Step, program_of
 from factory.simulation.run import Event
@@ -105,7 +105,7 @@ class DistributedSupervisor:
         timestep: float,
         ticks: int,
         seed: int = 0,
-        stages: Sequence[Stage] = (),
+        stages: Sequence[HeadStart] = (),
     ) -> None:
         self.stages = {(stage.robot, stage.operation): stage for stage in stages}
         self.factory, self.modes, self.limits = factory, modes, limits

@@ -16,7 +16,7 @@ import numpy as np
 from factory.control.mode import REST, Array, Index, Limits, Mode
 from factory.control.navigation import Bundle
 from factory.control.obstacles import ranges
-from factory.modes.staging import Stage
+from factory.modes.staging import HeadStart
 from factory.nets.petri import Marking
 from factory.nets.threads import Threads
 from factory.plant.factory import Factory, Operation
@@ -87,7 +87,7 @@ class Supervisor:
         tick: float,
         start: Marking | None = None,
         counts: dict[int, int] | None = None,
-        stages: Sequence[Stage] = (),
+        stages: Sequence[HeadStart] = (),
     ) -> None:
         self.factory, self.world, self.tick = factory, world, tick
         self.modes = [*modes, *(stage.mode for stage in stages)]
@@ -113,7 +113,7 @@ class Supervisor:
             [number for number, place in waits.items() if self.marked[place]],
         )
 
-    def _stages(self, stages: Sequence[Stage]) -> dict[int, int]:
+    def _stages(self, stages: Sequence[HeadStart]) -> dict[int, int]:
         """Number the stages after the operations, by the one that each is of and by the one that it
         follows; gives the place in which each is."""
         count = len(self.factory.operations)
