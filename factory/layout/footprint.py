@@ -74,8 +74,8 @@ class Footprint:
         shape, half = self.shape, self.half
         lane = side * shape.offset + half + shape.spread
         post = side * shape.offset + POST / 2 + half if self.fed else -inf
-        ahead = beside(shape.last, side) + half if self.corridor else -inf
-        load = -inf if shape.tool else max(beside(pile, side) + half, post)
+        ahead = extent_to(shape.last, side) + half if self.corridor else -inf
+        load = -inf if shape.tool else max(extent_to(pile, side) + half, post)
         return max(lane + CARRIAGE / 2, post, ahead), max(lane + MAST / 2, post, ahead), load
 
     def strip_at(self, piles: Sequence[Placed]) -> Callable[[int, float], Strip]:
@@ -130,7 +130,7 @@ def footprint(
     return Footprint(shape, clearance, operations, corridor)
 
 
-def beside(pile: Extent, side: int) -> float:
+def extent_to(pile: Extent, side: int) -> float:
     """How far a pile reaches to one side of the product's middle [m]."""
     return pile[3] if side > 0 else -pile[2]
 

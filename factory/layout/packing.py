@@ -14,7 +14,7 @@ from math import inf
 
 from factory.layout.dimensions import PAYLOADS, Clearance, up
 from factory.layout.durations import Pace
-from factory.layout.footprint import Placed, beside, footprint, guests_of
+from factory.layout.footprint import Placed, extent_to, footprint, guests_of
 from factory.layout.guidepath import Extent
 from factory.layout.layout import BESIDE
 from factory.layout.outline import Guest, Outline, Plan, outlined
@@ -98,74 +98,62 @@ class Packing:
         return min(found, key=lambda pair: pair[0])[1]
 
     def _outlines(self, nested: bool) -> list[tuple[float, Outline]]:
-        operations = self.own.operations
         ways = [_Way(0.0, self._empty(nested))]
-        for number, operation in enumerate(operations):
-            following = operations[number + 1 : number + 2]
-            found = [w for way in ways for w in self._placed(way, operation, following)]
-            found.sort(key=lambda way: way.cost)
-            ways = found[: self.task.width]
+        for operation in self.own.operations:
+            found = [longer for way in ways for longer in self._placed(way, operation)]
+            ways = sorted(found, key=lambda way: way.cost)[: self.task.width]
         return [pair for way in ways if (pair := self._finished(way, nested)) is not None]
 
     def _empty(self, nested: bool) -> dict[int, Skyline]:
         return dict.fromkeys((-1, +1), Skyline.behind(self.own.frontier, nested))
 
-    def _placed(
-        self, way: _Way, operation: Operation, following: Sequence[Operation]
-    ) -> Iterator[_Way]:
+    def _placed(self, way: _Way, operation: Operation) -> Iterator[_Way]:
         """The ways to place one more operation."""
         robots, least = guests_of(operation), self.own.least(operation, way.station)
         if not robots:
             yield self._added(way, operation, least, ())
             return
         for sides in self._options(operation, robots):
-            alternatives = (self._guests(r, side, len(way.piles)) for r, side in sides.items())
+            alternatives = (self._guests(way, r, side) for r, side in sides.items())
             for guests in product(*alternatives):
                 if not way.piles:
                     yield self._added(way, operation, 0.0, guests)
                 else:
-                    yield from self._stations(way, operation, following, guests, least)
+                    yield from self._stations(way, operation, guests, least)
 
     def _options(self, operation: Operation, robots: Sequence[int]) -> list[Sides]:
         """From which sides they may come: two from opposite ones."""
         both = [dict(zip(robots, sides, strict=False)) for sides in ((-1, +1), (+1, -1))]
         return [sides for sides in both if self.admits(operation, sides)] or both
 
-    def _later(self, operations: Sequence[Operation]) -> Iterator[tuple[int, Outline]]:
-        """From which side which outline may come in operations to be placed."""
-        for operation in operations:
+    def _later(self, way: _Way, count: int) -> Iterator[tuple[int, Outline]]:
+        """From which side which outline may come in so many operations after the next."""
+        for operation in self.own.operations[len(way.piles) + 1 :][:count]:
             robots = [robot for robot in operation.robots if robot != self.robot]
             for sides in self._options(operation, robots):
                 for robot, side in sides.items():
                     yield side, self.outline(robot, side)
 
-    def _guests(self, robot: int, side: int, number: int) -> list[Guest]:
+    def _guests(self, way: _Way, robot: int, side: int) -> list[Guest]:
         """A robot that delivers from a side, as near as can be, or with its crown so far out that
-        robots without one find room before it."""
-        outline = self.outline(robot, side)
-        near = Guest(robot, outline, side, outline.clear(self.own.strips[side]))
-        out = up(outline.crown + self._depth(side, number)) if outline.crown > -inf else 0.0
+        robots without one that deliver soon find room before it."""
+        outline, strip = self.outline(robot, side), self.own.strips[side]
+        near = Guest(robot, outline, side, outline.clear(strip))
+        if outline.crown == -inf:
+            return [near]
+        depths = (
+            later.clear(strip) + later.behind
+            for where, later in self._later(way, SOON)
+            if where == side and later.crown == -inf
+        )
+        out = up(outline.crown + max(depths, default=0.0))
         return [near] if out <= near.travel else [near, replace(near, travel=out, wanted=out)]
 
-    def _depth(self, side: int, number: int) -> float:
-        """How far out robots without a crown need room that deliver after so many operations
-        [m]."""
-        deepest = 0.0
-        for where, outline in self._later(self.own.operations[number + 1 :][:SOON]):
-            if where == side and outline.crown == -inf:
-                deepest = max(deepest, outline.clear(self.own.strips[side]) + outline.behind)
-        return deepest
-
     def _stations(
-        self,
-        way: _Way,
-        operation: Operation,
-        following: Sequence[Operation],
-        guests: Sequence[Guest],
-        least: float,
+        self, way: _Way, operation: Operation, guests: Sequence[Guest], least: float
     ) -> Iterator[_Way]:
         """The stations at which something comes clear, as long as the way there is worth it."""
-        tried = {least, *self._next(way, following, least)}
+        tried = {least, *self._next(way, least)}
         for guest in guests:
             tried |= way.beside[guest.side].starts(guest.outline, least)
         best, weight = inf, self.task.weights[self.robot]
@@ -180,9 +168,9 @@ class Packing:
                 best = min(best, found.cost)
                 yield found
 
-    def _next(self, way: _Way, following: Sequence[Operation], least: float) -> Iterator[float]:
+    def _next(self, way: _Way, least: float) -> Iterator[float]:
         """Where the next operation could be if this one were not: to stop there once saves time."""
-        for side, outline in self._later(following):
+        for side, outline in self._later(way, 1):
             starts = way.beside[side].starts(outline, least)
             yield from (start for start in starts if start < least + ALIGN)
 
@@ -191,17 +179,22 @@ class Packing:
         travel = beside[guest.side].travel(guest.outline, station, guest.travel)
         return replace(guest, station=station, travel=travel)
 
+    @staticmethod
+    def _taken(beside: Mapping[int, Skyline], guests: Sequence[Guest]) -> dict[int, Skyline]:
+        """What is beside the path with robots that deliver at their stations."""
+        found = dict(beside)
+        for guest in guests:
+            skyline = found[guest.side]
+            found[guest.side] = skyline.taken(guest.outline, guest.station, guest.travel)
+        return found
+
     def _added(
         self, way: _Way, operation: Operation, station: float, guests: Sequence[Guest]
     ) -> _Way:
-        skylines = dict(way.beside)
-        for guest in guests:
-            skyline = skylines[guest.side]
-            skylines[guest.side] = skyline.taken(guest.outline, station, guest.travel)
-        time = self._time(way.piles, operation, station - way.station, guests)
+        time = self._time(way, operation, station, guests)
         return _Way(
             station,
-            skylines,
+            self._taken(way.beside, guests),
             (*way.guests, *guests),
             (*way.stations, station),
             (*way.piles, self.own.placed(operation, station)),
@@ -210,33 +203,26 @@ class Packing:
         )
 
     def _time(
-        self,
-        piles: Sequence[Placed],
-        operation: Operation,
-        further: float,
-        guests: Sequence[Guest],
+        self, way: _Way, operation: Operation, station: float, guests: Sequence[Guest]
     ) -> float:
-        """How long an operation takes [s] whose carrier goes further; but for its first, which it
-        goes back for."""
+        """How long an operation takes [s]; its carrier goes further, but for the first one, which
+        it goes back for."""
         pace = self.task.pace
-        rested = pace.rest(further)
-        longest = rested
+        longest = rested = pace.rest(station - way.station)
         for guest in guests:
             if guest.outline.shape.tool:
                 continue
-            if not piles:
+            if not way.piles:
                 longest = max(longest, pace.rest(guest.travel))
                 continue
-            standoff = self._standoff(operation, piles[-1][1], guest)
-            opens = pace.entered(rested)
-            longest = max(longest, pace.staged(guest.travel, standoff, opens))
+            standoff = self._standoff(operation, way.piles[-1][1], guest)
+            longest = max(longest, pace.staged(guest.travel, standoff, pace.entered(rested)))
         return longest + operation.dwell + pace.lost
 
     def _standoff(self, operation: Operation, pile: Extent, guest: Guest) -> float:
-        slot = operation.robots.index(guest.robot)
-        if slot == operation.lowered:
+        if operation.robots.index(guest.robot) == operation.lowered:
             return BESIDE
-        towards = beside(pile, guest.side)
+        towards = extent_to(pile, guest.side)
         return max(0.0, guest.outline.shape.last[1] + towards + self.task.clearance.c)
 
     def _cost(self, way: _Way, time: float, station: float, guests: Sequence[Guest]) -> float:
@@ -254,17 +240,15 @@ class Packing:
 
     def _finished(self, way: _Way, nested: bool) -> tuple[float, Outline] | None:
         """A way with its cost and outline, every travel fixed. None where a path is blocked."""
-        strip, skylines, guests = self.own.strip_at(way.piles), self._empty(nested), list[Guest]()
+        strip, beside, guests = self.own.strip_at(way.piles), self._empty(nested), list[Guest]()
         for guest in way.guests:
             outline = guest.outline
             clear = outline.clear(strip(guest.side, guest.station + outline.high[PAYLOADS]))
             least = replace(guest, travel=max(clear, guest.wanted))
-            came = self._came(skylines, least, guest.station)
-            if came.travel == inf:
+            guests.append(self._came(beside, least, guest.station))
+            if guests[-1].travel == inf:
                 return None
-            skyline = skylines[guest.side]
-            skylines[guest.side] = skyline.taken(outline, came.station, came.travel)
-            guests.append(came)
+            beside = self._taken(beside, guests[-1:])
         numbers = (operation.index for operation in self.own.operations)
         plan = Plan(
             {guest.robot: guest.side for guest in guests},
