@@ -287,7 +287,7 @@ def test_work_grows_with_the_number_of_robots() -> None:
 
 
 def test_only_who_is_coupled_may_share_room() -> None:
-    """Two payloads in one place: of robots in one mode, or of strangers, coupled or not."""
+    """Two payloads in one place: of robots in one mode, or of unrelated ones, coupled or not."""
     layout = paper_layout()
     mate, alone = (layout.factory.by_label[label].index for label in ("sub3", "part1"))
 

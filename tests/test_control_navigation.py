@@ -11,9 +11,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from factory.control import Bundle, Limits, Mode
 from factory.control import mode as mode_module
-from factory.control.mode import Array
+from factory.control.mode import Array, Limits, Mode
+from factory.control.navigation import Bundle
 
 R, EPS, DT = 0.06, 1e-3, 1e-3
 Field = Callable[[Array, float], Array]

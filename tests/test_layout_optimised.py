@@ -22,7 +22,7 @@ from factory.layout.embedding import lay_out
 from factory.layout.gain import gain
 from factory.layout.layout import Layout
 from factory.layout.optimising import first_feasible
-from factory.layout.outline import Outline, Plan
+from factory.layout.outline import Choice, Outline
 from factory.layout.request import Ground
 from factory.layout.shapes import Shape
 from factory.layout.skyline import Skyline
@@ -160,7 +160,7 @@ def outline(lane: tuple[float, float], front: float, crown: float = 0.0) -> Outl
     own = (-0.1, front, *lane)
     blocks = (own, (-0.3, 0.05, -crown, crown)) if crown else (own,)
     shape = Shape({}, (0.0, 0.0, 0.0, 0.0), 0.0, 0.035, 0.08, 0.0, False)
-    return Outline(shape, Plan(), (blocks,) * 3, 0.0)
+    return Outline(shape, Choice(), (blocks,) * 3, 0.0)
 
 
 NARROW = (-0.04, 0.04)

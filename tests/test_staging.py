@@ -65,7 +65,7 @@ def paper() -> Layout:
 
 def test_who_goes_ahead_in_the_papers_example(paper: Layout) -> None:
     """r1 and r3 go back with nothing, and wait there for what they are to carry; r2, r5 and r6 wait
-    for nobody at their feeders; r4 is a tool, and stays at its station."""
+    for no robot at their feeders; r4 is a tool, and stays at its station."""
     modes = operation_modes(paper, STAGED.eps)
     operations = paper.factory.operations
     found = {(s.robot + 1, operations[s.operation].label) for s in stages(paper, modes)}

@@ -58,11 +58,11 @@ def _chosen(task: Task, table: Sequence[Mapping[Frame, Outline]]) -> tuple[Stret
     frames, outlines = [OUTPUT] * robots, list[Outline]()
     for robot in range(robots):
         outlines.append(table[robot][frames[robot]])
-        plan = outlines[-1].plan
-        for number, station in plan.stations.items():
+        choice = outlines[-1].choice
+        for number, station in choice.stations.items():
             stations[number] = station
-        for guest, side in plan.sides.items():
-            sides[guest], travel[guest] = side, plan.travels[guest]
+        for guest, side in choice.sides.items():
+            sides[guest], travel[guest] = side, choice.travels[guest]
             frames[guest] = turned(frames[robot], side)
     travel[0] = outgoing(outlines[0], task.clearance)
     return Stretched(travel, stations, sides), [outline.shape for outline in outlines]

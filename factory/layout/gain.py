@@ -8,8 +8,7 @@ from factory.layout.bounds import cycle_time_bound
 from factory.layout.dimensions import Clearance
 from factory.layout.durations import Pace, gear_times
 from factory.layout.layout import Layout
-from factory.layout.optimising import bounds, first_feasible
-from factory.layout.sweeps import piles, regions
+from factory.layout.optimising import first_feasible, floor_of
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,8 +78,7 @@ def gain(layout: Layout, pace: Pace) -> LayoutGain:
 
 
 def _figures(layout: Layout, pace: Pace) -> Figures:
-    swept = regions(layout, piles(layout.factory, layout.product))
-    xlo, xhi, ylo, yhi = bounds(swept, layout.clearance)
+    xlo, xhi, ylo, yhi = floor_of(layout)
     cycle = max(gear_times(layout, pace))
     area = (xhi - xlo) * (yhi - ylo)
     return Figures(round(cycle, 6), round(layout.guidepath_length, 6), round(area, 6))

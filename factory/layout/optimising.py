@@ -8,7 +8,7 @@ one gives more weight to the robots that are the slowest in the best so far.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 
 from factory.geometry.solids import Product
@@ -28,6 +28,9 @@ from factory.plant.factory import Factory
 
 EFFORT = 800
 """Robots times layouts that are looked at, four layouts at most."""
+
+WAYS = ((True, 1.0), (False, 0.5), (True, 0.5), (False, 1.0))
+"""Ways to look for a layout: with a corridor or without, and the weight of a robot's breadth."""
 
 UNWEIGHTED = 2
 """The first so many take all robots to matter the same."""
@@ -67,14 +70,21 @@ def optimised(
     best = first_feasible(factory, product, c, wide)
     times = gear_times(best, pace)
     least = _score(best, times, floor)
-    for chosen in _tasks(task, max(1, EFFORT // count)):
-        weights = chosen.weights or _weights(times)
-        layout = _packed(replace(chosen, weights=weights), product, payloads)
+    for number, (corridor, breadth) in enumerate(WAYS[: max(1, EFFORT // count)]):
+        weights = task.weights if number < UNWEIGHTED else _weights(times)
+        way = replace(task, corridor=corridor, breadth=breadth, weights=weights)
+        layout = _packed(way, product, payloads)
         found = gear_times(layout, pace)
         score = _score(layout, found, floor)
         if score < least:
             best, times, least = layout, found, score
     return best
+
+
+def floor_of(layout: Layout) -> Box:
+    """The floor that a layout takes."""
+    swept = regions(layout, piles(layout.factory, layout.product))
+    return bounds(swept, layout.clearance)
 
 
 def bounds(found: Sequence[Region], clearance: float) -> Box:
@@ -88,8 +98,7 @@ def _score(layout: Layout, times: Sequence[float], floor: Point2 | None) -> tupl
     time [s], guidepaths [m], and the floor [m²] on which they lie."""
     excess = 0.0
     if floor is not None:
-        swept = regions(layout, piles(layout.factory, layout.product))
-        xlo, xhi, ylo, yhi = bounds(swept, layout.clearance)
+        xlo, xhi, ylo, yhi = floor_of(layout)
         excess = max(xhi - xlo - floor[0], yhi - ylo - floor[1], 0.0)
     ends = [p for g in layout.guidepaths for p in (g.carriage(0.0), g.carriage(g.length))]
     x, y = zip(*ends, strict=True)
@@ -108,14 +117,6 @@ def _packed(
 ) -> Layout:
     stretched, shapes = arrange(task, payloads, sides)
     return LayoutDraft(task.factory, product, task.clearance, payloads, shapes, stretched).layout()
-
-
-def _tasks(task: Task, count: int) -> Iterator[Task]:
-    """So many ways to look for a layout; no weights stand for those of the best so far."""
-    ways = ((True, 1.0), (False, 0.5), (True, 0.5), (False, 1.0))
-    for number, (corridor, breadth) in enumerate(ways[:count]):
-        weights = task.weights if number < UNWEIGHTED else ()
-        yield replace(task, corridor=corridor, breadth=breadth, weights=weights)
 
 
 def _weights(times: Sequence[float]) -> list[float]:

@@ -21,7 +21,7 @@ DETAILED = 4
 
 
 @dataclass(frozen=True, slots=True)
-class Plan:
+class Choice:
     """What was chosen for a robot: the side and the travel [m] of each robot that delivers to it,
     and the station [m] of each of its operations."""
 
@@ -37,7 +37,7 @@ class Outline:
     farthest extent ahead; `low`, `high`, to the sides."""
 
     shape: Shape
-    plan: Plan
+    choice: Choice
     blocks: tuple[tuple[Block, ...], ...]
     least: float
     front: tuple[float, ...] = field(init=False)
@@ -123,10 +123,10 @@ def crowns(guests: Sequence[Guest], layer: int) -> list[Block]:
 
 
 def outlined(
-    own: Footprint, piles: Sequence[Placed], guests: Sequence[Guest], plan: Plan
+    own: Footprint, piles: Sequence[Placed], guests: Sequence[Guest], choice: Choice
 ) -> Outline:
     """The outline of a robot with its piles and with those that deliver to it."""
     taken = own.blocks(piles)
     blocks = tuple((*taken[layer], *crowns(guests, layer)) for layer in LAYERS)
     least = max(TOOL_TRAVEL if own.shape.tool else 0.0, own.clearance.c)
-    return Outline(own.shape, plan, blocks, least)
+    return Outline(own.shape, choice, blocks, least)

@@ -17,7 +17,7 @@ from factory.layout.durations import Pace
 from factory.layout.footprint import Placed, extent_to, footprint, guests_of
 from factory.layout.guidepath import Extent
 from factory.layout.layout import BESIDE
-from factory.layout.outline import Guest, Outline, Plan, outlined
+from factory.layout.outline import Choice, Guest, Outline, outlined
 from factory.layout.shapes import Shape, Sides
 from factory.layout.skyline import Skyline
 from factory.plant.factory import Factory, Operation
@@ -250,12 +250,12 @@ class Packing:
                 return None
             beside = self._taken(beside, guests[-1:])
         numbers = (operation.index for operation in self.own.operations)
-        plan = Plan(
+        choice = Choice(
             {guest.robot: guest.side for guest in guests},
             {guest.robot: guest.travel for guest in guests},
             dict(zip(numbers, way.stations, strict=True)),
         )
-        outline = outlined(self.own, way.piles, guests, plan)
+        outline = outlined(self.own, way.piles, guests, choice)
         return self._worth(way, outline), outline
 
     def _worth(self, way: _Way, outline: Outline) -> float:
@@ -271,5 +271,5 @@ class Packing:
         carrier = factory.operations[last].carrier
         behind = 0.25 if factory.robots[carrier].operations[0] == last else 1.0
         breadth = task.breadth * (max(outline.high) - behind * min(outline.low))
-        ways = weights[carrier] * breadth + PATH * sum(outline.plan.travels.values())
+        ways = weights[carrier] * breadth + PATH * sum(outline.choice.travels.values())
         return weights[self.robot] * time + ways / pace.speed

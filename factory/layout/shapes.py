@@ -57,7 +57,7 @@ def headings(factory: Factory, sides: Sides) -> list[Frame]:
 
 
 def payload_boxes(factory: Factory, product: Product) -> dict[str, Box]:
-    """The plan of every sub-assembly about the product's middle, from its parts' real geometry."""
+    """The box of every sub-assembly about the product's middle, from its parts' real geometry."""
     return {label: pile.box for label, pile in piles(factory, product).items()}
 
 

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 
 from factory.layout.dimensions import LAYERS, PAYLOADS, Clearance, up
 from factory.layout.footprint import Footprint, Placed, footprint, guests_of
-from factory.layout.outline import Guest, Outline, Plan, outlined
+from factory.layout.outline import Choice, Guest, Outline, outlined
 from factory.layout.shapes import Shape, Sides
 from factory.plant.factory import Factory, Operation
 
@@ -48,7 +48,7 @@ def stretch(
         guests = builder.attached()
         for guest in guests:
             travel[guest.robot] = guest.travel
-        outlines[robot] = outlined(own, builder.piles, guests, Plan()).boxed()
+        outlines[robot] = outlined(own, builder.piles, guests, Choice()).boxed()
     travel[0] = outgoing(outlines[0], clearance)
     return Stretched(travel, stations, chosen)
 

@@ -46,7 +46,7 @@ from factory.problem.pag import NOPART
 
 @dataclass(frozen=True, slots=True)
 class Pile:
-    """The real extents of a sub-assembly: its plan about the product's middle, its z range [m]."""
+    """The real extents of a sub-assembly: its box about the product's middle, its z range [m]."""
 
     box: Box
     z: tuple[float, float]
