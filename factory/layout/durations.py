@@ -82,7 +82,7 @@ def gear_times(layout: Layout, pace: Pace) -> list[float]:
     """For each robot the summed delays [s] of its gear: the greatest is the cycle time. Where a
     robot goes ahead while it waits, it takes the longer of that and the operation."""
     ways, operations = _ways(layout), layout.factory.operations
-    delays = [_operation_time(layout, operation, ways, pace) for operation in operations]
+    delays = operation_times(layout, pace)
 
     def taken(number: int, robot: int) -> float:
         operation = operations[number]

@@ -111,9 +111,13 @@ class Guidepath:
 
 @dataclass(frozen=True, slots=True)
 class Feeder:
-    """Where a part is presented: the boxes of its post and of the boom above the part, in the
-    world, and the height of the boom's lower edge [m]."""
+    """Where a part is presented. About the product's middle, in the frame (u, t) of the robot: the
+    post is at `back`, the boom reaches from there to `ahead`, both `across` from the middle; in the
+    world: the boxes `post` and `boom`, and the `height` of the boom's lower edge [m]."""
 
+    back: float
+    ahead: float
+    across: float
     post: Box
     boom: Box
     height: float

@@ -158,6 +158,9 @@ class Layout:
         across, half = path.offset + path.aside, POST / 2
         solid = self.product.solids[label]
         return Feeder(
+            back,
+            ahead,
+            across,
             path.world((back - half, back + half, across - half, across + half), middle),
             path.world((back, ahead, across - BOOM / 2, across + BOOM / 2), middle),
             PAYLOAD

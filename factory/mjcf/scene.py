@@ -6,7 +6,7 @@ from __future__ import annotations
 from math import cos, hypot, radians, sin, tan
 from xml.etree.ElementTree import Element
 
-from factory.layout.dimensions import BOOM, BOOM_HEIGHT, CARRIAGE, PAYLOAD, POST, Clearance
+from factory.layout.dimensions import BOOM, BOOM_HEIGHT, CARRIAGE, PAYLOAD, POST
 from factory.layout.layout import Layout
 from factory.mjcf.elements import add, add_shown, numbers
 from factory.mjcf.names import COMPASS, feeder
@@ -210,16 +210,13 @@ def add_follower(body: Element, layout: Layout) -> None:
 
 def _feeder(world: Element, layout: Layout, label: str) -> None:
     """A post behind the robot's rear stop and a boom over the place where the part is presented."""
-    operation = layout.factory.by_label[label]
+    operation, found = layout.factory.by_label[label], layout.feeder(label)
     path, name = layout.guidepaths[operation.carrier], feeder(label)
     x, y = layout.meeting(operation)
-    quat = heading_quaternion(path)
+    u, quat = path.heading, heading_quaternion(path)
     body = add(world, "body", name=name, pos=(x, y, 0.0), quat=quat)
-    u, across = path.heading, path.offset * path.left
-    rear, front, _, _ = path.frame(layout.payloads[label])
-    back = -Clearance(layout.clearance).post(path.reach, rear)
-    ahead = round((rear + front) / 2, 3)
-    top, beam = layout.feeder(label).height, BOOM_HEIGHT
+    back, ahead, across = found.back, found.ahead, found.across * path.left
+    top, beam = found.height, BOOM_HEIGHT
     for kind, at, size in (
         ("post", (back, across, (top + beam) / 2), (POST / 2, POST / 2, (top + beam) / 2)),
         (

@@ -68,12 +68,6 @@ class Mating:
         """The best level of all."""
         return max(self.slide, self.lower)
 
-    def best(self, level: int) -> Kind:
-        """How the inputs can come together if it is judged by one level alone."""
-        if self.slide >= level:
-            return "slide"
-        return "lower" if self.lower >= level else "blocked"
-
 
 @dataclass(frozen=True)
 class Matings:
