@@ -114,7 +114,7 @@ def lay_out(
     more robots then. Raises InputError for a mesh that cannot be read,
     RunError where the factory does not fit the floor.
     """
-    from factory.geometry.solids import product_geometry
+    from factory.geometry.product import product_geometry
     from factory.layout.request import Ground
 
     ground = Ground(floor, relay, cycle if relay else None)

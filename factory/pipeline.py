@@ -10,7 +10,8 @@ from pathlib import Path
 
 from factory.compiler.compiler import compile_pag
 from factory.compiler.mating import Matings, matings, shaped
-from factory.geometry.solids import Product, product_geometry
+from factory.geometry.product import product_geometry
+from factory.geometry.solids import Product
 from factory.lang.pag_reader import load_pag
 from factory.lang.template_reader import load_templates
 from factory.plant.approaches import Approach

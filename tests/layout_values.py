@@ -10,11 +10,11 @@ from functools import cache
 
 from pag_values import SHAPES, factory_of, paper, random_pag
 
-from factory.geometry.solids import Product, Solid, product_geometry
-from factory.layout.crossings import delivered_to
+from factory.geometry.product import product_geometry
+from factory.geometry.solids import Product, Solid
 from factory.layout.embedding import lay_out
 from factory.layout.layout import Layout
-from factory.layout.stretching import is_tool
+from factory.layout.shapes import carriers, is_tool
 from factory.problem.pag import PAG, Assembly, Parameter, Value
 
 STYLES = ("plain", "small", "medium", "large", "far", "mixed")
@@ -124,7 +124,7 @@ def row_of_inserts(parts: int = 5) -> Layout:
 def shortened(layout: Layout, robot: int, length: float) -> Layout:
     """A guidepath shortened at its B end, with everything that delivers to it moved along."""
     below = defaultdict(list)
-    for guest, carrier in enumerate(delivered_to(layout)):
+    for guest, carrier in enumerate(carriers(layout.factory)):
         below[carrier].append(guest)
     paths = list(layout.guidepaths)
     u = paths[robot].heading

@@ -24,11 +24,11 @@ from layout_values import (
 )
 from pag_values import SHAPES
 
-from factory.layout.certificate import Certificate
+from factory.layout.certificate import ALWAYS, KINDS, PAYLOAD_BODY, STATIONS, Certificate, Region
 from factory.layout.clearance import _Search, certify, separation
 from factory.layout.crossings import touching
+from factory.layout.dimensions import PAYLOADS
 from factory.layout.layout import Layout
-from factory.layout.sweeps import ALWAYS, KINDS, PAYLOAD_BODY, PAYLOADS, STATIONS, Region
 
 
 def broken(layout: Layout, *words: str) -> Certificate:
@@ -287,7 +287,7 @@ def test_work_grows_with_the_number_of_robots() -> None:
 
 
 def test_only_who_is_coupled_may_share_room() -> None:
-    """Two payloads in one place: of robots in one mode, or of strangers, coupled or not."""
+    """Two payloads in one place: of robots in one mode, or of unrelated ones, coupled or not."""
     layout = paper_layout()
     mate, alone = (layout.factory.by_label[label].index for label in ("sub3", "part1"))
 

@@ -39,18 +39,18 @@ def codes(error: pytest.ExceptionInfo[InputError]) -> list[str]:
     return [d.code for d in error.value.diagnostics]
 
 
-def gears(plan) -> list[str]:
-    places = plan.net.threaded.places
+def gears(factory) -> list[str]:
+    places = factory.net.threaded.places
     return [
         f"{g.robot}: " + " · ".join(f"{places[p].mode} {places[p].label}".strip() for p in g.places)
-        for g in plan.net.gears
+        for g in factory.net.gears
     ]
 
 
 def test_the_papers_example_has_the_gears_of_the_paper() -> None:
-    plan = compiled(PAPER)
-    assert gears(plan) == GEARS
-    operations = {o.label: [r + 1 for r in o.robots] for o in plan.operations}
+    factory = compiled(PAPER)
+    assert gears(factory) == GEARS
+    operations = {o.label: [r + 1 for r in o.robots] for o in factory.operations}
     assert operations["sub1"] == [5, 6, 3]
     assert operations["sub2"] == [3, 4]
     assert operations["sub3"] == [3, 2, 1]
@@ -70,30 +70,30 @@ def test_further_inputs_become_piles() -> None:
 
 
 def test_a_part_alone_is_a_product() -> None:
-    plan = compiled("root = p; p = atomic()")
-    assert gears(plan) == ["r1: wait nopart · atomic p · wait p · dropoff"]
+    factory = compiled("root = p; p = atomic()")
+    assert gears(factory) == ["r1: wait nopart · atomic p · wait p · dropoff"]
 
 
 def test_numbering_gives_small_inputs_first_and_tools_last() -> None:
-    plan = compiled(
+    factory = compiled(
         "root = s; s = mate(t, u); t = mate(a, b); u = atomic(); a = weld(c); b = atomic();"
         "c = atomic()"
     )
-    made = {o.label: o.carrier + 1 for o in plan.operations}
+    made = {o.label: o.carrier + 1 for o in factory.operations}
     assert (made["s"], made["u"], made["t"]) == (1, 2, 3)
     assert (made["b"], made["a"]) == (4, 5)
-    assert [r + 1 for r in plan.by_label["a"].robots] == [5, 6]
+    assert [r + 1 for r in factory.by_label["a"].robots] == [5, 6]
 
 
 @given(pags(max_labels=40))
 def test_counts_are_those_of_the_specification(pag: PAG) -> None:
-    plan = compile_pag(pag, TEMPLATES, load_catalogue())
-    n = len(plan.operations) - 1
-    robots = 1 + sum(len(o.robots) - 1 for o in plan.operations[:-1])
-    assert len(plan.robots) == robots
-    assert len(plan.net.threaded.transitions) == 2 * n + 2
-    assert len(plan.net.threaded.places) == 2 * n + robots + 1
-    assert len(plan.net.initial_marking) == robots
+    factory = compile_pag(pag, TEMPLATES, load_catalogue())
+    n = len(factory.operations) - 1
+    robots = 1 + sum(len(o.robots) - 1 for o in factory.operations[:-1])
+    assert len(factory.robots) == robots
+    assert len(factory.net.threaded.transitions) == 2 * n + 2
+    assert len(factory.net.threaded.places) == 2 * n + robots + 1
+    assert len(factory.net.initial_marking) == robots
 
 
 CRANE = """crane = (R, j, ~, <a; b>, F) where R = < gantry >; j = 1; ~ = {};
@@ -154,10 +154,10 @@ def test_an_unknown_type_is_named_with_a_suggestion() -> None:
 
 def test_a_type_that_extends_another_takes_its_roles() -> None:
     text = "root = s; s = mate(h, c); h = hoist(a, b); a = atomic(); b = atomic(); c = atomic()"
-    plan = compiled(text, HOIST, catalogue=catalogue())
-    assert plan.robots[plan.by_label["h"].carrier].type == "lift"
-    assert plan.robots[plan.by_label["a"].carrier].type == "lift"
-    assert plan.robots[plan.by_label["b"].carrier].type == "dot"
+    factory = compiled(text, HOIST, catalogue=catalogue())
+    assert factory.robots[factory.by_label["h"].carrier].type == "lift"
+    assert factory.robots[factory.by_label["a"].carrier].type == "lift"
+    assert factory.robots[factory.by_label["b"].carrier].type == "dot"
 
 
 MATE = """mate = (R, j, ~, <a; b>, F) where R = < dot, dot, dot >; j = 3; ~ = { A1 = A2 = B3 };

@@ -6,9 +6,10 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from factory.control import Bundle, Limits, Mode, follow, govern, trapezoid_time
-from factory.control.mode import Array
-from factory.control.profile import landing_speed
+from factory.control.governor import follow, govern
+from factory.control.mode import Array, Limits, Mode
+from factory.control.navigation import Bundle
+from factory.control.profile import landing_speed, trapezoid_time
 
 EPS = 2e-4
 TICKS = st.floats(1e-3, 20e-3)

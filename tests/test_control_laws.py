@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from factory.control import LAWS, Setting, mode_of
+from factory.control.laws import LAWS, Setting, mode_of
 from factory.problem.template import Law, Point, Template
 from factory.support.errors import InputError
 

@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from factory.control import Bundle, Limits, Mode
+from factory.control.mode import Limits, Mode
+from factory.control.navigation import Bundle
 
 R = 0.1
 

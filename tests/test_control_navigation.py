@@ -11,9 +11,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from factory.control import Bundle, Limits, Mode
 from factory.control import mode as mode_module
-from factory.control.mode import Array
+from factory.control.mode import Array, Limits, Mode
+from factory.control.navigation import Bundle
 
 R, EPS, DT = 0.06, 1e-3, 1e-3
 Field = Callable[[Array, float], Array]
@@ -180,7 +180,7 @@ def test_batch_equals_one_by_one(case: str) -> None:
         alone = bundle_of([mode])
         assert np.allclose(alone.field(x[here], DT), bundle.field(x, DT)[here], atol=1e-12)
         assert np.allclose(alone.gradient(x[here]), bundle.gradient(x)[here], rtol=1e-12)
-        for name in ("potential", "at_goal", "in_domain", "distance_to_goal"):
+        for name in ("potential", "at_goal", "in_domain"):
             whole, part = getattr(bundle, name)(x), getattr(alone, name)(x[here])
             assert np.allclose(whole[number], part[0], rtol=1e-12)
 
@@ -253,7 +253,7 @@ def test_a_mode_is_near_before_it_is_there(count: int, within: float, seed: int)
     assert not bundle.near_goal(x, within)
     while not bundle.near_goal(x, within):
         x = x + bundle.field(x, DT) * DT
-    away = bundle.distance_to_goal(x)
+    away = np.maximum.reduceat(np.abs(x - bundle.goal), bundle.starts)
     assert any(way < mode.eps + within for way, mode in zip(away, bundle.modes, strict=True))
     assert bundle.near_goal(x, 0.0) == bundle.at_goal(x).any()
 

@@ -7,18 +7,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from factory.control import (
-    Bundle,
-    Limits,
-    Mode,
-    follow,
-    ideal_time,
-    mode_time,
-    staged_time,
-    trapezoid_time,
-)
-from factory.control.mode import Array
-from factory.control.profile import travelled
+from factory.control.governor import follow
+from factory.control.mode import Array, Limits, Mode
+from factory.control.navigation import Bundle
+from factory.control.profile import ideal_time, mode_time, staged_time, trapezoid_time, travelled
 
 R, EPS = 0.06, 2e-4
 

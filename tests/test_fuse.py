@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import factory
-from factory.geometry.solids import product_geometry
+from factory.geometry.product import product_geometry
 from factory.layout.layout import Layout
 from factory.plant.fused_bodies import FUSE_FROM, bodies_of, fused_copies, fusing_pays
 from factory.record.monitor import beside

@@ -20,7 +20,8 @@ from factory.geometry.meshes import (
     sound,
     usable,
 )
-from factory.geometry.solids import Product, Solid, product_geometry, rotation
+from factory.geometry.product import product_geometry
+from factory.geometry.solids import Product, Solid, rotation
 from factory.lang import read_pag
 from factory.pipeline import all_templates
 from factory.problem.pag import PAG, Value

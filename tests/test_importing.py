@@ -15,7 +15,8 @@ import yaml
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from factory.geometry.solids import product_geometry, rotation
+from factory.geometry.product import product_geometry
+from factory.geometry.solids import rotation
 from factory.importing import Options, import_product
 from factory.importing.places import quaternion
 from factory.lang import read_pag

@@ -18,11 +18,12 @@ from layout_values import (
 from pag_values import SHAPES, TEMPLATES, catalogue, factory_of, paper
 
 from factory.compiler.compiler import compile_pag
-from factory.geometry.solids import product_geometry
-from factory.layout.crossings import delivered_to
+from factory.geometry.product import product_geometry
 from factory.layout.embedding import lay_out
+from factory.layout.guidepath import hull
 from factory.layout.layout import Layout
-from factory.layout.sweeps import hull, piles
+from factory.layout.shapes import carriers
+from factory.layout.sweeps import piles
 from factory.modes.modes import operation_modes
 from factory.problem.template import Law, Point
 from factory.support.errors import InputError, RunError
@@ -51,7 +52,7 @@ def test_the_same_input_gives_the_same_layout() -> None:
 def test_robots_meet_where_their_operation_is(size: int, seed: int, shape: str, style: str) -> None:
     layout = random_layout(size, seed, shape, style)
     factory = layout.factory
-    for robot, carrier in enumerate(delivered_to(layout)):
+    for robot, carrier in enumerate(carriers(layout.factory)):
         if carrier < 0:
             continue
         number = factory.robots[robot].operations[-1]

@@ -12,7 +12,7 @@ from layout_values import many_layouts, paper_layout, random_layout, row_of_inse
 from pag_values import factory_of
 
 from factory.export.floor_sheet import write_svg
-from factory.geometry.solids import product_geometry
+from factory.geometry.product import product_geometry
 from factory.layout.embedding import lay_out
 from factory.layout.layout import Layout
 from factory.support.canvas import LONGEST, Canvas, clean, hull, number

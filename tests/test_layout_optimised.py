@@ -14,7 +14,7 @@ from layout_values import STYLES, paper_layout, random_layout, row_of_inserts, t
 from pag_values import SHAPES, factory_of
 
 import factory.layout.optimising as optimising
-from factory.geometry.solids import product_geometry
+from factory.geometry.product import product_geometry
 from factory.layout.bounds import cycle_time_bound
 from factory.layout.dimensions import LAYERS, Clearance
 from factory.layout.durations import Pace, gear_times, operation_times
@@ -22,10 +22,10 @@ from factory.layout.embedding import lay_out
 from factory.layout.gain import gain
 from factory.layout.layout import Layout
 from factory.layout.optimising import first_feasible
-from factory.layout.outline import Outline, Plan
+from factory.layout.outline import Choice, Outline
 from factory.layout.request import Ground
-from factory.layout.skyline import Flank
-from factory.layout.stretching import Shape
+from factory.layout.shapes import Shape
+from factory.layout.skyline import Skyline
 from factory.modes.modes import operation_modes, robot_limits
 from factory.pipeline import read
 from factory.support.errors import RunError
@@ -160,42 +160,42 @@ def outline(lane: tuple[float, float], front: float, crown: float = 0.0) -> Outl
     own = (-0.1, front, *lane)
     blocks = (own, (-0.3, 0.05, -crown, crown)) if crown else (own,)
     shape = Shape({}, (0.0, 0.0, 0.0, 0.0), 0.0, 0.035, 0.08, 0.0, False)
-    return Outline(shape, Plan(), (lane,) * 3, (blocks,) * 3, 0.0)
+    return Outline(shape, Choice(), (blocks,) * 3, 0.0)
 
 
 NARROW = (-0.04, 0.04)
 
 
 def test_beside_a_path_a_long_robot_goes_past_the_crown_of_a_short_one() -> None:
-    flank = Flank().taken(outline(NARROW, 0.0, 0.5), 0.0, 0.1)
+    skyline = Skyline().taken(outline(NARROW, 0.0, 0.5), 0.0, 0.1)
     long = outline(NARROW, 0.0, 0.5)
-    assert flank.travel(long, 0.3, 0.1) == inf, "its own path would cross that crown"
-    assert flank.travel(long, 0.6, 0.1) == pytest.approx(0.45), "behind 0.4 m, 0.05 m ahead"
-    assert flank.travel(long, 1.0, 0.1) == pytest.approx(0.1), "beside it, no further than need be"
+    assert skyline.travel(long, 0.3, 0.1) == inf, "its own path would cross that crown"
+    assert skyline.travel(long, 0.6, 0.1) == pytest.approx(0.45), "behind 0.4 m, 0.05 m ahead"
+    assert skyline.travel(long, 1.0, 0.1) == pytest.approx(0.1), "beside it, no further than needed"
 
 
 def test_beside_a_path_a_short_robot_stops_before_the_crown_of_a_long_one() -> None:
-    flank = Flank().taken(outline(NARROW, 0.0, 0.5), 0.0, 0.6)
+    skyline = Skyline().taken(outline(NARROW, 0.0, 0.5), 0.0, 0.6)
     short = outline(NARROW, 0.0)
-    assert flank.travel(short, 0.2, 0.3) == pytest.approx(0.3), "0.55 m is where the crown begins"
-    assert flank.travel(short, 0.2, 0.5) == inf, "its rear would be in the crown"
-    assert flank.travel(short, 0.07, 0.3) == inf, "their lanes would overlap"
-    assert {round(start, 3) for start in flank.starts(short, 0.0)} == {0.08, 0.54}
+    assert skyline.travel(short, 0.2, 0.3) == pytest.approx(0.3), "0.55 m is where the crown begins"
+    assert skyline.travel(short, 0.2, 0.5) == inf, "its rear would be in the crown"
+    assert skyline.travel(short, 0.07, 0.3) == inf, "their lanes would overlap"
+    assert {round(start, 3) for start in skyline.starts(short, 0.0)} == {0.08, 0.54}
 
 
 def test_boxes_do_not_nest() -> None:
-    flank = Flank(nested=False).taken(outline(NARROW, 0.0, 0.5), 0.0, 0.6)
-    assert flank.travel(outline(NARROW, 0.0), 0.2, 0.3) == inf
-    assert flank.travel(outline(NARROW, 0.0), 0.6, 0.3) == pytest.approx(0.3)
+    skyline = Skyline(nested=False).taken(outline(NARROW, 0.0, 0.5), 0.0, 0.6)
+    assert skyline.travel(outline(NARROW, 0.0), 0.2, 0.3) == inf
+    assert skyline.travel(outline(NARROW, 0.0), 0.6, 0.3) == pytest.approx(0.3)
 
 
 def test_what_is_far_back_becomes_a_wall() -> None:
-    flank = Flank()
+    skyline = Skyline()
     for number in range(20):
-        flank = flank.taken(outline(NARROW, 0.0), 0.08 * number, 0.1)
-    assert all(len(flank.blocks[layer]) <= 16 for layer in LAYERS)
-    assert flank.travel(outline(NARROW, 0.0), 0.08 * 20, 0.1) == pytest.approx(0.1)
-    assert flank.travel(outline(NARROW, 0.0), 0.0, 0.1) == inf
+        skyline = skyline.taken(outline(NARROW, 0.0), 0.08 * number, 0.1)
+    assert all(len(skyline.blocks[layer]) <= 16 for layer in LAYERS)
+    assert skyline.travel(outline(NARROW, 0.0), 0.08 * 20, 0.1) == pytest.approx(0.1)
+    assert skyline.travel(outline(NARROW, 0.0), 0.0, 0.1) == inf
 
 
 def test_a_slow_pace_takes_longer() -> None:

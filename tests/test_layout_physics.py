@@ -7,8 +7,8 @@ import pytest
 from layout_values import STYLES, random_layout, row_of_inserts
 from pag_values import SHAPES
 
+from factory.layout.certificate import KINDS, NAMES
 from factory.layout.layout import Box, Layout
-from factory.layout.sweeps import KINDS, NAMES
 from factory.simulation.simulation import Simulation
 from factory.support.settings import Settings
 

@@ -8,8 +8,8 @@ import pytest
 
 import factory.layout.arranging as arranging
 import factory.layout.optimising as optimising
-from factory.compiler.mating.judged import judged
-from factory.geometry.solids import product_geometry
+from factory.compiler.mating import judged
+from factory.geometry.product import product_geometry
 from factory.layout.embedding import lay_out
 from factory.layout.layout import Layout
 from factory.layout.sides import admissible, admitted
@@ -23,8 +23,8 @@ b = atomic(box = (0.05, 0.05, 0.05), pos = (0.02, 0.02, 0.06))"""
 
 
 def laid_out(text: str) -> Layout:
-    plan = compiled(text)
-    return lay_out(plan, product_geometry(plan.pag))
+    factory = compiled(text)
+    return lay_out(factory, product_geometry(factory.pag))
 
 
 def deepest(layout: Layout) -> float:
@@ -63,13 +63,13 @@ def test_inputs_from_the_wrong_sides_are_seen(monkeypatch: pytest.MonkeyPatch) -
 
 
 def test_sides_are_right_for_any_sides_to_begin_with() -> None:
-    plan = judged(compiled(BALANCED), product_geometry(compiled(BALANCED).pag))
-    guests = range(1, len(plan.robots))
+    factory = judged(compiled(BALANCED), product_geometry(compiled(BALANCED).pag))
+    guests = range(1, len(factory.robots))
     for chosen in range(2 ** len(guests)):
         sides = {g: 1 if chosen >> g - 1 & 1 else -1 for g in guests}
-        for operation in plan.operations:
+        for operation in factory.operations:
             pair = [r for r in operation.robots if r != operation.carrier]
             if len(pair) == 2:
                 sides[pair[1]] = -sides[pair[0]]
-        found = admissible(plan, sides)
-        assert admissible(plan, found) == found
+        found = admissible(factory, sides)
+        assert admissible(factory, found) == found

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from factory.compiler.mating import matings
-from factory.geometry.solids import product_geometry
+from factory.geometry.product import product_geometry
 from factory.lang.pag_reader import read_pag
 from factory.layout.clearance import certify
 from factory.layout.embedding import lay_out

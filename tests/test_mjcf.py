@@ -212,13 +212,13 @@ def test_a_weld_for_every_pair_that_can_be_joined(tmp_path: Path, text: str) -> 
     layout = laid_out(tmp_path / "p.pag", text)
     m = compiled(physical_model(layout), tmp_path)
     joined = {(m.body(int(a)).name, names.label_of(m.body(int(b)).name)) for a, b in pairs(m)}
-    plan = layout.factory
-    for operation in plan.operations:
+    made = layout.factory
+    for operation in made.operations:
         for slot, robot in enumerate(operation.robots):
-            for label in {operation.before[slot], operation.after[slot]} & set(plan.contents):
-                for part in plan.contents[label]:
-                    assert (names.carriage(plan.robots[robot].name), part) in joined
-    for part in plan.contents[plan.pag.root]:
+            for label in {operation.before[slot], operation.after[slot]} & set(made.contents):
+                for part in made.contents[label]:
+                    assert (names.carriage(made.robots[robot].name), part) in joined
+    for part in made.contents[made.pag.root]:
         assert (names.feeder(part), part) in joined
         assert (names.OUTFEED_TRAY, part) in joined
 

@@ -15,7 +15,8 @@ import pytest
 
 import factory
 from factory.geometry.meshes import Array
-from factory.geometry.solids import Product, product_geometry
+from factory.geometry.product import product_geometry
+from factory.geometry.solids import Product
 from tests.command_line import ROOT, Terminal, files_in
 
 EXAMPLES = ROOT / "examples"

@@ -21,7 +21,7 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 
 import factory
-from factory.geometry.solids import Mesh
+from factory.geometry.meshes import Mesh
 from factory.mjcf.mesh_files import corner_normals, face_normals, mesh_file
 from factory.record.log import LogWriter, read_log
 from factory.render import Film, Picture, Still, camera_named, check_output, render_log

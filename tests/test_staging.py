@@ -65,7 +65,7 @@ def paper() -> Layout:
 
 def test_who_goes_ahead_in_the_papers_example(paper: Layout) -> None:
     """r1 and r3 go back with nothing, and wait there for what they are to carry; r2, r5 and r6 wait
-    for nobody at their feeders; r4 is a tool, and stays at its station."""
+    for no robot at their feeders; r4 is a tool, and stays at its station."""
     modes = operation_modes(paper, STAGED.eps)
     operations = paper.factory.operations
     found = {(s.robot + 1, operations[s.operation].label) for s in stages(paper, modes)}
@@ -339,7 +339,7 @@ def loaded_too(layout: Layout, modes: Any) -> Any:
             if (robot, operation.index) not in known and len(operation.robots) > 1:
                 own = slice(slot, slot + 1)
                 alone = type(mode)(mode.goals[own], mode.lower[own], mode.upper[own], mode.eps)
-                found.append(staging.Stage(robot, operation.index, slot, alone, 0.0))
+                found.append(staging.HeadStart(robot, operation.index, slot, alone, 0.0))
     return tuple(found)
 
 

@@ -1,4 +1,4 @@
-"""A run that nobody looks at has nothing that is only shown, and is the same to the last bit."""
+"""A run that is not shown lacks what is only there to be seen, and is the same to the last bit."""
 
 from __future__ import annotations
 

@@ -6,8 +6,8 @@ from typing import Any
 
 import pytest
 
-from factory.control import Bundle
 from factory.control.mode import Array, Truth
+from factory.control.navigation import Bundle
 from factory.simulation.simulation import Simulation
 from factory.support.settings import Settings
 from tests.test_vicinity import layout

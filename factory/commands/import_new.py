@@ -97,7 +97,7 @@ def import_(
 
 def _shape_warnings(pag: Path, templates: Mapping[str, Template]) -> tuple[Diagnostic, ...]:
     """What `build` will say of the shapes in a PAG that has been written."""
-    from factory.geometry.solids import product_geometry
+    from factory.geometry.product import product_geometry
     from factory.lang.pag_reader import load_pag
 
     try:

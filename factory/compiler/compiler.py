@@ -1,7 +1,7 @@
 """Compile and CompileNode (paper, section 5): from a PAG to a factory F = (R, ~, N).
 
 Guarantees: the net is composed of one gear per robot and is a gear net (Theorem 5.1);
-`factory.nets. verify` proves it again, independently. What would break that is refused here. Linear
+`factory.nets.verify` proves it again, independently. What would break that is refused here. Linear
 in the PAG.
 """
 
@@ -45,25 +45,6 @@ class Node:
     position: Position | None
 
 
-@dataclass(slots=True)
-class _Draft:
-    """What CompileNode has allocated so far: types, operations and, per robot, its operations from
-    the last of its cycle to the first."""
-
-    types: list[str]
-    births: list[Position | None]
-    visits: list[list[int]]
-    operations: list[Operation]
-    parents: list[int]
-    troubles: list[Diagnostic]
-
-    def allocate(self, robot_type: str, position: Position | None) -> int:
-        self.types.append(robot_type)
-        self.births.append(position)
-        self.visits.append([])
-        return len(self.types) - 1
-
-
 @collector_paused()
 def compile_pag(
     pag: PAG,
@@ -81,18 +62,14 @@ def compile_pag(
     its new robots at once, the input with fewest operation instances first, tools last.
     """
     nodes = expand(pag, templates)
-    draft = _Draft([], [], [], [], [], [])
     output = templates[DROPOFF]
     _check_types(nodes, output, catalogue)
-    carrier = draft.allocate(output.robots[0], pag[pag.root].position)
-    _compile_nodes(nodes, pag.root, carrier, draft, catalogue, approaches)
-    _add_dropoff(output, pag, carrier, draft)
-    if not draft.troubles:
-        robots = _robots(draft)
-        operations = tuple(draft.operations)
-        draft.troubles.extend(check_prepared(robots, operations))
-    if draft.troubles:
-        raise InputError(draft.troubles)
+    draft = _Draft(nodes, catalogue, approaches)
+    draft.compile(pag, output)
+    robots, operations = draft.robots(), tuple(draft.operations)
+    troubles = draft.troubles or [*check_prepared(robots, operations)]
+    if troubles:
+        raise InputError(troubles)
     return Factory(pag, robots, operations, gear_net(robots, operations), tuple(draft.parents))
 
 
@@ -152,50 +129,121 @@ def _dwell(template: Template, assembly: Assembly) -> float:
     return float(wanted) if isinstance(wanted, int | float) else 0.0
 
 
-def _compile_nodes(
-    nodes: Mapping[str, Node],
-    root: str,
-    output: int,
-    draft: _Draft,
-    catalogue: Catalogue,
-    approaches: Mapping[str, Approach],
-) -> None:
-    """CompileNode(P, carrier) for every node in preorder, with a stack in place of recursion."""
-    stack: list[tuple[str, int, int]] = [(root, output, -1)]
-    while stack:
-        label, carrier, parent = stack.pop()
-        node = nodes[label]
-        index = len(draft.operations)
-        brought = _brought(node)
-        _claim_carrier(node, carrier, draft, catalogue)
-        approach = approaches.get(label)
-        lowered = approach.lowered if approach else ""
-        robots = _allocate(node, carrier, brought, nodes, draft, catalogue, lowered)
-        before = tuple(brought)
-        after = tuple(NOPART if b == NOPART else label for b in node.template.after)
-        draft.operations.append(
-            Operation(
-                index,
-                label,
-                node.template,
-                robots,
-                before,
-                after,
-                node.dwell,
-                node.position,
-                approach,
-            )
+class _Draft:
+    """What CompileNode has allocated so far: operations with their parents and, per robot, its
+    type, the position that made it necessary and its operations from the last of its cycle to the
+    first."""
+
+    def __init__(
+        self,
+        nodes: Mapping[str, Node],
+        catalogue: Catalogue,
+        approaches: Mapping[str, Approach],
+    ) -> None:
+        self.nodes, self.catalogue, self.approaches = nodes, catalogue, approaches
+        self.types: list[str] = []
+        self.births: list[Position | None] = []
+        self.visits: list[list[int]] = []
+        self.operations: list[Operation] = []
+        self.parents: list[int] = []
+        self.troubles: list[Diagnostic] = []
+
+    def compile(self, pag: PAG, output: Template) -> None:
+        """CompileNode(P, carrier) for every node in preorder, with a stack in place of recursion,
+        and dropoff."""
+        position = pag[pag.root].position
+        carrier = self._new_robot(output.robots[0], position)
+        stack: list[tuple[str, int, int]] = [(pag.root, carrier, -1)]
+        while stack:
+            label, robot, parent = stack.pop()
+            operation = self._operation(self.nodes[label], robot)
+            self.operations.append(operation)
+            self.parents.append(parent)
+            for robot in operation.robots:
+                self.visits[robot].append(operation.index)
+            brought = zip(operation.robots, operation.before, strict=True)
+            inputs = sorted((r, x) for r, x in brought if x != NOPART)
+            stack.extend((x, robot, operation.index) for robot, x in reversed(inputs))
+        index = len(self.operations)
+        last = Operation(index, DROPOFF, output, (carrier,), (pag.root,), (NOPART,), 0.0, position)
+        self.operations.append(last)
+        self.parents = [index, *self.parents[1:], -1]
+        self.visits[carrier].insert(0, index)
+
+    def robots(self) -> tuple[Robot, ...]:
+        """The robots allocated."""
+        return tuple(
+            Robot(i, f"r{i + 1}", self.types[i], tuple(reversed(visits)), self.births[i])
+            for i, visits in enumerate(self.visits)
         )
-        draft.parents.append(parent)
-        for robot in robots:
-            draft.visits[robot].append(index)
-        inputs = sorted((r, x) for r, x in zip(robots, before, strict=True) if x != NOPART)
-        stack.extend((x, robot, index) for robot, x in reversed(inputs))
 
+    def _new_robot(self, robot_type: str, position: Position | None) -> int:
+        self.types.append(robot_type)
+        self.births.append(position)
+        self.visits.append([])
+        return len(self.types) - 1
 
-def _brought(node: Node) -> list[str]:
-    """a, with the template's label variables replaced by the labels of the inputs."""
-    return [NOPART if i < 0 else node.inputs[i] for i in _arguments(node.template.before)]
+    def _operation(self, node: Node, carrier: int) -> Operation:
+        """The instance of a node's template, with its new robots."""
+        template, approach = node.template, self.approaches.get(node.label)
+        before = tuple(NOPART if i < 0 else node.inputs[i] for i in _arguments(template.before))
+        self._claim_carrier(node, carrier)
+        return Operation(
+            len(self.operations),
+            node.label,
+            template,
+            self._allocate(node, carrier, before, approach.lowered if approach else ""),
+            before,
+            tuple(NOPART if label == NOPART else node.label for label in template.after),
+            node.dwell,
+            node.position,
+            approach,
+        )
+
+    def _claim_carrier(self, node: Node, carrier: int) -> None:
+        """The carrier takes the role T_j: its type becomes the more special of the two."""
+        wanted, given = node.template.robots[node.template.carrier - 1], self.types[carrier]
+        met = self.catalogue.meet(given, wanted)
+        if met is None:
+            message = (
+                f"robot r{carrier + 1} carries '{node.label}' and must be a '{wanted}' for"
+                f" {node.template.name}, but its next role asks for a '{given}'"
+            )
+            hint = f"use an operation whose carrier is a '{given}', or a type that extends both"
+            self.troubles.append(Diagnostic("TypeMismatch", message, node.position, hint))
+        else:
+            self.types[carrier] = met
+
+    def _allocate(
+        self, node: Node, carrier: int, before: tuple[str, ...], lowered: str
+    ) -> tuple[int, ...]:
+        """r_1, ..., r_k: the carrier and the new robots, numbered smallest input first, tools last.
+        The one that brings `lowered` is a lift."""
+        template = node.template
+        robots = {template.carrier - 1: carrier}
+
+        def order(slot: int) -> tuple[int, int, int]:
+            label = before[slot]
+            if label == NOPART:
+                return 1, 0, slot
+            return 0, self.nodes[label].size, node.inputs.index(label)
+
+        for slot in sorted({*range(len(template.robots))} - {*robots}, key=order):
+            wanted = template.robots[slot]
+            if lowered and before[slot] == lowered:
+                wanted = self._lift(wanted, node)
+            robots[slot] = self._new_robot(wanted, node.position)
+        return tuple(robots[slot] for slot in range(len(template.robots)))
+
+    def _lift(self, wanted: str, node: Node) -> str:
+        """The type of a robot that takes the role of a `wanted` and can lower what it brings."""
+        met = self.catalogue.meet(LIFT, wanted) if LIFT in self.catalogue.types else None
+        if met is not None and self.catalogue.fits(met, LIFT):
+            return met
+        message = f"what '{node.label}' takes must be lowered, and a '{wanted}' has no lift"
+        hint = "let the template ask for a 'dot', or the type extend 'lift'"
+        self.troubles.append(Diagnostic("TypeMismatch", message, node.position, hint))
+        return wanted
 
 
 @cache
@@ -203,78 +251,6 @@ def _arguments(before: tuple[str, ...]) -> tuple[int, ...]:
     """For each label of a template's a the number of the input that it stands for, -1 for none."""
     variables = sorted({*before} - {NOPART}, key=variable_number)
     return tuple(-1 if label == NOPART else variables.index(label) for label in before)
-
-
-def _claim_carrier(node: Node, carrier: int, draft: _Draft, catalogue: Catalogue) -> None:
-    """The carrier takes the role T_j: its type becomes the more special of the two."""
-    wanted, given = node.template.robots[node.template.carrier - 1], draft.types[carrier]
-    met = catalogue.meet(given, wanted)
-    if met is None:
-        message = (
-            f"robot r{carrier + 1} carries '{node.label}' and must be a '{wanted}' for"
-            f" {node.template.name}, but its next role asks for a '{given}'"
-        )
-        hint = f"use an operation whose carrier is a '{given}', or a type that extends both"
-        draft.troubles.append(Diagnostic("TypeMismatch", message, node.position, hint))
-    else:
-        draft.types[carrier] = met
-
-
-def _allocate(
-    node: Node,
-    carrier: int,
-    brought: list[str],
-    nodes: Mapping[str, Node],
-    draft: _Draft,
-    catalogue: Catalogue,
-    lowered: str,
-) -> tuple[int, ...]:
-    """r_1, ..., r_k: the carrier and the new robots, numbered smallest input first, tools last. The
-    one that brings `lowered` is a lift."""
-    template = node.template
-    robots = {template.carrier - 1: carrier}
-    new = [i for i in range(len(template.robots)) if i != template.carrier - 1]
-    argument = {label: i for i, label in enumerate(node.inputs)}
-
-    def order(i: int) -> tuple[int, int, int]:
-        label = brought[i]
-        return (1, 0, i) if label == NOPART else (0, nodes[label].size, argument[label])
-
-    for i in sorted(new, key=order):
-        wanted = template.robots[i]
-        if lowered and brought[i] == lowered:
-            wanted = _lift(wanted, node, draft, catalogue)
-        robots[i] = draft.allocate(wanted, node.position)
-    return tuple(robots[i] for i in range(len(template.robots)))
-
-
-def _lift(wanted: str, node: Node, draft: _Draft, catalogue: Catalogue) -> str:
-    """The type of a robot that takes the role of a `wanted` and can lower what it brings."""
-    met = catalogue.meet(LIFT, wanted) if LIFT in catalogue.types else None
-    if met is not None and catalogue.fits(met, LIFT):
-        return met
-    message = f"what '{node.label}' takes must be lowered, and a '{wanted}' has no lift"
-    hint = "let the template ask for a 'dot', or the type extend 'lift'"
-    draft.troubles.append(Diagnostic("TypeMismatch", message, node.position, hint))
-    return wanted
-
-
-def _add_dropoff(output: Template, pag: PAG, carrier: int, draft: _Draft) -> None:
-    index = len(draft.operations)
-    draft.operations.append(
-        Operation(
-            index, DROPOFF, output, (carrier,), (pag.root,), (NOPART,), 0.0, pag[pag.root].position
-        )
-    )
-    draft.parents = [index if p == -1 else p for p in draft.parents] + [-1]
-    draft.visits[carrier].insert(0, index)
-
-
-def _robots(draft: _Draft) -> tuple[Robot, ...]:
-    return tuple(
-        Robot(i, f"r{i + 1}", draft.types[i], tuple(reversed(visits)), draft.births[i])
-        for i, visits in enumerate(draft.visits)
-    )
 
 
 def gear_net(robots: tuple[Robot, ...], operations: tuple[Operation, ...]) -> GearNet:

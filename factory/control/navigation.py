@@ -185,10 +185,6 @@ class Bundle:
         found[touching] = False
         return found
 
-    def distance_to_goal(self, x: Array) -> Array:
-        """How far (modes,) [m] each mode's farthest robot is from its goal."""
-        return np.maximum.reduceat(np.abs(x - self.goal), self.starts)
-
     def near_goal(self, x: Array, within: float, slow: Truth | None = None) -> bool:
         """Whether any mode's robots are all that near to its goal ball [m]; and all of those that
         are `slow` (n,), but where time in the ball counts."""

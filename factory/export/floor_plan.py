@@ -10,7 +10,8 @@ import numpy as np
 from factory.geometry.solids import Solid
 from factory.layout.dimensions import ARM_WIDTH, CARRIAGE
 from factory.layout.layout import Box, Extent, Guidepath, Layout, Point2
-from factory.layout.sweeps import ALWAYS, PAYLOAD_BODY, piles, regions
+from factory.layout.certificate import ALWAYS, PAYLOAD_BODY
+from factory.layout.sweeps import piles, regions
 from factory.support.canvas import hexadecimal, hull
 
 JUNCTION = 0.008

@@ -87,7 +87,7 @@ def cache_folder() -> Path:
 
 
 def _key(mesh: Mesh, release: str) -> str:
-    """What a decomposition depends on, as a digest."""
+    """A digest of what a decomposition depends on."""
     digest = hashlib.sha256(f"{release} {sorted(PARAMETERS.items())} {SLIVER}".encode())
     for array in (mesh.vertices, mesh.faces):
         digest.update(f" {array.shape} ".encode())
@@ -105,7 +105,7 @@ def _run_coacd(mesh: Mesh) -> tuple[Array, ...]:
         coacd.set_log_level("off")
         bodies = coacd.run_coacd(coacd.Mesh(mesh.vertices, mesh.faces), **PARAMETERS)
         hulls = [trimesh.convex.convex_hull(np.asarray(vertices, float)) for vertices, _ in bodies]
-    except Exception:  # whatever a library of C++ makes of a strange mesh, its hull still serves
+    except Exception:  # CoACD raises anything on a strange mesh
         return ()
     least = SLIVER * sum(float(hull.volume) for hull in hulls)
     return tuple(np.asarray(hull.vertices) for hull in hulls if hull.volume > least)
@@ -113,8 +113,7 @@ def _run_coacd(mesh: Mesh) -> tuple[Array, ...]:
 
 def _packed(pieces: tuple[Array, ...]) -> bytes:
     content = io.BytesIO()
-    counts = np.array([len(piece) for piece in pieces], np.int64)
-    np.savez(content, counts=counts, vertices=np.concatenate([np.zeros((0, 3)), *pieces]))
+    np.savez(content, *pieces)
     return content.getvalue()
 
 
@@ -122,11 +121,8 @@ def _read(path: Path) -> tuple[Array, ...] | None:
     """What `_packed` wrote; None where there is none, or it is damaged."""
     try:
         with np.load(path, allow_pickle=False) as content:
-            counts, vertices = content["counts"], content["vertices"]
-        if vertices.shape != (int(counts.sum()), 3) or not np.isfinite(vertices).all():
-            return None
-        if (counts < 4).any():
-            return None
-        return tuple(np.split(vertices, np.cumsum(counts)[:-1])) if len(counts) else ()
+            found = tuple(content[name] for name in content.files)
+        sound = all(p.shape[1:] == (3,) and len(p) > 3 and np.isfinite(p).all() for p in found)
+        return found if sound else None
     except Exception:  # numpy and zipfile raise anything on a broken file
         return None

@@ -3,16 +3,12 @@ where they are written."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from factory.geometry.meshes import Array
+from factory.geometry.solids import Solid
 from factory.problem.pag import PAG, Assembly
 from factory.support.errors import Diagnostic, Position
-
-if TYPE_CHECKING:
-    from factory.geometry.solids import Solid
 
 SMALLEST, FURTHEST, HEAVIEST = 5e-9, 1e4, 1e12
 """A part of a smaller half length, or beyond this distance [m] or mass [kg], is refused: the engine

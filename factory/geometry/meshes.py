@@ -36,7 +36,7 @@ class Mesh:
 
 
 @dataclass(frozen=True, slots=True)
-class Measured:
+class MassProperties:
     """A mesh, what was wrong with it, and its mass properties for unit density. `leak`: why they
     are those of its hull, "" where they are its own."""
 
@@ -97,7 +97,7 @@ def _hull_mesh(name: str, vertices: Array) -> Mesh:
     return Mesh(name, np.asarray(hull.vertices), np.asarray(hull.faces))
 
 
-def measured(mesh: Mesh, trouble: str = "") -> Measured:
+def measured(mesh: Mesh, trouble: str = "") -> MassProperties:
     """Volume, centre of mass, inertia for unit density, vertices of the hull. An open mesh, or one
     that is inside out somewhere, has those of its convex hull."""
     import trimesh
@@ -115,7 +115,7 @@ def measured(mesh: Mesh, trouble: str = "") -> Measured:
     leak = "" if solid is body else f"{wrong}; its convex hull is used instead"
     centre = np.asarray(properties.center_mass)
     volume, corners = float(properties.volume), np.asarray(hull.vertices)
-    return Measured(mesh, trouble, leak, volume, centre, inertia, corners)
+    return MassProperties(mesh, trouble, leak, volume, centre, inertia, corners)
 
 
 def is_inertia(matrix: Array) -> bool:

@@ -9,19 +9,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from factory.layout.layout import Box, Point2
+from factory.layout.guidepath import Box
 from factory.layout.outline import Outline
 from factory.layout.packing import Packing, Task
-from factory.layout.shapes import carriers, oriented_shape
+from factory.layout.shapes import OUTPUT, Frame, Shape, Sides, carriers, oriented_shape, turned
 from factory.layout.sides import admitted
-from factory.layout.stretching import Shape, Sides, Stretched, up
+from factory.layout.stretching import Stretched, outgoing
 from factory.plant.factory import Operation
-
-Frame = tuple[Point2, Point2]
-"""(u, t): how a robot lies on the floor."""
-
-OUTPUT: Frame = ((1.0, 0.0), (0.0, 1.0))
-"""How the output robot does."""
 
 
 def arrange(
@@ -32,24 +26,19 @@ def arrange(
     factory, on, c = task.factory, carriers(task.factory), task.clearance
     table: list[dict[Frame, Outline]] = [{} for _ in factory.robots]
     for robot, frames in reversed(list(enumerate(_frames(on, sides)))):
-        for u, t in frames:
-            shape = oriented_shape(factory, payloads, robot, on[robot], u, t, c, task.wide)
+        for frame in frames:
+            shape = oriented_shape(factory, payloads, robot, on[robot], frame, c, task.wide)
 
-            def outline(guest: int, side: int, u: Point2 = u, t: Point2 = t) -> Outline:
-                return table[guest][turned(u, t, side)]
+            def outline(guest: int, side: int, frame: Frame = frame) -> Outline:
+                return table[guest][turned(frame, side)]
 
-            def admits(operation: Operation, chosen: Sides, t: Point2 = t) -> bool:
+            def admits(operation: Operation, chosen: Sides, frame: Frame = frame) -> bool:
                 if sides is not None:
                     return all(sides[robot] == side for robot, side in chosen.items())
-                return admitted(operation, chosen, t)
+                return admitted(operation, chosen, frame[1])
 
-            table[robot][u, t] = Packing(task, robot, shape, outline, admits).packed()
+            table[robot][frame] = Packing(task, robot, shape, outline, admits).packed()
     return _chosen(task, table)
-
-
-def turned(u: Point2, t: Point2, side: int) -> Frame:
-    """The frame of a robot on one side of a path with the frame (u, t)."""
-    return (-side * t[0], -side * t[1]), u
 
 
 def _frames(on: Sequence[int], sides: Sides | None) -> list[tuple[Frame, ...]]:
@@ -57,7 +46,7 @@ def _frames(on: Sequence[int], sides: Sides | None) -> list[tuple[Frame, ...]]:
     found: list[tuple[Frame, ...]] = [(OUTPUT,)]
     for robot, carrier in list(enumerate(on))[1:]:
         both = (-1, +1) if sides is None else (sides[robot],)
-        frames = [turned(u, t, side) for u, t in found[carrier] for side in both]
+        frames = [turned(frame, side) for frame in found[carrier] for side in both]
         found.append(tuple(dict.fromkeys(frames)))
     return found
 
@@ -68,14 +57,12 @@ def _chosen(task: Task, table: Sequence[Mapping[Frame, Outline]]) -> tuple[Stret
     travel, stations, sides = [0.0] * robots, [0.0] * operations, Sides()
     frames, outlines = [OUTPUT] * robots, list[Outline]()
     for robot in range(robots):
-        u, t = frames[robot]
-        outlines.append(table[robot][u, t])
-        plan = outlines[-1].plan
-        for number, station in plan.stations.items():
+        outlines.append(table[robot][frames[robot]])
+        choice = outlines[-1].choice
+        for number, station in choice.stations.items():
             stations[number] = station
-        for guest, side in plan.sides.items():
-            sides[guest], travel[guest] = side, plan.travels[guest]
-            frames[guest] = turned(u, t, side)
-    last = outlines[0].shape.last
-    travel[0] = up(outlines[0].ahead - min(0.0, last[0]) + task.clearance.c)
+        for guest, side in choice.sides.items():
+            sides[guest], travel[guest] = side, choice.travels[guest]
+            frames[guest] = turned(frames[robot], side)
+    travel[0] = outgoing(outlines[0], task.clearance)
     return Stretched(travel, stations, sides), [outline.shape for outline in outlines]

@@ -5,11 +5,38 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from factory.layout.layout import Point2
-from factory.layout.sweeps import ALWAYS, KINDS, NAMES, Region
+from factory.layout.guidepath import Box, Point2
+from factory.plant.factory import Factory
 from factory.support.errors import Diagnostic, Position
 
 MILLI = 1000.0
+
+NAMES = ("carriages", "masts and arms", "payloads")
+"""The layers' names."""
+
+KINDS = ("carriage", "mast", "arm", "payload", "post", "boom", "outfeed")
+"""What a region is swept by; STATIONS are those that stand still."""
+
+CARRIAGE_BODY, MAST_BODY, ARM_BODY, PAYLOAD_BODY, POST_BODY, BOOM, OUTFEED = range(len(KINDS))
+STATIONS = (POST_BODY, BOOM, OUTFEED)
+
+ALWAYS = -1
+"""The mode of a region that is uncoupled."""
+
+
+@dataclass(frozen=True, slots=True)
+class Region:
+    """A rectangle in one layer: which robot is there (a station counts to the robot it serves),
+    with what, carrying which label, from z low to z high [m], a lift up, and in the mode of which
+    operation, ALWAYS for an uncoupled region."""
+
+    robot: int
+    layer: int
+    kind: int
+    box: Box
+    z: tuple[float, float]
+    label: str = ""
+    mode: int = ALWAYS
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,6 +69,21 @@ class Fault:
             "layer": self.layer,
             "positions": [None if p is None else str(p) for p in self.positions],
         }
+
+
+def fault(factory: Factory, message: str, *found: Region | int, lacking: float = 0.0) -> Fault:
+    """A fault of robots, each given by a region in which it is or by its number."""
+    regions = [region for region in found if isinstance(region, Region)]
+    numbers = (region.robot if isinstance(region, Region) else region for region in found)
+    robots = [factory.robots[number] for number in numbers]
+    return Fault(
+        message,
+        tuple(robot.name for robot in robots),
+        tuple(dict.fromkeys(region.label for region in regions if region.label)),
+        lacking,
+        NAMES[regions[0].layer] if regions else "",
+        tuple(robot.position for robot in robots),
+    )
 
 
 @dataclass(frozen=True, slots=True)

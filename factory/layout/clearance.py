@@ -16,10 +16,22 @@ from itertools import islice
 
 import numpy as np
 import shapely
-from numpy.typing import NDArray
 
-from factory.layout.certificate import Certificate, Fault, Shared
-from factory.layout.crossings import CHUNK, embedding_faults
+from factory.layout.certificate import (
+    ALWAYS,
+    BOOM,
+    KINDS,
+    NAMES,
+    OUTFEED,
+    PAYLOAD_BODY,
+    STATIONS,
+    Certificate,
+    Fault,
+    Region,
+    Shared,
+    fault,
+)
+from factory.layout.crossings import embedding_faults, near
 from factory.layout.dimensions import (
     ARM_LOW,
     ARM_TOP,
@@ -30,28 +42,12 @@ from factory.layout.dimensions import (
     PAYLOAD,
     PAYLOADS,
 )
-from factory.layout.layout import Box, Layout
-from factory.layout.sweeps import (
-    ALWAYS,
-    BOOM,
-    KINDS,
-    NAMES,
-    OUTFEED,
-    PAYLOAD_BODY,
-    STATIONS,
-    Pile,
-    Region,
-    boxes,
-    goals,
-    piles,
-    regions,
-    sweep,
-)
+from factory.layout.guidepath import Box
+from factory.layout.layout import Layout
+from factory.layout.sweeps import Pile, piles, regions
 from factory.plant.approaches import MARGIN
 from factory.plant.factory import Operation
 from factory.problem.pag import NOPART
-
-Index = NDArray[np.intp]
 
 TOLERANCE = 1e-6
 """Distances are compared to this [m]: a thousandth of what a layout is rounded to."""
@@ -75,15 +71,7 @@ def certify(layout: Layout) -> Certificate:
     top = max(region.z[1] for region in swept)
     return Certificate(
         layout.clearance,
-        tuple(
-            (name, low, high)
-            for name, low, high in zip(
-                NAMES,
-                (0.0, CARRIAGE_TOP, PAYLOAD),
-                (CARRIAGE_TOP, ARM_TOP, top),
-                strict=True,
-            )
-        ),
+        tuple(zip(NAMES, (0.0, CARRIAGE_TOP, PAYLOAD), (CARRIAGE_TOP, ARM_TOP, top), strict=True)),
         (
             ("carriages to arms", ARM_LOW - CARRIAGE_TOP),
             ("masts and arms to fingers", FINGER_LOW - ARM_TOP),
@@ -132,20 +120,15 @@ class _Search:
     def _near(self, here: list[Region]) -> Iterator[tuple[Region, Region]]:
         """Pairs in one layer that are less than a clearance apart in plan: of different robots,
         or of a station and its own robot."""
-        corners = boxes(here)
+        corners = np.array([region.box for region in here], float).reshape(-1, 4)
         cells = shapely.box(corners[:, 0], corners[:, 2], corners[:, 1], corners[:, 3])
-        tree = shapely.STRtree(cells)
         robot = np.array([region.robot for region in here])
-        kind = np.array([region.kind for region in here])
+        stands = np.isin([region.kind for region in here], STATIONS)
         least = max(self.layout.clearance - TOLERANCE, 0.0)
-        for start in range(0, len(here), CHUNK):
-            first, second = tree.query(cells[start : start + CHUNK], "dwithin", least)
-            first = first + start
+        for first, second in near(cells, "dwithin", least):
             self.pairs += len(first)
-            still = np.isin(kind[first], STATIONS) != np.isin(kind[second], STATIONS)
-            kept = (first < second) & ((robot[first] != robot[second]) | still)
-            order = np.lexsort((second[kept], first[kept]))
-            for i, j in zip(first[kept][order].tolist(), second[kept][order].tolist(), strict=True):
+            kept = (robot[first] != robot[second]) | (stands[first] != stands[second])
+            for i, j in zip(first[kept].tolist(), second[kept].tolist(), strict=True):
                 yield here[i], here[j]
 
     def _settled(self, one: Region, other: Region) -> bool:
@@ -188,14 +171,10 @@ class _Search:
             return
         robots, operations = self.layout.factory.robots, self.layout.factory.operations
         labels = dict.fromkeys(operations[number].label for number in (first, second))
+        x, y = self.layout.meeting(operations[first])
         self.shared[i, j, first, second] = Shared(
-            (robots[i].name, robots[j].name), tuple(labels), self._point(operations[first])
+            (robots[i].name, robots[j].name), tuple(labels), (round(x, 6), round(y, 6))
         )
-
-    def _point(self, operation: Operation) -> tuple[float, float]:
-        path = self.layout.guidepaths[operation.carrier]
-        x, y = path.middle(self.layout.goal(operation.index, operation.template.carrier - 1))
-        return round(x, 6), round(y, 6)
 
     def _fault(self, one: Region, other: Region) -> Fault:
         c = self.layout.clearance
@@ -206,7 +185,7 @@ class _Search:
             f"{names[0]} and {names[1]} {found} in the layer of {NAMES[one.layer]};"
             f" {c * 1000:g} mm are needed"
         )
-        return _fault(self.layout, message, (one, other), c - gap)
+        return fault(self.layout.factory, message, one, other, lacking=c - gap)
 
     def _words(self, region: Region) -> str:
         name = self.layout.factory.robots[region.robot].name
@@ -218,32 +197,19 @@ class _Search:
         return f"{name}'s {KINDS[region.kind]}{label}"
 
 
-def _fault(layout: Layout, message: str, found: tuple[Region, ...], lacking: float) -> Fault:
-    robots = [layout.factory.robots[region.robot] for region in found]
-    return Fault(
-        message,
-        tuple(robot.name for robot in robots),
-        tuple(dict.fromkeys(region.label for region in found if region.label)),
-        lacking,
-        NAMES[found[0].layer],
-        tuple(robot.position for robot in robots),
-    )
-
-
 def _standoffs(layout: Layout, found: Mapping[str, Pile]) -> Iterator[Fault]:
     """Where a carrier brings a pile itself: what is brought to it is clear of the pile's way as
     long as it waits at its standoff, and waits no farther away than where it comes from."""
-    legs = _legs(layout)
     for operation in layout.factory.operations[:-1]:
         carrier = operation.template.carrier - 1
         if operation.before[carrier] == NOPART or len(operation.inputs) == 1:
             continue
-        pile = _way(layout, found, operation, carrier, legs)
+        pile = _way(layout, found, operation, carrier)
         for slot, label in enumerate(operation.before):
             if slot == carrier or label == NOPART:
                 continue
-            guest = _way(layout, found, operation, slot, legs)
-            start, end = legs[operation.index, guest.robot]
+            guest = _way(layout, found, operation, slot)
+            start, end = layout.legs[operation.index, guest.robot]
             room = start - end - layout.standoff(operation, slot)
             if room < -TOLERANCE:
                 name = layout.factory.robots[guest.robot].name
@@ -251,7 +217,7 @@ def _standoffs(layout: Layout, found: Mapping[str, Pile]) -> Iterator[Fault]:
                     f"{name} waits for '{operation.label}' {-room * 1000:.1f} mm behind the last"
                     " station of its guidepath: it could never start"
                 )
-                yield _fault(layout, message, (guest,), -room)
+                yield fault(layout.factory, message, guest, lacking=-room)
             if slot != operation.lowered:
                 yield from _met(layout, pile, guest)
 
@@ -274,33 +240,17 @@ def _raised(layout: Layout, found: Mapping[str, Pile]) -> Iterator[Fault]:
                     f" {MARGIN * 1000:g} mm are needed"
                 )
                 here = Region(guest, PAYLOADS, PAYLOAD_BODY, found[label].box, found[label].z)
-                yield _fault(layout, message, (here,), MARGIN - over)
+                yield fault(layout.factory, message, here, lacking=MARGIN - over)
 
 
-def _legs(layout: Layout) -> dict[tuple[int, int], tuple[float, float]]:
-    """From where to where (arc lengths) each robot goes in each of its operations."""
-    found: dict[tuple[int, int], tuple[float, float]] = {}
-    for robot in layout.factory.robots:
-        stops = goals(layout, robot.index)
-        for step, number in enumerate(robot.operations):
-            found[number, robot.index] = stops[step - 1], stops[step]
-    return found
-
-
-def _way(
-    layout: Layout,
-    found: Mapping[str, Pile],
-    operation: Operation,
-    slot: int,
-    legs: Mapping[tuple[int, int], tuple[float, float]],
-) -> Region:
+def _way(layout: Layout, found: Mapping[str, Pile], operation: Operation, slot: int) -> Region:
     """What a robot's payload sweeps in a mode before its gate opens."""
     robot = operation.robots[slot]
-    pile = found[operation.before[slot]].raised(layout.elevations[robot])
-    start, end = legs[operation.index, robot]
-    end += layout.standoff(operation, slot)
-    box = sweep(layout.guidepaths[robot], pile.box, max(start, end), end)
     label = operation.before[slot]
+    pile = found[label].raised(layout.elevations[robot])
+    start, end = layout.legs[operation.index, robot]
+    end += layout.standoff(operation, slot)
+    box = layout.guidepaths[robot].sweep(pile.box, max(start, end), end)
     return Region(robot, PAYLOADS, PAYLOAD_BODY, box, pile.z, label, operation.index)
 
 
@@ -314,7 +264,4 @@ def _met(layout: Layout, pile: Region, guest: Region) -> Iterator[Fault]:
         f"{waits}'s '{guest.label}' waits {gap * 1000:.1f} mm from the way of {comes}'s"
         f" '{pile.label}' in '{label}'; {layout.clearance * 1000:g} mm are needed"
     )
-    yield _fault(layout, message, (guest, pile), layout.clearance - gap)
-
-
-__all__ = ["Certificate", "certify", "separation"]
+    yield fault(layout.factory, message, guest, pile, lacking=layout.clearance - gap)

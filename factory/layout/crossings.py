@@ -10,14 +10,19 @@ integers.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from math import dist
 
 import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from factory.layout.certificate import Fault
-from factory.layout.layout import Layout, Point2
+from factory.layout.certificate import Fault, fault
+from factory.layout.guidepath import Point2
+from factory.layout.layout import Layout
+from factory.layout.shapes import carriers
 from factory.problem.pag import NOPART
+
+Index = NDArray[np.intp]
 
 CHUNK = 512
 """Boxes looked up at a time, so that a heap of them all in one place takes no more memory."""
@@ -30,39 +35,26 @@ def embedding_faults(layout: Layout) -> Iterator[Fault]:
     """What keeps f from being an embedding: ends off the grid of millimetres, junctions that ~
     asks for but f does not make, and crossings that it makes but ~ does not ask for. Near
     linear."""
-    carriers = delivered_to(layout)
-    for robot in range(len(layout.guidepaths)):
+    for robot, carrier in enumerate(carriers(layout.factory)):
         yield from _off_grid(layout, robot)
-        yield from _junction(layout, robot, carriers[robot])
+        yield from _junction(layout, robot, carrier)
     yield from _crossings(layout)
-
-
-def delivered_to(layout: Layout) -> list[int]:
-    """For each robot the carrier it delivers to, -1 for the output robot."""
-    operations = layout.factory.operations
-    found = [operations[robot.operations[-1]].carrier for robot in layout.factory.robots]
-    return [-1 if carrier == robot else carrier for robot, carrier in enumerate(found)]
 
 
 def _grid(point: Point2) -> Grid:
     return round(point[0] * 1000), round(point[1] * 1000)
 
 
-def _fault(layout: Layout, message: str, *robots: int, lacking: float = 0.0) -> Fault:
-    chosen = [layout.factory.robots[robot] for robot in robots]
-    names, places = tuple(r.name for r in chosen), tuple(r.position for r in chosen)
-    return Fault(message, names, (), lacking, "", places)
-
-
 def _off_grid(layout: Layout, robot: int) -> Iterator[Fault]:
-    name, path = layout.factory.robots[robot].name, layout.guidepaths[robot]
+    factory, path = layout.factory, layout.guidepaths[robot]
+    name = factory.robots[robot].name
     ends = *path.a, *path.carriage(path.reach), *path.carriage(path.length)
     if not all(abs(v * 1000 - round(v * 1000)) < 1e-3 for v in ends):
         message = f"{name}: its guidepath, {ends[2:4]} to {ends[4:]}, is not in whole millimetres"
-        yield _fault(layout, message, robot)
+        yield fault(factory, message, robot)
     elif not (path.travel > 0 and path.reach > 0):
         message = f"{name}: its guidepath has no length (it receives and delivers at {path.a})"
-        yield _fault(layout, message, robot)
+        yield fault(factory, message, robot)
 
 
 def _junction(layout: Layout, robot: int, carrier: int) -> Iterator[Fault]:
@@ -71,8 +63,9 @@ def _junction(layout: Layout, robot: int, carrier: int) -> Iterator[Fault]:
     path, factory = layout.guidepaths[robot], layout.factory
     name = factory.robots[robot].name
     u, t = path.heading, path.side
-    if _turn(u, t) == 0 or sorted(map(abs, u)) != [0.0, 1.0] or sorted(map(abs, t)) != [0.0, 1.0]:
-        yield _fault(layout, f"{name}: heading {u} and side {t} are no axes at right angles", robot)
+    if path.left == 0 or sorted(map(abs, u)) != [0.0, 1.0] or sorted(map(abs, t)) != [0.0, 1.0]:
+        message = f"{name}: heading {u} and side {t} are no axes at right angles"
+        yield fault(factory, message, robot)
         return
     if carrier < 0:
         return
@@ -81,34 +74,25 @@ def _junction(layout: Layout, robot: int, carrier: int) -> Iterator[Fault]:
     in_line = len(operation.robots) == 2 and len(operation.inputs) == 1 and t == on.side
     if t != on.heading and not (in_line and u == on.heading):
         message = f"{name}: its side {t} is not {other}'s heading {on.heading}: it is mirrored"
-        yield _fault(layout, message, robot, carrier)
+        yield fault(factory, message, robot, carrier)
     wanted = on.middle(on.length - layout.stations[number])
-    off = _distance(path.a, wanted)
+    off = dist(path.a, wanted)
     if off > 1e-6:
         message = (
             f"{name} ends {off * 1000:.1f} mm away from the junction of '{operation.label}'"
             f" on {other}'s guidepath"
         )
-        yield _fault(layout, message, robot, carrier, lacking=off)
+        yield fault(factory, message, robot, carrier, lacking=off)
         return
     slot = operation.robots.index(robot)
     mine = path.middle(layout.goal(number, slot))
-    theirs = on.middle(layout.goal(number, operation.template.carrier - 1))
-    off = _distance(mine, theirs)
+    off = dist(mine, layout.meeting(operation))
     if operation.before[slot] != NOPART and off > 1e-6:
         message = (
             f"{name} brings '{operation.before[slot]}' to {off * 1000:.1f} mm from its place in"
             f" '{operation.label}': the goals of {operation.template.name} do not meet"
         )
-        yield _fault(layout, message, robot, carrier, lacking=off)
-
-
-def _turn(u: Point2, t: Point2) -> float:
-    return u[0] * t[1] - u[1] * t[0]
-
-
-def _distance(p: Point2, q: Point2) -> float:
-    return float(np.hypot(p[0] - q[0], p[1] - q[1]))
+        yield fault(factory, message, robot, carrier, lacking=off)
 
 
 def _crossings(layout: Layout) -> Iterator[Fault]:
@@ -120,16 +104,22 @@ def _crossings(layout: Layout) -> Iterator[Fault]:
         x, y = (int(v) / 1000 for v in np.maximum(low[i], low[j]))
         names = [layout.factory.robots[robot].name for robot in (i, j)]
         message = f"the guidepaths of {names[0]} and {names[1]} cross at ({x:g}, {y:g})"
-        yield _fault(layout, message, i, j)
+        yield fault(layout.factory, message, i, j)
 
 
 def touching(low: NDArray[np.int64], high: NDArray[np.int64]) -> Iterator[tuple[int, int]]:
     """The pairs i < j of closed boxes with corners low, high (n, 2) that have a point in common."""
-    cells = shapely.box(low[:, 0], low[:, 1], high[:, 0], high[:, 1])
+    for first, second in near(shapely.box(low[:, 0], low[:, 1], high[:, 0], high[:, 1])):
+        yield from zip(first.tolist(), second.tolist(), strict=True)
+
+
+def near(cells: NDArray[np.object_], *predicate: object) -> Iterator[tuple[Index, Index]]:
+    """The pairs i < j of shapes whose boxes overlap, or for which a `predicate` of STRtree.query
+    holds, in order and CHUNK shapes at a time."""
     tree = shapely.STRtree(cells)
     for start in range(0, len(cells), CHUNK):
-        first, second = tree.query(cells[start : start + CHUNK])
-        kept = first + start < second
-        order = np.lexsort((second[kept], first[kept]))
-        for i, j in zip(first[kept][order], second[kept][order], strict=True):
-            yield int(i) + start, int(j)
+        first, second = tree.query(cells[start : start + CHUNK], *predicate)
+        first = first + start
+        order = np.lexsort((second, first))
+        order = order[first[order] < second[order]]
+        yield first[order], second[order]

@@ -50,6 +50,11 @@ BELT_GAP = 3e-4
 touching."""
 
 
+def up(length: float) -> float:
+    """The next whole millimetre [m]: rounding up keeps things apart."""
+    return ceil(length * 1000 - 1e-6) / 1000
+
+
 @dataclass(frozen=True, slots=True)
 class Clearance:
     """c: the least distance between two things that are not meant to touch [m]."""
@@ -64,8 +69,8 @@ class Clearance:
     @property
     def spread(self) -> float:
         """How far the lanes of robots that relay each other lie to either side of the line on which
-        one robot would run [whole mm]."""
-        return ceil((CARRIAGE + self.c) * 500 - 1e-6) / 1000
+        one robot would run."""
+        return up((CARRIAGE + self.c) / 2)
 
     def reach(self, arm: float, lane: float = 0.0) -> float:
         """How far the carriage stays behind: of the arm's end, and of the other robot's carriage

@@ -8,11 +8,13 @@ from dataclasses import dataclass
 from math import floor
 
 from factory.geometry.solids import Product
-from factory.layout.dimensions import CARRIAGE, Clearance
-from factory.layout.layout import Box, Extent, Guidepath, Layout, Point2
-from factory.layout.shapes import carriers
-from factory.layout.stretching import Shape, Sides, Stretched, up
-from factory.layout.sweeps import ALWAYS, KINDS, OUTFEED, Region, hull, piles, regions
+from factory.layout.certificate import ALWAYS, ARM_BODY, CARRIAGE_BODY, MAST_BODY, OUTFEED, Region
+from factory.layout.dimensions import CARRIAGE, Clearance, up
+from factory.layout.guidepath import Box, Extent, Guidepath, hull
+from factory.layout.layout import Layout
+from factory.layout.shapes import Shape, carriers, headings
+from factory.layout.stretching import Stretched
+from factory.layout.sweeps import piles, regions
 from factory.plant.factory import Factory
 
 SHED = 0.1
@@ -20,18 +22,8 @@ SHED = 0.1
 [m]."""
 
 
-def headings(factory: Factory, sides: Sides) -> list[tuple[Point2, Point2]]:
-    """(u, t) of each robot: a robot on side +1 of its carrier heads against the carrier's t."""
-    axes: list[tuple[Point2, Point2]] = [((1.0, 0.0), (0.0, 1.0))] * len(factory.robots)
-    for robot, carrier in enumerate(carriers(factory)):
-        if carrier >= 0:
-            (u, t), side = axes[carrier], sides[robot]
-            axes[robot] = ((-side * t[0], -side * t[1]), u)
-    return axes
-
-
 @dataclass(frozen=True, slots=True)
-class Draft:
+class LayoutDraft:
     """All that is needed to place the robots of a factory on a floor."""
 
     factory: Factory
@@ -66,9 +58,9 @@ class Draft:
     def _guidepaths(self, travel: Sequence[float], lane: int) -> tuple[Guidepath, ...]:
         """Places every robot, carriers first: its A is a station of its carrier."""
         paths: list[Guidepath] = []
-        axes = headings(self.factory, self.stretched.sides)
+        frames = headings(self.factory, self.stretched.sides)
         for robot, carrier in enumerate(carriers(self.factory)):
-            (u, t), shape, a = axes[robot], self.shapes[robot], (0.0, 0.0)
+            (u, t), shape, a = frames[robot], self.shapes[robot], (0.0, 0.0)
             if carrier >= 0:
                 number = self.factory.robots[robot].operations[-1]
                 on = paths[carrier]
@@ -125,4 +117,4 @@ def _beside(layout: Layout) -> list[int]:
 
 def _runs_under(region: Region) -> bool:
     """Whether a region is that of the output robot itself, which comes as far as A."""
-    return region.robot == 0 and KINDS[region.kind] in ("carriage", "mast", "arm")
+    return region.robot == 0 and region.kind in (CARRIAGE_BODY, MAST_BODY, ARM_BODY)

@@ -82,7 +82,7 @@ def gear_times(layout: Layout, pace: Pace) -> list[float]:
     """For each robot the summed delays [s] of its gear: the greatest is the cycle time. Where a
     robot goes ahead while it waits, it takes the longer of that and the operation."""
     ways, operations = _ways(layout), layout.factory.operations
-    delays = [_operation_time(layout, operation, ways, pace) for operation in operations]
+    delays = operation_times(layout, pace)
 
     def taken(number: int, robot: int) -> float:
         operation = operations[number]
@@ -101,17 +101,7 @@ def operation_times(layout: Layout, pace: Pace) -> list[float]:
 
 def _ways(layout: Layout) -> dict[tuple[int, int], float]:
     """How far a robot goes in an operation, by both [m]."""
-    factory = layout.factory
-    stops: dict[tuple[int, int], float] = {}
-    ways: dict[tuple[int, int], float] = {}
-    for robot in factory.robots:
-        for number in robot.operations:
-            slot = factory.operations[number].robots.index(robot.index)
-            stops[number, robot.index] = layout.goal(number, slot)
-        for step, number in enumerate(robot.operations):
-            before = stops[robot.operations[step - 1], robot.index]
-            ways[number, robot.index] = abs(stops[number, robot.index] - before)
-    return ways
+    return {leg: abs(end - start) for leg, (start, end) in layout.legs.items()}
 
 
 def _operation_time(

@@ -10,15 +10,15 @@ from __future__ import annotations
 from dataclasses import replace
 from math import ceil
 
-from factory.compiler.mating.judged import judged
+from factory.compiler.mating import judged
 from factory.geometry.solids import Product
+from factory.layout.certificate import KINDS, OUTFEED, STATIONS, Region
 from factory.layout.clearance import certify
 from factory.layout.dimensions import Clearance
 from factory.layout.durations import Pace
-from factory.layout.layout import Layout, Point2
+from factory.layout.guidepath import Point2
+from factory.layout.layout import Layout
 from factory.layout.optimising import bounds, optimised
-from factory.layout.shapes import project
-from factory.layout.sweeps import KINDS, OUTFEED, STATIONS, Region
 from factory.plant.factory import Factory
 from factory.support.errors import Diagnostic, RunError
 
@@ -83,6 +83,3 @@ def _at_edge(layout: Layout, found: tuple[Region, ...], edge: int) -> str:
     if region.kind in STATIONS:
         return f"the feeder of '{region.label}' ({name})"
     return f"{name}'s {KINDS[region.kind]}"
-
-
-__all__ = ["certified", "lay_out", "project"]

@@ -8,8 +8,7 @@ from factory.layout.bounds import cycle_time_bound
 from factory.layout.dimensions import Clearance
 from factory.layout.durations import Pace, gear_times
 from factory.layout.layout import Layout
-from factory.layout.optimising import bounds, first_feasible
-from factory.layout.sweeps import piles, regions
+from factory.layout.optimising import first_feasible, floor_of
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,7 +22,7 @@ class Figures:
 
 
 @dataclass(frozen=True, slots=True)
-class Gain:
+class LayoutGain:
     """The figures of a layout and of the first feasible one; the robot that allows no shorter cycle
     and the least cycle time that any layout without relays could have [s]. Where there are relays:
     the figures without them, and how many robots they add."""
@@ -37,10 +36,11 @@ class Gain:
 
     def as_json(self) -> dict[str, object]:
         """As a part of a document."""
-        relays = {"robots_added": self.added, "without": asdict(self.plain)} if self.plain else {}
+        found: dict[str, object] = asdict(self.chosen)
+        if self.plain:
+            found["relays"] = {"robots_added": self.added, "without": asdict(self.plain)}
         return {
-            **asdict(self.chosen),
-            **({"relays": relays} if relays else {}),
+            **found,
             "bottleneck": self.bottleneck,
             "cycle_time_bound_s": round(self.bound, 6),
             "first_feasible": asdict(self.first),
@@ -61,13 +61,13 @@ class Gain:
         )
 
 
-def gain(layout: Layout, pace: Pace) -> Gain:
+def gain(layout: Layout, pace: Pace) -> LayoutGain:
     """Compare a layout for robots of a pace."""
     plain = layout.plain or layout
     factory, product, c = plain.factory, layout.product, layout.clearance
     times = gear_times(layout, pace)
     slowest = max(range(len(times)), key=times.__getitem__)
-    return Gain(
+    return LayoutGain(
         _figures(layout, pace),
         _figures(first_feasible(factory, product, Clearance(c)), pace),
         layout.factory.robots[slowest].name,
@@ -78,8 +78,7 @@ def gain(layout: Layout, pace: Pace) -> Gain:
 
 
 def _figures(layout: Layout, pace: Pace) -> Figures:
-    swept = regions(layout, piles(layout.factory, layout.product))
-    xlo, xhi, ylo, yhi = bounds(swept, layout.clearance)
+    xlo, xhi, ylo, yhi = floor_of(layout)
     cycle = max(gear_times(layout, pace))
     area = (xhi - xlo) * (yhi - ylo)
     return Figures(round(cycle, 6), round(layout.guidepath_length, 6), round(area, 6))

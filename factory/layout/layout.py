@@ -1,9 +1,4 @@
-"""A layout: the embedding f of the quotient workspace W in the plane (paper, section 5.1).
-
-Every part is carried in its place in the finished product, relative to the product's middle. Where
-that middle is in the world is the robot's *station*: at a mate the middles of all robots coincide,
-so the parts are assembled when they meet. A guidepath is the straight line of that point.
-"""
+"""A layout: the embedding f of the quotient workspace W in the plane (paper, section 5.1)."""
 
 from __future__ import annotations
 
@@ -11,102 +6,17 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from types import MappingProxyType
-from typing import TYPE_CHECKING
 
 from factory.geometry.solids import Product
+from factory.layout.certificate import Certificate
 from factory.layout.dimensions import BOOM, PAYLOAD, POST, Clearance
+from factory.layout.guidepath import Box, Extent, Feeder, Guidepath, Point2
 from factory.plant.approaches import Pair
 from factory.plant.factory import Factory, Operation
 from factory.problem.pag import NOPART
 
-if TYPE_CHECKING:
-    from factory.layout.clearance import Certificate
-
-Box = tuple[float, float, float, float]
-"""(xlo, xhi, ylo, yhi) [m]."""
-
-Extent = tuple[float, float, float, float]
-"""(ulo, uhi, tlo, thi): a box in a robot's frame, about the product's middle [m]."""
-
-Point2 = tuple[float, float]
-
 BESIDE = 0.005
 """What is to be lowered stays this far short of its meeting point until the others stand [m]."""
-
-
-@dataclass(frozen=True, slots=True)
-class Guidepath:
-    """The guidepath of one robot and how the robot is stretched to its payload.
-
-    `heading` u, a unit vector towards A, and `side` t, to the left or right of it; `a`: the
-    product's middle when the robot delivers (x, y); `travel`: how far before that it receives (the
-    station at its B end); `reach` = 2r: how far the carriage stays behind the product's middle;
-    `offset`: how far the carriage's line is to the side t; `arm`: how far behind the middle the arm
-    ends; `nest`: where ahead of the middle the payload's own middle is, reached by the finger;
-    `aside`: how far to the side t of the carriage's line that is, in a lane beside another's. All
-    lengths in [m].
-
-    Arc length x of the carriage runs from A = 0; delivering at x = reach, receiving at B = reach +
-    travel.
-    """
-
-    heading: Point2
-    side: Point2
-    a: Point2
-    travel: float
-    reach: float
-    offset: float
-    arm: float
-    nest: float
-    aside: float = 0.0
-
-    @property
-    def length(self) -> float:
-        """B - A [m]."""
-        return self.reach + self.travel
-
-    @property
-    def r(self) -> float:
-        """The robot's width r [m], of which the templates' goals are multiples."""
-        return self.reach / 2
-
-    def middle(self, x: float) -> Point2:
-        """Where the product's middle is when the carriage is at arc length x."""
-        back = x - self.reach
-        return self.a[0] - self.heading[0] * back, self.a[1] - self.heading[1] * back
-
-    def carriage(self, x: float) -> Point2:
-        """f: where the carriage's centre is at arc length x."""
-        return (
-            self.a[0] - self.heading[0] * x + self.side[0] * self.offset,
-            self.a[1] - self.heading[1] * x + self.side[1] * self.offset,
-        )
-
-    def world(self, extent: Extent, middle: Point2) -> Box:
-        """A box given in the robot's frame (u, t), as it lies in the world about `middle`."""
-        ulo, uhi, tlo, thi = extent
-        u, t = self.heading, self.side
-        x = sorted((u[0] * ulo + t[0] * tlo, u[0] * uhi + t[0] * thi))
-        y = sorted((u[1] * ulo + t[1] * tlo, u[1] * uhi + t[1] * thi))
-        return middle[0] + x[0], middle[0] + x[1], middle[1] + y[0], middle[1] + y[1]
-
-    def frame(self, box: Box) -> Extent:
-        """A box about the product's middle, in the world's directions, in the robot's frame (u,
-        t)."""
-        u, t = self.heading, self.side
-        along = sorted((box[0] * u[0] + box[2] * u[1], box[1] * u[0] + box[3] * u[1]))
-        across = sorted((box[0] * t[0] + box[2] * t[1], box[1] * t[0] + box[3] * t[1]))
-        return along[0], along[1], across[0], across[1]
-
-
-@dataclass(frozen=True, slots=True)
-class Feeder:
-    """Where a part is presented: the boxes of its post and of the boom above the part, in the
-    world, and the height of the boom's lower edge [m]."""
-
-    post: Box
-    boom: Box
-    height: float
 
 
 @dataclass(frozen=True)
@@ -117,7 +27,7 @@ class Layout:
     `stations[i]`: distance [m] of operation i from its carrier's B end; `payloads[label]`: the box
     of a sub-assembly about the product's middle; `outfeed`: the box of the conveyor in the world;
     `plain`: the layout without relays, None where this is one; `ground`: what it was made for, by
-    the names that `planning.Ground` has.
+    the names that `request.Ground` has.
     """
 
     factory: Factory
@@ -166,6 +76,29 @@ class Layout:
         exact = {"B": 0.0, "S": 2.0}[point.end]
         return path.length - self.stations[operation] + (point.multiple - exact) * path.r
 
+    def meeting(self, operation: Operation) -> Point2:
+        """The product's middle where the carrier of an operation has its goal."""
+        path = self.guidepaths[operation.carrier]
+        return path.middle(self.goal(operation.index, operation.template.carrier - 1))
+
+    def stops(self, robot: int) -> list[float]:
+        """The arc lengths at which a robot has its goals, in the order of its gear."""
+        operations = self.factory.operations
+        return [
+            self.goal(number, operations[number].robots.index(robot))
+            for number in self.factory.robots[robot].operations
+        ]
+
+    @cached_property
+    def legs(self) -> Mapping[tuple[int, int], tuple[float, float]]:
+        """For each (operation, robot of it): from where to where it goes (arc lengths)."""
+        found: dict[tuple[int, int], tuple[float, float]] = {}
+        for robot in self.factory.robots:
+            stops = self.stops(robot.index)
+            for step, number in enumerate(robot.operations):
+                found[number, robot.index] = stops[step - 1], stops[step]
+        return MappingProxyType(found)
+
     @cached_property
     def lifts(self) -> tuple[int, ...]:
         """The robots that have a lift, in the order of their axes."""
@@ -210,24 +143,24 @@ class Layout:
     def home(self, robot: int, operation: int) -> float:
         """Arc length at which a robot waits before an operation: the goal of the one before, or B
         where it waits with no part at the beginning of its cycle."""
-        gear = self.factory.robots[robot].operations
-        step = gear.index(operation)
-        if step == 0:
+        if self.factory.robots[robot].operations[0] == operation:
             return self.guidepaths[robot].length
-        before = self.factory.operations[gear[step - 1]]
-        return self.goal(before.index, before.robots.index(robot))
+        return self.legs[operation, robot][0]
 
     def feeder(self, label: str) -> Feeder:
         """The feeder of a part, behind the rear stop of the robot that it serves."""
         operation = self.factory.by_label[label]
         path = self.guidepaths[operation.carrier]
-        middle = path.middle(self.goal(operation.index, operation.template.carrier - 1))
+        middle = self.meeting(operation)
         rear, front, _, _ = path.frame(self.payloads[label])
         back = -Clearance(self.clearance).post(path.reach, rear)
         ahead = round((rear + front) / 2, 3)
         across, half = path.offset + path.aside, POST / 2
         solid = self.product.solids[label]
         return Feeder(
+            back,
+            ahead,
+            across,
             path.world((back - half, back + half, across - half, across + half), middle),
             path.world((back, ahead, across - BOOM / 2, across + BOOM / 2), middle),
             PAYLOAD
@@ -265,3 +198,6 @@ class Layout:
         """Length of the finished product along the output robot's heading [m]."""
         xlo, xhi, _, _ = self.payloads[self.factory.pag.root]
         return xhi - xlo
+
+
+__all__ = ["BESIDE", "Box", "Extent", "Feeder", "Guidepath", "Layout", "Point2"]

@@ -8,24 +8,29 @@ one gives more weight to the robots that are the slowest in the best so far.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 
 from factory.geometry.solids import Product
 from factory.layout.arranging import arrange
+from factory.layout.certificate import Region
 from factory.layout.dimensions import Clearance
-from factory.layout.drafting import Draft, headings
+from factory.layout.drafting import LayoutDraft
 from factory.layout.durations import Pace, gear_times
-from factory.layout.layout import Box, Layout, Point2
+from factory.layout.guidepath import Box, Point2, hull
+from factory.layout.layout import Layout
 from factory.layout.packing import Task
-from factory.layout.shapes import exact_shapes, payload_boxes, symmetric_shapes
+from factory.layout.shapes import Sides, exact_shapes, headings, payload_boxes, symmetric_shapes
 from factory.layout.sides import admissible
-from factory.layout.stretching import Sides, stretch
-from factory.layout.sweeps import Region, hull, piles, regions
+from factory.layout.stretching import stretch
+from factory.layout.sweeps import piles, regions
 from factory.plant.factory import Factory
 
 EFFORT = 800
 """Robots times layouts that are looked at, four layouts at most."""
+
+WAYS = ((True, 1.0), (False, 0.5), (True, 0.5), (False, 1.0))
+"""Ways to look for a layout: with a corridor or without, and the weight of a robot's breadth."""
 
 UNWEIGHTED = 2
 """The first so many take all robots to matter the same."""
@@ -41,8 +46,8 @@ def first_feasible(
     payloads = payload_boxes(factory, product)
     sides = _first_sides(factory, payloads, c)
     shapes = exact_shapes(factory, payloads, headings(factory, sides), c, wide)
-    stretched = stretch(factory, shapes.__getitem__, c, sides)
-    return Draft(factory, product, c, payloads, shapes, stretched).layout()
+    stretched = stretch(factory, shapes, c, sides)
+    return LayoutDraft(factory, product, c, payloads, shapes, stretched).layout()
 
 
 def optimised(
@@ -65,14 +70,21 @@ def optimised(
     best = first_feasible(factory, product, c, wide)
     times = gear_times(best, pace)
     least = _score(best, times, floor)
-    for chosen in _tasks(task, max(1, EFFORT // count)):
-        weights = chosen.weights or _weights(times)
-        layout = _packed(replace(chosen, weights=weights), product, payloads)
+    for number, (corridor, breadth) in enumerate(WAYS[: max(1, EFFORT // count)]):
+        weights = task.weights if number < UNWEIGHTED else _weights(times)
+        way = replace(task, corridor=corridor, breadth=breadth, weights=weights)
+        layout = _packed(way, product, payloads)
         found = gear_times(layout, pace)
         score = _score(layout, found, floor)
         if score < least:
             best, times, least = layout, found, score
     return best
+
+
+def floor_of(layout: Layout) -> Box:
+    """The floor that a layout takes."""
+    swept = regions(layout, piles(layout.factory, layout.product))
+    return bounds(swept, layout.clearance)
 
 
 def bounds(found: Sequence[Region], clearance: float) -> Box:
@@ -86,8 +98,7 @@ def _score(layout: Layout, times: Sequence[float], floor: Point2 | None) -> tupl
     time [s], guidepaths [m], and the floor [m²] on which they lie."""
     excess = 0.0
     if floor is not None:
-        swept = regions(layout, piles(layout.factory, layout.product))
-        xlo, xhi, ylo, yhi = bounds(swept, layout.clearance)
+        xlo, xhi, ylo, yhi = floor_of(layout)
         excess = max(xhi - xlo - floor[0], yhi - ylo - floor[1], 0.0)
     ends = [p for g in layout.guidepaths for p in (g.carriage(0.0), g.carriage(g.length))]
     x, y = zip(*ends, strict=True)
@@ -105,15 +116,7 @@ def _packed(
     task: Task, product: Product, payloads: Mapping[str, Box], sides: Sides | None = None
 ) -> Layout:
     stretched, shapes = arrange(task, payloads, sides)
-    return Draft(task.factory, product, task.clearance, payloads, shapes, stretched).layout()
-
-
-def _tasks(task: Task, count: int) -> Iterator[Task]:
-    """So many ways to look for a layout; no weights stand for those of the best so far."""
-    ways = ((True, 1.0), (False, 0.5), (True, 0.5), (False, 1.0))
-    for number, (corridor, breadth) in enumerate(ways[:count]):
-        weights = task.weights if number < UNWEIGHTED else ()
-        yield replace(task, corridor=corridor, breadth=breadth, weights=weights)
+    return LayoutDraft(task.factory, product, task.clearance, payloads, shapes, stretched).layout()
 
 
 def _weights(times: Sequence[float]) -> list[float]:

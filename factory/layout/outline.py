@@ -7,21 +7,21 @@ origin at its B station. Blocks are rectangles of one layer with half a clearanc
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from math import inf
+from operator import add
 
-from factory.layout.dimensions import LAYERS
-from factory.layout.stretching import Shape
-
-Block = tuple[float, float, float, float]
-"""(ulo, uhi, tlo, thi) [m]; on one side of a path (from, to, near, far), away from its line."""
+from factory.layout.dimensions import LAYERS, TOOL_TRAVEL, up
+from factory.layout.footprint import Block, Footprint, Placed, Strip
+from factory.layout.guidepath import hull
+from factory.layout.shapes import Shape
 
 DETAILED = 4
 """Guests whose crowns an outline keeps apart; of more, all on one side are one block."""
 
 
 @dataclass(frozen=True, slots=True)
-class Plan:
+class Choice:
     """What was chosen for a robot: the side and the travel [m] of each robot that delivers to it,
     and the station [m] of each of its operations."""
 
@@ -32,12 +32,12 @@ class Plan:
 
 @dataclass(frozen=True, slots=True)
 class Outline:
-    """By layer: the `lane` (tlo, thi) of the robot's own path, and the blocks, of which the first
-    is what the robot itself takes about its stations. `least`: its least travel [m]."""
+    """By layer the blocks, of which the first is what the robot itself takes about its stations, as
+    wide as the lane of its path. `least`: its least travel [m]. Derived, by layer: `front`, the
+    farthest extent ahead; `low`, `high`, to the sides."""
 
     shape: Shape
-    plan: Plan
-    lane: tuple[tuple[float, float], ...]
+    choice: Choice
     blocks: tuple[tuple[Block, ...], ...]
     least: float
     front: tuple[float, ...] = field(init=False)
@@ -45,13 +45,10 @@ class Outline:
     high: tuple[float, ...] = field(init=False)
 
     def __post_init__(self) -> None:
-        blocks = self.blocks
-        for name, values in (
-            ("front", [max((b[1] for b in blocks[layer]), default=-inf) for layer in LAYERS]),
-            ("low", [min((b[2] for b in blocks[layer]), default=inf) for layer in LAYERS]),
-            ("high", [max((b[3] for b in blocks[layer]), default=-inf) for layer in LAYERS]),
-        ):
-            object.__setattr__(self, name, tuple(values))
+        hulls = [hull(blocks) if blocks else (inf, -inf, inf, -inf) for blocks in self.blocks]
+        _, front, low, high = zip(*hulls, strict=True)
+        for name, values in (("front", front), ("low", low), ("high", high)):
+            object.__setattr__(self, name, values)
 
     @property
     def ahead(self) -> float:
@@ -71,6 +68,16 @@ class Outline:
     def crown(self) -> float:
         """How far ahead what brings it something reaches [m]; less than nothing without any."""
         return max((b[1] for blocks in self.blocks for b in blocks[1:]), default=-inf)
+
+    def clear(self, strip: Strip) -> float:
+        """How far the robot comes at the least to a path that takes a strip of the floor on its
+        side, so that all of this is clear of it [m]."""
+        return up(max(self.least, *map(add, self.front, strip)))
+
+    def boxed(self) -> Outline:
+        """The same with one block a layer."""
+        boxes = tuple((hull(found),) if len(found) > 1 else found for found in self.blocks)
+        return replace(self, blocks=boxes) if boxes != self.blocks else self
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,18 +102,12 @@ class Guest:
         near = min(0.0, self.travel - own[1])
         found = [(own[2], own[3], near, self.travel - own[0])]
         if len(blocks) > 1:
-            ulo, uhi, tlo, thi = box_of(blocks[1:])
+            ulo, uhi, tlo, thi = hull(blocks[1:])
             found.append((tlo, thi, self.travel - uhi, self.travel - ulo))
         at = self.station
         if self.side > 0:
             return [(at + tlo, at + thi, near, far) for tlo, thi, near, far in found]
         return [(at + tlo, at + thi, -far, -near) for tlo, thi, near, far in found]
-
-
-def box_of(blocks: Sequence[Block]) -> Block:
-    """The bounding box of blocks."""
-    ulo, uhi, tlo, thi = zip(*blocks, strict=True)
-    return min(ulo), max(uhi), min(tlo), max(thi)
 
 
 def crowns(guests: Sequence[Guest], layer: int) -> list[Block]:
@@ -117,5 +118,15 @@ def crowns(guests: Sequence[Guest], layer: int) -> list[Block]:
     for side in (-1, +1):
         blocks = [b for guest in guests if guest.side == side for b in guest.seen(layer)]
         if blocks:
-            found.append(box_of(blocks))
+            found.append(hull(blocks))
     return found
+
+
+def outlined(
+    own: Footprint, piles: Sequence[Placed], guests: Sequence[Guest], choice: Choice
+) -> Outline:
+    """The outline of a robot with its piles and with those that deliver to it."""
+    taken = own.blocks(piles)
+    blocks = tuple((*taken[layer], *crowns(guests, layer)) for layer in LAYERS)
+    least = max(TOOL_TRAVEL if own.shape.tool else 0.0, own.clearance.c)
+    return Outline(own.shape, choice, blocks, least)

@@ -7,28 +7,19 @@ beam), since where a station is best depends on the next.
 
 from __future__ import annotations
 
-from bisect import bisect_left
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import accumulate, product
+from itertools import product
 from math import inf
 
-from factory.layout.dimensions import (
-    ARMS,
-    CARRIAGE,
-    CARRIAGES,
-    LAYERS,
-    MAST,
-    PAYLOADS,
-    POST,
-    TOOL_TRAVEL,
-    Clearance,
-)
+from factory.layout.dimensions import PAYLOADS, Clearance, up
 from factory.layout.durations import Pace
-from factory.layout.layout import BESIDE, Extent
-from factory.layout.outline import Guest, Outline, Plan, crowns
-from factory.layout.skyline import Flank
-from factory.layout.stretching import Shape, Sides, ahead_of, check_guests, up
+from factory.layout.footprint import Placed, extent_to, footprint, guests_of
+from factory.layout.guidepath import Extent
+from factory.layout.layout import BESIDE
+from factory.layout.outline import Choice, Guest, Outline, outlined
+from factory.layout.shapes import Shape, Sides
+from factory.layout.skyline import Skyline
 from factory.plant.factory import Factory, Operation
 
 SPAN = 0.15
@@ -68,14 +59,15 @@ class Task:
 
 @dataclass(frozen=True, slots=True)
 class _Way:
-    """One way to place the operations so far: where the robot stands, what is beside its path,
-    who delivers, at which time and cost [s]; `time` does not count the way back."""
+    """One way to place the operations so far: where the robot stands, what is beside its path on
+    each side, which robots deliver, at which time and cost [s]; `time` does not count the way
+    back."""
 
     station: float
-    flanks: Mapping[int, Flank]
+    beside: Mapping[int, Skyline]
     guests: tuple[Guest, ...] = ()
     stations: tuple[float, ...] = ()
-    piles: tuple[tuple[float, Extent], ...] = ()
+    piles: tuple[Placed, ...] = ()
     time: float = 0.0
     cost: float = 0.0
 
@@ -95,23 +87,10 @@ class Packing:
         outline: Callable[[int, int], Outline],
         admits: Callable[[Operation, Sides], bool],
     ) -> None:
-        self.task, self.robot, self.shape = task, robot, shape
+        self.task, self.robot = task, robot
         self.outline, self.admits = outline, admits
-        self.half = task.clearance.c / 2
-        self.wide = task.corridor and robot == 0
-        self.post = {-1: -inf, +1: -inf}
-        self.boom = -inf
-        self.own = [(inf, -inf) for _ in LAYERS]
-        for layer, half in ((CARRIAGES, CARRIAGE / 2), (ARMS, MAST / 2)):
-            rear = -shape.reach - half - self.half
-            self.own[layer] = (rear, max(rear, -shape.arm + self.half))
-        factory = task.factory
-        chosen = (factory.operations[number] for number in factory.robots[robot].operations)
-        last = factory.dropoff.index
-        self.operations = [o for o in chosen if o.carrier == robot and o.index != last]
-        if self.operations and len(self.operations[0].robots) == 1:
-            self._feeder(shape.piles[self.operations[0].index])
-        self.strip = {side: self._strip(side, shape.last) for side in (-1, +1)}
+        corridor = task.corridor and robot == 0
+        self.own = footprint(task.factory, robot, shape, task.clearance, corridor)
 
     def packed(self) -> Outline:
         """The best outline found. Raises InputError where a template asks for what cannot be."""
@@ -119,188 +98,131 @@ class Packing:
         return min(found, key=lambda pair: pair[0])[1]
 
     def _outlines(self, nested: bool) -> list[tuple[float, Outline]]:
-        ways = [_Way(0.0, self._flanks(nested))]
-        for number, operation in enumerate(self.operations):
-            following = self.operations[number + 1 : number + 2]
-            found = [w for way in ways for w in self._placed(way, operation, following)]
-            found.sort(key=lambda way: way.cost)
-            ways = found[: self.task.width]
+        ways = [_Way(0.0, self._empty(nested))]
+        for operation in self.own.operations:
+            found = [longer for way in ways for longer in self._placed(way, operation)]
+            ways = sorted(found, key=lambda way: way.cost)[: self.task.width]
         return [pair for way in ways if (pair := self._finished(way, nested)) is not None]
 
-    def _flanks(self, nested: bool) -> dict[int, Flank]:
-        empty = Flank(nested=nested)
-        if self.boom > -inf:
-            empty = empty.barred(PAYLOADS, self.boom + self.half)
-        return {-1: empty, +1: empty}
+    def _empty(self, nested: bool) -> dict[int, Skyline]:
+        return dict.fromkeys((-1, +1), Skyline.behind(self.own.frontier, nested))
 
-    def _feeder(self, part: Extent) -> None:
-        """A post behind the carriage's rear stop and behind the part, and a boom over the part,
-        which what is put on the part later has to be clear of."""
-        post = -self.task.clearance.post(self.shape.reach, part[0])
-        room = POST / 2 + self.half
-        for side in (-1, +1):
-            self.post[side] = side * self.shape.offset + POST / 2
-        self.boom = round((part[0] + part[1]) / 2, 3)
-        for layer in LAYERS:
-            low, high = self.own[layer]
-            self.own[layer] = min(low, post - room), max(high, post + room)
-        low, high = self.own[PAYLOADS]
-        self.own[PAYLOADS] = low, max(high, self.boom + self.half)
-
-    def _strip(self, side: int, pile: Extent) -> tuple[float, ...]:
-        """How far to a side the robot's own path takes the floor, by layer, with a pile."""
-        lane = side * self.shape.offset + self.half + self.shape.spread
-        post = self.post[side] + self.half
-        load = max((pile[3] if side > 0 else -pile[2]) + self.half, post)
-        floor = [max(lane + CARRIAGE / 2, post), max(lane + MAST / 2, post)]
-        if self.wide:
-            last = self.shape.last
-            way = (last[3] if side > 0 else -last[2]) + self.half
-            floor = [max(width, way) for width in floor]
-        return (*floor, -inf if self.shape.tool else load)
-
-    def _placed(
-        self, way: _Way, operation: Operation, following: Sequence[Operation]
-    ) -> Iterator[_Way]:
+    def _placed(self, way: _Way, operation: Operation) -> Iterator[_Way]:
         """The ways to place one more operation."""
-        robots = [r for r in operation.robots if r != self.robot]
-        check_guests(operation, robots)
-        pile = self.shape.piles[operation.index]
-        least = way.station
-        if self.boom > -inf and len(operation.inputs) > 1:
-            least = max(least, up(self.boom + self.task.clearance.c - pile[0]))
+        robots, least = guests_of(operation), self.own.least(operation, way.station)
         if not robots:
             yield self._added(way, operation, least, ())
             return
         for sides in self._options(operation, robots):
-            alternatives = (self._guests(r, side, len(way.piles)) for r, side in sides.items())
+            alternatives = (self._guests(way, r, side) for r, side in sides.items())
             for guests in product(*alternatives):
                 if not way.piles:
                     yield self._added(way, operation, 0.0, guests)
                 else:
-                    yield from self._stations(way, operation, following, guests, least)
+                    yield from self._stations(way, operation, guests, least)
 
     def _options(self, operation: Operation, robots: Sequence[int]) -> list[Sides]:
         """From which sides they may come: two from opposite ones."""
         both = [dict(zip(robots, sides, strict=False)) for sides in ((-1, +1), (+1, -1))]
         return [sides for sides in both if self.admits(operation, sides)] or both
 
-    def _later(self, operations: Sequence[Operation]) -> Iterator[tuple[int, Outline]]:
-        """From which side which outline may come in operations to be placed."""
-        for operation in operations:
+    def _later(self, way: _Way, count: int) -> Iterator[tuple[int, Outline]]:
+        """From which side which outline may come in so many operations after the next."""
+        for operation in self.own.operations[len(way.piles) + 1 :][:count]:
             robots = [robot for robot in operation.robots if robot != self.robot]
             for sides in self._options(operation, robots):
                 for robot, side in sides.items():
                     yield side, self.outline(robot, side)
 
-    def _guests(self, robot: int, side: int, number: int) -> list[Guest]:
+    def _guests(self, way: _Way, robot: int, side: int) -> list[Guest]:
         """A robot that delivers from a side, as near as can be, or with its crown so far out that
-        robots without one find room before it."""
-        outline = self.outline(robot, side)
-        near = Guest(robot, outline, side, self._clear(outline, self.strip[side]))
-        out = up(outline.crown + self._depth(side, number)) if outline.crown > -inf else 0.0
+        robots without one that deliver soon find room before it."""
+        outline, strip = self.outline(robot, side), self.own.strips[side]
+        near = Guest(robot, outline, side, outline.clear(strip))
+        if outline.crown == -inf:
+            return [near]
+        depths = (
+            later.clear(strip) + later.behind
+            for where, later in self._later(way, SOON)
+            if where == side and later.crown == -inf
+        )
+        out = up(outline.crown + max(depths, default=0.0))
         return [near] if out <= near.travel else [near, replace(near, travel=out, wanted=out)]
 
-    def _depth(self, side: int, number: int) -> float:
-        """How far out robots without a crown need room that deliver after so many operations
-        [m]."""
-        deepest = 0.0
-        for way, outline in self._later(self.operations[number + 1 :][:SOON]):
-            if way == side and outline.crown == -inf:
-                depth = self._clear(outline, self.strip[side]) + outline.behind
-                deepest = max(deepest, depth)
-        return deepest
-
-    def _clear(self, outline: Outline, strip: Sequence[float]) -> float:
-        """How far a robot comes at least, to be clear of this path with its branch."""
-        clear = max(outline.front[layer] + strip[layer] for layer in LAYERS)
-        return up(max(outline.least, clear, self.task.clearance.c))
-
     def _stations(
-        self,
-        way: _Way,
-        operation: Operation,
-        following: Sequence[Operation],
-        guests: Sequence[Guest],
-        least: float,
+        self, way: _Way, operation: Operation, guests: Sequence[Guest], least: float
     ) -> Iterator[_Way]:
         """The stations at which something comes clear, as long as the way there is worth it."""
-        tried = {least, *self._next(way, following, least)}
+        tried = {least, *self._next(way, least)}
         for guest in guests:
-            tried |= way.flanks[guest.side].starts(guest.outline, least)
+            tried |= way.beside[guest.side].starts(guest.outline, least)
         best, weight = inf, self.task.weights[self.robot]
         for station in sorted({up(value) for value in tried}):
             further = station - way.station
             moving = self.task.pace.rest(further) + further / self.task.pace.speed
             if way.cost + weight * moving > best + SPAN / self.task.pace.speed:
                 break
-            placed = [self._came(way.flanks, guest, station) for guest in guests]
+            placed = [self._came(way.beside, guest, station) for guest in guests]
             if max(guest.travel for guest in placed) < inf:
                 found = self._added(way, operation, station, placed)
                 best = min(best, found.cost)
                 yield found
 
-    def _next(self, way: _Way, following: Sequence[Operation], least: float) -> Iterator[float]:
+    def _next(self, way: _Way, least: float) -> Iterator[float]:
         """Where the next operation could be if this one were not: to stop there once saves time."""
-        for side, outline in self._later(following):
-            starts = way.flanks[side].starts(outline, least)
+        for side, outline in self._later(way, 1):
+            starts = way.beside[side].starts(outline, least)
             yield from (start for start in starts if start < least + ALIGN)
 
     @staticmethod
-    def _came(flanks: Mapping[int, Flank], guest: Guest, station: float) -> Guest:
-        travel = flanks[guest.side].travel(guest.outline, station, guest.travel)
+    def _came(beside: Mapping[int, Skyline], guest: Guest, station: float) -> Guest:
+        travel = beside[guest.side].travel(guest.outline, station, guest.travel)
         return replace(guest, station=station, travel=travel)
+
+    @staticmethod
+    def _taken(beside: Mapping[int, Skyline], guests: Sequence[Guest]) -> dict[int, Skyline]:
+        """What is beside the path with robots that deliver at their stations."""
+        found = dict(beside)
+        for guest in guests:
+            skyline = found[guest.side]
+            found[guest.side] = skyline.taken(guest.outline, guest.station, guest.travel)
+        return found
 
     def _added(
         self, way: _Way, operation: Operation, station: float, guests: Sequence[Guest]
     ) -> _Way:
-        flanks = dict(way.flanks)
-        for guest in guests:
-            flank = flanks[guest.side]
-            flanks[guest.side] = flank.taken(guest.outline, station, guest.travel)
-        time = self._time(way.piles, operation, station - way.station, guests)
+        time = self._time(way, operation, station, guests)
         return _Way(
             station,
-            flanks,
+            self._taken(way.beside, guests),
             (*way.guests, *guests),
             (*way.stations, station),
-            (*way.piles, self._pile(operation, station)),
+            (*way.piles, self.own.placed(operation, station)),
             way.time + time,
             way.cost + self._cost(way, time, station, guests),
         )
 
-    def _pile(self, operation: Operation, station: float) -> tuple[float, Extent]:
-        pile = self.shape.piles[operation.index]
-        return station + ahead_of(operation, self.shape.reach), pile
-
     def _time(
-        self,
-        piles: Sequence[tuple[float, Extent]],
-        operation: Operation,
-        further: float,
-        guests: Sequence[Guest],
+        self, way: _Way, operation: Operation, station: float, guests: Sequence[Guest]
     ) -> float:
-        """How long an operation takes [s] whose carrier goes further; but for its first, which it
-        goes back for."""
+        """How long an operation takes [s]; its carrier goes further, but for the first one, which
+        it goes back for."""
         pace = self.task.pace
-        rested = pace.rest(further)
-        longest = rested
+        longest = rested = pace.rest(station - way.station)
         for guest in guests:
             if guest.outline.shape.tool:
                 continue
-            if not piles:
+            if not way.piles:
                 longest = max(longest, pace.rest(guest.travel))
                 continue
-            standoff = self._standoff(operation, piles[-1][1], guest)
-            opens = pace.entered(rested)
-            longest = max(longest, pace.staged(guest.travel, standoff, opens))
+            standoff = self._standoff(operation, way.piles[-1][1], guest)
+            longest = max(longest, pace.staged(guest.travel, standoff, pace.entered(rested)))
         return longest + operation.dwell + pace.lost
 
     def _standoff(self, operation: Operation, pile: Extent, guest: Guest) -> float:
-        slot = operation.robots.index(guest.robot)
-        if slot == operation.lowered:
+        if operation.robots.index(guest.robot) == operation.lowered:
             return BESIDE
-        towards = pile[3] if guest.side > 0 else -pile[2]
+        towards = extent_to(pile, guest.side)
         return max(0.0, guest.outline.shape.last[1] + towards + self.task.clearance.c)
 
     def _cost(self, way: _Way, time: float, station: float, guests: Sequence[Guest]) -> float:
@@ -317,44 +239,24 @@ class Packing:
         return cost
 
     def _finished(self, way: _Way, nested: bool) -> tuple[float, Outline] | None:
-        """A way with its cost and outline, every travel fixed. Only the piles that come so far back
-        are beside a branch: the last of them is the widest. None where a path is blocked."""
-        starts = [at + pile[0] - self.half for at, pile in way.piles]
-        starts = list(accumulate(reversed(starts), min))[::-1]
-        flanks, guests = self._flanks(nested), list[Guest]()
+        """A way with its cost and outline, every travel fixed. None where a path is blocked."""
+        strip, beside, guests = self.own.strip_at(way.piles), self._empty(nested), list[Guest]()
         for guest in way.guests:
-            beside = bisect_left(starts, guest.station + guest.outline.high[PAYLOADS])
-            strip = self._strip(guest.side, way.piles[max(beside, 1) - 1][1])
-            least = max(self._clear(guest.outline, strip), guest.wanted)
-            came = self._came(flanks, replace(guest, travel=least), guest.station)
-            if came.travel == inf:
+            outline = guest.outline
+            clear = outline.clear(strip(guest.side, guest.station + outline.high[PAYLOADS]))
+            least = replace(guest, travel=max(clear, guest.wanted))
+            guests.append(self._came(beside, least, guest.station))
+            if guests[-1].travel == inf:
                 return None
-            flank = flanks[guest.side]
-            flanks[guest.side] = flank.taken(came.outline, came.station, came.travel)
-            guests.append(came)
-        outline = self._outline(way, guests)
-        return self._worth(way, outline), outline
-
-    def _outline(self, way: _Way, guests: Sequence[Guest]) -> Outline:
-        own = list(self.own)
-        for at, pile in way.piles:
-            low, high = own[PAYLOADS]
-            behind, before = at + pile[0] - self.half, at + pile[1] + self.half
-            own[PAYLOADS] = min(low, behind), max(high, before)
-        lanes = [(-self.strip[-1][layer], self.strip[+1][layer]) for layer in LAYERS]
-        blocks = []
-        for layer in LAYERS:
-            (low, high), lane = own[layer], lanes[layer]
-            here = [(low, high, *lane)] if low <= high and lane[0] < lane[1] else []
-            blocks.append((*here, *crowns(guests, layer)))
-        numbers = (operation.index for operation in self.operations)
-        plan = Plan(
+            beside = self._taken(beside, guests[-1:])
+        numbers = (operation.index for operation in self.own.operations)
+        choice = Choice(
             {guest.robot: guest.side for guest in guests},
             {guest.robot: guest.travel for guest in guests},
             dict(zip(numbers, way.stations, strict=True)),
         )
-        least = TOOL_TRAVEL if self.shape.tool else 0.0
-        return Outline(self.shape, plan, tuple(lanes), tuple(blocks), least)
+        outline = outlined(self.own, way.piles, guests, choice)
+        return self._worth(way, outline), outline
 
     def _worth(self, way: _Way, outline: Outline) -> float:
         """What an outline costs [s]: the robot's own time there and back, and what its breadth adds
@@ -369,5 +271,5 @@ class Packing:
         carrier = factory.operations[last].carrier
         behind = 0.25 if factory.robots[carrier].operations[0] == last else 1.0
         breadth = task.breadth * (max(outline.high) - behind * min(outline.low))
-        ways = weights[carrier] * breadth + PATH * sum(outline.plan.travels.values())
+        ways = weights[carrier] * breadth + PATH * sum(outline.choice.travels.values())
         return weights[self.robot] * time + ways / pace.speed

@@ -3,66 +3,89 @@ them, arms, lanes."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass
 
 from factory.geometry.solids import Product
-from factory.layout.dimensions import Clearance
-from factory.layout.layout import Box, Extent, Point2
-from factory.layout.stretching import Shape, is_tool, up
-from factory.layout.sweeps import hull
+from factory.layout.dimensions import Clearance, up
+from factory.layout.guidepath import Box, Extent, Point2, project
+from factory.layout.sweeps import piles
 from factory.plant.factory import Factory
+from factory.problem.pag import NOPART
+
+Frame = tuple[Point2, Point2]
+"""(u, t): how a robot lies on the floor."""
+
+OUTPUT: Frame = ((1.0, 0.0), (0.0, 1.0))
+"""How the output robot does."""
+
+Sides = dict[int, int]
+"""For each robot but the first: +1 where it stands on the side t of its carrier's path, else -1."""
 
 NOWHERE: Extent = (0.0, 0.0, 0.0, 0.0)
 
 
+@dataclass(frozen=True, slots=True)
+class Shape:
+    """What the layout must know of a robot: the box of each pile it carries, by operation, and
+    of the last one, how far its carriage line is to the side, how far behind the middle its arm
+    ends and its carriage is (`reach`, 2r), how far ahead its finger goes (`nest`), and how far its
+    lane reaches to either side for relays (`spread`) [m]."""
+
+    piles: Mapping[int, Extent]
+    last: Extent
+    offset: float
+    arm: float
+    reach: float
+    nest: float
+    tool: bool
+    spread: float = 0.0
+
+
+def turned(frame: Frame, side: int) -> Frame:
+    """The frame of a robot on one side of a path with a frame: on side +1 it heads against t."""
+    u, t = frame
+    return (-side * t[0], -side * t[1]), u
+
+
+def headings(factory: Factory, sides: Sides) -> list[Frame]:
+    """The frame of each robot."""
+    frames: list[Frame] = []
+    for robot, carrier in enumerate(carriers(factory)):
+        frames.append(turned(frames[carrier], sides[robot]) if carrier >= 0 else OUTPUT)
+    return frames
+
+
 def payload_boxes(factory: Factory, product: Product) -> dict[str, Box]:
-    """The plan of every sub-assembly about the product's middle, from its parts' real geometry."""
-    x, y, _ = (float(v) for v in product.middle)
-    found: dict[str, Box] = {}
-    for operation in reversed(factory.operations[:-1]):
-        if operation.inputs:
-            found[operation.label] = hull([found[label] for label in operation.inputs])
-            continue
-        (xlo, ylo, _), (xhi, yhi, _) = (
-            map(float, corner)
-            for corner in (
-                product.solids[operation.label].low,
-                product.solids[operation.label].high,
-            )
-        )
-        found[operation.label] = (xlo - x, xhi - x, ylo - y, yhi - y)
-    return found
+    """The box of every sub-assembly about the product's middle, from its parts' real geometry."""
+    return {label: pile.box for label, pile in piles(factory, product).items()}
 
 
-def symmetric_shapes(
-    factory: Factory, payloads: Mapping[str, Box], c: Clearance
-) -> Callable[[int], Shape]:
+def symmetric_shapes(factory: Factory, payloads: Mapping[str, Box], c: Clearance) -> list[Shape]:
     """Shapes whose extents are the same in every direction, to choose the sides by."""
-
-    def square(label: str) -> Extent:
-        half = max(abs(edge) for edge in payloads[label])
-        return (-half, half, -half, half)
-
-    def shape(robot: int) -> Shape:
-        piles = {n: square(factory.operations[n].label) for n in carried(factory, robot)}
+    found = []
+    for robot in range(len(factory.robots)):
+        halves = {
+            number: max(map(abs, payloads[factory.operations[number].label]))
+            for number in carried(factory, robot)
+        }
+        boxes = {number: (-half, half, -half, half) for number, half in halves.items()}
         tool = is_tool(factory, robot)
-        return Shape(piles, _last(piles), 0.0, c.rim, c.reach(c.rim), 0.0, tool)
-
-    return shape
+        found.append(Shape(boxes, _last(boxes), 0.0, c.rim, c.reach(c.rim), 0.0, tool))
+    return found
 
 
 def exact_shapes(
     factory: Factory,
     payloads: Mapping[str, Box],
-    axes: list[tuple[Point2, Point2]],
+    frames: Sequence[Frame],
     c: Clearance,
     wide: Collection[int] = (),
 ) -> list[Shape]:
     """Shapes from the payloads as they lie in the world: parts never turn."""
-    on = carriers(factory)
     return [
-        oriented_shape(factory, payloads, robot, on[robot], *axes[robot], c, wide)
-        for robot in range(len(factory.robots))
+        oriented_shape(factory, payloads, robot, carrier, frames[robot], c, wide)
+        for robot, carrier in enumerate(carriers(factory))
     ]
 
 
@@ -71,31 +94,29 @@ def oriented_shape(
     payloads: Mapping[str, Box],
     robot: int,
     carrier: int,
-    u: Point2,
-    t: Point2,
+    frame: Frame,
     c: Clearance,
     wide: Collection[int] = (),
 ) -> Shape:
-    """The shape of a robot that lies in a frame (u, t). Its arm ends beside the line of its
-    carrier, which runs beside the product's middle as the carrier's last pile lies. `wide`: robots
-    with room for relays, which run to either side of such a line."""
-    numbers = carried(factory, robot)
-    piles = {n: project(payloads[factory.operations[n].label], u, t) for n in numbers}
-    last, tool = _last(piles), is_tool(factory, robot)
-    held, lane, belt = last, 0.0, c.c - last[0]
+    """The shape of a robot that lies in a frame. Its arm ends beside the line of its carrier, which
+    runs beside the product's middle as the carrier's last pile lies. `wide`: robots with room for
+    relays, which run to either side of such a line."""
+
+    def lies(number: int) -> Extent:
+        return project(payloads[factory.operations[number].label], *frame)
+
+    boxes = {number: lies(number) for number in carried(factory, robot)}
+    last, tool = _last(boxes), is_tool(factory, robot)
+    lane, belt = 0.0, c.c - last[0]
     if carrier >= 0:
-        made = factory.operations[factory.robots[carrier].operations[-2]].label
-        along = project(payloads[made], u, t)
+        along = lies(factory.robots[carrier].operations[-2])
         lane, belt = -round((along[0] + along[1]) / 2, 3), 0.0
         lane += c.spread if carrier in wide else 0.0
-    if tool:
-        held = project(
-            payloads[factory.operations[factory.robots[robot].operations[0]].label], u, t
-        )
+    held = lies(factory.robots[robot].operations[0]) if tool else last
     arm = up(max(c.rim, c.rim + lane, belt))
     offset, nest = round((held[2] + held[3]) / 2, 3), round((held[0] + held[1]) / 2, 3)
     spread = c.spread if robot in wide else 0.0
-    return Shape(piles, last, offset, arm, up(c.reach(arm, lane)), nest, tool, spread)
+    return Shape(boxes, last, offset, arm, up(c.reach(arm, lane)), nest, tool, spread)
 
 
 def carried(factory: Factory, robot: int) -> list[int]:
@@ -115,12 +136,12 @@ def carriers(factory: Factory) -> list[int]:
     ]
 
 
-def project(box: Box, u: Point2, t: Point2) -> Extent:
-    """A box of the world in the frame (u, t), both along world axes."""
-    along = sorted((box[0] * u[0] + box[2] * u[1], box[1] * u[0] + box[3] * u[1]))
-    across = sorted((box[0] * t[0] + box[2] * t[1], box[1] * t[0] + box[3] * t[1]))
-    return along[0], along[1], across[0], across[1]
+def is_tool(factory: Factory, robot: int) -> bool:
+    """Whether a robot never carries anything: a tool of one operation."""
+    numbers = factory.robots[robot].operations
+    operation = factory.operations[numbers[0]]
+    return len(numbers) == 1 and operation.before[operation.robots.index(robot)] == NOPART
 
 
-def _last(piles: Mapping[int, Extent]) -> Extent:
-    return list(piles.values())[-1] if piles else NOWHERE
+def _last(boxes: Mapping[int, Extent]) -> Extent:
+    return list(boxes.values())[-1] if boxes else NOWHERE

@@ -8,9 +8,8 @@ output robot.
 
 from __future__ import annotations
 
-from factory.layout.layout import Point2
-from factory.layout.shapes import carriers
-from factory.layout.stretching import Sides
+from factory.layout.guidepath import Point2
+from factory.layout.shapes import OUTPUT, Frame, Sides, carriers, turned
 from factory.plant.factory import Factory, Operation
 from factory.problem.pag import NOPART
 
@@ -20,17 +19,13 @@ def admissible(factory: Factory, sides: Sides) -> Sides:
 
     Carriers first: a swap turns the frames of all that comes after. Linear.
     """
-    axes: list[tuple[Point2, Point2]] = []
+    frames: list[Frame] = []
     result = dict(sides)
     for robot, carrier in zip(factory.robots, carriers(factory), strict=True):
-        u, t = (1.0, 0.0), (0.0, 1.0)
-        if carrier >= 0:
-            (u_on, t_on), side = axes[carrier], result[robot.index]
-            u, t = (-side * t_on[0], -side * t_on[1]), u_on
-        axes.append((u, t))
+        frames.append(turned(frames[carrier], result[robot.index]) if carrier >= 0 else OUTPUT)
         for number in robot.operations:
             operation = factory.operations[number]
-            if operation.carrier == robot.index and not admitted(operation, result, t):
+            if operation.carrier == robot.index and not admitted(operation, result, frames[-1][1]):
                 for guest in operation.robots:
                     if guest != robot.index:
                         result[guest] = -result[guest]

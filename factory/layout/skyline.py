@@ -1,4 +1,4 @@
-"""One side of a guidepath: what stands beside it already, and how far a further robot must come.
+"""The skyline of one side of a guidepath: what stands there, and how far a further robot must come.
 
 Everything is pushed outwards until it is clear, so a short branch can stand under the crown of a
 long one and a long one can reach past a short one: the contours fit into each other.
@@ -6,12 +6,13 @@ long one and a long one can reach past a short one: the contours fit into each o
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from math import inf
 
-from factory.layout.dimensions import LAYERS
-from factory.layout.outline import Block, Outline
-from factory.layout.stretching import up
+from factory.layout.dimensions import LAYERS, up
+from factory.layout.footprint import Block
+from factory.layout.outline import Outline
 
 WINDOW = 16
 """So many blocks a layer are looked at; what was there before is a wall."""
@@ -21,7 +22,7 @@ TOUCH = 1e-9
 
 
 @dataclass(frozen=True, slots=True)
-class Flank:
+class Skyline:
     """The blocks beside a path, by layer: (from, to, near, far), along the path and away from it,
     in the order in which they were put there.
 
@@ -31,11 +32,11 @@ class Flank:
     blocks: tuple[tuple[Block, ...], ...] = ((), (), ())
     nested: bool = True
 
-    def barred(self, layer: int, end: float) -> Flank:
-        """The same with nothing of a layer to come to the path before `end`."""
-        blocks = list(self.blocks)
-        blocks[layer] = (*blocks[layer], (-inf, end, 0.0, 2 * TOUCH))
-        return Flank(tuple(blocks), self.nested)
+    @classmethod
+    def behind(cls, frontier: Sequence[float], nested: bool) -> Skyline:
+        """Nothing but a frontier: where along the path, by layer, something may come to it."""
+        bars = (((-inf, end, 0.0, 2 * TOUCH),) if end > -inf else () for end in frontier)
+        return cls(tuple(bars), nested)
 
     def travel(self, outline: Outline, station: float, least: float) -> float:
         """How far a robot has to come that ends at a station, at least so far [m]; infinity where
@@ -44,15 +45,14 @@ class Flank:
         while not settled and travel < inf:
             settled = True
             for layer in LAYERS:
-                if self.blocks[layer]:
+                if self.blocks[layer] and outline.blocks[layer]:
                     further = self._pushed(outline, layer, station, travel)
                     settled = settled and further == travel
                     travel = further
         return travel
 
     def _pushed(self, outline: Outline, layer: int, station: float, travel: float) -> float:
-        beside = self.blocks[layer]
-        low, high = outline.lane[layer]
+        beside, (_, _, low, high) = self.blocks[layer], outline.blocks[layer][0]
         low, high = low + station + TOUCH, high + station - TOUCH
         rear = outline.rear(layer)
         for start, end, near, _ in beside:
@@ -76,18 +76,20 @@ class Flank:
         """The stations after `least` where something of an outline comes clear of something."""
         found = set[float]()
         for layer in LAYERS:
-            edges = {outline.lane[layer][0], *(block[2] for block in outline.blocks[layer])}
+            edges = {block[2] for block in outline.blocks[layer]}
             for _, end, _, _ in self.blocks[layer]:
                 found.update(end - edge for edge in edges if least < end - edge < inf)
         return found
 
-    def taken(self, outline: Outline, station: float, travel: float) -> Flank:
+    def taken(self, outline: Outline, station: float, travel: float) -> Skyline:
         """The same with a robot that comes so far to a station."""
         blocks = []
         for layer in LAYERS:
-            low, high = outline.lane[layer]
             rear = outline.rear(layer)
-            new = [(station + low, station + high, 0.0, travel + rear)] if low < high else []
+            new = [
+                (station + tlo, station + thi, 0.0, travel + rear)
+                for _, _, tlo, thi in outline.blocks[layer][:1]
+            ]
             new += [
                 (station + tlo, station + thi, travel - uhi, travel - ulo)
                 for ulo, uhi, tlo, thi in outline.blocks[layer]
@@ -95,7 +97,7 @@ class Flank:
             if not self.nested:
                 new = [(start, end, 0.0, inf) for start, end, _, _ in new]
             blocks.append(_window((*self.blocks[layer], *new)))
-        return Flank(tuple(blocks), self.nested)
+        return Skyline(tuple(blocks), self.nested)
 
 
 def _window(blocks: tuple[Block, ...]) -> tuple[Block, ...]:

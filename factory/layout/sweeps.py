@@ -13,10 +13,17 @@ from __future__ import annotations
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass
 
-import numpy as np
-from numpy.typing import NDArray
-
 from factory.geometry.solids import Product
+from factory.layout.certificate import (
+    ARM_BODY,
+    BOOM,
+    CARRIAGE_BODY,
+    MAST_BODY,
+    OUTFEED,
+    PAYLOAD_BODY,
+    POST_BODY,
+    Region,
+)
 from factory.layout.dimensions import (
     ARM_LOW,
     ARM_TOP,
@@ -31,41 +38,15 @@ from factory.layout.dimensions import (
     PAYLOAD,
     PAYLOADS,
 )
-from factory.layout.layout import Box, Extent, Guidepath, Layout
+from factory.layout.guidepath import Box, Extent, hull
+from factory.layout.layout import Layout
 from factory.plant.factory import Factory
 from factory.problem.pag import NOPART
-
-NAMES = ("carriages", "masts and arms", "payloads")
-"""The layers' names."""
-
-KINDS = ("carriage", "mast", "arm", "payload", "post", "boom", "outfeed")
-"""What a region is swept by; STATIONS are those that stand still."""
-
-CARRIAGE_BODY, MAST_BODY, ARM_BODY, PAYLOAD_BODY, POST_BODY, BOOM, OUTFEED = range(len(KINDS))
-STATIONS = (POST_BODY, BOOM, OUTFEED)
-
-ALWAYS = -1
-"""The mode of a region that is uncoupled."""
-
-
-@dataclass(frozen=True, slots=True)
-class Region:
-    """A rectangle in one layer: which robot is there (a station counts to the robot it serves),
-    with what, carrying which label, from z low to z high [m], a lift up, and in the mode of which
-    operation, ALWAYS for an uncoupled region."""
-
-    robot: int
-    layer: int
-    kind: int
-    box: Box
-    z: tuple[float, float]
-    label: str = ""
-    mode: int = ALWAYS
 
 
 @dataclass(frozen=True, slots=True)
 class Pile:
-    """The real extents of a sub-assembly: its plan about the product's middle, its z range [m]."""
+    """The real extents of a sub-assembly: its box about the product's middle, its z range [m]."""
 
     box: Box
     z: tuple[float, float]
@@ -83,36 +64,14 @@ def piles(factory: Factory, product: Product) -> dict[str, Pile]:
     for operation in reversed(factory.operations[:-1]):
         inputs = [found[label] for label in operation.inputs]
         if not inputs:
-            low, high = product.solids[operation.label].low, product.solids[operation.label].high
-            inputs = [
-                Pile(
-                    (low[0] - x, high[0] - x, low[1] - y, high[1] - y),
-                    (low[2] - ground, high[2] - ground),
-                )
-            ]
+            solid = product.solids[operation.label]
+            (xlo, ylo, zlo), (xhi, yhi, zhi) = solid.low, solid.high
+            inputs = [Pile((xlo - x, xhi - x, ylo - y, yhi - y), (zlo - ground, zhi - ground))]
         found[operation.label] = Pile(
             hull([pile.box for pile in inputs]),
             (float(min(p.z[0] for p in inputs)), float(max(p.z[1] for p in inputs))),
         )
     return found
-
-
-def hull(boxes: list[Box]) -> Box:
-    """The bounding box of boxes."""
-    xlo, xhi, ylo, yhi = zip(*boxes, strict=True)
-    return float(min(xlo)), float(max(xhi)), float(min(ylo)), float(max(yhi))
-
-
-def sweep(path: Guidepath, box: Box, start: float, end: float) -> Box:
-    """What a box about the product's middle sweeps while the carriage goes from one arc length to
-    another."""
-    (x0, y0), (x1, y1) = path.middle(start), path.middle(end)
-    return (
-        min(x0, x1) + box[0],
-        max(x0, x1) + box[1],
-        min(y0, y1) + box[2],
-        max(y0, y1) + box[3],
-    )
 
 
 def regions(
@@ -133,19 +92,9 @@ def regions(
     return result
 
 
-def goals(layout: Layout, robot: int) -> list[float]:
-    """The arc lengths at which a robot has its goals, in the order of its gear."""
-    operations = layout.factory.operations
-    return [
-        layout.goal(number, operations[number].robots.index(robot))
-        for number in layout.factory.robots[robot].operations
-    ]
-
-
 def _bodies(layout: Layout, robot: int) -> Iterator[Region]:
     """Carriage, mast and arm, anywhere on the guidepath."""
-    path = layout.guidepaths[robot]
-    stops = goals(layout, robot)
+    path, stops = layout.guidepaths[robot], layout.stops(robot)
     start, end = min(path.reach, *stops), max(path.length, *stops)
     mast, width = (CARRIAGE_TOP, ARM_TOP), MAST / 2
     for kind, layer, half, ahead, side, z in (
@@ -154,15 +103,14 @@ def _bodies(layout: Layout, robot: int) -> Iterator[Region]:
         (ARM_BODY, ARMS, 0.0, path.reach - path.arm, ARM_WIDTH / 2, (ARM_LOW, ARM_TOP)),
     ):
         foot: Extent = (-half, max(ahead, 0.0), -side, side)
-        (x0, y0), (x1, y1) = path.carriage(start), path.carriage(end)
-        one, other = path.world(foot, (x0, y0)), path.world(foot, (x1, y1))
-        yield Region(robot, layer, kind, hull([one, other]), z)
+        box = hull([path.world(foot, path.carriage(x)) for x in (start, end)])
+        yield Region(robot, layer, kind, box, z)
 
 
 def _payloads(layout: Layout, robot: int, found: Mapping[str, Pile]) -> Iterator[Region]:
     """Each pile from where it is taken or made to where the next operation has its goal."""
     path, operations = layout.guidepaths[robot], layout.factory.operations
-    gear, stops = layout.factory.robots[robot].operations, goals(layout, robot)
+    gear, stops = layout.factory.robots[robot].operations, layout.stops(robot)
     for step, number in enumerate(gear):
         operation = operations[number]
         label = operation.after[operation.robots.index(robot)]
@@ -172,10 +120,10 @@ def _payloads(layout: Layout, robot: int, found: Mapping[str, Pile]) -> Iterator
         step = (step + 1) % len(gear)
         onward = operations[gear[step]]
         leaves = onward.after[onward.robots.index(robot)] == NOPART
-        stand = sweep(path, pile.box, at, at if leaves else stops[step])
+        stand = path.sweep(pile.box, at, at if leaves else stops[step])
         yield Region(robot, PAYLOADS, PAYLOAD_BODY, stand, pile.z, label)
         if leaves:
-            way = sweep(path, pile.box, at, stops[step])
+            way = path.sweep(pile.box, at, stops[step])
             yield Region(robot, PAYLOADS, PAYLOAD_BODY, way, pile.z, label, onward.index)
 
 
@@ -190,8 +138,3 @@ def _upright(robot: int, kind: int, box: Box, top: float, label: str) -> Iterato
     """Something that stands in all layers."""
     for layer in LAYERS:
         yield Region(robot, layer, kind, box, (0.0, top), label)
-
-
-def boxes(found: list[Region]) -> NDArray[np.float64]:
-    """The boxes of regions (n, 4) [m]."""
-    return np.array([region.box for region in found], float).reshape(-1, 4)

@@ -107,7 +107,7 @@ def cached(model: Model) -> mujoco.MjModel | None:
 
 
 def keep(model: Model, m: mujoco.MjModel) -> None:
-    """Put what the engine made of a large model in the cache; no matter if that fails."""
+    """Put what the engine made of a large model in the cache, where that can be written."""
     if not _is_large(model):
         return
     key, content = key_of(model), packed(m)

@@ -13,8 +13,7 @@ import struct
 
 import numpy as np
 
-from factory.geometry.meshes import Indices
-from factory.geometry.solids import Array, Mesh
+from factory.geometry.meshes import Array, Indices, Mesh
 
 CREASE = 31.0
 """Triangles that meet at a smaller angle are shaded as one rounded surface [degrees]."""

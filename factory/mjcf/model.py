@@ -26,7 +26,7 @@ from factory.mjcf.robots import Drive, Hoist, add_paints, instantiate, load_robo
 from factory.mjcf.scene import add_assets, add_follower, add_scene, add_visuals
 from factory.mjcf.unseen import leave_out_what_is_shown
 from factory.mjcf.welds import add_welds, exclusions, held_at
-from factory.plant.factory import Factory
+from factory.plant.factory import Factory, Robot
 from factory.plant.fused_bodies import FusedBodies, bodies_of
 from factory.problem.robot_types import Catalogue
 from factory.support.settings import Settings
@@ -132,7 +132,10 @@ def build_model(
     masses = {
         label: sum(bodies.mass[body] for body in found) for label, found in bodies.carried.items()
     }
-    drives = tuple(_drive(factory, robot.index, masses, settings) for robot in factory.robots)
+    drives = tuple(
+        drive_for(CARRIAGE_MASS, _load(factory, robot, masses), settings.acceleration, settings)
+        for robot in factory.robots
+    )
     root = Element("mujoco", {"model": product_name(factory)})
     add(root, "compiler", angle="radian", autolimits=True, meshdir="meshes")
     _options(root, settings, sum(copies.values()) + len(factory.robots))
@@ -180,14 +183,10 @@ def model_files(model: Model, path: Path) -> dict[Path, bytes]:
     return {path: xml.encode(errors="surrogateescape"), **meshes}
 
 
-def _drive(factory: Factory, robot: int, masses: Mapping[str, float], settings: Settings) -> Drive:
-    """The drive for the heaviest load a robot carries."""
-    operations = factory.operations
-    load = max(
-        masses.get(operations[o].after[operations[o].robots.index(robot)], 0.0)
-        for o in factory.robots[robot].operations
-    )
-    return drive_for(CARRIAGE_MASS, load, settings.acceleration, settings)
+def _load(factory: Factory, robot: Robot, masses: Mapping[str, float]) -> float:
+    """The heaviest load that a robot carries [kg]."""
+    operations = (factory.operations[number] for number in robot.operations)
+    return max(masses.get(o.after[o.robots.index(robot.index)], 0.0) for o in operations)
 
 
 def drive_for(
@@ -219,35 +218,21 @@ def _hoists(factory: Factory, masses: Mapping[str, float], settings: Settings) -
 
 
 def _options(root: Element, settings: Settings, bodies: int) -> None:
-    option = add(
-        root,
-        "option",
-        timestep=settings.timestep,
-        integrator="Euler",
-        cone="elliptic",
-        impratio=1,
-    )
-    add(option, "flag", sleep="enable")
+    how = {"timestep": settings.timestep, "integrator": "Euler", "cone": "elliptic", "impratio": 1}
+    add(add(root, "option", **how), "flag", sleep="enable")
     add(root, "size", memory=f"{64 + prod((4, bodies, bodies)) // 2**20}M")
 
 
 def _defaults(root: Element) -> Element:
     default = add(root, "default")
     add(default, "equality", solref="0.004 1", solimp="0.999 0.9999 0.001 0.5 2")
-    part = add(default, "default", class_="part")
-    add(
-        part,
-        "geom",
-        contype=2,
-        conaffinity=1,
-        condim=3,
-        friction="0.6 0.005 0.0001",
-        group=0,
-    )
-    station = add(default, "default", class_="station")
-    add(station, "geom", contype=1, conaffinity=1, group=0)
-    shown = add(default, "default", class_="shown")
-    add(shown, "geom", contype=0, conaffinity=0, mass=0, group=1)
+    rough = {"condim": 3, "friction": "0.6 0.005 0.0001"}
+    for name, what in (
+        ("part", {"contype": 2, "conaffinity": 1, **rough, "group": 0}),
+        ("station", {"contype": 1, "conaffinity": 1, "group": 0}),
+        ("shown", {"contype": 0, "conaffinity": 0, "mass": 0, "group": 1}),
+    ):
+        add(add(default, "default", class_=name), "geom", **what)
     return default
 
 

@@ -21,6 +21,8 @@ LEAST_WIDTH, SLENDEREST = 1e-5, 1e-7
 """Half the least width of tray and belt [m], and in half their length: of what is thinner the
 engine cannot make out the inertia."""
 
+Point3 = tuple[float, float, float]
+
 SHED = (0.87, 0.88, 0.89, 1.0)
 
 
@@ -73,48 +75,22 @@ def add_outfeed(world: Element, layout: Layout) -> None:
     tall = float(layout.product.high[2] - layout.product.low[2])
     length = layout.product_length + 0.1
     shed, wall = half[0] - length / 2, top + tall / 2 + 0.005
+    shown: list[tuple[str, Point3, Point3]] = []
     for side in (-1, 1):
-        add_shown(
-            world,
-            f"outfeed/side{side}",
-            "box",
-            pos=(x, y + side * (half[1] + 0.006), top - 0.008),
-            size=(half[0], 0.0055, 0.012),
-            material="frame",
-        )
+        rim = (x, y + side * (half[1] + 0.006), top - 0.008)
+        shown.append((f"side{side}", rim, (half[0], 0.0055, 0.012)))
         for end in (-1, 1):
-            add_shown(
-                world,
-                f"outfeed/leg{side}{end}",
-                "box",
-                pos=(x + end * (half[0] - 0.03), y + side * (half[1] - 0.008), (top - thick) / 2),
-                size=(0.006, 0.006, (top - thick) / 2),
-                material="frame",
-            )
-        add_shown(
-            world,
-            f"outfeed/wall{side}",
-            "box",
-            pos=(x + shed, y + side * (half[1] + 0.0165), wall),
-            size=(length / 2, 0.004, tall / 2 + 0.025),
-            rgba=SHED,
-        )
-    add_shown(
-        world,
-        "outfeed/roof",
-        "box",
-        pos=(x + shed + 0.002, y, top + tall + 0.0335),
-        size=(length / 2 + 0.008, half[1] + 0.024, 0.004),
-        rgba=SHED,
-    )
-    add_shown(
-        world,
-        "outfeed/back",
-        "box",
-        pos=(x + half[0] + 0.0045, y, wall),
-        size=(0.004, half[1] + 0.0205, tall / 2 + 0.025),
-        rgba=SHED,
-    )
+            foot = (x + end * (half[0] - 0.03), y + side * (half[1] - 0.008), (top - thick) / 2)
+            shown.append((f"leg{side}{end}", foot, (0.006, 0.006, (top - thick) / 2)))
+        beside = (x + shed, y + side * (half[1] + 0.0165), wall)
+        shown.append((f"wall{side}", beside, (length / 2, 0.004, tall / 2 + 0.025)))
+    roof = (x + shed + 0.002, y, top + tall + 0.0335)
+    shown.append(("roof", roof, (length / 2 + 0.008, half[1] + 0.024, 0.004)))
+    back = (x + half[0] + 0.0045, y, wall)
+    shown.append(("back", back, (0.004, half[1] + 0.0205, tall / 2 + 0.025)))
+    for name, pos, size in shown:
+        look = {"material": "frame"} if name.startswith(("side", "leg")) else {"rgba": SHED}
+        add_shown(world, f"outfeed/{name}", "box", pos=pos, size=size, **look)
 
 
 def _plate(x: float, y: float) -> Point2:

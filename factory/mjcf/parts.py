@@ -6,8 +6,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from xml.etree.ElementTree import Element
 
-from factory.geometry.meshes import Array
-from factory.geometry.solids import Mesh, Product, Solid
+from factory.geometry.meshes import Array, Mesh
+from factory.geometry.solids import Product, Solid
 from factory.layout.dimensions import PAYLOAD
 from factory.layout.layout import Layout, Point2
 from factory.mjcf.elements import add, exact, numbers
@@ -35,24 +35,16 @@ def place_in(
     )
 
 
-def middle_at(layout: Layout, label: str) -> Point2:
-    """The product's middle where a label is made: for a part, at its feeder."""
-    operation = layout.factory.by_label[label]
-    path = layout.guidepaths[operation.carrier]
-    return path.middle(layout.goal(operation.index, operation.template.carrier - 1))
-
-
 def presented_at(layout: Layout, label: str) -> tuple[float, float, float]:
     """Where a part's centre of mass is in its feeder."""
-    carrier = layout.factory.by_label[label].carrier
-    centre = layout.product.solids[label].centre
-    middle = middle_at(layout, label)
-    return place_in(layout.product, centre, middle, layout.elevations[carrier])
+    operation, centre = layout.factory.by_label[label], layout.product.solids[label].centre
+    elevation = layout.elevations[operation.carrier]
+    return place_in(layout.product, centre, layout.meeting(operation), elevation)
 
 
 def parked_at(layout: Layout, label: str, number: int) -> tuple[float, float, float]:
     """Where a spare copy is kept: under the place where it is made, out of sight."""
-    x, y = middle_at(layout, label)
+    x, y = layout.meeting(layout.factory.by_label[label])
     return x, y, PARKED - 0.4 * (number - 1)
 
 

@@ -170,22 +170,22 @@ def heading_quaternion(path: Guidepath) -> tuple[float, float, float, float]:
 def _stretch(body: Element, path: Guidepath, top: float, stroke: float) -> None:
     """Arm to the rim, finger to the nest, pin up to the payload, or to where the column goes into
     it."""
-    rim = path.reach - path.arm
-    u, t = path.heading, path.side
-    left = path.aside * (u[0] * t[1] - u[1] * t[0]) + 0.0
-    nest = (max(path.reach + path.nest, rim + 0.01), left)
+    rim, top = path.reach - path.arm, PAYLOAD + top
+    nest = (max(path.reach + path.nest, rim + 0.01), path.aside * path.left + 0.0)
+    lines = {"arm": ((0.0, 0.0), (rim, 0.0)), "finger": ((rim - 0.01, 0.0), nest)}
+    uprights = {
+        "pin": (FINGER_TOP, top - 1e-3),
+        "column": (top - 2e-3 - stroke, top - 2e-3),
+        "plate": (top - 2e-3, top),
+    }
     for geom in body.iter("geom"):
-        kind = (geom.get("name") or "").rpartition("/")[2]
-        if kind.startswith("arm"):
-            _span(geom, (0.0, 0.0), (rim, 0.0))
-        elif kind.startswith("finger"):
-            _span(geom, (rim - 0.01, 0.0), nest)
-        elif kind.startswith("pin"):
-            _stand(geom, nest, FINGER_TOP, PAYLOAD + top - 1e-3)
-        elif kind.startswith("column"):
-            _stand(geom, nest, PAYLOAD + top - 2e-3 - stroke, PAYLOAD + top - 2e-3)
-        elif kind.startswith("plate"):
-            _stand(geom, nest, PAYLOAD + top - 2e-3, PAYLOAD + top)
+        name = (geom.get("name") or "").rpartition("/")[2]
+        for kind, ends in lines.items():
+            if name.startswith(kind):
+                _span(geom, *ends)
+        for kind, heights in uprights.items():
+            if name.startswith(kind):
+                _stand(geom, nest, *heights)
     for site in body.iter("site"):
         if (site.get("name") or "").endswith("/nest"):
             site.set("pos", numbers((*nest, PAYLOAD)))

@@ -6,13 +6,11 @@ from __future__ import annotations
 from math import cos, hypot, radians, sin, tan
 from xml.etree.ElementTree import Element
 
-from factory.layout.dimensions import CARRIAGE, PAYLOAD, POST, Clearance
-from factory.layout.embedding import project
+from factory.layout.dimensions import BOOM, BOOM_HEIGHT, CARRIAGE, PAYLOAD, POST
 from factory.layout.layout import Layout
 from factory.mjcf.elements import add, add_shown, numbers
 from factory.mjcf.names import COMPASS, feeder
 from factory.mjcf.outfeed import add_outfeed
-from factory.mjcf.parts import middle_at
 from factory.mjcf.robots import heading_quaternion
 
 VIEW = 32.0
@@ -23,6 +21,9 @@ FAR = 1e5
 
 GROUND = 0.1
 """Half the thickness of the floor [m]: spare copies are kept below it."""
+
+OVERVIEW = radians(42), radians(-62)
+"""From how high up and from how far around the overview camera looks [rad]."""
 
 KEY, FILL = (0.40, 0.48, -0.78), (-0.65, 0.30, -0.70)
 """Directions of the two lights; the first casts the shadows."""
@@ -35,9 +36,8 @@ def add_visuals(root: Element, layout: Layout) -> None:
     add(visual, "quality", shadowsize=2048, offsamples=4)
     add(visual, "map", znear=0.02, zfar=60, shadowclip=1.0)
     add(visual, "global", offwidth=1920, offheight=1080, fovy=VIEW)
-    x, y = _centre(layout)
-    size = _radius(layout)
-    add(root, "statistic", center=(x, y, 0.1), extent=size)
+    x, y, radius = _floor(layout)
+    add(root, "statistic", center=(x, y, 0.1), extent=radius)
 
 
 def add_assets(asset: Element) -> None:
@@ -75,11 +75,14 @@ def add_assets(asset: Element) -> None:
         specular=0,
         shininess=0,
     )
-    add(asset, "material", name="rail", rgba="0.55 0.58 0.62 1", specular=0.2, shininess=0.4)
-    add(asset, "material", name="post", rgba="0.80 0.82 0.84 1", specular=0.1, shininess=0.3)
-    add(asset, "material", name="tray", rgba="0.45 0.48 0.52 1", specular=0.2, shininess=0.3)
-    add(asset, "material", name="belt", rgba="0.24 0.26 0.29 1", specular=0, shininess=0)
-    add(asset, "material", name="frame", rgba="0.70 0.73 0.76 1", specular=0.2, shininess=0.4)
+    for name, rgba, specular, shininess in (
+        ("rail", "0.55 0.58 0.62 1", 0.2, 0.4),
+        ("post", "0.80 0.82 0.84 1", 0.1, 0.3),
+        ("tray", "0.45 0.48 0.52 1", 0.2, 0.3),
+        ("belt", "0.24 0.26 0.29 1", 0, 0),
+        ("frame", "0.70 0.73 0.76 1", 0.2, 0.4),
+    ):
+        add(asset, "material", name=name, rgba=rgba, specular=specular, shininess=shininess)
 
 
 def add_scene(world: Element, layout: Layout) -> None:
@@ -104,19 +107,14 @@ def add_scene(world: Element, layout: Layout) -> None:
     add_outfeed(world, layout)
 
 
-def _centre(layout: Layout) -> tuple[float, float]:
+def _floor(layout: Layout) -> tuple[float, float, float]:
+    """The centre of the floor and half its diagonal [m]."""
     xlo, xhi, ylo, yhi = layout.floor
-    return (xlo + xhi) / 2, (ylo + yhi) / 2
-
-
-def _radius(layout: Layout) -> float:
-    xlo, xhi, ylo, yhi = layout.floor
-    return hypot(xhi - xlo, yhi - ylo) / 2
+    return (xlo + xhi) / 2, (ylo + yhi) / 2, hypot(xhi - xlo, yhi - ylo) / 2
 
 
 def _floor_and_light(world: Element, layout: Layout) -> None:
-    x, y = _centre(layout)
-    radius = _radius(layout)
+    x, y, radius = _floor(layout)
     add(
         world,
         "geom",
@@ -155,7 +153,7 @@ def _compass(world: Element, layout: Layout) -> None:
     """Two specks far away at either end of the floor's longer side, which nothing sees or touches.
     The engine's broad phase boxes all bodies along the principal axes of the places of all geoms,
     and sweeps along the first: these make it an edge of the floor, so that the boxes are tight."""
-    x, y = _centre(layout)
+    x, y, _ = _floor(layout)
     xlo, xhi, ylo, yhi = layout.floor
     east, north = (FAR, 0.0) if xhi - xlo >= yhi - ylo else (0.0, FAR)
     body = add(world, "body", name=COMPASS, pos=(x, y, 0.0))
@@ -171,41 +169,30 @@ def _compass(world: Element, layout: Layout) -> None:
         )
 
 
-def _cameras(world: Element, layout: Layout) -> None:
-    x, y = _centre(layout)
-    distance = look_distance(layout, 16 / 9)
-    up, around = radians(42), radians(-62)
-    offset = (
-        distance * cos(up) * cos(around),
-        distance * cos(up) * sin(around),
-        distance * sin(up),
-    )
+def _aim(up: float, around: float, distance: float) -> tuple[tuple[float, float, float], str]:
+    """Where a camera is that looks at the origin from so high up and from so far around [rad], and
+    its axes."""
     right = (-sin(around), cos(around), 0.0)
     above = (-sin(up) * cos(around), -sin(up) * sin(around), cos(up))
-    add(
-        world,
-        "camera",
-        name="overview",
-        pos=(x + offset[0], y + offset[1], 0.05 + offset[2]),
-        xyaxes=numbers((*right, *above)),
-        fovy=VIEW,
-    )
+    flat = distance * cos(up)
+    return (flat * cos(around), flat * sin(around), distance * sin(up)), numbers((*right, *above))
+
+
+def _cameras(world: Element, layout: Layout) -> None:
+    x, y, _ = _floor(layout)
+    at, axes = _aim(*OVERVIEW, look_distance(layout, 16 / 9))
+    pos = (x + at[0], y + at[1], 0.05 + at[2])
+    add(world, "camera", name="overview", pos=pos, xyaxes=axes, fovy=VIEW)
     xlo, xhi, ylo, yhi = layout.floor
     tall = max(yhi - ylo, (xhi - xlo) * 9 / 16) * 1.12 + 0.2
-    add(
-        world,
-        "camera",
-        name="top",
-        pos=(x, y, tall / 2 / tan(radians(VIEW / 2))),
-        xyaxes="1 0 0 0 1 0",
-        fovy=VIEW,
-    )
+    pos = (x, y, tall / 2 / tan(radians(VIEW / 2)))
+    add(world, "camera", name="top", pos=pos, xyaxes="1 0 0 0 1 0", fovy=VIEW)
 
 
 def look_distance(layout: Layout, aspect: float) -> float:
     """How far the overview camera stands so that the floor fills the picture [m]."""
     xlo, xhi, ylo, yhi = layout.floor
-    up, around = radians(42), radians(-62)
+    up, around = OVERVIEW
     wide = abs((xhi - xlo) * sin(around)) + abs((yhi - ylo) * cos(around))
     deep = abs((xhi - xlo) * cos(around)) + abs((yhi - ylo) * sin(around))
     tall = deep * sin(up) + 0.25 * cos(up)
@@ -216,68 +203,48 @@ def look_distance(layout: Layout, aspect: float) -> float:
 def add_follower(body: Element, layout: Layout) -> None:
     """The camera `product`, which rides with the output robot and looks at its nest."""
     size = float(max(layout.product.high - layout.product.low)) + 0.1
-    distance = 2.2 * size + 0.15
-    up, around = radians(32), radians(-125)
-    nest = layout.guidepaths[0].reach
-    pos = (
-        nest + distance * cos(up) * cos(around),
-        distance * cos(up) * sin(around),
-        PAYLOAD + 0.3 * size + distance * sin(up),
-    )
-    right = (-sin(around), cos(around), 0.0)
-    above = (-sin(up) * cos(around), -sin(up) * sin(around), cos(up))
-    add(body, "camera", name="product", pos=pos, xyaxes=numbers((*right, *above)), fovy=VIEW)
+    at, axes = _aim(radians(32), radians(-125), 2.2 * size + 0.15)
+    pos = (layout.guidepaths[0].reach + at[0], at[1], PAYLOAD + 0.3 * size + at[2])
+    add(body, "camera", name="product", pos=pos, xyaxes=axes, fovy=VIEW)
 
 
 def _feeder(world: Element, layout: Layout, label: str) -> None:
     """A post behind the robot's rear stop and a boom over the place where the part is presented."""
-    operation = layout.factory.by_label[label]
-    path = layout.guidepaths[operation.carrier]
-    solid, product = layout.product.solids[label], layout.product
-    x, y = middle_at(layout, label)
-    body = add(world, "body", name=feeder(label), pos=(x, y, 0.0), quat=heading_quaternion(path))
-    u, across = path.heading, path.offset * _handedness(path.heading, path.side)
-    rear, front, _, _ = project(layout.payloads[label], path.heading, path.side)
-    back = -Clearance(layout.clearance).post(path.reach, rear)
-    raised = layout.elevations[operation.carrier]
-    top = PAYLOAD + raised + float(solid.high[2] - product.low[2]) + layout.clearance
-    beam = 0.014
-    add(
-        body,
-        "geom",
-        name=f"{feeder(label)}/post",
-        class_="station",
-        type="box",
-        pos=(back, across, (top + beam) / 2),
-        size=(POST / 2, POST / 2, (top + beam) / 2),
-        material="post",
-    )
-    ahead = round((rear + front) / 2, 3)
-    add(
-        body,
-        "geom",
-        name=f"{feeder(label)}/boom",
-        class_="station",
-        type="box",
-        pos=((back + ahead) / 2, across, top + beam / 2),
-        size=((ahead - back) / 2, 0.008, beam / 2),
-        material="post",
-    )
-    for name, along, z, shape, size in (
+    operation, found = layout.factory.by_label[label], layout.feeder(label)
+    path, name = layout.guidepaths[operation.carrier], feeder(label)
+    x, y = layout.meeting(operation)
+    u, quat = path.heading, heading_quaternion(path)
+    body = add(world, "body", name=name, pos=(x, y, 0.0), quat=quat)
+    back, ahead, across = found.back, found.ahead, found.across * path.left
+    top, beam = found.height, BOOM_HEIGHT
+    for kind, at, size in (
+        ("post", (back, across, (top + beam) / 2), (POST / 2, POST / 2, (top + beam) / 2)),
+        (
+            "boom",
+            ((back + ahead) / 2, across, top + beam / 2),
+            ((ahead - back) / 2, BOOM / 2, beam / 2),
+        ),
+    ):
+        add(
+            body,
+            "geom",
+            name=f"{name}/{kind}",
+            class_="station",
+            type="box",
+            pos=at,
+            size=size,
+            material="post",
+        )
+    for kind, along, z, shape, shown in (
         ("cap", back, top + beam, "box", (POST / 2 + 0.001, POST / 2 + 0.001, 0.002)),
         ("head", ahead, top + beam / 2, "cylinder", (0.012, beam / 2 + 0.002)),
     ):
         add_shown(
             world,
-            f"{feeder(label)}/{name}",
+            f"{name}/{kind}",
             shape,
             pos=(x + along * u[0] - across * u[1], y + along * u[1] + across * u[0], z),
-            quat=heading_quaternion(path),
-            size=size,
-            rgba=solid.rgba,
+            quat=quat,
+            size=shown,
+            rgba=layout.product.solids[label].rgba,
         )
-
-
-def _handedness(u: tuple[float, float], t: tuple[float, float]) -> int:
-    """+1 where the side t is to the left of the heading u, else -1."""
-    return 1 if u[0] * t[1] - u[1] * t[0] > 0 else -1

@@ -1,4 +1,4 @@
-"""The model of a run that nobody looks at: without what is only shown.
+"""The model of a run that is not shown: without what is only there to be seen.
 
 The engine places every geom of all that does not sleep in every step, seen or not. Left out are
 geoms of classes that say of themselves that they weigh nothing and touch nothing, and bodies that

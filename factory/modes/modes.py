@@ -50,11 +50,7 @@ def operation_starts(layout: Layout) -> list[Array]:
     """For each operation where its axes (k,) are when it starts: where the ones before left
     them."""
     factory = layout.factory
-    left: dict[tuple[int, int], float] = {}
-    for robot in factory.robots:
-        for step, number in enumerate(robot.operations):
-            before = factory.operations[robot.operations[step - 1]]
-            left[number, robot.index] = layout.goal(before.index, before.robots.index(robot.index))
+    left = {leg: start for leg, (start, _) in layout.legs.items()}
     for axis, lift in enumerate(layout.lifts, start=len(factory.robots)):
         gear, stroke = factory.robots[lift].operations, factory.strokes[lift]
         left[gear[0], axis] = 0.0

@@ -1,7 +1,7 @@
 """Whether the operations of a factory have modes at all, found when it is compiled.
 
 Of the shipped templates it is known, whatever the layout. One of the user's own is tried on the
-first feasible layout: its goal ball, and who may hold up whom, are measured in metres.
+first feasible layout: its goal ball, and which robots may hold up which, are measured in metres.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ def _check_moves(template: Template) -> None:
     """What is joined, or changes hands, has to come together."""
     if law_of(template) is hold:
         message = (
-            f"{template.name}: F = {template.law.name} moves nobody, so its robots never come to"
+            f"{template.name}: F = {template.law.name} moves no robot, so they never come to"
             " their goals"
         )
         raise InputError(Diagnostic("NotPrepared", message, template.law_position, EXAMPLE))

@@ -21,7 +21,7 @@ from factory.support.settings import Settings
 
 
 @dataclass(frozen=True, slots=True)
-class Stage:
+class HeadStart:
     """The way of a robot ahead of one of its operations: the `mode` that moves its carriage alone,
     to the goal of its `slot` there, and where it `starts` in the long run [m]."""
 
@@ -37,7 +37,7 @@ class Stage:
         return float(self.mode.goals[0])
 
 
-def stages(layout: Layout, modes: Sequence[Mode]) -> tuple[Stage, ...]:
+def stages(layout: Layout, modes: Sequence[Mode]) -> tuple[HeadStart, ...]:
     """Every way that a robot can go ahead: it brings nothing and has others to wait for, and none
     of them comes near it on its way, whatever their speeds."""
     found = []
@@ -52,16 +52,16 @@ def stages(layout: Layout, modes: Sequence[Mode]) -> tuple[Stage, ...]:
             if operation.awaits_empty(slot) and mode.gate[slot] < 0 and way > ROUNDING:
                 own = slice(slot, slot + 1)
                 alone = Mode(mode.goals[own], mode.lower[own], mode.upper[own], mode.eps)
-                found.append(Stage(robot, operation.index, slot, alone, float(start[slot])))
+                found.append(HeadStart(robot, operation.index, slot, alone, float(start[slot])))
     return tuple(found)
 
 
-def stages_of(layout: Layout, modes: Sequence[Mode], settings: Settings) -> tuple[Stage, ...]:
+def stages_of(layout: Layout, modes: Sequence[Mode], settings: Settings) -> tuple[HeadStart, ...]:
     """Those, where the settings ask for them."""
     return stages(layout, modes) if settings.stage else ()
 
 
-def staged(starts: Sequence[Array], ahead: Sequence[Stage]) -> list[Array]:
+def staged(starts: Sequence[Array], ahead: Sequence[HeadStart]) -> list[Array]:
     """Where the axes of each operation are when it starts, if those that go ahead are there."""
     found = [np.array(start) for start in starts]
     for stage in ahead:

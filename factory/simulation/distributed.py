@@ -18,7 +18,7 @@ import numpy as np
 from factory.control.governor import govern
 from factory.control.mode import REST, ROUNDING, Array, Index, Limits, Mode
 from factory.control.navigation import Bundle
-from factory.modes.staging import Stage
+from factory.modes.staging import HeadStart
 from factory.plant.factory import Factory, Operation
 from factory.plant.programs import Program, ProgramStep, program_of
 from factory.simulation.bundles import Bundles
@@ -75,10 +75,9 @@ class Record:
         """The operations under way."""
         return Active(tuple(self._under_way))
 
-    def marking(self) -> tuple[str, ...]:
-        """The names of the places that are marked."""
-        places = enumerate(self._net.places)
-        return tuple(place.name for number, place in places if number in self._marked)
+    def marked(self) -> tuple[int, ...]:
+        """The places that are marked, by number."""
+        return tuple(sorted(self._marked))
 
     def has_started(self, operation: Operation, unit: int) -> bool:
         """Whether some robot has entered an operation for a unit."""
@@ -117,7 +116,7 @@ class DistributedSupervisor:
         timestep: float,
         ticks: int,
         seed: int,
-        stages: Sequence[Stage],
+        stages: Sequence[HeadStart],
     ) -> None:
         self.factory, self.world, self.timestep, self.ticks = factory, world, timestep, ticks
         count = len(factory.operations)
@@ -157,9 +156,9 @@ class DistributedSupervisor:
         """The operations under way."""
         return self.record.active
 
-    def marking(self) -> tuple[str, ...]:
-        """The names of the places that the record marks."""
-        return self.record.marking()
+    def marked(self) -> tuple[int, ...]:
+        """The places that the record marks, by number."""
+        return self.record.marked()
 
     def awaited(self) -> list[Operation]:
         """None: no robot sees whether all robots of an operation wait for it."""

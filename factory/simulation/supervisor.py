@@ -14,7 +14,7 @@ import numpy as np
 
 from factory.control.mode import REST, Array, Index, Limits, Mode
 from factory.control.navigation import Bundle
-from factory.modes.staging import Stage
+from factory.modes.staging import HeadStart
 from factory.nets.petri import Marking
 from factory.nets.threads import Threads
 from factory.plant.factory import Factory, Operation
@@ -48,7 +48,7 @@ class Ahead:
     """The stages of robots that go ahead while they wait, numbered after the operations: by the
     operation that each is `of`, and by the one that it is `after`; `place`: where each is."""
 
-    def __init__(self, factory: Factory, stages: Sequence[Stage]) -> None:
+    def __init__(self, factory: Factory, stages: Sequence[HeadStart]) -> None:
         count = len(factory.operations)
         self.of: list[list[int]] = [[] for _ in range(count)]
         self.after: list[list[int]] = [[] for _ in range(count)]
@@ -79,7 +79,7 @@ class Supervisor:
         tick: float,
         start: Marking,
         counts: Mapping[int, int],
-        stages: Sequence[Stage],
+        stages: Sequence[HeadStart],
     ) -> None:
         self.factory, self.world, self.tick = factory, world, tick
         axes_of = [*factory.axes, *((stage.robot,) for stage in stages)]
@@ -136,10 +136,9 @@ class Supervisor:
             ticks = 1
         self.near = self.world.step(self.active.bundle, self.active.axes, ticks)
 
-    def marking(self) -> tuple[str, ...]:
-        """The names of the marked places."""
-        places = self.factory.net.threaded.places
-        return tuple(p.name for p, m in zip(places, self.threads.marked, strict=True) if m)
+    def marked(self) -> tuple[int, ...]:
+        """The marked places, by number."""
+        return tuple(np.flatnonzero(np.frombuffer(self.threads.marked, np.uint8)).tolist())
 
     def awaited(self) -> list[Operation]:
         """The operations all of whose robots wait for them."""

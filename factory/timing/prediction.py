@@ -16,7 +16,7 @@ from factory.control.mode import Limits, Mode
 from factory.control.profile import World, mode_time, trapezoid_time
 from factory.layout.layout import Layout
 from factory.modes.modes import operation_starts
-from factory.modes.staging import Stage, staged
+from factory.modes.staging import HeadStart, staged
 from factory.support.settings import Settings
 from factory.timing.cycle_time import (
     CycleTime,
@@ -33,7 +33,7 @@ def operation_delays(
     limits: Limits,
     settings: Settings,
     world: World,
-    ahead: Sequence[Stage] = (),
+    ahead: Sequence[HeadStart] = (),
 ) -> list[float]:
     """The time [s] from X_s to X_e of every operation, and the tick until what follows can fire.
     `ahead`: the ways that robots go while they wait."""
@@ -47,7 +47,7 @@ def operation_delays(
 
 
 def ways_ahead(
-    ahead: Sequence[Stage], limits: Limits, settings: Settings, world: World
+    ahead: Sequence[HeadStart], limits: Limits, settings: Settings, world: World
 ) -> dict[tuple[int, int], float]:
     """The time [s] from the end of a robot's operation until it is where it has gone ahead to, by
     the robot and the operation to come. It sets out at once."""
@@ -59,7 +59,9 @@ def ways_ahead(
     }
 
 
-def way_time(stage: Stage, start: float, limits: Limits, settings: Settings, world: World) -> float:
+def way_time(
+    stage: HeadStart, start: float, limits: Limits, settings: Settings, world: World
+) -> float:
     """How long a robot with these limits goes ahead from `start` [m], and settles [s]."""
     settle = settings.settle if world == "mujoco" else 0.0
     return mode_time(stage.mode, np.array([start]), limits, world) + settle

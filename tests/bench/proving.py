@@ -56,7 +56,7 @@ def work(file: str, lay_out: bool) -> dict[str, Any]:
 
 
 def _laid_out(plan: Any) -> dict[str, float]:
-    from factory.geometry.solids import product_geometry
+    from factory.geometry.product import product_geometry
     from factory.layout.clearance import certify
     from factory.layout.embedding import lay_out
 

@@ -6,7 +6,7 @@ from time import perf_counter
 from typing import Any
 
 from factory.compiler.mating import LEFT_OUT, NO_DEEPER, STRICT, TOLERANCE
-from factory.compiler.mating.contacts import CLEAR
+from factory.compiler.mating.overlaps import CLEAR
 from factory.pipeline import read
 from factory.simulation.simulation import Simulation
 from tests.fidelity.products import BRICKS_NAMES, REAL, file_of, is_here, layout

@@ -328,8 +328,8 @@ def section(results: dict) -> str:
             ),
             "The largest disturbance of each kind that is survived, on a grid (the next point is"
             " not, for the reason given). Pushes come every half second, on a robot or part drawn"
-            " at random. Noise is white, 500 times a second, its standard deviation given; noise and"
-            " delay are in what the supervisor sees and in the drive's own loop.",
+            " at random. Noise is white, 500 times a second, its standard deviation given; noise"
+            " and delay are in what the supervisor sees and in the drive's own loop.",
             table(
                 ("product", "disturbance", "survived", "next", "", *costs, "what ends the next"),
                 most,

@@ -89,8 +89,8 @@ def section(results: dict[str, Any]) -> str:
         [
             "## Paces",
             "The cycle times of a product that takes too long for both worlds with so many units"
-            f" and seeds: jitter {results['jitter']:g}, the physical run alone, by `factory sweep`. The"
-            " prediction is made from the net before each run, with the speeds that are drawn for"
+            f" and seeds: jitter {results['jitter']:g}, the physical run alone, by `factory sweep`."
+            " The prediction is made from the net before each run, with the speeds that are drawn for"
             f" it; at most {LIMIT:g} % is accepted.",
             table(
                 (

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
-from factory.compiler.mating.contacts import TOLERANCE
 from factory.compiler.mating.mating import (
     BLOCKED,
     LEFT_OUT,
@@ -13,21 +10,11 @@ from factory.compiler.mating.mating import (
     Clash,
     Mating,
     Matings,
+    judged,
     matings,
     shaped,
 )
-from factory.geometry.solids import Product
-from factory.plant.approaches import Approach
-from factory.problem.pag import PAG
-from factory.problem.template import Template
-
-
-def approaches(
-    pag: PAG, templates: Mapping[str, Template], product: Product
-) -> Mapping[str, Approach]:
-    """The approach of each operation with two inputs or more, by its label as in `expand`."""
-    return matings(pag, templates, product).approaches
-
+from factory.compiler.mating.overlaps import TOLERANCE
 
 __all__ = [
     "BLOCKED",
@@ -38,7 +25,7 @@ __all__ = [
     "Clash",
     "Mating",
     "Matings",
-    "approaches",
+    "judged",
     "matings",
     "shaped",
 ]

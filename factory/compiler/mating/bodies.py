@@ -16,7 +16,7 @@ ROUNDING = 1e-9
 
 
 @dataclass(frozen=True, slots=True)
-class Bodies:
+class ConvexBodies:
     """All convex bodies: `vertices` (n, 3) of each, `low`, `high` (bodies, 3) its bounding box,
     `part` the number of the part it belongs to, `boxes` whether it is its bounding box [m]."""
 
@@ -34,7 +34,7 @@ class Bodies:
         return placed, key.tobytes()
 
 
-def bodies(product: Product, parts: Sequence[str]) -> Bodies:
+def bodies(product: Product, parts: Sequence[str]) -> ConvexBodies:
     """The bodies of the parts, in their order, as the engine collides them."""
     found: list[Array] = []
     part: list[int] = []
@@ -48,7 +48,7 @@ def bodies(product: Product, parts: Sequence[str]) -> Bodies:
     points = np.concatenate(found)
     low, high = np.minimum.reduceat(points, starts), np.maximum.reduceat(points, starts)
     boxes = _boxes(points, starts, counts, low, high)
-    return Bodies(tuple(found), np.array(part, np.int64), low, high, boxes)
+    return ConvexBodies(tuple(found), np.array(part, np.int64), low, high, boxes)
 
 
 def _boxes(

@@ -9,8 +9,9 @@ at the third, pairs that overlap in the finished product are *left out*. All of 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
+from math import ceil
 from types import MappingProxyType
 
 import numpy as np
@@ -18,11 +19,11 @@ from numpy.typing import NDArray
 
 from factory.compiler.compiler import expand
 from factory.compiler.mating.bodies import bodies
-from factory.compiler.mating.contacts import SIGNS, TOLERANCE, Contacts, Finder
 from factory.compiler.mating.meetings import Ints, Meeting, Meetings, meetings
-from factory.compiler.mating.stroke import strokes
+from factory.compiler.mating.overlaps import SIGNS, TOLERANCE, Finder, Overlaps
 from factory.geometry.solids import Product
-from factory.plant.approaches import Approach, Kind, Pair
+from factory.plant.approaches import MARGIN, Approach, Kind, Pair
+from factory.plant.factory import Factory
 from factory.problem.pag import PAG
 from factory.problem.template import Template
 from factory.support.errors import Position
@@ -66,12 +67,6 @@ class Mating:
     def level(self) -> int:
         """The best level of all."""
         return max(self.slide, self.lower)
-
-    def best(self, level: int) -> Kind:
-        """How the inputs can come together if it is judged by one level alone."""
-        if self.slide >= level:
-            return "slide"
-        return "lower" if self.lower >= level else "blocked"
 
 
 @dataclass(frozen=True)
@@ -122,6 +117,19 @@ def matings(
     return Matings(made, judge.contents(made))
 
 
+def judged(factory: Factory, product: Product) -> Factory:
+    """A factory that was compiled without approaches, with one for every operation that has inputs
+    to join: its robots have no lifts, so all inputs slide, or are blocked."""
+    if all(o.approach is not None for o in factory.operations if len(o.inputs) > 1):
+        return factory
+    templates = {o.template.name: o.template for o in factory.operations}
+    found = matings(factory.pag, templates, product, lifts=False).approaches
+    operations = tuple(
+        replace(o, approach=o.approach or found.get(o.label)) for o in factory.operations
+    )
+    return replace(factory, operations=operations)
+
+
 class _Judge:
     """The levels of all meetings, and the choice among them."""
 
@@ -131,85 +139,99 @@ class _Judge:
         self.slides = np.zeros((count, 2), np.int64)
         self.lowers = np.full((count, 2), BLOCKED)
         self.clashing = np.zeros((count, 2), np.int64)
-        self.contacts: dict[int, Contacts] = {}
+        self.overlaps: dict[int, Overlaps] = {}
 
-    def slide(self, axis: int, contacts: Contacts) -> None:
+    def slide(self, axis: int, overlaps: Overlaps) -> None:
         """Takes note of what happens along x or y."""
         at = self.meetings.axes == axis
-        levels, clashing = _levels(contacts, len(at))
+        levels, clashing = _levels(overlaps, len(at))
         self.slides[at], self.clashing[at] = levels[at], clashing[at]
-        self.contacts[axis] = contacts
+        self.overlaps[axis] = overlaps
 
-    def lower(self, contacts: Contacts, tried: NDArray[np.bool_]) -> None:
+    def lower(self, overlaps: Overlaps, tried: NDArray[np.bool_]) -> None:
         """Takes note of what happens along z: column 0, the first is lowered, 1, the last."""
         either = np.array([m.either for m in self.meetings.all])
-        levels = _levels(contacts, len(tried))[0]
-        self.lowers[tried] = levels[tried]
+        self.lowers[tried] = _levels(overlaps, len(tried))[0][tried]
         self.lowers[~either, 0] = BLOCKED
-        self.contacts[UPRIGHT] = contacts
+        self.overlaps[UPRIGHT] = overlaps
 
     def mating(self, number: int) -> Mating:
         """The best: the stricter, and of the same level to slide."""
         meeting = self.meetings.all[number]
-        slide, lower = max(self.slides[number].tolist()), max(self.lowers[number].tolist())
+        slides, clashing = self.slides[number].tolist(), self.clashing[number].tolist()
+        slide, lower = max(slides), max(self.lowers[number].tolist())
         clashes: tuple[Clash, ...] = ()
         if slide == lower == BLOCKED:
-            approach, clashes = self._blocked(number, meeting)
+            columns = [column for column in (0, 1) if clashing[column] == min(clashing)]
+            approach = self._along(number, "blocked", columns)
+            clashes = self._clashes(number, meeting.axis, columns[0])
         elif slide >= lower:
-            approach = self._sliding(number, meeting, slide)
+            columns = [column for column in (0, 1) if slides[column] == slide]
+            approach = self._along(number, "slide", columns, slide == STRICT)
         else:
-            approach = self._lowering(number, meeting, lower)
+            approach = self._lowering(number, lower)
         position = _position(self.pag, meeting)
         return Mating(meeting.label, meeting.inputs, approach, slide, lower, clashes, position)
 
-    def _sliding(self, number: int, meeting: Meeting, level: int) -> Approach:
-        """From all sides of a level."""
-        found = self.slides[number].tolist()
-        columns = [column for column in (0, 1) if found[column] == level]
-        return self._from(number, meeting, "slide", columns, level == STRICT)
-
-    def _from(
-        self, number: int, meeting: Meeting, kind: Kind, columns: list[int], clean: bool = False
-    ) -> Approach:
+    def _along(self, number: int, kind: Kind, columns: list[int], clean: bool = False) -> Approach:
+        """From some of the sides."""
+        axis = self.meetings.all[number].axis
         sides = tuple(SIGNS[column] for column in columns)
-        pairs = tuple(() if clean else self._excluded(number, meeting.axis, c) for c in columns)
-        return Approach(kind, meeting.axis, sides, "", 0.0, pairs)
+        pairs = tuple(() if clean else self._excluded(number, axis, c) for c in columns)
+        return Approach(kind, axis, sides, "", 0.0, pairs)
 
-    def _lowering(self, number: int, meeting: Meeting, level: int) -> Approach:
+    def _lowering(self, number: int, level: int) -> Approach:
         """Of two that can be lowered the one with the shorter stroke, or else the last."""
-        stroke = strokes(self.product, self.meetings.parts, meeting)
+        meeting = self.meetings.all[number]
+        stroke = self._strokes(meeting)
         columns = [c for c in (1, 0) if self.lowers[number, c] == level]
         column = min(columns, key=lambda c: stroke[c])
-        lowered = meeting.inputs[-1] if column else meeting.inputs[0]
         pairs = self._excluded(number, UPRIGHT, column)
+        lowered = meeting.inputs[-1 if column else 0]
         return Approach("lower", meeting.axis, SIGNS, lowered, stroke[column], (pairs, pairs))
 
-    def _blocked(self, number: int, meeting: Meeting) -> tuple[Approach, tuple[Clash, ...]]:
-        counts = self.clashing[number].tolist()
-        columns = [column for column in (0, 1) if counts[column] == min(counts)]
-        column = columns[0]
-        contacts = self.contacts[meeting.axis]
-        rows = [r for r in contacts.rows(number) if _clashes(contacts)[r, column]]
-        clashes = [self._clash(contacts, row, column) for row in rows]
-        ordered = tuple(sorted(clashes, key=lambda c: (-c.depth, c.parts)))
-        return self._from(number, meeting, "blocked", columns), ordered
-
-    def _clash(self, contacts: Contacts, row: int, column: int) -> Clash:
-        return Clash(
-            self._pair(contacts, row),
-            float(contacts.path[row, column]),
-            float(contacts.finished[row]),
-            float(contacts.shift[row, column]),
+    def _strokes(self, meeting: Meeting) -> tuple[float, float]:
+        """How high the first, or the last input is raised above its place, so that it clears the
+        others wherever it comes: from its bottom to the top of the others, and a margin [whole
+        mm]."""
+        (low, high), (last_low, last_high) = (
+            (min(s.low[2] for s in solids), max(s.high[2] for s in solids))
+            for solids in (
+                [self.product.solids[part] for part in parts] for parts in self._sides(meeting)
+            )
         )
+        heights = (float(last_high - low), float(high - last_low))
+        first, last = (ceil((max(h, 0.0) + MARGIN) * 1e3 - 1e-6) / 1e3 for h in heights)
+        return first, last
+
+    def _sides(self, meeting: Meeting) -> tuple[tuple[str, ...], tuple[str, ...]]:
+        """The parts of all inputs but the last, and those of the last."""
+        parts = self.meetings.parts
+        return parts[meeting.first : meeting.split], parts[meeting.split : meeting.end]
+
+    def _clashes(self, number: int, axis: int, column: int) -> tuple[Clash, ...]:
+        """The pairs that clash from one side, the deepest first."""
+        overlaps = self.overlaps[axis].of(number)
+        depths, rows = overlaps.depths, np.flatnonzero(_clashing(overlaps)[:, column])
+        found = [
+            Clash(
+                self._pair(overlaps, row),
+                float(depths.path[row, column]),
+                float(depths.finished[row]),
+                float(depths.shift[row, column]),
+            )
+            for row in rows.tolist()
+        ]
+        return tuple(sorted(found, key=lambda c: (-c.depth, c.parts)))
 
     def _excluded(self, number: int, axis: int, column: int) -> tuple[Pair, ...]:
-        contacts = self.contacts[axis]
-        rows = [r for r in contacts.rows(number) if contacts.faulty[r, column]]
-        return tuple(sorted(self._pair(contacts, row) for row in rows))
+        overlaps = self.overlaps[axis].of(number)
+        rows = np.flatnonzero(overlaps.depths.faulty[:, column])
+        return tuple(sorted(self._pair(overlaps, row) for row in rows.tolist()))
 
-    def _pair(self, contacts: Contacts, row: int) -> Pair:
+    def _pair(self, overlaps: Overlaps, row: int) -> Pair:
         parts = self.meetings.parts
-        one, other = sorted((parts[contacts.one[row]], parts[contacts.other[row]]))
+        one, other = sorted((parts[overlaps.one[row]], parts[overlaps.other[row]]))
         return one, other
 
     def contents(self, made: tuple[Mating, ...]) -> dict[str, tuple[str, ...]]:
@@ -217,9 +239,7 @@ class _Judge:
         found: dict[str, tuple[str, ...]] = {}
         for mating, meeting in zip(made, self.meetings.all, strict=True):
             if mating.approach.kind == "blocked":
-                parts = self.meetings.parts
-                found[meeting.inputs[-1]] = parts[meeting.split : meeting.end]
-                found[meeting.inputs[0]] = parts[meeting.first : meeting.split]
+                found[meeting.inputs[0]], found[meeting.inputs[-1]] = self._sides(meeting)
         return found
 
 
@@ -232,26 +252,24 @@ def _position(pag: PAG, meeting: Meeting) -> Position | None:
     return node.input_positions[node.inputs.index(meeting.inputs[-1])]
 
 
-def _clashes(contacts: Contacts) -> NDArray[np.bool_]:
+def _clashing(overlaps: Overlaps) -> NDArray[np.bool_]:
     """Which pairs (n, 2) that are apart in the end pass through each other from each side."""
-    return _deeper(contacts) & (contacts.finished <= TOLERANCE)[:, None]
+    return _deeper(overlaps) & (overlaps.depths.finished <= TOLERANCE)[:, None]
 
 
-def _deeper(contacts: Contacts) -> NDArray[np.bool_]:
-    return np.asarray(contacts.path > contacts.finished[:, None] + TOLERANCE)
+def _deeper(overlaps: Overlaps) -> NDArray[np.bool_]:
+    depths = overlaps.depths
+    return np.asarray(depths.path > depths.finished[:, None] + TOLERANCE)
 
 
-def _levels(contacts: Contacts, count: int) -> tuple[Ints, Ints]:
+def _levels(overlaps: Overlaps, count: int) -> tuple[Ints, Ints]:
     """The level of each meeting from each side (count, 2), and how many pairs clash there."""
-    levels, clashing = np.empty((count, 2), np.int64), np.empty((count, 2), np.int64)
-    faults = (_clashes(contacts), _deeper(contacts), contacts.faulty)
-    for side in (0, 1):
-        clashing[:, side], deeper, overlaps = (
-            np.bincount(contacts.meeting[fault[:, side]], minlength=count) for fault in faults
+    clashing, deeper, faulty = (
+        np.stack(
+            [np.bincount(overlaps.meeting[fault[:, side]], minlength=count) for side in (0, 1)],
+            axis=1,
         )
-        levels[:, side] = np.select(
-            [overlaps == 0, deeper == 0, clashing[:, side] == 0],
-            [STRICT, NO_DEEPER, LEFT_OUT],
-            BLOCKED,
-        )
-    return levels, clashing
+        for fault in (_clashing(overlaps), _deeper(overlaps), overlaps.depths.faulty)
+    )
+    found = [faulty == 0, deeper == 0, clashing == 0]
+    return np.select(found, [STRICT, NO_DEEPER, LEFT_OUT], BLOCKED), clashing

@@ -13,9 +13,9 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import accumulate, pairwise
-from math import ceil, floor, inf
+from math import floor, inf
 
-from factory.layout.dimensions import CARRIAGE, MAST
+from factory.layout.dimensions import CARRIAGE, MAST, up
 from factory.layout.layout import Layout
 from factory.problem.pag import NOPART
 
@@ -59,19 +59,11 @@ def ways(layout: Layout) -> dict[str, Way]:
     return {way.label: way for way in found if way.most}
 
 
-def stops(layout: Layout, robot: int) -> list[float]:
-    """How far from its B end a robot has its goals, in the order of its gear [m]."""
-    operations, path = layout.factory.operations, layout.guidepaths[robot]
-    return [
-        round(path.length - layout.goal(n, operations[n].robots.index(robot)), 3)
-        for n in layout.factory.robots[robot].operations
-    ]
-
-
 def _ways(layout: Layout, robot: int) -> Iterator[Way]:
     path, c = layout.guidepaths[robot], layout.clearance
     lanes = max(CARRIAGE, path.reach - path.arm + MAST / 2)
-    at, piles = stops(layout, robot), _piles(layout, robot)
+    at = [round(path.length - stop, 3) for stop in layout.stops(robot)]
+    piles = _piles(layout, robot)
     fronts = [-inf, *(front for _, _, front in piles)]
     ends = (at[n] + max(front, before) for n, (before, front) in enumerate(pairwise(fronts)))
     reached = list(accumulate(ends, max))
@@ -83,7 +75,7 @@ def _ways(layout: Layout, robot: int) -> Iterator[Way]:
             last = max(0.0, at[step + 1] + front - beyond) + c
             apart = max(front - rear, lanes) + c
             start = max(at[step], reached[step] - front)
-            found.append(Way(label, robot, _up(start), at[step + 1], _up(apart), _up(last)))
+            found.append(Way(label, robot, up(start), at[step + 1], up(apart), up(last)))
         beyond = min(beyond, at[step] + rear)
     yield from reversed(found)
 
@@ -110,7 +102,3 @@ def _beyond(layout: Layout, robot: int) -> float:
         return beside
     front = path.frame(layout.payloads[factory.pag.root])[1]
     return beside - c + min(0.0, front + path.arm, front + path.reach - CARRIAGE / 2)
-
-
-def _up(length: float) -> float:
-    return ceil(length * 1000 - 1e-6) / 1000

@@ -193,7 +193,7 @@ class Session:
             self._runs,
             world.time,
             poses.astype("<f4").tobytes(),
-            tuple(np.flatnonzero(np.frombuffer(supervisor.marked, np.uint8)).tolist()),
+            supervisor.marked(),
             len(supervisor.events),
             world.delivered(),
             round(left[-1] - left[-2], 4) if len(left := world.dropoffs) > 1 else None,

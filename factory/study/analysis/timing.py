@@ -13,7 +13,7 @@ from factory.control.mode import Array, Limits, Mode
 from factory.control.profile import World, ideal_time, mode_time, trapezoid_time
 from factory.layout.layout import Layout
 from factory.modes.modes import operation_modes, operation_starts, robot_limits
-from factory.modes.staging import Stage, staged, stages_of
+from factory.modes.staging import HeadStart, staged, stages_of
 from factory.plant.factory import Factory
 from factory.simulation.simulation import start_positions
 from factory.support.settings import Settings
@@ -68,7 +68,7 @@ class Timing:
         return robot_limits(self.layout, self.settings, self.seed, self.jitter)[0]
 
     @cached_property
-    def stages(self) -> tuple[Stage, ...]:
+    def stages(self) -> tuple[HeadStart, ...]:
         """The ways that robots go ahead of operations while they wait, if they are to."""
         return stages_of(self.layout, self.modes, self.settings)
 
@@ -102,7 +102,7 @@ class Timing:
             }
         )
 
-    def _way(self, stage: Stage, start: float, change: Change) -> float:
+    def _way(self, stage: HeadStart, start: float, change: Change) -> float:
         start = stage.goal + (start - stage.goal) * change.way.get(stage.robot, 1.0)
         own = (stage.robot,)
         return way_time(stage, start, self._limits(own, own, change), self.settings, self.world)

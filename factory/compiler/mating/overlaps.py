@@ -1,0 +1,200 @@
+"""The pairs of parts that come to overlap when the inputs of operations come along an axis.
+
+Candidates are the bodies whose boxes overlap across the axis. Boxes bound the depth, and for boxes
+they give it; for the others the faces bound it better, and what is left is computed. Bodies of two
+shapes are computed together, wherever they are.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from factory.compiler.mating.bodies import ConvexBodies
+from factory.compiler.mating.depth import Difference, Polytope, deepest, exact, polytope, rough
+from factory.compiler.mating.meetings import Ints, Meetings
+from factory.geometry.meshes import Array
+
+TOLERANCE = 2e-5
+"""Overlaps of no more than this [m] do not count: what welds in the engine give way, and far above
+what numbers written with five digits are rounded by."""
+
+CLEAR = 5e-5
+"""On their way bodies that do not overlap still need so much room between them [m], or they scrape:
+faces that are flush catch at their edges when a weld gives way by its 0.03 mm."""
+
+LAST = 1e-3
+"""But for the last bit of the way [m]: finished parts may touch."""
+
+SIGNS = (-1, +1)
+"""The sides from which the last input comes: its path is shifted to this side of the axis."""
+
+CHUNK = 4096
+"""Bodies whose candidates are sought at a time."""
+
+
+@dataclass(frozen=True)
+class Depths:
+    """How deep the two of each pair get into each other [m], less than 0 where apart: `finished`
+    (n,) in the finished product; `path` (n, 2) the most if the last input comes from the lower or
+    the upper side, and `shift` (n, 2) how far from its place that is; `graze` (n, 2) the most but
+    for the last bit of the way."""
+
+    finished: Array
+    path: Array
+    shift: Array
+    graze: Array
+
+    @property
+    def faulty(self) -> NDArray[np.bool_]:
+        """Which pairs (n, 2) overlap or scrape on the way from either side."""
+        return np.asarray((self.path > TOLERANCE) | (self.graze > -CLEAR))
+
+    def at(self, rows: Ints | slice) -> Depths:
+        """Those of some of the pairs."""
+        return Depths(self.finished[rows], self.path[rows], self.shift[rows], self.graze[rows])
+
+
+@dataclass(frozen=True)
+class Overlaps:
+    """Pairs of parts that overlap by more than the tolerance in some place of a path, or scrape, by
+    meeting. `meeting`, `one` < `other` (n,): numbers of the meeting and the parts."""
+
+    meeting: Ints
+    one: Ints
+    other: Ints
+    depths: Depths = field(repr=False)
+
+    def of(self, meeting: int) -> Overlaps:
+        """Those of one meeting."""
+        rows = slice(*np.searchsorted(self.meeting, [meeting, meeting + 1]).tolist())
+        at = self.meeting[rows], self.one[rows], self.other[rows]
+        return Overlaps(*at, self.depths.at(rows))
+
+
+class Finder:
+    """Finds overlaps in one product; shapes are kept from one axis to the next."""
+
+    def __init__(self, found: ConvexBodies, where: Meetings) -> None:
+        self.bodies, self.meetings = found, where
+        self._polytopes: dict[bytes, Polytope] = {}
+        self._differences: dict[tuple[bytes, bytes], Difference] = {}
+
+    def along(self, axis: int, wanted: NDArray[np.bool_]) -> Overlaps:
+        """The overlaps of the wanted meetings when their inputs come along an axis: x, y or z."""
+        parts = [self._near(axis, wanted, *pairs) for pairs in self._chunks(axis)]
+        moving, standing, meeting = np.concatenate([np.zeros((3, 0), np.int64), *parts], axis=1)
+        depths = _box_depths(self.bodies, moving, standing, axis)
+        self._refine(moving, standing, axis, depths)
+        idle = self.bodies.part[moving] < self.meetings.splits[meeting]
+        depths.path[idle], depths.shift[idle] = depths.finished[idle, None], 0.0
+        depths.graze[idle] = -np.inf
+        return self._by_parts(meeting, moving, standing, depths)
+
+    def _chunks(self, axis: int) -> Iterator[tuple[Ints, Ints]]:
+        """Pairs (moving, standing) of bodies whose boxes overlap or are near across the axis, the
+        part of the moving one being the later, in chunks."""
+        from shapely import STRtree, box
+
+        u, v = (i for i in range(3) if i != axis)
+        low, high, part = self.bodies.low, self.bodies.high, self.bodies.part
+        c = CLEAR / 2
+        flat = box(low[:, u] - c, low[:, v] - c, high[:, u] + c, high[:, v] + c)
+        tree = STRtree(flat)
+        for start in range(0, len(flat), CHUNK):
+            one, other = tree.query(flat[start : start + CHUNK])
+            one = one + start
+            later = part[one] > part[other]
+            yield one[later], other[later]
+
+    def _near(self, axis: int, wanted: NDArray[np.bool_], moving: Ints, standing: Ints) -> Ints:
+        """Those that meet at a wanted meeting and whose boxes come to overlap there: rows moving,
+        standing, meeting (3, n)."""
+        meeting = self.meetings.of(self.bodies.part[standing], self.bodies.part[moving])
+        found = np.stack([moving, standing, meeting])[:, wanted[meeting]]
+        depths = _box_depths(self.bodies, found[0], found[1], axis)
+        return np.asarray(found[:, depths.faulty.any(axis=1)])
+
+    def _refine(self, moving: Ints, standing: Ints, axis: int, depths: Depths) -> None:
+        """Replaces the depths of boxes by those of the bodies where these are no boxes."""
+        groups: dict[tuple[bytes, bytes], list[int]] = {}
+        keys: dict[int, bytes] = {}
+        both = self.bodies.boxes[moving] & self.bodies.boxes[standing]
+        for row in np.flatnonzero(~both).tolist():
+            pair = self._key(int(moving[row]), keys), self._key(int(standing[row]), keys)
+            groups.setdefault(pair, []).append(row)
+        low = self.bodies.low
+        for pair, members in groups.items():
+            rows = np.array(members)
+            for differ in (self._rough, self._exact):
+                difference, apart = differ(pair), low[moving[rows]] - low[standing[rows]]
+                depths.finished[rows] = difference.heights(apart).min(axis=1)
+                for side, sign in enumerate(SIGNS):
+                    direction = sign * np.eye(3)[axis]
+                    found = deepest(difference, apart, direction)
+                    depths.path[rows, side], depths.shift[rows, side] = found
+                    further = apart + LAST * direction
+                    depths.graze[rows, side] = deepest(difference, further, direction)[0]
+                rows = rows[depths.at(rows).faulty.any(axis=1)]
+                if not len(rows):
+                    break
+
+    def _rough(self, pair: tuple[bytes, bytes]) -> Difference:
+        """What is known of two shapes: all, if it was needed along another axis."""
+        return self._differences.get(pair) or rough(*(self._polytopes[key] for key in pair))
+
+    def _exact(self, pair: tuple[bytes, bytes]) -> Difference:
+        if pair not in self._differences:
+            self._differences[pair] = exact(*(self._polytopes[key] for key in pair))
+        return self._differences[pair]
+
+    def _key(self, body: int, keys: dict[int, bytes]) -> bytes:
+        if body not in keys:
+            vertices, keys[body] = self.bodies.shape(body)
+            if keys[body] not in self._polytopes:
+                self._polytopes[keys[body]] = polytope(vertices)
+        return keys[body]
+
+    def _by_parts(self, meeting: Ints, moving: Ints, standing: Ints, depths: Depths) -> Overlaps:
+        """Of all bodies of two parts the deepest."""
+        part = self.bodies.part
+        kept = np.flatnonzero(depths.faulty.any(axis=1))
+        order = kept[np.lexsort((part[moving[kept]], part[standing[kept]], meeting[kept]))]
+        meeting, one, other = meeting[order], part[standing[order]], part[moving[order]]
+        depths = depths.at(order)
+        new = np.ones(len(order), bool)
+        new[1:] = (np.diff(one) != 0) | (np.diff(other) != 0)
+        starts = np.flatnonzero(new)
+        if not len(starts):
+            return Overlaps(meeting, one, other, depths)
+        path = np.maximum.reduceat(depths.path, starts)
+        at = np.where(depths.path >= path[np.cumsum(new) - 1], depths.shift, np.inf)
+        by_parts = Depths(
+            np.maximum(np.maximum.reduceat(depths.finished, starts), 0.0),
+            path,
+            np.minimum.reduceat(at, starts),
+            np.maximum.reduceat(depths.graze, starts),
+        )
+        return Overlaps(meeting[starts], one[starts], other[starts], by_parts)
+
+
+def _box_depths(bodies: ConvexBodies, moving: Ints, standing: Ints, axis: int) -> Depths:
+    """The depths of bounding boxes (see `depth.py`), in closed form."""
+    low, high = bodies.low, bodies.high
+    up, down = high[standing] - low[moving], high[moving] - low[standing]
+    depth = np.minimum(up, down)
+    across = np.delete(depth, axis, axis=1).min(axis=1)[:, None]
+    half = ((up[:, axis] + down[:, axis]) / 2)[:, None]
+    ahead = (up[:, axis] - down[:, axis])[:, None] * np.array(SIGNS) / 2
+
+    def most(ahead: Array) -> Array:
+        along = np.where(ahead > 0, half, half - np.abs(ahead))
+        return np.asarray(np.minimum(across, along))
+
+    path = most(ahead)
+    shift = np.where(ahead > 0, np.maximum(ahead - (half - path), 0.0), 0.0)
+    finished = np.minimum(across[:, 0], depth[:, axis])
+    return Depths(finished, path, shift, most(ahead - LAST))

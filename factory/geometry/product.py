@@ -1,0 +1,178 @@
+"""The geometry of a product: a solid for each part, in the frame of the finished product.
+
+Shapes written in the PAG are taken as they are; meshes are read with trimesh; parts with no
+geometry get a box in a cubic lattice of at most 0.2 m. A mesh that the engine cannot use, or that
+is open, falls back to its convex hull or its box, with a warning that names it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from factory.geometry.decomposition import in_pieces
+from factory.geometry.limits import (
+    FURTHEST,
+    SHAPES,
+    SMALLEST,
+    beyond,
+    size_warnings,
+    too_far,
+    value_position,
+)
+from factory.geometry.meshes import Array, Indices, MassProperties, measured, usable
+from factory.geometry.solids import Product, Solid, from_mesh, primitive
+from factory.problem.pag import PAG, Assembly
+from factory.support.errors import Diagnostic, InputError
+
+LATTICE = 0.2
+"""Longest edge of the lattice of parts with no geometry [m]."""
+
+CELL = 0.06
+"""Largest cell of that lattice [m]."""
+
+NAMED = 3
+"""So many meshes are named that are open or inside out."""
+
+
+@np.errstate(all="ignore")
+def product_geometry(pag: PAG) -> Product:
+    """The solids of all parts. Raises InputError where a mesh cannot be read (BadMesh), or a part
+    is too large, too far away or too heavy for any engine (BadValue)."""
+    reader = _Reader(Path(pag.folder))
+    leaves = [node for node in pag.postorder() if not node.inputs]
+    plain = [node for node in leaves if not _has_shape(node)]
+    found = {n.label: reader.solid(n, i) for i, n in enumerate(leaves) if _has_shape(n)}
+    solids = {label: solid for label, solid in found.items() if solid is not None}
+    lift = max((float(solid.high[2]) for solid in solids.values()), default=0.0)
+    cells = _lattice(len(plain))
+    for number, node in enumerate(plain):
+        solids[node.label] = _box_in_lattice(node, number, cells, lift)
+    faults = [beyond(node, solids[node.label]) for node in leaves if node.label in solids]
+    if reader.errors or any(faults):
+        raise InputError([*reader.errors, *(fault for fault in faults if fault)])
+    low = np.min([s.low for s in solids.values()], axis=0)
+    high = np.max([s.high for s in solids.values()], axis=0)
+    leaks = _first_few(list(reader.leaks.values()))
+    warnings = (*reader.warnings, *leaks, *size_warnings(pag, low, high))
+    return Product(solids, low, high, warnings)
+
+
+def _has_shape(node: Assembly) -> bool:
+    return any(p.name in SHAPES for p in node.parameters)
+
+
+def _lattice(count: int) -> tuple[int, float]:
+    """Cells along an edge, and the edge of a cell [m], for `count` parts."""
+    edge = 1
+    while edge**3 < count:
+        edge += 1
+    return edge, min(CELL, LATTICE / edge)
+
+
+def _box_in_lattice(node: Assembly, number: int, cells: tuple[int, float], lift: float) -> Solid:
+    """A box in the cell `number` of a path that goes to and fro, so neighbours stay neighbours."""
+    edge, cell = cells
+    layer, rest = divmod(number, edge * edge)
+    row, column = divmod(rest, edge)
+    if layer % 2:
+        row = edge - 1 - row
+    if (row + layer) % 2:
+        column = edge - 1 - column
+    middle = (edge - 1) / 2
+    place = ((column - middle) * cell, (row - middle) * cell, (layer + 0.5) * cell + lift)
+    at = np.array(node.parameter("pos", place), float)
+    return primitive(node, "box", np.full(3, 0.49 * cell), at, np.array([1.0, 0, 0, 0]), number)
+
+
+class _Reader:
+    """Reads shapes, collecting errors and warnings, those of meshes that are open or inside out in
+    `leaks`, by file; a mesh file is read once."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self.errors: list[Diagnostic] = []
+        self.warnings: list[Diagnostic] = []
+        self.leaks: dict[str, Diagnostic] = {}
+        self._meshes: dict[tuple[str, float], MassProperties | None] = {}
+
+    def solid(self, node: Assembly, number: int) -> Solid | None:
+        """The solid of a part, None where there is an error."""
+        place = np.array(node.parameter("pos", (0.0, 0.0, 0.0)), float)
+        quaternion = np.array(node.parameter("quat", (1.0, 0.0, 0.0, 0.0)), float)
+        quaternion /= np.abs(quaternion).max()
+        quaternion /= np.linalg.norm(quaternion)
+        kind = next(name for name in SHAPES if node.parameter(name) is not None)
+        if kind == "mesh":
+            found = self._mesh(node)
+            return None if found is None else from_mesh(node, found, place, quaternion, number)
+        size = _half(kind, np.atleast_1d(np.array(node.parameter(kind), float)))
+        if SMALLEST <= size.min() <= size.max() <= FURTHEST:
+            return primitive(node, kind, size, place, quaternion, number)
+        message = f"the {kind} of '{node.label}' is out of range"
+        hint = f"from {2 * SMALLEST:g} to {FURTHEST:g} m; lengths are in metres"
+        self.errors.append(Diagnostic("BadValue", message, value_position(node, kind), hint))
+        return None
+
+    def _mesh(self, node: Assembly) -> MassProperties | None:
+        """The mesh of a part as it can be used, None where there is an error."""
+        path, scale = str(node.parameter("mesh")), float(node.parameter("scale", 1.0))  # type: ignore[arg-type]
+        if (path, scale) in self._meshes:
+            return self._meshes[path, scale]
+        found = self._meshes[path, scale] = self._read(node, path, scale)
+        trouble = found and (found.trouble or found.leak)
+        if found and trouble:
+            hint = "repair the mesh to have it used as it is"
+            position = value_position(node, "mesh")
+            warning = Diagnostic("BadMesh", f"{path} {trouble}", position, hint)
+            if found.trouble:
+                self.warnings.append(warning)
+            else:
+                self.leaks.setdefault(path, warning)
+        return found
+
+    def _read(self, node: Assembly, path: str, scale: float) -> MassProperties | None:
+        try:
+            vertices, faces = self._load(path, scale, process=True)
+            if len(faces) == 0 or not np.isfinite(vertices).all():
+                raise ValueError("it has no triangles, or vertices that are not finite")
+            if not np.abs(vertices).max() <= FURTHEST:
+                self.errors.append(too_far(node, "scale", "mesh"))
+                return None
+            mesh, trouble = usable(f"m{len(self._meshes)}", vertices, faces)
+            if not trouble:
+                mesh = in_pieces(mesh, lambda: self._load(path, scale, process=False))
+            return measured(mesh, trouble)
+        except Exception as error:  # trimesh's readers raise anything on a broken file
+            position = value_position(node, "mesh")
+            hint = "export it again as .obj, .stl, .ply or .glb with triangles"
+            why = "its content is no mesh" if isinstance(error, ImportError) else str(error)
+            message = f"cannot read '{path}': {why}"
+            self.errors.append(Diagnostic("BadMesh", message, position, hint))
+            return None
+
+    def _load(self, path: str, scale: float, process: bool) -> tuple[Array, Indices]:
+        """Vertices (n, 3) and faces (m, 3) of a mesh file. Vertices in the same place are one
+        with `process`, and stay apart without."""
+        import trimesh
+
+        loaded = trimesh.load(self.folder / path, force="mesh", process=process)
+        return np.asarray(loaded.vertices, float) * scale, np.asarray(loaded.faces, np.int64)
+
+
+def _half(kind: str, given: Array) -> Array:
+    """Full lengths as the PAG writes them, to the half lengths of MJCF."""
+    if kind == "cylinder":
+        return np.array([given[0], given[1] / 2])
+    return given / 2 if kind == "box" else given
+
+
+def _first_few(leaks: list[Diagnostic]) -> list[Diagnostic]:
+    """At most NAMED of these warnings, and one for all the others: most meshes of bricks are
+    open."""
+    if len(leaks) <= NAMED + 1:
+        return leaks
+    message = f"and {len(leaks) - NAMED} more meshes are open or inside out"
+    return [*leaks[:NAMED], replace(leaks[NAMED], message=message)]

@@ -1,0 +1,162 @@
+"""The footprint of one robot: what its own path takes of the floor, with its feeder and its piles.
+
+Frame of a robot: u ahead along its heading, t along the heading of the robot it delivers to, the
+origin at its B station. Everything has half a clearance around it.
+"""
+
+from __future__ import annotations
+
+from bisect import bisect_left
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import accumulate
+from math import inf
+
+from factory.layout.dimensions import CARRIAGE, MAST, PAYLOADS, POST, Clearance, up
+from factory.layout.guidepath import Extent
+from factory.layout.shapes import Shape
+from factory.plant.factory import Factory, Operation
+from factory.support.errors import Diagnostic, InputError
+
+Block = tuple[float, float, float, float]
+"""(ulo, uhi, tlo, thi) [m]; on one side of a path (from, to, near, far), away from its line."""
+
+Placed = tuple[float, Extent]
+"""A pile: where the product's middle is, ahead of the B station [m], and its box about it."""
+
+Strip = tuple[float, float, float]
+"""How far to one side a path takes the floor, by layer [m]; -inf for not at all."""
+
+
+@dataclass(frozen=True)
+class Footprint:
+    """`operations`: those after which the robot carries something; the first may be a feeder's.
+    `corridor`: whether its way ahead is kept free for its last pile."""
+
+    shape: Shape
+    clearance: Clearance
+    operations: tuple[Operation, ...]
+    corridor: bool = False
+
+    @cached_property
+    def half(self) -> float:
+        """Half a clearance [m]."""
+        return self.clearance.c / 2
+
+    @cached_property
+    def fed(self) -> bool:
+        """Whether a feeder presents the first pile."""
+        return bool(self.operations) and len(self.operations[0].robots) == 1
+
+    @cached_property
+    def boom(self) -> float:
+        """How far ahead the boom of the feeder reaches, over the middle of the part; what is put on
+        the part later has to be clear of it [m]."""
+        if not self.fed:
+            return -inf
+        part = self.shape.piles[self.operations[0].index]
+        return round((part[0] + part[1]) / 2, 3)
+
+    @property
+    def frontier(self) -> tuple[float, float, float]:
+        """Where along the path, by layer, something may come to it from the side: behind the end of
+        the boom."""
+        return (-inf, -inf, self.boom + self.half)
+
+    @cached_property
+    def strips(self) -> dict[int, Strip]:
+        """What is taken of the floor on each side, with the last pile."""
+        return {side: self.strip(side, self.shape.last) for side in (-1, +1)}
+
+    def strip(self, side: int, pile: Extent) -> Strip:
+        """What is taken of the floor on one side, with a pile on the path."""
+        shape, half = self.shape, self.half
+        lane = side * shape.offset + half + shape.spread
+        post = side * shape.offset + POST / 2 + half if self.fed else -inf
+        ahead = extent_to(shape.last, side) + half if self.corridor else -inf
+        load = -inf if shape.tool else max(extent_to(pile, side) + half, post)
+        return max(lane + CARRIAGE / 2, post, ahead), max(lane + MAST / 2, post, ahead), load
+
+    def strip_at(self, piles: Sequence[Placed]) -> Callable[[int, float], Strip]:
+        """The strip on a side beside what reaches so far ahead on this path. Only the piles that
+        come so far back are beside it: the last of them is the widest."""
+        starts = [at + pile[0] - self.half for at, pile in piles]
+        starts = list(accumulate(reversed(starts), min))[::-1]
+
+        def found(side: int, end: float) -> Strip:
+            return self.strip(side, piles[max(bisect_left(starts, end), 1) - 1][1])
+
+        return found
+
+    def along(self, piles: Sequence[Placed]) -> list[tuple[float, float]]:
+        """From where to where along the path each layer is taken; (inf, -inf) for nowhere. A post
+        is behind the carriage's rear stop and behind the part."""
+        shape, half = self.shape, self.half
+        taken = [(-shape.reach - width / 2 - half, half - shape.arm) for width in (CARRIAGE, MAST)]
+        starts = [at + pile[0] - half for at, pile in piles]
+        ends = [at + pile[1] + half for at, pile in piles]
+        taken.append((min(starts, default=inf), max(ends, default=-inf)))
+        if self.fed:
+            rear = shape.piles[self.operations[0].index][0]
+            post, room = -self.clearance.post(shape.reach, rear), POST / 2 + half
+            taken = [(min(low, post - room), max(high, post + room)) for low, high in taken]
+            taken[PAYLOADS] = taken[PAYLOADS][0], max(taken[PAYLOADS][1], self.boom + half)
+        return taken
+
+    def blocks(self, piles: Sequence[Placed]) -> list[tuple[Block, ...]]:
+        """What it takes of each layer: a block as wide as the strips on both sides, or none."""
+        spans = zip(self.along(piles), self.strips[-1], self.strips[+1], strict=True)
+        return [((*span, -low, high),) if span[0] <= span[1] else () for span, low, high in spans]
+
+    def least(self, operation: Operation, station: float) -> float:
+        """The least station of an operation after another station [m]: what joins the part of a
+        feeder is clear of the boom."""
+        if not self.fed or len(operation.inputs) < 2:
+            return station
+        pile = self.shape.piles[operation.index]
+        return max(station, up(self.boom + self.clearance.c - pile[0]))
+
+    def placed(self, operation: Operation, station: float) -> Placed:
+        """The pile that an operation at a station makes."""
+        return station + ahead_of(operation, self.shape.reach), self.shape.piles[operation.index]
+
+
+def footprint(
+    factory: Factory, robot: int, shape: Shape, clearance: Clearance, corridor: bool = False
+) -> Footprint:
+    """The footprint of a robot with a shape of its own."""
+    operations = tuple(factory.operations[number] for number in shape.piles)
+    return Footprint(shape, clearance, operations, corridor)
+
+
+def extent_to(pile: Extent, side: int) -> float:
+    """How far a pile reaches to one side of the product's middle [m]."""
+    return pile[3] if side > 0 else -pile[2]
+
+
+def ahead_of(operation: Operation, reach: float) -> float:
+    """How far ahead of its station a carrier has its goal [m]; 0 where it meets what is brought."""
+    point = operation.template.law.goals[operation.template.carrier - 1]
+    exact = {"B": 0.0, "S": 2.0}.get(point.end, point.multiple)
+    return (exact - point.multiple) * reach / 2
+
+
+def guests_of(operation: Operation) -> list[int]:
+    """The robots that deliver to the carrier of an operation. Raises InputError (Layout) where the
+    layout cannot have them: two guidepaths can end at one point of a third, one from each side; a
+    third cannot."""
+    guests = [robot for robot in operation.robots if robot != operation.carrier]
+    goals = operation.template.law.goals
+    away = any(goals[operation.robots.index(guest)].end != "A" for guest in guests)
+    if len(guests) <= 2 and not away:
+        return guests
+    message, hint = (
+        f"{len(guests)} guidepaths would end at one point of the carrier's",
+        "give further inputs to another template (further = insert), two at a point at most",
+    )
+    if away:
+        message = "a robot that is not the carrier has its goal away from A"
+        hint = "write its goal as A + 2r: its guidepath ends where it meets the carrier"
+    position = operation.template.position or operation.position
+    raise InputError(Diagnostic("Layout", f"'{operation.label}': {message}", position, hint))

@@ -1,0 +1,123 @@
+"""Guidepaths: straight lines on the floor, and how robots are stretched to their payloads.
+
+Every part is carried in its place in the finished product, relative to the product's middle. Where
+that middle is in the world is the robot's *station*: at a mate the middles of all robots coincide,
+so the parts are assembled when they meet. A guidepath is the straight line of that point.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+Box = tuple[float, float, float, float]
+"""(xlo, xhi, ylo, yhi) [m]."""
+
+Extent = tuple[float, float, float, float]
+"""(ulo, uhi, tlo, thi): a box in a robot's frame, about the product's middle [m]."""
+
+Point2 = tuple[float, float]
+
+
+def project(box: Box, u: Point2, t: Point2) -> Extent:
+    """A box of the world in the frame (u, t), both along world axes."""
+    along = sorted((box[0] * u[0] + box[2] * u[1], box[1] * u[0] + box[3] * u[1]))
+    across = sorted((box[0] * t[0] + box[2] * t[1], box[1] * t[0] + box[3] * t[1]))
+    return along[0], along[1], across[0], across[1]
+
+
+def hull(boxes: Sequence[Box]) -> Box:
+    """The bounding box of boxes."""
+    xlo, xhi, ylo, yhi = zip(*boxes, strict=True)
+    return float(min(xlo)), float(max(xhi)), float(min(ylo)), float(max(yhi))
+
+
+@dataclass(frozen=True, slots=True)
+class Guidepath:
+    """The guidepath of one robot and how the robot is stretched to its payload.
+
+    `heading` u, a unit vector towards A, and `side` t, to the left or right of it; `a`: the
+    product's middle when the robot delivers (x, y); `travel`: how far before that it receives (the
+    station at its B end); `reach` = 2r: how far the carriage stays behind the product's middle;
+    `offset`: how far the carriage's line is to the side t; `arm`: how far behind the middle the arm
+    ends; `nest`: where ahead of the middle the payload's own middle is, reached by the finger;
+    `aside`: how far to the side t of the carriage's line that is, in a lane beside another's. All
+    lengths in [m].
+
+    Arc length x of the carriage runs from A = 0; delivering at x = reach, receiving at B = reach +
+    travel.
+    """
+
+    heading: Point2
+    side: Point2
+    a: Point2
+    travel: float
+    reach: float
+    offset: float
+    arm: float
+    nest: float
+    aside: float = 0.0
+
+    @property
+    def length(self) -> float:
+        """B - A [m]."""
+        return self.reach + self.travel
+
+    @property
+    def r(self) -> float:
+        """The robot's width r [m], of which the templates' goals are multiples."""
+        return self.reach / 2
+
+    @property
+    def left(self) -> float:
+        """+1 where the side t is to the left of the heading u, -1 where it is to the right."""
+        return self.heading[0] * self.side[1] - self.heading[1] * self.side[0]
+
+    def middle(self, x: float) -> Point2:
+        """Where the product's middle is when the carriage is at arc length x."""
+        back = x - self.reach
+        return self.a[0] - self.heading[0] * back, self.a[1] - self.heading[1] * back
+
+    def carriage(self, x: float) -> Point2:
+        """f: where the carriage's centre is at arc length x."""
+        return (
+            self.a[0] - self.heading[0] * x + self.side[0] * self.offset,
+            self.a[1] - self.heading[1] * x + self.side[1] * self.offset,
+        )
+
+    def world(self, extent: Extent, middle: Point2) -> Box:
+        """A box given in the robot's frame (u, t), as it lies in the world about `middle`."""
+        ulo, uhi, tlo, thi = extent
+        u, t = self.heading, self.side
+        x = sorted((u[0] * ulo + t[0] * tlo, u[0] * uhi + t[0] * thi))
+        y = sorted((u[1] * ulo + t[1] * tlo, u[1] * uhi + t[1] * thi))
+        return middle[0] + x[0], middle[0] + x[1], middle[1] + y[0], middle[1] + y[1]
+
+    def frame(self, box: Box) -> Extent:
+        """A box about the product's middle, in the world's directions, in the robot's frame."""
+        return project(box, self.heading, self.side)
+
+    def sweep(self, box: Box, start: float, end: float) -> Box:
+        """What a box about the product's middle sweeps while the carriage goes from one arc length
+        to another."""
+        (x0, y0), (x1, y1) = self.middle(start), self.middle(end)
+        return (
+            min(x0, x1) + box[0],
+            max(x0, x1) + box[1],
+            min(y0, y1) + box[2],
+            max(y0, y1) + box[3],
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class Feeder:
+    """Where a part is presented. About the product's middle, in the frame (u, t) of the robot: the
+    post is at `back`, the boom reaches from there to `ahead`, both `across` from the middle; in the
+    world: the boxes `post` and `boom`, and the `height` of the boom's lower edge [m]."""
+
+    back: float
+    ahead: float
+    across: float
+    post: Box
+    boom: Box
+    height: float
