@@ -19,8 +19,8 @@ from factory.layout.layout import Layout
 from factory.nets.history import legal_marking
 from factory.pipeline import all_templates, read
 from factory.record.log import Log, LogWriter, read_log
-from factory.record.monitor import Anatomy, Monitor, Report, Subject, subject_of, subject_of_run
-from factory.record.monitor.explanation import Explanation
+from factory.record.monitor import MonitorSubject, Report, beside, subject_of
+from factory.record.monitor.explanation import SeenFirings
 from factory.record.monitor.record import watch_log
 from factory.simulation.simulation import Simulation
 from factory.support.errors import InputError
@@ -29,16 +29,8 @@ from tests.command_line import PAPER, ROOT, Terminal
 from tests.test_simulation import PRODUCTS, UNARY, laid_out, random_marking
 
 
-def monitor_of(simulation: Simulation) -> Monitor:
-    subject = subject_of_run(simulation)
-    world = simulation.world
-    monitor = Monitor(subject, Anatomy.of(world.m, simulation.layout.factory))
-    monitor.watch(world.m, world.d)
-    return monitor
-
-
 def watched(simulation: Simulation, max_time: float | None = None) -> tuple[Any, Report]:
-    monitor = monitor_of(simulation)
+    monitor = beside(simulation)
     run = simulation.run([monitor.observe], max_time)
     return run, monitor.report()
 
@@ -390,16 +382,16 @@ def test_parts_that_the_marking_does_not_account_for(paper: Layout) -> None:
     start = legal_marking(paper.factory.net, "r3:sub1")
     simulation = Simulation(paper, units=1, start=start)
     simulation.start = paper.factory.net.initial_marking
-    monitor = monitor_of(simulation)
+    monitor = beside(simulation)
     found = [(v.code, v.robot, v.label) for v in monitor.violations]
     assert ("Start", "r3", "part1") in found
 
 
 def test_firings_in_an_impossible_order(paper: Layout) -> None:
     """The difference constraints alone: one firing too early is one violation."""
-    subject: Subject = subject_of(paper, Settings())
+    subject: MonitorSubject = subject_of(paper, Settings())
     events = paper.factory.net.threaded.net.transition_index
-    explanation = Explanation(subject, 0.015)
+    explanation = SeenFirings(subject, 0.015)
     for name, t in (("part1_e", 1.0), ("part2_e", 1.0), ("sub1_e", 3.0)):
         explanation.saw(events[name], 0, t, t + 0.01, t, "r3")
     _, inferred, found = explanation.solve(0.0, 9.0)
@@ -430,7 +422,7 @@ def test_a_log_gives_the_same_verdict(paper: Layout, tmp_path: Path) -> None:
     path = tmp_path / "run.log"
     start = legal_marking(paper.factory.net, "sub1")
     simulation = Simulation(paper, units=2, seed=2, jitter=0.3, wip=2, start=start)
-    monitor = monitor_of(simulation)
+    monitor = beside(simulation)
     with LogWriter(path, simulation) as writer:
         simulation.run([writer.observe, monitor.observe])
     live, (recorded, subject) = monitor.report(), watch_log(read_log(path))

@@ -9,7 +9,7 @@ from typing import Literal
 
 import numpy as np
 
-from factory.record.monitor.subject import Subject
+from factory.record.monitor.subject import MonitorSubject
 from factory.render.area import PanelName, shared
 from factory.render.camera import Camera
 from factory.render.caption import Caption, Words
@@ -65,7 +65,7 @@ class Take:
     size: Size
     camera: Camera
     caption: bool
-    subject: Subject | None = None
+    subject: MonitorSubject | None = None
     panels: tuple[PanelName, ...] = ()
     title: str = ""
 

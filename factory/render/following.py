@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from factory.mjcf import names
-from factory.record.monitor.subject import Subject
+from factory.record.monitor.subject import MonitorSubject
 from factory.render.camera import Array
 from factory.render.subject import SIGNS, Snapshot, corners
 from factory.support.engine import mujoco
@@ -26,7 +26,7 @@ class Followed:
     A product is known by one of its parts, by itself that which the most robots carry.
     """
 
-    def __init__(self, m: mujoco.MjModel, subject: Subject, part: str = "") -> None:
+    def __init__(self, m: mujoco.MjModel, subject: MonitorSubject, part: str = "") -> None:
         self.part, self.places = part, subject.places
         self.kinds = [m.equality(e).name for e in range(m.neq)]
         factory, contents = subject.factory, subject.factory.contents

@@ -7,7 +7,7 @@ from copy import copy
 import numpy as np
 from numpy.typing import NDArray
 
-from factory.record.monitor.subject import Subject
+from factory.record.monitor.subject import MonitorSubject
 from factory.render.camera import (
     PART,
     Array,
@@ -54,7 +54,7 @@ class Painter(Closing):
         camera: Camera,
         caption: float = 0.0,
         samples: int = 1,
-        subject: Subject | None = None,
+        subject: MonitorSubject | None = None,
     ) -> None:
         gl.probe()
         self.width, self.height = size

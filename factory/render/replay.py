@@ -9,7 +9,7 @@ import numpy as np
 from factory.record.log import Log
 from factory.record.log.model import model_of
 from factory.record.monitor.record import AGAIN, recorded_subject
-from factory.record.monitor.subject import Subject
+from factory.record.monitor.subject import MonitorSubject
 from factory.render.area import PanelName, shared
 from factory.render.camera import camera_named
 from factory.render.camerawork import FPS, SIZE, Moment, Reel, Size, Take, When, pictureless, save
@@ -86,7 +86,7 @@ def moment_of(log: Log, row: int) -> Moment:
     return Moment(float(log.time[row]), int(log.delivered[row]), shown)
 
 
-def _subject(log: Log) -> Subject:
+def _subject(log: Log) -> MonitorSubject:
     """The factory that a log is of."""
     try:
         return recorded_subject(log.header)

@@ -10,12 +10,13 @@ from typing import Any
 import numpy as np
 
 from factory.mjcf import names
+from factory.mjcf.weld_frames import WeldFrames, check_holders
 from factory.plant.factory import Factory
-from factory.record.monitor.frames import Frames, frames_of
 from factory.record.monitor.observation import Index
+from factory.support.engine import mujoco
 
 PARK, FEED, GRIP, HOLD = KINDS = range(4)
-"""Who holds a part: its parking place, its feeder, a robot, the outfeed's tray."""
+"""What holds a part: its parking place, its feeder, a robot, the outfeed's tray."""
 
 WORDS = {"park": PARK, "feed": FEED, "grip": GRIP, "hold": HOLD}
 
@@ -46,7 +47,7 @@ class Anatomy:
     copy_of: Index = field(repr=False)
     holder: tuple[Holder | None, ...] = field(repr=False)
     part: tuple[str, ...] = field(repr=False)
-    frames: Frames = field(repr=False)
+    frames: WeldFrames = field(repr=False)
 
     @classmethod
     def of(cls, m: Any, factory: Factory) -> Anatomy:
@@ -65,6 +66,9 @@ class Anatomy:
         copy_of[bodies] = np.arange(len(bodies))
         called = [m.body(b).name for b in bodies]
         welds = [m.equality(e).name.split("/", 2) for e in range(m.neq)]
+        check_holders(m, np.flatnonzero([words[0] in WORDS for words in welds]))
+        d = mujoco.MjData(m)
+        mujoco.mj_kinematics(m, d)
         return cls(
             np.asarray(m.jnt_qposadr[slide], np.intp),
             np.asarray(m.jnt_dofadr[slide], np.intp),
@@ -78,7 +82,7 @@ class Anatomy:
             copy_of,
             tuple(_holder(words, robots) for words in welds),
             tuple(_part(words) for words in welds),
-            frames_of(m, [words[0] in WORDS for words in welds]),
+            WeldFrames.of(m, d),
         )
 
 

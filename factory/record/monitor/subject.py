@@ -13,6 +13,7 @@ from factory.nets.history import firings
 from factory.nets.petri import Marking
 from factory.plant.factory import Factory, Operation
 from factory.plant.fused_bodies import Bodies, bodies_of
+from factory.record.observed import Observed
 from factory.support.settings import Settings
 
 PATIENCE = 4.0
@@ -20,7 +21,7 @@ PATIENCE = 4.0
 
 
 @dataclass(frozen=True)
-class Subject:
+class MonitorSubject:
     """The factory under watch.
 
     `goals[i]`: arc length [m] of the goal of each robot of operation i; `radii[i]`: its goal ball
@@ -97,7 +98,7 @@ def subject_of(
     start: Marking | None = None,
     wip: int | None = None,
     bodies: Bodies | None = None,
-) -> Subject:
+) -> MonitorSubject:
     """The subject that a layout is, run with these settings from a marking (m_0 where None), of one
     body a part unless other `bodies` are given."""
     factory, product = layout.factory, layout.product
@@ -117,12 +118,12 @@ def subject_of(
     travel += (4 * longest / settings.acceleration) ** 0.5
     travel += layout.outfeed_way / settings.outfeed + max(o.dwell for o in factory.operations)
     marking = factory.net.initial_marking if start is None else start
-    return Subject(
+    return MonitorSubject(
         factory, goals, radii, places, settings, marking, round(PATIENCE * travel, 6), wip
     )
 
 
-def subject_of_run(simulation: Any) -> Subject:
+def subject_of_run(simulation: Observed) -> MonitorSubject:
     """The subject that a simulation is, in either world."""
     model = simulation.model
     return subject_of(
@@ -141,7 +142,7 @@ def subject_from(
     settings: Settings,
     start: Sequence[int],
     wip: int | None,
-) -> Subject:
+) -> MonitorSubject:
     """The inverse of `as_json`. Raises ValueError where what was kept is not of that factory."""
     goals = tuple(tuple(float(x) for x in row) for row in kept["goals"])
     radii = tuple(float(x) for x in kept["radii"])
@@ -150,4 +151,4 @@ def subject_from(
         raise ValueError("its goals are not those of its PAG")
     places = {str(k): (float(x), float(y), float(z)) for k, (x, y, z) in kept["places"].items()}
     patience = float(kept["patience"])
-    return Subject(factory, goals, radii, places, settings, frozenset(start), patience, wip)
+    return MonitorSubject(factory, goals, radii, places, settings, frozenset(start), patience, wip)

@@ -9,7 +9,7 @@ from factory.plant.factory import Operation
 from factory.problem.pag import NOPART
 from factory.record.monitor.anatomy import FEED, GRIP, HOLD, PARK, Anatomy, Holder
 from factory.record.monitor.grips import Switch
-from factory.record.monitor.subject import Subject
+from factory.record.monitor.subject import MonitorSubject
 
 Blame = Callable[[str, int, str, str], None]
 """Notes a violation: its code, the robot (-1 for none), the label, and what is wrong."""
@@ -17,10 +17,10 @@ Blame = Callable[[str, int, str, str], None]
 
 @dataclass(slots=True)
 class Transfers:
-    """The hands that each copy is in, the unit it is for (the k-th one that a feeder presents is
+    """What holds each copy, the unit it is for (the k-th one that a feeder presents is
     for unit k), and how often each operation that moves parts has ended."""
 
-    subject: Subject
+    subject: MonitorSubject
     anatomy: Anatomy
     blame: Blame
     at: list[Holder | None] = field(init=False, repr=False)

@@ -113,5 +113,6 @@ def _ends(simulation: Simulation) -> Iterator[tuple[Operation, Floats]]:
     for operation in layout.factory.operations:
         qpos = start.copy()
         for slot, robot in enumerate(operation.robots):
-            qpos[world.qpos[robot]] = layout.goal(operation.index, slot)
+            axis = world.qpos[robot]
+            qpos[axis] = layout.goal(operation.index, slot)
         yield operation, qpos

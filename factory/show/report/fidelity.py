@@ -10,6 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from factory.mjcf.parts import HIDDEN
+from factory.mjcf.states import aim_welds, pose
+from factory.mjcf.weld_frames import gaps
 from factory.nets.replay import replay
 from factory.record.monitor.record import watch_log
 from factory.record.monitor.report import Report
@@ -41,7 +43,7 @@ class Figure:
 
 
 @dataclass(frozen=True)
-class Fidelity:
+class RecordedFidelity:
     """The figures, whether the record refines the net, and the verdict of the monitor, None where
     the log is not one to be judged."""
 
@@ -50,7 +52,7 @@ class Fidelity:
     monitor: Report | None
 
 
-def fidelity(recording: Recording) -> Fidelity:
+def fidelity(recording: Recording) -> RecordedFidelity:
     """Everything that can be said."""
     log = recording.log
     try:
@@ -67,7 +69,7 @@ def fidelity(recording: Recording) -> Fidelity:
         **_ideal(recording),
     }
     figures = tuple(Figure(key, value) for key, value in found.items() if key in QUANTITIES)
-    return Fidelity(figures, record.refines, monitor)
+    return RecordedFidelity(figures, record.refines, monitor)
 
 
 def _tracking(recording: Recording) -> float | None:
@@ -87,22 +89,22 @@ def _welds(recording: Recording) -> dict[str, float | None]:
     """Hand-offs, the gap that each finds, what welds leave open, how products turn out [mm]."""
     log, m = recording.log, copy(recording.motion.m)
     d = mujoco.MjData(m)
-    _aim(recording, m, d, 0)
+    aim_welds(m, d, log.active[0])
     welds = Welds(m, d)
     gap = residual = product = 0.0
     handoffs, finished = 0, bool(log.delivered[-1])
     for row, switched in _rows(recording):
         if switched:
-            _pose(recording, m, d, row - 1)
-            _aim(recording, m, d, row)
+            pose(m, d, log.qpos[row - 1])
+            aim_welds(m, d, log.active[row])
             fresh = welds.scan()
             fresh = fresh[d.xpos[m.eq_obj2id[fresh], 2] > HIDDEN]  # none that replaces others
             handoffs += len(fresh)
-            gap = max(gap, float(welds.gaps(fresh, d.xpos, d.xmat).max(initial=0.0)))
+            gap = max(gap, float(gaps(m, fresh, d.xpos, d.xmat).max(initial=0.0)))
             continue
-        _pose(recording, m, d, row)
+        pose(m, d, log.qpos[row])
         on = np.flatnonzero(welds.active & (welds.kinds >= GRIP))
-        residual = max(residual, float(welds.gaps(on, d.xpos, d.xmat).max(initial=0.0)))
+        residual = max(residual, float(gaps(m, on, d.xpos, d.xmat).max(initial=0.0)))
         held = np.flatnonzero(welds.active & (welds.kinds == HOLD))
         if len(held):
             off = d.xpos[m.eq_obj2id[held]] - m.eq_data[held, 3:6]
@@ -123,19 +125,6 @@ def _rows(recording: Recording) -> Iterator[tuple[int, bool]]:
             yield row, True
         elif row % EVERY == 0:
             yield row, False
-
-
-def _pose(recording: Recording, m: mujoco.MjModel, d: mujoco.MjData, row: int) -> None:
-    d.qpos[:] = recording.log.qpos[row]
-    mujoco.mj_kinematics(m, d)
-
-
-def _aim(recording: Recording, m: mujoco.MjModel, d: mujoco.MjData, row: int) -> None:
-    """Switch the constraints as they are in a row."""
-    on = recording.log.active[row]
-    d.eq_active[:] = 0
-    d.eq_active[on[:, 0]] = 1
-    m.eq_obj1id[on[:, 0]], m.eq_obj2id[on[:, 0]] = on[:, 1], on[:, 2]
 
 
 def _ideal(recording: Recording) -> dict[str, float | None]:

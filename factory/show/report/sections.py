@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator
 from html import escape
 
 from factory.plant.factory import Factory
-from factory.show.report.fidelity import Fidelity
+from factory.show.report.fidelity import RecordedFidelity
 from factory.show.report.links import words_of
 from factory.show.report.measured import Measured
 from factory.show.report.prediction import Predicted
@@ -23,7 +23,7 @@ def heading(
     run: Measured,
     plan: Predicted | None,
     proof: Proof,
-    found: Fidelity,
+    found: RecordedFidelity,
 ) -> str:
     """The key figures, as cards."""
     robots = recording.factory.robots
@@ -167,7 +167,7 @@ def proof_words(proof: Proof) -> str:
     return f'<ul class="claims">{items}</ul>{digest}{save}'
 
 
-def fidelity_words(found: Fidelity) -> str:
+def fidelity_words(found: RecordedFidelity) -> str:
     """The figures in a table, and what the monitor says."""
     rows = "".join(
         f'<tr class="{"bad" if figure.exceeded else ""}">'
@@ -180,7 +180,7 @@ def fidelity_words(found: Fidelity) -> str:
     return "".join(_judged(found)) + table
 
 
-def _judged(found: Fidelity) -> Iterator[str]:
+def _judged(found: RecordedFidelity) -> Iterator[str]:
     yield "<p>The record of firings " + ("refines" if found.refines else "does not refine")
     yield " the net. "
     if found.monitor is None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from factory.control.mode import Array, Index
+from factory.mjcf.weld_frames import gaps
 from factory.simulation.mujoco.fusing import turns
 from factory.study.fidelity.record import HandOff
 from factory.study.fidelity.welds import Velocities, Welds
@@ -32,17 +33,17 @@ class HandOffs:
         """Welds switched on at `time`, when the speeds were `v` (nv,) and bodies at `xpos`."""
         self._finish([w for w in self._watched if self.welds.active[w.welds].all()])
         holders = self.m.eq_obj1id[fresh]
-        gaps = self.welds.gaps(fresh, xpos, xmat)
+        apart = gaps(self.m, fresh, xpos, xmat)
         for holder in np.unique(holders):
             here = holders == holder
             parts = self.m.eq_obj2id[fresh[here]]
-            u = self._relative(v, parts, holders[here])
+            u = self.velocities.relative(v, parts, holders[here])
             made = HandOff(
                 round(time, 9),
                 self.m.body(int(holder)).name,
                 len(parts),
                 float(self.m.body_mass[parts].sum()),
-                1e3 * float(gaps[here].max()),
+                1e3 * float(apart[here].max()),
                 1e3 * float(np.linalg.norm(u, axis=1).max()),
             )
             self._watched.append(_Watched(made, fresh[here], parts, holders[here], u, time))
@@ -52,7 +53,7 @@ class HandOffs:
         """The steps of a tick, speeds (n + 1, nv), that ends at `time`."""
         if not self._watched:
             return
-        u = self._relative(v, self._parts, self._holders)
+        u = self.velocities.relative(v, self._parts, self._holders)
         gained = self._mass * np.linalg.norm(u - self._before, axis=2)
         impulse = np.add.reduceat(gained, self._starts, axis=1).max(axis=0)
         energy = np.add.reduceat(self._energy(u, v), self._starts, axis=1)
@@ -70,9 +71,6 @@ class HandOffs:
         self.done += [w.result() for w in self._watched if w not in kept]
         self._watched = kept
         self._join()
-
-    def _relative(self, v: Array, parts: Index, holders: Index) -> Array:
-        return self.velocities.linear(v, parts) - self.velocities.of_holders(v, holders)
 
     def _energy(self, u: Array, v: Array) -> Array:
         """Kinetic energy (n + 1, p) of the watched parts in the frame of their carrier [J]."""

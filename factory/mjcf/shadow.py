@@ -1,7 +1,8 @@
-"""A second copy of the engine's model, in which nothing sleeps and near is as good as touching.
+"""A second copy of the engine's model of a run, in which no body sleeps and contacts are found at a
+distance.
 
-Every tick it takes over the run's configuration and contact masks, and only looks: where bodies
-are, and which come near each other. The run never sees it.
+It takes over the run's configuration and contact masks, and finds where bodies are and which come
+near each other. It writes nothing of the run.
 """
 
 from __future__ import annotations
@@ -10,17 +11,18 @@ import copy
 
 import numpy as np
 
+from factory.mjcf.states import pose
 from factory.support.engine import mujoco
 
 COPIED = ("geom_contype", "geom_conaffinity", "exclude_signature")
-"""What a run changes of its model: who may touch whom."""
+"""What a run changes of its model: which geoms may touch."""
 
 MASKS = (("body_contype", "geom_contype"), ("body_conaffinity", "geom_conaffinity"))
-"""The mask of a body is that of its geoms; a run leaves bodies out that have nothing near."""
+"""The mask of a body is the union of its geoms' masks; a run clears it where none is near."""
 
 
 class Shadow:
-    """The shadow of a run: `m`, `d`. Contacts are found up to `reach` [m]."""
+    """The copy `m`, `d` of a run's model. Contacts are found up to the distance `reach` [m]."""
 
     def __init__(self, m: mujoco.MjModel, d: mujoco.MjData, reach: float) -> None:
         self.run_m, self.run_d, self.reach = m, d, reach
@@ -35,12 +37,11 @@ class Shadow:
         self.follow()
 
     def follow(self) -> None:
-        """Take over where everything is."""
-        self.d.qpos[:] = self.run_d.qpos
-        mujoco.mj_kinematics(self.m, self.d)
+        """Take over the configuration of the run."""
+        pose(self.m, self.d, self.run_d.qpos)
 
     def collide(self) -> None:
-        """Find what is near, by the masks of the run; the floor is near everything."""
+        """Find the contacts by the masks of the run, the floor left out: it is near everything."""
         m = self.m
         for own, other in self._pairs:
             own[...] = other
