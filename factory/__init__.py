@@ -25,6 +25,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from factory.support.errors import Diagnostic, FactoryError, InputError, MissingError, RunError
 from factory.support.settings import Settings
+from factory.support.version import __version__ as __version__
 
 if TYPE_CHECKING:
     from factory.layout.layout import Layout
@@ -33,7 +34,6 @@ if TYPE_CHECKING:
     from factory.problem.pag import PAG
     from factory.simulation.run import Run
 
-__version__ = "0.1.0"
 
 __all__ = [
     "Diagnostic",

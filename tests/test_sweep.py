@@ -25,12 +25,12 @@ from scipy import stats
 from factory.layout.embedding import lay_out
 from factory.pipeline import read
 from factory.simulation.simulation import Simulation
-from factory.study.sweep import Recipe, local, points, read_axes, summarise, sweeping
+from factory.study import pool
+from factory.study.sweep import Recipe, points, read_axes, summarise, sweeping
 from factory.study.sweep.grid import Point, Value
 from factory.study.sweep.kept import COLUMNS
-from factory.study.sweep.local import run_local
 from factory.study.sweep.store import Store
-from factory.study.sweep.sweeping import sweep
+from factory.study.sweep.sweeping import run_local, sweep
 from factory.study.sweep.work import FIGURES, Outcome, Runner
 from factory.support.errors import InputError, MissingError, RunError
 from factory.support.settings import Settings
@@ -438,7 +438,7 @@ def test_bad_command_lines_write_nothing(
 def test_a_killed_worker_loses_the_run_under_way_alone(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(local, "TRIES", 2)
+    monkeypatch.setattr(pool, "TRIES", 2)
     recipe = recipe_of()
     deadly = Deadly(recipe.factory, recipe.product, recipe.fixed, mark=tmp_path / "mark")
     grid = list(points(read_axes(["seed=2,0,3,1,4:8"])))

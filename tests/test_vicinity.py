@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 
 from factory.layout.layout import Layout
-from factory.mjcf.shadow import Shadow
 from factory.simulation.disturbance import Push, disturb
 from factory.simulation.disturbance.hands import Hands
 from factory.simulation.mujoco import parts as stock
@@ -22,6 +21,7 @@ from factory.simulation.mujoco.fast.swept_boxes import CELL, Reach
 from factory.simulation.mujoco.loads import Load, loads
 from factory.simulation.mujoco.parts import Stock
 from factory.simulation.simulation import Simulation
+from factory.study.fidelity.shadow import Shadow
 from factory.support.engine import mujoco
 from factory.support.settings import MOST, Settings
 from tests.bench.factories import balanced

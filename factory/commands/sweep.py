@@ -110,8 +110,8 @@ def _carry_out(
     from factory.commands.run_factory import check_ideal
     from factory.nets.verify import proved
     from factory.pipeline import read
+    from factory.study.pool import cores
     from factory.study.sweep.grid import DEFAULTS, SETTINGS, read_axes
-    from factory.study.sweep.local import cores
     from factory.study.sweep.recipe import Recipe
     from factory.study.sweep.sweeping import LOCAL, sweep
 

@@ -1,4 +1,4 @@
-"""The frames that welds join, and how far they are apart.
+"""The welds of a compiled model: the frames that they join, and how far these are apart.
 
 A weld joins a part, at its origin, with a frame fixed to the part's holder. Holders do nothing but
 slide: a carriage along its guidepath, a lift on a carriage. So the frame on a holder follows from
@@ -104,3 +104,8 @@ def residuals(d: mujoco.MjData) -> Array:
     """How far apart (k, 3) [m] the frames of each active, awake weld were in the engine's last
     step."""
     return np.asarray(d.efc_pos[: d.ne].reshape(-1, ROWS)[:, :3])
+
+
+def soften(m: mujoco.MjModel, factor: float) -> None:
+    """Multiply the time constants of all welds by a factor."""
+    m.eq_solref[:, 0] *= factor

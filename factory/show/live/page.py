@@ -111,8 +111,6 @@ def _ends(simulation: Simulation) -> Iterator[tuple[Operation, Floats]]:
     layout, world = simulation.layout, simulation.world
     start: Any = world.d.qpos
     for operation in layout.factory.operations:
-        qpos = start.copy()
-        for slot, robot in enumerate(operation.robots):
-            axis = world.qpos[robot]
-            qpos[axis] = layout.goal(operation.index, slot)
+        qpos, slides = start.copy(), [world.qpos[robot] for robot in operation.robots]
+        qpos[slides] = [layout.goal(operation.index, n) for n in range(len(slides))]
         yield operation, qpos

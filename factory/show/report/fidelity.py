@@ -4,13 +4,12 @@ where there is a layout."""
 from __future__ import annotations
 
 from collections.abc import Iterator
-from copy import copy
 from dataclasses import dataclass
 
 import numpy as np
 
 from factory.mjcf.parts import HIDDEN
-from factory.mjcf.states import aim_welds, pose
+from factory.mjcf.replica import Replica
 from factory.mjcf.weld_frames import gaps
 from factory.nets.replay import replay
 from factory.record.monitor.record import watch_log
@@ -22,7 +21,6 @@ from factory.study.analysis.recorded import conditions
 from factory.study.fidelity.causality import duration_differences, process
 from factory.study.fidelity.quantities import QUANTITIES
 from factory.study.fidelity.welds import GRIP, HOLD, Welds
-from factory.support.engine import mujoco
 from factory.support.errors import InputError
 
 EVERY = 5
@@ -87,22 +85,22 @@ def _tracking(recording: Recording) -> float | None:
 
 def _welds(recording: Recording) -> dict[str, float | None]:
     """Hand-offs, the gap that each finds, what welds leave open, how products turn out [mm]."""
-    log, m = recording.log, copy(recording.motion.m)
-    d = mujoco.MjData(m)
-    aim_welds(m, d, log.active[0])
+    log, replica = recording.log, Replica(recording.motion.m)
+    m, d = replica.m, replica.d
+    replica.switch(log.active[0])
     welds = Welds(m, d)
     gap = residual = product = 0.0
     handoffs, finished = 0, bool(log.delivered[-1])
     for row, switched in _rows(recording):
         if switched:
-            pose(m, d, log.qpos[row - 1])
-            aim_welds(m, d, log.active[row])
+            replica.place(log.qpos[row - 1])
+            replica.switch(log.active[row])
             fresh = welds.scan()
             fresh = fresh[d.xpos[m.eq_obj2id[fresh], 2] > HIDDEN]  # none that replaces others
             handoffs += len(fresh)
             gap = max(gap, float(gaps(m, fresh, d.xpos, d.xmat).max(initial=0.0)))
             continue
-        pose(m, d, log.qpos[row])
+        replica.place(log.qpos[row])
         on = np.flatnonzero(welds.active & (welds.kinds >= GRIP))
         residual = max(residual, float(gaps(m, on, d.xpos, d.xmat).max(initial=0.0)))
         held = np.flatnonzero(welds.active & (welds.kinds == HOLD))

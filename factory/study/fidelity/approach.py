@@ -15,8 +15,8 @@ from factory.control.mode import Array, Index, Truth
 from factory.layout.clearance import certify
 from factory.layout.layout import Layout
 from factory.mjcf import names
-from factory.mjcf.shadow import Shadow
 from factory.study.fidelity.record import Approach
+from factory.study.fidelity.shadow import Shadow
 from factory.study.fidelity.welds import Welds
 
 ROBOT, PART, FEEDER, OUTFEED, NONE = range(5)

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import signal
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
+from contextlib import closing
 from dataclasses import dataclass, field, replace
-from multiprocessing import active_children, get_context
 from time import perf_counter
 
 import numpy as np
@@ -22,15 +20,13 @@ from factory.study.fidelity.causality import compare, differences, duration_diff
 from factory.study.fidelity.measuring import Measurement
 from factory.study.fidelity.quantities import QUANTITIES
 from factory.study.fidelity.record import Fidelity, SeedRecord
+from factory.study.pool import over_processes
 from factory.support.engine import mujoco
-from factory.support.pickling import pickle_locked_mappings
+from factory.support.errors import Diagnostic, RunError
 from factory.support.settings import Settings
 
 Alter = Callable[[mujoco.MjModel], None]
 """Changes the engine's model before the run: a softer weld, a planted fault."""
-
-
-pickle_locked_mappings()  # of which layouts are full
 
 
 @dataclass(frozen=True)
@@ -85,23 +81,18 @@ def _worked(work: Sequence[tuple[Case, int]], jobs: int) -> Iterator[tuple[int, 
         for number, (case, seed) in enumerate(work):
             yield number, measure_seed(case, seed)
         return
-    others = set(active_children())
-    pool = ProcessPoolExecutor(min(jobs, len(work)), get_context("spawn"), _end_quietly)
-    try:
-        futures = {pool.submit(measure_seed, *item): i for i, item in enumerate(work)}
-        for future in as_completed(futures):
-            yield futures[future], future.result()
-    except BaseException:
-        for child in set(active_children()) - others:
-            child.terminate()
-        raise
-    finally:
-        pool.shutdown(cancel_futures=True)
+    with closing(over_processes(_measured, work, jobs)) as results:
+        for one in results:
+            if one.found is None:
+                seed = work[one.number][1]
+                message = f"the process of seed {seed} died in {one.tries} tries"
+                hint = "take fewer --jobs, or more memory"
+                raise RunError(Diagnostic("Killed", message, None, hint))
+            yield one.number, one.found
 
 
-def _end_quietly() -> None:
-    """Let an interruption end a worker without a word."""
-    signal.signal(signal.SIGINT, signal.SIG_DFL)
+def _measured(item: tuple[Case, int]) -> SeedRecord:
+    return measure_seed(*item)
 
 
 def measure_seed(case: Case, seed: int) -> SeedRecord:

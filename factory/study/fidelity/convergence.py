@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-from factory.mjcf.states import soften_welds
+from factory.mjcf.weld_frames import soften
 from factory.study.fidelity.comparing import Case, over_cases
 from factory.study.fidelity.quantities import QUANTITIES
 from factory.study.fidelity.record import Figures, SeedRecord
@@ -45,7 +45,7 @@ class Softened:
     factor: float
 
     def __call__(self, m: mujoco.MjModel) -> None:
-        soften_welds(m, self.factor)
+        soften(m, self.factor)
 
 
 @dataclass(frozen=True)

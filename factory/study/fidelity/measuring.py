@@ -9,7 +9,6 @@ from dataclasses import replace
 from time import perf_counter
 from typing import Any
 
-from factory.mjcf.shadow import Shadow
 from factory.record.monitor import beside
 from factory.simulation.run import Run
 from factory.simulation.simulation import Simulation
@@ -20,6 +19,7 @@ from factory.study.fidelity.handoffs import HandOffs
 from factory.study.fidelity.payload import Payload
 from factory.study.fidelity.record import HandOff
 from factory.study.fidelity.residual import Residual
+from factory.study.fidelity.shadow import Shadow
 from factory.study.fidelity.steps import Steps
 from factory.study.fidelity.welds import Velocities, Welds
 

@@ -11,7 +11,6 @@ from typing import Any
 
 import numpy as np
 
-from factory import __version__
 from factory.geometry.solids import Product
 from factory.lang.pag_writer import write_pag
 from factory.lang.template_writer import write_template
@@ -20,6 +19,7 @@ from factory.plant.factory import Factory
 from factory.study.sweep.grid import DEFAULTS, SETTINGS, Axis, Point, Value
 from factory.support.pickling import pickle_locked_mappings
 from factory.support.resources import mjcf_folder
+from factory.support.version import __version__
 
 pickle_locked_mappings()  # of which factories are full
 

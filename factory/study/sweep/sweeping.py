@@ -5,22 +5,25 @@ from __future__ import annotations
 
 from collections.abc import Callable, Generator, Sequence
 from contextlib import closing
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from time import perf_counter
 
-from factory.study.sweep.bar import Bar
+from factory.study.bar import RunsBar
+from factory.study.pool import over_processes
 from factory.study.sweep.grid import Axis, Point, check_value, points
-from factory.study.sweep.local import run_local
 from factory.study.sweep.recipe import Recipe, name_of
 from factory.study.sweep.store import Store
-from factory.study.sweep.work import Outcome
+from factory.study.sweep.work import Outcome, Runner, failed
 from factory.support.errors import InputError
 from factory.support.interruption import Interruption
 
 LOCAL = "local"
 
 Outcomes = Generator[Outcome, None, None]
+
+THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
+"""Set to 1 for the processes: there is one for each core already."""
 
 
 @dataclass(slots=True)
@@ -80,15 +83,15 @@ def sweep(
         raise InputError(faults)
     grid = {name_of(point): point for point in points(axes)}
     with Store(database, recipe.identity(axes)) as store:
-        failed = set() if retry else store.points("failed")
-        there = store.points("done") | failed
+        lost = set() if retry else store.points("failed")
+        there = store.points("done") | lost
         wanted = [point for name, point in grid.items() if name not in there]
-        tally = Tally(len(grid), len(grid) - len(wanted), len(grid.keys() & failed))
+        tally = Tally(len(grid), len(grid) - len(wanted), len(grid.keys() & lost))
         if not wanted:
             return tally
         begin = perf_counter()
         with (
-            Bar(len(grid), tally.there, quiet) as bar,
+            RunsBar(len(grid), tally.there, quiet) as bar,
             closing(_backend(on, jobs)(recipe, wanted)) as outcomes,
         ):
             for outcome in outcomes:
@@ -99,6 +102,18 @@ def sweep(
                 interruption.observe(None, None)
         tally.wall_time_s = perf_counter() - begin
     return tally
+
+
+def run_local(recipe: Recipe, points: Sequence[Point], jobs: int) -> Outcomes:
+    """The outcomes of all points as they come, from `jobs` processes. Closing the iterator ends
+    them. Raises RunError where processes die as they start."""
+    with closing(over_processes(Runner(recipe), points, jobs, dict.fromkeys(THREADS, "1"))) as done:
+        for one in done:
+            if one.found is None:
+                reason = f"Killed the process died in {one.tries} tries (exit status {one.status})"
+                yield failed(points[one.number], reason, one.tries)
+            else:
+                yield replace(one.found, tries=one.tries)
 
 
 def _backend(on: str, jobs: int) -> Callable[[Recipe, Sequence[Point]], Outcomes]:
