@@ -20,12 +20,12 @@ from factory.simulation.run import Event
 from factory.simulation.simulation import Simulation
 from factory.study.fidelity import QUANTITIES, SeedRecord, measure, measure_seed, study
 from factory.study.fidelity.causality import (
+    CausalRecord,
     Orders,
-    Process,
+    causal_record,
     compare,
     differences,
     duration_differences,
-    process,
 )
 from factory.study.fidelity.comparing import Alter, Case
 from factory.study.fidelity.convergence import Series, Softened
@@ -333,9 +333,9 @@ def test_a_contact_fails_the_record() -> None:
 # --- order and time --------------------------------------------------------------------------
 
 
-def record_of(*firings: tuple[str, float]) -> Process:
+def record_of(*firings: tuple[str, float]) -> CausalRecord:
     net = layout().factory.net
-    return process(net, [Event(t, name) for name, t in firings])
+    return causal_record(net, [Event(t, name) for name, t in firings])
 
 
 def test_concurrent_firings_that_swap_are_counted_and_are_no_fault() -> None:

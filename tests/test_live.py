@@ -19,17 +19,17 @@ import pytest
 
 from factory.nets.replay import replay
 from factory.record.monitor import beside
-from factory.show.live import Frame, Server, Session
+from factory.show.live import LiveFrame, Server, Session
 from factory.show.live.commands import (
     KINDS,
     Block,
     Pause,
     Play,
-    Push,
+    PlayToFiring,
+    PushRobot,
     Restart,
     Slow,
     Speed,
-    Step,
     command_of,
 )
 from factory.show.live.page import page, stage_of
@@ -53,9 +53,9 @@ PARTS = ("part1", "part2", "part3")
     ("message", "command"),
     [
         ('{"do": "pause"}', Pause()),
-        ('{"do": "step", "more": 1}', Step()),
+        ('{"do": "step", "more": 1}', PlayToFiring()),
         ('{"do": "speed", "factor": 0}', Speed(0)),
-        ('{"do": "push", "robot": 5, "share": -1}', Push(5, -1)),
+        ('{"do": "push", "robot": 5, "share": -1}', PushRobot(5, -1)),
         ('{"do": "slow", "robot": 0, "factor": 0.1}', Slow(0, 0.1)),
         ('{"do": "block", "part": "part2", "blocked": false}', Block("part2", False)),
     ],
@@ -181,7 +181,7 @@ class Running:
         if self.over:
             raise Stopped
 
-    def until(self, holds: Any, seconds: float = 20.0) -> Frame:
+    def until(self, holds: Any, seconds: float = 20.0) -> LiveFrame:
         """The first frame of which something holds."""
         end = monotonic() + seconds
         while not holds(frame := self.session.frame):
@@ -211,7 +211,7 @@ def test_pause_step_and_play(running: Running) -> None:
     assert running.session.frame.time == still.time
     fired = still.fired
     for _ in range(4):
-        send(Step())
+        send(PlayToFiring())
         after = running.until(lambda f, n=fired: f.fired > n and not f.playing)
         fired = after.fired
         (last,) = {t for t, _ in running.session.fired(after.run, fired - 1, fired)}
@@ -443,5 +443,5 @@ def test_what_is_missing_is_said_first(run: Terminal, monkeypatch: pytest.Monkey
 
 def test_every_kind_has_a_name() -> None:
     assert {kind for kind, _ in KINDS.values()} == {
-        *(Pause, Play, Step, Restart, Speed, Push, Slow, Block)
+        *(Pause, Play, PlayToFiring, Restart, Speed, PushRobot, Slow, Block)
     }

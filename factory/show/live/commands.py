@@ -28,7 +28,7 @@ class Play:
 
 
 @dataclass(frozen=True, slots=True)
-class Step:
+class PlayToFiring:
     """Go on until the next transition fires."""
 
 
@@ -45,7 +45,7 @@ class Speed:
 
 
 @dataclass(frozen=True, slots=True)
-class Push:
+class PushRobot:
     """Push a robot (index) for PUSH seconds with one of SHARES."""
 
     robot: int
@@ -68,7 +68,7 @@ class Block:
     blocked: bool
 
 
-Command = Pause | Play | Step | Restart | Speed | Push | Slow | Block
+Command = Pause | Play | PlayToFiring | Restart | Speed | PushRobot | Slow | Block
 
 PUSH = 0.3
 """A push lasts so long [s]."""
@@ -111,10 +111,10 @@ def _is_one(value: object, of: Collection[float]) -> bool:
 KINDS: Mapping[str, tuple[Callable[..., Command], tuple[str, ...]]] = {
     "pause": (Pause, ()),
     "play": (Play, ()),
-    "step": (Step, ()),
+    "step": (PlayToFiring, ()),
     "restart": (Restart, ()),
     "speed": (Speed, ("factor",)),
-    "push": (Push, ("robot", "share")),
+    "push": (PushRobot, ("robot", "share")),
     "slow": (Slow, ("robot", "factor")),
     "block": (Block, ("part", "blocked")),
 }

@@ -12,7 +12,7 @@ from threading import Thread
 from typing import TYPE_CHECKING, Any
 
 from factory.show.live.commands import command_of
-from factory.show.live.session import Frame, Session
+from factory.show.live.session import LiveFrame, Session
 from factory.support.errors import Diagnostic, InputError
 from factory.support.extras import optional
 from factory.support.resource import Closing
@@ -173,7 +173,7 @@ def _silent() -> logging.Logger:
     return logger
 
 
-def packed(frame: Frame, fired: list[tuple[float, int]]) -> bytes:
+def packed(frame: LiveFrame, fired: list[tuple[float, int]]) -> bytes:
     """A frame as the page reads it: the length of a JSON text (4 bytes, little-endian), the text,
     padded to a multiple of 4, and the poses."""
     told: Mapping[str, object] = {

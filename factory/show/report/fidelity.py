@@ -18,7 +18,7 @@ from factory.show.report.recording import Recording
 from factory.simulation.run import Event
 from factory.simulation.simulation import Simulation
 from factory.study.analysis.recorded import conditions
-from factory.study.fidelity.causality import duration_differences, process
+from factory.study.fidelity.causality import causal_record, duration_differences
 from factory.study.fidelity.quantities import QUANTITIES
 from factory.study.fidelity.welds import GRIP, HOLD, Welds
 from factory.support.errors import InputError
@@ -138,7 +138,7 @@ def _ideal(recording: Recording) -> dict[str, float | None]:
         recording.layout, "ideal", units, made.seed, made.jitter, made.settings, wip=made.wip
     ).run()
     events = [Event(t, name) for t, name in log.events]
-    apart = duration_differences(process(net, thought.events), process(net, events))
+    apart = duration_differences(causal_record(net, thought.events), causal_record(net, events))
     if not len(apart):
         return {}
     return {

@@ -10,7 +10,7 @@ from factory.show.report.recording import Recording
 
 
 @dataclass(frozen=True)
-class Measured:
+class MeasuredPace:
     """Of a run, in seconds: when each product left (`dropoffs`), the mean interval between the last
     half of them (None below 4); for each operation its mean duration (None where it never ended),
     the first time left out where there are others; for each robot the share of the run it was in
@@ -28,7 +28,7 @@ class Measured:
         return int(np.argmax(self.gears))
 
 
-def measured(recording: Recording) -> Measured:
+def measured(recording: Recording) -> MeasuredPace:
     """What the log's events say."""
     log, factory = recording.log, recording.factory
     times: dict[int, list[float]] = {}
@@ -48,7 +48,7 @@ def measured(recording: Recording) -> Measured:
             busy[robot] += sum(spent)
     gears = [sum(durations[o] or 0.0 for o in robot.operations) for robot in factory.robots]
     total = recording.end or 1.0
-    return Measured(
+    return MeasuredPace(
         dropoffs,
         _interval(dropoffs),
         tuple(durations),

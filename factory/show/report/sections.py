@@ -9,7 +9,7 @@ from html import escape
 from factory.plant.factory import Factory
 from factory.show.report.fidelity import RecordedFidelity
 from factory.show.report.links import words_of
-from factory.show.report.measured import Measured
+from factory.show.report.measured import MeasuredPace
 from factory.show.report.prediction import Predicted
 from factory.show.report.recording import Recording
 from factory.show.report.words import Proof
@@ -20,7 +20,7 @@ SIGNS = {True: "✓", False: "✗", None: "?"}
 
 def heading(
     recording: Recording,
-    run: Measured,
+    run: MeasuredPace,
     plan: Predicted | None,
     proof: Proof,
     found: RecordedFidelity,
@@ -60,7 +60,7 @@ def _per_hour(cycle: float | None) -> float | None:
     return 3600 / cycle if cycle else None
 
 
-def pace(recording: Recording, run: Measured, plan: Predicted | None) -> str:
+def pace(recording: Recording, run: MeasuredPace, plan: Predicted | None) -> str:
     """Cycle time, throughput and the critical gear, predicted and measured."""
     first = run.dropoffs[0] if run.dropoffs else None
     last = run.dropoffs[-1] if run.dropoffs else None
@@ -86,7 +86,7 @@ def pace(recording: Recording, run: Measured, plan: Predicted | None) -> str:
     return _table(names, body) + note + _gears(recording, run, plan)
 
 
-def _gears(recording: Recording, run: Measured, plan: Predicted | None) -> str:
+def _gears(recording: Recording, run: MeasuredPace, plan: Predicted | None) -> str:
     """The critical gear as a chain of its operations, as predicted and as measured."""
     factory = recording.factory
     names = {robot.name: robot.index for robot in factory.robots}
@@ -129,7 +129,7 @@ def _chain(
     )
 
 
-def utilisation(recording: Recording, run: Measured, plan: Predicted | None) -> str:
+def utilisation(recording: Recording, run: MeasuredPace, plan: Predicted | None) -> str:
     """A bar for each robot, the busiest first, with a mark where it was predicted."""
     rows, roles = [], recording.stage.roles
     for robot in sorted(recording.factory.robots, key=lambda r: -run.busy[r.index]):

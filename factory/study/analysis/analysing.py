@@ -8,7 +8,7 @@ from math import inf
 from factory.nets.slack import slacks
 from factory.study.analysis.bounds import WipCurve, wip_curve
 from factory.study.analysis.flow import Flow, flow
-from factory.study.analysis.measured import Comparison, Record, compare
+from factory.study.analysis.measured import Comparison, RunRecord, compare
 from factory.study.analysis.sensitivity import Sensitivity, sensitivities
 from factory.study.analysis.timed import TimedNet, timed_net
 from factory.study.analysis.timing import AS_IT_IS, Change, Timing
@@ -43,7 +43,7 @@ def analyse(
     units: int = 20,
     wip: int | None = None,
     asked: tuple[str, Change] | None = None,
-    record: Record | None = None,
+    record: RunRecord | None = None,
 ) -> Analysis:
     """Analyse a laid-out factory: `units` products from the initial marking, a bound `wip` on
     copies of each part, a change that is `asked` about, in words, and the `record` of a run to

@@ -14,7 +14,7 @@ from factory.study.analysis.timing import Timing
 
 
 @dataclass(frozen=True, slots=True)
-class Stock:
+class WorkInProgress:
     """How many copies of a label there are at once in the long run, and how long each stays [s].
 
     A part stays from the start of the operation that takes it until it is dropped off, whatever it
@@ -65,7 +65,7 @@ class Flow:
     last: float
     full_pace: int | None
     settled: bool
-    stocks: tuple[Stock, ...] = field(repr=False)
+    stocks: tuple[WorkInProgress, ...] = field(repr=False)
     shares: tuple[Share, ...] = field(repr=False)
     firings: Firings = field(repr=False)
 
@@ -100,7 +100,7 @@ def _full_pace(products: Floats, found: Firings) -> int | None:
     return int(late[-1]) + 2 if len(late) else 1
 
 
-def _stocks(timing: Timing, found: Firings) -> tuple[Stock, ...]:
+def _stocks(timing: Timing, found: Firings) -> tuple[WorkInProgress, ...]:
     """Over as many whole periods as lie before the first transition runs out of firings."""
     factory, dates = timing.factory, found.dates
     end = float(dates[-1].min())
@@ -117,7 +117,9 @@ def _stocks(timing: Timing, found: Firings) -> tuple[Stock, ...]:
     return tuple(stocks)
 
 
-def _stock(operation: Operation, enters: Floats, leaves: Floats, begin: float, end: float) -> Stock:
+def _stock(
+    operation: Operation, enters: Floats, leaves: Floats, begin: float, end: float
+) -> WorkInProgress:
     """Time averages between `begin` and `end`. Copies that are gone at the very moment at which
     another comes are not there with it."""
     stays = np.clip(leaves, begin, end) - np.clip(enters, begin, end)
@@ -132,7 +134,7 @@ def _stock(operation: Operation, enters: Floats, leaves: Floats, begin: float, e
     stay = float(whole.mean()) if len(whole) else 0.0
     length = end - begin
     mean = float(stays.sum()) / length if length > 0 else 0.0
-    return Stock(operation.label, not operation.inputs, mean, most, stay)
+    return WorkInProgress(operation.label, not operation.inputs, mean, most, stay)
 
 
 def _share(timing: Timing, net: TimedNet, number: int) -> Share:

@@ -13,7 +13,7 @@ from factory.nets.cycle_ratio import max_cycle_ratio
 from factory.nets.gears import GearNet
 from factory.nets.marked import MarkedNet, marked
 from factory.nets.slack import Slack, circuits, slacks
-from factory.study.analysis.tables import SHOWN, Table, cut
+from factory.study.analysis.tables import SHOWN, PrintedTable, cut
 from factory.support.errors import Diagnostic, InputError, Position, did_you_mean
 
 MOST = 1_000
@@ -75,7 +75,7 @@ def net_document(name: str, found: NetAnalysis) -> dict[str, object]:
     }
 
 
-def net_tables(found: NetAnalysis, verbose: bool) -> Iterator[Table]:
+def net_tables(found: NetAnalysis, verbose: bool) -> Iterator[PrintedTable]:
     """The circuits and the places with little slack, for people."""
     places, most = found.net.net.places, None if verbose else SHOWN
     rows = []

@@ -14,7 +14,7 @@ from factory.study.analysis.timing import Timing
 
 
 @dataclass(frozen=True, slots=True)
-class Pair:
+class ComparedFigure:
     """A quantity as predicted and as measured, None where a run is too short to say."""
 
     predicted: float
@@ -32,7 +32,7 @@ class Duration:
     measured. The first time is left out where there are others: robots may come from elsewhere."""
 
     label: str
-    time: Pair
+    time: ComparedFigure
     least: float
     greatest: float
     count: int
@@ -44,11 +44,11 @@ class Comparison:
 
     source: str
     units: int
-    cycle: Pair
-    first: Pair
-    last: Pair
+    cycle: ComparedFigure
+    first: ComparedFigure
+    last: ComparedFigure
     durations: tuple[Duration, ...] = field(repr=False)
-    busy: tuple[Pair, ...] = field(repr=False)
+    busy: tuple[ComparedFigure, ...] = field(repr=False)
 
     @property
     def worst(self) -> Duration | None:
@@ -58,7 +58,7 @@ class Comparison:
 
 
 @dataclass(frozen=True, slots=True)
-class Record:
+class RunRecord:
     """What a run left: its events, when each product was dropped off, its end [s]."""
 
     source: str
@@ -66,7 +66,7 @@ class Record:
     dropoffs: tuple[float, ...]
 
 
-def compare(timing: Timing, net: TimedNet, found: Flow, record: Record) -> Comparison:
+def compare(timing: Timing, net: TimedNet, found: Flow, record: RunRecord) -> Comparison:
     """The record of a run from the initial marking against the flow of as many units."""
     factory = timing.factory
     times: dict[str, list[float]] = {}
@@ -89,21 +89,27 @@ def compare(timing: Timing, net: TimedNet, found: Flow, record: Record) -> Compa
     return Comparison(
         record.source,
         len(left),
-        Pair(net.pace, _interval(left)),
-        Pair(found.first, left[0] if left else None),
-        Pair(found.last, last),
+        ComparedFigure(net.pace, _interval(left)),
+        ComparedFigure(found.first, left[0] if left else None),
+        ComparedFigure(found.last, last),
         tuple(compared),
-        tuple(Pair(p, b / last if last else None) for p, b in zip(shares, busy, strict=True)),
+        tuple(
+            ComparedFigure(p, b / last if last else None) for p, b in zip(shares, busy, strict=True)
+        ),
     )
 
 
 def _duration(label: str, predicted: float, spent: Sequence[float]) -> Duration:
     counted = np.array(spent[1:] if len(spent) > 1 else spent)
     if not len(counted):
-        return Duration(label, Pair(predicted, None), 0.0, 0.0, 0)
+        return Duration(label, ComparedFigure(predicted, None), 0.0, 0.0, 0)
     mean = float(counted.mean())
     return Duration(
-        label, Pair(predicted, mean), float(counted.min()), float(counted.max()), len(counted)
+        label,
+        ComparedFigure(predicted, mean),
+        float(counted.min()),
+        float(counted.max()),
+        len(counted),
     )
 
 

@@ -13,7 +13,7 @@ from factory.control.profile import World
 from factory.plant.factory import Factory
 from factory.record.log.header import settings_of
 from factory.simulation.run import Event, Run
-from factory.study.analysis.measured import Record
+from factory.study.analysis.measured import RunRecord
 from factory.support.errors import Diagnostic, InputError
 from factory.support.settings import Settings
 
@@ -29,9 +29,9 @@ class Conditions:
     wip: int | None
 
 
-def record_of(run: Run) -> Record:
+def record_of(run: Run) -> RunRecord:
     """What a run on the spot left."""
-    return Record("a run on the spot", run.events, run.dropoffs)
+    return RunRecord("a run on the spot", run.events, run.dropoffs)
 
 
 def logged_record(
@@ -39,11 +39,11 @@ def logged_record(
     events: Sequence[tuple[float, str]],
     time: NDArray[np.float64],
     delivered: NDArray[np.int32],
-) -> Record:
+) -> RunRecord:
     """What a log holds; the moment of a dropoff is the first tick after it."""
     grown = np.flatnonzero(np.diff(delivered)) + 1
     left = tuple(time[grown].tolist())
-    return Record(source, tuple(Event(t, name) for t, name in events), left)
+    return RunRecord(source, tuple(Event(t, name) for t, name in events), left)
 
 
 def conditions(header: Mapping[str, Any]) -> Conditions:
@@ -70,7 +70,7 @@ def check_log(source: str, header: Mapping[str, Any], factory: Factory) -> None:
         )
 
 
-def check_products(record: Record) -> None:
+def check_products(record: RunRecord) -> None:
     """A run that left no product says nothing. Raises InputError (BadLog)."""
     if not record.dropoffs:
         message = f"'{record.source}' has no finished product"

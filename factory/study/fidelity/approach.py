@@ -15,7 +15,7 @@ from factory.control.mode import Array, Index, Truth
 from factory.layout.clearance import certify
 from factory.layout.layout import Layout
 from factory.mjcf import names
-from factory.study.fidelity.record import Approach
+from factory.study.fidelity.record import ClosestApproach
 from factory.study.fidelity.shadow import Shadow
 from factory.study.fidelity.welds import Welds
 
@@ -102,10 +102,10 @@ class Approaches:
             self.least[i, j] = self.least[j, i] = dist[nearest]
             self.who[i, j] = (self.m.body(int(a)).name, self.m.body(int(b)).name)
 
-    def found(self) -> tuple[Approach, ...]:
+    def found(self) -> tuple[ClosestApproach, ...]:
         """All kinds of pairs that have come within the detection distance."""
         return tuple(
-            Approach(
+            ClosestApproach(
                 f"{KINDS[i]} - {KINDS[j]}",
                 1e3 * float(self.certified[i, j]),
                 1e3 * float(self.least[i, j]),

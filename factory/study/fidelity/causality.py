@@ -25,7 +25,7 @@ MOST = 6000
 
 
 @dataclass(frozen=True, slots=True)
-class Process:
+class CausalRecord:
     """A record as a partial order: its firings with their times [s] and immediate causes."""
 
     times: dict[Firing, float]
@@ -47,7 +47,9 @@ class Orders:
         return 100.0 * self.swapped / self.unrelated if self.unrelated else 0.0
 
 
-def process(net: GearNet, events: Iterable[Event], start: Marking | None = None) -> Process:
+def causal_record(
+    net: GearNet, events: Iterable[Event], start: Marking | None = None
+) -> CausalRecord:
     """The token game of a legal record, each token knowing the firing that made it."""
     marking = net.initial_marking if start is None else start
     threaded = net.threaded.net
@@ -64,10 +66,10 @@ def process(net: GearNet, events: Iterable[Event], start: Marking | None = None)
         causes[firing] = frozenset(cause for cause in taken if cause is not None)
         times[firing] = event.t
         made.update(dict.fromkeys(threaded.postset[index], firing))
-    return Process(times, causes)
+    return CausalRecord(times, causes)
 
 
-def compare(one: Process, other: Process) -> Orders:
+def compare(one: CausalRecord, other: CausalRecord) -> Orders:
     """Order and causes of two records, on the firings that both have."""
     shared = [firing for firing in one.times if firing in other.times]
     differing = sum(one.causes[f] != other.causes[f] for f in shared)
@@ -79,13 +81,13 @@ def compare(one: Process, other: Process) -> Orders:
     return Orders(int((upper & (first != second)).sum()), int(upper.sum()), differing)
 
 
-def differences(one: Process, other: Process) -> Array:
+def differences(one: CausalRecord, other: CausalRecord) -> Array:
     """Time in `other` less time in `one` of every firing that both have [s]."""
     shared = [firing for firing in one.times if firing in other.times]
     return np.array([other.times[f] - one.times[f] for f in shared])
 
 
-def durations(record: Process) -> dict[Firing, float]:
+def durations(record: CausalRecord) -> dict[Firing, float]:
     """X_e - X_s [s] by the end's firing, where both are in the record."""
     found = {}
     for (name, n), time in record.times.items():
@@ -95,13 +97,13 @@ def durations(record: Process) -> dict[Firing, float]:
     return found
 
 
-def duration_differences(one: Process, other: Process) -> Array:
+def duration_differences(one: CausalRecord, other: CausalRecord) -> Array:
     """Duration in `other` less that in `one`, of every operation that both have [s]."""
     first, second = durations(one), durations(other)
     return np.array([second[f] - first[f] for f in first if f in second])
 
 
-def _related(firings: Sequence[Firing], record: Process) -> Truth:
+def _related(firings: Sequence[Firing], record: CausalRecord) -> Truth:
     """Whether one of two firings is before the other through causes (n, n)."""
     place = {firing: i for i, firing in enumerate(firings)}
     before = np.zeros((len(firings), len(firings)), bool)
@@ -112,6 +114,6 @@ def _related(firings: Sequence[Firing], record: Process) -> Truth:
     return np.logical_or(before, before.T)
 
 
-def _signs(firings: Sequence[Firing], record: Process) -> Array:
+def _signs(firings: Sequence[Firing], record: CausalRecord) -> Array:
     times = np.array([record.times[firing] for firing in firings])
     return np.asarray(np.sign(times[:, None] - times[None, :]))

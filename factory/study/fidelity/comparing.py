@@ -16,7 +16,12 @@ from factory.simulation.run import Run
 from factory.simulation.simulation import Simulation
 from factory.study.analysis.steady import steady_units
 from factory.study.analysis.timing import Timing
-from factory.study.fidelity.causality import compare, differences, duration_differences, process
+from factory.study.fidelity.causality import (
+    causal_record,
+    compare,
+    differences,
+    duration_differences,
+)
 from factory.study.fidelity.measuring import Measurement
 from factory.study.fidelity.quantities import QUANTITIES
 from factory.study.fidelity.record import Fidelity, SeedRecord
@@ -136,7 +141,7 @@ def _compared(layout: Layout, ideal: Run, run: Run) -> SeedRecord:
     }
     apart = spent = np.empty(0)
     if not illegal:
-        one, other = process(net, ideal.events), process(net, run.events)
+        one, other = causal_record(net, ideal.events), causal_record(net, run.events)
         orders = compare(one, other)
         apart, spent = differences(one, other), duration_differences(one, other)
         cycle = ideal.cycle_time_s or ideal.predicted_cycle_time_s

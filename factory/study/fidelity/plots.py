@@ -8,7 +8,7 @@ import numpy as np
 
 from factory.study.fidelity.convergence import Series, Study
 from factory.study.fidelity.quantities import QUANTITIES
-from factory.study.fidelity.record import Approach, Fidelity
+from factory.study.fidelity.record import ClosestApproach, Fidelity
 from factory.support.plotting import (
     BLUE,
     GREY,
@@ -157,7 +157,7 @@ def _product(found: Fidelity) -> Any:
 
 def _approach(found: Fidelity) -> Any:
     """Least distances by kinds of bodies against what is certified."""
-    least: dict[str, Approach] = {}
+    least: dict[str, ClosestApproach] = {}
     for record in found.seeds:
         for one in record.approaches:
             kept = least.get(one.kinds)

@@ -44,7 +44,7 @@ class Misplaced:
 
 
 @dataclass(frozen=True, slots=True)
-class Approach:
+class ClosestApproach:
     """The least distance between bodies of two kinds, what is certified for them, and who it was;
     `least_mm` None where nothing came within the detection distance."""
 
@@ -67,7 +67,7 @@ class SeedRecord:
     figures: Figures
     handoffs: tuple[HandOff, ...] = ()
     misplaced: tuple[Misplaced, ...] = ()
-    approaches: tuple[Approach, ...] = ()
+    approaches: tuple[ClosestApproach, ...] = ()
     differences: tuple[float, ...] = field(default=(), repr=False)
     durations: tuple[float, ...] = field(default=(), repr=False)
     contacts: tuple[str, ...] = ()
