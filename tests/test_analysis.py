@@ -30,11 +30,10 @@ from factory.nets.slack import circuits, slacks
 from factory.simulation.run import Run
 from factory.simulation.simulation import Simulation
 from factory.study.analysis import Change, Timing, analyse
-from factory.study.analysis.bounds import wip_curve
 from factory.study.analysis.flow import flow
 from factory.study.analysis.steady import reached
 from factory.study.analysis.timed import timed_net
-from factory.study.analysis.what_if import scenarios
+from factory.study.analysis.what_if import scenarios, wip_curve
 from factory.support.settings import Settings
 from factory.timing.pool import part_pool
 from factory.timing.prediction import operation_delays, predict

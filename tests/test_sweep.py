@@ -28,8 +28,7 @@ from factory.simulation.simulation import Simulation
 from factory.study import pool
 from factory.study.sweep import Recipe, points, read_axes, summarise, sweeping
 from factory.study.sweep.grid import Point, Value
-from factory.study.sweep.kept import COLUMNS
-from factory.study.sweep.store import Store
+from factory.study.sweep.store import COLUMNS, Store
 from factory.study.sweep.sweeping import run_local, sweep
 from factory.study.sweep.work import FIGURES, Outcome, Runner
 from factory.support.errors import InputError, MissingError, RunError
@@ -597,7 +596,7 @@ def test_the_summary_is_numpys(tmp_path: Path, here: None) -> None:
         assert (group.done, group.failed, told.n) == (8, 0, 8)
         assert told.mean == pytest.approx(values.mean(), rel=1e-12)
         assert told.deviation == pytest.approx(values.std(ddof=1), rel=1e-12)
-        assert (told.low, told.high) == pytest.approx((low, high), rel=1e-9)
+        assert (told.confidence_low, told.confidence_high) == pytest.approx((low, high), rel=1e-9)
         assert (told.least, told.greatest) == (values.min(), values.max())
         assert "handoffs" not in group.figures  # no such thing in the ideal world
 
@@ -614,7 +613,7 @@ def test_failed_runs_count_and_nothing_more(tmp_path: Path) -> None:
     assert (group.done, group.failed) == (1, 2)
     assert found.reasons == {"Stalled so": 2}
     told = group.figures["cycle_time_s"]
-    assert (told.n, told.mean, told.deviation, told.low) == (1, 2.0, None, None)
+    assert (told.n, told.mean, told.deviation, told.confidence_low) == (1, 2.0, None, None)
 
 
 def test_summaries_are_told_and_drawn(tmp_path: Path, run: Terminal, here: None) -> None:

@@ -226,7 +226,7 @@ def _tell_summary(found: Summary, verbose: bool) -> None:
 
 
 def _cells(s: Statistic) -> tuple[float | None, ...]:
-    return s.mean, s.deviation, s.low, s.high, s.least, s.greatest
+    return s.mean, s.deviation, s.confidence_low, s.confidence_high, s.least, s.greatest
 
 
 def _shown(value: float | None) -> str:

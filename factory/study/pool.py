@@ -148,11 +148,11 @@ class _Pool(Generic[Item, Found]):
         if self.stillborn == STILLBORN:
             message = f"the processes die as they start (exit status {status})"
             raise RunError(Diagnostic("Killed", message, None, "take fewer --jobs, or more memory"))
-        gone = None
+        gone: Worked[Found] | None = None
         if number is not None:
             self.tries[number] += 1
             if self.tries[number] > TRIES:
-                gone = Worked[Found](number, None, TRIES, status)
+                gone = Worked(number, None, TRIES, status)
             else:
                 self.waiting.appendleft(number)
         if self.waiting:

@@ -7,6 +7,12 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from factory.show.report.recording import Recording
+from factory.study.analysis.measured import (
+    dropoff_times,
+    mean_interval,
+    operation_times,
+    robot_times,
+)
 
 
 @dataclass(frozen=True)
@@ -31,34 +37,16 @@ class MeasuredPace:
 def measured(recording: Recording) -> MeasuredPace:
     """What the log's events say."""
     log, factory = recording.log, recording.factory
-    times: dict[int, list[float]] = {}
-    for number, at in zip(log.fired.tolist(), log.fired_t.tolist(), strict=True):
-        times.setdefault(number, []).append(at)
-    grown = np.flatnonzero(np.diff(log.delivered)) + 1
-    dropoffs = tuple(log.time[grown].tolist())
-    durations: list[float | None] = []
-    busy = np.zeros(len(factory.robots))
-    for operation in factory.operations:
-        begun, ended = times.get(operation.start, []), times.get(operation.end, [])
-        late = len(ended) - len(begun) if len(ended) > len(begun) else 0
-        spent = [end - start for start, end in zip(begun, ended[late:], strict=False)]
-        counted = spent[1:] or spent
-        durations.append(sum(counted) / len(counted) if counted else None)
-        for robot in operation.robots:
-            busy[robot] += sum(spent)
+    spent = operation_times(factory, zip(log.fired.tolist(), log.fired_t.tolist(), strict=True))
+    counted = [times[1:] or times for times in spent]
+    durations = [sum(times) / len(times) if times else None for times in counted]
+    dropoffs = dropoff_times(log.time, log.delivered)
     gears = [sum(durations[o] or 0.0 for o in robot.operations) for robot in factory.robots]
     total = recording.end or 1.0
     return MeasuredPace(
         dropoffs,
-        _interval(dropoffs),
+        mean_interval(dropoffs),
         tuple(durations),
-        tuple((busy / total).tolist()),
+        tuple(busy / total for busy in robot_times(factory, spent)),
         tuple(gears),
     )
-
-
-def _interval(left: tuple[float, ...]) -> float | None:
-    if len(left) < 4:
-        return None
-    tail = left[len(left) // 2 - 1 :]
-    return (tail[-1] - tail[0]) / (len(tail) - 1)

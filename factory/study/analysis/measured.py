@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
+from numpy.typing import NDArray
 
+from factory.nets.firing import Floats
+from factory.plant.factory import Factory
 from factory.simulation.run import Event
 from factory.study.analysis.flow import Flow, busy_until, durations, lasting
 from factory.study.analysis.timed import TimedNet
@@ -69,27 +72,21 @@ class RunRecord:
 def compare(timing: Timing, net: TimedNet, found: Flow, record: RunRecord) -> Comparison:
     """The record of a run from the initial marking against the flow of as many units."""
     factory = timing.factory
-    times: dict[str, list[float]] = {}
-    for event in record.events:
-        times.setdefault(event.transition, []).append(event.t)
-    names = [transition.name for transition in factory.net.threaded.transitions]
+    number = factory.net.threaded.net.transition_index
+    spent = operation_times(factory, ((number[e.transition], e.t) for e in record.events))
+    busy = robot_times(factory, spent)
     first, usual = durations(timing, found)[0], lasting(timing, found)
-    compared, busy = [], [0.0] * len(factory.robots)
-    for operation in factory.operations:
-        begun = times.get(names[operation.start], [])
-        ended = times.get(names[operation.end], [])
-        spent = [end - start for start, end in zip(begun, ended, strict=False)]
-        predicted = float((usual if len(spent) > 1 else first)[operation.index])
-        compared.append(_duration(operation.label, predicted, spent))
-        for robot in operation.robots:
-            busy[robot] += sum(spent)
+    compared = [
+        _duration(o.label, float((usual if len(times) > 1 else first)[o.index]), times)
+        for o, times in zip(factory.operations, spent, strict=True)
+    ]
     left = record.dropoffs
     last = left[-1] if left else None
     shares = busy_until(timing, found)
     return Comparison(
         record.source,
         len(left),
-        ComparedFigure(net.pace, _interval(left)),
+        ComparedFigure(net.pace, mean_interval(left)),
         ComparedFigure(found.first, left[0] if left else None),
         ComparedFigure(found.last, last),
         tuple(compared),
@@ -97,6 +94,34 @@ def compare(timing: Timing, net: TimedNet, found: Flow, record: RunRecord) -> Co
             ComparedFigure(p, b / last if last else None) for p, b in zip(shares, busy, strict=True)
         ),
     )
+
+
+def operation_times(factory: Factory, firings: Iterable[tuple[int, float]]) -> list[list[float]]:
+    """How long each operation lasted each time, from its start to its end [s], by the times at
+    which transitions (by number) fired. An end whose start was before the run is left out."""
+    times: dict[int, list[float]] = {}
+    for number, t in firings:
+        times.setdefault(number, []).append(t)
+    found = []
+    for operation in factory.operations:
+        begun, ended = times.get(operation.start, []), times.get(operation.end, [])
+        late = max(0, len(ended) - len(begun))
+        found.append([end - start for start, end in zip(begun, ended[late:], strict=False)])
+    return found
+
+
+def robot_times(factory: Factory, spent: Sequence[Sequence[float]]) -> list[float]:
+    """How long each robot was in operations [s], by how long each of these lasted each time."""
+    busy = [0.0] * len(factory.robots)
+    for operation, times in zip(factory.operations, spent, strict=True):
+        for robot in operation.robots:
+            busy[robot] += sum(times)
+    return busy
+
+
+def dropoff_times(time: Floats, delivered: NDArray[np.int32]) -> tuple[float, ...]:
+    """When products were dropped off [s], to a tick, by the ticks of a log."""
+    return tuple(time[np.flatnonzero(np.diff(delivered)) + 1].tolist())
 
 
 def _duration(label: str, predicted: float, spent: Sequence[float]) -> Duration:
@@ -113,8 +138,8 @@ def _duration(label: str, predicted: float, spent: Sequence[float]) -> Duration:
     )
 
 
-def _interval(left: Sequence[float]) -> float | None:
-    """The mean interval over the last half of the products; None below 4."""
+def mean_interval(left: Sequence[float]) -> float | None:
+    """The mean interval [s] over the last half of the products; None below 4."""
     if len(left) < 4:
         return None
     tail = left[len(left) // 2 - 1 :]

@@ -13,7 +13,7 @@ from factory.control.profile import World
 from factory.plant.factory import Factory
 from factory.record.log.header import settings_of
 from factory.simulation.run import Event, Run
-from factory.study.analysis.measured import RunRecord
+from factory.study.analysis.measured import RunRecord, dropoff_times
 from factory.support.errors import Diagnostic, InputError
 from factory.support.settings import Settings
 
@@ -40,10 +40,9 @@ def logged_record(
     time: NDArray[np.float64],
     delivered: NDArray[np.int32],
 ) -> RunRecord:
-    """What a log holds; the moment of a dropoff is the first tick after it."""
-    grown = np.flatnonzero(np.diff(delivered)) + 1
-    left = tuple(time[grown].tolist())
-    return RunRecord(source, tuple(Event(t, name) for t, name in events), left)
+    """What a log holds."""
+    made = tuple(Event(t, name) for t, name in events)
+    return RunRecord(source, made, dropoff_times(time, delivered))
 
 
 def conditions(header: Mapping[str, Any]) -> Conditions:

@@ -1,12 +1,16 @@
-"""What the cycle time would be: further robots, faster robots, shorter ways."""
+"""What the cycle time would be: further robots, faster robots, shorter ways, fewer parts let in."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
 from factory.study.analysis.sensitivity import STEP
-from factory.study.analysis.timed import TimedNet, timed_net
-from factory.study.analysis.timing import Change, Timing
+from factory.study.analysis.timed import SAME, TimedNet, timed_net
+from factory.study.analysis.timing import AS_IT_IS, Change, Timing
+from factory.timing.pool import part_pool
+
+POINTS = 12
+"""So many points of the curve at the most."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,3 +71,33 @@ def listed(names: list[str], most: int = 6) -> str:
     """Names in a row of words."""
     shown = names[:most] + ([f"{len(names) - most} more"] if len(names) > most else [])
     return " and ".join([", ".join(shown[:-1]), shown[-1]] if len(shown) > 1 else shown)
+
+
+@dataclass(frozen=True, slots=True)
+class WipCurve:
+    """Points (W, cycle time [s]) for growing W; `least`: the least W at which the pace is the full
+    one; `all`: that at which W is no bound any more."""
+
+    points: tuple[tuple[int, float], ...]
+    least: int
+    all: int
+
+
+def wip_curve(timing: Timing) -> WipCurve:
+    """The cycle time for some W from 1 up to the least at which the pace is the full one, and on
+    to where W bounds nothing. Found by bisection: the cycle time never grows with W."""
+    full = timed_net(timing).pace
+    paces: dict[int, float] = {}
+
+    def pace(wip: int) -> float:
+        if wip not in paces:
+            paces[wip] = timed_net(timing, AS_IT_IS, wip).pace
+        return paces[wip]
+
+    top = max(part_pool(timing.factory).values())
+    low, high = 0, top
+    while high - low > 1:
+        middle = (low + high) // 2
+        low, high = (low, middle) if pace(middle) <= full * (1 + SAME) else (middle, high)
+    shown = sorted({round(1 + (top - 1) * i / (POINTS - 1)) for i in range(POINTS)} | {high})
+    return WipCurve(tuple((wip, pace(wip)) for wip in shown), high, top)

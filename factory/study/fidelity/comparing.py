@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from time import perf_counter
 
 import numpy as np
@@ -12,6 +12,7 @@ import numpy as np
 from factory.control.mode import Array
 from factory.layout.layout import Layout
 from factory.mjcf.model import product_name
+from factory.nets.gears import GearNet
 from factory.simulation.run import Run
 from factory.simulation.simulation import Simulation
 from factory.study.analysis.steady import steady_units
@@ -111,26 +112,28 @@ def measure_seed(case: Case, seed: int) -> SeedRecord:
     measurement = Measurement(physical)
     begin = perf_counter()
     thought, run = ideal.run(max_time=case.max_time), measurement.run(case.max_time)
-    record = _compared(layout, thought, run)
-    handoffs, misplaced = measurement.handoffs.all(), measurement.finished.found()
-    figures = {**record.figures, **measurement.figures()}
-    return replace(
-        record,
-        seed=seed,
-        figures={key: figures.get(key) for key in QUANTITIES},
-        handoffs=handoffs,
-        misplaced=misplaced,
-        approaches=measurement.approaches.found(),
-        run_s=perf_counter() - begin - measurement.seconds,
-        measuring_s=measurement.seconds,
+    took = perf_counter() - begin
+    figures, apart, spent = _compared(layout.factory.net, thought, run)
+    figures |= measurement.figures()
+    return SeedRecord(
+        seed,
+        run.units,
+        {key: figures.get(key) for key in QUANTITIES},
+        measurement.handoffs.all(),
+        measurement.finished.found(),
+        measurement.approaches.found(),
+        tuple(np.round(apart, 9).tolist()),
+        tuple(np.round(spent, 9).tolist()),
+        run.physics.contacts if run.physics else (),
+        tuple(t for t in (thought.trouble, run.trouble) if t is not None),
+        took - measurement.seconds,
+        measurement.seconds,
     )
 
 
-def _compared(layout: Layout, ideal: Run, run: Run) -> SeedRecord:
-    """The figures that need both runs."""
-    net = layout.factory.net
+def _compared(net: GearNet, ideal: Run, run: Run) -> tuple[dict[str, float | None], Array, Array]:
+    """The figures that need both runs; how far firing times and durations are apart [s]."""
     illegal = (not ideal.refines_net) + (not run.refines_net)
-    physics = run.physics
     figures: dict[str, float | None] = {
         "illegal_records": illegal,
         "monitor_violations": len(run.monitor.violations) if run.monitor else None,
@@ -139,26 +142,17 @@ def _compared(layout: Layout, ideal: Run, run: Run) -> SeedRecord:
         "cycle_from_ideal_percent": _over(run.cycle_time_s, ideal.cycle_time_s),
         "cycle_from_predicted_percent": _over(run.cycle_time_s, run.predicted_cycle_time_s),
     }
-    apart = spent = np.empty(0)
-    if not illegal:
-        one, other = causal_record(net, ideal.events), causal_record(net, run.events)
-        orders = compare(one, other)
-        apart, spent = differences(one, other), duration_differences(one, other)
-        cycle = ideal.cycle_time_s or ideal.predicted_cycle_time_s
-        figures |= {
-            "orders_swapped_percent": orders.percent,
-            "causes_differing": orders.causes,
-            **_distances(apart, spent, cycle),
-        }
-    return SeedRecord(
-        run.seed,
-        run.units,
-        figures,
-        differences=tuple(np.round(apart, 9).tolist()),
-        durations=tuple(np.round(spent, 9).tolist()),
-        contacts=physics.contacts if physics else (),
-        trouble=tuple(t for t in (ideal.trouble, run.trouble) if t is not None),
-    )
+    if illegal:
+        return figures, np.empty(0), np.empty(0)
+    one, other = causal_record(net, ideal.events), causal_record(net, run.events)
+    orders = compare(one, other)
+    apart, spent = differences(one, other), duration_differences(one, other)
+    figures |= {
+        "orders_swapped_percent": orders.percent,
+        "causes_differing": orders.causes,
+        **_distances(apart, spent, ideal.cycle_time_s or ideal.predicted_cycle_time_s),
+    }
+    return figures, apart, spent
 
 
 def _distances(apart: Array, spent: Array, cycle: float | None) -> dict[str, float | None]:

@@ -13,12 +13,9 @@ from factory.record.monitor import beside
 from factory.simulation.run import Run
 from factory.simulation.simulation import Simulation
 from factory.study.fidelity.approach import BEYOND, Approaches
-from factory.study.fidelity.drives import Drives
+from factory.study.fidelity.dynamics import Drives, Payload, Residual
 from factory.study.fidelity.finished import Finished
 from factory.study.fidelity.handoffs import HandOffs
-from factory.study.fidelity.payload import Payload
-from factory.study.fidelity.record import HandOff
-from factory.study.fidelity.residual import Residual
 from factory.study.fidelity.shadow import Shadow
 from factory.study.fidelity.steps import Steps
 from factory.study.fidelity.welds import Velocities, Welds
@@ -92,7 +89,12 @@ class Measurement:
             "tracking_error_p99_mm": 1e3 * drives.tracking.quantile(0.99),
             "tracking_error_rms_mm": 1e3 * drives.tracking.rms,
             "handoffs": sum(h.parts for h in handoffs),
-            **_of_handoffs(handoffs),
+            "handoff_gap_max_mm": max((h.gap_mm for h in handoffs), default=None),
+            "speed_step_max_mm_s": max((h.speed_step_mm_s for h in handoffs), default=None),
+            "impulse_max_mNs": max((h.impulse_mNs for h in handoffs), default=None),
+            "handoff_energy_max_mJ_per_kg": max(
+                (h.energy_mJ_per_kg for h in handoffs), default=None
+            ),
             "weld_residual_max_mm": 1e3 * self.residual.largest,
             "weld_residual_p99_mm": 1e3 * self.residual.moving.quantile(0.99),
             "product_position_max_mm": max((m.position_mm for m in misplaced), default=None),
@@ -111,12 +113,3 @@ class Measurement:
             "unintended_contacts": physics.unintended_contacts,
             "engine_warnings": physics.engine_warnings,
         }
-
-
-def _of_handoffs(handoffs: tuple[HandOff, ...]) -> dict[str, float | None]:
-    return {
-        "handoff_gap_max_mm": max((h.gap_mm for h in handoffs), default=None),
-        "speed_step_max_mm_s": max((h.speed_step_mm_s for h in handoffs), default=None),
-        "impulse_max_mNs": max((h.impulse_mNs for h in handoffs), default=None),
-        "handoff_energy_max_mJ_per_kg": max((h.energy_mJ_per_kg for h in handoffs), default=None),
-    }

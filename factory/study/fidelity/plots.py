@@ -161,7 +161,7 @@ def _approach(found: Fidelity) -> Any:
     for record in found.seeds:
         for one in record.approaches:
             kept = least.get(one.kinds)
-            if kept is None or (one.least_mm or 0.0) < (kept.least_mm or 0.0):
+            if kept is None or one.least_mm < kept.least_mm:
                 least[one.kinds] = one
     if not least:
         return None
@@ -170,7 +170,7 @@ def _approach(found: Fidelity) -> Any:
     at = np.arange(len(rows))
     axes.barh(at, [r.least_mm for r in rows], 0.5, color=BLUE, label="closest approach")
     axes.plot([r.certified_mm for r in rows], at, "|", ms=18, mew=2, color=RED, label="certified")
-    axes.set_yticks(at, [f"{r.kinds}\n{' – '.join(r.bodies or ())}" for r in rows], fontsize=8)
+    axes.set_yticks(at, [f"{r.kinds}\n{' – '.join(r.bodies)}" for r in rows], fontsize=8)
     axes.set_xlabel("distance [mm]")
     axes.grid(axis="y", visible=False)
     axes.legend(loc="lower left", bbox_to_anchor=(0, 1), ncols=2)

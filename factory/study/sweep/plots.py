@@ -85,7 +85,7 @@ def _lines(axes: Any, groups: Sequence[Group], key: str, across: str) -> None:
             break
         line = sorted(members, key=place)
         told = [group.figures[key] for group in line]
-        spread = [0.0 if s.low is None else s.mean - s.low for s in told]
+        spread = [0.0 if s.confidence_low is None else s.mean - s.confidence_low for s in told]
         axes.errorbar(
             [place(group) for group in line],
             [s.mean for s in told],

@@ -16,7 +16,7 @@ from factory.lang.pag_writer import write_pag
 from factory.lang.template_writer import write_template
 from factory.layout.request import Ground
 from factory.plant.factory import Factory
-from factory.study.sweep.grid import DEFAULTS, SETTINGS, Axis, Point, Value
+from factory.study.sweep.grid import DEFAULTS, Axis, Point, Value
 from factory.support.pickling import pickle_locked_mappings
 from factory.support.resources import mjcf_folder
 from factory.support.version import __version__
@@ -64,11 +64,6 @@ class Recipe:
 def versions() -> dict[str, str]:
     """What a run's figures depend on, beside its product."""
     return {"factory": __version__, "mujoco": version("mujoco")}
-
-
-def settings_at(values: Mapping[str, Value]) -> dict[str, Any]:
-    """Those values that are settings."""
-    return {name: values[name] for name in SETTINGS}
 
 
 def digest(factory: Factory, product: Product) -> str:

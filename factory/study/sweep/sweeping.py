@@ -3,7 +3,7 @@ comes."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator, Sequence
+from collections.abc import Generator, Sequence
 from contextlib import closing
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -92,7 +92,7 @@ def sweep(
         begin = perf_counter()
         with (
             RunsBar(len(grid), tally.there, quiet) as bar,
-            closing(_backend(on, jobs)(recipe, wanted)) as outcomes,
+            closing(_outcomes(recipe, wanted, on, jobs)) as outcomes,
         ):
             for outcome in outcomes:
                 with Interruption() as interruption:
@@ -116,10 +116,10 @@ def run_local(recipe: Recipe, points: Sequence[Point], jobs: int) -> Outcomes:
                 yield replace(one.found, tries=one.tries)
 
 
-def _backend(on: str, jobs: int) -> Callable[[Recipe, Sequence[Point]], Outcomes]:
-    """What runs points, by the name of a place."""
+def _outcomes(recipe: Recipe, wanted: Sequence[Point], on: str, jobs: int) -> Outcomes:
+    """The outcomes of points, from processes or from the cluster at a place."""
     if on == LOCAL:
-        return lambda recipe, wanted: run_local(recipe, wanted, jobs)
+        return run_local(recipe, wanted, jobs)
     from factory.study.sweep.cluster import run_dask
 
-    return lambda recipe, wanted: run_dask(recipe, wanted, on)
+    return run_dask(recipe, wanted, on)

@@ -17,8 +17,8 @@ from factory.plant.fused_bodies import fusing_pays
 from factory.problem.robot_types import load_catalogue
 from factory.simulation.run import Run
 from factory.simulation.simulation import Compiled, Simulation, compiled
-from factory.study.sweep.grid import Point
-from factory.study.sweep.recipe import Recipe, settings_at
+from factory.study.sweep.grid import SETTINGS, Point
+from factory.study.sweep.recipe import Recipe
 from factory.support.errors import FactoryError
 from factory.support.settings import Settings
 
@@ -95,7 +95,7 @@ class Runner:
     def run(self, point: Point) -> Run:
         """The run at a point. Raises FactoryError."""
         values: dict[str, Any] = self.recipe.at(point)
-        settings = Settings(**settings_at(values))
+        settings = Settings(**{name: values[name] for name in SETTINGS})
         units, wip = values["units"], values["wip"]
         layout = _or_raise(self._layout(settings))
         shared = _or_raise(self._compiled(settings, values["world"], units, wip))
