@@ -208,7 +208,7 @@ def test_a_part_that_is_let_go(paper: Layout) -> None:
     done = plant(simulation, after(simulation, "sub1_e"), let_go)
     _, report = watched(simulation, 3)
     assert_caught(report, "Dropped", "r3", "part1", 6, done[0])
-    assert report.violations[0].message == "nobody holds part1#1, which r3 held"
+    assert report.violations[0].message == "nothing holds part1#1, which r3 held"
 
 
 def test_a_part_that_is_knocked_off_its_place(paper: Layout) -> None:

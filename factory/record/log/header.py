@@ -1,4 +1,4 @@
-"""What the header of a log must be: checked once, when the log is read."""
+"""The header of a log: what its values must be, checked when the log is read."""
 
 from __future__ import annotations
 
@@ -10,15 +10,15 @@ from factory.control.profile import World
 from factory.support.settings import RANGES, Settings, wrong_type
 
 LARGE = 10**9
-"""No length [m], time [s] or count in a header is greater."""
+"""Upper bound on every length [m], time [s] and count in a header."""
 
 Test = Callable[[Any], bool]
 
 
 @dataclass(frozen=True, slots=True)
 class Key:
-    """A key of the header, with a dot within a table: what its value is, in words too; `later`:
-    logs of older versions lack it."""
+    """A key of the header, with a dot within a table: what its value must be, in words, and the
+    test of that; `later`: logs of older versions lack it."""
 
     name: str
     wanted: str
@@ -26,7 +26,7 @@ class Key:
     later: bool = False
 
     def check(self, header: Mapping[str, Any]) -> None:
-        """Raises ValueError where its value is missing or is something else."""
+        """Raises ValueError where the value is missing or fails the test."""
         value: Any = header
         for word in self.name.split("."):
             if word not in value:
@@ -40,7 +40,7 @@ class Key:
 
 
 def check_header(header: Any) -> None:
-    """Raises ValueError where a value is missing, or is none that a run can have."""
+    """Raises ValueError where a value is missing, or no run can have it."""
     if not is_table(header):
         raise ValueError("its header is no table")
     for key in KEYS:
@@ -54,7 +54,7 @@ def check_header(header: Any) -> None:
 
 
 def settings_of(header: Mapping[str, Any]) -> Settings:
-    """The settings of the run: those that this version knows."""
+    """The settings of the run that this version knows."""
     known = {field.name for field in fields(Settings)}
     return Settings(**{k: v for k, v in header["settings"].items() if k in known})
 
@@ -146,4 +146,4 @@ KEYS = (
     Key("places", "a list of texts", listed(is_text)),
     Key("transitions", "a list of texts", listed(is_text)),
 )
-"""What is read of a header, by anybody."""
+"""The keys that some reader uses."""

@@ -1,4 +1,4 @@
-"""Writing a log while a factory runs."""
+"""The writer of a log, an observer of a run."""
 
 from __future__ import annotations
 
@@ -66,11 +66,11 @@ class _Ticks:
 
 
 class LogWriter(Closing):
-    """An observer that writes a log; close it, or use it as a context manager.
+    """Writes a log; to be closed, or used as a context manager.
 
-    `source`: the PAG with its templates, if there is more to it than the factory knows; `command`:
-    the command line, this process's unless given. Raises InputError (BadLog) where the file cannot
-    be written."""
+    `source`: the PAG as it was read, where the factory was compiled from more; `command`: the
+    command line, that of this process unless given. Raises InputError (BadLog) where the file
+    cannot be written."""
 
     def __init__(
         self,

@@ -10,12 +10,12 @@ from factory.record.monitor.anatomy import GRIP, HOLD, Anatomy
 from factory.record.monitor.observation import Array, Index, Observation
 
 HANGS = 2e-3
-"""A part further than this from where its weld keeps it is not held [m], beyond twice the radius of
-the goal balls in which robots hand over. The engine's welds yield by 0.03 mm, and hand-overs with a
-gap above 1 mm are faults already."""
+"""A part is not held where it is further than this from its place [m], beyond twice the radius of
+the goal balls in which robots hand over. The engine's welds yield by 0.03 mm, and a hand-over with
+a gap above 1 mm is a fault already."""
 
 TURNS = 0.05
-"""Nor is one that is turned by more than this [rad]."""
+"""A part that is turned by more than this is not held either [rad]."""
 
 STRAIGHT = float(np.cos(TURNS / 2))
 """The least product of two quaternions that are no further apart."""
@@ -23,7 +23,7 @@ STRAIGHT = float(np.cos(TURNS / 2))
 
 @dataclass(frozen=True, slots=True)
 class Switch:
-    """A copy that is held by other welds than before, by number."""
+    """A copy that is held by other welds than before; all by number."""
 
     copy: int
     before: tuple[int, ...]

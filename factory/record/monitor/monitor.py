@@ -21,10 +21,10 @@ from factory.record.monitor.transfers import Transfers
 from factory.support.errors import Position
 
 MOST = 100
-"""So many violations are kept, the first ones: a fault is often followed by others."""
+"""Number of violations that are kept, the first ones: a fault is often followed by others."""
 
 TICKS = 1.5
-"""What is seen only tick by tick may be off by so many."""
+"""Times that are seen tick by tick may be off by so many ticks."""
 
 
 @dataclass(slots=True)
@@ -44,8 +44,8 @@ class Monitor:
     run begins, and then an observation after every tick.
 
     `turn[r]`: how many operations robot r has finished since m_0, which tells where in its gear it
-    is; `judged[o]`: how often operation o has been looked at when it was over. `time_s`: what all
-    this took [s].
+    is; `judged[o]`: how often operation o has been judged. `time_s`: the time that the monitor took
+    [s].
     """
 
     def __init__(self, subject: MonitorSubject, anatomy: Anatomy, first: Observation) -> None:
@@ -156,13 +156,13 @@ class Monitor:
         self.clock.changed = self.clock.now
         self._over(robot, turn, begun)
         if self.subject.goes_ahead(operation, robot):
-            return  # it need not wait until the operation starts
+            return  # it may leave before the operation starts
         name = self.factory.robots[robot].name
         shown = max(self.clock.begun, begun - self.subject.settings.tick)
         self.explanation.saw(operation.start, unit, self.clock.begun, begun, shown, name)
 
     def _passed(self, robot: int) -> None:
-        """A robot passes its goal without stopping: its operation ended before it had come."""
+        """A robot passes its goal without stopping: its operation ended before the robot came."""
         operation, _ = self._at(robot, self.turn[robot])
         words = f"it passes its goal of {self.subject.name(operation)} without stopping"
         self._blame("Early", robot, operation.label, words)
@@ -181,8 +181,9 @@ class Monitor:
         self.turn[robot] = max(self.turn[robot], turn)
 
     def _judge(self, operation: Operation, unit: int, t: float, leaving: int = -1) -> None:
-        """Whether the robots of an operation that is over at `t` [s] were at their goals, at rest,
-        and for as long as it takes. The one that shows its end by `leaving` was."""
+        """Blame a robot of an operation that is over at `t` [s] where it was not at rest at its
+        goal, or not for as long as the operation takes. The robot `leaving`, which shows the end,
+        was."""
         if self.judged[operation.index] > unit:
             return
         self.judged[operation.index] = unit + 1
@@ -208,8 +209,8 @@ class Monitor:
         self._blame("Stuck", robot, self._label(robot), words, since)
 
     def _stalled(self) -> None:
-        """Nothing has happened for too long. To blame are the robots that are under way, or else an
-        operation that all its robots have come to and that does not go on."""
+        """Nothing has happened for too long: blame the robots that are under way, or else
+        operations that all their robots have come to."""
         self.clock.stalled = True
         when = f"nothing has happened for {self.clock.now - self.clock.changed:.1f} s"
         away = [r for r in range(len(self.turn)) if self.motion.gone[r]]
@@ -222,7 +223,7 @@ class Monitor:
             self._blame("Stalled", operation.carrier, operation.label, words, self.clock.changed)
 
     def _ready(self) -> list[Operation]:
-        """The operations that all their robots have come to: those that are fed by others first."""
+        """The operations that all their robots have come to, those without inputs first."""
         at = [self._at(r, turn)[0].index for r, turn in enumerate(self.turn)]
         ready = [o for o in self.factory.operations if all(at[r] == o.index for r in o.robots)]
         return sorted(ready, key=lambda o: not o.inputs)
@@ -230,13 +231,13 @@ class Monitor:
     # --- words ---------------------------------------------------------------------------------
 
     def _at(self, robot: int, turn: int) -> tuple[Operation, int]:
-        """The operation that a robot comes to after `turn` others, and its unit."""
+        """The operation of a robot after `turn` others, and its unit."""
         gear: Sequence[int] = self.factory.robots[robot].operations
         unit, step = divmod(turn, len(gear))
         return self.factory.operations[gear[step]], unit
 
     def _label(self, robot: int) -> str:
-        """What a robot is at; the dropoff for the outfeed."""
+        """The label of the operation that a robot is at; of the dropoff for the outfeed."""
         if robot < 0:
             return self.factory.dropoff.label
         return self._at(robot, self.turn[robot])[0].label

@@ -1,5 +1,5 @@
 """How robots move: which leave the place where they stood, come to their goal, pass it, or do not
-follow their setpoints. Nothing here loops over robots."""
+follow their setpoints."""
 
 from __future__ import annotations
 
@@ -13,16 +13,16 @@ from factory.record.monitor.observation import Array, Index, Observation
 from factory.support.settings import Settings
 
 REST = 0.01
-"""Robots hand over only when slower than this [m/s]."""
+"""Speed below which robots hand over [m/s]."""
 
 NEAREST = 1e-3
-"""What a robot at rest may do within a tick counts at most so far [m]."""
+"""Upper bound on the way that a robot at rest may go within a tick [m]."""
 
 LAG = 0.01
-"""A robot follows its setpoint within this [m], and what it does in `LATENCY`."""
+"""A robot follows its setpoint within this [m], plus its way in `LATENCY`."""
 
 LATENCY = 0.02
-"""[s]: more than the time constant of a drive's position loop, 1/70 s."""
+"""More than the time constant of a drive's position loop, 1/70 s [s]."""
 
 LATE = 0.2
 """A robot that lags for so long is stuck [s]: to brake from full speed takes as long."""

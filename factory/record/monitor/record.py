@@ -1,4 +1,4 @@
-"""Watching a run that is over, from its log alone."""
+"""The monitor on a log: judging a run that is over."""
 
 from __future__ import annotations
 
@@ -22,8 +22,7 @@ AGAIN = "record it again: `factory run FILE.pag --log OUT`"
 
 
 def watch_log(log: Log) -> tuple[Report, MonitorSubject]:
-    """The verdict on a recorded run, and the factory that it is of: compiled again from what the
-    log's header holds.
+    """The verdict on a recorded run, and its factory, compiled again from the log's header.
 
     The log's events and markings are not read. Raises InputError (BadLog) for a log of the ideal
     world, of an older version, or of another factory than its header says.
@@ -48,7 +47,7 @@ def watch_log(log: Log) -> tuple[Report, MonitorSubject]:
 
 
 def observations(log: Log) -> Iterator[Observation]:
-    """What a log shows, row by row; the same array of welds for as long as none is switched."""
+    """The observations in a log, row by row; `welds` is one array as long as none is switched."""
     assert log.ctrl is not None
     welds = np.empty((0, 3), np.intp)
     span = (-1, -1)

@@ -1,4 +1,4 @@
-"""What a monitor knows beforehand of the factory it watches: the net, and where its goals are."""
+"""What a monitor knows of the factory before the run: the net, and where its goals are."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from factory.record.observed import Observed
 from factory.support.settings import Settings
 
 PATIENCE = 4.0
-"""Nothing may happen for this many times the longest time an operation can take."""
+"""A run stalls when nothing happens for this many times the longest time of an operation."""
 
 
 @dataclass(frozen=True)
@@ -56,7 +56,7 @@ class MonitorSubject:
 
     @cached_property
     def moves_parts(self) -> tuple[bool, ...]:
-        """Whether each operation's end shows as a switch of grips: it makes a part, somebody other
+        """Whether each operation's end shows as a switch of grips: it makes a part, a robot other
         than its carrier brings one, or it drops the product off."""
         return tuple(
             not o.inputs
@@ -78,7 +78,7 @@ class MonitorSubject:
         return bool(self.settings.stage) and operation.awaits_empty(slot)
 
     def name(self, operation: Operation) -> str:
-        """An operation for people: `mate(sub1)`."""
+        """The name of an operation in messages: `mate(sub1)`."""
         return f"{operation.template.name}({operation.label})"
 
     def as_json(self) -> dict[str, Any]:
@@ -99,8 +99,8 @@ def subject_of(
     wip: int | None = None,
     bodies: Bodies | None = None,
 ) -> MonitorSubject:
-    """The subject that a layout is, run with these settings from a marking (m_0 where None), of one
-    body a part unless other `bodies` are given."""
+    """The subject of a layout, run with these settings from a marking (m_0 where None). Each part
+    is one body unless other `bodies` are given."""
     factory, product = layout.factory, layout.product
     goals = tuple(
         tuple(layout.goal(o.index, slot) for slot in range(len(o.robots)))
@@ -124,7 +124,7 @@ def subject_of(
 
 
 def subject_of_run(simulation: Observed) -> MonitorSubject:
-    """The subject that a simulation is, in either world."""
+    """The subject of a simulation, in either world."""
     model = simulation.model
     return subject_of(
         simulation.layout,
@@ -143,7 +143,7 @@ def subject_from(
     start: Sequence[int],
     wip: int | None,
 ) -> MonitorSubject:
-    """The inverse of `as_json`. Raises ValueError where what was kept is not of that factory."""
+    """The inverse of `as_json`. Raises ValueError where `kept` is not of that factory."""
     goals = tuple(tuple(float(x) for x in row) for row in kept["goals"])
     radii = tuple(float(x) for x in kept["radii"])
     slots = [len(o.robots) for o in factory.operations]
