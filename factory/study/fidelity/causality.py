@@ -1,4 +1,4 @@
-"""Two records of one net compared: what caused what, which order, and when.
+"""Two records of one net compared: causes, order and times of their firings.
 
 The n-th firing of a transition in one record stands for the n-th in the other. A firing's immediate
 causes are the firings that made the tokens it takes; what is not before it through causes, nor
@@ -21,7 +21,7 @@ Firing = tuple[str, int]
 """A transition's name and which of its firings."""
 
 MOST = 6000
-"""So many firings are compared pair by pair; of longer records the first."""
+"""Number of firings that are compared pair by pair; of longer records the first."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,8 +34,8 @@ class CausalRecord:
 
 @dataclass(frozen=True, slots=True)
 class Orders:
-    """How two records relate: `swapped` of `unrelated` pairs that are causally unrelated and apart
-    in time in both; how many firings' `causes` differ."""
+    """How two records differ: of the `unrelated` pairs, which are causally unrelated and apart in
+    time in both, the number `swapped`; the number of firings whose `causes` differ."""
 
     swapped: int
     unrelated: int
@@ -50,7 +50,7 @@ class Orders:
 def causal_record(
     net: GearNet, events: Iterable[Event], start: Marking | None = None
 ) -> CausalRecord:
-    """The token game of a legal record, each token knowing the firing that made it."""
+    """The partial order of a legal record: the token game, with the firing that made each token."""
     marking = net.initial_marking if start is None else start
     threaded = net.threaded.net
     number = {t.name: i for i, t in enumerate(net.threaded.transitions)}

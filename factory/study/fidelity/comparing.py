@@ -1,4 +1,4 @@
-"""Run both worlds over the same seeds and compare them; seeds may go over processes."""
+"""Both worlds, run over the same seeds and compared; seeds may be shared out to processes."""
 
 from __future__ import annotations
 
@@ -32,14 +32,13 @@ from factory.support.errors import Diagnostic, RunError
 from factory.support.settings import Settings
 
 Alter = Callable[[mujoco.MjModel], None]
-"""Changes the engine's model before the run: a softer weld, a planted fault."""
+"""Changes the engine's model before a run."""
 
 
 @dataclass(frozen=True)
 class Case:
-    """What is run: a layout, how many units, and the draws; `alter` must be a plain function of a
-    module where processes share the work. Without `units` each seed makes as many as it takes to
-    show its cycle time, by its net."""
+    """A layout and how it is run. Without `units` each seed makes as many as it takes to show its
+    cycle time, by its net. `alter` must be picklable where processes share the work."""
 
     layout: Layout
     units: int | None = None
@@ -59,9 +58,9 @@ def measure(
     done: Callable[[int], None] | None = None,
     max_time: float | None = None,
 ) -> Fidelity:
-    """Compare the worlds over `seeds`. With `jobs` > 1 the seeds go over as many processes (a
-    script then needs its `if __name__ == "__main__"`); the figures are the same. `done` hears of
-    every seed that is finished."""
+    """Compare the worlds over `seeds`. With `jobs` > 1 as many processes share the seeds (a script
+    then needs its `if __name__ == "__main__"`); the figures are the same. `done` is called with the
+    number of seeds that are finished."""
     case = Case(layout, units, jitter, settings or Settings(), max_time)
     records = over_cases([(case, seed) for seed in seeds], jobs, done)
     factory = layout.factory

@@ -1,4 +1,4 @@
-"""Do the figures converge? The same run with other timesteps, and with other weld stiffnesses."""
+"""Convergence of the figures: the same run with other timesteps and other weld stiffnesses."""
 
 from __future__ import annotations
 

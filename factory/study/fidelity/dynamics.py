@@ -13,7 +13,7 @@ from factory.study.fidelity.welds import FEED, Velocities, Welds
 from factory.support.engine import mujoco
 
 FULL = 0.999
-"""A force of this share of its limit is saturated."""
+"""Share of its limit from which a force is saturated."""
 
 
 class Drives:

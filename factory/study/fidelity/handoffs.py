@@ -1,6 +1,8 @@
-"""Hand-offs under the magnifying glass: gap, speed step, impulse and injected energy of each."""
+"""Hand-offs: gap, speed step, impulse and injected energy of each."""
 
 from __future__ import annotations
+
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -12,14 +14,14 @@ from factory.study.fidelity.welds import Velocities, Welds
 from factory.support.engine import mujoco
 
 WINDOW = 0.05
-"""So long after the switch [s] its consequences are looked for; a weld settles in a fifth of it."""
+"""Time after the switch in which a hand-off is watched [s]; a weld settles in a fifth of it."""
 
 
 class HandOffs:
-    """Watches the parts of every hand-off for a while after the switch.
+    """The hand-offs of a run; their parts are watched for a while after the switch.
 
-    The parts that one carrier takes over in one tick are one hand-off. Watched parts lie side by
-    side in arrays, hand-off after hand-off, and a tick treats all at once.
+    The parts that one carrier takes over in one tick are one hand-off. The parts of all watched
+    hand-offs are joined in arrays.
     """
 
     def __init__(self, m: mujoco.MjModel, welds: Welds, velocities: Velocities) -> None:
@@ -90,16 +92,20 @@ class HandOffs:
         self._mass = self.m.body_mass[self._parts]
 
 
+@dataclass(slots=True)
 class _Watched:
-    """A hand-off under watch: its parts, their first relative velocity, and the peaks so far."""
+    """A hand-off under watch: its welds, parts and holders, their first relative velocity `u`, when
+    it began, and the peaks so far."""
 
-    def __init__(
-        self, made: HandOff, welds: Index, parts: Index, holders: Index, u: Array, begun: float
-    ) -> None:
-        self.made, self.welds, self.parts, self.holders = made, welds, parts, holders
-        self.u, self.begun = u, begun
-        self.impulse = self.peak = 0.0
-        self.first: float | None = None
+    made: HandOff
+    welds: Index
+    parts: Index
+    holders: Index
+    u: Array
+    begun: float
+    impulse: float = 0.0
+    peak: float = 0.0
+    first: float | None = None
 
     def note(self, impulse: float, energy: Array) -> None:
         if self.first is None:

@@ -1,4 +1,4 @@
-"""Measure a run in MuJoCo while it goes on: an observer that reads and never writes.
+"""The measurement of a run in MuJoCo: an observer that only reads.
 
 The run is the same, to the last bit, with and without it.
 """
@@ -22,8 +22,8 @@ from factory.study.fidelity.welds import Velocities, Welds
 
 
 class Measurement:
-    """Measures the simulation it is made for; `run` goes through it. `seconds`: what measuring and
-    the monitor took."""
+    """Measures a simulation, which is run by `run`. `seconds`: what measuring and the monitor
+    took."""
 
     def __init__(self, simulation: Simulation) -> None:
         world, model, layout = simulation.world, simulation.model, simulation.layout
@@ -54,7 +54,8 @@ class Measurement:
         return replace(run, monitor=report)
 
     def observe(self, world: Any, supervisor: Any) -> None:
-        """After a tick. The shadow is still where the tick began: where welds were switched."""
+        """Measure a tick. The shadow is in the configuration in which the tick began, in which
+        welds were switched."""
         begin = perf_counter()
         v, force = self._steps.take()
         happened = self._what_happened()
@@ -75,7 +76,8 @@ class Measurement:
         self.seconds += perf_counter() - begin
 
     def _what_happened(self) -> tuple[int, int]:
-        """Firings and products gone so far: welds are switched only with one of them."""
+        """Numbers of firings and of products gone so far; welds are switched only with one of
+        them."""
         world, supervisor = self.simulation.world, self.simulation.supervisor
         return len(supervisor.events), len(world.dropoffs)
 

@@ -1,4 +1,4 @@
-"""Plots of a comparison, for people, as PNG. They need matplotlib, an optional part."""
+"""Plots of a comparison as PNG. They need matplotlib, an optional package."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from factory.support.plotting import (
 )
 
 MOST = 40
-"""So many parts have a bar each; of more, the worst."""
+"""Number of parts that have a bar each; of more, the worst."""
 
 LEAST = 1e-5
 """Smaller energies are drawn as this [mJ/kg]."""
@@ -178,7 +178,7 @@ def _approach(found: Fidelity) -> Any:
 
 
 def _convergence(study: Study) -> Any:
-    """Every figure over its value at the finest setting; what does not converge stands out."""
+    """Every figure over its value at the finest setting, in colour where it does not converge."""
     import matplotlib
 
     unsettled = study.unsettled()

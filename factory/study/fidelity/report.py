@@ -1,4 +1,4 @@
-"""A comparison written down: figures.json for machines, report.md with plots for people."""
+"""The report of a comparison: figures.json, and report.md with plots."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ TITLES = {
 
 
 def document(found: Fidelity, study: Study | None = None) -> dict[str, Any]:
-    """Everything as one JSON document; keys as `fidelity --json` prints them."""
+    """The JSON document of a comparison, with the keys of `fidelity --json`."""
     unsettled = set(study.unsettled()) if study else set()
     made = found.as_json()
     for key, figure in made["figures"].items():
@@ -35,8 +35,8 @@ def document(found: Fidelity, study: Study | None = None) -> dict[str, Any]:
 
 
 def check_report(path: Path | None) -> None:
-    """Whether a report can be written there, before anything is run. Raises InputError (BadFile),
-    MissingError where plots are wanted and there is no matplotlib."""
+    """Raises InputError (BadFile) where a report cannot be written there, MissingError where plots
+    are wanted and there is no matplotlib."""
     if path is None or _is_json(path):
         return
     if path.exists() and not path.is_dir():
@@ -46,7 +46,8 @@ def check_report(path: Path | None) -> None:
 
 
 def write_report(path: Path, found: Fidelity, study: Study | None = None) -> list[Path]:
-    """Write a folder, or figures alone where `path` ends in .json; all files or none."""
+    """Write a folder, or figures alone where `path` ends in .json; all files or none. Gives their
+    paths."""
     text = json.dumps(_finite(document(found, study)), indent=1).encode() + b"\n"
     if _is_json(path):
         contents = {path: text}
@@ -63,7 +64,7 @@ def write_report(path: Path, found: Fidelity, study: Study | None = None) -> lis
 
 
 def markdown(found: Fidelity, study: Study | None, pictures: list[str]) -> str:
-    """The page for people."""
+    """The text of report.md."""
     verdict = "All runs passed." if found.passed else "**Some run failed.**"
     lines = [
         f"# Fidelity of {found.product}",
@@ -95,7 +96,7 @@ def _rows(found: Fidelity, study: Study | None) -> list[str]:
 
 
 def remark(key: str, value: float | None, study: Study | None) -> str:
-    """What is to be said of a figure: beyond its limit, not converged."""
+    """Remarks on a figure: beyond its limit, not converged."""
     found = [
         *(["beyond its limit"] if QUANTITIES[key].exceeded(value) else []),
         *(["not converged"] if study is not None and key in study.unsettled() else []),
@@ -115,7 +116,7 @@ def _is_json(path: Path) -> bool:
 
 
 def _finite(value: Any) -> Any:
-    """null for what is not finite."""
+    """A value with null for what is not finite."""
     if isinstance(value, float):
         return value if isfinite(value) else None
     if isinstance(value, dict):

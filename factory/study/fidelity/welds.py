@@ -15,8 +15,8 @@ KINDS = {"park": PARK, "feed": FEED, "grip": GRIP, "hold": HOLD}
 
 
 class Welds:
-    """`holder`, `kind` (nbody,): for each body the body that holds it and the kind of the weld by
-    which; -1 where nothing does."""
+    """The active welds as of the last `scan`. `holder`, `kind` (nbody,): for each body the body
+    that holds it and the kind of the weld; -1 for none."""
 
     def __init__(self, m: mujoco.MjModel, d: mujoco.MjData) -> None:
         self.m, self.d = m, d
@@ -26,7 +26,7 @@ class Welds:
         self.scan()
 
     def scan(self) -> Index:
-        """Look again; gives the grips and holds that have been switched on since the last time."""
+        """Read the welds; gives the grips and holds switched on since they were read last."""
         active = self.d.eq_active.astype(bool)
         fresh = active & (~self.active | (self.m.eq_obj2id != self.target))
         self.active, self.target = active, np.array(self.m.eq_obj2id)
