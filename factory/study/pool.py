@@ -76,8 +76,8 @@ def over_processes(
 
 @dataclass(slots=True)
 class _Worker:
-    """A process, our end of its pipe, the number of the item it was given, and whether it has come
-    to life."""
+    """A process, our end of its pipe, the number of the item it was given, and whether it is
+    ready."""
 
     process: SpawnProcess
     pipe: Connection
@@ -86,7 +86,7 @@ class _Worker:
 
 
 class _Pool(Generic[Item, Found]):
-    """Some workers and the numbers of the items that wait for one."""
+    """Workers, and the numbers of the items that wait for one."""
 
     def __init__(
         self, work: Callable[[Item], Found], items: Sequence[Item], variables: Mapping[str, str]
@@ -98,7 +98,7 @@ class _Pool(Generic[Item, Found]):
         self.workers: list[_Worker] = []
 
     def results(self, jobs: int) -> Generator[Worked[Found], None, None]:
-        """What the workers tell, until all items are done."""
+        """What becomes of the items, until all are done."""
         for _ in range(jobs):
             self._start()
         left = len(self.items)
@@ -111,7 +111,7 @@ class _Pool(Generic[Item, Found]):
                     yield worked
 
     def end(self) -> None:
-        """End all processes, whatever they are at."""
+        """End all processes at once."""
         for worker in self.workers:
             worker.pipe.close()
             worker.process.terminate()
@@ -119,8 +119,8 @@ class _Pool(Generic[Item, Found]):
             worker.process.join()
 
     def _heard(self, worker: _Worker) -> Worked[Found] | None:
-        """What a worker says: that it is ready, what it has found, or nothing any more. It gets its
-        next item before what it has found is looked at."""
+        """Receive what a worker sends: that it is ready, or what it has found; its pipe ends where
+        it has died. It gets its next item before what it has found is given on."""
         number = worker.number
         try:
             told: tuple[Found | None, Exception | None] = worker.pipe.recv()
@@ -129,7 +129,7 @@ class _Pool(Generic[Item, Found]):
         self.stillborn, worker.ready = 0, True
         worker.number = self.waiting.popleft() if self.waiting else None
         if worker.number is not None:
-            with suppress(OSError):  # a worker that is dead will be found so
+            with suppress(OSError):  # that a worker is dead shows when it is next received from
                 worker.pipe.send(self.items[worker.number])
         if number is None:
             return None
@@ -172,8 +172,7 @@ class _Pool(Generic[Item, Found]):
 
 @contextmanager
 def _uninterrupted() -> Iterator[None]:
-    """Processes started in here do not hear Ctrl-C, which goes to everyone: their parent ends
-    them."""
+    """Processes started in here do not get Ctrl-C, which goes to all: their parent ends them."""
     if not hasattr(signal, "pthread_sigmask"):
         yield
         return
@@ -186,7 +185,7 @@ def _uninterrupted() -> Iterator[None]:
 
 
 def _work(work: Callable[[Any], Any], pipe: Connection) -> None:
-    """What a process does: work on items until the pipe is closed."""
+    """The main function of a process: work on items until the pipe is closed."""
     threading.Thread(target=_follow_parent, daemon=True).start()
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     with suppress(EOFError, OSError):
@@ -204,7 +203,7 @@ def _tried(work: Callable[[Any], Any], item: Any) -> tuple[Any, Exception | None
 
 
 def _follow_parent() -> None:
-    """A process whose parent was killed ends, whatever it is at."""
+    """End this process when its parent has ended."""
     parent = parent_process()
     assert parent is not None
     parent.join()

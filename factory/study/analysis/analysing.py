@@ -1,4 +1,4 @@
-"""The analysis of a factory's pace, by its net: everything in one value."""
+"""The analysis of a factory's pace by its timed net."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from factory.study.analysis.what_if import Scenario, WipCurve, scenario, scenari
 
 @dataclass(frozen=True)
 class Analysis:
-    """What the timed net of a laid-out factory says; see the values it is made of.
+    """The results of the timed net of a laid-out factory.
 
     `slack[i]`: how much longer operation i may take before it sets the pace [s].
     """
@@ -33,7 +33,7 @@ class Analysis:
 
     @property
     def bottlenecks(self) -> tuple[str, ...]:
-        """What sets the pace."""
+        """The names of what sets the pace."""
         return tuple(circuit.name for circuit in self.net.critical)
 
 
@@ -44,9 +44,9 @@ def analyse(
     asked: tuple[str, Change] | None = None,
     record: RunRecord | None = None,
 ) -> Analysis:
-    """Analyse a laid-out factory: `units` products from the initial marking, a bound `wip` on
-    copies of each part, a change that is `asked` about, in words, and the `record` of a run to
-    compare with.
+    """The analysis of a laid-out factory: of `units` products from the initial marking, with a
+    bound `wip` on copies of each part, with a change that is `asked` about, in words, and with the
+    `record` of a run to compare with.
 
     Raises InputError where `wip` is below 1 or a mode cannot reach its goal.
     """
@@ -70,8 +70,8 @@ def analyse(
 
 
 def operation_slacks(timing: Timing, net: TimedNet) -> tuple[float, ...]:
-    """How much longer each operation may take before it sets the pace [s]: what the tightest of the
-    circuits through it lacks."""
+    """How much longer each operation may take before it sets the pace [s]: the slack of the
+    tightest circuit through it."""
     operations = timing.factory.operations
     if net.bounds:
         found = slacks(net.ratio, (o.place for o in operations))

@@ -1,4 +1,4 @@
-"""A run against its prediction: durations, cycle time, utilisation."""
+"""A run compared with its prediction: durations, cycle time, utilisation."""
 
 from __future__ import annotations
 
@@ -18,21 +18,21 @@ from factory.study.analysis.timing import Timing
 
 @dataclass(frozen=True, slots=True)
 class ComparedFigure:
-    """A quantity as predicted and as measured, None where a run is too short to say."""
+    """A quantity as predicted and as measured; None where the run is too short."""
 
     predicted: float
     measured: float | None
 
     @property
     def error(self) -> float | None:
-        """Predicted less measured, as a share of what was measured."""
+        """Predicted less measured, as a share of the measured value."""
         return self.predicted / self.measured - 1 if self.measured else None
 
 
 @dataclass(frozen=True, slots=True)
 class Duration:
-    """How long an operation takes from its start to its end [s]; `least` and `greatest` of what was
-    measured. The first time is left out where there are others: robots may come from elsewhere."""
+    """The duration of an operation from its start to its end [s], with the `least` and `greatest`
+    measured. The first is left out where there are others: robots start it from other places."""
 
     label: str
     time: ComparedFigure
@@ -43,7 +43,7 @@ class Duration:
 
 @dataclass(frozen=True)
 class Comparison:
-    """A run of `units` products against the prediction of just that run."""
+    """A run of `units` products compared with its prediction."""
 
     source: str
     units: int
@@ -62,7 +62,7 @@ class Comparison:
 
 @dataclass(frozen=True, slots=True)
 class RunRecord:
-    """What a run left: its events, when each product was dropped off, its end [s]."""
+    """A run to compare with: its events, and when each product was dropped off [s]."""
 
     source: str
     events: tuple[Event, ...]
@@ -70,7 +70,7 @@ class RunRecord:
 
 
 def compare(timing: Timing, net: TimedNet, found: Flow, record: RunRecord) -> Comparison:
-    """The record of a run from the initial marking against the flow of as many units."""
+    """The record of a run from the initial marking, compared with the flow of as many units."""
     factory = timing.factory
     number = factory.net.threaded.net.transition_index
     spent = operation_times(factory, ((number[e.transition], e.t) for e in record.events))

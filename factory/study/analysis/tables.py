@@ -1,4 +1,4 @@
-"""An analysis as lines and tables for people."""
+"""An analysis as lines of text and tables."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from factory.study.analysis.measured import ComparedFigure, Comparison
 from factory.study.analysis.what_if import listed
 
 SHOWN = 12
-"""Rows of a table; `-v` shows all."""
+"""Number of rows of a table; `-v` shows all."""
 
 
 ASSUMED = """\
@@ -20,7 +20,7 @@ such robots works, one works at a time; shorter ways are shorter in proportion, 
 
 @dataclass(frozen=True, slots=True)
 class PrintedTable:
-    """A table with its title, ready to be printed, and what is to be said after it."""
+    """A table to be printed, with its title and a note after it."""
 
     title: str
     columns: tuple[str, ...]
@@ -29,7 +29,7 @@ class PrintedTable:
 
 
 def summary(found: Analysis) -> Iterator[str]:
-    """What matters most, in a few lines."""
+    """The main results, in a few lines."""
     flow, net, timing = found.flow, found.net, found.timing
     does = "sets" if len(found.bottlenecks) == 1 else "set"
     hourly = f", {3600 / net.pace:.0f} products an hour" if net.pace else ""
@@ -51,7 +51,7 @@ def summary(found: Analysis) -> Iterator[str]:
 
 
 def critical_words(found: Analysis) -> str:
-    """The first critical circuit: its operations with their times, those that wait left out."""
+    """The first critical circuit: its places that take time, with their times."""
     circuit, net = found.net.critical[0], found.net
     timed = [(net.net.net.places[p], net.seconds[p]) for p in circuit.places if net.seconds[p]]
     names = [f"{place.mode} {place.label}".strip() + f" {seconds:.3f}" for place, seconds in timed]
@@ -60,7 +60,7 @@ def critical_words(found: Analysis) -> str:
 
 
 def tables(found: Analysis, verbose: bool) -> Iterator[PrintedTable]:
-    """The tables in the order in which they are read."""
+    """The tables, in order."""
     most = None if verbose else SHOWN
     yield _shares(found, most)
     yield _gains(found, most)
@@ -183,7 +183,7 @@ def _compared(pair: ComparedFigure) -> tuple[str, str, str]:
 def cut(
     title: str, columns: tuple[str, ...], rows: Sequence[tuple[str, ...]], most: int | None
 ) -> PrintedTable:
-    """A table of so many rows, and how many more there would be."""
+    """A table of at most `most` rows, and the number of further rows."""
     if most is None or len(rows) <= most:
         return PrintedTable(title, columns, rows)
     rest = (f"... {len(rows) - most} more (-v)",) + ("",) * (len(columns) - 1)

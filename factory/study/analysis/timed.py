@@ -1,4 +1,4 @@
-"""The timed net of a factory: the compiled one, and what else holds a run up."""
+"""The timed net of a factory: the compiled net, with the times and places that a run adds."""
 
 from __future__ import annotations
 
@@ -17,15 +17,15 @@ from factory.timing.pool import with_wip
 from factory.timing.ways import with_ways
 
 SAME = 1e-9
-"""Times that differ by no more than this share are equal."""
+"""Relative difference up to which times are equal."""
 
 LONGEST_PERIOD = 60
 
 
 @dataclass(frozen=True, slots=True)
 class Circuit:
-    """A circuit of the timed net: what it is called (a robot, `outfeed`, `station part1`, `wip
-    part1`), its time [s], its tokens, and its places in order."""
+    """A circuit of the timed net: its name (a robot, `outfeed`, `station part1`, `wip part1`), its
+    time [s], its tokens, and its places in order."""
 
     name: str
     seconds: float
@@ -34,7 +34,7 @@ class Circuit:
 
     @property
     def pace(self) -> float:
-        """Seconds per token: no product comes sooner after another."""
+        """Seconds per token, a lower bound on the interval between products."""
         return self.seconds / self.tokens
 
 
@@ -97,7 +97,8 @@ class TimedNet:
         return found if found > SAME * self.pace else 0.0
 
     def firings(self, units: int) -> Firings:
-        """As soon as possible, from the initial marking, `units` of them at least."""
+        """At least `units` firings of each transition from the initial marking, as soon as
+        possible."""
         period = lcm(*(c.tokens for c in self.critical))
         period = min(period, LONGEST_PERIOD)
         return settled_firings(

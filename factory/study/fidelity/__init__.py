@@ -1,4 +1,4 @@
-"""How faithful is the physics? Ideal and MuJoCo runs over the same seeds, figure by figure.
+"""How near the physics is to the ideal world: runs in both over the same seeds, in figures.
 
     >>> from factory.study.fidelity import QUANTITIES
     >>> QUANTITIES["handoff_gap_max_mm"].unit

@@ -1,4 +1,4 @@
-"""Plots of a sweep's summary, for people, as PNG. They need matplotlib, an optional part."""
+"""Plots of a sweep's summary as PNG. They need matplotlib, an optional package."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ UNITS = {
 """Of the keys that vary."""
 
 MOST = 10
-"""So many lines or histograms at most."""
+"""Upper bound on the lines or histograms of a plot."""
 
 
 def plots(found: Summary) -> dict[str, bytes]:

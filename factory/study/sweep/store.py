@@ -1,7 +1,7 @@
 """The database of a sweep: SQLite in WAL mode, a row for each run that is done.
 
 Only the parent writes it, and commits every row by itself: killing it, or a worker, loses no row
-that is there. Anybody may read it meanwhile.
+that is there. It may be read while it is written.
 """
 
 from __future__ import annotations
@@ -39,10 +39,10 @@ APPLICATION = 0x4B4C4156
 """SQLite's application_id of such a database."""
 
 PATIENCE = 30.0
-"""Wait so long for another writer [s]."""
+"""Time to wait for another writer [s]."""
 
 DISK = "check the path, its permissions and the space on the disk"
-"""A hint, where a database cannot be used that may be all right."""
+"""The hint where a database cannot be used that may be sound."""
 
 CIRCUMSTANCES = (
     sqlite3.SQLITE_PERM,
@@ -54,7 +54,7 @@ CIRCUMSTANCES = (
     sqlite3.SQLITE_PROTOCOL,
     sqlite3.SQLITE_NOTADB,
 )
-"""SQLite's codes that do not speak of what a sweep's database holds."""
+"""SQLite's codes of faults outside the contents of a database."""
 
 
 class Store(Closing):
@@ -83,7 +83,7 @@ class Store(Closing):
                 raise
 
     def close(self) -> None:
-        """Leave one file behind."""
+        """Close the database, which leaves one file."""
         with _told(self.path):
             self.connection.close()
 
@@ -114,7 +114,7 @@ class Store(Closing):
             )
 
     def _create(self, identity: Mapping[str, Any]) -> None:
-        """Make the tables, in one transaction, unless another sweep has made them meanwhile."""
+        """Make the tables, in one transaction, unless another sweep has made them by now."""
         self.connection.execute("BEGIN IMMEDIATE")
         kept = _identity(self.connection, self.path)
         if kept is not None:
@@ -139,7 +139,9 @@ def reading(path: Path) -> Iterator[tuple[dict[str, Any], Iterator[Mapping[str, 
     InputError (BadFile)."""
     if not path.is_file():
         raise InputError(_bad(path, "there is no such file", "give the -o of a sweep"))
-    mode = "rw" if os.access(path, os.W_OK) else "ro"  # who only reads leaves SQLite's WAL behind
+    mode = (
+        "rw" if os.access(path, os.W_OK) else "ro"
+    )  # a reader without write access leaves the WAL
     with _told(path), closing(_connect(path, mode)) as connection:
         identity = _identity(connection, path)
         if identity is None:
@@ -157,7 +159,7 @@ def _identity(connection: sqlite3.Connection, path: Path) -> dict[str, Any] | No
     """The identity kept in a database, None for an empty one. Raises InputError (BadFile) for one
     of another program, sqlite3.Error for one that is not sound."""
     tables = connection.execute("SELECT count(*) FROM sqlite_master").fetchone()[0]
-    # they and the id come at once: whoever asks for the id last has it where there are tables
+    # both come in one transaction: the id, read last, is there where the tables are
     if connection.execute("PRAGMA application_id").fetchone()[0] == APPLICATION:
         return _kept_identity(connection)
     if tables:
@@ -166,8 +168,8 @@ def _identity(connection: sqlite3.Connection, path: Path) -> dict[str, Any] | No
 
 
 def _kept_identity(connection: sqlite3.Connection) -> dict[str, Any]:
-    """The identity in a database, all of whose rows are such as a sweep writes. Raises
-    sqlite3.Error, which says what is not."""
+    """The identity in a database. Raises sqlite3.Error where it or some row is not one that a sweep
+    writes."""
     kept = connection.execute("SELECT key, value FROM sweep")
     identity = {key: _value(key, text) for key, text in kept}
     varied = identity.get("varied")
@@ -188,8 +190,8 @@ def _value(key: str, text: Any) -> Any:
 
 
 def _check_rows(connection: sqlite3.Connection, varied: Sequence[str]) -> None:
-    """A row has a point, a status and a value for all that varies, all of the types of their
-    columns: SQLite itself takes any. Raises sqlite3.Error."""
+    """Raises sqlite3.Error where a row lacks a point, a status or a value for a key that varies, or
+    where a value is not of the type of its column, which SQLite itself does not check."""
     faults = [f"{name} IS NULL" for name in ("point", "status", *varied)]
     faults.append("status NOT IN ('done', 'failed')")
     for name, kind in COLUMNS.items():
@@ -229,8 +231,8 @@ def _bad(path: Path, message: str, hint: str) -> Diagnostic:
 
 @contextmanager
 def _told(path: Path) -> Iterator[None]:
-    """Whatever SQLite refuses, as an error for the user; what makes no sense is damaged, or of
-    another version."""
+    """Raises InputError (BadFile) for an error of SQLite; contents that make no sense are damaged,
+    or of another version."""
     try:
         yield
     except (sqlite3.Error, UnicodeDecodeError) as error:

@@ -20,7 +20,7 @@ from factory.study.sweep.work import FIGURES
 CONFIDENCE = 0.95
 
 UNTOLD = ("wall_time_s", "physics_time_s", "supervisor_time_s", "refines_net")
-"""Figures that say nothing of the factory."""
+"""Figures that do not depend on the factory."""
 
 SUMMED = tuple(key for key, kind in FIGURES.items() if kind != "TEXT" and key not in UNTOLD)
 
@@ -92,7 +92,7 @@ class Summary:
 
 
 class _Part:
-    """What is read of one group."""
+    """The rows of one group."""
 
     def __init__(self) -> None:
         self.done = self.failed = 0

@@ -1,4 +1,4 @@
-"""Carry a sweep out: what is not in its database yet is run, and every outcome written as it
+"""A sweep: the points that its database does not have are run, and every outcome is written as it
 comes."""
 
 from __future__ import annotations
@@ -23,14 +23,14 @@ LOCAL = "local"
 Outcomes = Generator[Outcome, None, None]
 
 THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
-"""Set to 1 for the processes: there is one for each core already."""
+"""Environment variables set to 1 for the processes: there is one for each core already."""
 
 
 @dataclass(slots=True)
 class Tally:
     """What a sweep did: runs in its grid, rows that were there, how many of these had failed, runs
-    done and failed now; the time it took, and the sums of what its runs took their workers, and of
-    their run loops [s]."""
+    done and failed now; the time it took, the sum of the workers' times, and that of their run
+    loops [s]."""
 
     runs: int
     there: int

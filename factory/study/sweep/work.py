@@ -48,13 +48,13 @@ FIGURES: Mapping[str, str] = {
 """What a row keeps of a run, under the names of `run --json`, with its type in the database."""
 
 KEPT = 8
-"""A worker keeps so many layouts and models: the grid brings points of one together."""
+"""Number of layouts and models that a worker keeps: the grid puts points of one together."""
 
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """A point that is done. `reason` says why its run failed, "" if it did not; `row_time_s`: all
-    the time that it took its worker [s], of which `wall_time_s` of the figures is the run loop."""
+    """A point that is done. `reason`: why its run failed, "" if it did not; `row_time_s`: the time
+    that it took its worker [s], of which `wall_time_s` of the figures is the run loop."""
 
     point: Point
     reason: str = ""
@@ -79,7 +79,7 @@ class Runner:
         return Runner, (self.recipe,)
 
     def __call__(self, point: Point) -> Outcome:
-        """Run a point. Whatever goes wrong is the reason of its outcome."""
+        """Run a point. Every error is the reason of its outcome."""
         begin = perf_counter()
         figures: dict[str, Any] = {}
         try:
@@ -135,7 +135,7 @@ class Runner:
 
 
 def failed(point: Point, reason: str, tries: int) -> Outcome:
-    """The outcome of a run that nobody lived to tell of."""
+    """The outcome of a run whose worker died."""
     return replace(_outcome(point, reason, {}, 0.0), worker="", tries=tries)
 
 
@@ -153,7 +153,7 @@ def _reason(run: Run) -> str:
 
 
 def _or_raise(found: T | FactoryError) -> T:
-    """What was found, or kept as an error."""
+    """What was found; raises it where it is an error."""
     if isinstance(found, FactoryError):
         raise found
     return found
