@@ -1,4 +1,4 @@
-"""What a watcher may ask of a running factory: JSON messages, checked before anything acts."""
+"""The commands to a running factory: JSON messages, checked before they act."""
 
 from __future__ import annotations
 
@@ -8,18 +8,18 @@ from dataclasses import dataclass
 from typing import Any
 
 SPEEDS = (0.1, 0.25, 0.5, 1.0, 2.0, 5.0, 10.0, 0.0)
-"""Of the run, against a clock on the wall; 0: as fast as it goes."""
+"""Speeds of a run, simulated seconds a second; 0: as fast as it goes."""
 
 FACTORS = (0.1, 0.25, 0.5, 1.0)
-"""Of a robot's speed."""
+"""Factors on a robot's speed."""
 
 SHARES = (-1.0, -0.5, 0.5, 1.0)
-"""Of the greatest force of a robot's drive: what is more, it could not hold."""
+"""Pushes, as shares of the greatest force of a robot's drive, which can hold no more."""
 
 
 @dataclass(frozen=True, slots=True)
 class Pause:
-    """Stand still, at the end of a tick."""
+    """Stop at the end of a tick."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,7 +54,7 @@ class PushRobot:
 
 @dataclass(frozen=True, slots=True)
 class Slow:
-    """Let a robot (index) go at one of FACTORS of its speed."""
+    """Run a robot (index) at one of FACTORS of its speed."""
 
     robot: int
     factor: float
@@ -62,7 +62,7 @@ class Slow:
 
 @dataclass(frozen=True, slots=True)
 class Block:
-    """Let the feeder of a part give nothing, or give again."""
+    """Block the feeder of a part, or free it."""
 
     part: str
     blocked: bool
@@ -71,12 +71,12 @@ class Block:
 Command = Pause | Play | PlayToFiring | Restart | Speed | PushRobot | Slow | Block
 
 PUSH = 0.3
-"""A push lasts so long [s]."""
+"""Duration of a push [s]."""
 
 
 def command_of(message: str | bytes, robots: int, parts: Collection[str]) -> Command:
     """The command in a message such as `{"do": "slow", "robot": 3, "factor": 0.5}`, to a factory of
-    so many robots and these parts. Raises ValueError, saying what is wrong and what would do."""
+    so many robots and these parts. Raises ValueError with what is wrong and what is valid."""
     try:
         told = json.loads(message)
     except (ValueError, RecursionError):

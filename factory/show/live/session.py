@@ -1,4 +1,4 @@
-"""A factory that runs in step with the clock on the wall, and obeys commands between ticks."""
+"""A factory that runs in step with real time, and obeys commands between ticks."""
 
 from __future__ import annotations
 
@@ -32,18 +32,18 @@ RATE = 30.0
 """Frames a second."""
 
 BEHIND = 0.25
-"""A run that is further behind the clock [s] does not try to make up for it."""
+"""A run that is further behind the clock than this [s] does not catch up."""
 
 QUIET = 3.0
 """Where nothing has fired for so many times the longest delay, a note says what waits for what."""
 
 LOOK = 0.05
-"""While it stands still, a session looks for commands so often [s]."""
+"""Interval at which a session that is paused looks for commands [s]."""
 
 
 @dataclass(frozen=True, slots=True)
 class LiveFrame:
-    """What is seen at an instant. `number`: frames are counted; `run`: how often it was begun anew;
+    """The state at an instant. `number`: of the frame; `run`: number of restarts;
     `poses`: positions [m] and quaternions (bodies, 7) as float32; `marked` places; `fired`: how
     many transitions have; `rhythm`: between the last two products [s]; `pace`: simulated seconds in
     a second; `note`: what is wrong, if anything."""
@@ -65,36 +65,36 @@ class LiveFrame:
 
 
 class WallClock:
-    """Simulated time against the clock on the wall, at `speed` times its pace; 0: as fast as it
-    goes. `begun` and `marks`: both times [s] when it was started, and of late."""
+    """Real time against simulated time, which passes `speed` times as fast; 0: as fast as it goes.
+    `begun`, `marks`: pairs of both [s], at the start and recently."""
 
     def __init__(self, speed: float = 1.0) -> None:
         self.speed = speed
 
     def start(self, time: float) -> None:
-        """Time goes by from here and now."""
+        """Start anew at a simulated time."""
         self.begun = perf_counter(), time
         self.marks = deque([self.begun], maxlen=int(RATE))
 
     def mark(self, time: float) -> None:
-        """The run has come to a time."""
+        """The run has come to a simulated time."""
         self.marks.append((perf_counter(), time))
 
     def due(self) -> float:
-        """The time to which the run should have come."""
+        """The simulated time to which the run should have come."""
         wall, time = self.begun
         return time + (perf_counter() - wall) * self.speed
 
     @property
     def pace(self) -> float:
-        """Simulated seconds in a second, of late."""
+        """Simulated seconds a second, recently."""
         (wall, time), (now, reached) = self.marks[0], self.marks[-1]
         return (reached - time) / (now - wall) if now > wall else 0.0
 
 
 class Session:
-    """Runs what `make` gives, again and again if asked; `run` goes on until it is stopped by an
-    exception of an observer. `frame` may be read, `send` and `wait` called from any thread."""
+    """Runs what `make` gives, anew after each restart; `run` ends with an exception of an observer.
+    `frame` may be read, `send` and `wait` called from any thread."""
 
     def __init__(self, make: Callable[[], Simulation], playing: bool = True) -> None:
         self._make, self._clock = make, WallClock()
@@ -117,7 +117,7 @@ class Session:
         return np.flatnonzero(self.simulation.world.m.body_treeid >= 0)
 
     def send(self, command: Command) -> None:
-        """Have a command obeyed, soon."""
+        """Give a command, which is obeyed between ticks."""
         self._commands.put(command)
 
     def wait(self, number: int, timeout: float) -> LiveFrame:
@@ -135,7 +135,7 @@ class Session:
         return [(round(e.t, 4), numbers[e.transition]) for e in events]
 
     def run(self, observe: Observer) -> None:
-        """Go on for ever; `observe` is called after every tick, and while nothing moves."""
+        """Run for ever; `observe` is called after every tick, and repeatedly while it is paused."""
         while True:
             begun = perf_counter()
             ran = self._advance(begun, observe) if self._goes else 0
@@ -151,8 +151,8 @@ class Session:
         return (self._playing or self._stepping) and not self._trouble
 
     def _advance(self, begun: float, observe: Observer) -> int:
-        """Ticks until the run is where the clock on the wall is, or a frame is due; gives how
-        many."""
+        """Run ticks until simulated time is what it should be, or a frame is due; gives their
+        number."""
         supervisor, world, clock = self.simulation.supervisor, self.simulation.world, self._clock
         count = 0
         while self._goes:
@@ -176,7 +176,8 @@ class Session:
         return count
 
     def _obey(self, timeout: float) -> bool:
-        """Do what is asked; waits so long for it. Gives whether anything was."""
+        """Obey the commands given, waiting for one up to `timeout` [s]; gives whether there was
+        one."""
         obeyed = False
         while True:
             try:
@@ -233,7 +234,7 @@ class Session:
             self._changed.notify_all()
 
     def _waits(self) -> str:
-        """Which robots wait for what, where nothing has fired for long."""
+        """Which robots wait for what, where nothing has fired for a long time."""
         supervisor: Any = self.simulation.supervisor
         silent = self.simulation.world.time - supervisor.last_event
         if silent < QUIET * max(self.simulation.delays):
@@ -243,5 +244,5 @@ class Session:
             f"{robots[o.carrier].name} {'at' if o.inputs else 'for the feeder of'} {o.label}"
             for o in supervisor.awaited()[:4]
         ]
-        who = "; ".join(words) or "no robot can start"
-        return f"nothing has fired for {silent:.0f} s: waiting are {who}"
+        waiting = "; ".join(words) or "no robot can start"
+        return f"nothing has fired for {silent:.0f} s: waiting are {waiting}"

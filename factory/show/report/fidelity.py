@@ -1,5 +1,5 @@
-"""How far a recorded run can be believed: figures from the log alone, and against the ideal world
-where there is a layout."""
+"""The fidelity of a recorded run: figures from the log alone, and against the ideal world where
+there is a layout."""
 
 from __future__ import annotations
 
@@ -24,12 +24,12 @@ from factory.study.fidelity.welds import GRIP, HOLD, Welds
 from factory.support.errors import InputError
 
 EVERY = 5
-"""Residuals of welds are taken every so many ticks."""
+"""Residuals of welds are measured every so many ticks."""
 
 
 @dataclass(frozen=True, slots=True)
 class Figure:
-    """A figure by the key of its definition; `value` None where it could not be had."""
+    """A figure by the key of its definition; `value` None where there is none."""
 
     key: str
     value: float | None
@@ -51,7 +51,7 @@ class RecordedFidelity:
 
 
 def fidelity(recording: Recording) -> RecordedFidelity:
-    """Everything that can be said."""
+    """The fidelity of a recording."""
     log = recording.log
     try:
         monitor = watch_log(log)[0]
@@ -71,7 +71,7 @@ def fidelity(recording: Recording) -> RecordedFidelity:
 
 
 def _tracking(recording: Recording) -> float | None:
-    """How far any axis is from its setpoint at the end of a tick, at most [mm]."""
+    """Largest distance of an axis from its setpoint at the end of a tick [mm]."""
     log, m = recording.log, recording.motion.m
     if log.ctrl is None:
         return None
@@ -84,7 +84,7 @@ def _tracking(recording: Recording) -> float | None:
 
 
 def _welds(recording: Recording) -> dict[str, float | None]:
-    """Hand-offs, the gap that each finds, what welds leave open, how products turn out [mm]."""
+    """Number of hand-offs, largest gap, residual and displacement of a part in the product [mm]."""
     log, replica = recording.log, Replica(recording.motion.m)
     m, d = replica.m, replica.d
     replica.switch(log.active[0])
@@ -96,7 +96,9 @@ def _welds(recording: Recording) -> dict[str, float | None]:
             replica.place(log.qpos[row - 1])
             replica.switch(log.active[row])
             fresh = welds.scan()
-            fresh = fresh[d.xpos[m.eq_obj2id[fresh], 2] > HIDDEN]  # none that replaces others
+            fresh = fresh[
+                d.xpos[m.eq_obj2id[fresh], 2] > HIDDEN
+            ]  # without bodies that replace others
             handoffs += len(fresh)
             gap = max(gap, float(gaps(m, fresh, d.xpos, d.xmat).max(initial=0.0)))
             continue
@@ -116,7 +118,7 @@ def _welds(recording: Recording) -> dict[str, float | None]:
 
 
 def _rows(recording: Recording) -> Iterator[tuple[int, bool]]:
-    """Rows of the log to look at, and whether welds are switched there."""
+    """Rows of the log to measure, and whether welds are switched there."""
     active = recording.log.active
     for row in range(1, len(recording.log)):
         if active.starts[row] != active.starts[row - 1]:
@@ -126,7 +128,7 @@ def _rows(recording: Recording) -> Iterator[tuple[int, bool]]:
 
 
 def _ideal(recording: Recording) -> dict[str, float | None]:
-    """How long operations take against the ideal world, in which ẋ = F."""
+    """Durations of operations less those in the ideal world, in which ẋ = F [s]."""
     if recording.layout is None:
         return {}
     log, net = recording.log, recording.factory.net

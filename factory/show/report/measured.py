@@ -1,4 +1,4 @@
-"""What a run shows of its pace: cycle time, how long operations take, how busy robots are."""
+"""The pace of a run as measured: cycle time, durations of operations, utilisation of robots."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ class MeasuredPace:
 
 
 def measured(recording: Recording) -> MeasuredPace:
-    """What the log's events say."""
+    """The pace by the events of a log."""
     log, factory = recording.log, recording.factory
     spent = operation_times(factory, zip(log.fired.tolist(), log.fired_t.tolist(), strict=True))
     counted = [times[1:] or times for times in spent]

@@ -1,5 +1,4 @@
-"""The parts of a report that are words and figures, as HTML. All that comes from a user's file is
-escaped here."""
+"""The text and figures of a report, as HTML. What comes from a user's file is escaped here."""
 
 from __future__ import annotations
 
@@ -168,7 +167,7 @@ def proof_words(proof: Proof) -> str:
 
 
 def fidelity_words(found: RecordedFidelity) -> str:
-    """The figures in a table, and what the monitor says."""
+    """The figures in a table, and the verdict of the monitor."""
     rows = "".join(
         f'<tr class="{"bad" if figure.exceeded else ""}">'
         f"<th>{escape(_title(figure.key))}<p>{escape(QUANTITIES[figure.key].definition)}</p></th>"
@@ -236,7 +235,7 @@ def _figure(value: float | None) -> str:
 
 
 def _shown(value: float | None) -> str:
-    """A figure in three digits, or that it is too small for that."""
+    """A figure in three digits, or a bound where it is very small."""
     if value is None:
         return "–"
     return f"{value:.3g}" if not value or abs(value) >= 1e-4 else "&lt; 0.0001"
