@@ -14,6 +14,11 @@ import numpy as np
 from factory.control.mode import Array, Index
 from factory.support.engine import mujoco
 
+PARK, FEED, GRIP, HOLD = range(4)
+KINDS = {"park": PARK, "feed": FEED, "grip": GRIP, "hold": HOLD}
+"""What holds a part, by the first word of a weld's name: its parking place, its feeder, a robot,
+the outfeed's tray."""
+
 ROWS = 6
 """Rows of a weld among the engine's constraints: three of place, three of turn."""
 

@@ -10,15 +10,10 @@ from typing import Any
 import numpy as np
 
 from factory.mjcf import names
-from factory.mjcf.weld_frames import WeldFrames, check_holders
+from factory.mjcf.weld_frames import GRIP, KINDS, WeldFrames, check_holders
 from factory.plant.factory import Factory
 from factory.record.monitor.observation import Index
 from factory.support.engine import mujoco
-
-PARK, FEED, GRIP, HOLD = KINDS = range(4)
-"""What holds a part: its parking place, its feeder, a robot, the outfeed's tray."""
-
-WORDS = {"park": PARK, "feed": FEED, "grip": GRIP, "hold": HOLD}
 
 Holder = tuple[int, int]
 """Kind and, for a grip, the robot's index; -1 for others."""
@@ -66,7 +61,7 @@ class Anatomy:
         copy_of[bodies] = np.arange(len(bodies))
         called = [m.body(b).name for b in bodies]
         welds = [m.equality(e).name.split("/", 2) for e in range(m.neq)]
-        check_holders(m, np.flatnonzero([words[0] in WORDS for words in welds]))
+        check_holders(m, np.flatnonzero([words[0] in KINDS for words in welds]))
         d = mujoco.MjData(m)
         mujoco.mj_kinematics(m, d)
         return cls(
@@ -87,7 +82,7 @@ class Anatomy:
 
 
 def _holder(words: list[str], robots: dict[str, int]) -> Holder | None:
-    kind = WORDS.get(words[0])
+    kind = KINDS.get(words[0])
     if kind is None:
         return None
     return (kind, robots[words[1]]) if kind == GRIP else (kind, -1)

@@ -6,7 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from factory.record.monitor.anatomy import GRIP, HOLD, Anatomy
+from factory.mjcf.weld_frames import GRIP, HOLD
+from factory.record.monitor.anatomy import Anatomy
 from factory.record.monitor.observation import Array, Index, Observation
 
 HANGS = 2e-3

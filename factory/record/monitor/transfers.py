@@ -6,9 +6,10 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
+from factory.mjcf.weld_frames import FEED, GRIP, HOLD, PARK
 from factory.plant.factory import Operation
 from factory.problem.pag import NOPART
-from factory.record.monitor.anatomy import FEED, GRIP, HOLD, PARK, Anatomy, Holder
+from factory.record.monitor.anatomy import Anatomy, Holder
 from factory.record.monitor.grips import Switch
 from factory.record.monitor.subject import MonitorSubject
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from factory.mjcf.parts import HIDDEN
 from factory.mjcf.replica import Replica
-from factory.mjcf.weld_frames import gaps
+from factory.mjcf.weld_frames import GRIP, HOLD, gaps
 from factory.nets.replay import replay
 from factory.record.monitor.record import watch_log
 from factory.record.monitor.report import Report
@@ -20,7 +20,7 @@ from factory.simulation.simulation import Simulation
 from factory.study.analysis.recorded import conditions
 from factory.study.fidelity.causality import causal_record, duration_differences
 from factory.study.fidelity.quantities import QUANTITIES
-from factory.study.fidelity.welds import GRIP, HOLD, Welds
+from factory.study.fidelity.welds import Welds
 from factory.support.errors import InputError
 
 EVERY = 5

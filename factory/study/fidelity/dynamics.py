@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 
 from factory.control.mode import REST, Array
-from factory.mjcf.weld_frames import ROWS, Slides, residuals
+from factory.mjcf.weld_frames import FEED, ROWS, Slides, residuals
 from factory.study.fidelity.histogram import Histogram
-from factory.study.fidelity.welds import FEED, Velocities, Welds
+from factory.study.fidelity.welds import Velocities, Welds
 from factory.support.engine import mujoco
 
 FULL = 0.999

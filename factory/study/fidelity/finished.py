@@ -7,8 +7,9 @@ import numpy as np
 from factory.control.mode import Array, Index
 from factory.mjcf import names
 from factory.mjcf.model import Model
+from factory.mjcf.weld_frames import HOLD
 from factory.study.fidelity.record import Misplaced
-from factory.study.fidelity.welds import HOLD, Welds
+from factory.study.fidelity.welds import Welds
 
 
 class Finished:

@@ -7,11 +7,8 @@ import numpy as np
 
 from factory.control.mode import Array, Index
 from factory.mjcf import names
-from factory.mjcf.weld_frames import Slides
+from factory.mjcf.weld_frames import GRIP, KINDS, Slides
 from factory.support.engine import mujoco
-
-PARK, FEED, GRIP, HOLD = range(4)
-KINDS = {"park": PARK, "feed": FEED, "grip": GRIP, "hold": HOLD}
 
 
 class Welds:
