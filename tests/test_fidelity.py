@@ -1,4 +1,4 @@
-"""Every measure of fidelity against what is known of it, and against planted faults."""
+"""Every figure of fidelity against known values, and against planted faults."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
-"""The monitor: it explains every good run, and catches what is planted in the engine under it, with
-time, robot, label and source line."""
+"""The monitor: it explains every good run, and finds faults planted in the engine, with time, robot,
+label and source line."""
 
 from __future__ import annotations
 
@@ -141,7 +141,7 @@ def test_it_reads_neither_the_supervisor_nor_the_world() -> None:
 
 
 def plant(simulation: Simulation, when: Callable[[], bool], act: Callable[[], None]) -> list[float]:
-    """Do something to the engine once, at the beginning of a tick; gives the time, when done."""
+    """Act on the engine once, at the beginning of a tick; gives the time of that."""
     step, done = simulation.supervisor.step, list[float]()
 
     def stepped(ticks: int = 1) -> None:
@@ -323,7 +323,7 @@ def test_a_weld_ended_before_its_dwell(paper: Layout) -> None:
 
 
 def test_a_weld_ended_on_the_way_to_it(paper: Layout) -> None:
-    """Nobody stops there, and the next operation starts before this one can have ended."""
+    """The robot does not stop there, and the next operation starts before this one can end."""
     simulation = Simulation(paper, units=1)
     done = hurry(simulation, "sub2", 0.2)
     _, report = watched(simulation, 4)
@@ -369,7 +369,7 @@ def test_an_operation_that_does_not_go_on(paper: Layout) -> None:
 
 
 def test_more_parts_let_in_than_allowed(paper: Layout) -> None:
-    """The world lets in what it has; the monitor was told that one unit is to be inside at once."""
+    """The world lets in what it has; the bound in the monitor's subject is one unit at once."""
     simulation = Simulation(paper, units=2)
     simulation.wip = 1
     run, report = watched(simulation)

@@ -1,4 +1,4 @@
-"""Many runs at once: the grid, the rows, what is survived, and the figures of the summary."""
+"""Sweeps: the grid, the rows, interruptions and kills, and the figures of the summary."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ def rows_of(path: Path, columns: str = "point") -> list[tuple[Any, ...]]:
 
 
 def has_rows(path: Path, least: int) -> bool:
-    """Whether so many rows are there by now."""
+    """Whether there are at least so many rows."""
     try:
         return len(rows_of(path)) >= least
     except sqlite3.OperationalError:
@@ -172,7 +172,7 @@ def test_seeds_vary_fastest_and_settings_slowest() -> None:
 
 
 def test_runs_that_share_a_model_are_the_runs_alone() -> None:
-    """A run writes into its model: none may see what another has left there."""
+    """A run writes into its model; no other run may see that."""
     runner = Runner(recipe_of(world="mujoco", jitter=0.3, units=2))
     source = read(PAPER)
     layout = lay_out(source.compile(), source.product)
@@ -296,7 +296,7 @@ def test_another_sweep_is_refused(tmp_path: Path, run: Terminal, here: None) -> 
 def test_two_sweeps_may_begin_at_once(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, statement: str, seeds: str
 ) -> None:
-    """Whatever one has just asked the new database when the other makes it its own."""
+    """At any point at which one reads the new database while the other makes its tables."""
     database, recipe = tmp_path / "r.db", recipe_of()
     other = recipe.identity(read_axes([seeds]))
     begun = []
@@ -476,7 +476,7 @@ def alive(pid: int) -> bool:
 def test_a_stopped_sweep_keeps_its_rows_and_goes_on(
     tmp_path: Path, run: Terminal, here: None
 ) -> None:
-    """After Ctrl-C and after kill -9. Its workers end too: nobody is left to work for."""
+    """After Ctrl-C and after kill -9. Its workers end too."""
     database = tmp_path / "r.db"
     words = ["sweep", str(PAPER), "--vary", "seed=0:40", "--jitter", "0.3", "--world", "ideal"]
     words += ["--units", "10", "-o", str(database)]
@@ -566,7 +566,7 @@ def test_a_cluster_survives_the_death_of_a_worker(
     assert there.figures["sim_time_s"] == at_home.figures["sim_time_s"]
 
 
-def test_nobody_at_the_address(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_no_scheduler_at_the_address(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip("distributed")
     from factory.study.sweep import cluster
 
@@ -598,7 +598,7 @@ def test_the_summary_is_numpys(tmp_path: Path, here: None) -> None:
         assert told.deviation == pytest.approx(values.std(ddof=1), rel=1e-12)
         assert (told.confidence_low, told.confidence_high) == pytest.approx((low, high), rel=1e-9)
         assert (told.least, told.greatest) == (values.min(), values.max())
-        assert "handoffs" not in group.figures  # no such thing in the ideal world
+        assert "handoffs" not in group.figures  # there are none in the ideal world
 
 
 def test_failed_runs_count_and_nothing_more(tmp_path: Path) -> None:

@@ -118,39 +118,32 @@ def _read(data: memoryview) -> Log:
                 raise ValueError("its states take too much memory for a file of its size")
             ticks.append(arrays)
         complete = kind == b"E"
-    states = [[unpack_rows(q, a, len(a["time"])) for a in ticks] for q in ("qpos", "qvel")]
-    qpos, qvel = (
-        _locked(np.concatenate([np.zeros((0, n)), *rows]))
-        for n, rows in zip((sizes.nq, sizes.nv), states, strict=True)
-    )
     counts = [len(a["time"]) for a in ticks]
     time, delivered = _joined("time", ticks, np.float64), _joined("delivered", ticks, np.int32)
     check_course(time, delivered)
+    wide = len(ticks[0]["ctrl_first"]) if ticks and "ctrl_first" in ticks[0] else None
     return Log(
         MappingProxyType(header),
         xml,
         MappingProxyType(files),
         time,
         delivered,
-        qpos,
-        qvel,
+        _states("qpos", sizes.nq, ticks),
+        _states("qvel", sizes.nv, ticks),
         _lasting("marking", ticks, counts),
         _lasting("active", ticks, counts),
         _single("contact", "contact", ticks, counts),
         _single("contact", "contact_dist", ticks, counts),
         _joined("fired", ticks, np.int32),
         _joined("fired_t", ticks, np.float64),
-        _setpoints(ticks),
+        _states("ctrl", wide, ticks) if wide is not None else None,
         complete,
     )
 
 
-def _setpoints(ticks: Sequence[Arrays]) -> NDArray[np.float64] | None:
-    if not ticks or "ctrl_first" not in ticks[0]:
-        return None
-    rows = [unpack_rows("ctrl", a, len(a["time"])) for a in ticks]
-    found: NDArray[np.float64] = _locked(np.concatenate(rows))
-    return found
+def _states(name: str, width: int, ticks: Sequence[Arrays]) -> Any:
+    rows = (unpack_rows(name, a, len(a["time"])) for a in ticks)
+    return _locked(np.concatenate([np.zeros((0, width)), *rows]))
 
 
 def _locked(values: Any) -> Any:

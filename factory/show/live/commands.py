@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Collection, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Any
 
 SPEEDS = (0.1, 0.25, 0.5, 1.0, 2.0, 5.0, 10.0, 0.0)
@@ -86,7 +86,8 @@ def command_of(message: str | bytes, robots: int, parts: Collection[str]) -> Com
     name = told.get("do")
     if not isinstance(name, str) or name not in KINDS:
         raise ValueError(f"'do' is {name!r}: there are {', '.join(KINDS)}")
-    kind, fields = KINDS[name]
+    kind = KINDS[name]
+    keys = [field.name for field in fields(kind)]
     valid: Mapping[str, tuple[Callable[[Any], bool], str]] = {
         "robot": (lambda v: type(v) is int and 0 <= v < robots, f"a number from 0 to {robots - 1}"),
         "part": (lambda v: isinstance(v, str) and v in parts, "the label of a part"),
@@ -97,25 +98,25 @@ def command_of(message: str | bytes, robots: int, parts: Collection[str]) -> Com
             f"one of {SPEEDS if kind is Speed else FACTORS}",
         ),
     }
-    for key in fields:
+    for key in keys:
         holds, words = valid[key]
         if not holds(told.get(key)):
             raise ValueError(f"'{key}' of '{name}' is {told.get(key)!r}: {words} is needed")
-    return kind(*(told[key] for key in fields))
+    return kind(*(told[key] for key in keys))
 
 
 def _is_one(value: object, of: Collection[float]) -> bool:
     return type(value) in (int, float) and value in of
 
 
-KINDS: Mapping[str, tuple[Callable[..., Command], tuple[str, ...]]] = {
-    "pause": (Pause, ()),
-    "play": (Play, ()),
-    "step": (PlayToFiring, ()),
-    "restart": (Restart, ()),
-    "speed": (Speed, ("factor",)),
-    "push": (PushRobot, ("robot", "share")),
-    "slow": (Slow, ("robot", "factor")),
-    "block": (Block, ("part", "blocked")),
+KINDS: Mapping[str, type[Command]] = {
+    "pause": Pause,
+    "play": Play,
+    "step": PlayToFiring,
+    "restart": Restart,
+    "speed": Speed,
+    "push": PushRobot,
+    "slow": Slow,
+    "block": Block,
 }
-"""The commands by name, with their fields."""
+"""The commands by name."""

@@ -72,17 +72,14 @@ class TimedNet:
     @cached_property
     def circuits(self) -> tuple[Circuit, ...]:
         """Those with a name and the tightest through each bound, the slowest first."""
-        found = [self._bounded(slack) for slack in self._tightest]
+        tightest = circuits(self.ratio, self.bounds) if self.bounds else ()
+        found = [self._bounded(slack) for slack in tightest]
         return tuple(sorted((*self.named, *found), key=lambda c: -c.pace))
 
     @cached_property
     def critical(self) -> tuple[Circuit, ...]:
         """The circuits that set the pace."""
         return tuple(c for c in self.circuits if c.pace >= self.pace * (1 - SAME))
-
-    @cached_property
-    def _tightest(self) -> tuple[Slack, ...]:
-        return circuits(self.ratio, self.bounds) if self.bounds else ()
 
     def _bounded(self, slack: Slack) -> Circuit:
         tokens = sum(self.net.tokens[p] for p in slack.circuit)
