@@ -1,5 +1,5 @@
-"""Logs: what is written is read back to the bit, from whole files and from cut-off ones; other files
-are refused with a diagnostic."""
+"""Logs: what is written is read back to the bit, from whole files and from cut-off ones; other
+files are refused with a diagnostic."""
 
 from __future__ import annotations
 

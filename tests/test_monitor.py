@@ -1,5 +1,5 @@
-"""The monitor: it explains every good run, and finds faults planted in the engine, with time, robot,
-label and source line."""
+"""The monitor: it explains every good run, and finds faults planted in the engine, with time,
+robot, label and source line."""
 
 from __future__ import annotations
 
