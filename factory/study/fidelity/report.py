@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from math import isfinite
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +10,7 @@ from factory.study.fidelity.convergence import Study
 from factory.study.fidelity.plots import check_plots, plots
 from factory.study.fidelity.quantities import QUANTITIES
 from factory.study.fidelity.record import Fidelity
+from factory.support.console import finite
 from factory.support.errors import Diagnostic, InputError
 from factory.support.files import write_all
 
@@ -48,7 +48,7 @@ def check_report(path: Path | None) -> None:
 def write_report(path: Path, found: Fidelity, study: Study | None = None) -> list[Path]:
     """Write a folder, or figures alone where `path` ends in .json; all files or none. Gives their
     paths."""
-    text = json.dumps(_finite(document(found, study)), indent=1).encode() + b"\n"
+    text = json.dumps(finite(document(found, study)), indent=1).encode() + b"\n"
     if _is_json(path):
         contents = {path: text}
     else:
@@ -97,11 +97,11 @@ def _rows(found: Fidelity, study: Study | None) -> list[str]:
 
 def remark(key: str, value: float | None, study: Study | None) -> str:
     """Remarks on a figure: beyond its limit, not converged."""
-    found = [
-        *(["beyond its limit"] if QUANTITIES[key].exceeded(value) else []),
-        *(["not converged"] if study is not None and key in study.unsettled() else []),
-    ]
-    return ", ".join(found)
+    found = {
+        "beyond its limit": QUANTITIES[key].exceeded(value),
+        "not converged": study is not None and key in study.unsettled(),
+    }
+    return ", ".join(words for words, holds in found.items() if holds)
 
 
 def shown(value: float | None) -> str:
@@ -113,12 +113,3 @@ def shown(value: float | None) -> str:
 
 def _is_json(path: Path) -> bool:
     return path.suffix.lower() == ".json"
-
-
-def _finite(value: Any) -> Any:
-    """A value with null for what is not finite."""
-    if isinstance(value, float):
-        return value if isfinite(value) else None
-    if isinstance(value, dict):
-        return {key: _finite(item) for key, item in value.items()}
-    return [_finite(item) for item in value] if isinstance(value, list | tuple) else value
