@@ -28,13 +28,12 @@ from factory.nets.marked import MarkedNet
 from factory.simulation.run import Run
 from factory.simulation.simulation import Simulation
 from factory.study.analysis import Change, Timing, analyse
-from factory.study.analysis.bounds import wip_curve
 from factory.study.analysis.firing import earliest_firings, settled_firings
 from factory.study.analysis.flow import flow
 from factory.study.analysis.slack import circuits, slacks
 from factory.study.analysis.steady import reached
 from factory.study.analysis.timed import timed_net
-from factory.study.analysis.what_if import scenarios
+from factory.study.analysis.what_if import scenarios, wip_curve
 from factory.support.settings import Settings
 from factory.timing.pool import part_pool
 from factory.timing.prediction import operation_delays, predict
@@ -336,7 +335,7 @@ def test_the_curve_of_copies_let_in() -> None:
 
 
 def test_robots_that_set_the_pace_together() -> None:
-    """Either alone buys nothing then: they are looked at as one."""
+    """A change of either alone has no effect then; the scenario changes both."""
     timing = Timing(paper_layout(), Settings(), "ideal")
     net = timed_net(timing)
     slow = [replace(c, seconds=9.0) if c.name in ("r5", "r6") else c for c in net.named]
@@ -388,7 +387,7 @@ def test_a_slow_robot_shows(monkeypatch: pytest.MonkeyPatch, run: Terminal) -> N
 
 
 def test_a_run_of_one_unit(run: Terminal) -> None:
-    """What is done once is compared with the first time that it is done."""
+    """An operation done once is compared with its first predicted duration."""
     found = run("analyze", PAPER, "--world", "ideal", "--units", 1, "--run", "--json").json
     assert found["measured"]["cycle_time_s"]["measured"] is None
     durations = found["measured"]["durations"]
@@ -422,7 +421,7 @@ def test_the_document(run: Terminal) -> None:
 
 
 def test_what_is_asked_is_told_once(run: Terminal) -> None:
-    """The robot that sets the pace would be doubled unasked."""
+    """The robot that sets the pace is doubled without being asked for."""
     told = run("analyze", PAPER, "--second", "r3", "--json").json["scenarios"]
     changes = [scenario["change"] for scenario in told]
     assert changes[0] == "2 × r3" and changes.count("2 × r3") == 1

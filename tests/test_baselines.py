@@ -31,7 +31,7 @@ PRODUCTS = {
 }
 SEED, JITTER, DIGITS = 1, 0.3, 9
 UNITS = {"gearbox": 2}
-"""Of the large ones, for time's sake; 4 of all others, which gives a cycle time."""
+"""Units of the large products, to save time; 4 of all others, which gives a cycle time."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,7 +53,7 @@ TOLERANCES = {
 
 
 def deviations(found: Figures, expected: Figures) -> dict[str, str]:
-    """For each figure that has left its tolerance: what was expected, what found, by how much."""
+    """For each figure outside its tolerance: the expected value, the found one, the difference."""
     told: dict[str, str] = {}
     for key, tolerance in TOLERANCES.items():
         one, other = found.get(key), expected.get(key)
@@ -83,7 +83,7 @@ def figures(name: str, alter: Alter | None = None, settings: Settings | None = N
 
 
 def rounded(value: float | None) -> float | None:
-    """A figure as it is kept: nine digits, and nothing below what anybody could measure."""
+    """A figure as it is kept: nine digits, and 0 below what can be measured."""
     return None if value is None else round(float(f"{value:.{DIGITS}g}"), 12)
 
 

@@ -1,11 +1,11 @@
-"""Every measure of fidelity against what is known of it, and against planted faults."""
+"""Every figure of fidelity against known values, and against planted faults."""
 
 from __future__ import annotations
 
 import json
 import sys
 from dataclasses import replace
-from functools import cache
+from functools import cache, partial
 from math import e
 from pathlib import Path
 from types import MappingProxyType
@@ -16,19 +16,20 @@ import pytest
 
 import factory
 from factory.layout.layout import Layout
+from factory.mjcf.weld_frames import soften
 from factory.simulation.run import Event
 from factory.simulation.simulation import Simulation
 from factory.study.fidelity import QUANTITIES, SeedRecord, measure, measure_seed, study
 from factory.study.fidelity.causality import (
+    CausalRecord,
     Orders,
-    Process,
+    causal_record,
     compare,
     differences,
     duration_differences,
-    process,
 )
 from factory.study.fidelity.comparing import Alter, Case
-from factory.study.fidelity.convergence import Series, Softened
+from factory.study.fidelity.convergence import Series
 from factory.study.fidelity.finished import Finished
 from factory.study.fidelity.histogram import Histogram
 from factory.study.fidelity.measuring import Measurement
@@ -204,7 +205,8 @@ def test_a_carrier_that_moves_along_gives_no_speed_step() -> None:
 def test_softer_welds_show_in_the_residual() -> None:
     """What they give under load goes with the square of their time constant, once that is more than
     what a hand-over leaves for a moment."""
-    give = [figure(altered(Softened(f)), "weld_residual_p99_mm") for f in (2.0, 4.0, 8.0)]
+    softer = [altered(partial(soften, factor=factor)) for factor in (2.0, 4.0, 8.0)]
+    give = [figure(record, "weld_residual_p99_mm") for record in softer]
     assert figure(good(), "weld_residual_p99_mm") < 0.6 * give[0]
     assert give[1] > 3 * give[0]
     assert give[2] == pytest.approx(4 * give[1], rel=0.15)
@@ -333,9 +335,9 @@ def test_a_contact_fails_the_record() -> None:
 # --- order and time --------------------------------------------------------------------------
 
 
-def record_of(*firings: tuple[str, float]) -> Process:
+def record_of(*firings: tuple[str, float]) -> CausalRecord:
     net = layout().factory.net
-    return process(net, [Event(t, name) for name, t in firings])
+    return causal_record(net, [Event(t, name) for name, t in firings])
 
 
 def test_concurrent_firings_that_swap_are_counted_and_are_no_fault() -> None:

@@ -1,4 +1,4 @@
-"""A running factory: what its watchers may ask, what then happens, and who may watch."""
+"""A running factory: its commands, their effects, and access to its page."""
 
 from __future__ import annotations
 
@@ -20,17 +20,17 @@ from factory.simulation.disturbance.hands import Hands
 
 from factory.nets.replay import replay
 from factory.record.monitor import beside
-from factory.show.live import Frame, Server, Session
+from factory.show.live import LiveFrame, Server, Session
 from factory.show.live.commands import (
     KINDS,
     Block,
     Pause,
     Play,
-    Push,
+    PlayToFiring,
+    PushRobot,
     Restart,
     Slow,
     Speed,
-    Step,
     command_of,
 )
 from factory.show.live.page import page, stage_of
@@ -53,9 +53,9 @@ PARTS = ("part1", "part2", "part3")
     ("message", "command"),
     [
         ('{"do": "pause"}', Pause()),
-        ('{"do": "step", "more": 1}', Step()),
+        ('{"do": "step", "more": 1}', PlayToFiring()),
         ('{"do": "speed", "factor": 0}', Speed(0)),
-        ('{"do": "push", "robot": 5, "share": -1}', Push(5, -1)),
+        ('{"do": "push", "robot": 5, "share": -1}', PushRobot(5, -1)),
         ('{"do": "slow", "robot": 0, "factor": 0.1}', Slow(0, 0.1)),
         ('{"do": "block", "part": "part2", "blocked": false}', Block("part2", False)),
     ],
@@ -96,7 +96,7 @@ def test_what_is_no_command_is_explained(message: str | bytes, words: str) -> No
 
 
 def moved(share: float) -> float:
-    """How far a waiting robot is moved along its guidepath by a push [m], at most."""
+    """The greatest distance that a push moves a waiting robot along its guidepath [m]."""
     simulation = Simulation(paper_layout(), units=10)
     hands, world = Hands(simulation), simulation.world
     hands.block("part1")
@@ -160,7 +160,7 @@ class Stopped(Exception):
 
 
 def a_session(playing: bool) -> Session:
-    """Of the paper's example, for ever; it does not run yet."""
+    """A session of the paper's example, without end; it does not run yet."""
     return Session(lambda: Simulation(paper_layout(), units=10**9), playing)
 
 
@@ -181,7 +181,7 @@ class Running:
         if self.over:
             raise Stopped
 
-    def until(self, holds: Any, seconds: float = 20.0) -> Frame:
+    def until(self, holds: Any, seconds: float = 20.0) -> LiveFrame:
         """The first frame of which something holds."""
         end = monotonic() + seconds
         while not holds(frame := self.session.frame):
@@ -211,7 +211,7 @@ def test_pause_step_and_play(running: Running) -> None:
     assert running.session.frame.time == still.time
     fired = still.fired
     for _ in range(4):
-        send(Step())
+        send(PlayToFiring())
         after = running.until(lambda f, n=fired: f.fired > n and not f.playing)
         fired = after.fired
         (last,) = {t for t, _ in running.session.fired(after.run, fired - 1, fired)}
@@ -315,7 +315,7 @@ def test_the_page_is_at_the_address_and_nowhere_else(server: Server) -> None:
 
 
 def test_other_names_and_other_pages_are_refused(server: Server) -> None:
-    """A page elsewhere whose name is made to mean this machine, and one that knows the address."""
+    """A page of another origin whose name resolves to this machine, and one with the address."""
     assert asked(server, path_of(server), Host="evil.example:80")[0] == 403
     assert asked(server, path_of(server), Host="localhost:9000")[0] == 200
     from websockets.exceptions import InvalidStatus
@@ -419,14 +419,14 @@ def test_the_command_serves_until_it_is_interrupted() -> None:
             told["address"].replace("http", "ws") + "live", proxy=None
         ) as watcher:
             assert unpacked(watcher.recv(10))[0]["playing"]
-            process.stdout.close()  # nobody reads any more
+            process.stdout.close()  # nothing reads it from now on
             process.send_signal(signal.SIGINT)
             assert process.wait(20) == 130
         assert process.stderr.read().strip() == "Interrupted stopped by the user"
 
 
 def test_other_hosts_need_a_word(run: Terminal, monkeypatch: pytest.MonkeyPatch) -> None:
-    """It is said before anything is laid out."""
+    """The error comes before anything is laid out."""
     monkeypatch.setattr(sys.modules["factory.commands.view"], "plan", None)
     done = run("view", PAPER, "--host", "0.0.0.0", "--json")
     assert done.status == 2 and done.codes == ["BadValue"]
@@ -442,6 +442,6 @@ def test_what_is_missing_is_said_first(run: Terminal, monkeypatch: pytest.Monkey
 
 
 def test_every_kind_has_a_name() -> None:
-    assert {kind for kind, _ in KINDS.values()} == {
-        *(Pause, Play, Step, Restart, Speed, Push, Slow, Block)
+    assert set(KINDS.values()) == {
+        *(Pause, Play, PlayToFiring, Restart, Speed, PushRobot, Slow, Block)
     }

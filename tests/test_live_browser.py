@@ -17,7 +17,7 @@ from tests.test_report_browser import CHROMIUM, browser  # noqa: F401
 pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="no chromium: apt-get install chromium")
 
 LONG = 20.0
-"""A browser that draws in software is given so long [s]."""
+"""Time limit for a browser that draws in software [s]."""
 
 
 class Watched:

@@ -1,5 +1,5 @@
-"""Logs: what is written is read back to the bit, from whole files and from cut-off ones; what is no
-log is refused, never a traceback."""
+"""Logs: what is written is read back to the bit, from whole files and from cut-off ones; other
+files are refused with a diagnostic."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from hypothesis.extra import numpy as arrays
 
 import factory
 from factory.record.log import MAGIC, Log, LogWriter, is_log, read_log
+from factory.record.log import writer as writing
 from factory.record.log.blocks import HEAD, LENGTH, pack_rows, unpack_rows
 from factory.simulation.simulation import Simulation
 from factory.support.engine import mujoco
@@ -101,12 +102,12 @@ def test_a_log_without_setpoints_is_still_read(
     layout, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Older versions kept none."""
-    arrays = LogWriter._arrays
+    arrays = writing._Ticks.arrays
 
-    def older(self: LogWriter) -> dict:
+    def older(self: writing._Ticks) -> dict:
         return {k: a for k, a in arrays(self).items() if not k.startswith("ctrl")}
 
-    monkeypatch.setattr(LogWriter, "_arrays", older)
+    monkeypatch.setattr(writing._Ticks, "arrays", older)
     simulation = Simulation(layout, "mujoco", 1)
     with LogWriter(tmp_path / "old", simulation) as writer:
         simulation.run([writer.observe], 0.1)

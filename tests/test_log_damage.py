@@ -1,4 +1,4 @@
-"""Logs whose values are damaged: each command refuses them with a diagnostic, or makes do."""
+"""Logs whose values are damaged: each command refuses them with a diagnostic, or still works."""
 
 from __future__ import annotations
 
@@ -152,7 +152,7 @@ def longer(values: np.ndarray) -> np.ndarray:
 
 
 def first(value: float) -> Callable[[np.ndarray], np.ndarray]:
-    """Another value in the first place."""
+    """The same array with another first value."""
 
     def change(values: np.ndarray) -> np.ndarray:
         return np.concatenate([np.full_like(values[:1], value), values[1:]])

@@ -1,5 +1,5 @@
-"""The monitor: it explains every good run, and catches what is planted in the engine under it, with
-time, robot, label and source line."""
+"""The monitor: it explains every good run, and finds faults planted in the engine, with time,
+robot, label and source line."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ from factory.layout.layout import Layout
 from factory.nets.history import legal_marking
 from factory.pipeline import all_templates, read
 from factory.record.log import Log, LogWriter, read_log
-from factory.record.monitor import Anatomy, Monitor, Report, Subject, subject_of, subject_of_run
-from factory.record.monitor.explanation import Explanation
+from factory.record.monitor import MonitorSubject, Report, beside, subject_of
+from factory.record.monitor.explanation import SeenFirings
 from factory.record.monitor.record import watch_log
 from factory.simulation.simulation import Simulation
 from factory.support.errors import InputError
@@ -29,16 +29,8 @@ from tests.command_line import PAPER, ROOT, Terminal
 from tests.test_simulation import PRODUCTS, UNARY, laid_out, random_marking
 
 
-def monitor_of(simulation: Simulation) -> Monitor:
-    subject = subject_of_run(simulation)
-    world = simulation.world
-    monitor = Monitor(subject, Anatomy.of(world.m, simulation.layout.factory))
-    monitor.watch(world.m, world.d)
-    return monitor
-
-
 def watched(simulation: Simulation, max_time: float | None = None) -> tuple[Any, Report]:
-    monitor = monitor_of(simulation)
+    monitor = beside(simulation)
     run = simulation.run([monitor.observe], max_time)
     return run, monitor.report()
 
@@ -149,7 +141,7 @@ def test_it_reads_neither_the_supervisor_nor_the_world() -> None:
 
 
 def plant(simulation: Simulation, when: Callable[[], bool], act: Callable[[], None]) -> list[float]:
-    """Do something to the engine once, at the beginning of a tick; gives the time, when done."""
+    """Act on the engine once, at the beginning of a tick; gives the time of that."""
     step, done = simulation.supervisor.step, list[float]()
 
     def stepped(ticks: int = 1) -> None:
@@ -216,7 +208,7 @@ def test_a_part_that_is_let_go(paper: Layout) -> None:
     done = plant(simulation, after(simulation, "sub1_e"), let_go)
     _, report = watched(simulation, 3)
     assert_caught(report, "Dropped", "r3", "part1", 6, done[0])
-    assert report.violations[0].message == "nobody holds part1#1, which r3 held"
+    assert report.violations[0].message == "nothing holds part1#1, which r3 held"
 
 
 def test_a_part_that_is_knocked_off_its_place(paper: Layout) -> None:
@@ -331,7 +323,7 @@ def test_a_weld_ended_before_its_dwell(paper: Layout) -> None:
 
 
 def test_a_weld_ended_on_the_way_to_it(paper: Layout) -> None:
-    """Nobody stops there, and the next operation starts before this one can have ended."""
+    """The robot does not stop there, and the next operation starts before this one can end."""
     simulation = Simulation(paper, units=1)
     done = hurry(simulation, "sub2", 0.2)
     _, report = watched(simulation, 4)
@@ -377,7 +369,7 @@ def test_an_operation_that_does_not_go_on(paper: Layout) -> None:
 
 
 def test_more_parts_let_in_than_allowed(paper: Layout) -> None:
-    """The world lets in what it has; the monitor was told that one unit is to be inside at once."""
+    """The world lets in what it has; the bound in the monitor's subject is one unit at once."""
     simulation = Simulation(paper, units=2)
     simulation.wip = 1
     run, report = watched(simulation)
@@ -390,16 +382,16 @@ def test_parts_that_the_marking_does_not_account_for(paper: Layout) -> None:
     start = legal_marking(paper.factory.net, "r3:sub1")
     simulation = Simulation(paper, units=1, start=start)
     simulation.start = paper.factory.net.initial_marking
-    monitor = monitor_of(simulation)
+    monitor = beside(simulation)
     found = [(v.code, v.robot, v.label) for v in monitor.violations]
     assert ("Start", "r3", "part1") in found
 
 
 def test_firings_in_an_impossible_order(paper: Layout) -> None:
     """The difference constraints alone: one firing too early is one violation."""
-    subject: Subject = subject_of(paper, Settings())
+    subject: MonitorSubject = subject_of(paper, Settings())
     events = paper.factory.net.threaded.net.transition_index
-    explanation = Explanation(subject, 0.015)
+    explanation = SeenFirings(subject, 0.015)
     for name, t in (("part1_e", 1.0), ("part2_e", 1.0), ("sub1_e", 3.0)):
         explanation.saw(events[name], 0, t, t + 0.01, t, "r3")
     _, inferred, found = explanation.solve(0.0, 9.0)
@@ -430,7 +422,7 @@ def test_a_log_gives_the_same_verdict(paper: Layout, tmp_path: Path) -> None:
     path = tmp_path / "run.log"
     start = legal_marking(paper.factory.net, "sub1")
     simulation = Simulation(paper, units=2, seed=2, jitter=0.3, wip=2, start=start)
-    monitor = monitor_of(simulation)
+    monitor = beside(simulation)
     with LogWriter(path, simulation) as writer:
         simulation.run([writer.observe, monitor.observe])
     live, (recorded, subject) = monitor.report(), watch_log(read_log(path))

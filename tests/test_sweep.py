@@ -1,4 +1,4 @@
-"""Many runs at once: the grid, the rows, what is survived, and the figures of the summary."""
+"""Sweeps: the grid, the rows, interruptions and kills, and the figures of the summary."""
 
 from __future__ import annotations
 
@@ -25,12 +25,11 @@ from scipy import stats
 from factory.layout.embedding import lay_out
 from factory.pipeline import read
 from factory.simulation.simulation import Simulation
-from factory.study.sweep import Recipe, local, points, read_axes, summarise, sweeping
+from factory.study import pool
+from factory.study.sweep import Recipe, points, read_axes, summarise, sweeping
 from factory.study.sweep.grid import Point, Value
-from factory.study.sweep.kept import COLUMNS
-from factory.study.sweep.local import run_local
-from factory.study.sweep.store import Store
-from factory.study.sweep.sweeping import sweep
+from factory.study.sweep.store import COLUMNS, Store
+from factory.study.sweep.sweeping import run_local, sweep
 from factory.study.sweep.work import FIGURES, Outcome, Runner
 from factory.support.errors import InputError, MissingError, RunError
 from factory.support.settings import Settings
@@ -56,7 +55,7 @@ def rows_of(path: Path, columns: str = "point") -> list[tuple[Any, ...]]:
 
 
 def has_rows(path: Path, least: int) -> bool:
-    """Whether so many rows are there by now."""
+    """Whether there are at least so many rows."""
     try:
         return len(rows_of(path)) >= least
     except sqlite3.OperationalError:
@@ -173,7 +172,7 @@ def test_seeds_vary_fastest_and_settings_slowest() -> None:
 
 
 def test_runs_that_share_a_model_are_the_runs_alone() -> None:
-    """A run writes into its model: none may see what another has left there."""
+    """A run writes into its model; no other run may see that."""
     runner = Runner(recipe_of(world="mujoco", jitter=0.3, units=2))
     source = read(PAPER)
     layout = lay_out(source.compile(), source.product)
@@ -297,7 +296,7 @@ def test_another_sweep_is_refused(tmp_path: Path, run: Terminal, here: None) -> 
 def test_two_sweeps_may_begin_at_once(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, statement: str, seeds: str
 ) -> None:
-    """Whatever one has just asked the new database when the other makes it its own."""
+    """At any point at which one reads the new database while the other makes its tables."""
     database, recipe = tmp_path / "r.db", recipe_of()
     other = recipe.identity(read_axes([seeds]))
     begun = []
@@ -438,7 +437,7 @@ def test_bad_command_lines_write_nothing(
 def test_a_killed_worker_loses_the_run_under_way_alone(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(local, "TRIES", 2)
+    monkeypatch.setattr(pool, "TRIES", 2)
     recipe = recipe_of()
     deadly = Deadly(recipe.factory, recipe.product, recipe.fixed, mark=tmp_path / "mark")
     grid = list(points(read_axes(["seed=2,0,3,1,4:8"])))
@@ -477,7 +476,7 @@ def alive(pid: int) -> bool:
 def test_a_stopped_sweep_keeps_its_rows_and_goes_on(
     tmp_path: Path, run: Terminal, here: None
 ) -> None:
-    """After Ctrl-C and after kill -9. Its workers end too: nobody is left to work for."""
+    """After Ctrl-C and after kill -9. Its workers end too."""
     database = tmp_path / "r.db"
     words = ["sweep", str(PAPER), "--vary", "seed=0:40", "--jitter", "0.3", "--world", "ideal"]
     words += ["--units", "10", "-o", str(database)]
@@ -567,7 +566,7 @@ def test_a_cluster_survives_the_death_of_a_worker(
     assert there.figures["sim_time_s"] == at_home.figures["sim_time_s"]
 
 
-def test_nobody_at_the_address(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_no_scheduler_at_the_address(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip("distributed")
     from factory.study.sweep import cluster
 
@@ -597,9 +596,9 @@ def test_the_summary_is_numpys(tmp_path: Path, here: None) -> None:
         assert (group.done, group.failed, told.n) == (8, 0, 8)
         assert told.mean == pytest.approx(values.mean(), rel=1e-12)
         assert told.deviation == pytest.approx(values.std(ddof=1), rel=1e-12)
-        assert (told.low, told.high) == pytest.approx((low, high), rel=1e-9)
+        assert (told.confidence_low, told.confidence_high) == pytest.approx((low, high), rel=1e-9)
         assert (told.least, told.greatest) == (values.min(), values.max())
-        assert "handoffs" not in group.figures  # no such thing in the ideal world
+        assert "handoffs" not in group.figures  # there are none in the ideal world
 
 
 def test_failed_runs_count_and_nothing_more(tmp_path: Path) -> None:
@@ -614,7 +613,7 @@ def test_failed_runs_count_and_nothing_more(tmp_path: Path) -> None:
     assert (group.done, group.failed) == (1, 2)
     assert found.reasons == {"Stalled so": 2}
     told = group.figures["cycle_time_s"]
-    assert (told.n, told.mean, told.deviation, told.low) == (1, 2.0, None, None)
+    assert (told.n, told.mean, told.deviation, told.confidence_low) == (1, 2.0, None, None)
 
 
 def test_summaries_are_told_and_drawn(tmp_path: Path, run: Terminal, here: None) -> None:

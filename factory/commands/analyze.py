@@ -29,7 +29,7 @@ from factory.support.errors import Diagnostic, InputError, did_you_mean
 if TYPE_CHECKING:
     from factory.plant.factory import Factory
     from factory.study.analysis import Change, Timing
-    from factory.study.analysis.measured import Record
+    from factory.study.analysis.measured import RunRecord
     from factory.study.analysis.recorded import Conditions
 
 
@@ -126,7 +126,7 @@ def _analyze_pag(
     warn(layout.product.warnings, quiet)
     timing = Timing(layout, made.settings, made.world, made.seed, made.jitter)
     asked = _asked(factory, options)
-    record: Record | None = None
+    record: RunRecord | None = None
     status = 0
     if log is not None:
         record = _logged(str(options["measured"]), log, factory)
@@ -179,7 +179,7 @@ def _conditions(file: Path, log: Any, options: dict[str, Any]) -> Conditions:
     )
 
 
-def _logged(name: str, log: Any, factory: Factory) -> Record:
+def _logged(name: str, log: Any, factory: Factory) -> RunRecord:
     from factory.study.analysis.recorded import check_log, check_products, logged_record
 
     check_log(name, log.header, factory)
@@ -190,7 +190,7 @@ def _logged(name: str, log: Any, factory: Factory) -> Record:
 
 def _run(
     source: Any, timing: Timing, units: int, wip: int | None, quiet: bool
-) -> tuple[Record, int]:
+) -> tuple[RunRecord, int]:
     """A run on the spot; status 1 where it was troubled."""
     from factory.simulation.simulation import Simulation
     from factory.study.analysis.recorded import check_products, record_of

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import sys
 from pathlib import Path
 from typing import Any
@@ -70,11 +69,12 @@ def fidelity(
 ) -> int:
     """Compare FILE.pag in MuJoCo with the ideal world over the same seeds."""
     from factory.nets.verify import proved
+    from factory.study.bar import RunsBar
     from factory.study.fidelity import measure, study
-    from factory.study.fidelity.bar import Bar
     from factory.study.fidelity.comparing import Case
     from factory.study.fidelity.convergence import runs
     from factory.study.fidelity.report import check_report, document, write_report
+    from factory.study.pool import cores
 
     check_report(output)
     if output is not None:
@@ -84,11 +84,15 @@ def fidelity(
     _, factory, layout = plan(file, folders, settings, floor, options)
     proved(factory.net)
     warn(layout.product.warnings, quiet)
-    jobs = jobs or os.cpu_count() or 1
-    with Bar(seeds + (runs() if convergence else 0), quiet or as_json) as bar:
-        found = measure(layout, range(seeds), units, jitter, settings, jobs, bar.advance, max_time)
+    jobs = jobs or cores()
+    with RunsBar(seeds + (runs() if convergence else 0), 0, quiet or as_json) as bar:
+
+        def done(finished: int) -> None:
+            bar.advance()
+
+        found = measure(layout, range(seeds), units, jitter, settings, jobs, done, max_time)
         case = Case(layout, units, jitter, settings, max_time)
-        studied = study(case, 0, jobs, bar.advance) if convergence else None
+        studied = study(case, 0, jobs, done) if convergence else None
     written = [] if output is None else write_report(output, found, studied)
     if as_json:
         emit(document(found, studied))

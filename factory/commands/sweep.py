@@ -110,8 +110,8 @@ def _carry_out(
     from factory.commands.run_factory import check_ideal
     from factory.nets.verify import proved
     from factory.pipeline import read
+    from factory.study.pool import cores
     from factory.study.sweep.grid import DEFAULTS, SETTINGS, read_axes
-    from factory.study.sweep.local import cores
     from factory.study.sweep.recipe import Recipe
     from factory.study.sweep.sweeping import LOCAL, sweep
 
@@ -226,7 +226,7 @@ def _tell_summary(found: Summary, verbose: bool) -> None:
 
 
 def _cells(s: Statistic) -> tuple[float | None, ...]:
-    return s.mean, s.deviation, s.low, s.high, s.least, s.greatest
+    return s.mean, s.deviation, s.confidence_low, s.confidence_high, s.least, s.greatest
 
 
 def _shown(value: float | None) -> str:

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from factory.geometry.solids import Solid
+from factory.layout.certificate import ALWAYS, PAYLOAD_BODY
 from factory.layout.dimensions import ARM_WIDTH, CARRIAGE
 from factory.layout.layout import Box, Extent, Guidepath, Layout, Point2
-from factory.layout.certificate import ALWAYS, PAYLOAD_BODY
 from factory.layout.sweeps import piles, regions
 from factory.support.canvas import hexadecimal, hull
 

@@ -7,7 +7,7 @@ from typing import Literal
 
 import numpy as np
 
-from factory.record.monitor.subject import Subject
+from factory.record.monitor.subject import MonitorSubject
 from factory.render.caption import Caption, draw_title
 from factory.render.history import History
 from factory.render.ink import Pixels
@@ -48,7 +48,7 @@ class Take:
     name, the units asked for; `history` holds what has fired up to the moment of a picture."""
 
     m: mujoco.MjModel
-    subject: Subject
+    subject: MonitorSubject
     product: str
     units: int
     picture: Picture

@@ -11,7 +11,7 @@ import numpy as np
 
 from factory.mjcf import names
 from factory.mjcf.replica import Replica
-from factory.record.monitor.subject import Subject
+from factory.record.monitor.subject import MonitorSubject
 from factory.render.camera import (
     PART,
     Array,
@@ -39,7 +39,7 @@ class Viewpoint:
     need to know the factory."""
 
     def __init__(
-        self, replica: Replica, camera: Camera, framing: Framing, subject: Subject
+        self, replica: Replica, camera: Camera, framing: Framing, subject: MonitorSubject
     ) -> None:
         self.d, self.camera, self.framing = replica.d, camera, framing
         self.points = extent(replica.m, replica.d)
@@ -98,7 +98,7 @@ class Followed:
     A product is known by one of its parts, by itself that which the most robots carry.
     """
 
-    def __init__(self, m: mujoco.MjModel, subject: Subject, part: str = "") -> None:
+    def __init__(self, m: mujoco.MjModel, subject: MonitorSubject, part: str = "") -> None:
         self.part, self.places = part, subject.places
         self.kinds = [m.equality(e).name for e in range(m.neq)]
         factory, contents = subject.factory, subject.factory.contents

@@ -12,7 +12,7 @@ from math import inf
 from factory.control.mode import Array
 from factory.layout.durations import Pace
 from factory.plant.factory import Factory, Operation
-from factory.record.monitor.subject import Subject
+from factory.record.monitor.subject import MonitorSubject
 
 TIE = 1e-9
 """Times that are no further apart are the same [s]."""
@@ -39,7 +39,7 @@ class History:
     """Grows firing by firing, in the order of time; it can be asked for any time up to now. What
     fires at a time shows after it, as in a log, whose state at a time is before what fires then."""
 
-    def __init__(self, subject: Subject) -> None:
+    def __init__(self, subject: MonitorSubject) -> None:
         self.subject, self.factory = subject, subject.factory
         gears = self.factory.net.gears
         self.spells: list[list[Spell]] = []
@@ -100,7 +100,7 @@ class OperationProgress:
     run that goes straight to its goals.
     """
 
-    def __init__(self, subject: Subject) -> None:
+    def __init__(self, subject: MonitorSubject) -> None:
         self.subject, self.factory = subject, subject.factory
         self.pace = Pace.of(subject.settings)
 

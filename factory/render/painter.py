@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from factory.mjcf.replica import Replica
-from factory.record.monitor.subject import Subject
+from factory.record.monitor.subject import MonitorSubject
 from factory.render.camera import Array, Camera, Framing, View
 from factory.render.following import Viewpoint
 from factory.render.ink import Pixels
@@ -39,7 +39,7 @@ class Painter(Closing):
         m: mujoco.MjModel,
         size: Size,
         camera: Camera,
-        subject: Subject,
+        subject: MonitorSubject,
         caption: float = 0.0,
         samples: int = 1,
     ) -> None:

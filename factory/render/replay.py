@@ -9,7 +9,7 @@ import numpy as np
 from factory.record.log import Log
 from factory.record.log.model import model_of
 from factory.record.monitor.record import AGAIN, recorded_subject
-from factory.record.monitor.subject import Subject
+from factory.record.monitor.subject import MonitorSubject
 from factory.render.camerawork import Moment, Take, When, pictureless
 from factory.render.history import History
 from factory.render.picture import USUAL, Picture
@@ -76,7 +76,7 @@ def _row(log: Log, take: Take, at: When) -> int:
     return next((row for row in rows if held(take.m, moment_of(log, row).shown)), last)
 
 
-def _subject(log: Log) -> Subject:
+def _subject(log: Log) -> MonitorSubject:
     """The factory that a log is of."""
     try:
         return recorded_subject(log.header)

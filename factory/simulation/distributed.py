@@ -61,12 +61,14 @@ class Process:
 
 class Record:
     """The record of a distributed run, in the terms of the net: X_s when the first robot enters an
-    operation, X_e when its carrier ends it. `last`: when something fired last, at first `time`
+    operation, X_e when its carrier ends it. `marked`: 1 for each place that is. `last`: when something fired last, at first `time`
     [s]."""
 
     def __init__(self, factory: Factory, time: float) -> None:
         self._net, self.last, self.events = factory.net.threaded, time, list[Event]()
-        self._marked = {*factory.net.initial_marking}
+        self.marked = bytearray(len(self._net.places))
+        for place in factory.net.initial_marking:
+            self.marked[place] = 1
         self._started: set[tuple[int, int]] = set()
         self._under_way: list[int] = []
 
@@ -74,10 +76,6 @@ class Record:
     def active(self) -> Active:
         """The operations under way."""
         return Active(tuple(self._under_way))
-
-    def marked(self) -> tuple[int, ...]:
-        """The places that are marked, by number."""
-        return tuple(sorted(self._marked))
 
     def has_started(self, operation: Operation, unit: int) -> bool:
         """Whether some robot has entered an operation for a unit."""
@@ -97,8 +95,10 @@ class Record:
 
     def _fire(self, transition: int, time: float) -> None:
         net = self._net.net
-        self._marked.difference_update(net.preset[transition])
-        self._marked.update(net.postset[transition])
+        for place in net.preset[transition]:
+            self.marked[place] = 0
+        for place in net.postset[transition]:
+            self.marked[place] = 1
         self.events.append(Event(time, self._net.transitions[transition].name))
         self.last = time
 
@@ -156,9 +156,10 @@ class DistributedSupervisor:
         """The operations under way."""
         return self.record.active
 
-    def marked(self) -> tuple[int, ...]:
-        """The places that the record marks, by number."""
-        return self.record.marked()
+    @property
+    def marked(self) -> bytearray:
+        """1 for each place that the record marks, 0 for the others."""
+        return self.record.marked
 
     def awaited(self) -> list[Operation]:
         """None: no robot sees whether all robots of an operation wait for it."""

@@ -136,9 +136,10 @@ class Supervisor:
             ticks = 1
         self.near = self.world.step(self.active.bundle, self.active.axes, ticks)
 
-    def marked(self) -> tuple[int, ...]:
-        """The marked places, by number."""
-        return tuple(np.flatnonzero(np.frombuffer(self.threads.marked, np.uint8)).tolist())
+    @property
+    def marked(self) -> bytearray:
+        """1 for each place that is marked, 0 for the others."""
+        return self.threads.marked
 
     def awaited(self) -> list[Operation]:
         """The operations all of whose robots wait for them."""

@@ -7,27 +7,11 @@ module that needs the engine imports it from here: `from factory.support.engine 
 
 from __future__ import annotations
 
-import os
 import sys
-from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import suppress
 
+from factory.support.environment import environment
 from factory.support.errors import Diagnostic, MissingError
-
-
-@contextmanager
-def environment(name: str, value: str) -> Iterator[None]:
-    """An environment variable set for a while, then as it was."""
-    before = os.environ.get(name)
-    os.environ[name] = value
-    try:
-        yield
-    finally:
-        if before is None:
-            del os.environ[name]
-        else:
-            os.environ[name] = before
-
 
 try:
     import mujoco
@@ -48,4 +32,4 @@ def _warn(words: str) -> None:
 
 mujoco.set_mju_user_warning(_warn)
 
-__all__ = ["environment", "mujoco"]
+__all__ = ["mujoco"]

@@ -79,6 +79,9 @@ class FactoryError(Exception):
         self.diagnostics: tuple[Diagnostic, ...] = tuple(many)
         super().__init__("\n".join(str(d) for d in self.diagnostics))
 
+    def __reduce__(self) -> tuple[type[FactoryError], tuple[tuple[Diagnostic, ...]]]:
+        return type(self), (self.diagnostics,)
+
 
 class InputError(FactoryError):
     """Bad input: a PAG, a template, a net, a log, an option. Exit status 2."""

@@ -90,8 +90,8 @@ def section(results: dict[str, Any]) -> str:
             "## Paces",
             "The cycle times of a product that takes too long for both worlds with so many units"
             f" and seeds: jitter {results['jitter']:g}, the physical run alone, by `factory sweep`."
-            " The prediction is made from the net before each run, with the speeds that are drawn for"
-            f" it; at most {LIMIT:g} % is accepted.",
+            " The prediction is made from the net before each run, with the speeds that are drawn"
+            f" for it; at most {LIMIT:g} % is accepted.",
             table(
                 (
                     *("product", "robots", "seeds", "units", "refine the net", "cycle times [s]"),

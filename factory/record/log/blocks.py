@@ -26,8 +26,8 @@ MAGIC = LOG + b"1\n"
 HEAD = struct.Struct("<cII")
 LENGTH = struct.Struct("<I")
 DENSEST = 200
-"""No block unpacks to more than so many times its bytes. Models take 20 times theirs, ticks 10:
-their states and times are all different. What is packed to fill the memory takes 1,000 times."""
+"""Upper bound on the bytes of an unpacked block over its packed bytes. Models take 20, ticks 10; a
+block made to fill the memory takes 1,000."""
 
 KINDS = ("|u1", "<i4", "<f8")
 
@@ -57,7 +57,7 @@ def blocks(data: memoryview) -> Iterator[tuple[bytes, Arrays]]:
 
 
 def unpacked(content: memoryview) -> Arrays:
-    """The arrays of a block. Raises ValueError where it is none."""
+    """The arrays of a block. Raises ValueError where it is not one."""
     try:
         packed = zlib.decompressobj()
         body = packed.decompress(content, DENSEST * len(content))
@@ -78,8 +78,8 @@ def unpacked(content: memoryview) -> Arrays:
 
 
 def pack_rows(name: str, rows: NDArray[np.float64]) -> Arrays:
-    """Rows (n, k) of which most columns stand still: the first row, the columns that change, and of
-    these each value's bits against those of the row before, byte by byte."""
+    """Rows (n, k) of which most columns are constant: the first row, the columns that change, and
+    for these the XOR of each value's bits with those of the row before, byte by byte."""
     bits = rows.view(np.int64)
     change = bits[1:] ^ bits[:-1]
     moving = np.flatnonzero(change.any(axis=0)).astype(np.int32)
@@ -100,7 +100,7 @@ def unpack_rows(name: str, arrays: Arrays, count: int) -> NDArray[np.float64]:
 
 
 def bad_log(path: Path, words: str) -> Diagnostic:
-    """What is wrong with a file that should be a log."""
+    """The error of a file that should be a log."""
     return Diagnostic(
         "BadLog", f"'{path}' {words}", None, "`factory run FILE.pag --log OUT` writes one"
     )

@@ -1,24 +1,25 @@
-"""What the header of a log must be: checked once, when the log is read."""
+"""The header of a log: what its values must be, checked when the log is read."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, fields
+from math import inf
 from typing import Any, get_args
 
 from factory.control.profile import World
 from factory.support.settings import RANGES, Settings, wrong_type
 
 LARGE = 10**9
-"""No length [m], time [s] or count in a header is greater."""
+"""Upper bound on every length [m], time [s] and count in a header."""
 
 Test = Callable[[Any], bool]
 
 
 @dataclass(frozen=True, slots=True)
 class Key:
-    """A key of the header, with a dot within a table: what its value is, in words too; `later`:
-    logs of older versions lack it."""
+    """A key of the header, with a dot within a table: what its value must be, in words, and the
+    test of that; `later`: logs of older versions lack it."""
 
     name: str
     wanted: str
@@ -26,7 +27,7 @@ class Key:
     later: bool = False
 
     def check(self, header: Mapping[str, Any]) -> None:
-        """Raises ValueError where its value is missing or is something else."""
+        """Raises ValueError where the value is missing or fails the test."""
         value: Any = header
         for word in self.name.split("."):
             if word not in value:
@@ -40,8 +41,8 @@ class Key:
 
 
 def check_header(header: Any) -> None:
-    """Raises ValueError where a value is missing, or is none that a run can have."""
-    if not is_table(header):
+    """Raises ValueError where a value is missing, or no run can have it."""
+    if not isinstance(header, dict):
         raise ValueError("its header is no table")
     for key in KEYS:
         key.check(header)
@@ -54,19 +55,19 @@ def check_header(header: Any) -> None:
 
 
 def settings_of(header: Mapping[str, Any]) -> Settings:
-    """The settings of the run: those that this version knows."""
+    """The settings of the run that this version knows."""
     known = {field.name for field in fields(Settings)}
     return Settings(**{k: v for k, v in header["settings"].items() if k in known})
 
 
-def is_table(value: Any) -> bool:
-    """Whether a value is a table."""
-    return isinstance(value, dict)
+def of(kind: type) -> Test:
+    """Whether a value is of a type."""
+    return lambda v: isinstance(v, kind)
 
 
-def is_text(value: Any) -> bool:
-    """Whether a value is a text."""
-    return isinstance(value, str)
+def whole(least: int, most: float) -> Test:
+    """Whether a value is a whole number from `least` to `most`."""
+    return lambda v: type(v) is int and least <= v <= most
 
 
 def is_number(value: Any) -> bool:
@@ -79,24 +80,7 @@ def is_positive(value: Any) -> bool:
     return is_number(value) and value > 0
 
 
-def is_share(value: Any) -> bool:
-    """Whether a value is a number from 0 to less than 1."""
-    return is_number(value) and 0 <= value < 1
-
-
-def is_count(value: Any) -> bool:
-    """Whether a value is a whole number from 0, not too large."""
-    return type(value) is int and 0 <= value <= LARGE
-
-
-def is_some(value: Any) -> bool:
-    """Whether a value is a whole number from 1, not too large."""
-    return is_count(value) and value > 0
-
-
-def is_seed(value: Any) -> bool:
-    """Whether a value is a whole number from 0."""
-    return type(value) is int and value >= 0
+is_table, is_text, is_count = of(dict), of(str), whole(0, LARGE)
 
 
 def listed(test: Test, length: int | None = None) -> Test:
@@ -120,10 +104,10 @@ KEYS = (
     Key("versions", "a table of texts", tabled(is_text)),
     Key("command", "a list of texts", listed(is_text)),
     Key("world", f"one of {', '.join(get_args(World))}", get_args(World).__contains__),
-    Key("seed", "a whole number from 0", is_seed),
-    Key("jitter", "a number from 0 to less than 1", is_share),
-    Key("units", "a whole number from 1", is_some),
-    Key("wip", "a whole number from 1, or null", maybe(is_some), later=True),
+    Key("seed", "a whole number from 0", whole(0, inf)),
+    Key("jitter", "a number from 0 to less than 1", lambda v: is_number(v) and 0 <= v < 1),
+    Key("units", "a whole number from 1", whole(1, LARGE)),
+    Key("wip", "a whole number from 1, or null", maybe(whole(1, LARGE)), later=True),
     Key("start", "a list of numbers of places", listed(is_count), later=True),
     Key("settings", "a table of numbers", tabled(is_number)),
     Key("product", "a text", is_text),
@@ -135,7 +119,7 @@ KEYS = (
     Key("templates", "a table of texts", tabled(is_text), later=True),
     Key("ground", "a table", is_table, later=True),
     Key("ground.floor", "two lengths in m, or null", maybe(listed(is_positive, 2)), later=True),
-    Key("ground.relay", "true or false", lambda v: isinstance(v, bool), later=True),
+    Key("ground.relay", "true or false", of(bool), later=True),
     Key("ground.cycle", "a time in s, or null", maybe(is_positive), later=True),
     Key("monitor", "a table", is_table, later=True),
     Key("monitor.goals", "lists of numbers", listed(listed(is_number)), later=True),
@@ -146,4 +130,4 @@ KEYS = (
     Key("places", "a list of texts", listed(is_text)),
     Key("transitions", "a list of texts", listed(is_text)),
 )
-"""What is read of a header, by anybody."""
+"""The keys that some reader uses."""

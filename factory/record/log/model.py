@@ -1,4 +1,4 @@
-"""The engine's model that a log was kept of."""
+"""The engine's model in a log."""
 
 from __future__ import annotations
 

@@ -21,13 +21,13 @@ from factory.support.errors import InputError
 Index = NDArray[np.int32]
 
 ROOM, FOLD = 1 << 30, 1000
-"""The states of a log take no more than so many bytes, beside so many times those of its file. Of
-runs they take 5 to 15 times those, of one in which 1,000 robots stand still for hours 200 times."""
+"""Upper bound on the bytes of a log's states: ROOM, plus FOLD times the bytes of its file. Runs
+take 5 to 15 times those; one in which 1,000 robots stand still for hours takes 200 times."""
 
 
 @dataclass(frozen=True, slots=True)
 class Ragged:
-    """For each row of a log an array of its own: `values` from starts[i] to ends[i]."""
+    """An array for each row i of a log: `values` from starts[i] to ends[i]."""
 
     values: NDArray[Any] = field(repr=False)
     starts: NDArray[np.int64] = field(repr=False)
@@ -73,8 +73,7 @@ class Log:
 
 
 def read_log(path: Path | str) -> Log:
-    """The log in a file; what a cut-off file still has. Raises InputError (BadLog) for anything
-    else."""
+    """The log in a file, whole or cut off. Raises InputError (BadLog) where it is not one."""
     path = Path(path)
     try:
         data = path.read_bytes()
@@ -119,39 +118,32 @@ def _read(data: memoryview) -> Log:
                 raise ValueError("its states take too much memory for a file of its size")
             ticks.append(arrays)
         complete = kind == b"E"
-    states = [[unpack_rows(q, a, len(a["time"])) for a in ticks] for q in ("qpos", "qvel")]
-    qpos, qvel = (
-        _locked(np.concatenate([np.zeros((0, n)), *rows]))
-        for n, rows in zip((sizes.nq, sizes.nv), states, strict=True)
-    )
     counts = [len(a["time"]) for a in ticks]
     time, delivered = _joined("time", ticks, np.float64), _joined("delivered", ticks, np.int32)
     check_course(time, delivered)
+    wide = len(ticks[0]["ctrl_first"]) if ticks and "ctrl_first" in ticks[0] else None
     return Log(
         MappingProxyType(header),
         xml,
         MappingProxyType(files),
         time,
         delivered,
-        qpos,
-        qvel,
+        _states("qpos", sizes.nq, ticks),
+        _states("qvel", sizes.nv, ticks),
         _lasting("marking", ticks, counts),
         _lasting("active", ticks, counts),
         _single("contact", "contact", ticks, counts),
         _single("contact", "contact_dist", ticks, counts),
         _joined("fired", ticks, np.int32),
         _joined("fired_t", ticks, np.float64),
-        _setpoints(ticks),
+        _states("ctrl", wide, ticks) if wide is not None else None,
         complete,
     )
 
 
-def _setpoints(ticks: Sequence[Arrays]) -> NDArray[np.float64] | None:
-    if not ticks or "ctrl_first" not in ticks[0]:
-        return None
-    rows = [unpack_rows("ctrl", a, len(a["time"])) for a in ticks]
-    found: NDArray[np.float64] = _locked(np.concatenate(rows))
-    return found
+def _states(name: str, width: int, ticks: Sequence[Arrays]) -> Any:
+    rows = (unpack_rows(name, a, len(a["time"])) for a in ticks)
+    return _locked(np.concatenate([np.zeros((0, width)), *rows]))
 
 
 def _locked(values: Any) -> Any:
@@ -166,7 +158,7 @@ def _joined(name: str, ticks: Sequence[Arrays], kind: Any) -> Any:
 def _spans(
     name: str, ticks: Sequence[Arrays], counts: Sequence[int]
 ) -> tuple[NDArray[Any], NDArray[Any], NDArray[Any]]:
-    """Rows of the whole log at which something is recorded, and where its values start and end."""
+    """Rows of the whole log at which an array is recorded, and where its values start and end."""
     base = np.cumsum([0, *counts])
     at = np.concatenate(
         [np.zeros(0, int), *(a[f"{name}_at"] + b for a, b in zip(ticks, base, strict=False))]
@@ -176,7 +168,7 @@ def _spans(
 
 
 def _lasting(name: str, ticks: Sequence[Arrays], counts: Sequence[int]) -> Ragged:
-    """Values that hold until the next are recorded."""
+    """Values that hold from a row until the next are recorded."""
     at, starts, ends = _spans(name, ticks, counts)
     values = np.concatenate([a[name] for a in ticks]) if ticks else np.zeros((0,), np.int32)
     if not len(at):
@@ -189,7 +181,7 @@ def _lasting(name: str, ticks: Sequence[Arrays], counts: Sequence[int]) -> Ragge
 
 
 def _single(name: str, values: str, ticks: Sequence[Arrays], counts: Sequence[int]) -> Ragged:
-    """Values of one row alone."""
+    """Values that hold for one row."""
     at, first, last = _spans(name, ticks, counts)
     starts, ends = np.zeros(sum(counts), int), np.zeros(sum(counts), int)
     starts[at], ends[at] = first, last

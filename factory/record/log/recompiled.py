@@ -1,4 +1,4 @@
-"""The factory that a log is of, compiled again from what its header holds."""
+"""The factory of a log, compiled again from the header."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from factory.problem.robot_types import load_catalogue
 
 
 def factory_of(header: Mapping[str, Any]) -> Factory:
-    """The factory that a log's PAG and templates compile to; its meshes need not be there.
+    """The factory that a log's PAG and templates compile to; meshes are not read.
 
-    Raises ValueError where it is another than the header says, or the run began in none of its
-    markings; KeyError where the header is of an older version.
+    Raises ValueError where its names are not those of the header, or the run's first marking is not
+    one of its own; KeyError where the header is of an older version.
     """
     templates = {name: read_template(text, name) for name, text in header["templates"].items()}
     pag = read_pag(header["pag"]["text"], templates, header["pag"]["file"], None)

@@ -1,4 +1,4 @@
-"""What the arrays of a block of ticks must be: checked once, when the log is read."""
+"""A block of ticks: what its arrays must be, checked when the log is read."""
 
 from __future__ import annotations
 
@@ -25,12 +25,12 @@ ARRAYS: Mapping[str, tuple[str, tuple[int, ...]]] = {
 """The type of each array, and the shape of one row."""
 
 RAGGED = ("marking", "active", "contact")
-"""Arrays of which several rows may be of one tick, or none."""
+"""Arrays with any number of rows for a tick."""
 
 
 @dataclass(frozen=True, slots=True)
 class Sizes:
-    """How many coordinates, speeds, places and transitions a log has."""
+    """Numbers of coordinates, speeds, places and transitions in a log."""
 
     nq: int
     nv: int
@@ -66,7 +66,7 @@ class Sizes:
         _check_range("fired", arrays["fired"], self.transitions - 1)
 
     def states(self, arrays: Arrays) -> int:
-        """How many bytes the states of a block take."""
+        """Number of bytes of the states of a block."""
         wide = self.nq + self.nv + len(arrays.get("ctrl_first", ()))
         return 8 * wide * len(arrays["time"])
 

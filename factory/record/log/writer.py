@@ -1,4 +1,4 @@
-"""Writing a log while a factory runs."""
+"""The writer of a log, an observer of a run."""
 
 from __future__ import annotations
 
@@ -7,137 +7,54 @@ import json
 import platform
 import sys
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import asdict
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from factory.lang import write_pag, write_template
+from factory.pipeline import Source
 from factory.record.log.blocks import LENGTH, MAGIC, Arrays, bad_log, block, pack_rows
+from factory.record.monitor.observation import EngineView
 from factory.record.monitor.subject import subject_of_run
+from factory.record.observed import Observed
 from factory.support.errors import InputError
 from factory.support.resource import Closing
 
-if TYPE_CHECKING:
-    from factory.pipeline import Source
-    from factory.simulation.simulation import Simulation
+STATES = ("qpos", "qvel", "ctrl")
 
 
-class LogWriter(Closing):
-    """An observer that writes a log; close it, or use it as a context manager.
+class _Ticks:
+    """The ticks of a block: lists with an entry for each, or with a row number and what is recorded
+    of that row; the marking and the active constraints recorded last."""
 
-    `source`: the PAG with its templates, if there is more to it than the factory knows; `command`:
-    the command line, this process's unless given. Raises InputError (BadLog) where the file cannot
-    be written."""
-
-    def __init__(
-        self,
-        path: Path | str,
-        simulation: Simulation,
-        source: Source | None = None,
-        command: Sequence[str] | None = None,
-    ) -> None:
-        self.path, self.world = Path(path), simulation.world
-        self.physical = simulation.model is not None
-        self.before = int(simulation.before)
-        net = simulation.supervisor.net
-        self.number = {t.name: n for n, t in enumerate(net.transitions)}
-        self.ticks = max(1, round(1.0 / simulation.settings.tick))
-        nq, nv = (s.shape[0] for s in self._state())
-        self.qpos, self.qvel = np.empty((self.ticks, nq)), np.empty((self.ticks, nv))
-        self.ctrl = np.empty((self.ticks, simulation.world.d.ctrl.size if self.physical else 0))
-        self.seen = 0
-        self.row = 0
-        self.marked = self.aimed = b""
-        self._start()
-        try:
-            self.path.parent.mkdir(parents=True, exist_ok=True)
-            self.file = self.path.open("wb")
-        except OSError as error:
-            raise InputError(bad_log(self.path, f"cannot be written: {error.strerror}")) from error
-        header = json.dumps(_header(simulation, source, command, nq, nv)).encode()
-        self.file.write(MAGIC + LENGTH.pack(len(header)) + header)
-        if simulation.model is not None:
-            files = {f"mesh/{name}": content for name, content in simulation.model.files.items()}
-            packed = {"xml": simulation.model.xml.encode(), **files}
-            self.file.write(block(b"M", {k: np.frombuffer(v, "u1") for k, v in packed.items()}, 6))
-        self.observe(simulation.world, simulation.supervisor)
-
-    def __call__(self, world: Any, supervisor: Any) -> None:
-        self.observe(world, supervisor)
-
-    def observe(self, world: Any, supervisor: Any) -> None:
-        """Record the state after a tick."""
-        row = self.row
-        self.qpos[row], self.qvel[row] = self._state()
-        self.time.append(world.time)
-        self.delivered.append(world.delivered() - self.before)
-        marked = bytes(supervisor.marked)
-        if marked != self.marked:
-            self.marked = marked
-            self.markings.append((row, np.flatnonzero(np.frombuffer(marked, "u1"))))
-        if self.physical:
-            self.ctrl[row] = world.d.ctrl
-            self._constraints(world, row)
-        events = supervisor.events
-        while self.seen < len(events):
-            event = events[self.seen]
-            self.fired.append((row, self.number[event.transition], event.t))
-            self.seen += 1
-        self.row = row + 1
-        if self.row == self.ticks:
-            self.flush()
-
-    def flush(self) -> None:
-        """Write the ticks since the last block."""
-        if self.row:
-            self.file.write(block(b"T", self._arrays()))
-            self.file.flush()
-            self._start()
-
-    def close(self) -> None:
-        """Write what is left, and the end."""
-        if not self.file.closed:
-            self.flush()
-            self.file.write(block(b"E", {}))
-            self.file.close()
-
-    def _start(self) -> None:
-        self.row = 0
+    def __init__(self) -> None:
         self.time: list[float] = []
         self.delivered: list[int] = []
-        self.marked = self.aimed = b""
+        self.states: list[tuple[NDArray[np.float64], ...]] = []
         self.markings: list[tuple[int, Any]] = []
         self.active: list[tuple[int, Any]] = []
         self.contacts: list[tuple[int, Any, Any]] = []
         self.fired: list[tuple[int, int, float]] = []
+        self.marked: bytes | None = None
+        self.welds: NDArray[np.intp] | None = None
 
-    def _state(self) -> tuple[Any, Any]:
-        if self.physical:
-            return self.world.d.qpos, self.world.d.qvel
-        return self.world.x, self.world.v
-
-    def _constraints(self, world: Any, row: int) -> None:
-        m, d = world.m, world.d
-        aimed = d.eq_active.tobytes() + m.eq_obj2id.tobytes() + m.eq_obj1id.tobytes()
-        if aimed != self.aimed:
-            self.aimed = aimed
-            on = np.flatnonzero(d.eq_active)
-            self.active.append((row, np.stack([on, m.eq_obj1id[on], m.eq_obj2id[on]], axis=1)))
-        if d.ncon:
-            contact = d.contact
-            self.contacts.append((row, contact.geom.copy(), contact.dist.copy()))
-
-    def _arrays(self) -> Arrays:
+    def arrays(self) -> Arrays:
+        """The arrays of the block."""
         fired = np.array(self.fired, float).reshape(-1, 3)
-        return {
+        states = zip(STATES, zip(*self.states, strict=True), strict=False)
+        found: Arrays = {
             "time": np.array(self.time, float),
             "delivered": np.array(self.delivered, np.int32),
-            **pack_rows("qpos", self.qpos[: self.row]),
-            **pack_rows("qvel", self.qvel[: self.row]),
-            **(pack_rows("ctrl", self.ctrl[: self.row]) if self.physical else {}),
+        }
+        for name, rows in states:
+            found |= pack_rows(name, np.array(rows))
+        return {
+            **found,
             **_ragged("marking", self.markings, ()),
             **_ragged("active", self.active, (3,)),
             **_ragged("contact", [c[:2] for c in self.contacts], (2,)),
@@ -146,6 +63,86 @@ class LogWriter(Closing):
             "fired": fired[:, 1].astype(np.int32),
             "fired_t": fired[:, 2],
         }
+
+
+class LogWriter(Closing):
+    """Writes a log; to be closed, or used as a context manager.
+
+    `source`: the PAG as it was read, where the factory was compiled from more; `command`: the
+    command line, that of this process unless given. Raises InputError (BadLog) where the file
+    cannot be written."""
+
+    def __init__(
+        self,
+        path: Path | str,
+        simulation: Observed,
+        source: Source | None = None,
+        command: Sequence[str] | None = None,
+    ) -> None:
+        self.path, self.world = Path(path), simulation.world
+        self.view = EngineView(self.world.m, self.world.d) if simulation.model else None
+        self.before = int(simulation.before)
+        net = simulation.layout.factory.net.threaded
+        self.numbers = {t.name: n for n, t in enumerate(net.transitions)}
+        self.most = max(1, round(1.0 / simulation.settings.tick))
+        self.events = 0
+        self.ticks = _Ticks()
+        try:
+            self.path.parent.mkdir(parents=True, exist_ok=True)
+            self.file = self.path.open("wb")
+        except OSError as error:
+            raise InputError(bad_log(self.path, f"cannot be written: {error.strerror}")) from error
+        sizes = [len(values) for values in self._state()[:2]]
+        header = json.dumps(_header(simulation, source, command, *sizes)).encode()
+        self.file.write(MAGIC + LENGTH.pack(len(header)) + header)
+        if simulation.model is not None:
+            files = {f"mesh/{name}": content for name, content in simulation.model.files.items()}
+            packed = {"xml": simulation.model.xml.encode(), **files}
+            self.file.write(block(b"M", {k: np.frombuffer(v, "u1") for k, v in packed.items()}, 6))
+        self.observe(simulation.world, simulation.supervisor)
+
+    def observe(self, world: Any, supervisor: Any) -> None:
+        """Record the state after a tick."""
+        ticks, row = self.ticks, len(self.ticks.time)
+        ticks.time.append(world.time)
+        ticks.delivered.append(world.delivered() - self.before)
+        ticks.states.append(self._state())
+        marked = bytes(supervisor.marked)
+        if marked != ticks.marked:
+            ticks.marked = marked
+            ticks.markings.append((row, np.flatnonzero(np.frombuffer(marked, "u1"))))
+        if self.view is not None:
+            welds, contact = self.view.welds(), self.view.d.contact
+            if welds is not ticks.welds:
+                ticks.welds = welds
+                ticks.active.append((row, welds))
+            if self.view.d.ncon:
+                ticks.contacts.append((row, contact.geom.copy(), contact.dist.copy()))
+        for event in supervisor.events[self.events :]:
+            ticks.fired.append((row, self.numbers[event.transition], event.t))
+        self.events = len(supervisor.events)
+        if row + 1 == self.most:
+            self.flush()
+
+    def flush(self) -> None:
+        """Write the ticks since the last block."""
+        if self.ticks.time:
+            self.file.write(block(b"T", self.ticks.arrays()))
+            self.file.flush()
+            self.ticks = _Ticks()
+
+    def close(self) -> None:
+        """Write what is left, and the end."""
+        if not self.file.closed:
+            self.flush()
+            self.file.write(block(b"E", {}))
+            self.file.close()
+
+    def _state(self) -> tuple[NDArray[np.float64], ...]:
+        if self.view is None:
+            return self.world.x.copy(), self.world.v.copy()
+        d = self.view.d
+        return d.qpos.copy(), d.qvel.copy(), d.ctrl.copy()
 
 
 def _ragged(name: str, rows: Sequence[tuple[int, Any]], shape: tuple[int, ...]) -> Arrays:
@@ -158,26 +155,25 @@ def _ragged(name: str, rows: Sequence[tuple[int, Any]], shape: tuple[int, ...]) 
 
 
 def _header(
-    simulation: Simulation, source: Source | None, command: Sequence[str] | None, nq: int, nv: int
+    simulation: Observed, source: Source | None, command: Sequence[str] | None, nq: int, nv: int
 ) -> dict[str, Any]:
-    layout, net = simulation.layout, simulation.supervisor.net
+    layout, net = simulation.layout, simulation.layout.factory.net.threaded
     factory, plain = layout.factory, layout.plain or layout
     given = source.pag if source else plain.factory.pag
     file = Path(given.file)
     said = file.read_text("utf-8", errors="replace") if file.is_file() else write_pag(given)
     text = said if layout.plain is None else write_pag(factory.pag)
-    settings, jitter = simulation.settings, simulation.jitter
-    subject = subject_of_run(simulation)
+    templates = {o.template.name: o.template for o in factory.operations}
     return {
         "versions": {"python": platform.python_version(), **_versions()},
         "command": list(sys.argv if command is None else command),
         "world": simulation.kind,
         "seed": simulation.seed,
-        "jitter": jitter,
+        "jitter": simulation.jitter,
         "units": simulation.units,
         "wip": simulation.wip,
         "start": sorted(simulation.start),
-        "settings": asdict(settings),
+        "settings": asdict(simulation.settings),
         "product": file.stem or "factory",
         "pag": {
             "file": str(file),
@@ -186,13 +182,8 @@ def _header(
             "plain": None if layout.plain is None else said,
         },
         "ground": dict(layout.ground),
-        "templates": {
-            name: write_template(template)
-            for name, template in sorted(
-                {o.template.name: o.template for o in factory.operations}.items()
-            )
-        },
-        "monitor": subject.as_json(),
+        "templates": {name: write_template(made) for name, made in sorted(templates.items())},
+        "monitor": subject_of_run(simulation).as_json(),
         "robots": [robot.name for robot in factory.robots],
         "places": [place.name for place in net.places],
         "transitions": [transition.name for transition in net.transitions],
@@ -204,8 +195,6 @@ def _header(
 def _versions() -> dict[str, str]:
     found = {}
     for name in ("klavins-factory", "mujoco", "numpy"):
-        try:
+        with suppress(PackageNotFoundError):
             found[name] = version(name)
-        except PackageNotFoundError:
-            continue
     return found

@@ -10,14 +10,10 @@ from typing import Any
 import numpy as np
 
 from factory.mjcf import names
+from factory.mjcf.weld_frames import GRIP, KINDS, WeldFrames, check_holders
 from factory.plant.factory import Factory
-from factory.record.monitor.frames import Frames, frames_of
 from factory.record.monitor.observation import Index
-
-PARK, FEED, GRIP, HOLD = KINDS = range(4)
-"""Who holds a part: its parking place, its feeder, a robot, the outfeed's tray."""
-
-WORDS = {"park": PARK, "feed": FEED, "grip": GRIP, "hold": HOLD}
+from factory.support.engine import mujoco
 
 Holder = tuple[int, int]
 """Kind and, for a grip, the robot's index; -1 for others."""
@@ -46,7 +42,7 @@ class Anatomy:
     copy_of: Index = field(repr=False)
     holder: tuple[Holder | None, ...] = field(repr=False)
     part: tuple[str, ...] = field(repr=False)
-    frames: Frames = field(repr=False)
+    frames: WeldFrames = field(repr=False)
 
     @classmethod
     def of(cls, m: Any, factory: Factory) -> Anatomy:
@@ -65,6 +61,9 @@ class Anatomy:
         copy_of[bodies] = np.arange(len(bodies))
         called = [m.body(b).name for b in bodies]
         welds = [m.equality(e).name.split("/", 2) for e in range(m.neq)]
+        check_holders(m, np.flatnonzero([words[0] in KINDS for words in welds]))
+        d = mujoco.MjData(m)
+        mujoco.mj_kinematics(m, d)
         return cls(
             np.asarray(m.jnt_qposadr[slide], np.intp),
             np.asarray(m.jnt_dofadr[slide], np.intp),
@@ -78,12 +77,12 @@ class Anatomy:
             copy_of,
             tuple(_holder(words, robots) for words in welds),
             tuple(_part(words) for words in welds),
-            frames_of(m, [words[0] in WORDS for words in welds]),
+            WeldFrames.of(m, d),
         )
 
 
 def _holder(words: list[str], robots: dict[str, int]) -> Holder | None:
-    kind = WORDS.get(words[0])
+    kind = KINDS.get(words[0])
     if kind is None:
         return None
     return (kind, robots[words[1]]) if kind == GRIP else (kind, -1)

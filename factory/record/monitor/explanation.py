@@ -12,9 +12,9 @@ from collections import deque
 from dataclasses import dataclass, field
 from math import inf
 
-from factory.nets.marked import MarkedNet, marked, token_free
+from factory.nets.marked import marked, token_free
 from factory.record.monitor.report import Firing, Violation
-from factory.record.monitor.subject import Subject
+from factory.record.monitor.subject import MonitorSubject
 from factory.timing.pool import with_wip
 
 
@@ -29,11 +29,11 @@ class _Seen:
 
 
 @dataclass(slots=True)
-class Explanation:
+class SeenFirings:
     """What was seen of each firing, by transition and number (from 0, since m_0). `slack` [s]: how
-    far times may be off. Linear in the firings."""
+    far times may be off."""
 
-    subject: Subject
+    subject: MonitorSubject
     slack: float
     seen: dict[tuple[int, int], _Seen] = field(default_factory=dict, repr=False)
 
@@ -50,7 +50,8 @@ class Explanation:
             self.seen[event, unit] = _Seen(earliest, latest, t, robot)
 
     def solve(self, begin: float, end: float) -> tuple[list[Firing], list[Firing], list[Violation]]:
-        """The firings seen, those inferred, and the firings that nothing explains."""
+        """The firings seen, those inferred, and the firings that nothing explains. Linear in the
+        firings."""
         solver = _Solver(self, begin, end)
         violations = solver.forward()
         solver.backward()
@@ -61,25 +62,24 @@ class Explanation:
 class _Solver:
     """The intervals of all firings that what was seen asks for."""
 
-    def __init__(self, explanation: Explanation, begin: float, end: float) -> None:
-        self.seen, self.subject = explanation.seen, explanation.subject
-        self.slack, self.begin, self.end = explanation.slack, begin, end
-        factory, wip = self.subject.factory, self.subject.wip
+    def __init__(self, seen: SeenFirings, begin: float, end: float) -> None:
+        self.given, self.begin, self.end = seen, begin, end
+        factory, wip, counts = seen.subject.factory, seen.subject.wip, seen.subject.counts
         self.net = marked(factory.net) if wip is None else with_wip(factory, wip)
-        self.events = factory.net.threaded.transitions
+        self.names = [t.name for t in factory.net.threaded.transitions]
         self.weight = {
-            o.place: max(0.0, o.dwell - explanation.slack) for o in factory.operations if o.dwell
+            o.place: max(0.0, o.dwell - seen.slack) for o in factory.operations if o.dwell
         }
-        self.done = [self.subject.counts.get(e, 0) for e in range(len(self.events))]
+        self.done = [counts.get(e, 0) for e in range(len(self.names))]
         self.count = self._counts()
-        self.order = self._order(self.net)
+        self.order = self._order()
         self.low: dict[tuple[int, int], float] = {}
         self.high: dict[tuple[int, int], float] = {}
 
     def _counts(self) -> list[int]:
         """How often each transition has fired at least, since m_0."""
         count = list(self.done)
-        for event, unit in self.seen:
+        for event, unit in self.given.seen:
             count[event] = max(count[event], unit + 1)
         waiting = deque(range(len(count)))
         queued = [True] * len(count)
@@ -99,9 +99,9 @@ class _Solver:
         net = self.net
         return [(net.left[p], net.tokens[p], p) for p in net.net.preset[event]]
 
-    def _order(self, net: MarkedNet) -> list[tuple[int, int]]:
+    def _order(self) -> list[tuple[int, int]]:
         """All firings, each after those it needs."""
-        order = token_free(net).order
+        order = token_free(self.net).order
         first, last = min(self.done), max(self.count)
         return [
             (event, unit)
@@ -115,7 +115,9 @@ class _Solver:
         from then on as seen, so that one fault gives one violation."""
         found = []
         seen_when_over = {
-            o.end for o in self.subject.factory.operations if self.subject.moves_parts[o.index]
+            o.end
+            for o in self.given.subject.factory.operations
+            if self.given.subject.moves_parts[o.index]
         }
         for event, unit in self.order:
             early, cause = self.begin, -1
@@ -123,12 +125,12 @@ class _Solver:
                 ready = self.low.get((before, unit - tokens), -inf) + self.weight.get(place, 0.0)
                 if ready > early:
                     early, cause = ready, before
-            noted = self.seen.get((event, unit))
+            noted = self.given.seen.get((event, unit))
             if noted is None:
                 late = event in seen_when_over
                 self.low[event, unit] = self.end if late else min(early, self.end)
                 continue
-            if early > noted.latest + self.slack:
+            if early > noted.latest + self.given.slack:
                 found.append(self._violation(event, unit, noted, cause, early))
                 early = noted.earliest
             self.low[event, unit] = min(max(early, noted.earliest), noted.latest)
@@ -137,8 +139,8 @@ class _Solver:
     def _violation(
         self, event: int, unit: int, noted: _Seen, cause: int, early: float
     ) -> Violation:
-        operation = self.subject.factory.operations[event // 2]
-        name, other = self.events[event].name, self.events[cause].name
+        operation = self.given.subject.factory.operations[event // 2]
+        name, other = self.names[event], self.names[cause]
         never = f"{other} comes first, and was not seen"
         why = f"could not fire before {early:.3f} s, for {other} comes first"
         words = f"{name} was seen at {noted.t:.3f} s, in unit {unit}, but "
@@ -149,7 +151,7 @@ class _Solver:
     def backward(self) -> None:
         """The latest time of every firing."""
         for event, unit in self.order:
-            noted = self.seen.get((event, unit))
+            noted = self.given.seen.get((event, unit))
             self.high[event, unit] = noted.latest if noted else self.end
         for event, unit in reversed(self.order):
             latest = self.high[event, unit]
@@ -163,8 +165,8 @@ class _Solver:
         """All firings, in the order of time."""
         seen, inferred = [], []
         for event, unit in self.order:
-            noted = self.seen.get((event, unit))
-            name, low, high = self.events[event].name, self.low[event, unit], self.high[event, unit]
+            noted = self.given.seen.get((event, unit))
+            name, low, high = self.names[event], self.low[event, unit], self.high[event, unit]
             if noted is None:
                 inferred.append(Firing(name, unit, low, high))
             else:

@@ -1,87 +1,87 @@
-"""The monitor: watches a factory tick by tick, and judges what it saw against the net."""
+"""The monitor: it watches a factory tick by tick, and judges what it saw against the net."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from time import perf_counter
 from typing import Any
 
 import numpy as np
 
-from factory.plant.factory import Operation
+from factory.plant.factory import Factory, Operation
 from factory.record.monitor.anatomy import Anatomy
-from factory.record.monitor.explanation import Explanation
-from factory.record.monitor.grips import Hands, misplaced
-from factory.record.monitor.motion import Motion
-from factory.record.monitor.observation import Eyes, Sight
+from factory.record.monitor.explanation import SeenFirings
+from factory.record.monitor.grips import Grips, misplaced
+from factory.record.monitor.motion import AxisMotion, Lags
+from factory.record.monitor.observation import EngineView, Observation
 from factory.record.monitor.report import Report, Violation
-from factory.record.monitor.subject import Subject
+from factory.record.monitor.subject import MonitorSubject
 from factory.record.monitor.transfers import Transfers
 from factory.support.errors import Position
 
 MOST = 100
-"""So many violations are kept, the first ones: a fault is often followed by others."""
+"""Number of violations that are kept, the first ones: a fault is often followed by others."""
 
 TICKS = 1.5
-"""What is seen only tick by tick may be off by so many."""
+"""Times that are seen tick by tick may be off by so many ticks."""
+
+
+@dataclass(slots=True)
+class _Clock:
+    """Times [s]: when the monitor began, of the present tick and the one before, of the last change
+    that was seen; and whether the run was found to be stalled."""
+
+    begun: float
+    now: float
+    before: float
+    changed: float
+    stalled: bool = False
 
 
 class Monitor:
-    """Reconstructs each robot's mode and each part's carrier from what it sees.
+    """Reconstructs each robot's mode and each part's carrier from what it sees: `first`, before the
+    run begins, and then an observation after every tick.
 
     `turn[r]`: how many operations robot r has finished since m_0, which tells where in its gear it
-    is; `judged[o]`: how often operation o has been looked at when it was over. `time_s`: what all
-    this took [s]. Give it a `Sight` before the run begins and one after every tick; as an observer
-    of a run it looks for itself.
+    is; `judged[o]`: how often operation o has been judged. `time_s`: the time that the monitor took
+    [s].
     """
 
-    def __init__(self, subject: Subject, anatomy: Anatomy) -> None:
+    def __init__(self, subject: MonitorSubject, anatomy: Anatomy, first: Observation) -> None:
         begin = perf_counter()
-        self.subject, self.anatomy, self.factory = subject, anatomy, subject.factory
-        self.slack = TICKS * subject.settings.tick
-        radius = np.array(
-            [max(subject.radii[o] for o in r.operations) for r in self.factory.robots]
-        )
-        self.hands = Hands(anatomy, float(radius.max()))
-        self.motion = Motion(anatomy, subject.settings, radius)
-        self.transfers = Transfers(subject, anatomy, self._blame)
-        self.explanation = Explanation(subject, self.slack)
+        self.subject, self.anatomy = subject, anatomy
+        robots, operations, counts = self.factory.robots, self.factory.operations, subject.counts
         self.violations: list[Violation] = []
-        counts = subject.counts
-        self.judged = [counts.get(o.end, 0) for o in self.factory.operations]
-        self.turn = [
-            sum(counts.get(self.factory.operations[o].end, 0) for o in r.operations)
-            for r in self.factory.robots
-        ]
-        self.begun = self.now = self.before = self.changed = 0.0
-        self.started = self.stalled = False
-        self.eyes: Eyes | None = None
+        self.judged = [counts.get(o.end, 0) for o in operations]
+        self.turn = [sum(self.judged[o] for o in r.operations) for r in robots]
+        self.clock = _Clock(first.time, first.time, first.time, first.time)
+        radius = np.array([max(subject.radii[o] for o in r.operations) for r in robots])
+        self.motion = AxisMotion(anatomy, subject.settings, radius, first)
+        self.lags = Lags(anatomy, subject.settings)
+        self.grips = Grips(anatomy, float(radius.max()))
+        self.transfers = Transfers(subject, anatomy, self._blame)
+        self.transfers.begin(self.grips.switched(first))
+        self.explanation = SeenFirings(subject, TICKS * subject.settings.tick)
+        self._look_at_frames()
+        self._look_at_parts(first)
         self.time_s = perf_counter() - begin
 
-    def watch(self, m: Any, d: Any) -> None:
-        """Look at a running engine from now on, at first before its run begins."""
-        self.eyes = Eyes(m, d)
-        self.observe(None, None)
-
-    def observe(self, world: Any, supervisor: Any) -> None:
-        """An observer of a run; it looks at neither of the two, but at the engine."""
-        assert self.eyes is not None
-        begin = perf_counter()
-        self.see(self.eyes.look())
-        self.time_s += perf_counter() - begin
+    @property
+    def factory(self) -> Factory:
+        """The factory under watch."""
+        return self.subject.factory
 
     # --- a tick --------------------------------------------------------------------------------
 
-    def see(self, sight: Sight) -> None:
+    def see(self, seen: Observation) -> None:
         """Take in the state after a tick."""
-        if not self.started:
-            self._begin(sight)
-            return
-        self.before, self.now = self.now, sight.time
-        left, arrived, passed = self.motion.look(sight)
-        switches = self.hands.switched(sight)
+        clock = self.clock
+        clock.before, clock.now = clock.now, seen.time
+        left, arrived, passed = self.motion.look(seen)
+        switches = self.grips.switched(seen)
         if switches:
-            self.changed = self.now
+            clock.changed = clock.now
             for operation, unit in self.transfers.judge(switches):
                 self._ended(operation, unit)
         for robot in passed.tolist():
@@ -90,51 +90,51 @@ class Monitor:
             if not self.motion.gone[robot]:
                 self._leaves(robot)
         if len(arrived):
-            self.changed = self.now
-        for copy, weld, gap in self.hands.dropped(sight):
-            self._hangs(copy, weld, gap)
-        for actuator, since in self.motion.stuck(sight):
-            self._stuck(actuator, since, sight)
-        if self.now - self.changed > self.subject.patience and not self.stalled:
+            clock.changed = clock.now
+        self._look_at_parts(seen)
+        for actuator, since in self.lags.stuck(seen):
+            self._stuck(actuator, since, seen)
+        if clock.now - clock.changed > self.subject.patience and not clock.stalled:
             self._stalled()
 
     def report(self) -> Report:
         """The verdict on what was seen so far."""
         begin = perf_counter()
-        seen, inferred, unexplained = self.explanation.solve(self.begun, self.now)
+        seen, inferred, unexplained = self.explanation.solve(self.clock.begun, self.clock.now)
         every = sorted([*self.violations, *unexplained], key=lambda v: v.t)[:MOST]
         self.time_s += perf_counter() - begin
         return Report(tuple(seen), tuple(inferred), tuple(every), self.time_s)
 
-    def _begin(self, sight: Sight) -> None:
-        self.started, self.begun = True, sight.time
-        self.now = self.before = self.changed = sight.time
-        self.motion.begin(sight)
-        self.transfers.begin(self.hands.switched(sight))
+    def _look_at_frames(self) -> None:
+        """Blame welds that put a part elsewhere than where it is in the product."""
         places = {part: np.array(place) for part, place in self.subject.places.items()}
         for weld in misplaced(self.anatomy, places):
             holder, part = self.anatomy.holder[weld], self.anatomy.part[weld]
             words = f"the weld that holds {part} puts it elsewhere than where it is in the product"
             self._blame("Frame", holder[1] if holder else -1, part, words)
-        for copy, weld, gap in self.hands.dropped(sight):
-            self._hangs(copy, weld, gap)
+
+    def _look_at_parts(self, seen: Observation) -> None:
+        """Blame parts that have left the place where their weld keeps them."""
+        for copy, weld, gap in self.grips.dropped(seen):
+            holder, name = self.anatomy.holder[weld], self.anatomy.copies[copy]
+            words = f"{name} is {1e3 * gap:.1f} mm from where its weld keeps it, or turned"
+            self._blame("Dropped", holder[1] if holder else -1, self.anatomy.label[copy], words)
 
     # --- what is seen --------------------------------------------------------------------------
 
     def _ended(self, operation: Operation, unit: int) -> None:
         """The parts of an operation have changed hands: X_e."""
-        robot = self.factory.robots[operation.carrier].name
-        self.explanation.saw(operation.end, unit, self.before, self.now, self.before, robot)
-        for number in operation.robots:
-            gear = self.factory.robots[number].operations
-            last = unit * len(gear) + gear.index(operation.index)
-            self._over(number, last, self.now)
-        self._judge(operation, unit, self.now)
-        for number in operation.robots:
-            gear = self.factory.robots[number].operations
-            last = unit * len(gear) + gear.index(operation.index)
-            self.turn[number] = max(self.turn[number], last + 1)
-            self.motion.stand(number, self.subject.goal(operation, number))
+        robots, before, now = self.factory.robots, self.clock.before, self.clock.now
+        carrier = robots[operation.carrier].name
+        self.explanation.saw(operation.end, unit, before, now, before, carrier)
+        gears = {r: robots[r].operations for r in operation.robots}
+        last = {r: unit * len(gear) + gear.index(operation.index) for r, gear in gears.items()}
+        for robot, turn in last.items():
+            self._over(robot, turn, now)
+        self._judge(operation, unit, now)
+        for robot, turn in last.items():
+            self.turn[robot] = max(self.turn[robot], turn + 1)
+            self.motion.stand(robot, self.subject.goal(operation, robot))
 
     def _leaves(self, robot: int) -> None:
         """A robot leaves the place where it stood: the next operation that has its goal elsewhere
@@ -150,19 +150,19 @@ class Monitor:
         else:
             words = "it moves, though its program keeps it where it is"
             self._blame("Order", robot, operation.label, words)
-            self.motion.anchor[robot] = self.motion.s[robot]
+            self.motion.anchor[robot] = self.motion.now.s[robot]
             return
         begun = self.motion.leave(robot, goal)
-        self.changed = self.now
+        self.clock.changed = self.clock.now
         self._over(robot, turn, begun)
         if self.subject.goes_ahead(operation, robot):
-            return  # it need not wait until the operation starts
+            return  # it may leave before the operation starts
         name = self.factory.robots[robot].name
-        shown = max(self.begun, begun - self.subject.settings.tick)
-        self.explanation.saw(operation.start, unit, self.begun, begun, shown, name)
+        shown = max(self.clock.begun, begun - self.subject.settings.tick)
+        self.explanation.saw(operation.start, unit, self.clock.begun, begun, shown, name)
 
     def _passed(self, robot: int) -> None:
-        """A robot passes its goal without stopping: its operation ended before it had come."""
+        """A robot passes its goal without stopping: its operation ended before the robot came."""
         operation, _ = self._at(robot, self.turn[robot])
         words = f"it passes its goal of {self.subject.name(operation)} without stopping"
         self._blame("Early", robot, operation.label, words)
@@ -181,8 +181,9 @@ class Monitor:
         self.turn[robot] = max(self.turn[robot], turn)
 
     def _judge(self, operation: Operation, unit: int, t: float, leaving: int = -1) -> None:
-        """Whether the robots of an operation that is over at `t` [s] were at their goals, at rest,
-        and for as long as it takes. The one that shows its end by `leaving` was."""
+        """Blame a robot of an operation that is over at `t` [s] where it was not at rest at its
+        goal, or not for as long as the operation takes. The robot `leaving`, which shows the end,
+        was."""
         if self.judged[operation.index] > unit:
             return
         self.judged[operation.index] = unit + 1
@@ -196,38 +197,33 @@ class Monitor:
                 return
         last = max(operation.robots, key=lambda r: float(self.motion.came[r]))
         stayed = t - float(self.motion.came[last])
-        if stayed < operation.dwell - self.slack:
+        if stayed < operation.dwell - self.explanation.slack:
             words = f"{name} ended {stayed:.3f} s after it came, and takes {operation.dwell:g} s"
             self._blame("Early", last, operation.label, words)
 
-    def _hangs(self, copy: int, weld: int, gap: float) -> None:
-        holder, name = self.anatomy.holder[weld], self.anatomy.copies[copy]
-        words = f"{name} is {1e3 * gap:.1f} mm from where its weld keeps it, or turned"
-        self._blame("Dropped", holder[1] if holder else -1, self.anatomy.label[copy], words)
-
-    def _stuck(self, actuator: int, since: float, sight: Sight) -> None:
+    def _stuck(self, actuator: int, since: float, seen: Observation) -> None:
         robot = self.anatomy.owner[actuator]
         joint, setpoint = self.anatomy.joint[actuator], self.anatomy.setpoint[actuator]
-        lag = 1e3 * abs(float(sight.qpos[joint] - sight.ctrl[setpoint]))
+        lag = 1e3 * abs(float(seen.qpos[joint] - seen.ctrl[setpoint]))
         words = f"it is {lag:.0f} mm from its setpoint, and does not follow"
         self._blame("Stuck", robot, self._label(robot), words, since)
 
     def _stalled(self) -> None:
-        """Nothing has happened for too long. To blame are the robots that are under way, or else an
-        operation that all its robots have come to and that does not go on."""
-        self.stalled = True
-        when = f"nothing has happened for {self.now - self.changed:.1f} s"
+        """Nothing has happened for too long: blame the robots that are under way, or else
+        operations that all their robots have come to."""
+        self.clock.stalled = True
+        when = f"nothing has happened for {self.clock.now - self.clock.changed:.1f} s"
         away = [r for r in range(len(self.turn)) if self.motion.gone[r]]
         for robot in away[:3]:
             operation, _ = self._at(robot, self.turn[robot])
             words = f"{when} while it was on its way in {self.subject.name(operation)}"
-            self._blame("Stalled", robot, operation.label, words, self.changed)
+            self._blame("Stalled", robot, operation.label, words, self.clock.changed)
         for operation in () if away else self._ready()[:3]:
             words = f"{when}; {self.subject.name(operation)} does not go on, with all robots there"
-            self._blame("Stalled", operation.carrier, operation.label, words, self.changed)
+            self._blame("Stalled", operation.carrier, operation.label, words, self.clock.changed)
 
     def _ready(self) -> list[Operation]:
-        """The operations that all their robots have come to: those that are fed by others first."""
+        """The operations that all their robots have come to, those without inputs first."""
         at = [self._at(r, turn)[0].index for r, turn in enumerate(self.turn)]
         ready = [o for o in self.factory.operations if all(at[r] == o.index for r in o.robots)]
         return sorted(ready, key=lambda o: not o.inputs)
@@ -235,13 +231,13 @@ class Monitor:
     # --- words ---------------------------------------------------------------------------------
 
     def _at(self, robot: int, turn: int) -> tuple[Operation, int]:
-        """The operation that a robot comes to after `turn` others, and its unit."""
+        """The operation of a robot after `turn` others, and its unit."""
         gear: Sequence[int] = self.factory.robots[robot].operations
         unit, step = divmod(turn, len(gear))
         return self.factory.operations[gear[step]], unit
 
     def _label(self, robot: int) -> str:
-        """What a robot is at; the dropoff for the outfeed."""
+        """The label of the operation that a robot is at; of the dropoff for the outfeed."""
         if robot < 0:
             return self.factory.dropoff.label
         return self._at(robot, self.turn[robot])[0].label
@@ -251,7 +247,7 @@ class Monitor:
     ) -> None:
         if len(self.violations) >= MOST:
             return
-        t = self.now if since is None else since
+        t = self.clock.now if since is None else since
         name = self.factory.robots[robot].name if robot >= 0 else ""
         where = self._position(label, robot)
         self.violations.append(Violation(t, name, label, code, message, where))
@@ -261,3 +257,17 @@ class Monitor:
         if operation is not None:
             return operation.position
         return self.factory.robots[robot].position if robot >= 0 else None
+
+
+class EngineMonitor(Monitor):
+    """A monitor of a running engine, which begins before the run does; an observer of that run."""
+
+    def __init__(self, subject: MonitorSubject, anatomy: Anatomy, m: Any, d: Any) -> None:
+        self.view = EngineView(m, d)
+        super().__init__(subject, anatomy, self.view.look())
+
+    def observe(self, world: Any, supervisor: Any) -> None:
+        """Look at the engine after a tick; what it is called with is not looked at."""
+        begin = perf_counter()
+        self.see(self.view.look())
+        self.time_s += perf_counter() - begin

@@ -13,7 +13,7 @@ Index = NDArray[np.intp]
 
 
 @dataclass(frozen=True, slots=True)
-class Sight:
+class Observation:
     """The state at a time [s]: the engine's `qpos`, `qvel` and setpoints `ctrl`; `welds` (k, 3):
     the active constraints by number, and the two bodies that each joins.
 
@@ -26,20 +26,25 @@ class Sight:
     welds: Index = field(repr=False)
 
 
-class Eyes:
-    """Looks at a running engine."""
+class EngineView:
+    """Observes a running engine: its model `m` and data `d`."""
 
     def __init__(self, m: Any, d: Any) -> None:
         self.m, self.d = m, d
         self._seen = b""
         self._welds: Index = np.empty((0, 3), np.intp)
 
-    def look(self) -> Sight:
+    def look(self) -> Observation:
         """The present state; its arrays are the engine's own and change with the next tick."""
+        d = self.d
+        return Observation(float(d.time), d.qpos, d.qvel, d.ctrl, self.welds())
+
+    def welds(self) -> Index:
+        """The active constraints (k, 3), as of an `Observation`."""
         m, d = self.m, self.d
         seen = d.eq_active.tobytes() + m.eq_obj2id.tobytes() + m.eq_obj1id.tobytes()
         if seen != self._seen:
             self._seen = seen
             on = np.flatnonzero(d.eq_active)
             self._welds = np.stack([on, m.eq_obj1id[on], m.eq_obj2id[on]], axis=1)
-        return Sight(float(d.time), d.qpos, d.qvel, d.ctrl, self._welds)
+        return self._welds

@@ -1,4 +1,4 @@
-"""Watching a run that is over, from its log alone."""
+"""The monitor on a log: judging a run that is over."""
 
 from __future__ import annotations
 
@@ -13,17 +13,16 @@ from factory.record.log.reader import Log
 from factory.record.log.recompiled import factory_of
 from factory.record.monitor.anatomy import Anatomy
 from factory.record.monitor.monitor import Monitor
-from factory.record.monitor.observation import Sight
+from factory.record.monitor.observation import Observation
 from factory.record.monitor.report import Report
-from factory.record.monitor.subject import Subject, subject_from
+from factory.record.monitor.subject import MonitorSubject, subject_from
 from factory.support.errors import Diagnostic, InputError
 
 AGAIN = "record it again: `factory run FILE.pag --log OUT`"
 
 
-def watch_log(log: Log) -> tuple[Report, Subject]:
-    """The verdict on a recorded run, and the factory that it is of: compiled again from what the
-    log's header holds.
+def watch_log(log: Log) -> tuple[Report, MonitorSubject]:
+    """The verdict on a recorded run, and its factory, compiled again from the log's header.
 
     The log's events and markings are not read. Raises InputError (BadLog) for a log of the ideal
     world, of an older version, or of another factory than its header says.
@@ -38,16 +37,17 @@ def watch_log(log: Log) -> tuple[Report, Subject]:
         raise InputError(_bad("the log has no tick"))
     try:
         subject = recorded_subject(log.header)
-        monitor = Monitor(subject, Anatomy.of(model_of(log, AGAIN), subject.factory))
-        for sight in sights(log):
-            monitor.see(sight)
+        anatomy, seen = Anatomy.of(model_of(log, AGAIN), subject.factory), observations(log)
+        monitor = Monitor(subject, anatomy, next(seen))
+        for observation in seen:
+            monitor.see(observation)
     except (ValueError, KeyError, TypeError, AttributeError, IndexError) as error:
         raise InputError(_bad(f"the log is not of the factory in its header: {error}")) from error
     return monitor.report(), subject
 
 
-def sights(log: Log) -> Iterator[Sight]:
-    """What a log shows, row by row; the same array of welds for as long as none is switched."""
+def observations(log: Log) -> Iterator[Observation]:
+    """The observations in a log, row by row; `welds` is one array as long as none is switched."""
     assert log.ctrl is not None
     welds = np.empty((0, 3), np.intp)
     span = (-1, -1)
@@ -57,10 +57,10 @@ def sights(log: Log) -> Iterator[Sight]:
             found, span = log.active[row].astype(np.intp), now
             if not np.array_equal(found, welds):
                 welds = found
-        yield Sight(float(log.time[row]), log.qpos[row], log.qvel[row], log.ctrl[row], welds)
+        yield Observation(float(log.time[row]), log.qpos[row], log.qvel[row], log.ctrl[row], welds)
 
 
-def recorded_subject(header: Mapping[str, Any]) -> Subject:
+def recorded_subject(header: Mapping[str, Any]) -> MonitorSubject:
     """The factory that a log is of. Raises ValueError, KeyError, TypeError or AttributeError where
     the header is of none."""
     factory = factory_of(header)

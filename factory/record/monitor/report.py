@@ -1,4 +1,4 @@
-"""What a monitor finds: the firings that explain a run, and what nothing explains."""
+"""What a monitor finds: the firings that explain a run, and the violations, which none explain."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ from factory.support.errors import Diagnostic, Position
 
 @dataclass(frozen=True, slots=True)
 class Violation:
-    """What no run of the net can show: when [s], whose fault, which label it is about, and the line
-    of the PAG that this comes from. `robot` is "" where none is concerned."""
+    """An observation that no run of the net gives: the time [s], the robot at fault ("" for none),
+    the label it is about, and the line of the PAG that this comes from."""
 
     t: float
     robot: str
@@ -33,7 +33,7 @@ class Violation:
         }
 
     def diagnostic(self) -> Diagnostic:
-        """The violation for people."""
+        """The violation as a message."""
         where = f"{self.robot}: " if self.robot else ""
         return Diagnostic(self.code, f"at {self.t:.3f} s, {where}{self.message}", self.position)
 

@@ -1,4 +1,4 @@
-"""What a monitor knows beforehand of the factory it watches: the net, and where its goals are."""
+"""What a monitor knows of the factory before the run: the net, and where its goals are."""
 
 from __future__ import annotations
 
@@ -13,14 +13,15 @@ from factory.nets.history import firings
 from factory.nets.petri import Marking
 from factory.plant.factory import Factory, Operation
 from factory.plant.fused_bodies import FusedBodies, bodies_of
+from factory.record.observed import Observed
 from factory.support.settings import Settings
 
 PATIENCE = 4.0
-"""Nothing may happen for this many times the longest time an operation can take."""
+"""A run stalls when nothing happens for this many times the longest time of an operation."""
 
 
 @dataclass(frozen=True)
-class Subject:
+class MonitorSubject:
     """The factory under watch.
 
     `goals[i]`: arc length [m] of the goal of each robot of operation i; `radii[i]`: its goal ball
@@ -55,7 +56,7 @@ class Subject:
 
     @cached_property
     def moves_parts(self) -> tuple[bool, ...]:
-        """Whether each operation's end shows as a switch of grips: it makes a part, somebody other
+        """Whether each operation's end shows as a switch of grips: it makes a part, a robot other
         than its carrier brings one, or it drops the product off."""
         return tuple(
             not o.inputs
@@ -77,7 +78,7 @@ class Subject:
         return bool(self.settings.stage) and operation.awaits_empty(slot)
 
     def name(self, operation: Operation) -> str:
-        """An operation for people: `mate(sub1)`."""
+        """The name of an operation in messages: `mate(sub1)`."""
         return f"{operation.template.name}({operation.label})"
 
     def as_json(self) -> dict[str, Any]:
@@ -97,9 +98,9 @@ def subject_of(
     start: Marking | None = None,
     wip: int | None = None,
     bodies: FusedBodies | None = None,
-) -> Subject:
-    """The subject that a layout is, run with these settings from a marking (m_0 where None), of one
-    body a part unless other `bodies` are given."""
+) -> MonitorSubject:
+    """The subject of a layout, run with these settings from a marking (m_0 where None). Each part
+    is one body unless other `bodies` are given."""
     factory, product = layout.factory, layout.product
     goals = tuple(
         tuple(layout.goal(o.index, slot) for slot in range(len(o.robots)))
@@ -117,13 +118,13 @@ def subject_of(
     travel += (4 * longest / settings.acceleration) ** 0.5
     travel += layout.outfeed_way / settings.outfeed + max(o.dwell for o in factory.operations)
     marking = factory.net.initial_marking if start is None else start
-    return Subject(
+    return MonitorSubject(
         factory, goals, radii, places, settings, marking, round(PATIENCE * travel, 6), wip
     )
 
 
-def subject_of_run(simulation: Any) -> Subject:
-    """The subject that a simulation is, in either world."""
+def subject_of_run(simulation: Observed) -> MonitorSubject:
+    """The subject of a simulation, in either world."""
     model = simulation.model
     return subject_of(
         simulation.layout,
@@ -141,8 +142,8 @@ def subject_from(
     settings: Settings,
     start: Sequence[int],
     wip: int | None,
-) -> Subject:
-    """The inverse of `as_json`. Raises ValueError where what was kept is not of that factory."""
+) -> MonitorSubject:
+    """The inverse of `as_json`. Raises ValueError where `kept` is not of that factory."""
     goals = tuple(tuple(float(x) for x in row) for row in kept["goals"])
     radii = tuple(float(x) for x in kept["radii"])
     slots = [len(o.robots) for o in factory.operations]
@@ -150,4 +151,4 @@ def subject_from(
         raise ValueError("its goals are not those of its PAG")
     places = {str(k): (float(x), float(y), float(z)) for k, (x, y, z) in kept["places"].items()}
     patience = float(kept["patience"])
-    return Subject(factory, goals, radii, places, settings, frozenset(start), patience, wip)
+    return MonitorSubject(factory, goals, radii, places, settings, frozenset(start), patience, wip)

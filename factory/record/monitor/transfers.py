@@ -1,26 +1,28 @@
-"""What switched grips mean: which operation has ended, for which unit, and what none asked for."""
+"""What switched grips mean: which operation has ended, for which unit, and which switches belong to
+no operation."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
+from factory.mjcf.weld_frames import FEED, GRIP, HOLD, PARK
 from factory.plant.factory import Operation
 from factory.problem.pag import NOPART
-from factory.record.monitor.anatomy import FEED, GRIP, HOLD, PARK, Anatomy, Holder
+from factory.record.monitor.anatomy import Anatomy, Holder
 from factory.record.monitor.grips import Switch
-from factory.record.monitor.subject import Subject
+from factory.record.monitor.subject import MonitorSubject
 
 Blame = Callable[[str, int, str, str], None]
-"""Notes a violation: its code, the robot (-1 for none), the label, and what is wrong."""
+"""Records a violation: its code, the robot (-1 for none), the label, and the message."""
 
 
 @dataclass(slots=True)
 class Transfers:
-    """The hands that each copy is in, the unit it is for (the k-th one that a feeder presents is
+    """What holds each copy, the unit it is for (the k-th one that a feeder presents is
     for unit k), and how often each operation that moves parts has ended."""
 
-    subject: Subject
+    subject: MonitorSubject
     anatomy: Anatomy
     blame: Blame
     at: list[Holder | None] = field(init=False, repr=False)
@@ -38,7 +40,7 @@ class Transfers:
         self.load = {}
 
     def begin(self, switches: Sequence[Switch]) -> None:
-        """Take what is held at first; blames what the marking does not account for."""
+        """Record what is held at the start; blame what the marking does not account for."""
         factory = self.subject.factory
         for switch in switches:
             holder = self._holder(switch)
@@ -73,8 +75,8 @@ class Transfers:
         return [self._end(number, copies) for number, copies in sorted(passed.items())]
 
     def _fused(self, switches: Sequence[Switch]) -> list[Switch]:
-        """The switches but those by which bodies in one pair of hands, now parked, have become the
-        one body, parked before, that is made of the same parts; no copy becomes another."""
+        """The switches, without those by which bodies that one robot held have become one body made
+        of the same parts: they are parked, and it was parked before."""
         anatomy, at = self.anatomy, self.at
         gone: dict[Holder, list[int]] = {}
         for switch in switches:
@@ -100,7 +102,7 @@ class Transfers:
         return {holder[0] for weld in switch.after if (holder := self.anatomy.holder[weld])}
 
     def _become(self, whole: int, holder: Holder, copies: Sequence[int]) -> None:
-        """Copies in some hands have become one body; blames that they are for several units."""
+        """Copies that a robot held have become one body; blame that they are for several units."""
         units = {self.unit[copy] for copy in copies}
         if len(units) > 1:
             name, label = self.anatomy.copies[whole], self.anatomy.label[whole]
@@ -113,20 +115,21 @@ class Transfers:
         self.unit[whole] = max(units)
 
     def _parts(self, copies: Sequence[int]) -> list[str]:
-        """The labels of the parts that copies are, or are made of."""
+        """The labels of the parts in copies."""
         contents = self.subject.factory.contents
         return [part for copy in copies for part in contents[self.anatomy.label[copy]]]
 
     # --- one copy ------------------------------------------------------------------------------
 
     def _holder(self, switch: Switch) -> Holder | None:
-        """Who holds a copy now; blames its being held by nobody, by two, or as another part."""
+        """What holds a copy now. Blame that nothing holds it, that two hold it, or that it is held
+        as another part."""
         anatomy, label = self.anatomy, self.anatomy.label[switch.copy]
         before, name = self.at[switch.copy], anatomy.copies[switch.copy]
         if not switch.after:
-            who = before[1] if before else -1
+            robot = before[1] if before else -1
             self.blame(
-                "Dropped", who, label, f"nobody holds {name}, which {self._named(before)} held"
+                "Dropped", robot, label, f"nothing holds {name}, which {self._named(before)} held"
             )
             return None
         wrong = [w for w in switch.after if anatomy.part[w] != label]
@@ -143,8 +146,8 @@ class Transfers:
         return fresh[-1] if fresh else holders[0]
 
     def _operation(self, copy: int, before: Holder | None, after: Holder) -> Operation | None:
-        """The operation whose end passes a copy on like that; None where none has to. Blames what
-        no operation does."""
+        """The operation whose end passes a copy on from `before` to `after`; None where none has
+        to. Blame what no operation does."""
         factory, label = self.subject.factory, self.anatomy.label[copy]
         found: Operation | None = None
         if after[0] == FEED and before and before[0] in (PARK, HOLD):
@@ -161,10 +164,10 @@ class Transfers:
             else after[0] == HOLD
         )
         if found is None or not takes:
-            who = after[1] if after[1] >= 0 else before[1] if before else -1
+            robot = after[1] if after[1] >= 0 else before[1] if before else -1
             name = self.anatomy.copies[copy]
             words = f"{name} passes from {self._named(before)} to {self._named(after)}"
-            self.blame("Exchanged", who, label, f"{words}, as no operation does")
+            self.blame("Exchanged", robot, label, f"{words}, as no operation does")
             return None
         return found
 
@@ -184,7 +187,7 @@ class Transfers:
     # --- one operation -------------------------------------------------------------------------
 
     def _end(self, number: int, copies: Sequence[int]) -> tuple[Operation, int]:
-        """Count the end of an operation, and look at what its carrier then has."""
+        """Count the end of an operation, and check what its carrier then has."""
         operation = self.subject.factory.operations[number]
         unit = self.ended[number]
         self.ended[number] += 1
@@ -232,7 +235,7 @@ class Transfers:
 
     def _named(self, holder: Holder | None) -> str:
         if holder is None:
-            return "nobody"
+            return "nothing"
         if holder[0] == GRIP:
             return self.subject.factory.robots[holder[1]].name
         return {PARK: "its parking place", FEED: "its feeder", HOLD: "the outfeed"}[holder[0]]

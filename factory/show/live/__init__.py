@@ -1,6 +1,6 @@
-"""A running factory in the browser: watched, paused, pushed, slowed down and blocked."""
+"""A running factory in the browser, with commands to pause, push, slow down and block."""
 
 from factory.show.live.server import Server
-from factory.show.live.session import Frame, Session
+from factory.show.live.session import LiveFrame, Session
 
-__all__ = ["Frame", "Server", "Session"]
+__all__ = ["LiveFrame", "Server", "Session"]

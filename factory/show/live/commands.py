@@ -1,25 +1,25 @@
-"""What a watcher may ask of a running factory: JSON messages, checked before anything acts."""
+"""The commands to a running factory: JSON messages, checked before they act."""
 
 from __future__ import annotations
 
 import json
 from collections.abc import Callable, Collection, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Any
 
 SPEEDS = (0.1, 0.25, 0.5, 1.0, 2.0, 5.0, 10.0, 0.0)
-"""Of the run, against a clock on the wall; 0: as fast as it goes."""
+"""Speeds of a run, simulated seconds a second; 0: as fast as it goes."""
 
 FACTORS = (0.1, 0.25, 0.5, 1.0)
-"""Of a robot's speed."""
+"""Factors on a robot's speed."""
 
 SHARES = (-1.0, -0.5, 0.5, 1.0)
-"""Of the greatest force of a robot's drive: what is more, it could not hold."""
+"""Pushes, as shares of the greatest force of a robot's drive, which can hold no more."""
 
 
 @dataclass(frozen=True, slots=True)
 class Pause:
-    """Stand still, at the end of a tick."""
+    """Stop at the end of a tick."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,7 +28,7 @@ class Play:
 
 
 @dataclass(frozen=True, slots=True)
-class Step:
+class PlayToFiring:
     """Go on until the next transition fires."""
 
 
@@ -45,7 +45,7 @@ class Speed:
 
 
 @dataclass(frozen=True, slots=True)
-class Push:
+class PushRobot:
     """Push a robot (index) for PUSH seconds with one of SHARES."""
 
     robot: int
@@ -54,7 +54,7 @@ class Push:
 
 @dataclass(frozen=True, slots=True)
 class Slow:
-    """Let a robot (index) go at one of FACTORS of its speed."""
+    """Run a robot (index) at one of FACTORS of its speed."""
 
     robot: int
     factor: float
@@ -62,21 +62,21 @@ class Slow:
 
 @dataclass(frozen=True, slots=True)
 class Block:
-    """Let the feeder of a part give nothing, or give again."""
+    """Block the feeder of a part, or free it."""
 
     part: str
     blocked: bool
 
 
-Command = Pause | Play | Step | Restart | Speed | Push | Slow | Block
+Command = Pause | Play | PlayToFiring | Restart | Speed | PushRobot | Slow | Block
 
 PUSH = 0.3
-"""A push lasts so long [s]."""
+"""Duration of a push [s]."""
 
 
 def command_of(message: str | bytes, robots: int, parts: Collection[str]) -> Command:
     """The command in a message such as `{"do": "slow", "robot": 3, "factor": 0.5}`, to a factory of
-    so many robots and these parts. Raises ValueError, saying what is wrong and what would do."""
+    so many robots and these parts. Raises ValueError with what is wrong and what is valid."""
     try:
         told = json.loads(message)
     except (ValueError, RecursionError):
@@ -86,7 +86,8 @@ def command_of(message: str | bytes, robots: int, parts: Collection[str]) -> Com
     name = told.get("do")
     if not isinstance(name, str) or name not in KINDS:
         raise ValueError(f"'do' is {name!r}: there are {', '.join(KINDS)}")
-    kind, fields = KINDS[name]
+    kind = KINDS[name]
+    keys = [field.name for field in fields(kind)]
     valid: Mapping[str, tuple[Callable[[Any], bool], str]] = {
         "robot": (lambda v: type(v) is int and 0 <= v < robots, f"a number from 0 to {robots - 1}"),
         "part": (lambda v: isinstance(v, str) and v in parts, "the label of a part"),
@@ -97,25 +98,25 @@ def command_of(message: str | bytes, robots: int, parts: Collection[str]) -> Com
             f"one of {SPEEDS if kind is Speed else FACTORS}",
         ),
     }
-    for key in fields:
+    for key in keys:
         holds, words = valid[key]
         if not holds(told.get(key)):
             raise ValueError(f"'{key}' of '{name}' is {told.get(key)!r}: {words} is needed")
-    return kind(*(told[key] for key in fields))
+    return kind(*(told[key] for key in keys))
 
 
 def _is_one(value: object, of: Collection[float]) -> bool:
     return type(value) in (int, float) and value in of
 
 
-KINDS: Mapping[str, tuple[Callable[..., Command], tuple[str, ...]]] = {
-    "pause": (Pause, ()),
-    "play": (Play, ()),
-    "step": (Step, ()),
-    "restart": (Restart, ()),
-    "speed": (Speed, ("factor",)),
-    "push": (Push, ("robot", "share")),
-    "slow": (Slow, ("robot", "factor")),
-    "block": (Block, ("part", "blocked")),
+KINDS: Mapping[str, type[Command]] = {
+    "pause": Pause,
+    "play": Play,
+    "step": PlayToFiring,
+    "restart": Restart,
+    "speed": Speed,
+    "push": PushRobot,
+    "slow": Slow,
+    "block": Block,
 }
-"""The commands by name, with their fields."""
+"""The commands by name."""

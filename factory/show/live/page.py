@@ -1,4 +1,4 @@
-"""The page of a running factory: the drawings of a report, moved by what the socket says."""
+"""The page of a running factory: the drawings of a report, moved by the messages of a socket."""
 
 from __future__ import annotations
 

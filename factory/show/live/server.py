@@ -1,4 +1,4 @@
-"""Serves a session to browsers: one page, and one socket each, at an address nobody can guess."""
+"""The server of a session: one page, and one socket for each browser, at a secret address."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from threading import Thread
 from typing import TYPE_CHECKING, Any
 
 from factory.show.live.commands import command_of
-from factory.show.live.session import Frame, Session
+from factory.show.live.session import LiveFrame, Session
 from factory.support.errors import Diagnostic, InputError
 from factory.support.extras import optional
 from factory.support.resource import Closing
@@ -22,16 +22,16 @@ if TYPE_CHECKING:
     from websockets.sync.server import ServerConnection
 
 RECENT = 2000
-"""Firings that a watcher who comes later is told of."""
+"""Number of past firings that a new watcher is sent."""
 
 PATIENCE = 1.0
-"""A watcher hears something at least so often [s]."""
+"""Longest interval between two messages to a watcher [s]."""
 
 LARGEST = 4096
-"""Bytes of the longest command."""
+"""Upper bound on the bytes of a command."""
 
 MOST = 16
-"""Watchers at once."""
+"""Upper bound on the watchers at once."""
 
 HEADERS = {
     "Content-Type": "text/html; charset=utf-8",
@@ -51,7 +51,7 @@ def is_loopback(host: str) -> bool:
 
 
 def check_server(host: str, exposed: bool) -> Any:
-    """What sockets are served with. Raises InputError (BadValue) for a host other than loopback
+    """The module that serves sockets. Raises InputError (BadValue) for a host other than loopback
     that is not to be exposed, MissingError without the package `websockets`."""
     if not is_loopback(host) and not exposed:
         message = f"'{host}' can be reached from other machines, who could then run this one"
@@ -61,12 +61,12 @@ def check_server(host: str, exposed: bool) -> Any:
 
 
 class Server(Closing):
-    """Listens from when it is made until it is closed; `address` is what to open. `exposed`: other
-    machines may come, by whatever name they know this one.
+    """Listens from when it is made until it is closed; `address` is the page's. `exposed`: other
+    machines may connect, by any name of this one.
 
-    Only who knows the address is let in, which has a secret in it that is new every time; a page
-    from elsewhere is refused. Raises what `check_server` does, and InputError (BadValue) where it
-    cannot listen.
+    The address has a secret in it that is new every time, without which nothing is served; a page
+    of another origin is refused. Raises what `check_server` does, and InputError (BadValue) where
+    it cannot listen.
     """
 
     def __init__(
@@ -102,12 +102,12 @@ class Server(Closing):
         self._thread.start()
 
     def close(self) -> None:
-        """Let all watchers go."""
+        """Disconnect all watchers."""
         self._server.shutdown()
         self._thread.join()
 
     def _answer(self, connection: ServerConnection, request: Request) -> Response | None:
-        """The page, or None for what becomes a socket."""
+        """The response to a request; None for one that becomes a socket."""
         host = request.headers.get("Host", "")
         name = host.rpartition(":")[0] if not host.endswith("]") and ":" in host else host
         if not self._exposed and not is_loopback(name):
@@ -128,7 +128,7 @@ class Server(Closing):
         return Response(HTTPStatus.OK, "OK", headers, self._page)
 
     def _watch(self, connection: ServerConnection) -> None:
-        """Send frames for as long as somebody watches: the newest, and all firings."""
+        """Send the newest frame, and all firings, until the connection is closed."""
         from websockets.exceptions import ConnectionClosed
 
         hearing = Thread(target=self._hear, args=(connection,), daemon=True)
@@ -149,7 +149,7 @@ class Server(Closing):
             self._watchers -= 1
 
     def _hear(self, connection: ServerConnection) -> None:
-        """Pass commands on; what is none is told to who sent it."""
+        """Pass commands on; the sender gets the error of a message that is not one."""
         from websockets.exceptions import ConnectionClosed
 
         factory = self._session.simulation.layout.factory
@@ -167,13 +167,13 @@ class Server(Closing):
 
 
 def _silent() -> logging.Logger:
-    """Watchers come and go, and strangers knock: nobody is told."""
+    """A logger that writes nothing: connections that fail are usual."""
     logger = logging.Logger("factory.live")
     logger.addHandler(logging.NullHandler())
     return logger
 
 
-def packed(frame: Frame, fired: list[tuple[float, int]]) -> bytes:
+def packed(frame: LiveFrame, fired: list[tuple[float, int]]) -> bytes:
     """A frame as the page reads it: the length of a JSON text (4 bytes, little-endian), the text,
     padded to a multiple of 4, and the poses."""
     told: Mapping[str, object] = {

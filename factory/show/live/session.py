@@ -1,4 +1,4 @@
-"""A factory that runs in step with the clock on the wall, and obeys commands between ticks."""
+"""A factory that runs in step with real time, and obeys commands between ticks."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from time import perf_counter
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from factory.show.live.commands import (
     PUSH,
@@ -18,11 +19,11 @@ from factory.show.live.commands import (
     Command,
     Pause,
     Play,
-    Push,
+    PlayToFiring,
+    PushRobot,
     Restart,
     Slow,
     Speed,
-    Step,
 )
 from factory.simulation.disturbance.interventions import Interventions
 from factory.simulation.simulation import Observer, Simulation
@@ -31,18 +32,18 @@ RATE = 30.0
 """Frames a second."""
 
 BEHIND = 0.25
-"""A run that is further behind the clock [s] does not try to make up for it."""
+"""A run that is further behind the clock than this [s] does not catch up."""
 
 QUIET = 3.0
-"""Where nothing has fired for so many times the longest delay, it is said who waits for what."""
+"""Where nothing has fired for so many times the longest delay, a note says what waits for what."""
 
 LOOK = 0.05
-"""While it stands still, a session looks for commands so often [s]."""
+"""Interval at which a session that is paused looks for commands [s]."""
 
 
 @dataclass(frozen=True, slots=True)
-class Frame:
-    """What is seen at an instant. `number`: frames are counted; `run`: how often it was begun anew;
+class LiveFrame:
+    """The state at an instant. `number`: of the frame; `run`: number of restarts;
     `poses`: positions [m] and quaternions (bodies, 7) as float32; `marked` places; `fired`: how
     many transitions have; `rhythm`: between the last two products [s]; `pace`: simulated seconds in
     a second; `note`: what is wrong, if anything."""
@@ -63,36 +64,63 @@ class Frame:
     note: str
 
 
+class WallClock:
+    """Real time against simulated time, which passes `speed` times as fast; 0: as fast as it goes.
+    `begun`, `marks`: pairs of both [s], at the start and recently."""
+
+    def __init__(self, speed: float = 1.0) -> None:
+        self.speed = speed
+
+    def start(self, time: float) -> None:
+        """Start anew at a simulated time."""
+        self.begun = perf_counter(), time
+        self.marks = deque([self.begun], maxlen=int(RATE))
+
+    def mark(self, time: float) -> None:
+        """The run has come to a simulated time."""
+        self.marks.append((perf_counter(), time))
+
+    def due(self) -> float:
+        """The simulated time to which the run should have come."""
+        wall, time = self.begun
+        return time + (perf_counter() - wall) * self.speed
+
+    @property
+    def pace(self) -> float:
+        """Simulated seconds a second, recently."""
+        (wall, time), (now, reached) = self.marks[0], self.marks[-1]
+        return (reached - time) / (now - wall) if now > wall else 0.0
+
+
 class Session:
-    """Runs what `make` gives, again and again if asked; `run` goes on until it is stopped by an
-    exception of an observer. `frame` may be read, `send` and `wait` called from any thread."""
+    """Runs what `make` gives, anew after each restart; `run` ends with an exception of an observer.
+    `frame` may be read, `send` and `wait` called from any thread."""
 
     def __init__(self, make: Callable[[], Simulation], playing: bool = True) -> None:
-        self._make = make
+        self._make, self._clock = make, WallClock()
         self._commands: SimpleQueue[Command] = SimpleQueue()
         self._changed = Condition()
-        self._playing, self._stepping, self._speed = playing, False, 1.0
+        self._playing, self._stepping = playing, False
         self._number = self._runs = 0
-        self._start = 0.0, 0.0
         self._begin()
         self._publish()
 
     def _begin(self) -> None:
-        self.simulation = made = self._make()
-        self.interventions = Interventions(made)
-        net = made.layout.factory.net.threaded
-        self._numbers = {t.name: n for n, t in enumerate(net.transitions)}
-        m = made.physical.m
-        self.bodies = np.flatnonzero(m.body_treeid >= 0)
-        self._quiet = QUIET * max(made.delays)
+        self.simulation = self._make()
+        self.interventions = Interventions(self.simulation)
         self._trouble = ""
-        self._anchor()
+        self._clock.start(self.simulation.world.time)
+
+    @property
+    def bodies(self) -> NDArray[np.intp]:
+        """The bodies that can move, by number."""
+        return np.flatnonzero(self.simulation.physical.m.body_treeid >= 0)
 
     def send(self, command: Command) -> None:
-        """Have a command obeyed, soon."""
+        """Give a command, which is obeyed between ticks."""
         self._commands.put(command)
 
-    def wait(self, number: int, timeout: float) -> Frame:
+    def wait(self, number: int, timeout: float) -> LiveFrame:
         """The newest frame, as soon as there is one after `number`."""
         with self._changed:
             self._changed.wait_for(lambda: self.frame.number > number, timeout)
@@ -102,18 +130,19 @@ class Session:
         """Time [s] and transition of some of the firings of a run; none of one that is over."""
         if run != self._runs:
             return []
+        numbers = self.simulation.layout.factory.net.threaded.net.transition_index
         events = self.simulation.supervisor.events[since:until]
-        return [(round(e.t, 4), self._numbers[e.transition]) for e in events]
+        return [(round(e.t, 4), numbers[e.transition]) for e in events]
 
     def run(self, observe: Observer) -> None:
-        """Go on for ever; `observe` is called after every tick, and while nothing moves."""
+        """Run for ever; `observe` is called after every tick, and repeatedly while it is paused."""
         while True:
             begun = perf_counter()
             ran = self._advance(begun, observe) if self._goes else 0
             observe(self.simulation.world, self.simulation.supervisor)
             if ran:
                 self._publish()
-            rest = 1 / RATE - (perf_counter() - begun) if self._speed else 0.0
+            rest = 1 / RATE - (perf_counter() - begun) if self._clock.speed else 0.0
             if self._obey(max(rest, 0.0) if self._goes else LOOK):
                 self._publish()
 
@@ -122,18 +151,17 @@ class Session:
         return (self._playing or self._stepping) and not self._trouble
 
     def _advance(self, begun: float, observe: Observer) -> int:
-        """Ticks until the run is where the clock on the wall is, or a frame is due; gives how
-        many."""
-        supervisor, world = self.simulation.supervisor, self.simulation.world
+        """Run ticks until simulated time is what it should be, or a frame is due; gives their
+        number."""
+        supervisor, world, clock = self.simulation.supervisor, self.simulation.world, self._clock
         count = 0
         while self._goes:
-            now = perf_counter()
-            due = self._start[1] + (now - self._start[0]) * self._speed
-            if self._speed and not self._stepping and world.time >= due:
+            due = clock.due()
+            if clock.speed and not self._stepping and world.time >= due:
                 break
-            if count and now - begun >= 1 / RATE:
-                if due - world.time > BEHIND * max(self._speed, 1.0):
-                    self._start = now, world.time
+            if count and perf_counter() - begun >= 1 / RATE:
+                if due - world.time > BEHIND * max(clock.speed, 1.0):
+                    clock.begun = perf_counter(), world.time
                 break
             before = len(supervisor.events)
             supervisor.step()
@@ -143,11 +171,12 @@ class Session:
                 self._trouble = f"{reason}: begin anew"
             elif self._stepping and len(supervisor.events) > before:
                 self._stepping = self._playing = False
-        self._paces.append((perf_counter(), world.time))
+        clock.mark(world.time)
         return count
 
     def _obey(self, timeout: float) -> bool:
-        """Do what is asked; waits so long for it. Gives whether anything was."""
+        """Obey the commands given, waiting for one up to `timeout` [s]; gives whether there was
+        one."""
         obeyed = False
         while True:
             try:
@@ -163,43 +192,42 @@ class Session:
                 self._playing = self._stepping = False
             case Play():
                 self._playing, self._stepping = True, False
-            case Step():
+            case PlayToFiring():
                 self._stepping, self._playing = True, False
             case Restart():
                 self._runs += 1
                 self._begin()
             case Speed(factor):
-                self._speed = factor
-            case Push(robot, share):
+                self._clock.speed = factor
+            case PushRobot(robot, share):
                 self.interventions.push(robot, share, PUSH)
             case Slow(robot, factor):
                 self.interventions.slow(robot, factor)
             case Block(part, blocked):
                 (self.interventions.block if blocked else self.interventions.free)(part)
-        self._anchor()
-
-    def _anchor(self) -> None:
-        """Time goes by from here and now."""
-        self._start = perf_counter(), self.simulation.world.time
-        self._paces: deque[tuple[float, float]] = deque([self._start], maxlen=int(RATE))
+        self._clock.start(self.simulation.world.time)
 
     def _publish(self) -> None:
-        world, supervisor = self.simulation.physical, self.simulation.supervisor
-        poses = np.hstack([world.d.xpos[self.bodies], world.d.xquat[self.bodies]])
-        (wall, time), (now, reached) = self._paces[0], self._paces[-1]
+        world, supervisor, bodies = (
+            self.simulation.physical,
+            self.simulation.supervisor,
+            self.bodies,
+        )
+        poses = np.hstack([world.d.xpos[bodies], world.d.xquat[bodies]])
+        left = world.dropoffs
         self._number += 1
-        frame = Frame(
+        frame = LiveFrame(
             self._number,
             self._runs,
             world.time,
             poses.astype("<f4").tobytes(),
-            supervisor.marked(),
+            tuple(np.flatnonzero(np.frombuffer(supervisor.marked, np.uint8)).tolist()),
             len(supervisor.events),
             world.delivered(),
-            round(left[-1] - left[-2], 4) if len(left := world.dropoffs) > 1 else None,
+            round(left[-1] - left[-2], 4) if len(left) > 1 else None,
             self._playing or self._stepping,
-            self._speed,
-            (reached - time) / (now - wall) if now > wall else 0.0,
+            self._clock.speed,
+            self._clock.pace,
             dict(self.interventions.slowed),
             tuple(sorted(self.interventions.blocked)),
             self._trouble or self._waits(),
@@ -209,15 +237,15 @@ class Session:
             self._changed.notify_all()
 
     def _waits(self) -> str:
-        """Who waits for what, where nothing has fired for long."""
+        """Which robots wait for what, where nothing has fired for a long time."""
         supervisor: Any = self.simulation.supervisor
         silent = self.simulation.world.time - supervisor.last_event
-        if silent < self._quiet:
+        if silent < QUIET * max(self.simulation.delays):
             return ""
         robots = self.simulation.layout.factory.robots
         words = [
             f"{robots[o.carrier].name} {'at' if o.inputs else 'for the feeder of'} {o.label}"
             for o in supervisor.awaited()[:4]
         ]
-        who = "; ".join(words) or "no robot can start"
-        return f"nothing has fired for {silent:.0f} s: waiting are {who}"
+        waiting = "; ".join(words) or "no robot can start"
+        return f"nothing has fired for {silent:.0f} s: waiting are {waiting}"

@@ -1,5 +1,5 @@
-"""How far a recorded run can be believed: figures from the log alone, and against the ideal world
-where there is a layout."""
+"""The fidelity of a recorded run: figures from the log alone, and against the ideal world where
+there is a layout."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ import numpy as np
 
 from factory.mjcf.parts import HIDDEN
 from factory.mjcf.replica import Replica
+from factory.mjcf.weld_frames import GRIP, HOLD, gaps
 from factory.nets.replay import replay
 from factory.record.monitor.record import watch_log
 from factory.record.monitor.report import Report
@@ -17,18 +18,18 @@ from factory.show.report.recording import Recording
 from factory.simulation.run import Event
 from factory.simulation.simulation import Simulation
 from factory.study.analysis.recorded import conditions
-from factory.study.fidelity.causality import duration_differences, process
+from factory.study.fidelity.causality import causal_record, duration_differences
 from factory.study.fidelity.quantities import QUANTITIES
-from factory.study.fidelity.welds import GRIP, HOLD, Welds
+from factory.study.fidelity.welds import Welds
 from factory.support.errors import InputError
 
 EVERY = 5
-"""Residuals of welds are taken every so many ticks."""
+"""Residuals of welds are measured every so many ticks."""
 
 
 @dataclass(frozen=True, slots=True)
 class Figure:
-    """A figure by the key of its definition; `value` None where it could not be had."""
+    """A figure by the key of its definition; `value` None where there is none."""
 
     key: str
     value: float | None
@@ -40,7 +41,7 @@ class Figure:
 
 
 @dataclass(frozen=True)
-class Fidelity:
+class RecordedFidelity:
     """The figures, whether the record refines the net, and the verdict of the monitor, None where
     the log is not one to be judged."""
 
@@ -49,8 +50,8 @@ class Fidelity:
     monitor: Report | None
 
 
-def fidelity(recording: Recording) -> Fidelity:
-    """Everything that can be said."""
+def fidelity(recording: Recording) -> RecordedFidelity:
+    """The fidelity of a recording."""
     log = recording.log
     try:
         monitor = watch_log(log)[0]
@@ -66,11 +67,11 @@ def fidelity(recording: Recording) -> Fidelity:
         **_ideal(recording),
     }
     figures = tuple(Figure(key, value) for key, value in found.items() if key in QUANTITIES)
-    return Fidelity(figures, record.refines, monitor)
+    return RecordedFidelity(figures, record.refines, monitor)
 
 
 def _tracking(recording: Recording) -> float | None:
-    """How far any axis is from its setpoint at the end of a tick, at most [mm]."""
+    """Largest distance of an axis from its setpoint at the end of a tick [mm]."""
     log, m = recording.log, recording.motion.m
     if log.ctrl is None:
         return None
@@ -83,7 +84,7 @@ def _tracking(recording: Recording) -> float | None:
 
 
 def _welds(recording: Recording) -> dict[str, float | None]:
-    """Hand-offs, the gap that each finds, what welds leave open, how products turn out [mm]."""
+    """Number of hand-offs, largest gap, residual and displacement of a part in the product [mm]."""
     log, replica = recording.log, Replica(recording.motion.m)
     m, d = replica.m, replica.d
     replica.switch(log.active[0])
@@ -95,13 +96,15 @@ def _welds(recording: Recording) -> dict[str, float | None]:
             replica.place(log.qpos[row - 1])
             replica.switch(log.active[row])
             fresh = welds.scan()
-            fresh = fresh[d.xpos[m.eq_obj2id[fresh], 2] > HIDDEN]  # none that replaces others
+            fresh = fresh[
+                d.xpos[m.eq_obj2id[fresh], 2] > HIDDEN
+            ]  # without bodies that replace others
             handoffs += len(fresh)
-            gap = max(gap, float(welds.gaps(fresh, d.xpos, d.xmat).max(initial=0.0)))
+            gap = max(gap, float(gaps(m, fresh, d.xpos, d.xmat).max(initial=0.0)))
             continue
         replica.place(log.qpos[row])
         on = np.flatnonzero(welds.active & (welds.kinds >= GRIP))
-        residual = max(residual, float(welds.gaps(on, d.xpos, d.xmat).max(initial=0.0)))
+        residual = max(residual, float(gaps(m, on, d.xpos, d.xmat).max(initial=0.0)))
         held = np.flatnonzero(welds.active & (welds.kinds == HOLD))
         if len(held):
             off = d.xpos[m.eq_obj2id[held]] - m.eq_data[held, 3:6]
@@ -115,7 +118,7 @@ def _welds(recording: Recording) -> dict[str, float | None]:
 
 
 def _rows(recording: Recording) -> Iterator[tuple[int, bool]]:
-    """Rows of the log to look at, and whether welds are switched there."""
+    """Rows of the log to measure, and whether welds are switched there."""
     active = recording.log.active
     for row in range(1, len(recording.log)):
         if active.starts[row] != active.starts[row - 1]:
@@ -125,7 +128,7 @@ def _rows(recording: Recording) -> Iterator[tuple[int, bool]]:
 
 
 def _ideal(recording: Recording) -> dict[str, float | None]:
-    """How long operations take against the ideal world, in which ẋ = F."""
+    """Durations of operations less those in the ideal world, in which ẋ = F [s]."""
     if recording.layout is None:
         return {}
     log, net = recording.log, recording.factory.net
@@ -137,7 +140,7 @@ def _ideal(recording: Recording) -> dict[str, float | None]:
         recording.layout, "ideal", units, made.seed, made.jitter, made.settings, wip=made.wip
     ).run()
     events = [Event(t, name) for t, name in log.events]
-    apart = duration_differences(process(net, thought.events), process(net, events))
+    apart = duration_differences(causal_record(net, thought.events), causal_record(net, events))
     if not len(apart):
         return {}
     return {

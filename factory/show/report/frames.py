@@ -1,4 +1,4 @@
-"""The motion of a run as few numbers: positions of what moves, frame by frame."""
+"""The motion of a run, compressed: poses of the bodies that move, frame by frame."""
 
 from __future__ import annotations
 
@@ -14,16 +14,16 @@ from factory.show.report.packing import Pack, planes
 from factory.show.report.recording import Recording
 
 RATE = motion.RATE / 3
-"""Frames a second, where the run is not too long: every third of those that other exports have."""
+"""Frames a second of a run that is not too long: a third of those in other exports."""
 
 MOST = 4_000_000
-"""Numbers in all frames together; a longer run has fewer frames a second."""
+"""Upper bound on the numbers in all frames; a longer run has fewer frames a second."""
 
 UNITS = 10_000
 """Positions are whole tenths of a millimetre, components of quaternions whole 1/10000."""
 
 TURNED = 2e-3
-"""What never turns by more, in a component of its quaternion, has one orientation for good."""
+"""A body has one orientation where no component of its quaternion changes by more than this."""
 
 
 def frames(recording: Recording, pack: Pack) -> dict[str, Any]:
@@ -58,7 +58,7 @@ def frames(recording: Recording, pack: Pack) -> dict[str, Any]:
 
 
 def _thinned(time: NDArray[np.float64], bodies: int) -> NDArray[np.int64]:
-    """The frames that are kept, the first and the last among them."""
+    """The frames that are kept, with the first and the last."""
     span = float(time[-1] - time[0])
     rate = min(RATE, max(1.0, MOST / (3 * max(1, bodies) * max(span, 1e-9))))
     wanted = np.arange(time[0], time[-1], 1 / rate)
@@ -67,7 +67,7 @@ def _thinned(time: NDArray[np.float64], bodies: int) -> NDArray[np.int64]:
 
 
 def _continuous(turns: NDArray[np.float64]) -> NDArray[np.float64]:
-    """The same orientations without jumps from a quaternion to its opposite."""
+    """The same orientations, without jumps from a quaternion to its negative."""
     flips = np.where(np.sum(turns[1:] * turns[:-1], axis=1) < 0, -1.0, 1.0)
     return np.asarray(turns * np.cumprod([1.0, *flips])[:, None])
 

@@ -1,4 +1,4 @@
-"""What belongs together: what is highlighted with every robot, label, transition and place."""
+"""Links: what is highlighted with every robot, label, transition and place."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ whose bodies are meant."""
 
 
 def labels_of(factory: Factory) -> dict[str, int]:
-    """The labels by number: parts first, each sub-assembly after what it is made of."""
+    """The number of each label: parts first, each sub-assembly after its inputs."""
     return {node.label: number for number, node in enumerate(factory.pag.postorder())}
 
 
 def about(labels: dict[str, int], label: str) -> str:
-    """The label of the PAG that a label of the net belongs to: itself, or what it is a stage of, as
-    `shelf/2` of `shelf`; "" for none."""
+    """The label of the PAG that a label of the net belongs to: itself, or, for a stage such as
+    `shelf/2`, `shelf`; "" for none."""
     whole = label.partition("/")[0]
     return label if label in labels else whole if whole in labels else ""
 
@@ -93,7 +93,7 @@ def _of_place(factory: Factory, labels: dict[str, int], place: int) -> Link:
 
 
 def _solids(factory: Factory, labels: dict[str, int], label: str) -> list[int]:
-    """The labels whose bodies a sub-assembly is: its own, and those of all that it is made of."""
+    """The labels of the bodies in a sub-assembly: its own, and those of all its inputs."""
     found, stack = [], [label]
     while stack:
         name = stack.pop()
@@ -103,7 +103,7 @@ def _solids(factory: Factory, labels: dict[str, int], label: str) -> list[int]:
 
 
 def words_of(operation: Operation) -> str:
-    """An operation for people: `mate sub1`, `dropoff`."""
+    """The name of an operation on the page: `mate sub1`, `dropoff`."""
     name, label = operation.template.name, operation.label
     return name if name == label else f"{name} {label}"
 

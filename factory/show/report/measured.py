@@ -1,4 +1,4 @@
-"""What a run shows of its pace: cycle time, how long operations take, how busy robots are."""
+"""The pace of a run as measured: cycle time, durations of operations, utilisation of robots."""
 
 from __future__ import annotations
 
@@ -7,10 +7,16 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from factory.show.report.recording import Recording
+from factory.study.analysis.measured import (
+    dropoff_times,
+    mean_interval,
+    operation_times,
+    robot_times,
+)
 
 
 @dataclass(frozen=True)
-class Measured:
+class MeasuredPace:
     """Of a run, in seconds: when each product left (`dropoffs`), the mean interval between the last
     half of them (None below 4); for each operation its mean duration (None where it never ended),
     the first time left out where there are others; for each robot the share of the run it was in
@@ -28,37 +34,19 @@ class Measured:
         return int(np.argmax(self.gears))
 
 
-def measured(recording: Recording) -> Measured:
-    """What the log's events say."""
+def measured(recording: Recording) -> MeasuredPace:
+    """The pace by the events of a log."""
     log, factory = recording.log, recording.factory
-    times: dict[int, list[float]] = {}
-    for number, at in zip(log.fired.tolist(), log.fired_t.tolist(), strict=True):
-        times.setdefault(number, []).append(at)
-    grown = np.flatnonzero(np.diff(log.delivered)) + 1
-    dropoffs = tuple(log.time[grown].tolist())
-    durations: list[float | None] = []
-    busy = np.zeros(len(factory.robots))
-    for operation in factory.operations:
-        begun, ended = times.get(operation.start, []), times.get(operation.end, [])
-        late = len(ended) - len(begun) if len(ended) > len(begun) else 0
-        spent = [end - start for start, end in zip(begun, ended[late:], strict=False)]
-        counted = spent[1:] or spent
-        durations.append(sum(counted) / len(counted) if counted else None)
-        for robot in operation.robots:
-            busy[robot] += sum(spent)
+    spent = operation_times(factory, zip(log.fired.tolist(), log.fired_t.tolist(), strict=True))
+    counted = [times[1:] or times for times in spent]
+    durations = [sum(times) / len(times) if times else None for times in counted]
+    dropoffs = dropoff_times(log.time, log.delivered)
     gears = [sum(durations[o] or 0.0 for o in robot.operations) for robot in factory.robots]
     total = recording.end or 1.0
-    return Measured(
+    return MeasuredPace(
         dropoffs,
-        _interval(dropoffs),
+        mean_interval(dropoffs),
         tuple(durations),
-        tuple((busy / total).tolist()),
+        tuple(busy / total for busy in robot_times(factory, spent)),
         tuple(gears),
     )
-
-
-def _interval(left: tuple[float, ...]) -> float | None:
-    if len(left) < 4:
-        return None
-    tail = left[len(left) // 2 - 1 :]
-    return (tail[-1] - tail[0]) / (len(tail) - 1)

@@ -1,4 +1,4 @@
-"""Arrays of numbers as one text inside a page: laid end to end, compressed, in base 64."""
+"""Arrays of numbers as one text in a page: concatenated, compressed, in base 64."""
 
 from __future__ import annotations
 
@@ -34,13 +34,13 @@ class Pack:
 
 
 def planes(values: NDArray[np.int32]) -> NDArray[np.uint8]:
-    """Whole numbers as first differences along the last axis, byte plane by byte plane: what hardly
-    changes is all zeros, which compress well."""
+    """Whole numbers as first differences along the last axis, byte plane by byte plane: slow
+    changes give zeros, which compress well."""
     steps = np.diff(values.astype(np.int64), axis=-1, prepend=0).astype("<i4")
     return np.ascontiguousarray(steps.reshape(-1).view(np.uint8).reshape(-1, 4).T).reshape(-1)
 
 
 def json_inside(value: Any) -> str:
-    """JSON that may stand in a `<script>`: nothing in it ends that or begins a comment."""
+    """JSON for a `<script>`: nothing in it ends the script or begins a comment."""
     text = json.dumps(value, allow_nan=False, separators=(",", ":"))
     return text.replace("&", "\\u0026").replace("<", "\\u003c").replace(">", "\\u003e")

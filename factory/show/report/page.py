@@ -1,4 +1,4 @@
-"""The page: everything about a run in one HTML file that refers to nothing outside itself."""
+"""The page of a report: one HTML file that refers to nothing outside itself."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ STYLES = ("report/report.css",)
 
 
 def page(recording: Recording) -> str:
-    """The page as a text, the same for the same recording."""
+    """The text of the page, the same for the same recording."""
     labels = labels_of(recording.factory)
     run, plan = measured(recording), predicted(recording)
     proved, found = proof(recording.factory), fidelity(recording)
@@ -89,7 +89,7 @@ def _counts(recording: Recording) -> str:
 
 
 def options(document: dict[str, Any]) -> str:
-    """What the field that finds things by name offers."""
+    """The options of the field that finds things by name."""
     kinds = (("robot", "robots"), ("part", "labels"), ("transition", "transitions"))
     return "".join(
         f'<option value="{escape(f"{kind} {name}", quote=True)}"></option>'
@@ -107,8 +107,8 @@ def filled(
     styles: Sequence[str],
     connects: str = "",
 ) -> str:
-    """A template with everything in its place, in one pass: what is filled in is not looked at
-    again. Templates, scripts and styles are named like `report/report.css`; `connects`: what the
+    """A template with its fields filled in, in one pass: what is filled in is not scanned again.
+    Templates, scripts and styles are named like `report/report.css`; `connects`: what the
     page may connect to, by its content security policy."""
     texts = [_asset(name) for name in scripts]
     every = {
@@ -125,7 +125,7 @@ def filled(
 
 
 def _policy(scripts: list[str], connects: str) -> str:
-    """A content security policy under which only these scripts run, and nothing is fetched."""
+    """A content security policy under which only these scripts run and nothing is fetched."""
     digests = (b64encode(hashlib.sha256(s.encode()).digest()).decode() for s in scripts)
     allowed = " ".join(f"'sha256-{digest}'" for digest in digests)
     return (

@@ -1,4 +1,4 @@
-"""What the timed net says of a recorded run, where its layout is at hand."""
+"""The pace of a recorded run as the timed net predicts it, where there is a layout."""
 
 from __future__ import annotations
 

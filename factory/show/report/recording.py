@@ -1,5 +1,5 @@
-"""What a report is of: a log with its motion, the factory it compiles to and, where it can be had,
-the layout that it ran in."""
+"""The subject of a report: a log with its motion, the factory it compiles to and, where it can be
+made again, the layout that it ran in."""
 
 from __future__ import annotations
 
@@ -33,8 +33,7 @@ from factory.support.errors import InputError, RunError
 
 @dataclass(frozen=True)
 class Recording:
-    """A run to be told about. `layout` is what predictions follow from; where it is None, `missing`
-    says why there are none."""
+    """A recorded run. Predictions follow from `layout`; where it is None, `missing` says why."""
 
     file: str
     log: Log = field(repr=False)
@@ -94,8 +93,8 @@ class Recording:
 
 
 def recording_of(path: Path, layout: Layout | None = None) -> Recording:
-    """The recording in a log; of the `layout` that it was made with, if that is at hand, else of
-    one that is made again. Raises InputError (BadLog) for what is no log of a run in MuJoCo."""
+    """The recording in a log, with the `layout` that it was made with, if given, else with one that
+    is made again. Raises InputError (BadLog) where it is not a log of a run in MuJoCo."""
     subject = Subject(path)
     motion, factory = motion_of(subject), compiled(subject)
     if layout is not None:
@@ -112,8 +111,8 @@ def recording_of(path: Path, layout: Layout | None = None) -> Recording:
 
 def _laid_out(log: Log, beside: Path) -> Layout:
     """The layout of a log in the folder `beside`, made again. Raises InputError where meshes are
-    gone, RunError where the floor is too small for it, ValueError where it is not the one that the
-    run was in."""
+    missing, RunError where the floor is too small, ValueError where the run was in another
+    layout."""
     header, made = log.header, conditions(log.header)
     templates = {word: read_template(text, word) for word, text in header["templates"].items()}
     source = Source(_pag(header["pag"], templates, beside), templates, load_catalogue())
@@ -128,8 +127,8 @@ def _laid_out(log: Log, beside: Path) -> Layout:
 
 
 def _pag(kept: Mapping[str, str], templates: Mapping[str, Template], beside: Path) -> PAG:
-    """The PAG that a log keeps, with its meshes from where it was or, where they are not there from
-    here, from beside the log. Raises InputError where they are gone."""
+    """The PAG in a log, with its meshes from the folder that the PAG was in or, where they are not
+    there, from beside the log. Raises InputError where they are in neither."""
     file, text = kept["file"], kept.get("plain") or kept["text"]
     try:
         return read_pag(text, templates, file, os.path.dirname(file) or ".")

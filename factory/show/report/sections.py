@@ -1,5 +1,4 @@
-"""The parts of a report that are words and figures, as HTML. All that comes from a user's file is
-escaped here."""
+"""The text and figures of a report, as HTML. What comes from a user's file is escaped here."""
 
 from __future__ import annotations
 
@@ -7,9 +6,9 @@ from collections.abc import Iterable, Iterator
 from html import escape
 
 from factory.plant.factory import Factory
-from factory.show.report.fidelity import Fidelity
+from factory.show.report.fidelity import RecordedFidelity
 from factory.show.report.links import words_of
-from factory.show.report.measured import Measured
+from factory.show.report.measured import MeasuredPace
 from factory.show.report.prediction import Predicted
 from factory.show.report.recording import Recording
 from factory.show.report.words import Proof
@@ -20,10 +19,10 @@ SIGNS = {True: "✓", False: "✗", None: "?"}
 
 def heading(
     recording: Recording,
-    run: Measured,
+    run: MeasuredPace,
     plan: Predicted | None,
     proof: Proof,
-    found: Fidelity,
+    found: RecordedFidelity,
 ) -> str:
     """The key figures, as cards."""
     robots = recording.factory.robots
@@ -60,7 +59,7 @@ def _per_hour(cycle: float | None) -> float | None:
     return 3600 / cycle if cycle else None
 
 
-def pace(recording: Recording, run: Measured, plan: Predicted | None) -> str:
+def pace(recording: Recording, run: MeasuredPace, plan: Predicted | None) -> str:
     """Cycle time, throughput and the critical gear, predicted and measured."""
     first = run.dropoffs[0] if run.dropoffs else None
     last = run.dropoffs[-1] if run.dropoffs else None
@@ -86,7 +85,7 @@ def pace(recording: Recording, run: Measured, plan: Predicted | None) -> str:
     return _table(names, body) + note + _gears(recording, run, plan)
 
 
-def _gears(recording: Recording, run: Measured, plan: Predicted | None) -> str:
+def _gears(recording: Recording, run: MeasuredPace, plan: Predicted | None) -> str:
     """The critical gear as a chain of its operations, as predicted and as measured."""
     factory = recording.factory
     names = {robot.name: robot.index for robot in factory.robots}
@@ -129,7 +128,7 @@ def _chain(
     )
 
 
-def utilisation(recording: Recording, run: Measured, plan: Predicted | None) -> str:
+def utilisation(recording: Recording, run: MeasuredPace, plan: Predicted | None) -> str:
     """A bar for each robot, the busiest first, with a mark where it was predicted."""
     rows, roles = [], recording.stage.roles
     for robot in sorted(recording.factory.robots, key=lambda r: -run.busy[r.index]):
@@ -167,8 +166,8 @@ def proof_words(proof: Proof) -> str:
     return f'<ul class="claims">{items}</ul>{digest}{save}'
 
 
-def fidelity_words(found: Fidelity) -> str:
-    """The figures in a table, and what the monitor says."""
+def fidelity_words(found: RecordedFidelity) -> str:
+    """The figures in a table, and the verdict of the monitor."""
     rows = "".join(
         f'<tr class="{"bad" if figure.exceeded else ""}">'
         f"<th>{escape(_title(figure.key))}<p>{escape(QUANTITIES[figure.key].definition)}</p></th>"
@@ -180,7 +179,7 @@ def fidelity_words(found: Fidelity) -> str:
     return "".join(_judged(found)) + table
 
 
-def _judged(found: Fidelity) -> Iterator[str]:
+def _judged(found: RecordedFidelity) -> Iterator[str]:
     yield "<p>The record of firings " + ("refines" if found.refines else "does not refine")
     yield " the net. "
     if found.monitor is None:
@@ -236,7 +235,7 @@ def _figure(value: float | None) -> str:
 
 
 def _shown(value: float | None) -> str:
-    """A figure in three digits, or that it is too small for that."""
+    """A figure in three digits, or a bound where it is very small."""
     if value is None:
         return "–"
     return f"{value:.3g}" if not value or abs(value) >= 1e-4 else "&lt; 0.0001"

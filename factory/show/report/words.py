@@ -50,7 +50,7 @@ class Proof:
 
     @property
     def holds(self) -> bool:
-        """Whether everything is proved and the checker agrees."""
+        """Whether all claims are proved and the checker accepts them."""
         return not self.faults and all(claim.holds for claim in self.claims)
 
 

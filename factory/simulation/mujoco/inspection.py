@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from factory.mjcf.model import Model
+from factory.mjcf.weld_frames import residuals
 from factory.plant.factory import Operation
 from factory.simulation.mujoco.contacts import ContactMasks
 from factory.simulation.mujoco.product_error import ProductError
@@ -35,10 +36,8 @@ class Inspection:
 
     def welds(self) -> None:
         """Keep the largest residual of the active welds' positions."""
-        rows = self._d.ne
-        if rows:
-            position = self._d.efc_pos[:rows].reshape(-1, 6)[:, :3]
-            self.residual = max(self.residual, float(np.abs(position).max()))
+        if self._d.ne:
+            self.residual = max(self.residual, float(np.abs(residuals(self._d)).max()))
 
     def tick(self) -> None:
         """A tick is over: what touched in it may be apart."""

@@ -8,11 +8,11 @@ import numpy as np
 
 from factory.mjcf import names
 from factory.mjcf.model import Model
+from factory.mjcf.weld_frames import held_at
 from factory.plant.factory import Operation
 from factory.simulation.mujoco.contacts import ContactMasks
 from factory.simulation.mujoco.copies import Copies, copies_of
 from factory.simulation.mujoco.feeders import Feeders
-from factory.simulation.mujoco.gaps import held_at
 from factory.simulation.mujoco.hands import Hands
 from factory.simulation.mujoco.joining import Joining
 from factory.simulation.mujoco.sleep import Sleep
@@ -139,6 +139,6 @@ class Parts:
     def _give(self, m: mujoco.MjModel, label: str, unit: int, robot: int) -> None:
         """Put a copy into a robot's hands, where the weld holds it."""
         body, weld = self.copies.take(label, unit), self.hands.grip[robot, label]
-        x, y, z = held_at(m, self._d, np.array([weld]))[0].tolist()
+        x, y, z = held_at(m, np.array([weld]), self._d.xpos, self._d.xmat)[0].tolist()
         self.welds.place(body, (x, y, z))
         self.hands.begin_with(robot, unit, {label: body})

@@ -8,8 +8,9 @@ from collections.abc import Iterable, Mapping
 
 import numpy as np
 
+from factory.control.mode import Index
+from factory.mjcf.weld_frames import WeldFrames
 from factory.simulation.mujoco.contacts import ContactMasks
-from factory.simulation.mujoco.gaps import WeldFrames
 from factory.simulation.mujoco.sleep import Sleep
 from factory.support.engine import mujoco
 
@@ -27,7 +28,10 @@ class Welds:
         self, m: mujoco.MjModel, d: mujoco.MjData, masks: ContactMasks, sleep: Sleep
     ) -> None:
         self.masks, self.gap, self.handoffs = masks, 0.0, 0
-        self._m, self._d, self._sleep, self._frames = m, d, sleep, WeldFrames(m, d)
+        self._m, self._d, self._sleep = m, d, sleep
+        mujoco.mj_kinematics(m, d)
+        self._frames = WeldFrames.of(m, d)
+        self._free = m.jnt_qposadr[m.body_jntadr][:, None] + np.arange(3)
         self._on: dict[int, int] = {}
         self._off: set[int] = set()
         self._gripped: dict[int, int] = {}
@@ -64,7 +68,7 @@ class Welds:
         self._put()
         if self._gripped:
             welds, bodies = np.array([*self._gripped.items()]).T
-            self.gap = max(self.gap, self._frames.apart(welds, bodies))
+            self.gap = max(self.gap, self._apart(welds, bodies))
             self.handoffs += len(welds)
         m, d = self._m, self._d
         off, on = np.array([*self._off], np.intp), np.array([*self._on], np.intp)
@@ -76,6 +80,13 @@ class Welds:
         self.masks.hold(self._held)
         for gathered in (self._on, self._off, self._gripped, self._held, self._placed):
             gathered.clear()
+
+    def _apart(self, welds: Index, bodies: Index) -> float:
+        """The largest distance [m] between where welds hold bodies and where those are: now, which
+        `xpos` tells of where the last step began."""
+        q, frames = self._d.qpos, self._frames.chosen(welds)
+        offset = q[self._free[bodies]] - frames.at(q[frames.along])
+        return float(np.linalg.norm(offset, axis=1).max())
 
     def _put(self) -> None:
         """Put bodies where they belong; `xpos` too, which the engine renews in its next step."""

@@ -1,23 +1,22 @@
-"""The analysis of a factory's pace, by its net: everything in one value."""
+"""The analysis of a factory's pace by its timed net."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
 from math import inf
 
-from factory.study.analysis.bounds import WipCurve, wip_curve
 from factory.study.analysis.flow import Flow, flow
-from factory.study.analysis.measured import Comparison, Record, compare
+from factory.study.analysis.measured import Comparison, RunRecord, compare
 from factory.study.analysis.sensitivity import Sensitivity, sensitivities
 from factory.study.analysis.slack import slacks
 from factory.study.analysis.timed import TimedNet, timed_net
 from factory.study.analysis.timing import AS_IT_IS, Change, Timing
-from factory.study.analysis.what_if import Scenario, scenario, scenarios
+from factory.study.analysis.what_if import Scenario, WipCurve, scenario, scenarios, wip_curve
 
 
 @dataclass(frozen=True)
 class Analysis:
-    """What the timed net of a laid-out factory says; see the values it is made of.
+    """The results of the timed net of a laid-out factory.
 
     `slack[i]`: how much longer operation i may take before it sets the pace [s].
     """
@@ -34,7 +33,7 @@ class Analysis:
 
     @property
     def bottlenecks(self) -> tuple[str, ...]:
-        """What sets the pace."""
+        """The names of what sets the pace."""
         return tuple(circuit.name for circuit in self.net.critical)
 
 
@@ -43,11 +42,11 @@ def analyse(
     units: int = 20,
     wip: int | None = None,
     asked: tuple[str, Change] | None = None,
-    record: Record | None = None,
+    record: RunRecord | None = None,
 ) -> Analysis:
-    """Analyse a laid-out factory: `units` products from the initial marking, a bound `wip` on
-    copies of each part, a change that is `asked` about, in words, and the `record` of a run to
-    compare with.
+    """The analysis of a laid-out factory: of `units` products from the initial marking, with a
+    bound `wip` on copies of each part, with a change that is `asked` about, in words, and with the
+    `record` of a run to compare with.
 
     Raises InputError where `wip` is below 1 or a mode cannot reach its goal.
     """
@@ -71,8 +70,8 @@ def analyse(
 
 
 def operation_slacks(timing: Timing, net: TimedNet) -> tuple[float, ...]:
-    """How much longer each operation may take before it sets the pace [s]: what the tightest of the
-    circuits through it lacks."""
+    """How much longer each operation may take before it sets the pace [s]: the slack of the
+    tightest circuit through it."""
     operations = timing.factory.operations
     if net.bounds:
         found = slacks(net.ratio, (o.place for o in operations))

@@ -6,7 +6,7 @@ from dataclasses import asdict
 from typing import Any
 
 from factory.study.analysis.analysing import Analysis
-from factory.study.analysis.measured import Comparison, Pair
+from factory.study.analysis.measured import ComparedFigure, Comparison
 
 
 def document(found: Analysis) -> dict[str, Any]:
@@ -126,5 +126,5 @@ def _measured(found: Analysis, run: Comparison) -> dict[str, Any]:
     }
 
 
-def _pair(pair: Pair) -> dict[str, Any]:
+def _pair(pair: ComparedFigure) -> dict[str, Any]:
     return {**asdict(pair), "error": pair.error}

@@ -1,4 +1,4 @@
-"""What the firings of a timed net say: filling, work in progress, where the robots' time goes."""
+"""The firings of a timed net: filling, work in progress, how robots spend their time."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from factory.study.analysis.timing import Timing
 
 
 @dataclass(frozen=True, slots=True)
-class Stock:
-    """How many copies of a label there are at once in the long run, and how long each stays [s].
+class WorkInProgress:
+    """The number of copies of a label at once in the long run, and how long each stays [s].
 
     A part stays from the start of the operation that takes it until it is dropped off, whatever it
     has become a part of; any other sub-assembly from the end of the operation that makes it to that
@@ -31,9 +31,9 @@ class Stock:
 
 @dataclass(frozen=True, slots=True)
 class Share:
-    """Where a robot's time goes, in seconds of each cycle: `moving`; `working`, a dwell; `standing`
-    at its place in an operation while others move, the outfeed's tray too; `waiting` for the next
-    one. To go ahead while it waits counts as moving. Of several copies of a robot, one's."""
+    """How a robot spends a cycle [s]: `moving`; `working`, a dwell; `standing` at its place in an
+    operation while other robots or the outfeed's tray move; `waiting` for the next operation. Going
+    ahead while it waits counts as moving. Of several copies of a robot, one of them."""
 
     robot: str
     moving: float
@@ -43,7 +43,7 @@ class Share:
 
     @property
     def cycle(self) -> float:
-        """All of it [s]."""
+        """The cycle [s]."""
         return self.moving + self.working + self.standing + self.waiting
 
     @property
@@ -54,10 +54,10 @@ class Share:
 
 @dataclass(frozen=True)
 class Flow:
-    """How products come: `first` and `last`, when the first and the last of `units` products is
-    dropped off (in the engine: has left the outfeed) [s]; `full_pace`: the number of the product
-    from which on they come at the pace; `settled`: whether everything repeats itself within what
-    was looked at, else stocks are those at its end. `inside`: parts in the factory, all together.
+    """When products come: `first` and `last` of `units`, dropped off (in the engine: out of the
+    outfeed) [s]; `full_pace`: the number of the product from which on they come at the pace;
+    `settled`: whether the firings become periodic within those that were computed, else `stocks`
+    are those at their end.
     """
 
     units: int
@@ -65,18 +65,19 @@ class Flow:
     last: float
     full_pace: int | None
     settled: bool
-    stocks: tuple[Stock, ...] = field(repr=False)
+    stocks: tuple[WorkInProgress, ...] = field(repr=False)
     shares: tuple[Share, ...] = field(repr=False)
     firings: Firings = field(repr=False)
 
     @property
     def inside(self) -> float:
-        """Parts in the factory at once, all together, on the average."""
+        """The mean number of parts in the factory at once."""
         return sum(stock.mean for stock in self.stocks if stock.is_part)
 
 
 def flow(timing: Timing, net: TimedNet, units: int) -> Flow:
-    """Fire the net as soon as possible, from the initial marking, for `units` products at least."""
+    """The flow of at least `units` products from the initial marking, all firing as soon as they
+    can."""
     found = net.firings(units)
     products = found.dates[:, timing.factory.dropoff.end]
     return Flow(
@@ -100,8 +101,8 @@ def _full_pace(products: Floats, found: Firings) -> int | None:
     return int(late[-1]) + 2 if len(late) else 1
 
 
-def _stocks(timing: Timing, found: Firings) -> tuple[Stock, ...]:
-    """Over as many whole periods as lie before the first transition runs out of firings."""
+def _stocks(timing: Timing, found: Firings) -> tuple[WorkInProgress, ...]:
+    """Over as many whole periods as lie before the last firing of every transition."""
     factory, dates = timing.factory, found.dates
     end = float(dates[-1].min())
     settled = 0 if found.settled is None else found.settled
@@ -117,9 +118,11 @@ def _stocks(timing: Timing, found: Firings) -> tuple[Stock, ...]:
     return tuple(stocks)
 
 
-def _stock(operation: Operation, enters: Floats, leaves: Floats, begin: float, end: float) -> Stock:
-    """Time averages between `begin` and `end`. Copies that are gone at the very moment at which
-    another comes are not there with it."""
+def _stock(
+    operation: Operation, enters: Floats, leaves: Floats, begin: float, end: float
+) -> WorkInProgress:
+    """Time averages between `begin` and `end`. A copy that leaves at the moment at which another
+    comes is not counted with it."""
     stays = np.clip(leaves, begin, end) - np.clip(enters, begin, end)
     instants = [(float(t), -1) for t in leaves if begin < t <= end]
     instants += [(float(t), +1) for t in enters if begin < t <= end]
@@ -132,7 +135,7 @@ def _stock(operation: Operation, enters: Floats, leaves: Floats, begin: float, e
     stay = float(whole.mean()) if len(whole) else 0.0
     length = end - begin
     mean = float(stays.sum()) / length if length > 0 else 0.0
-    return Stock(operation.label, not operation.inputs, mean, most, stay)
+    return WorkInProgress(operation.label, not operation.inputs, mean, most, stay)
 
 
 def _share(timing: Timing, net: TimedNet, number: int) -> Share:
@@ -159,15 +162,14 @@ def durations(timing: Timing, found: Flow) -> Floats:
 
 
 def lasting(timing: Timing, found: Flow) -> Floats:
-    """(operations,): how long each lasts on the average [s]. The first time is left out where there
-    are others: robots may come from elsewhere."""
+    """(operations,): the mean duration of each [s]. The first is left out where there are others:
+    robots start it from other places."""
     each = durations(timing, found)
     return np.asarray(each[min(1, len(each) - 1) :].mean(axis=0))
 
 
 def busy_until(timing: Timing, found: Flow) -> Sequence[float]:
-    """For each robot the share of the time until the last of the units that it is in operations:
-    what a run of so many units shows."""
+    """The share of the time until the last of the units for which each robot is in operations."""
     spent = durations(timing, found).sum(axis=0)
     robots = timing.factory.robots
     return [float(spent[list(robot.operations)].sum()) / found.last for robot in robots]

@@ -1,4 +1,4 @@
-"""The pace of any timed marked graph, from PNML say, with a table of delays."""
+"""The pace of any timed marked graph, such as a net in PNML, with a table of delays."""
 
 from __future__ import annotations
 
@@ -13,17 +13,17 @@ from factory.nets.cycle_ratio import max_cycle_ratio
 from factory.nets.gears import GearNet
 from factory.nets.marked import MarkedNet, marked
 from factory.study.analysis.slack import Slack, circuits, slacks
-from factory.study.analysis.tables import SHOWN, Table, cut
+from factory.study.analysis.tables import SHOWN, PrintedTable, cut
 from factory.support.errors import Diagnostic, InputError, Position, did_you_mean
 
 MOST = 1_000
-"""So many places have their own slack; of larger nets, the ones on the critical circuit."""
+"""Number of places whose slack is computed; of larger nets, those on the critical circuit."""
 
 
 @dataclass(frozen=True)
 class NetAnalysis:
-    """The cycle time of a net [s]; its `circuits`, of those that are the tightest through some
-    place with a time, the critical ones first; the `slack` of each of these places."""
+    """The cycle time `pace` of a net [s]; its `circuits`, the tightest through each place with a
+    time, the critical ones first; the `slack` of each of these places."""
 
     net: MarkedNet
     seconds: tuple[float, ...]
@@ -75,8 +75,8 @@ def net_document(name: str, found: NetAnalysis) -> dict[str, object]:
     }
 
 
-def net_tables(found: NetAnalysis, verbose: bool) -> Iterator[Table]:
-    """The circuits and the places with little slack, for people."""
+def net_tables(found: NetAnalysis, verbose: bool) -> Iterator[PrintedTable]:
+    """The tables of circuits and of places with little slack."""
     places, most = found.net.net.places, None if verbose else SHOWN
     rows = []
     for c in found.circuits:
@@ -93,10 +93,10 @@ def net_tables(found: NetAnalysis, verbose: bool) -> Iterator[Table]:
 
 
 def read_delays(path: Path, net: GearNet | MarkedNet) -> dict[str, float]:
-    """A table of delays, TOML: `place = seconds`, a name in quotes where it has other signs than
-    letters, digits, - and _.
+    """A table of delays in TOML: `place = seconds`, the name in quotes where it has other
+    characters than letters, digits, - and _.
 
-    Raises InputError with every fault: broken TOML, an unknown place, no time.
+    Raises InputError with every fault: broken TOML, an unknown place, a value that is not a time.
     """
     try:
         text = path.read_bytes().decode("utf-8-sig")
@@ -127,7 +127,7 @@ EXAMPLE = 'seconds, for example "p1" = 0.5'
 
 
 def _broken(path: Path, words: str) -> Diagnostic:
-    """What tomllib says, at the place it speaks of."""
+    """The error of tomllib, at its position."""
     at = re.search(r" \(at line (\d+), column (\d+)\)", words)
     line, column = (int(at[1]), int(at[2])) if at else (1, 1)
     words = words.replace(at[0], "") if at else words

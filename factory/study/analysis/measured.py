@@ -1,38 +1,41 @@
-"""A run against its prediction: durations, cycle time, utilisation."""
+"""A run compared with its prediction: durations, cycle time, utilisation."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
+from numpy.typing import NDArray
 
+from factory.plant.factory import Factory
 from factory.simulation.run import Event
+from factory.study.analysis.firing import Floats
 from factory.study.analysis.flow import Flow, busy_until, durations, lasting
 from factory.study.analysis.timed import TimedNet
 from factory.study.analysis.timing import Timing
 
 
 @dataclass(frozen=True, slots=True)
-class Pair:
-    """A quantity as predicted and as measured, None where a run is too short to say."""
+class ComparedFigure:
+    """A quantity as predicted and as measured; None where the run is too short."""
 
     predicted: float
     measured: float | None
 
     @property
     def error(self) -> float | None:
-        """Predicted less measured, as a share of what was measured."""
+        """Predicted less measured, as a share of the measured value."""
         return self.predicted / self.measured - 1 if self.measured else None
 
 
 @dataclass(frozen=True, slots=True)
 class Duration:
-    """How long an operation takes from its start to its end [s]; `least` and `greatest` of what was
-    measured. The first time is left out where there are others: robots may come from elsewhere."""
+    """The duration of an operation from its start to its end [s], with the `least` and `greatest`
+    measured. The first is left out where there are others: robots start it from other places."""
 
     label: str
-    time: Pair
+    time: ComparedFigure
     least: float
     greatest: float
     count: int
@@ -40,15 +43,15 @@ class Duration:
 
 @dataclass(frozen=True)
 class Comparison:
-    """A run of `units` products against the prediction of just that run."""
+    """A run of `units` products compared with its prediction."""
 
     source: str
     units: int
-    cycle: Pair
-    first: Pair
-    last: Pair
+    cycle: ComparedFigure
+    first: ComparedFigure
+    last: ComparedFigure
     durations: tuple[Duration, ...] = field(repr=False)
-    busy: tuple[Pair, ...] = field(repr=False)
+    busy: tuple[ComparedFigure, ...] = field(repr=False)
 
     @property
     def worst(self) -> Duration | None:
@@ -58,57 +61,85 @@ class Comparison:
 
 
 @dataclass(frozen=True, slots=True)
-class Record:
-    """What a run left: its events, when each product was dropped off, its end [s]."""
+class RunRecord:
+    """A run to compare with: its events, and when each product was dropped off [s]."""
 
     source: str
     events: tuple[Event, ...]
     dropoffs: tuple[float, ...]
 
 
-def compare(timing: Timing, net: TimedNet, found: Flow, record: Record) -> Comparison:
-    """The record of a run from the initial marking against the flow of as many units."""
+def compare(timing: Timing, net: TimedNet, found: Flow, record: RunRecord) -> Comparison:
+    """The record of a run from the initial marking, compared with the flow of as many units."""
     factory = timing.factory
-    times: dict[str, list[float]] = {}
-    for event in record.events:
-        times.setdefault(event.transition, []).append(event.t)
-    names = [transition.name for transition in factory.net.threaded.transitions]
+    number = factory.net.threaded.net.transition_index
+    spent = operation_times(factory, ((number[e.transition], e.t) for e in record.events))
+    busy = robot_times(factory, spent)
     first, usual = durations(timing, found)[0], lasting(timing, found)
-    compared, busy = [], [0.0] * len(factory.robots)
-    for operation in factory.operations:
-        begun = times.get(names[operation.start], [])
-        ended = times.get(names[operation.end], [])
-        spent = [end - start for start, end in zip(begun, ended, strict=False)]
-        predicted = float((usual if len(spent) > 1 else first)[operation.index])
-        compared.append(_duration(operation.label, predicted, spent))
-        for robot in operation.robots:
-            busy[robot] += sum(spent)
+    compared = [
+        _duration(o.label, float((usual if len(times) > 1 else first)[o.index]), times)
+        for o, times in zip(factory.operations, spent, strict=True)
+    ]
     left = record.dropoffs
     last = left[-1] if left else None
     shares = busy_until(timing, found)
     return Comparison(
         record.source,
         len(left),
-        Pair(net.pace, _interval(left)),
-        Pair(found.first, left[0] if left else None),
-        Pair(found.last, last),
+        ComparedFigure(net.pace, mean_interval(left)),
+        ComparedFigure(found.first, left[0] if left else None),
+        ComparedFigure(found.last, last),
         tuple(compared),
-        tuple(Pair(p, b / last if last else None) for p, b in zip(shares, busy, strict=True)),
+        tuple(
+            ComparedFigure(p, b / last if last else None) for p, b in zip(shares, busy, strict=True)
+        ),
     )
+
+
+def operation_times(factory: Factory, firings: Iterable[tuple[int, float]]) -> list[list[float]]:
+    """How long each operation lasted each time, from its start to its end [s], by the times at
+    which transitions (by number) fired. An end whose start was before the run is left out."""
+    times: dict[int, list[float]] = {}
+    for number, t in firings:
+        times.setdefault(number, []).append(t)
+    found = []
+    for operation in factory.operations:
+        begun, ended = times.get(operation.start, []), times.get(operation.end, [])
+        late = max(0, len(ended) - len(begun))
+        found.append([end - start for start, end in zip(begun, ended[late:], strict=False)])
+    return found
+
+
+def robot_times(factory: Factory, spent: Sequence[Sequence[float]]) -> list[float]:
+    """How long each robot was in operations [s], by how long each of these lasted each time."""
+    busy = [0.0] * len(factory.robots)
+    for operation, times in zip(factory.operations, spent, strict=True):
+        for robot in operation.robots:
+            busy[robot] += sum(times)
+    return busy
+
+
+def dropoff_times(time: Floats, delivered: NDArray[np.int32]) -> tuple[float, ...]:
+    """When products were dropped off [s], to a tick, by the ticks of a log."""
+    return tuple(time[np.flatnonzero(np.diff(delivered)) + 1].tolist())
 
 
 def _duration(label: str, predicted: float, spent: Sequence[float]) -> Duration:
     counted = np.array(spent[1:] if len(spent) > 1 else spent)
     if not len(counted):
-        return Duration(label, Pair(predicted, None), 0.0, 0.0, 0)
+        return Duration(label, ComparedFigure(predicted, None), 0.0, 0.0, 0)
     mean = float(counted.mean())
     return Duration(
-        label, Pair(predicted, mean), float(counted.min()), float(counted.max()), len(counted)
+        label,
+        ComparedFigure(predicted, mean),
+        float(counted.min()),
+        float(counted.max()),
+        len(counted),
     )
 
 
-def _interval(left: Sequence[float]) -> float | None:
-    """The mean interval over the last half of the products; None below 4."""
+def mean_interval(left: Sequence[float]) -> float | None:
+    """The mean interval [s] over the last half of the products; None below 4."""
     if len(left) < 4:
         return None
     tail = left[len(left) // 2 - 1 :]

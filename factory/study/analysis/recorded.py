@@ -1,4 +1,4 @@
-"""Runs to compare with: how they were made, and what they left."""
+"""Runs to compare with: their conditions and records."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ from factory.control.profile import World
 from factory.plant.factory import Factory
 from factory.record.log.header import settings_of
 from factory.simulation.run import Event, Run
-from factory.study.analysis.measured import Record
+from factory.study.analysis.measured import RunRecord, dropoff_times
 from factory.support.errors import Diagnostic, InputError
 from factory.support.settings import Settings
 
 
 @dataclass(frozen=True, slots=True)
 class Conditions:
-    """How a run was made, which is what its prediction has to assume."""
+    """The conditions of a run, which its prediction assumes."""
 
     settings: Settings
     world: World
@@ -29,9 +29,9 @@ class Conditions:
     wip: int | None
 
 
-def record_of(run: Run) -> Record:
-    """What a run on the spot left."""
-    return Record("a run on the spot", run.events, run.dropoffs)
+def record_of(run: Run) -> RunRecord:
+    """The record of a run that was just made."""
+    return RunRecord("a run on the spot", run.events, run.dropoffs)
 
 
 def logged_record(
@@ -39,15 +39,14 @@ def logged_record(
     events: Sequence[tuple[float, str]],
     time: NDArray[np.float64],
     delivered: NDArray[np.int32],
-) -> Record:
-    """What a log holds; the moment of a dropoff is the first tick after it."""
-    grown = np.flatnonzero(np.diff(delivered)) + 1
-    left = tuple(time[grown].tolist())
-    return Record(source, tuple(Event(t, name) for t, name in events), left)
+) -> RunRecord:
+    """The record of the run in a log."""
+    made = tuple(Event(t, name) for t, name in events)
+    return RunRecord(source, made, dropoff_times(time, delivered))
 
 
 def conditions(header: Mapping[str, Any]) -> Conditions:
-    """How the run in a log was made."""
+    """The conditions of the run in a log."""
     settings, jitter = settings_of(header), float(header["jitter"])
     return Conditions(settings, header["world"], header["seed"], jitter, header.get("wip"))
 
@@ -56,8 +55,8 @@ HINT = "`factory run FILE.pag --log OUT` writes one that fits"
 
 
 def check_log(source: str, header: Mapping[str, Any], factory: Factory) -> None:
-    """The run in a log must be one of this factory, from its initial marking, with a product at the
-    least. Raises InputError (BadLog)."""
+    """Raises InputError (BadLog) where the run in a log is not one of this factory, or does not
+    start from its initial marking."""
     net = factory.net.threaded
     names = [transition.name for transition in net.transitions]
     if header.get("transitions") != names:
@@ -70,8 +69,8 @@ def check_log(source: str, header: Mapping[str, Any], factory: Factory) -> None:
         )
 
 
-def check_products(record: Record) -> None:
-    """A run that left no product says nothing. Raises InputError (BadLog)."""
+def check_products(record: RunRecord) -> None:
+    """Raises InputError (BadLog) where a run finished no product."""
     if not record.dropoffs:
         message = f"'{record.source}' has no finished product"
         raise InputError(Diagnostic("BadLog", message, None, "take a longer run"))

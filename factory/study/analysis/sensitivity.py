@@ -1,4 +1,4 @@
-"""Which robot's speed, or way, or a second copy of it, buys how much cycle time."""
+"""How much the cycle time falls with the speed of each robot, its ways, or a second copy of it."""
 
 from __future__ import annotations
 
@@ -8,20 +8,19 @@ from factory.study.analysis.timed import Circuit, TimedNet, timed_net
 from factory.study.analysis.timing import AT_ONCE, Change, Timing
 
 STEP = 0.1
-"""How much faster a robot, or shorter its ways are made."""
+"""Relative change of a speed, an acceleration or a way."""
 
 
 @dataclass(frozen=True, slots=True)
 class Sensitivity:
-    """What a change of one robot alone takes off the cycle time [s], exactly.
+    """The reduction of the cycle time [s] by a change of one robot alone.
 
     `faster`: its speed (and its lift's) a tenth higher, `slower` (negative): a tenth lower;
-    `quicker`: its acceleration a tenth higher; `shorter`: each of its ways a tenth shorter;
-    `most`: its speed not limited at all, its acceleration still; `then`: what sets the pace after
-    that; `enough`: the factor on its speed with which nearly all of `most` is bought, None where
-    there is nothing to buy or it takes more than 64. `copy`: a second robot takes turns
-    with it. `slack`: for how long the robot waits in a cycle.
-    """
+    `quicker`: its acceleration a tenth higher; `shorter`: each of its ways a tenth shorter; `most`:
+    its speed not limited at all, its acceleration still; `then`: what sets the pace after that;
+    `enough`: the least factor on its speed with nearly all of `most`, None where `most` is 0 or the
+    factor is above 64. `copy`: a second robot takes turns with it. `slack`: how long the robot
+    waits in a cycle."""
 
     robot: str
     slack: float

@@ -1,4 +1,4 @@
-"""How many products a run takes until products come at the pace of its net."""
+"""The number of products of a run that come at the pace of its net."""
 
 from __future__ import annotations
 
@@ -27,8 +27,8 @@ def steady_units(timing: Timing, wip: int | None = None) -> int:
 
 
 def reached(dates: Floats, pace: float) -> int:
-    """The same, of the `dates` [s] of all dropoffs, 4 at least: the most there are where the pace
-    is not reached."""
+    """The same number, by the `dates` [s] of at least 4 dropoffs; all of them where the pace is not
+    reached."""
     units = np.arange(LEAST, len(dates) + 1)
     before = units // 2 - 1
     mean = (dates[units - 1] - dates[before]) / (units - 1 - before)

@@ -1,4 +1,4 @@
-"""An analysis as lines and tables for people."""
+"""An analysis as lines of text and tables."""
 
 from __future__ import annotations
 
@@ -6,11 +6,11 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from factory.study.analysis.analysing import Analysis
-from factory.study.analysis.measured import Comparison, Pair
+from factory.study.analysis.measured import ComparedFigure, Comparison
 from factory.study.analysis.what_if import listed
 
 SHOWN = 12
-"""Rows of a table; `-v` shows all."""
+"""Number of rows of a table; `-v` shows all."""
 
 
 ASSUMED = """\
@@ -19,8 +19,8 @@ such robots works, one works at a time; shorter ways are shorter in proportion, 
 
 
 @dataclass(frozen=True, slots=True)
-class Table:
-    """A table with its title, ready to be printed, and what is to be said after it."""
+class PrintedTable:
+    """A table to be printed, with its title and a note after it."""
 
     title: str
     columns: tuple[str, ...]
@@ -29,7 +29,7 @@ class Table:
 
 
 def summary(found: Analysis) -> Iterator[str]:
-    """What matters most, in a few lines."""
+    """The main results, in a few lines."""
     flow, net, timing = found.flow, found.net, found.timing
     does = "sets" if len(found.bottlenecks) == 1 else "set"
     hourly = f", {3600 / net.pace:.0f} products an hour" if net.pace else ""
@@ -51,7 +51,7 @@ def summary(found: Analysis) -> Iterator[str]:
 
 
 def critical_words(found: Analysis) -> str:
-    """The first critical circuit: its operations with their times, those that wait left out."""
+    """The first critical circuit: its places that take time, with their times."""
     circuit, net = found.net.critical[0], found.net
     timed = [(net.net.net.places[p], net.seconds[p]) for p in circuit.places if net.seconds[p]]
     names = [f"{place.mode} {place.label}".strip() + f" {seconds:.3f}" for place, seconds in timed]
@@ -59,8 +59,8 @@ def critical_words(found: Analysis) -> str:
     return f"{circuit.name}: {' · '.join(names)} = {circuit.seconds:.3f} s{tokens}"
 
 
-def tables(found: Analysis, verbose: bool) -> Iterator[Table]:
-    """The tables in the order in which they are read."""
+def tables(found: Analysis, verbose: bool) -> Iterator[PrintedTable]:
+    """The tables, in order."""
     most = None if verbose else SHOWN
     yield _shares(found, most)
     yield _gains(found, most)
@@ -72,7 +72,7 @@ def tables(found: Analysis, verbose: bool) -> Iterator[Table]:
         yield _durations(found.measured, most)
 
 
-def _shares(found: Analysis, most: int | None) -> Table:
+def _shares(found: Analysis, most: int | None) -> PrintedTable:
     run = found.measured
     columns: tuple[str, ...]
     columns = ("robot", "type", "moving", "working", "standing", "waiting", "busy")
@@ -92,7 +92,7 @@ def _shares(found: Analysis, most: int | None) -> Table:
     return cut("Where the time of a cycle goes [s]", columns, ordered, most)
 
 
-def _gains(found: Analysis, most: int | None) -> Table:
+def _gains(found: Analysis, most: int | None) -> PrintedTable:
     rows = []
     for s in found.sensitivities:
         worth = max(s.faster, s.quicker, s.shorter, s.most, s.copy)
@@ -125,17 +125,17 @@ def _gains(found: Analysis, most: int | None) -> Table:
     return cut("What one robot alone buys: cycle time saved [s]", columns, ordered, most)
 
 
-def _scenarios(found: Analysis) -> Table:
+def _scenarios(found: Analysis) -> PrintedTable:
     pace = found.net.pace
     rows = [
         (s.words, f"{s.pace:.3f}", f"{pace - s.pace:.3f}", listed(list(s.then), 3))
         for s in found.scenarios
     ]
     columns = ("change", "cycle time [s]", "saved [s]", "then sets the pace")
-    return Table("What if", columns, rows, ASSUMED)
+    return PrintedTable("What if", columns, rows, ASSUMED)
 
 
-def _stocks(found: Analysis, most: int | None) -> Table:
+def _stocks(found: Analysis, most: int | None) -> PrintedTable:
     ordered = sorted(found.flow.stocks, key=lambda s: (not s.is_part, -s.mean))
     rows = [
         (s.label, "part" if s.is_part else "", f"{s.mean:.2f}", str(s.most), f"{s.stay:.3f}")
@@ -145,25 +145,25 @@ def _stocks(found: Analysis, most: int | None) -> Table:
     return cut(title, ("label", "", "mean", "most", "stay [s]"), rows, most)
 
 
-def _curve(found: Analysis) -> Table:
+def _curve(found: Analysis) -> PrintedTable:
     least = found.curve.least
     rows = [
         (str(wip), f"{pace:.3f}", "the least with the full pace" if wip == least else "")
         for wip, pace in found.curve.points
     ]
-    return Table("Copies of each part let in (--wip)", ("W", "cycle time [s]", ""), rows)
+    return PrintedTable("Copies of each part let in (--wip)", ("W", "cycle time [s]", ""), rows)
 
 
-def _totals(run: Comparison) -> Table:
+def _totals(run: Comparison) -> PrintedTable:
     rows = [
         ("cycle time [s]", *_compared(run.cycle)),
         ("first product [s]", *_compared(run.first)),
         (f"product {run.units} [s]", *_compared(run.last)),
     ]
-    return Table(f"Against {run.source}", ("", "predicted", "measured", "error"), rows)
+    return PrintedTable(f"Against {run.source}", ("", "predicted", "measured", "error"), rows)
 
 
-def _durations(run: Comparison, most: int | None) -> Table:
+def _durations(run: Comparison, most: int | None) -> PrintedTable:
     ordered = sorted(run.durations, key=lambda d: -abs(d.time.error or 0.0))
     rows = [
         (d.label, *_compared(d.time), f"{d.least:.3f} to {d.greatest:.3f}", str(d.count))
@@ -173,7 +173,7 @@ def _durations(run: Comparison, most: int | None) -> Table:
     return cut("Durations of operations [s]", columns, rows, most)
 
 
-def _compared(pair: Pair) -> tuple[str, str, str]:
+def _compared(pair: ComparedFigure) -> tuple[str, str, str]:
     if pair.measured is None:
         return f"{pair.predicted:.3f}", "–", ""
     error = "" if pair.error is None else f"{100 * pair.error:+.1f} %"
@@ -182,12 +182,12 @@ def _compared(pair: Pair) -> tuple[str, str, str]:
 
 def cut(
     title: str, columns: tuple[str, ...], rows: Sequence[tuple[str, ...]], most: int | None
-) -> Table:
-    """A table of so many rows, and how many more there would be."""
+) -> PrintedTable:
+    """A table of at most `most` rows, and the number of further rows."""
     if most is None or len(rows) <= most:
-        return Table(title, columns, rows)
+        return PrintedTable(title, columns, rows)
     rest = (f"... {len(rows) - most} more (-v)",) + ("",) * (len(columns) - 1)
-    return Table(title, columns, [*rows[:most], rest])
+    return PrintedTable(title, columns, [*rows[:most], rest])
 
 
 def _percent(share: float | None) -> str:

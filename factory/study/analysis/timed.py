@@ -1,4 +1,4 @@
-"""The timed net of a factory: the compiled one, and what else holds a run up."""
+"""The timed net of a factory: the compiled net, with the times and places that a run adds."""
 
 from __future__ import annotations
 
@@ -17,15 +17,15 @@ from factory.timing.cycle_time import with_ways
 from factory.timing.pool import with_wip
 
 SAME = 1e-9
-"""Times that differ by no more than this share are equal."""
+"""Relative difference up to which times are equal."""
 
 LONGEST_PERIOD = 60
 
 
 @dataclass(frozen=True, slots=True)
 class Circuit:
-    """A circuit of the timed net: what it is called (a robot, `outfeed`, `station part1`, `wip
-    part1`), its time [s], its tokens, and its places in order."""
+    """A circuit of the timed net: its name (a robot, `outfeed`, `station part1`, `wip part1`), its
+    time [s], its tokens, and its places in order."""
 
     name: str
     seconds: float
@@ -34,7 +34,7 @@ class Circuit:
 
     @property
     def pace(self) -> float:
-        """Seconds per token: no product comes sooner after another."""
+        """Seconds per token, a lower bound on the interval between products."""
         return self.seconds / self.tokens
 
 
@@ -72,17 +72,14 @@ class TimedNet:
     @cached_property
     def circuits(self) -> tuple[Circuit, ...]:
         """Those with a name and the tightest through each bound, the slowest first."""
-        found = [self._bounded(slack) for slack in self._tightest]
+        tightest = circuits(self.ratio, self.bounds) if self.bounds else ()
+        found = [self._bounded(slack) for slack in tightest]
         return tuple(sorted((*self.named, *found), key=lambda c: -c.pace))
 
     @cached_property
     def critical(self) -> tuple[Circuit, ...]:
         """The circuits that set the pace."""
         return tuple(c for c in self.circuits if c.pace >= self.pace * (1 - SAME))
-
-    @cached_property
-    def _tightest(self) -> tuple[Slack, ...]:
-        return circuits(self.ratio, self.bounds) if self.bounds else ()
 
     def _bounded(self, slack: Slack) -> Circuit:
         tokens = sum(self.net.tokens[p] for p in slack.circuit)
@@ -97,7 +94,8 @@ class TimedNet:
         return found if found > SAME * self.pace else 0.0
 
     def firings(self, units: int) -> Firings:
-        """As soon as possible, from the initial marking, `units` of them at least."""
+        """At least `units` firings of each transition from the initial marking, as soon as
+        possible."""
         period = lcm(*(c.tokens for c in self.critical))
         period = min(period, LONGEST_PERIOD)
         return settled_firings(

@@ -1,4 +1,4 @@
-"""The delays of a factory's operations, and what they become when robots change."""
+"""The delays of a factory's operations, also with changed robots."""
 
 from __future__ import annotations
 
@@ -25,9 +25,8 @@ AT_ONCE = 1e6
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Change:
-    """What is different of some robots (index): factors on their `speed`, their `acceleration` and
-    the length of each of their ways (`way`), and how many robots share the work of one
-    (`copies`)."""
+    """Changes of some robots (index): factors on their `speed`, their `acceleration` and the length
+    of each of their ways (`way`); the number of robots that share the work of one (`copies`)."""
 
     speed: Mapping[int, float] = field(default_factory=dict)
     acceleration: Mapping[int, float] = field(default_factory=dict)
@@ -40,7 +39,7 @@ AS_IT_IS = Change()
 
 @dataclass(frozen=True)
 class Timing:
-    """What delays follow from: the modes of a layout, where each starts, and the robots' limits.
+    """The delays of a layout, by its modes, where each starts, and the robots' limits.
 
     Speeds are those of `seed` and `jitter`, as in a run. Raises InputError where a mode cannot
     reach its goal.
@@ -74,7 +73,7 @@ class Timing:
 
     @cached_property
     def left(self) -> list[Array]:
-        """Where the axes of each operation were left by the ones before, in the long run."""
+        """Where the operations before leave the axes of each operation, in the long run."""
         return operation_starts(self.layout)
 
     @cached_property
@@ -84,7 +83,7 @@ class Timing:
         return staged(self.left, self.stages)
 
     def ways(self, change: Change = AS_IT_IS) -> dict[tuple[int, int], float]:
-        """What a robot (index) takes [s] to go ahead to an operation."""
+        """The time [s] of a robot to go ahead to an operation, by (robot, operation)."""
         return {
             (stage.robot, stage.operation): self._way(stage, stage.start, change)
             for stage in self.stages
@@ -118,8 +117,8 @@ class Timing:
 
     @cached_property
     def rest(self) -> float:
-        """What an operation takes in which nobody moves and nothing dwells: the tick until what
-        follows can fire, and in the engine the time to settle [s]."""
+        """The delay of an operation without motion and dwell [s]: the tick until the next
+        transition can fire, and in the engine the time to settle."""
         settle = self.settings.settle if self.world == "mujoco" else 0.0
         return settle + self.settings.tick
 
@@ -159,7 +158,7 @@ class Timing:
         )
 
     def travel(self, number: int, slot: int) -> float:
-        """How long one robot moves in an operation, if it need not wait on its way [s]."""
+        """How long one robot moves in an operation, without stops on its way [s]."""
         mode = self.modes[number]
         axis = self.factory.axes[number][slot]
         v, a = float(self.limits.speed[axis]), float(self.limits.acceleration[axis])

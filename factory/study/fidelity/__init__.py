@@ -1,4 +1,4 @@
-"""How faithful is the physics? Ideal and MuJoCo runs over the same seeds, figure by figure.
+"""How near the physics is to the ideal world: runs in both over the same seeds, in figures.
 
     >>> from factory.study.fidelity import QUANTITIES
     >>> QUANTITIES["handoff_gap_max_mm"].unit
@@ -11,11 +11,11 @@ over timestep and weld stiffness. The definitions of all figures are in `quantit
 from factory.study.fidelity.comparing import measure, measure_seed
 from factory.study.fidelity.convergence import Study, study
 from factory.study.fidelity.quantities import QUANTITIES, Quantity
-from factory.study.fidelity.record import Approach, Fidelity, HandOff, Misplaced, SeedRecord
+from factory.study.fidelity.record import ClosestApproach, Fidelity, HandOff, Misplaced, SeedRecord
 
 __all__ = [
     "QUANTITIES",
-    "Approach",
+    "ClosestApproach",
     "Fidelity",
     "HandOff",
     "Misplaced",

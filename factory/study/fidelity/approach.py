@@ -1,9 +1,8 @@
-"""How near bodies come that are not meant to touch, against the distance certified for them.
+"""The least distances of bodies that are not meant to touch, against those certified.
 
-Left out is what is meant to be near: a part and what holds it, parts held by one body, parts whose
-robots are in one and the same active operation, robots on the floor, and the output robot at the
-outfeed that it serves.
-"""
+Left out are pairs that are meant to be near: a part and what holds it, parts held by one body,
+parts whose robots are in one and the same active operation, robots on the floor, and the output
+robot at the outfeed that it serves."""
 
 from __future__ import annotations
 
@@ -15,7 +14,7 @@ from factory.control.mode import Array, Index, Truth
 from factory.layout.clearance import certify
 from factory.layout.layout import Layout
 from factory.mjcf import names
-from factory.study.fidelity.record import Approach
+from factory.study.fidelity.record import ClosestApproach
 from factory.study.fidelity.shadow import Shadow
 from factory.study.fidelity.welds import Welds
 
@@ -23,7 +22,7 @@ ROBOT, PART, FEEDER, OUTFEED, NONE = range(5)
 KINDS = ("robot", "part", "feeder", "outfeed")
 
 BEYOND = 2e-3
-"""Distances are measured up to this much more than the clearance [m]."""
+"""Distances are measured up to the clearance plus this [m]."""
 
 
 def certified(layout: Layout) -> Array:
@@ -53,11 +52,11 @@ class Approaches:
         self.operations = layout.factory.operations
         self.least = np.full((5, 5), np.inf)
         self.least[NONE] = self.least[:, NONE] = -np.inf
-        self.who: dict[tuple[int, int], tuple[str, str]] = {}
+        self.bodies: dict[tuple[int, int], tuple[str, str]] = {}
         self._coupled: tuple[int, ...] | None = None
 
     def tick(self, active: tuple[int, ...]) -> None:
-        """Look at the present configuration, while the operations `active` are under way."""
+        """Measure the present configuration, with the operations `active` under way."""
         self.shadow.collide()
         d = self.shadow.d
         if not d.ncon:
@@ -75,7 +74,7 @@ class Approaches:
             self._keep(pairs[kept], dist[kept])
 
     def _couple(self, active: tuple[int, ...]) -> None:
-        """Note which robot is in which operation."""
+        """Record which robot is in which operation."""
         self._coupled = active
         self.operation[:] = -1
         for number in active:
@@ -96,35 +95,35 @@ class Approaches:
         return np.asarray(held | together | joining | serving)
 
     def _keep(self, pairs: Index, dist: Array) -> None:
-        for nearest in np.argsort(-dist):  # the nearest of a kind comes last, and stays
+        for nearest in np.argsort(-dist):  # the nearest of a kind comes last, and is kept
             a, b = sorted(pairs[nearest], key=lambda body: int(self.kind[body]))
             i, j = int(self.kind[a]), int(self.kind[b])
             self.least[i, j] = self.least[j, i] = dist[nearest]
-            self.who[i, j] = (self.m.body(int(a)).name, self.m.body(int(b)).name)
+            self.bodies[i, j] = (self.m.body(int(a)).name, self.m.body(int(b)).name)
 
-    def found(self) -> tuple[Approach, ...]:
-        """All kinds of pairs that have come within the detection distance."""
+    def found(self) -> tuple[ClosestApproach, ...]:
+        """The kinds of pairs that have come within the detection distance."""
         return tuple(
-            Approach(
+            ClosestApproach(
                 f"{KINDS[i]} - {KINDS[j]}",
                 1e3 * float(self.certified[i, j]),
                 1e3 * float(self.least[i, j]),
-                self.who[i, j],
+                self.bodies[i, j],
             )
-            for i, j in sorted(self.who)
+            for i, j in sorted(self.bodies)
         )
 
     def closest(self) -> float:
-        """The least distance of all but those to the outfeed's table [m]."""
+        """The least distance [m], those to the outfeed's table left out."""
         return min(self.shadow.reach, float(self.least[:OUTFEED, :OUTFEED].min()))
 
     def margin(self) -> float:
-        """The least of the distances less what is certified for them [m]."""
+        """The least of the distances less those certified [m]."""
         found = np.minimum(self.least[:NONE, :NONE], self.shadow.reach) - self.certified
         return float(found[np.triu_indices(4)].min())
 
 
 def _robots(bodies: list[str], robots: list[str]) -> Index:
-    """The number of the robot that a body belongs to; the last, one too many, for no robot."""
+    """The index of the robot of each body; that after the last for none."""
     number = {name: i for i, name in enumerate(robots)}
     return np.array([number.get(name.partition("/")[0], len(robots)) for name in bodies])

@@ -1,4 +1,4 @@
-"""Two records of one net compared: what caused what, which order, and when.
+"""Two records of one net compared: causes, order and times of their firings.
 
 The n-th firing of a transition in one record stands for the n-th in the other. A firing's immediate
 causes are the firings that made the tokens it takes; what is not before it through causes, nor
@@ -21,11 +21,11 @@ Firing = tuple[str, int]
 """A transition's name and which of its firings."""
 
 MOST = 6000
-"""So many firings are compared pair by pair; of longer records the first."""
+"""Number of firings that are compared pair by pair; of longer records the first."""
 
 
 @dataclass(frozen=True, slots=True)
-class Process:
+class CausalRecord:
     """A record as a partial order: its firings with their times [s] and immediate causes."""
 
     times: dict[Firing, float]
@@ -34,8 +34,8 @@ class Process:
 
 @dataclass(frozen=True, slots=True)
 class Orders:
-    """How two records relate: `swapped` of `unrelated` pairs that are causally unrelated and apart
-    in time in both; how many firings' `causes` differ."""
+    """How two records differ: of the `unrelated` pairs, which are causally unrelated and apart in
+    time in both, the number `swapped`; the number of firings whose `causes` differ."""
 
     swapped: int
     unrelated: int
@@ -47,8 +47,10 @@ class Orders:
         return 100.0 * self.swapped / self.unrelated if self.unrelated else 0.0
 
 
-def process(net: GearNet, events: Iterable[Event], start: Marking | None = None) -> Process:
-    """The token game of a legal record, each token knowing the firing that made it."""
+def causal_record(
+    net: GearNet, events: Iterable[Event], start: Marking | None = None
+) -> CausalRecord:
+    """The partial order of a legal record: the token game, with the firing that made each token."""
     marking = net.initial_marking if start is None else start
     threaded = net.threaded.net
     number = {t.name: i for i, t in enumerate(net.threaded.transitions)}
@@ -64,10 +66,10 @@ def process(net: GearNet, events: Iterable[Event], start: Marking | None = None)
         causes[firing] = frozenset(cause for cause in taken if cause is not None)
         times[firing] = event.t
         made.update(dict.fromkeys(threaded.postset[index], firing))
-    return Process(times, causes)
+    return CausalRecord(times, causes)
 
 
-def compare(one: Process, other: Process) -> Orders:
+def compare(one: CausalRecord, other: CausalRecord) -> Orders:
     """Order and causes of two records, on the firings that both have."""
     shared = [firing for firing in one.times if firing in other.times]
     differing = sum(one.causes[f] != other.causes[f] for f in shared)
@@ -79,13 +81,13 @@ def compare(one: Process, other: Process) -> Orders:
     return Orders(int((upper & (first != second)).sum()), int(upper.sum()), differing)
 
 
-def differences(one: Process, other: Process) -> Array:
+def differences(one: CausalRecord, other: CausalRecord) -> Array:
     """Time in `other` less time in `one` of every firing that both have [s]."""
     shared = [firing for firing in one.times if firing in other.times]
     return np.array([other.times[f] - one.times[f] for f in shared])
 
 
-def durations(record: Process) -> dict[Firing, float]:
+def durations(record: CausalRecord) -> dict[Firing, float]:
     """X_e - X_s [s] by the end's firing, where both are in the record."""
     found = {}
     for (name, n), time in record.times.items():
@@ -95,13 +97,13 @@ def durations(record: Process) -> dict[Firing, float]:
     return found
 
 
-def duration_differences(one: Process, other: Process) -> Array:
+def duration_differences(one: CausalRecord, other: CausalRecord) -> Array:
     """Duration in `other` less that in `one`, of every operation that both have [s]."""
     first, second = durations(one), durations(other)
     return np.array([second[f] - first[f] for f in first if f in second])
 
 
-def _related(firings: Sequence[Firing], record: Process) -> Truth:
+def _related(firings: Sequence[Firing], record: CausalRecord) -> Truth:
     """Whether one of two firings is before the other through causes (n, n)."""
     place = {firing: i for i, firing in enumerate(firings)}
     before = np.zeros((len(firings), len(firings)), bool)
@@ -112,6 +114,6 @@ def _related(firings: Sequence[Firing], record: Process) -> Truth:
     return np.logical_or(before, before.T)
 
 
-def _signs(firings: Sequence[Firing], record: Process) -> Array:
+def _signs(firings: Sequence[Firing], record: CausalRecord) -> Array:
     times = np.array([record.times[firing] for firing in firings])
     return np.asarray(np.sign(times[:, None] - times[None, :]))

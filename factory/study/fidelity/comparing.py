@@ -1,12 +1,10 @@
-"""Run both worlds over the same seeds and compare them; seeds may go over processes."""
+"""Both worlds, run over the same seeds and compared; seeds may be shared out to processes."""
 
 from __future__ import annotations
 
-import signal
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
-from dataclasses import dataclass, field, replace
-from multiprocessing import active_children, get_context
+from contextlib import closing
+from dataclasses import dataclass, field
 from time import perf_counter
 
 import numpy as np
@@ -14,30 +12,33 @@ import numpy as np
 from factory.control.mode import Array
 from factory.layout.layout import Layout
 from factory.mjcf.model import product_name
+from factory.nets.gears import GearNet
 from factory.simulation.run import Run
 from factory.simulation.simulation import Simulation
 from factory.study.analysis.steady import steady_units
 from factory.study.analysis.timing import Timing
-from factory.study.fidelity.causality import compare, differences, duration_differences, process
+from factory.study.fidelity.causality import (
+    causal_record,
+    compare,
+    differences,
+    duration_differences,
+)
 from factory.study.fidelity.measuring import Measurement
 from factory.study.fidelity.quantities import QUANTITIES
 from factory.study.fidelity.record import Fidelity, SeedRecord
+from factory.study.pool import over_processes
 from factory.support.engine import mujoco
-from factory.support.pickling import pickle_locked_mappings
+from factory.support.errors import Diagnostic, RunError
 from factory.support.settings import Settings
 
 Alter = Callable[[mujoco.MjModel], None]
-"""Changes the engine's model before the run: a softer weld, a planted fault."""
-
-
-pickle_locked_mappings()  # of which layouts are full
+"""Changes the engine's model before a run."""
 
 
 @dataclass(frozen=True)
 class Case:
-    """What is run: a layout, how many units, and the draws; `alter` must be a plain function of a
-    module where processes share the work. Without `units` each seed makes as many as it takes to
-    show its cycle time, by its net."""
+    """A layout and how it is run. Without `units` each seed makes as many as it takes to show its
+    cycle time, by its net. `alter` must be picklable where processes share the work."""
 
     layout: Layout
     units: int | None = None
@@ -57,9 +58,9 @@ def measure(
     done: Callable[[int], None] | None = None,
     max_time: float | None = None,
 ) -> Fidelity:
-    """Compare the worlds over `seeds`. With `jobs` > 1 the seeds go over as many processes (a
-    script then needs its `if __name__ == "__main__"`); the figures are the same. `done` hears of
-    every seed that is finished."""
+    """Compare the worlds over `seeds`. With `jobs` > 1 as many processes share the seeds (a script
+    then needs its `if __name__ == "__main__"`); the figures are the same. `done` is called with the
+    number of seeds that are finished."""
     case = Case(layout, units, jitter, settings or Settings(), max_time)
     records = over_cases([(case, seed) for seed in seeds], jobs, done)
     factory = layout.factory
@@ -85,23 +86,18 @@ def _worked(work: Sequence[tuple[Case, int]], jobs: int) -> Iterator[tuple[int, 
         for number, (case, seed) in enumerate(work):
             yield number, measure_seed(case, seed)
         return
-    others = set(active_children())
-    pool = ProcessPoolExecutor(min(jobs, len(work)), get_context("spawn"), _end_quietly)
-    try:
-        futures = {pool.submit(measure_seed, *item): i for i, item in enumerate(work)}
-        for future in as_completed(futures):
-            yield futures[future], future.result()
-    except BaseException:
-        for child in set(active_children()) - others:
-            child.terminate()
-        raise
-    finally:
-        pool.shutdown(cancel_futures=True)
+    with closing(over_processes(_measured, work, jobs)) as results:
+        for one in results:
+            if one.found is None:
+                seed = work[one.number][1]
+                message = f"the process of seed {seed} died in {one.tries} tries"
+                hint = "take fewer --jobs, or more memory"
+                raise RunError(Diagnostic("Killed", message, None, hint))
+            yield one.number, one.found
 
 
-def _end_quietly() -> None:
-    """Let an interruption end a worker without a word."""
-    signal.signal(signal.SIGINT, signal.SIG_DFL)
+def _measured(item: tuple[Case, int]) -> SeedRecord:
+    return measure_seed(*item)
 
 
 def measure_seed(case: Case, seed: int) -> SeedRecord:
@@ -115,26 +111,28 @@ def measure_seed(case: Case, seed: int) -> SeedRecord:
     measurement = Measurement(physical)
     begin = perf_counter()
     thought, run = ideal.run(max_time=case.max_time), measurement.run(case.max_time)
-    record = _compared(layout, thought, run)
-    handoffs, misplaced = measurement.handoffs.all(), measurement.finished.found()
-    figures = {**record.figures, **measurement.figures()}
-    return replace(
-        record,
-        seed=seed,
-        figures={key: figures.get(key) for key in QUANTITIES},
-        handoffs=handoffs,
-        misplaced=misplaced,
-        approaches=measurement.approaches.found(),
-        run_s=perf_counter() - begin - measurement.seconds,
-        measuring_s=measurement.seconds,
+    took = perf_counter() - begin
+    figures, apart, spent = _compared(layout.factory.net, thought, run)
+    figures |= measurement.figures()
+    return SeedRecord(
+        seed,
+        run.units,
+        {key: figures.get(key) for key in QUANTITIES},
+        measurement.handoffs.all(),
+        measurement.finished.found(),
+        measurement.approaches.found(),
+        tuple(np.round(apart, 9).tolist()),
+        tuple(np.round(spent, 9).tolist()),
+        run.physics.contacts if run.physics else (),
+        tuple(t for t in (thought.trouble, run.trouble) if t is not None),
+        took - measurement.seconds,
+        measurement.seconds,
     )
 
 
-def _compared(layout: Layout, ideal: Run, run: Run) -> SeedRecord:
-    """The figures that need both runs."""
-    net = layout.factory.net
+def _compared(net: GearNet, ideal: Run, run: Run) -> tuple[dict[str, float | None], Array, Array]:
+    """The figures that need both runs; how far firing times and durations are apart [s]."""
     illegal = (not ideal.refines_net) + (not run.refines_net)
-    physics = run.physics
     figures: dict[str, float | None] = {
         "illegal_records": illegal,
         "monitor_violations": len(run.monitor.violations) if run.monitor else None,
@@ -143,26 +141,17 @@ def _compared(layout: Layout, ideal: Run, run: Run) -> SeedRecord:
         "cycle_from_ideal_percent": _over(run.cycle_time_s, ideal.cycle_time_s),
         "cycle_from_predicted_percent": _over(run.cycle_time_s, run.predicted_cycle_time_s),
     }
-    apart = spent = np.empty(0)
-    if not illegal:
-        one, other = process(net, ideal.events), process(net, run.events)
-        orders = compare(one, other)
-        apart, spent = differences(one, other), duration_differences(one, other)
-        cycle = ideal.cycle_time_s or ideal.predicted_cycle_time_s
-        figures |= {
-            "orders_swapped_percent": orders.percent,
-            "causes_differing": orders.causes,
-            **_distances(apart, spent, cycle),
-        }
-    return SeedRecord(
-        run.seed,
-        run.units,
-        figures,
-        differences=tuple(np.round(apart, 9).tolist()),
-        durations=tuple(np.round(spent, 9).tolist()),
-        contacts=physics.contacts if physics else (),
-        trouble=tuple(t for t in (ideal.trouble, run.trouble) if t is not None),
-    )
+    if illegal:
+        return figures, np.empty(0), np.empty(0)
+    one, other = causal_record(net, ideal.events), causal_record(net, run.events)
+    orders = compare(one, other)
+    apart, spent = differences(one, other), duration_differences(one, other)
+    figures |= {
+        "orders_swapped_percent": orders.percent,
+        "causes_differing": orders.causes,
+        **_distances(apart, spent, ideal.cycle_time_s or ideal.predicted_cycle_time_s),
+    }
+    return figures, apart, spent
 
 
 def _distances(apart: Array, spent: Array, cycle: float | None) -> dict[str, float | None]:

@@ -1,15 +1,16 @@
-"""Do the figures converge? The same run with other timesteps, and with other weld stiffnesses."""
+"""Convergence of the figures: the same run with other timesteps and other weld stiffnesses."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
+from factory.mjcf.weld_frames import soften
 from factory.study.fidelity.comparing import Case, over_cases
 from factory.study.fidelity.quantities import QUANTITIES
 from factory.study.fidelity.record import Figures, SeedRecord
-from factory.support.engine import mujoco
 
 TIMESTEPS = (2.0, 1.0, 0.5, 0.25)
 """Factors on the timestep, the finest last."""
@@ -34,17 +35,7 @@ ABSOLUTE = {
     "J": 1e-3,
     "kg": 1e-9,
 }
-"""... or at most this, by its unit: what nobody would notice. Counts must not change."""
-
-
-@dataclass(frozen=True, slots=True)
-class Softened:
-    """Multiplies the time constant of all welds; may be sent to another process."""
-
-    factor: float
-
-    def __call__(self, m: mujoco.MjModel) -> None:
-        m.eq_solref[:, 0] *= self.factor
+"""... or at most this, by its unit. Counts must not change."""
 
 
 @dataclass(frozen=True)
@@ -80,7 +71,7 @@ class Series:
         return abs(known[2] - known[1]) < abs(known[1] - known[0])
 
     def noticeable(self, key: str) -> bool:
-        """Whether a figure is anywhere more than what nobody would notice."""
+        """Whether a figure is anywhere more than its absolute tolerance."""
         least = ABSOLUTE.get(QUANTITIES[key].unit, 0.0)
         return any(abs(figures.get(key) or 0.0) > least for figures in self.figures)
 
@@ -135,7 +126,8 @@ def study(
     """The same seed with other timesteps, then with other stiffnesses."""
     finer = [_with_timestep(case, factor) for factor in timesteps]
     half = _with_timestep(case, 0.5)
-    stiffer = [half if f == 1.0 else replace(half, alter=Softened(f)) for f in stiffnesses]
+    softened = [replace(half, alter=partial(soften, factor=f)) for f in stiffnesses]
+    stiffer = [half if f == 1.0 else c for f, c in zip(stiffnesses, softened, strict=True)]
     cases = list({id(c): c for c in (*finer, *stiffer)}.values())
     records = over_cases([(c, seed) for c in cases], jobs, done)
     by_case = {id(c): record for c, record in zip(cases, records, strict=True)}

@@ -5,8 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from factory.control.mode import Array, Index
+from factory.mjcf import names
 from factory.mjcf.model import Model
+from factory.mjcf.weld_frames import HOLD
 from factory.study.fidelity.record import Misplaced
+from factory.study.fidelity.welds import Welds
 
 
 class Finished:
@@ -25,6 +28,19 @@ class Finished:
         self.angle = np.zeros(len(solids))
         self.vertex = np.zeros(len(solids))
         self.products = 0
+        self._held: Index | None = None
+
+    def tick(self, welds: Welds, fresh: Index, xpos: Array, xmat: Array) -> None:
+        """Welds have been switched, with bodies at `xpos`, `xmat`, those in `fresh` on. A product
+        is measured when the outfeed takes it and when it has gone."""
+        if self._held is not None and not (welds.kind[self._held] == HOLD).all():
+            self.measure(self._held, xpos, xmat)
+            self._held = None
+        held = welds.target[fresh[welds.kinds[fresh] == HOLD]]
+        if len(held):
+            labels = [names.label_of(welds.m.body(int(body)).name) for body in held]
+            self._held = held[np.argsort([self.parts.index(label) for label in labels])]
+            self.measure(self._held, xpos, xmat)
 
     def measure(self, bodies: Index, xpos: Array, xmat: Array) -> None:
         """A product made of `bodies`, in the order of `parts`."""

@@ -1,24 +1,27 @@
-"""Hand-offs under the magnifying glass: gap, speed step, impulse and injected energy of each."""
+"""Hand-offs: gap, speed step, impulse and injected energy of each."""
 
 from __future__ import annotations
+
+from dataclasses import dataclass
 
 import numpy as np
 
 from factory.control.mode import Array, Index
+from factory.mjcf.weld_frames import gaps
 from factory.simulation.mujoco.fusing import rotations
 from factory.study.fidelity.record import HandOff
 from factory.study.fidelity.welds import Velocities, Welds
 from factory.support.engine import mujoco
 
 WINDOW = 0.05
-"""So long after the switch [s] its consequences are looked for; a weld settles in a fifth of it."""
+"""Time after the switch in which a hand-off is watched [s]; a weld settles in a fifth of it."""
 
 
 class HandOffs:
-    """Watches the parts of every hand-off for a while after the switch.
+    """The hand-offs of a run; their parts are watched for a while after the switch.
 
-    The parts that one carrier takes over in one tick are one hand-off. Watched parts lie side by
-    side in arrays, hand-off after hand-off, and a tick treats all at once.
+    The parts that one carrier takes over in one tick are one hand-off. The parts of all watched
+    hand-offs are joined in arrays.
     """
 
     def __init__(self, m: mujoco.MjModel, welds: Welds, velocities: Velocities) -> None:
@@ -32,17 +35,17 @@ class HandOffs:
         """Welds switched on at `time`, when the speeds were `v` (nv,) and bodies at `xpos`."""
         self._finish([w for w in self._watched if self.welds.active[w.welds].all()])
         holders = self.m.eq_obj1id[fresh]
-        gaps = self.welds.gaps(fresh, xpos, xmat)
+        apart = gaps(self.m, fresh, xpos, xmat)
         for holder in np.unique(holders):
             here = holders == holder
             parts = self.m.eq_obj2id[fresh[here]]
-            u = self._relative(v, parts, holders[here])
+            u = self.velocities.relative(v, parts, holders[here])
             made = HandOff(
                 round(time, 9),
                 self.m.body(int(holder)).name,
                 len(parts),
                 float(self.m.body_mass[parts].sum()),
-                1e3 * float(gaps[here].max()),
+                1e3 * float(apart[here].max()),
                 1e3 * float(np.linalg.norm(u, axis=1).max()),
             )
             self._watched.append(_Watched(made, fresh[here], parts, holders[here], u, time))
@@ -52,7 +55,7 @@ class HandOffs:
         """The steps of a tick, speeds (n + 1, nv), that ends at `time`."""
         if not self._watched:
             return
-        u = self._relative(v, self._parts, self._holders)
+        u = self.velocities.relative(v, self._parts, self._holders)
         gained = self._mass * np.linalg.norm(u - self._before, axis=2)
         impulse = np.add.reduceat(gained, self._starts, axis=1).max(axis=0)
         energy = np.add.reduceat(self._energy(u, v), self._starts, axis=1)
@@ -70,9 +73,6 @@ class HandOffs:
         self.done += [w.result() for w in self._watched if w not in kept]
         self._watched = kept
         self._join()
-
-    def _relative(self, v: Array, parts: Index, holders: Index) -> Array:
-        return self.velocities.linear(v, parts) - self.velocities.of_holders(v, holders)
 
     def _energy(self, u: Array, v: Array) -> Array:
         """Kinetic energy (n + 1, p) of the watched parts in the frame of their carrier [J]."""
@@ -92,16 +92,20 @@ class HandOffs:
         self._mass = self.m.body_mass[self._parts]
 
 
+@dataclass(slots=True)
 class _Watched:
-    """A hand-off under watch: its parts, their first relative velocity, and the peaks so far."""
+    """A hand-off under watch: its welds, parts and holders, their first relative velocity `u`, when
+    it began, and the peaks so far."""
 
-    def __init__(
-        self, made: HandOff, welds: Index, parts: Index, holders: Index, u: Array, begun: float
-    ) -> None:
-        self.made, self.welds, self.parts, self.holders = made, welds, parts, holders
-        self.u, self.begun = u, begun
-        self.impulse = self.peak = 0.0
-        self.first: float | None = None
+    made: HandOff
+    welds: Index
+    parts: Index
+    holders: Index
+    u: Array
+    begun: float
+    impulse: float = 0.0
+    peak: float = 0.0
+    first: float | None = None
 
     def note(self, impulse: float, energy: Array) -> None:
         if self.first is None:

@@ -9,7 +9,7 @@ from factory.control.mode import Array
 
 PER_DECADE = 240
 LOWEST, HIGHEST = -12, 6
-"""Powers of ten; what is smaller or larger counts to the first or last bin."""
+"""Powers of ten; smaller and larger values count to the first and last bin."""
 
 
 class Histogram:
@@ -30,8 +30,7 @@ class Histogram:
         self._room = 0
 
     def add(self, values: Array) -> None:
-        """Count values; those below the lowest bin as zero. They are kept until there are enough to
-        be worth the trouble."""
+        """Count values; those below the lowest bin as zero. Many are counted at once, for speed."""
         self._waiting.append(np.ravel(values))
         self._room += values.size
         if len(self._waiting) >= 100 or self._room >= 10_000:

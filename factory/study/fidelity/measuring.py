@@ -1,4 +1,4 @@
-"""Measure a run in MuJoCo while it goes on: an observer that reads and never writes.
+"""The measurement of a run in MuJoCo: an observer that only reads.
 
 The run is the same, to the last bit, with and without it.
 """
@@ -9,49 +9,41 @@ from dataclasses import replace
 from time import perf_counter
 from typing import Any
 
-import numpy as np
-
-from factory.control.mode import Index
-from factory.mjcf.names import label_of
 from factory.record.monitor import beside
 from factory.simulation.run import Run
 from factory.simulation.simulation import Simulation
 from factory.study.fidelity.approach import BEYOND, Approaches
-from factory.study.fidelity.drives import Drives
+from factory.study.fidelity.dynamics import Drives, Payload, Residual
 from factory.study.fidelity.finished import Finished
 from factory.study.fidelity.handoffs import HandOffs
-from factory.study.fidelity.payload import Payload
-from factory.study.fidelity.record import HandOff
-from factory.study.fidelity.residual import Residual
 from factory.study.fidelity.shadow import Shadow
 from factory.study.fidelity.steps import Steps
-from factory.study.fidelity.welds import HOLD, Velocities, Welds
+from factory.study.fidelity.welds import Velocities, Welds
 
 
 class Measurement:
-    """Measures the simulation it is made for; `run` goes through it."""
+    """Measures a simulation, which is run by `run`. `seconds`: what measuring and the monitor
+    took."""
 
     def __init__(self, simulation: Simulation) -> None:
-        model = simulation.model
+        model, layout = simulation.model, simulation.layout
         if model is None:
             raise ValueError("only a run in MuJoCo can be measured")
         world = simulation.physical
-        self.simulation, self.m, self.d = simulation, world.m, world.d
-        layout = simulation.layout
-        self.shadow = Shadow(self.m, self.d, layout.clearance + BEYOND)
-        self.welds = Welds(self.m, self.d)
-        velocities = Velocities(self.m, self.shadow.d.xaxis)
-        self.handoffs = HandOffs(self.m, self.welds, velocities)
-        self.payload = Payload(self.welds, velocities, float(self.m.opt.timestep))
+        m, d = world.m, world.d
+        self.simulation = simulation
+        self.shadow = Shadow(m, d, layout.clearance + BEYOND)
+        self.welds = Welds(m, d)
+        velocities = Velocities(m, self.shadow.d)
+        self.handoffs = HandOffs(m, self.welds, velocities)
+        self.payload = Payload(self.welds, velocities, float(m.opt.timestep))
         self.drives = Drives(world)
         self.approaches = Approaches(world, layout, self.welds, self.shadow)
         self.finished = Finished(model)
-        self.residual = Residual(world, velocities)
+        self.residual = Residual(m, d, velocities.slides)
         self.seconds = 0.0
-        self._order = {part: place for place, part in enumerate(self.finished.parts)}
-        self._product: Index | None = None
         self._seen = self._what_happened()
-        self._steps = Steps(self.m, self.d, simulation.settings.substeps)
+        self._steps = Steps(m, d, simulation.settings.substeps)
 
     def run(self, max_time: float | None = None) -> Run:
         """Run the simulation, measuring, with a monitor beside it."""
@@ -63,13 +55,19 @@ class Measurement:
         return replace(run, monitor=report)
 
     def observe(self, world: Any, supervisor: Any) -> None:
-        """After a tick. The shadow is still where the tick began: where welds were switched."""
+        """Measure a tick. The shadow is in the configuration in which the tick began, in which
+        welds were switched."""
         begin = perf_counter()
         v, force = self._steps.take()
         happened = self._what_happened()
         if happened != self._seen:
             self._seen = happened
-            self._switched(world, v)
+            fresh = self.welds.scan()
+            xpos, xmat = self.shadow.d.xpos, self.shadow.d.xmat
+            self.finished.tick(self.welds, fresh, xpos, xmat)
+            if len(fresh):
+                begun = world.time - (len(v) - 1) * float(world.m.opt.timestep)
+                self.handoffs.begin(fresh, begun, v[0], xpos, xmat)
         self.handoffs.tick(v, world.time)
         self.payload.tick(v)
         self.drives.tick(v, force)
@@ -79,40 +77,27 @@ class Measurement:
         self.seconds += perf_counter() - begin
 
     def _what_happened(self) -> tuple[int, int]:
-        """Firings and products gone so far: welds are switched only with one of them."""
+        """Numbers of firings and of products gone so far; welds are switched only with one of
+        them."""
         world, supervisor = self.simulation.world, self.simulation.supervisor
         return len(supervisor.events), len(world.dropoffs)
-
-    def _switched(self, world: Any, v: Any) -> None:
-        fresh = self.welds.scan()
-        xpos, xmat = self.shadow.d.xpos, self.shadow.d.xmat
-        if self._product is not None and not (self.welds.kind[self._product] == HOLD).all():
-            self.finished.measure(self._product, xpos, xmat)
-            self._product = None
-        if not len(fresh):
-            return
-        begun = world.time - (len(v) - 1) * float(self.m.opt.timestep)
-        self.handoffs.begin(fresh, begun, v[0], xpos, xmat)
-        held = self.m.eq_obj2id[fresh[self.welds.kinds[fresh] == HOLD]]
-        if len(held):
-            self._product = np.array(sorted(held, key=self._place))
-            self.finished.measure(self._product, xpos, xmat)
-
-    def _place(self, body: int) -> int:
-        return self._order[label_of(self.m.body(int(body)).name)]
 
     def figures(self) -> dict[str, float | None]:
         """The figures of the MuJoCo run alone, by the keys of their quantities."""
         handoffs, misplaced = self.handoffs.all(), self.finished.found()
-        drives, payload = self.drives, self.payload
-        moved = self.m.body_mass[self.m.body_treeid >= 0]
+        drives, payload, m = self.drives, self.payload, self.simulation.physical.m
         physics = self.simulation.physical.figures()
         return {
             "tracking_error_max_mm": 1e3 * drives.error,
             "tracking_error_p99_mm": 1e3 * drives.tracking.quantile(0.99),
             "tracking_error_rms_mm": 1e3 * drives.tracking.rms,
             "handoffs": sum(h.parts for h in handoffs),
-            **_of_handoffs(handoffs),
+            "handoff_gap_max_mm": max((h.gap_mm for h in handoffs), default=None),
+            "speed_step_max_mm_s": max((h.speed_step_mm_s for h in handoffs), default=None),
+            "impulse_max_mNs": max((h.impulse_mNs for h in handoffs), default=None),
+            "handoff_energy_max_mJ_per_kg": max(
+                (h.energy_mJ_per_kg for h in handoffs), default=None
+            ),
             "weld_residual_max_mm": 1e3 * self.residual.largest,
             "weld_residual_p99_mm": 1e3 * self.residual.moving.quantile(0.99),
             "product_position_max_mm": max((m.position_mm for m in misplaced), default=None),
@@ -127,16 +112,7 @@ class Measurement:
             "payload_acceleration_p99_m_s2": payload.acceleration.quantile(0.99),
             "payload_jerk_max_m_s3": payload.jerk.largest,
             "payload_jerk_p99_m_s3": payload.jerk.quantile(0.99),
-            "moved_mass_kg": float(moved.sum()),
+            "moved_mass_kg": float(m.body_mass[m.body_treeid >= 0].sum()),
             "unintended_contacts": physics.unintended_contacts,
             "engine_warnings": physics.engine_warnings,
         }
-
-
-def _of_handoffs(handoffs: tuple[HandOff, ...]) -> dict[str, float | None]:
-    return {
-        "handoff_gap_max_mm": max((h.gap_mm for h in handoffs), default=None),
-        "speed_step_max_mm_s": max((h.speed_step_mm_s for h in handoffs), default=None),
-        "impulse_max_mNs": max((h.impulse_mNs for h in handoffs), default=None),
-        "handoff_energy_max_mJ_per_kg": max((h.energy_mJ_per_kg for h in handoffs), default=None),
-    }

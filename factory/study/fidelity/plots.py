@@ -1,4 +1,4 @@
-"""Plots of a comparison, for people, as PNG. They need matplotlib, an optional part."""
+"""Plots of a comparison as PNG. They need matplotlib, an optional package."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 
 from factory.study.fidelity.convergence import Series, Study
 from factory.study.fidelity.quantities import QUANTITIES
-from factory.study.fidelity.record import Approach, Fidelity
+from factory.study.fidelity.record import ClosestApproach, Fidelity
 from factory.support.plotting import (
     BLUE,
     GREY,
@@ -21,7 +21,7 @@ from factory.support.plotting import (
 )
 
 MOST = 40
-"""So many parts have a bar each; of more, the worst."""
+"""Number of parts that have a bar each; of more, the worst."""
 
 LEAST = 1e-5
 """Smaller energies are drawn as this [mJ/kg]."""
@@ -157,11 +157,11 @@ def _product(found: Fidelity) -> Any:
 
 def _approach(found: Fidelity) -> Any:
     """Least distances by kinds of bodies against what is certified."""
-    least: dict[str, Approach] = {}
+    least: dict[str, ClosestApproach] = {}
     for record in found.seeds:
         for one in record.approaches:
             kept = least.get(one.kinds)
-            if kept is None or (one.least_mm or 0.0) < (kept.least_mm or 0.0):
+            if kept is None or one.least_mm < kept.least_mm:
                 least[one.kinds] = one
     if not least:
         return None
@@ -170,7 +170,7 @@ def _approach(found: Fidelity) -> Any:
     at = np.arange(len(rows))
     axes.barh(at, [r.least_mm for r in rows], 0.5, color=BLUE, label="closest approach")
     axes.plot([r.certified_mm for r in rows], at, "|", ms=18, mew=2, color=RED, label="certified")
-    axes.set_yticks(at, [f"{r.kinds}\n{' – '.join(r.bodies or ())}" for r in rows], fontsize=8)
+    axes.set_yticks(at, [f"{r.kinds}\n{' – '.join(r.bodies)}" for r in rows], fontsize=8)
     axes.set_xlabel("distance [mm]")
     axes.grid(axis="y", visible=False)
     axes.legend(loc="lower left", bbox_to_anchor=(0, 1), ncols=2)
@@ -178,7 +178,7 @@ def _approach(found: Fidelity) -> Any:
 
 
 def _convergence(study: Study) -> Any:
-    """Every figure over its value at the finest setting; what does not converge stands out."""
+    """Every figure over its value at the finest setting, in colour where it does not converge."""
     import matplotlib
 
     unsettled = study.unsettled()

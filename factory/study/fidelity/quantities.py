@@ -1,4 +1,4 @@
-"""What is measured: every figure with its unit and its definition."""
+"""The figures that are measured, each with its unit and definition."""
 
 from __future__ import annotations
 

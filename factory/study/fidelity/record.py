@@ -1,4 +1,4 @@
-"""What a comparison leaves behind: frozen values, the same whoever measured them."""
+"""What a comparison of the worlds gives: frozen values."""
 
 from __future__ import annotations
 
@@ -44,14 +44,14 @@ class Misplaced:
 
 
 @dataclass(frozen=True, slots=True)
-class Approach:
-    """The least distance between bodies of two kinds, what is certified for them, and who it was;
-    `least_mm` None where nothing came within the detection distance."""
+class ClosestApproach:
+    """The least distance between bodies of two kinds that came within the detection distance, what
+    is certified for them, and which bodies it was."""
 
     kinds: str
     certified_mm: float
-    least_mm: float | None
-    bodies: tuple[str, str] | None = None
+    least_mm: float
+    bodies: tuple[str, str]
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,7 +67,7 @@ class SeedRecord:
     figures: Figures
     handoffs: tuple[HandOff, ...] = ()
     misplaced: tuple[Misplaced, ...] = ()
-    approaches: tuple[Approach, ...] = ()
+    approaches: tuple[ClosestApproach, ...] = ()
     differences: tuple[float, ...] = field(default=(), repr=False)
     durations: tuple[float, ...] = field(default=(), repr=False)
     contacts: tuple[str, ...] = ()

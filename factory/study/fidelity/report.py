@@ -1,9 +1,8 @@
-"""A comparison written down: figures.json for machines, report.md with plots for people."""
+"""The report of a comparison: figures.json, and report.md with plots."""
 
 from __future__ import annotations
 
 import json
-from math import isfinite
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +10,7 @@ from factory.study.fidelity.convergence import Study
 from factory.study.fidelity.plots import check_plots, plots
 from factory.study.fidelity.quantities import QUANTITIES
 from factory.study.fidelity.record import Fidelity
+from factory.support.console import finite
 from factory.support.errors import Diagnostic, InputError
 from factory.support.files import write_all
 
@@ -25,7 +25,7 @@ TITLES = {
 
 
 def document(found: Fidelity, study: Study | None = None) -> dict[str, Any]:
-    """Everything as one JSON document; keys as `fidelity --json` prints them."""
+    """The JSON document of a comparison, with the keys of `fidelity --json`."""
     unsettled = set(study.unsettled()) if study else set()
     made = found.as_json()
     for key, figure in made["figures"].items():
@@ -35,8 +35,8 @@ def document(found: Fidelity, study: Study | None = None) -> dict[str, Any]:
 
 
 def check_report(path: Path | None) -> None:
-    """Whether a report can be written there, before anything is run. Raises InputError (BadFile),
-    MissingError where plots are wanted and there is no matplotlib."""
+    """Raises InputError (BadFile) where a report cannot be written there, MissingError where plots
+    are wanted and there is no matplotlib."""
     if path is None or _is_json(path):
         return
     if path.exists() and not path.is_dir():
@@ -46,8 +46,9 @@ def check_report(path: Path | None) -> None:
 
 
 def write_report(path: Path, found: Fidelity, study: Study | None = None) -> list[Path]:
-    """Write a folder, or figures alone where `path` ends in .json; all files or none."""
-    text = json.dumps(_finite(document(found, study)), indent=1).encode() + b"\n"
+    """Write a folder, or figures alone where `path` ends in .json; all files or none. Gives their
+    paths."""
+    text = json.dumps(finite(document(found, study)), indent=1).encode() + b"\n"
     if _is_json(path):
         contents = {path: text}
     else:
@@ -63,7 +64,7 @@ def write_report(path: Path, found: Fidelity, study: Study | None = None) -> lis
 
 
 def markdown(found: Fidelity, study: Study | None, pictures: list[str]) -> str:
-    """The page for people."""
+    """The text of report.md."""
     verdict = "All runs passed." if found.passed else "**Some run failed.**"
     lines = [
         f"# Fidelity of {found.product}",
@@ -95,12 +96,12 @@ def _rows(found: Fidelity, study: Study | None) -> list[str]:
 
 
 def remark(key: str, value: float | None, study: Study | None) -> str:
-    """What is to be said of a figure: beyond its limit, not converged."""
-    found = [
-        *(["beyond its limit"] if QUANTITIES[key].exceeded(value) else []),
-        *(["not converged"] if study is not None and key in study.unsettled() else []),
-    ]
-    return ", ".join(found)
+    """Remarks on a figure: beyond its limit, not converged."""
+    found = {
+        "beyond its limit": QUANTITIES[key].exceeded(value),
+        "not converged": study is not None and key in study.unsettled(),
+    }
+    return ", ".join(words for words, holds in found.items() if holds)
 
 
 def shown(value: float | None) -> str:
@@ -112,12 +113,3 @@ def shown(value: float | None) -> str:
 
 def _is_json(path: Path) -> bool:
     return path.suffix.lower() == ".json"
-
-
-def _finite(value: Any) -> Any:
-    """null for what is not finite."""
-    if isinstance(value, float):
-        return value if isfinite(value) else None
-    if isinstance(value, dict):
-        return {key: _finite(item) for key, item in value.items()}
-    return [_finite(item) for item in value] if isinstance(value, list | tuple) else value

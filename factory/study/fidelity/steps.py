@@ -1,4 +1,4 @@
-"""What the engine does within a tick, step by step, without touching the run.
+"""Speeds and forces within a tick, step by step, without changing the run.
 
 The engine calls its control callback in every step, when the state is that at the step's beginning
 and the forces are still those of the step before. The callback only copies.
@@ -40,7 +40,9 @@ class Steps:
 
     def _step(self, m: Any, d: Any) -> None:
         at = int(np.searchsorted(self._t[: self._count], d.time))
-        if at == self._count:  # else it is done again: it has woken a body, or something touched
+        if (
+            at == self._count
+        ):  # else the step is repeated: it has woken a body, or something touched
             self._t[at], self._v[at], self._f[at] = d.time, self._qvel, self._force
         self._count = at + 1
 

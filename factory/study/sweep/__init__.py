@@ -1,5 +1,5 @@
-"""Many runs at once: a grid of seeds, speeds, clearances, ... over processes, or over a Dask
-cluster, into an SQLite database that a stopped sweep goes on with.
+"""Many runs: a grid of seeds, speeds, clearances, ..., run by processes or by a Dask cluster, into
+an SQLite database, with which a stopped sweep goes on.
 
     >>> from factory.study.sweep import points, read_axes
     >>> [dict(point) for point in points(read_axes(["seed=0:2", "jitter=0.1"]))]

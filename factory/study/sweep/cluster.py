@@ -1,5 +1,5 @@
 """The runs of a sweep on a Dask cluster: the same work, sent to `dask worker`s by a `dask
-scheduler`. Needs `distributed`, an optional part."""
+scheduler`. Needs `distributed`, an optional package."""
 
 from __future__ import annotations
 
@@ -21,10 +21,10 @@ if TYPE_CHECKING:
 PREFIX = "dask://"
 
 PATIENCE = "10s"
-"""A scheduler that does not answer for so long is not there."""
+"""Time after which a scheduler that does not answer is taken to be absent."""
 
 AHEAD = 4
-"""So many runs wait for each thread of a worker, so that none is idle."""
+"""Number of runs that wait for each thread of a worker, so that none is idle."""
 
 
 def address_of(place: str) -> str:
@@ -40,7 +40,7 @@ def address_of(place: str) -> str:
 
 def run_dask(recipe: Recipe, points: Sequence[Point], place: str) -> Generator[Outcome, None, None]:
     """The outcomes of all points as they come, from the workers there are and those that join. A
-    run whose worker dies goes to another, three times. Closing the iterator takes back what is not
+    run whose worker dies goes to another, three times. Closing the iterator cancels what is not
     done.
 
     Raises MissingError where there is no Dask, no scheduler, or workers without factory; RunError
@@ -59,7 +59,7 @@ def connect(place: str) -> Client:
     address = address_of(place)
     distributed = optional("distributed", "Dask", "a cluster", "cluster")
     for name in [n for n in logging.root.manager.loggerDict if n.startswith("distributed")]:
-        logging.getLogger(name).setLevel(logging.CRITICAL)  # what matters, we say ourselves
+        logging.getLogger(name).setLevel(logging.CRITICAL)  # errors are raised from here
     try:
         return distributed.Client(address, timeout=PATIENCE, set_as_default=False)
     except (OSError, TimeoutError, ValueError) as error:
@@ -70,7 +70,7 @@ def connect(place: str) -> Client:
 def _outcomes(
     client: Client, recipe: Recipe, points: Sequence[Point]
 ) -> Generator[Outcome, None, None]:
-    """Hands out a few points for each thread there is, and more as outcomes come back."""
+    """Submit a few points for each thread, and more as outcomes come back."""
     from distributed import as_completed
 
     _check_workers(client)
@@ -96,13 +96,13 @@ def _run(runner: Runner, point: Point) -> Outcome:
 
 
 def _wanted(client: Client) -> int:
-    """How many runs to have on the cluster now."""
+    """The number of runs that should be on the cluster now."""
     threads: int = sum(client.nthreads().values())
     return AHEAD * max(1, threads)
 
 
 def _outcome(future: Any, point: Point) -> Outcome:
-    """What became of a run. Raises RunError where the cluster forgot it."""
+    """The outcome of a run. Raises RunError where the cluster lost it."""
     from distributed.scheduler import KilledWorker
 
     if future.status == "finished":

@@ -42,10 +42,10 @@ DEFAULTS: Mapping[str, Value] = {
     "wip": None,
     "world": "mujoco",
 }
-"""Keys that are no settings, with their values where nothing else is said."""
+"""Keys that are not settings, with their default values."""
 
 MOST = 1_000_000
-"""A sweep of more runs is refused."""
+"""Upper bound on the runs of a sweep."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,8 +77,8 @@ def read_axes(texts: Sequence[str]) -> tuple[Axis, ...]:
 
 
 def points(axes: Sequence[Axis]) -> Iterator[Point]:
-    """All points of a grid. Settings vary slowest and seeds fastest: other settings ask for another
-    model, some for another layout."""
+    """All points of a grid. Settings vary slowest and seeds fastest: other settings need another
+    model, some another layout."""
     rank = [(axis.key == "seed", axis.key not in SETTINGS) for axis in axes]
     order = sorted(range(len(axes)), key=lambda i: rank[i])
     for values in product(*(axes[i].values for i in order)):
@@ -86,7 +86,8 @@ def points(axes: Sequence[Axis]) -> Iterator[Point]:
 
 
 def check_value(key: str, value: Value) -> Diagnostic | None:
-    """What is wrong with the value of a key: a number out of range, a word that is none of it."""
+    """The error of a value of a key: a number out of range, an unknown word; None for a good
+    one."""
     if key in SETTINGS and isinstance(value, int | float):
         try:
             Settings().with_options({key: value})
@@ -165,7 +166,7 @@ def _number(key: str, word: str, item: str) -> int | float:
 
 
 def _example(key: str) -> str:
-    """How the values of a key are written."""
+    """An example of the values of a key."""
     words = {"seed": "0:100", "jitter": "0.1,0.3", "units": "4,8", "wip": "1:4"}
     words |= {"world": "ideal,mujoco"}
     return f"--vary {key}={words.get(key) or getattr(Settings(), key, '')}"

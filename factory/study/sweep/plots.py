@@ -1,4 +1,4 @@
-"""Plots of a sweep's summary, for people, as PNG. They need matplotlib, an optional part."""
+"""Plots of a sweep's summary as PNG. They need matplotlib, an optional package."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ UNITS = {
 """Of the keys that vary."""
 
 MOST = 10
-"""So many lines or histograms at most."""
+"""Upper bound on the lines or histograms of a plot."""
 
 
 def plots(found: Summary) -> dict[str, bytes]:
@@ -85,7 +85,7 @@ def _lines(axes: Any, groups: Sequence[Group], key: str, across: str) -> None:
             break
         line = sorted(members, key=place)
         told = [group.figures[key] for group in line]
-        spread = [0.0 if s.low is None else s.mean - s.low for s in told]
+        spread = [0.0 if s.confidence_low is None else s.mean - s.confidence_low for s in told]
         axes.errorbar(
             [place(group) for group in line],
             [s.mean for s in told],

@@ -1,4 +1,4 @@
-"""What a sweep runs, apart from the points of its grid, and what tells it from another sweep."""
+"""What a sweep runs, apart from the points of its grid, and its identity."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from factory.geometry.solids import Product
 from factory.lang.writer import write_pag, write_template
 from factory.layout.request import Ground
 from factory.plant.factory import Factory
-from factory.study.sweep.grid import DEFAULTS, SETTINGS, Axis, Point, Value
+from factory.study.sweep.grid import DEFAULTS, Axis, Point, Value
 from factory.support.pickling import pickle_locked_mappings
 from factory.support.resources import mjcf_folder
 from factory.support.version import __version__
@@ -27,8 +27,8 @@ pickle_locked_mappings()  # of which factories are full
 class Recipe:
     """A factory, the solids of its product, the values of keys that are the same in all runs, the
     simulated time after which a run is given up [s], what it is laid out for, whether joined parts
-    become one body (None: where that pays). It holds all that a worker needs: no file of the user's
-    is read there."""
+    become one body (None: where that pays). A worker needs nothing else, and reads no file of the
+    user's."""
 
     factory: Factory
     product: Product
@@ -42,8 +42,8 @@ class Recipe:
         return {**DEFAULTS, **self.fixed, **dict(point)}
 
     def identity(self, axes: Sequence[Axis]) -> dict[str, Any]:
-        """What must not change where a sweep is resumed: product, versions, fixed values, which
-        keys vary; their values may, a grid may grow."""
+        """What must be the same where a sweep is resumed: product, versions, fixed values, which
+        keys vary. The values of these may change: a grid may grow."""
         varied = sorted(axis.key for axis in axes)
         fixed = {k: v for k, v in self.at(()).items() if k not in varied}
         return {
@@ -61,18 +61,13 @@ class Recipe:
 
 
 def versions() -> dict[str, str]:
-    """What a run's figures depend on, beside its product."""
+    """The versions that the figures of a run depend on."""
     return {"factory": __version__, "mujoco": version("mujoco")}
 
 
-def settings_at(values: Mapping[str, Value]) -> dict[str, Any]:
-    """Those values that are settings."""
-    return {name: values[name] for name in SETTINGS}
-
-
 def digest(factory: Factory, product: Product) -> str:
-    """SHA-256 of a product and what it is made with: the PAG's canonical text, the solids that its
-    meshes gave, the templates it uses, the files of the robot types."""
+    """SHA-256 of a product and of what it is compiled with: the PAG's canonical text, the solids
+    that its meshes gave, the templates it uses, the files of the robot types."""
     made = sha256(write_pag(factory.pag).encode())
     for name, template in sorted({o.template.name: o.template for o in factory.operations}.items()):
         made.update(f"{name}\n{write_template(template)}".encode())

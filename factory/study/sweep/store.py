@@ -1,7 +1,7 @@
 """The database of a sweep: SQLite in WAL mode, a row for each run that is done.
 
 Only the parent writes it, and commits every row by itself: killing it, or a worker, loses no row
-that is there. Anybody may read it meanwhile.
+that is there. It may be read while it is written.
 """
 
 from __future__ import annotations
@@ -9,26 +9,40 @@ from __future__ import annotations
 import json
 import os
 import sqlite3
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import closing, contextmanager
 from pathlib import Path
 from typing import Any
 
-from factory.study.sweep.grid import Value
-from factory.study.sweep.kept import COLUMNS, kept_identity
+from factory.study.sweep.grid import KEYS, WHOLE, Value
 from factory.study.sweep.recipe import name_of
-from factory.study.sweep.work import Outcome
+from factory.study.sweep.work import FIGURES, Outcome
 from factory.support.errors import Diagnostic, InputError
 from factory.support.resource import Closing
+
+COLUMNS: Mapping[str, str] = {
+    "point": "TEXT PRIMARY KEY",
+    "status": "TEXT NOT NULL",
+    "reason": "TEXT",
+    **{key: "INTEGER" if key in WHOLE else "REAL" for key in KEYS},
+    "world": "TEXT",
+    **FIGURES,
+    "row_time_s": "REAL",
+    "worker": "TEXT",
+    "tries": "INTEGER",
+    "finished": "TEXT",
+}
+"""Of the table `runs`. `point`: the values of the keys that vary, as JSON; `status`: done or
+failed; then every key and figure; `row_time_s`: what the run took its worker in all [s]."""
 
 APPLICATION = 0x4B4C4156
 """SQLite's application_id of such a database."""
 
 PATIENCE = 30.0
-"""Wait so long for another writer [s]."""
+"""Time to wait for another writer [s]."""
 
 DISK = "check the path, its permissions and the space on the disk"
-"""A hint, where a database cannot be used that may be all right."""
+"""The hint where a database cannot be used that may be sound."""
 
 CIRCUMSTANCES = (
     sqlite3.SQLITE_PERM,
@@ -40,7 +54,7 @@ CIRCUMSTANCES = (
     sqlite3.SQLITE_PROTOCOL,
     sqlite3.SQLITE_NOTADB,
 )
-"""SQLite's codes that do not speak of what a sweep's database holds."""
+"""SQLite's codes of faults outside the contents of a database."""
 
 
 class Store(Closing):
@@ -69,7 +83,7 @@ class Store(Closing):
                 raise
 
     def close(self) -> None:
-        """Leave one file behind."""
+        """Close the database, which leaves one file."""
         with _told(self.path):
             self.connection.close()
 
@@ -100,7 +114,7 @@ class Store(Closing):
             )
 
     def _create(self, identity: Mapping[str, Any]) -> None:
-        """Make the tables, in one transaction, unless another sweep has made them meanwhile."""
+        """Make the tables, in one transaction, unless another sweep has made them by now."""
         self.connection.execute("BEGIN IMMEDIATE")
         kept = _identity(self.connection, self.path)
         if kept is not None:
@@ -125,7 +139,9 @@ def reading(path: Path) -> Iterator[tuple[dict[str, Any], Iterator[Mapping[str, 
     InputError (BadFile)."""
     if not path.is_file():
         raise InputError(_bad(path, "there is no such file", "give the -o of a sweep"))
-    mode = "rw" if os.access(path, os.W_OK) else "ro"  # who only reads leaves SQLite's WAL behind
+    mode = (
+        "rw" if os.access(path, os.W_OK) else "ro"
+    )  # a reader without write access leaves the WAL
     with _told(path), closing(_connect(path, mode)) as connection:
         identity = _identity(connection, path)
         if identity is None:
@@ -143,12 +159,47 @@ def _identity(connection: sqlite3.Connection, path: Path) -> dict[str, Any] | No
     """The identity kept in a database, None for an empty one. Raises InputError (BadFile) for one
     of another program, sqlite3.Error for one that is not sound."""
     tables = connection.execute("SELECT count(*) FROM sqlite_master").fetchone()[0]
-    # they and the id come at once: whoever asks for the id last has it where there are tables
+    # both come in one transaction: the id, read last, is there where the tables are
     if connection.execute("PRAGMA application_id").fetchone()[0] == APPLICATION:
-        return kept_identity(connection)
+        return _kept_identity(connection)
     if tables:
         raise InputError(_bad(path, "it is the database of another program", "choose another -o"))
     return None
+
+
+def _kept_identity(connection: sqlite3.Connection) -> dict[str, Any]:
+    """The identity in a database. Raises sqlite3.Error where it or some row is not one that a sweep
+    writes."""
+    kept = connection.execute("SELECT key, value FROM sweep")
+    identity = {key: _value(key, text) for key, text in kept}
+    varied = identity.get("varied")
+    if not isinstance(varied, list) or not all(key in KEYS for key in varied):
+        raise sqlite3.DatabaseError("it does not say what varies")
+    if not isinstance(identity.get("product"), str):
+        raise sqlite3.DatabaseError("it does not say what it is of")
+    _check_rows(connection, varied)
+    return identity
+
+
+def _value(key: str, text: Any) -> Any:
+    """A value of an identity, from its JSON."""
+    try:
+        return json.loads(text)
+    except (TypeError, ValueError, RecursionError) as error:
+        raise sqlite3.DatabaseError(f"its '{key}' cannot be read") from error
+
+
+def _check_rows(connection: sqlite3.Connection, varied: Sequence[str]) -> None:
+    """Raises sqlite3.Error where a row lacks a point, a status or a value for a key that varies, or
+    where a value is not of the type of its column, which SQLite itself does not check."""
+    faults = [f"{name} IS NULL" for name in ("point", "status", *varied)]
+    faults.append("status NOT IN ('done', 'failed')")
+    for name, kind in COLUMNS.items():
+        types = "'text'" if kind.startswith("TEXT") else "'integer', 'real'"
+        faults.append(f"typeof({name}) NOT IN ('null', {types})")
+    bad = connection.execute(f"SELECT rowid FROM runs WHERE {' OR '.join(faults)} LIMIT 1")
+    for (number,) in bad:
+        raise sqlite3.DatabaseError(f"row {number} of its runs is none that a sweep writes")
 
 
 def _compare(path: Path, kept: Mapping[str, Any], asked: Mapping[str, Any]) -> None:
@@ -180,8 +231,8 @@ def _bad(path: Path, message: str, hint: str) -> Diagnostic:
 
 @contextmanager
 def _told(path: Path) -> Iterator[None]:
-    """Whatever SQLite refuses, as an error for the user; what makes no sense is damaged, or of
-    another version."""
+    """Raises InputError (BadFile) for an error of SQLite; contents that make no sense are damaged,
+    or of another version."""
     try:
         yield
     except (sqlite3.Error, UnicodeDecodeError) as error:

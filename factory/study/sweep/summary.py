@@ -5,7 +5,7 @@ from __future__ import annotations
 from array import array
 from collections import Counter, defaultdict
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from math import sqrt
 from pathlib import Path
 from typing import Any
@@ -20,7 +20,7 @@ from factory.study.sweep.work import FIGURES
 CONFIDENCE = 0.95
 
 UNTOLD = ("wall_time_s", "physics_time_s", "supervisor_time_s", "refines_net")
-"""Figures that say nothing of the factory."""
+"""Figures that do not depend on the factory."""
 
 SUMMED = tuple(key for key, kind in FIGURES.items() if kind != "TEXT" and key not in UNTOLD)
 
@@ -33,22 +33,10 @@ class Statistic:
     n: int
     mean: float
     deviation: float | None
-    low: float | None
-    high: float | None
+    confidence_low: float | None
+    confidence_high: float | None
     least: float
     greatest: float
-
-    def as_json(self) -> dict[str, float | None]:
-        """Under the keys of `sweep --summary --json`."""
-        return {
-            "n": self.n,
-            "mean": self.mean,
-            "deviation": self.deviation,
-            "confidence_low": self.low,
-            "confidence_high": self.high,
-            "least": self.least,
-            "greatest": self.greatest,
-        }
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,7 +51,7 @@ class Group:
 
     def as_json(self) -> dict[str, Any]:
         """Under the keys of `sweep --summary --json`."""
-        figures = {key: statistic.as_json() for key, statistic in self.figures.items()}
+        figures = {key: asdict(statistic) for key, statistic in self.figures.items()}
         return {"values": dict(self.values), "done": self.done, "failed": self.failed} | {
             "figures": figures
         }
@@ -104,7 +92,7 @@ class Summary:
 
 
 class _Part:
-    """What is read of one group."""
+    """The rows of one group."""
 
     def __init__(self) -> None:
         self.done = self.failed = 0

@@ -1,20 +1,20 @@
-"""Carry a sweep out: what is not in its database yet is run, and every outcome written as it
+"""A sweep: the points that its database does not have are run, and every outcome is written as it
 comes."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator, Sequence
+from collections.abc import Generator, Sequence
 from contextlib import closing
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from time import perf_counter
 
-from factory.study.sweep.bar import Bar
+from factory.study.bar import RunsBar
+from factory.study.pool import over_processes
 from factory.study.sweep.grid import Axis, Point, check_value, points
-from factory.study.sweep.local import run_local
 from factory.study.sweep.recipe import Recipe, name_of
 from factory.study.sweep.store import Store
-from factory.study.sweep.work import Outcome
+from factory.study.sweep.work import Outcome, Runner, failed
 from factory.support.errors import InputError
 from factory.support.interruption import Interruption
 
@@ -22,12 +22,15 @@ LOCAL = "local"
 
 Outcomes = Generator[Outcome, None, None]
 
+THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
+"""Environment variables set to 1 for the processes: there is one for each core already."""
+
 
 @dataclass(slots=True)
 class Tally:
     """What a sweep did: runs in its grid, rows that were there, how many of these had failed, runs
-    done and failed now; the time it took, and the sums of what its runs took their workers, and of
-    their run loops [s]."""
+    done and failed now; the time it took, the sum of the workers' times, and that of their run
+    loops [s]."""
 
     runs: int
     there: int
@@ -80,16 +83,16 @@ def sweep(
         raise InputError(faults)
     grid = {name_of(point): point for point in points(axes)}
     with Store(database, recipe.identity(axes)) as store:
-        failed = set() if retry else store.points("failed")
-        there = store.points("done") | failed
+        lost = set() if retry else store.points("failed")
+        there = store.points("done") | lost
         wanted = [point for name, point in grid.items() if name not in there]
-        tally = Tally(len(grid), len(grid) - len(wanted), len(grid.keys() & failed))
+        tally = Tally(len(grid), len(grid) - len(wanted), len(grid.keys() & lost))
         if not wanted:
             return tally
         begin = perf_counter()
         with (
-            Bar(len(grid), tally.there, quiet) as bar,
-            closing(_backend(on, jobs)(recipe, wanted)) as outcomes,
+            RunsBar(len(grid), tally.there, quiet) as bar,
+            closing(_outcomes(recipe, wanted, on, jobs)) as outcomes,
         ):
             for outcome in outcomes:
                 with Interruption() as interruption:
@@ -101,10 +104,22 @@ def sweep(
     return tally
 
 
-def _backend(on: str, jobs: int) -> Callable[[Recipe, Sequence[Point]], Outcomes]:
-    """What runs points, by the name of a place."""
+def run_local(recipe: Recipe, points: Sequence[Point], jobs: int) -> Outcomes:
+    """The outcomes of all points as they come, from `jobs` processes. Closing the iterator ends
+    them. Raises RunError where processes die as they start."""
+    with closing(over_processes(Runner(recipe), points, jobs, dict.fromkeys(THREADS, "1"))) as done:
+        for one in done:
+            if one.found is None:
+                reason = f"Killed the process died in {one.tries} tries (exit status {one.status})"
+                yield failed(points[one.number], reason, one.tries)
+            else:
+                yield replace(one.found, tries=one.tries)
+
+
+def _outcomes(recipe: Recipe, wanted: Sequence[Point], on: str, jobs: int) -> Outcomes:
+    """The outcomes of points, from processes or from the cluster at a place."""
     if on == LOCAL:
-        return lambda recipe, wanted: run_local(recipe, wanted, jobs)
+        return run_local(recipe, wanted, jobs)
     from factory.study.sweep.cluster import run_dask
 
-    return lambda recipe, wanted: run_dask(recipe, wanted, on)
+    return run_dask(recipe, wanted, on)

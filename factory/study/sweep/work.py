@@ -17,8 +17,8 @@ from factory.plant.fused_bodies import fusing_pays
 from factory.problem.robot_types import load_catalogue
 from factory.simulation.run import Run
 from factory.simulation.simulation import Compiled, Simulation, compiled
-from factory.study.sweep.grid import Point
-from factory.study.sweep.recipe import Recipe, settings_at
+from factory.study.sweep.grid import SETTINGS, Point
+from factory.study.sweep.recipe import Recipe
 from factory.support.errors import FactoryError
 from factory.support.settings import Settings
 
@@ -48,13 +48,13 @@ FIGURES: Mapping[str, str] = {
 """What a row keeps of a run, under the names of `run --json`, with its type in the database."""
 
 KEPT = 8
-"""A worker keeps so many layouts and models: the grid brings points of one together."""
+"""Number of layouts and models that a worker keeps: the grid puts points of one together."""
 
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """A point that is done. `reason` says why its run failed, "" if it did not; `row_time_s`: all
-    the time that it took its worker [s], of which `wall_time_s` of the figures is the run loop."""
+    """A point that is done. `reason`: why its run failed, "" if it did not; `row_time_s`: the time
+    that it took its worker [s], of which `wall_time_s` of the figures is the run loop."""
 
     point: Point
     reason: str = ""
@@ -79,7 +79,7 @@ class Runner:
         return Runner, (self.recipe,)
 
     def __call__(self, point: Point) -> Outcome:
-        """Run a point. Whatever goes wrong is the reason of its outcome."""
+        """Run a point. Every error is the reason of its outcome."""
         begin = perf_counter()
         figures: dict[str, Any] = {}
         try:
@@ -95,7 +95,7 @@ class Runner:
     def run(self, point: Point) -> Run:
         """The run at a point. Raises FactoryError."""
         values: dict[str, Any] = self.recipe.at(point)
-        settings = Settings(**settings_at(values))
+        settings = Settings(**{name: values[name] for name in SETTINGS})
         units, wip = values["units"], values["wip"]
         layout = _or_raise(self._layout(settings))
         shared = _or_raise(self._compiled(settings, values["world"], units, wip))
@@ -135,7 +135,7 @@ class Runner:
 
 
 def failed(point: Point, reason: str, tries: int) -> Outcome:
-    """The outcome of a run that nobody lived to tell of."""
+    """The outcome of a run whose worker died."""
     return replace(_outcome(point, reason, {}, 0.0), worker="", tries=tries)
 
 
@@ -153,7 +153,7 @@ def _reason(run: Run) -> str:
 
 
 def _or_raise(found: T | FactoryError) -> T:
-    """What was found, or kept as an error."""
+    """What was found; raises it where it is an error."""
     if isinstance(found, FactoryError):
         raise found
     return found

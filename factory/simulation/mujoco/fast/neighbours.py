@@ -14,9 +14,9 @@ from collections.abc import Iterable
 import numpy as np
 
 from factory.control.mode import Array, Index, Truth
+from factory.mjcf.weld_frames import held_at
 from factory.simulation.mujoco.axes import Axes
 from factory.simulation.mujoco.contacts import NOBODY, ContactMasks
-from factory.simulation.mujoco.gaps import held_at
 from factory.simulation.mujoco.parts import Parts
 from factory.support.engine import mujoco
 
@@ -100,7 +100,7 @@ def _swept(
     welds, codes = np.array([*parts.grips()]).T
     held = m.eq_obj2id[welds]
     code = np.concatenate([masks.code[bodies], codes])
-    place = np.concatenate([d.xpos[bodies], held_at(m, d, welds)])[:, :2]
+    place = np.concatenate([d.xpos[bodies], held_at(m, welds, d.xpos, d.xmat)])[:, :2]
     which = np.concatenate([bodies, held])
     least, most = np.full((count, 2), np.inf), np.full((count, 2), -np.inf)
     np.minimum.at(least, code, place + low[which])

@@ -1,4 +1,4 @@
-"""A bar on stderr while a sweep goes on: runs done, failed, runs per second, time left."""
+"""A bar on stderr while runs go on: how many are done and failed, runs per second, time left."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ if TYPE_CHECKING:
     from rich.progress import Progress, TaskID
 
 
-class Bar(ProgressBar):
-    """Counts the runs of a sweep, of which some may be there already."""
+class RunsBar(ProgressBar):
+    """Counts runs, of which some may be there already."""
 
     def __init__(self, total: int, there: int = 0, quiet: bool = False) -> None:
         super().__init__(quiet)
@@ -24,7 +24,7 @@ class Bar(ProgressBar):
         bar = counter("runs, {task.fields[words]}, left")
         return bar, bar.add_task("", total=self.total, completed=self.there, words="")
 
-    def advance(self, failed: bool) -> None:
+    def advance(self, failed: bool = False) -> None:
         """One more run is done."""
         self.done += 1
         self.failed += failed

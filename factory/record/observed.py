@@ -1,0 +1,57 @@
+"""What a recorder needs of a simulation: of its factory, how it is run, and its two worlds."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, Protocol
+
+from factory.layout.layout import Layout
+from factory.nets.petri import Marking
+from factory.plant.fused_bodies import FusedBodies
+from factory.support.settings import Settings
+
+
+class ObservedModel(Protocol):
+    """The model of a simulation in MuJoCo: its text, its mesh files, its bodies."""
+
+    @property
+    def xml(self) -> str: ...
+    @property
+    def files(self) -> Mapping[str, bytes]: ...
+    @property
+    def carried(self) -> FusedBodies: ...
+
+
+class Observed(Protocol):
+    """A simulation that a log or a monitor is kept of; `simulation.Simulation` is one.
+
+    `kind`: mujoco or ideal; `model`: None in the ideal world; `before`: products delivered before
+    the run began. `world` has `time` [s] and `delivered()`; in MuJoCo the engine's `m` and `d`, in
+    the ideal world positions `x` [m] and speeds `v` [m/s]. `supervisor` has `marked` (a byte
+    for each place) and `events`.
+    """
+
+    @property
+    def layout(self) -> Layout: ...
+    @property
+    def kind(self) -> str: ...
+    @property
+    def units(self) -> int: ...
+    @property
+    def seed(self) -> int: ...
+    @property
+    def jitter(self) -> float: ...
+    @property
+    def wip(self) -> int | None: ...
+    @property
+    def settings(self) -> Settings: ...
+    @property
+    def start(self) -> Marking: ...
+    @property
+    def before(self) -> int: ...
+    @property
+    def model(self) -> ObservedModel | None: ...
+    @property
+    def world(self) -> Any: ...
+    @property
+    def supervisor(self) -> Any: ...

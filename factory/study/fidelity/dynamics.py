@@ -1,0 +1,96 @@
+"""Drives, payloads and welds, tick by tick: tracking errors, forces, accelerations, residuals."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from factory.control.mode import REST, Array
+from factory.mjcf.weld_frames import FEED, ROWS, Slides, residuals
+from factory.study.fidelity.histogram import Histogram
+from factory.study.fidelity.welds import Velocities, Welds
+from factory.support.engine import mujoco
+
+FULL = 0.999
+"""Share of its limit from which a force is saturated."""
+
+
+class Drives:
+    """Tracking errors [m], forces as a share of their limit, and work [J]."""
+
+    def __init__(self, world: Any) -> None:
+        self.world, m = world, world.m
+        self.tracking = Histogram()
+        self.error = self.peak = self.work = 0.0
+        self.dof = m.jnt_dofadr[m.actuator_trnid[:, 0]]
+        self.limit = m.actuator_forcerange[:, 1]
+        self.saturated = np.zeros(len(self.limit), np.int64)
+        self.steps = 0
+
+    def tick(self, v: Array, force: Array) -> None:
+        """The steps of a tick: speeds (n + 1, nv), forces (n, nu)."""
+        d, motion = self.world.d, self.world.motion
+        control = motion.drives.control
+        error = np.abs(d.qpos[motion.axes.qpos] - d.ctrl[control])
+        self.error = max(self.error, float(error.max()))
+        self.tracking.add(error[d.ctrl[control + 1] != 0.0])
+        share = np.abs(force) / self.limit
+        self.peak = max(self.peak, float(share.max()))
+        self.saturated += (share >= FULL).sum(axis=0)
+        self.steps += len(force)
+        speed, timestep = v[:, self.dof], float(self.world.m.opt.timestep)
+        self.work += timestep * float(np.abs(force * (speed[1:] + speed[:-1]) / 2).sum())
+
+    @property
+    def saturation(self) -> float:
+        """Share of the steps in which the worst drive was at its limit."""
+        return float(self.saturated.max()) / self.steps if self.steps else 0.0
+
+
+class Payload:
+    """Accelerations [m/s²], step by step, and jerks [m/s³], tick by tick, of parts held by robots
+    and the tray. Parts in feeders and spare copies are left out, and with them the engine's only
+    teleports."""
+
+    def __init__(self, welds: Welds, velocities: Velocities, timestep: float) -> None:
+        self.welds, self.velocities, self.timestep = welds, velocities, timestep
+        self.acceleration, self.jerk = Histogram(), Histogram()
+        self._mean = np.zeros((len(welds.kind), 3))
+        self._held = np.zeros(len(welds.kind), bool)
+
+    def tick(self, v: Array) -> None:
+        """The steps of a tick, speeds (n + 1, nv)."""
+        parts, before = self.welds.carried(), self._mean
+        self._mean = np.zeros_like(before)
+        if len(parts):
+            linear = self.velocities.linear(v, parts)
+            self.acceleration.add(_lengths((linear[1:] - linear[:-1]) / self.timestep))
+            span = (len(v) - 1) * self.timestep
+            self._mean[parts] = (linear[-1] - linear[0]) / span
+            again = parts[self._held[parts]]
+            self.jerk.add(_lengths((self._mean[again] - before[again]) / span))
+        self._held = self.welds.kind >= FEED
+
+
+class Residual:
+    """Residuals [m] of active, awake welds at the end of ticks: the `largest` of all, and the
+    distribution of those whose holder goes faster than the speed at which robots hand over: a
+    holder that stands may be asleep or not."""
+
+    def __init__(self, m: mujoco.MjModel, d: mujoco.MjData, slides: Slides) -> None:
+        self.m, self.d, self.slides = m, d, slides
+        self.largest, self.moving = 0.0, Histogram()
+
+    def tick(self, v: Array) -> None:
+        """Speeds at the end of a tick (nv,)."""
+        length = _lengths(residuals(self.d))
+        self.largest = max(self.largest, float(length.max(initial=0.0)))
+        holder = self.m.eq_obj1id[self.d.efc_id[: self.d.ne : ROWS]]
+        speed = np.linalg.norm(self.slides.velocity(holder, v), axis=1)
+        self.moving.add(length[speed > REST])
+
+
+def _lengths(vectors: Array) -> Array:
+    """The lengths (...) of vectors (..., 3)."""
+    return np.asarray(np.sqrt(np.einsum("...i,...i->...", vectors, vectors)))

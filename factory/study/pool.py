@@ -1,0 +1,210 @@
+"""Items of work over processes of this machine; no server.
+
+Each process has a pipe of its own, so that one that is killed takes with it only the item under
+way: that one goes to another process. (An executor of the standard library, and joblib's, give up
+as a whole when a process dies.)
+"""
+
+from __future__ import annotations
+
+import os
+import signal
+import threading
+from collections import deque
+from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager, suppress
+from dataclasses import dataclass
+from multiprocessing import get_context, parent_process, resource_tracker
+from multiprocessing.connection import Connection, wait
+from multiprocessing.context import SpawnProcess
+from types import MappingProxyType
+from typing import Any, Generic, TypeVar
+
+from factory.support.environment import environment
+from factory.support.errors import Diagnostic, RunError
+from factory.support.pickling import pickle_locked_mappings
+
+Item = TypeVar("Item")
+Found = TypeVar("Found")
+
+CONTEXT = get_context("spawn")
+
+TRIES = 3
+"""An item whose process dies so many times is given up."""
+
+STILLBORN = 3
+"""So many processes in a row that die before they are ready end the work."""
+
+NOTHING: Mapping[str, str] = MappingProxyType({})
+
+pickle_locked_mappings()  # of which layouts and factories are full
+
+
+def cores() -> int:
+    """The cores that this process may use."""
+    with suppress(AttributeError):  # there is no affinity on macOS
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
+@dataclass(frozen=True, slots=True)
+class Worked(Generic[Found]):
+    """What became of an item: its number, what was found, None where its process died in all its
+    tries, and how many these were; `status`: the exit status of the last that died."""
+
+    number: int
+    found: Found | None
+    tries: int
+    status: int | None = None
+
+
+def over_processes(
+    work: Callable[[Item], Found],
+    items: Sequence[Item],
+    jobs: int,
+    variables: Mapping[str, str] = NOTHING,
+) -> Generator[Worked[Found], None, None]:
+    """What `work` finds of all items as it comes, from `jobs` processes with these environment
+    variables; `work`, items and what is found must be picklable. Closing the iterator ends the
+    processes. Raises what `work` raises, RunError where processes die as they start."""
+    pool = _Pool(work, items, variables)
+    try:
+        yield from pool.results(min(jobs, len(items)))
+    finally:
+        pool.end()
+
+
+@dataclass(slots=True)
+class _Worker:
+    """A process, our end of its pipe, the number of the item it was given, and whether it is
+    ready."""
+
+    process: SpawnProcess
+    pipe: Connection
+    number: int | None = None
+    ready: bool = False
+
+
+class _Pool(Generic[Item, Found]):
+    """Workers, and the numbers of the items that wait for one."""
+
+    def __init__(
+        self, work: Callable[[Item], Found], items: Sequence[Item], variables: Mapping[str, str]
+    ) -> None:
+        self.work, self.items, self.variables = work, items, variables
+        self.waiting = deque(range(len(items)))
+        self.tries = [1] * len(items)
+        self.stillborn = 0
+        self.workers: list[_Worker] = []
+
+    def results(self, jobs: int) -> Generator[Worked[Found], None, None]:
+        """What becomes of the items, until all are done."""
+        for _ in range(jobs):
+            self._start()
+        left = len(self.items)
+        while left:
+            busy = {w.pipe: w for w in self.workers if w.number is not None or not w.ready}
+            for pipe in wait(list(busy)):
+                worked = self._heard(busy[pipe])  # type: ignore[index]
+                if worked is not None:
+                    left -= 1
+                    yield worked
+
+    def end(self) -> None:
+        """End all processes at once."""
+        for worker in self.workers:
+            worker.pipe.close()
+            worker.process.terminate()
+        for worker in self.workers:
+            worker.process.join()
+
+    def _heard(self, worker: _Worker) -> Worked[Found] | None:
+        """Receive what a worker sends: that it is ready, or what it has found; its pipe ends where
+        it has died. It gets its next item before what it has found is given on."""
+        number = worker.number
+        try:
+            told: tuple[Found | None, Exception | None] = worker.pipe.recv()
+        except (EOFError, OSError):
+            return self._bury(worker)
+        self.stillborn, worker.ready = 0, True
+        worker.number = self.waiting.popleft() if self.waiting else None
+        if worker.number is not None:
+            with suppress(OSError):  # that a worker is dead shows when it is next received from
+                worker.pipe.send(self.items[worker.number])
+        if number is None:
+            return None
+        found, error = told
+        if error is not None:
+            raise error
+        return Worked(number, found, self.tries[number])
+
+    def _bury(self, worker: _Worker) -> Worked[Found] | None:
+        """Another process takes the place and the item of one that died; an item that has had all
+        its tries is given up."""
+        worker.process.join()
+        status, number = worker.process.exitcode, worker.number
+        self.workers.remove(worker)
+        self.stillborn += not worker.ready
+        if self.stillborn == STILLBORN:
+            message = f"the processes die as they start (exit status {status})"
+            raise RunError(Diagnostic("Killed", message, None, "take fewer --jobs, or more memory"))
+        gone: Worked[Found] | None = None
+        if number is not None:
+            self.tries[number] += 1
+            if self.tries[number] > TRIES:
+                gone = Worked(number, None, TRIES, status)
+            else:
+                self.waiting.appendleft(number)
+        if self.waiting:
+            self._start()
+        return gone
+
+    def _start(self) -> None:
+        ours, theirs = CONTEXT.Pipe()
+        process = CONTEXT.Process(target=_work, args=(self.work, theirs), daemon=True)
+        with _uninterrupted(), ExitStack() as stack:
+            for name, value in self.variables.items():
+                stack.enter_context(environment(name, value))
+            process.start()
+        theirs.close()
+        self.workers.append(_Worker(process, ours))
+
+
+@contextmanager
+def _uninterrupted() -> Iterator[None]:
+    """Processes started in here do not get Ctrl-C, which goes to all: their parent ends them."""
+    if not hasattr(signal, "pthread_sigmask"):
+        yield
+        return
+    resource_tracker.ensure_running()  # it would lift the mask again
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+def _work(work: Callable[[Any], Any], pipe: Connection) -> None:
+    """The main function of a process: work on items until the pipe is closed."""
+    threading.Thread(target=_follow_parent, daemon=True).start()
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    with suppress(EOFError, OSError):
+        pipe.send(None)
+        while True:
+            pipe.send(_tried(work, pipe.recv()))
+
+
+def _tried(work: Callable[[Any], Any], item: Any) -> tuple[Any, Exception | None]:
+    """What work finds of an item, or what it raises."""
+    try:
+        return work(item), None
+    except Exception as error:
+        return None, error
+
+
+def _follow_parent() -> None:
+    """End this process when its parent has ended."""
+    parent = parent_process()
+    assert parent is not None
+    parent.join()
+    os._exit(1)

@@ -1,0 +1,80 @@
+"""The frames that welds join, against the engine's own."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import factory
+from factory.mjcf.weld_frames import Slides, WeldFrames, check_holders, gaps, held_at
+from factory.simulation.simulation import Simulation
+from factory.support.engine import mujoco
+
+EXAMPLES = Path(__file__).parent.parent / "examples"
+
+
+@pytest.fixture(scope="module", params=["paper", "gearbox"])
+def model(request: pytest.FixtureRequest) -> mujoco.MjModel:
+    plan = factory.compile(factory.load_pag(EXAMPLES / f"{request.param}.pag"))
+    return Simulation(factory.lay_out(plan)).world.m
+
+
+def anywhere(m: mujoco.MjModel, seed: int) -> mujoco.MjData:
+    """The engine in a configuration in which all slides are somewhere."""
+    d, draw = mujoco.MjData(m), np.random.default_rng(seed)
+    slides = m.jnt_qposadr[m.jnt_type == int(mujoco.mjtJoint.mjJNT_SLIDE)]
+    d.qpos[slides] = draw.uniform(-1, 1, len(slides))
+    mujoco.mj_kinematics(m, d)
+    return d
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_frames_follow_from_the_slides_alone(model: mujoco.MjModel, seed: int) -> None:
+    frames, d = WeldFrames.of(model, anywhere(model, 9)), anywhere(model, seed)
+    welds = np.arange(model.neq)
+    wanted = held_at(model, welds, d.xpos, d.xmat)
+    assert frames.at(d.qpos[frames.along]) == pytest.approx(wanted, abs=1e-12)
+    some = welds[::3]
+    assert np.array_equal(frames.chosen(some).base, frames.base[some])
+    for weld, holder in enumerate(model.eq_obj1id):
+        turn = np.empty(4)
+        mujoco.mju_mulQuat(turn, d.xquat[holder], model.eq_data[weld, 6:10])
+        assert frames.turn[weld] == pytest.approx(turn, abs=1e-12)
+
+
+def test_gaps_are_what_the_engine_has_to_close(model: mujoco.MjModel) -> None:
+    d = anywhere(model, 4)
+    welds = np.arange(model.neq)
+    d.eq_active[:] = 1
+    mujoco.mj_forward(model, d)
+    position = d.efc_pos[: d.ne].reshape(-1, 6)[:, :3]
+    assert len(position) == model.neq
+    found = gaps(model, welds, d.xpos, d.xmat)
+    assert found == pytest.approx(np.linalg.norm(position, axis=1), abs=1e-12)
+
+
+def test_velocities_of_holders_are_the_engines(model: mujoco.MjModel) -> None:
+    d, draw = anywhere(model, 2), np.random.default_rng(2)
+    d.qvel[:] = draw.normal(size=model.nv)
+    mujoco.mj_forward(model, d)
+    holders = np.unique(model.eq_obj1id)
+    found = Slides.of(model, d).velocity(holders, np.array(d.qvel))
+    jacobian = np.empty((3, model.nv))
+    for row, body in enumerate(holders):
+        mujoco.mj_jacBody(model, d, jacobian, None, body)
+        assert found[row] == pytest.approx(jacobian @ d.qvel, abs=1e-9)
+
+
+def test_a_holder_that_turns_is_refused() -> None:
+    xml = """<mujoco><worldbody>
+      <body name="slider"><joint type="slide"/><geom size="0.1"/>
+        <body name="arm"><joint type="{}"/><geom size="0.1"/></body></body>
+      <body name="part"><freejoint/><geom size="0.1"/></body>
+    </worldbody><equality><weld body1="arm" body2="part"/></equality></mujoco>"""
+    check_holders(mujoco.MjModel.from_xml_string(xml.format("slide")), np.array([0]))
+    turns = mujoco.MjModel.from_xml_string(xml.format("hinge"))
+    check_holders(turns, np.array([], int))
+    with pytest.raises(ValueError, match="arm holds parts and does more than slide"):
+        check_holders(turns, np.array([0]))
