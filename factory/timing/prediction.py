@@ -57,7 +57,9 @@ def ways_ahead(
     }
 
 
-def way_time(stage: HeadStart, start: float, limits: Limits, settings: Settings, world: World) -> float:
+def way_time(
+    stage: HeadStart, start: float, limits: Limits, settings: Settings, world: World
+) -> float:
     """How long a robot with these limits goes ahead from `start` [m], and settles [s]."""
     settle = settings.settle if world == "mujoco" else 0.0
     return mode_time(stage.mode, np.array([start]), limits, world) + settle
