@@ -13,8 +13,8 @@ from pag_values import SHAPES, factory_of, paper, random_pag
 from factory.geometry.product import product_geometry
 from factory.geometry.solids import Product, Solid
 from factory.layout.embedding import lay_out
-from factory.layout.layout import Layout
-from factory.layout.shapes import carriers, is_tool
+from factory.layout.layout import Layout, carriers
+from factory.layout.shapes import is_tool
 from factory.problem.pag import PAG, Assembly, Parameter, Value
 
 STYLES = ("plain", "small", "medium", "large", "far", "mixed")

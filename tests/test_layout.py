@@ -21,8 +21,7 @@ from factory.compiler.compiler import compile_pag
 from factory.geometry.product import product_geometry
 from factory.layout.embedding import lay_out
 from factory.layout.guidepath import hull
-from factory.layout.layout import Layout
-from factory.layout.shapes import carriers
+from factory.layout.layout import Layout, carriers
 from factory.layout.sweeps import piles
 from factory.modes.modes import operation_modes
 from factory.problem.template import Law, Point

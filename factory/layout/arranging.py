@@ -10,9 +10,10 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from factory.layout.guidepath import Box
+from factory.layout.layout import carriers
 from factory.layout.outline import Outline
 from factory.layout.packing import Packing, Task
-from factory.layout.shapes import OUTPUT, Frame, Shape, Sides, carriers, oriented_shape, turned
+from factory.layout.shapes import OUTPUT, Frame, Shape, Sides, oriented_shape, turned
 from factory.layout.sides import admitted
 from factory.layout.stretching import Stretched, outgoing
 from factory.plant.factory import Operation

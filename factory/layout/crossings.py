@@ -18,8 +18,7 @@ from numpy.typing import NDArray
 
 from factory.layout.certificate import Fault, fault
 from factory.layout.guidepath import Point2
-from factory.layout.layout import Layout
-from factory.layout.shapes import carriers
+from factory.layout.layout import Layout, carriers
 from factory.problem.pag import NOPART
 
 Index = NDArray[np.intp]

@@ -11,8 +11,8 @@ from factory.geometry.solids import Product
 from factory.layout.certificate import ALWAYS, ARM_BODY, CARRIAGE_BODY, MAST_BODY, OUTFEED, Region
 from factory.layout.dimensions import CARRIAGE, Clearance, up
 from factory.layout.guidepath import Box, Extent, Guidepath, hull
-from factory.layout.layout import Layout
-from factory.layout.shapes import Shape, carriers, headings
+from factory.layout.layout import Layout, carriers
+from factory.layout.shapes import Shape, headings
 from factory.layout.stretching import Stretched
 from factory.layout.sweeps import piles, regions
 from factory.plant.factory import Factory

@@ -200,4 +200,12 @@ class Layout:
         return xhi - xlo
 
 
-__all__ = ["BESIDE", "Box", "Extent", "Feeder", "Guidepath", "Layout", "Point2"]
+def carriers(factory: Factory) -> list[int]:
+    """For each robot the carrier it delivers to; -1 for the output robot."""
+    return [
+        -1 if robot.index == 0 else factory.operations[robot.operations[-1]].carrier
+        for robot in factory.robots
+    ]
+
+
+__all__ = ["BESIDE", "Box", "Extent", "Feeder", "Guidepath", "Layout", "Point2", "carriers"]

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from factory.geometry.solids import Product
 from factory.layout.dimensions import Clearance, up
 from factory.layout.guidepath import Box, Extent, Point2, project
+from factory.layout.layout import carriers
 from factory.layout.sweeps import piles
 from factory.plant.factory import Factory
 from factory.problem.pag import NOPART
@@ -125,14 +126,6 @@ def carried(factory: Factory, robot: int) -> list[int]:
         number
         for number in factory.robots[robot].operations
         if factory.operations[number].carrier == robot and number != factory.dropoff.index
-    ]
-
-
-def carriers(factory: Factory) -> list[int]:
-    """For each robot the carrier it delivers to; -1 for the output robot."""
-    return [
-        -1 if robot.index == 0 else factory.operations[robot.operations[-1]].carrier
-        for robot in factory.robots
     ]
 
 

@@ -9,7 +9,8 @@ output robot.
 from __future__ import annotations
 
 from factory.layout.guidepath import Point2
-from factory.layout.shapes import OUTPUT, Frame, Sides, carriers, turned
+from factory.layout.layout import carriers
+from factory.layout.shapes import OUTPUT, Frame, Sides, turned
 from factory.plant.factory import Factory, Operation
 from factory.problem.pag import NOPART
 

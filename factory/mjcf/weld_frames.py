@@ -8,16 +8,23 @@ the coordinates of at most two slide joints, and never turns.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from factory.control.mode import Array, Index
-from factory.support.engine import mujoco
+
+if TYPE_CHECKING:
+    from factory.support.engine import mujoco
 
 PARK, FEED, GRIP, HOLD = range(4)
 KINDS = {"park": PARK, "feed": FEED, "grip": GRIP, "hold": HOLD}
 """What holds a part, by the first word of a weld's name: its parking place, its feeder, a robot,
 the outfeed's tray."""
+
+SLIDE = 2
+"""The engine's number of the slide joint, `mjJNT_SLIDE`: logs are written and read without the
+engine."""
 
 ROWS = 6
 """Rows of a weld among the engine's constraints: three of place, three of turn."""
@@ -36,7 +43,7 @@ class Slides:
     def of(cls, m: mujoco.MjModel, d: mujoco.MjData) -> Slides:
         """Those of a model, whose kinematics in `d` are up to date."""
         own = np.where(m.body_jntnum > 0, m.body_jntadr, -1)
-        own[m.jnt_type[own] != int(mujoco.mjtJoint.mjJNT_SLIDE)] = -1
+        own[m.jnt_type[own] != SLIDE] = -1
         joint = np.stack([own, own[m.body_parentid]], axis=1)
         way = np.where(joint[:, :, None] < 0, 0.0, d.xaxis[joint])
         return cls(m.jnt_qposadr[joint], m.jnt_dofadr[joint], way)
@@ -66,10 +73,7 @@ class WeldFrames:
         along, way = slides.qpos[holder], slides.way[holder]
         base = held_at(m, np.arange(m.neq), d.xpos, d.xmat)
         base -= (way * d.qpos[along][:, :, None]).sum(axis=1)
-        turn = np.empty((m.neq, 4))
-        for weld, quaternion in enumerate(d.xquat[holder]):
-            mujoco.mju_mulQuat(turn[weld], quaternion, m.eq_data[weld, 6:10])
-        return cls(base, along, way, turn)
+        return cls(base, along, way, _products(d.xquat[holder], m.eq_data[:, 6:10]))
 
     def chosen(self, welds: Index) -> WeldFrames:
         """Those of some welds, in that order."""
@@ -85,7 +89,7 @@ def check_holders(m: mujoco.MjModel, welds: Index) -> None:
     """Raises ValueError where the first body of a weld does more than slide."""
     joints, up = m.body_jntnum, m.body_parentid
     first = m.jnt_type[np.minimum(m.body_jntadr, m.njnt - 1)]
-    slides = (joints == 0) | (joints == 1) & (first == int(mujoco.mjtJoint.mjJNT_SLIDE))
+    slides = (joints == 0) | (joints == 1) & (first == SLIDE)
     for body in np.unique(m.eq_obj1id[welds]):
         if not (slides[body] and slides[up[body]] and m.body_weldid[up[up[body]]] == 0):
             raise ValueError(f"{m.body(int(body)).name} holds parts and does more than slide")
@@ -114,3 +118,10 @@ def residuals(d: mujoco.MjData) -> Array:
 def soften(m: mujoco.MjModel, factor: float) -> None:
     """Multiply the time constants of all welds by a factor."""
     m.eq_solref[:, 0] *= factor
+
+
+def _products(p: Array, q: Array) -> Array:
+    """The products of quaternions (n, 4), w first."""
+    scalar = p[:, :1] * q[:, :1] - (p[:, 1:] * q[:, 1:]).sum(axis=1, keepdims=True)
+    vector = p[:, :1] * q[:, 1:] + q[:, :1] * p[:, 1:] + np.cross(p[:, 1:], q[:, 1:])
+    return np.hstack([scalar, vector])

@@ -13,7 +13,6 @@ from factory.mjcf import names
 from factory.mjcf.weld_frames import GRIP, KINDS, WeldFrames, check_holders
 from factory.plant.factory import Factory
 from factory.record.monitor.observation import Index
-from factory.support.engine import mujoco
 
 Holder = tuple[int, int]
 """Kind and, for a grip, the robot's index; -1 for others."""
@@ -47,6 +46,8 @@ class Anatomy:
     @classmethod
     def of(cls, m: Any, factory: Factory) -> Anatomy:
         """The anatomy of an engine's model. Raises ValueError where it is not of that factory."""
+        from factory.support.engine import mujoco  # logs are written and read without the engine
+
         robots = {r.name: r.index for r in factory.robots}
         try:
             slide = [m.joint(names.slide(r)).id for r in robots]
