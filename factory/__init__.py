@@ -134,11 +134,12 @@ def run(
     """Run the net over a world until `units` products are dropped off.
 
     `seed` and `jitter` draw each robot's speed and gain within ± jitter; `max_time` [s] of
-    simulated time; further options are those of `Simulation`. Raises RunError for a run that
+    simulated time; further options are those of a `RunRequest`. Raises RunError for a run that
     stalls or takes longer, InputError where the engine refuses a mesh.
     """
+    from factory.simulation.request import RunRequest
     from factory.simulation.simulation import Simulation, require
 
-    options = {"shown": False, **options}
-    simulation = Simulation(layout, world, units, seed, jitter, settings, **options)
-    return require(simulation.run(max_time=max_time))
+    options = {"shown": False, "settings": settings or Settings(), **options}
+    request = RunRequest(world, units, seed, jitter, **options)
+    return require(Simulation(layout, request).run(max_time=max_time))

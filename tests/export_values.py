@@ -14,6 +14,7 @@ import pytest
 
 from factory.export import Made, Subject, exporters
 from factory.layout.layout import Layout
+from factory.simulation.request import RunRequest
 from factory.simulation.simulation import Simulation
 from tests.command_line import PAPER, ROOT
 
@@ -65,7 +66,7 @@ def kept_log(layout: Layout, path: Path, **options: Any) -> Path:
     """A log of a run."""
     from factory.record.log import LogWriter
 
-    simulation = Simulation(layout, **options)
+    simulation = Simulation(layout, RunRequest(**options))
     with LogWriter(path, simulation) as log:
         simulation.run(observers=[log])
     return path

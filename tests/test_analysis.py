@@ -25,6 +25,7 @@ from factory.layout.layout import Layout
 from factory.modes.modes import robot_limits
 from factory.nets.cycle_ratio import max_cycle_ratio
 from factory.nets.marked import MarkedNet
+from factory.simulation.request import RunRequest
 from factory.simulation.run import Run
 from factory.simulation.simulation import Simulation
 from factory.study.analysis import Change, Timing, analyse
@@ -236,7 +237,7 @@ def test_littles_law(seed: int, wip: int | None) -> None:
 def test_the_run_that_is_predicted_is_the_ideal_one(jitter: float) -> None:
     for layout in layouts():
         timing = Timing(layout, Settings(), "ideal", 5, jitter)
-        run = Simulation(layout, "ideal", 6, 5, jitter).run()
+        run = Simulation(layout, RunRequest("ideal", units=6, seed=5, jitter=jitter)).run()
         found = flow(timing, timed_net(timing), 6)
         ticks = timing.settings.tick * 3 * len(layout.factory.operations)
         assert found.first == pytest.approx(run.dropoffs[0], abs=ticks, rel=0.02)
@@ -257,7 +258,7 @@ def test_units_are_as_many_as_it_takes(early: int, share: float, pace: float) ->
 
 @cache
 def made() -> Run:
-    return Simulation(paper_layout(), "ideal", 1).run()
+    return Simulation(paper_layout(), RunRequest("ideal", units=1)).run()
 
 
 @pytest.mark.parametrize("kind", ["speed", "acceleration", "way"])
@@ -284,9 +285,13 @@ def test_sensitivity_is_what_a_changed_run_shows(
         acceleration[2] *= change.acceleration.get(2, 1.0)
         return Limits(speed, acceleration), gains
 
-    before = Simulation(timing.layout, "ideal", 6, settings=slow).run().cycle_time_s
+    before = (
+        Simulation(timing.layout, RunRequest("ideal", units=6, settings=slow)).run().cycle_time_s
+    )
     monkeypatch.setattr("factory.simulation.simulation.robot_limits", limits)
-    after = Simulation(timing.layout, "ideal", 6, settings=slow).run().cycle_time_s
+    after = (
+        Simulation(timing.layout, RunRequest("ideal", units=6, settings=slow)).run().cycle_time_s
+    )
     assert before is not None and after is not None
     assert abs(predicted) > 0.2
     assert before - after == pytest.approx(predicted, abs=0.06)

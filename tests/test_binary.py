@@ -17,6 +17,7 @@ from factory.mjcf import binary, loading
 from factory.mjcf.binary import beside, kept, key_of, packed, seal_of, sealed
 from factory.mjcf.model import Model
 from factory.record.log import LogWriter
+from factory.simulation.request import RunRequest
 from factory.simulation.simulation import Simulation, physical_model
 from tests.command_line import PAPER, ROOT, Terminal, files_in
 from tests.fidelity.products import layout
@@ -209,7 +210,7 @@ def test_the_same_run_with_and_without_the_cache(
     """Event by event and state by state: the logs are equal, byte by byte."""
     logs = []
     for number in range(2):
-        made = Simulation(layout("paper"), units=2, seed=3, jitter=0.2)
+        made = Simulation(layout("paper"), RunRequest(units=2, seed=3, jitter=0.2))
         with LogWriter(tmp_path / f"{number}.log", made, command=["factory"]) as log:
             run = made.run([log.observe])
         logs.append((run.events, (tmp_path / f"{number}.log").read_bytes()))

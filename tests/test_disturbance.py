@@ -17,6 +17,7 @@ from factory.simulation.disturbance import (
     Slowed,
     disturb,
 )
+from factory.simulation.request import RunRequest
 from factory.simulation.simulation import Simulation
 from factory.support.engine import mujoco
 from factory.support.errors import InputError
@@ -25,7 +26,7 @@ from tests.fidelity.products import PAPER, layout
 
 
 def simulated(*wanted, **options) -> Simulation:
-    return disturb(Simulation(layout(PAPER), units=1, **options), *wanted)
+    return disturb(Simulation(layout(PAPER), RunRequest(units=1, **options)), *wanted)
 
 
 def final(simulation: Simulation) -> np.ndarray:
@@ -33,7 +34,7 @@ def final(simulation: Simulation) -> np.ndarray:
 
 
 def test_without_disturbances_a_run_is_the_same_to_the_bit() -> None:
-    plain, other = simulated(), disturb(Simulation(layout(PAPER), units=1), *())
+    plain, other = simulated(), disturb(Simulation(layout(PAPER), RunRequest(units=1)), *())
     one, two = plain.run(), other.run()
     assert one.events == two.events and one.physics == two.physics
     assert (final(plain) == final(other)).all()

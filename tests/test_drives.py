@@ -15,6 +15,7 @@ from factory.mjcf import model
 from factory.mjcf.model import CARRIAGE_MASS, HOIST_STIFFNESS, STIFFNESS, drive_for
 from factory.mjcf.robots import Drive
 from factory.simulation.mujoco.drives import Setpoints
+from factory.simulation.request import RunRequest
 from factory.simulation.simulation import Simulation
 from factory.support.settings import RANGES, Settings
 from tests.test_fuse import layout_of
@@ -67,7 +68,7 @@ def test_with_short_timesteps_drives_are_as_stiff_as_ever() -> None:
 def test_long_timesteps_do(name: str, timestep: float) -> None:
     """Gaps stay below 0.3 mm and welds hold, with robots and drives that differ."""
     settings = Settings(timestep=timestep, substeps=1)
-    run = Simulation(layout(name), units=2, seed=3, jitter=0.5, settings=settings).run()
+    run = Simulation(layout(name), RunRequest(units=2, seed=3, jitter=0.5, settings=settings)).run()
     figures: Any = run.physics
     assert run.trouble is None
     assert run.refines_net
@@ -81,7 +82,7 @@ def test_drives_that_are_too_stiff_for_the_timestep_are_noticed(
     monkeypatch.setattr(model, "PUSHED", 1e9)
     monkeypatch.setattr(model, "DAMPED", 1e9)
     settings = Settings(timestep=0.02, substeps=1)
-    run = Simulation(layout_of("paper"), units=2, settings=settings).run()
+    run = Simulation(layout_of("paper"), RunRequest(units=2, settings=settings)).run()
     assert run.trouble is not None
 
 
@@ -89,7 +90,7 @@ def largest_error() -> float:
     """How far any robot of the paper's example is from its reference [m] at the end of any tick of
     8 m/s^2, while that moves."""
     settings = Settings(acceleration=8.0, speed=2.0)
-    simulation = Simulation(layout_of("paper"), units=2, settings=settings)
+    simulation = Simulation(layout_of("paper"), RunRequest(units=2, settings=settings))
     world, largest = simulation.world, 0.0
     while not world.delivered():
         simulation.supervisor.step()

@@ -17,6 +17,7 @@ import pytest
 import factory
 from factory.layout.layout import Layout
 from factory.mjcf.weld_frames import soften
+from factory.simulation.request import RunRequest
 from factory.simulation.run import Event
 from factory.simulation.simulation import Simulation
 from factory.study.fidelity import QUANTITIES, SeedRecord, measure, measure_seed, study
@@ -80,8 +81,8 @@ def test_a_histogram_gives_quantiles_within_a_bin() -> None:
 
 @pytest.mark.parametrize("name", ["paper", "meshes", "kary"])
 def test_measuring_does_not_change_the_run_by_a_bit(name: str) -> None:
-    one = Simulation(layout(name), units=2, seed=3, jitter=0.3)
-    other = Simulation(layout(name), units=2, seed=3, jitter=0.3)
+    one = Simulation(layout(name), RunRequest(units=2, seed=3, jitter=0.3))
+    other = Simulation(layout(name), RunRequest(units=2, seed=3, jitter=0.3))
     first, second = one.run(), Measurement(other).run()
     assert first.events == second.events
     assert first.physics == second.physics
@@ -91,7 +92,7 @@ def test_measuring_does_not_change_the_run_by_a_bit(name: str) -> None:
 
 @pytest.mark.parametrize("name", ["paper", "meshes", "unary"])
 def test_figures_agree_with_those_the_run_keeps(name: str) -> None:
-    simulation = Simulation(layout(name), units=3, seed=2, jitter=0.3)
+    simulation = Simulation(layout(name), RunRequest(units=3, seed=2, jitter=0.3))
     measurement = Measurement(simulation)
     run = measurement.run()
     found = measurement.figures()
@@ -151,7 +152,7 @@ def test_a_misplaced_grip_injects_what_its_spring_holds(metres: float) -> None:
 
 
 def test_speed_step_impulse_and_energy_of_known_motion() -> None:
-    simulation = Simulation(layout(), units=2, seed=0)
+    simulation = Simulation(layout(), RunRequest(units=2, seed=0))
     measurement = Measurement(simulation)
     with measurement._steps:
         while not measurement.welds.carried().size:
@@ -180,7 +181,7 @@ def test_speed_step_impulse_and_energy_of_known_motion() -> None:
 
 
 def test_a_carrier_that_moves_along_gives_no_speed_step() -> None:
-    simulation = Simulation(layout(), units=2, seed=0)
+    simulation = Simulation(layout(), RunRequest(units=2, seed=0))
     measurement = Measurement(simulation)
     with measurement._steps:
         while not measurement.welds.carried().size:

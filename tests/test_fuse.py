@@ -16,6 +16,7 @@ from factory.plant.fused_bodies import FUSE_FROM, bodies_of, fused_copies, fusin
 from factory.record.monitor import beside
 from factory.simulation.disturbance import Mass, disturb
 from factory.simulation.mujoco.fusing import Fusion, turned
+from factory.simulation.request import RunRequest
 from factory.simulation.simulation import Simulation, physical_model
 from factory.support.engine import mujoco
 from tests.command_line import PAPER, ROOT, Terminal
@@ -96,7 +97,7 @@ def test_a_rigid_motion_goes_over_unchanged() -> None:
 
 
 def test_what_has_become_heavier_keeps_its_momentum() -> None:
-    simulation = Simulation(layout_of("gearbox"), units=1, fuse=True)
+    simulation = Simulation(layout_of("gearbox"), RunRequest(units=1, fuse=True))
     m, d, stock = simulation.world.m, simulation.world.d, simulation.world.stock
     disturb(simulation, Mass(2.0, tuple(stock.feed)[:2]))
     whole = int(next(stock.body[label][0] for label in stock.body if label not in stock.feed))
@@ -151,7 +152,9 @@ def test_turns_are_those_of_the_engine() -> None:
 @pytest.mark.parametrize(("name", "least"), [("paper", 1e-6), ("lamp", 1e-4), ("gearbox", 1e-4)])
 def test_a_fused_run_agrees_with_the_unfused(name: str, least: float) -> None:
     layout = layout_of(name)
-    one, other = (Simulation(layout, units=2, jitter=0.3, seed=2, fuse=f) for f in (False, True))
+    one, other = (
+        Simulation(layout, RunRequest(units=2, jitter=0.3, seed=2, fuse=f)) for f in (False, True)
+    )
     apart, fused = one.run(), other.run()
     assert fused.products == apart.products == 2
     assert [e.transition for e in fused.events] == [e.transition for e in apart.events]
@@ -210,13 +213,13 @@ def test_what_is_only_worked_upon_stays_the_body_that_it_is() -> None:
     }  # fmt: skip
     copies = fused_copies(bodies, layout.factory, None)
     assert copies == {"e": 2, "d": 2, "b": 2}
-    run = Simulation(layout, units=3, fuse=True).run()
+    run = Simulation(layout, RunRequest(units=3, fuse=True)).run()
     assert run.products == 3 and run.physics and run.physics.unintended_contacts == 0
 
 
 @pytest.mark.parametrize("name", ["paper", "lamp"])
 def test_the_monitor_explains_a_fused_run(name: str) -> None:
-    simulation = Simulation(layout_of(name), units=3, jitter=0.3, seed=1, fuse=True)
+    simulation = Simulation(layout_of(name), RunRequest(units=3, jitter=0.3, seed=1, fuse=True))
     monitor = beside(simulation)
     run = simulation.run([monitor.observe])
     report = monitor.report()
@@ -226,7 +229,7 @@ def test_the_monitor_explains_a_fused_run(name: str) -> None:
 
 def test_the_monitor_catches_a_body_made_of_another_unit() -> None:
     """Planted: the product appears in the output robot's hands, but one input stays there."""
-    simulation = Simulation(layout_of("paper"), units=2, fuse=True)
+    simulation = Simulation(layout_of("paper"), RunRequest(units=2, fuse=True))
     stock = simulation.world.stock
     retire = stock._retire
     kept: list[str] = []
@@ -285,7 +288,7 @@ def test_a_body_that_has_just_become_free_can_take_the_place_of_others(
     """The only copy of a sub-assembly is still joined to something else when the next one is
     made; both become one in the same tick, in either order."""
     monkeypatch.setattr("factory.simulation.mujoco.parts.SETTLING", np.inf)
-    simulation = Simulation(layout_of("chest"), units=4, fuse=True)
+    simulation = Simulation(layout_of("chest"), RunRequest(units=4, fuse=True))
     world, stock = simulation.world, simulation.world.stock
     found: list[tuple[int, int]] = []
     while not found:

@@ -9,6 +9,7 @@ from pag_values import SHAPES
 
 from factory.layout.certificate import KINDS, NAMES
 from factory.layout.layout import Box, Layout
+from factory.simulation.request import RunRequest
 from factory.simulation.simulation import Simulation
 from factory.support.settings import Settings
 
@@ -24,7 +25,9 @@ LAYOUTS = [
 def test_nothing_touches(number: int) -> None:
     """Two or three units, every robot with a speed and a gain of its own."""
     layout = LAYOUTS[number]
-    run = Simulation(layout, "mujoco", 2 + number % 2, seed=number, jitter=0.3).run()
+    run = Simulation(
+        layout, RunRequest("mujoco", units=2 + number % 2, seed=number, jitter=0.3)
+    ).run()
     assert run.trouble is None, str(run.trouble)
     assert run.refines_net
     assert run.physics is not None

@@ -13,6 +13,7 @@ from factory.geometry.product import product_geometry
 from factory.layout.embedding import lay_out
 from factory.layout.layout import Layout
 from factory.layout.sides import admissible, admitted
+from factory.simulation.request import RunRequest
 from factory.simulation.simulation import Simulation
 from tests.test_compiler import PAPER, compiled
 
@@ -29,7 +30,7 @@ def laid_out(text: str) -> Layout:
 
 def deepest(layout: Layout) -> float:
     """How deep any two parts of one product are in each other at any tick of its making [m]."""
-    simulation = Simulation(layout, units=1)
+    simulation = Simulation(layout, RunRequest(units=1))
     m, d = simulation.world.m, simulation.world.d
     parts = [m.geom(f"part/{o.label}#1").id for o in layout.factory.leaves]
     line, worst = np.zeros(6), [0.0]
@@ -56,7 +57,7 @@ def test_inputs_from_the_wrong_sides_are_seen(monkeypatch: pytest.MonkeyPatch) -
 
     monkeypatch.setattr(optimising, "admissible", swapped)
     monkeypatch.setattr(arranging, "admitted", lambda *given: not admitted(*given))
-    simulation = Simulation(laid_out(BALANCED), units=1)
+    simulation = Simulation(laid_out(BALANCED), RunRequest(units=1))
     run = simulation.run()
     assert run.trouble is not None and run.trouble.code == "Stalled"
     assert run.physics.mating_force_max_n > 10

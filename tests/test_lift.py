@@ -20,6 +20,7 @@ from factory.pipeline import all_templates
 from factory.plant.approaches import MARGIN
 from factory.plant.factory import Factory
 from factory.problem.robot_types import load_catalogue
+from factory.simulation.request import RunRequest
 from factory.simulation.simulation import Simulation
 from factory.support.errors import InputError
 from tests.test_compiler import compiled
@@ -99,7 +100,9 @@ def test_what_cannot_slide_is_brought_by_a_lift(text: str, lowered: set[str]) ->
 def test_lifts_lower_in_either_world(text: str, distributed: bool, world: str) -> None:
     """With every robot at a speed of its own; contact is on for all parts."""
     layout = laid_out(text)
-    simulation = Simulation(layout, world, 4, seed=5, jitter=0.3, distributed=distributed)
+    simulation = Simulation(
+        layout, RunRequest(world, units=4, seed=5, jitter=0.3, distributed=distributed)
+    )
     run = simulation.run()
     assert run.trouble is None, str(run.trouble)
     assert run.products == 4 and run.refines_net
@@ -152,7 +155,7 @@ def test_it_is_lowered_only_when_all_others_stand() -> None:
     factory = layout.factory
     robot = next(iter(factory.strokes))
     last = factory.operations[factory.robots[robot].operations[-1]]
-    simulation = Simulation(layout, units=1)
+    simulation = Simulation(layout, RunRequest(units=1))
     goals = np.array([layout.goal(last.index, s) for s in range(len(last.robots))])
     seen = []
 
@@ -169,7 +172,7 @@ def test_it_is_lowered_only_when_all_others_stand() -> None:
 
 def test_runs_start_from_any_marking_of_a_factory_with_lifts() -> None:
     layout = laid_out(FENCE)
-    ideal = Simulation(layout, "ideal", units=2)
+    ideal = Simulation(layout, RunRequest("ideal", units=2))
     places = set()
     while ideal.world.delivered() < 2:
         ideal.supervisor.step()
@@ -177,7 +180,7 @@ def test_runs_start_from_any_marking_of_a_factory_with_lifts() -> None:
     chosen = sorted(places, key=sorted)[:: max(1, len(places) // 6)]
     assert len(chosen) >= 6
     for marking in chosen:
-        run = Simulation(layout, units=1, start=marking).run()
+        run = Simulation(layout, RunRequest(units=1, start=marking)).run()
         assert run.trouble is None and run.refines_net, str(run.trouble)
         assert run.physics.unintended_contacts == 0, run.physics.contacts
         assert run.physics.handoff_gap_max_mm < 0.2
@@ -205,7 +208,7 @@ def test_without_a_lift_the_ball_is_blocked_and_its_pairs_left_out() -> None:
     kinds = {o.label: o.approach.kind for o in layout.factory.operations if o.approach}
     assert "blocked" in kinds.values()
     assert any("ball" in pair for pair in layout.excluded)
-    run = Simulation(layout, units=2).run()
+    run = Simulation(layout, RunRequest(units=2)).run()
     assert run.trouble is None and run.physics.unintended_contacts == 0
 
 

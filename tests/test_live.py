@@ -36,6 +36,7 @@ from factory.show.live.commands import (
 from factory.show.live.page import page, stage_of
 from factory.show.report.drawings import floor_plan
 from factory.show.report.links import labels_of
+from factory.simulation.request import RunRequest
 from factory.simulation.simulation import Simulation
 from factory.support.errors import InputError
 from tests.command_line import PAPER, Terminal, started
@@ -97,7 +98,7 @@ def test_what_is_no_command_is_explained(message: str | bytes, words: str) -> No
 
 def moved(share: float) -> float:
     """The greatest distance that a push moves a waiting robot along its guidepath [m]."""
-    simulation = Simulation(paper_layout(), units=10)
+    simulation = Simulation(paper_layout(), RunRequest(units=10))
     hands, world = Hands(simulation), simulation.world
     hands.block("part1")
     start = float(world.d.qpos[world.qpos[0]])
@@ -122,7 +123,7 @@ def test_hands_in_a_run_break_no_law(pushed: bool) -> None:
     """Slowed and blocked at random, and in one of two runs pushed, the run still refines the net
     and makes its products; the monitor agrees where nobody is pushed, which it could not tell from
     a fault."""
-    simulation = Simulation(paper_layout(), units=12)
+    simulation = Simulation(paper_layout(), RunRequest(units=12))
     hands, watcher, draw = Hands(simulation), beside(simulation), np.random.default_rng(5)
     ticks = 0
 
@@ -149,7 +150,7 @@ def test_hands_in_a_run_break_no_law(pushed: bool) -> None:
 
 def test_the_ideal_world_cannot_be_touched() -> None:
     with pytest.raises(InputError, match="nothing to push"):
-        Hands(Simulation(paper_layout(), "ideal"))
+        Hands(Simulation(paper_layout(), RunRequest("ideal")))
 
 
 # --- a session ---------------------------------------------------------------------------------
@@ -161,7 +162,7 @@ class Stopped(Exception):
 
 def a_session(playing: bool) -> Session:
     """A session of the paper's example, without end; it does not run yet."""
-    return Session(lambda: Simulation(paper_layout(), units=10**9), playing)
+    return Session(lambda: Simulation(paper_layout(), RunRequest(units=10**9)), playing)
 
 
 class Running:
@@ -388,7 +389,7 @@ def test_a_port_that_is_taken(running: Running) -> None:
 
 
 def test_the_page_names_every_robot_and_part(running: Running) -> None:
-    made = page(Session(lambda: Simulation(paper_layout(), units=9))).decode()
+    made = page(Session(lambda: Simulation(paper_layout(), RunRequest(units=9)))).decode()
     data = json.loads(made.split('id="data">')[1].split("</script>")[0])
     assert data["parts"] == [o.label for o in paper_layout().factory.leaves]
     assert len(data["frames"]["reach"][0]) == len(data["frames"]["moving"])

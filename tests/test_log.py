@@ -16,6 +16,7 @@ import factory
 from factory.record.log import MAGIC, Log, LogWriter, is_log, read_log
 from factory.record.log import writer as writing
 from factory.record.log.blocks import HEAD, LENGTH, pack_rows, unpack_rows
+from factory.simulation.request import RunRequest
 from factory.simulation.simulation import Simulation
 from factory.support.engine import mujoco
 from factory.support.errors import InputError
@@ -48,7 +49,7 @@ class Witness:
 @pytest.fixture(scope="module")
 def recorded(layout, tmp_path_factory: pytest.TempPathFactory):
     path = tmp_path_factory.mktemp("log") / "run.log"
-    simulation = Simulation(layout, "mujoco", 2, seed=3, jitter=0.2)
+    simulation = Simulation(layout, RunRequest("mujoco", units=2, seed=3, jitter=0.2))
     m = simulation.world.m
     part = m.geom("part/part3#1").id
     reach = 0.03  # the engine lists contacts from this far on, so that there are some to log
@@ -86,7 +87,7 @@ def test_the_header_has_all_that_made_the_run(recorded) -> None:
     assert header["world"] == "mujoco" and header["command"] == ["factory", "run"]
     assert header["pag"]["text"] == PAPER.read_text("utf-8") and len(header["pag"]["sha256"]) == 64
     assert header["versions"]["mujoco"] == mujoco.__version__
-    assert header["settings"]["timestep"] == simulation.settings.timestep
+    assert header["settings"]["timestep"] == simulation.request.settings.timestep
     assert header["wip"] is None and len(header["start"]) == 6
     assert set(header["templates"]) == {"atomic", "mate", "weld", "dropoff"}
     assert header["places"] == [p.name for p in simulation.supervisor.net.places]
@@ -108,7 +109,7 @@ def test_a_log_without_setpoints_is_still_read(
         return {k: a for k, a in arrays(self).items() if not k.startswith("ctrl")}
 
     monkeypatch.setattr(writing._Ticks, "arrays", older)
-    simulation = Simulation(layout, "mujoco", 1)
+    simulation = Simulation(layout, RunRequest("mujoco", units=1))
     with LogWriter(tmp_path / "old", simulation) as writer:
         simulation.run([writer.observe], 0.1)
     log = read_log(tmp_path / "old")
@@ -208,11 +209,11 @@ def test_a_folder_or_nothing_is_no_log(tmp_path: Path) -> None:
 
 def test_a_log_that_cannot_be_written_is_refused(layout, tmp_path: Path) -> None:
     with pytest.raises(InputError, match="BadLog"):
-        LogWriter(tmp_path, Simulation(layout, "ideal", 1))
+        LogWriter(tmp_path, Simulation(layout, RunRequest("ideal", units=1)))
 
 
 def test_an_interrupted_run_leaves_a_closed_log(layout, tmp_path: Path) -> None:
-    simulation = Simulation(layout, "mujoco", 1)
+    simulation = Simulation(layout, RunRequest("mujoco", units=1))
 
     def interrupt(world, supervisor) -> None:
         if world.time > 1.234:
@@ -226,7 +227,7 @@ def test_an_interrupted_run_leaves_a_closed_log(layout, tmp_path: Path) -> None:
 
 
 def test_the_ideal_world_logs_arc_lengths(layout, tmp_path: Path) -> None:
-    simulation = Simulation(layout, "ideal", 2)
+    simulation = Simulation(layout, RunRequest("ideal", units=2))
     with LogWriter(tmp_path / "ideal", simulation) as writer:
         run = simulation.run([writer.observe])
     log = read_log(tmp_path / "ideal")

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from factory.simulation.request import RunRequest
 from factory.simulation.simulation import Simulation
 from tests.fidelity import long_runs
 from tests.fidelity.__main__ import REPORT
@@ -16,7 +17,7 @@ from tests.fidelity.products import PAPER, layout
 @pytest.fixture
 def running() -> Simulation:
     """A run in the middle of its work."""
-    simulation = Simulation(layout(PAPER), units=8)
+    simulation = Simulation(layout(PAPER), RunRequest(units=8))
     while len(simulation.world.dropoffs) < 3:
         simulation.supervisor.step()
     return simulation
@@ -31,7 +32,7 @@ def test_thirty_units_do_not_drift() -> None:
 
 
 def test_every_copy_is_somewhere_at_every_tick() -> None:
-    simulation, seen = Simulation(layout(PAPER), units=4), set()
+    simulation, seen = Simulation(layout(PAPER), RunRequest(units=4)), set()
     wrong: list[str] = []
 
     def look(world, supervisor) -> None:

@@ -22,6 +22,7 @@ from factory.record.log import Log, LogWriter, read_log
 from factory.record.monitor import MonitorSubject, Report, beside, subject_of
 from factory.record.monitor.explanation import SeenFirings
 from factory.record.monitor.record import watch_log
+from factory.simulation.request import RunRequest
 from factory.simulation.simulation import Simulation
 from factory.support.errors import InputError
 from factory.support.settings import Settings
@@ -61,7 +62,7 @@ def paper() -> Layout:
 @pytest.mark.parametrize("distributed", [False, True])
 def test_every_shape_of_product_is_explained(name: str, distributed: bool) -> None:
     simulation = Simulation(
-        laid_out(PRODUCTS[name]), units=2, seed=1, jitter=0.3, distributed=distributed
+        laid_out(PRODUCTS[name]), RunRequest(units=2, seed=1, jitter=0.3, distributed=distributed)
     )
     assert_explained(simulation, *watched(simulation))
 
@@ -70,19 +71,23 @@ def test_every_shape_of_product_is_explained(name: str, distributed: bool) -> No
 def test_the_papers_example_is_explained(paper: Layout, seed: int) -> None:
     simulation = Simulation(
         paper,
-        units=3,
-        seed=seed,
-        jitter=0.3,
-        wip=1 + seed // 2 if seed % 2 else None,
-        distributed=seed == 4,
-        settings=Settings(timestep=0.001, substeps=4 + seed),
+        RunRequest(
+            units=3,
+            seed=seed,
+            jitter=0.3,
+            wip=1 + seed // 2 if seed % 2 else None,
+            distributed=seed == 4,
+            settings=Settings(timestep=0.001, substeps=4 + seed),
+        ),
     )
     assert_explained(simulation, *watched(simulation))
 
 
 @pytest.mark.parametrize("seed", range(6))
 def test_a_run_from_a_marking_is_explained(paper: Layout, seed: int) -> None:
-    simulation = Simulation(paper, units=2, seed=seed, start=random_marking(paper, seed))
+    simulation = Simulation(
+        paper, RunRequest(units=2, seed=seed, start=random_marking(paper, seed))
+    )
     assert_explained(simulation, *watched(simulation))
 
 
@@ -91,7 +96,7 @@ def test_random_factories_give_no_false_alarm(seed: int) -> None:
     style = ("plain", "small", "medium", "mixed")[seed % 4]
     layout = random_layout(3 + seed, seed, style=style)
     simulation = Simulation(
-        layout, units=2, seed=seed, jitter=0.3 * (seed % 2), distributed=seed % 4 == 3
+        layout, RunRequest(units=2, seed=seed, jitter=0.3 * (seed % 2), distributed=seed % 4 == 3)
     )
     assert_explained(simulation, *watched(simulation))
 
@@ -99,7 +104,7 @@ def test_random_factories_give_no_false_alarm(seed: int) -> None:
 def test_firings_are_seen_to_a_tick(paper: Layout) -> None:
     """Parts that change hands show X_e, the first robot that leaves shows X_s; what has no motion
     of its own is inferred: the first atomic_s, and the ends of welds."""
-    simulation = Simulation(paper, units=2)
+    simulation = Simulation(paper, RunRequest(units=2))
     run, report = watched(simulation)
     count: Counter[str] = Counter()
     when = {}
@@ -108,7 +113,7 @@ def test_firings_are_seen_to_a_tick(paper: Layout) -> None:
         count[event.transition] += 1
     for firing in report.seen:
         assert firing.seen == pytest.approx(when[firing.transition, firing.unit], abs=1e-9)
-        assert firing.latest - firing.seen <= simulation.settings.tick + 1e-9
+        assert firing.latest - firing.seen <= simulation.request.settings.tick + 1e-9
     inferred = {(f.transition, f.unit) for f in report.inferred}
     assert inferred == {
         *((f"part{n}_s", 0) for n in (1, 2, 3)),
@@ -121,7 +126,7 @@ def test_robots_that_lower_what_they_bring_are_explained() -> None:
     layout = factory.lay_out(read(ROOT / "examples" / "gearbox.pag").compile())
     lifts = [r for r in layout.factory.robots if r.type == "lift"]
     assert lifts
-    simulation = Simulation(layout, units=1, seed=2, jitter=0.3)
+    simulation = Simulation(layout, RunRequest(units=1, seed=2, jitter=0.3))
     assert_explained(simulation, *watched(simulation))
 
 
@@ -184,7 +189,7 @@ def address(simulation: Simulation, body: str) -> int:
 
 
 def test_a_weld_that_is_never_released(paper: Layout) -> None:
-    simulation = Simulation(paper, units=1)
+    simulation = Simulation(paper, RunRequest(units=1))
     board, kept = simulation.world.stock.board, weld(simulation, "grip/r5/part1")
     loose = board.loose
 
@@ -199,7 +204,7 @@ def test_a_weld_that_is_never_released(paper: Layout) -> None:
 
 
 def test_a_part_that_is_let_go(paper: Layout) -> None:
-    simulation = Simulation(paper, units=1)
+    simulation = Simulation(paper, RunRequest(units=1))
     grip = weld(simulation, "grip/r3/part1")
 
     def let_go() -> None:
@@ -212,7 +217,7 @@ def test_a_part_that_is_let_go(paper: Layout) -> None:
 
 
 def test_a_part_that_is_knocked_off_its_place(paper: Layout) -> None:
-    simulation = Simulation(paper, units=1)
+    simulation = Simulation(paper, RunRequest(units=1))
 
     def knock() -> None:
         simulation.world.d.qpos[address(simulation, "part/part2#1") + 2] -= 0.05
@@ -223,7 +228,7 @@ def test_a_part_that_is_knocked_off_its_place(paper: Layout) -> None:
 
 
 def test_a_part_that_hangs_off_its_weld(paper: Layout) -> None:
-    simulation = Simulation(paper, units=1)
+    simulation = Simulation(paper, RunRequest(units=1))
     grip = weld(simulation, "grip/r3/part1")
 
     def shift() -> None:
@@ -235,14 +240,14 @@ def test_a_part_that_hangs_off_its_weld(paper: Layout) -> None:
 
 
 def test_a_weld_with_a_wrong_frame(paper: Layout) -> None:
-    simulation = Simulation(paper, units=1)
+    simulation = Simulation(paper, RunRequest(units=1))
     simulation.world.m.eq_data[weld(simulation, "grip/r1/part2"), 4] += 0.001
     _, report = watched(simulation, 0.1)
     assert_caught(report, "Frame", "r1", "part2", 7, 0.0)
 
 
 def test_grips_aimed_at_each_others_parts(paper: Layout) -> None:
-    simulation = Simulation(paper, units=1)
+    simulation = Simulation(paper, RunRequest(units=1))
     m = simulation.world.m
     grips = [weld(simulation, f"grip/r3/part{n}") for n in (1, 2)]
 
@@ -257,7 +262,7 @@ def test_grips_aimed_at_each_others_parts(paper: Layout) -> None:
 
 def test_copies_of_two_units_exchanged(paper: Layout) -> None:
     """Bodies and welds both: nothing moves, and every part is held where it should be."""
-    simulation = Simulation(paper, units=2)
+    simulation = Simulation(paper, RunRequest(units=2))
     m, d = simulation.world.m, simulation.world.d
 
     def exchange() -> None:
@@ -309,14 +314,14 @@ def hurry(simulation: Simulation, label: str, delay: float) -> list[float]:
 def test_an_operation_ended_before_its_goal(
     paper: Layout, label: str, delay: float, robot: str, line: int
 ) -> None:
-    simulation = Simulation(paper, units=2)
+    simulation = Simulation(paper, RunRequest(units=2))
     done = hurry(simulation, label, delay)
     _, report = watched(simulation, 4)
     assert_caught(report, "Early", robot, label, line, done[0])
 
 
 def test_a_weld_ended_before_its_dwell(paper: Layout) -> None:
-    simulation = Simulation(paper, units=1)
+    simulation = Simulation(paper, RunRequest(units=1))
     done = hurry(simulation, "sub2", 0.9)
     _, report = watched(simulation, 4)
     assert_caught(report, "Early", "r4", "sub2", 4, done[0])
@@ -324,7 +329,7 @@ def test_a_weld_ended_before_its_dwell(paper: Layout) -> None:
 
 def test_a_weld_ended_on_the_way_to_it(paper: Layout) -> None:
     """The robot does not stop there, and the next operation starts before this one can end."""
-    simulation = Simulation(paper, units=1)
+    simulation = Simulation(paper, RunRequest(units=1))
     done = hurry(simulation, "sub2", 0.2)
     _, report = watched(simulation, 4)
     assert_caught(report, "Order", "r2", "sub3", 3, done[0])
@@ -333,7 +338,7 @@ def test_a_weld_ended_on_the_way_to_it(paper: Layout) -> None:
 
 
 def test_a_robot_whose_drive_does_nothing(paper: Layout) -> None:
-    simulation = Simulation(paper, units=1)
+    simulation = Simulation(paper, RunRequest(units=1))
     m = simulation.world.m
 
     def cut() -> None:
@@ -347,7 +352,7 @@ def test_a_robot_whose_drive_does_nothing(paper: Layout) -> None:
 
 
 def test_a_robot_whose_joint_is_locked(paper: Layout) -> None:
-    simulation = Simulation(paper, units=1)
+    simulation = Simulation(paper, RunRequest(units=1))
     m = simulation.world.m
 
     def lock() -> None:
@@ -359,7 +364,7 @@ def test_a_robot_whose_joint_is_locked(paper: Layout) -> None:
 
 
 def test_an_operation_that_does_not_go_on(paper: Layout) -> None:
-    simulation = Simulation(paper, units=1)
+    simulation = Simulation(paper, RunRequest(units=1))
     number = paper.factory.by_label["sub2"].index
     finished = simulation.supervisor._finished
     simulation.supervisor._finished = lambda: [o for o in finished() if o != number]
@@ -370,8 +375,8 @@ def test_an_operation_that_does_not_go_on(paper: Layout) -> None:
 
 def test_more_parts_let_in_than_allowed(paper: Layout) -> None:
     """The world lets in what it has; the bound in the monitor's subject is one unit at once."""
-    simulation = Simulation(paper, units=2)
-    simulation.wip = 1
+    simulation = Simulation(paper, RunRequest(units=2))
+    simulation.request.wip = 1
     run, report = watched(simulation)
     t = [e.t for e in run.events if e.transition == "part1_s"][1]
     assert_caught(report, "Order", "r5", "part1", 6, t)
@@ -380,7 +385,7 @@ def test_more_parts_let_in_than_allowed(paper: Layout) -> None:
 
 def test_parts_that_the_marking_does_not_account_for(paper: Layout) -> None:
     start = legal_marking(paper.factory.net, "r3:sub1")
-    simulation = Simulation(paper, units=1, start=start)
+    simulation = Simulation(paper, RunRequest(units=1, start=start))
     simulation.start = paper.factory.net.initial_marking
     monitor = beside(simulation)
     found = [(v.code, v.robot, v.label) for v in monitor.violations]
@@ -411,7 +416,7 @@ def test_a_feeder_that_presents_while_its_robot_still_works_there() -> None:
     """Found by the monitor: a run from a marking fed a part into the one that was still there."""
     layout = laid_out(UNARY)
     start = legal_marking(layout.factory.net, "r1:a")
-    simulation = Simulation(layout, units=2, start=start)
+    simulation = Simulation(layout, RunRequest(units=2, start=start))
     assert_explained(simulation, *watched(simulation))
 
 
@@ -421,7 +426,7 @@ def test_a_feeder_that_presents_while_its_robot_still_works_there() -> None:
 def test_a_log_gives_the_same_verdict(paper: Layout, tmp_path: Path) -> None:
     path = tmp_path / "run.log"
     start = legal_marking(paper.factory.net, "sub1")
-    simulation = Simulation(paper, units=2, seed=2, jitter=0.3, wip=2, start=start)
+    simulation = Simulation(paper, RunRequest(units=2, seed=2, jitter=0.3, wip=2, start=start))
     monitor = beside(simulation)
     with LogWriter(path, simulation) as writer:
         simulation.run([writer.observe, monitor.observe])
@@ -463,7 +468,7 @@ def test_a_text_without_a_file_is_kept_in_the_log(tmp_path: Path) -> None:
 
 def test_logs_that_cannot_be_watched(paper: Layout, tmp_path: Path, run: Terminal) -> None:
     path = tmp_path / "ideal"
-    with LogWriter(path, simulation := Simulation(paper, "ideal")) as writer:
+    with LogWriter(path, simulation := Simulation(paper, RunRequest("ideal"))) as writer:
         simulation.run([writer.observe])
     done = run("monitor", path, "--json")
     assert done.status == 2 and done.codes == ["BadLog"]

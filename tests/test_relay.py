@@ -34,6 +34,7 @@ from factory.problem.robot_types import load_catalogue
 from factory.problem.template import Template
 from factory.record.monitor import beside
 from factory.show.report import recording_of
+from factory.simulation.request import RunRequest
 from factory.simulation.simulation import Simulation
 from factory.support.resources import templates_folder
 from factory.support.settings import Settings
@@ -198,7 +199,9 @@ def test_relays_run(fuse: bool, distributed: bool) -> None:
     """In MuJoCo, at jitter, with the monitor beside."""
     layout = relayed(laid_out(cube(32)), SETTINGS)
     assert layout.plain
-    simulation = Simulation(layout, units=2, seed=4, jitter=0.3, fuse=fuse, distributed=distributed)
+    simulation = Simulation(
+        layout, RunRequest(units=2, seed=4, jitter=0.3, fuse=fuse, distributed=distributed)
+    )
     monitor = beside(simulation)
     run = simulation.run([monitor.observe])
     assert (run.products, run.refines_net, run.trouble) == (2, True, None)
@@ -214,7 +217,9 @@ def test_relays_run(fuse: bool, distributed: bool) -> None:
 def test_two_bodies_may_be_made_in_one_tick_of_what_is_alike() -> None:
     """One copy of a relayed sub-assembly goes into a larger one as the next copy is made."""
     layout = relayed(random_layout(9, 156, SHAPES[156 % len(SHAPES)]), SETTINGS, 0.5)
-    simulation = Simulation(layout, units=3, seed=156, jitter=0.3, fuse=True, distributed=True)
+    simulation = Simulation(
+        layout, RunRequest(units=3, seed=156, jitter=0.3, fuse=True, distributed=True)
+    )
     monitor = beside(simulation)
     run = simulation.run([monitor.observe])
     assert (run.products, run.trouble, monitor.report().violations) == (3, None, ())

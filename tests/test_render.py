@@ -27,6 +27,7 @@ from factory.record.log import LogWriter, read_log
 from factory.render import Film, Picture, Still, camera_named, check_output, render_log
 from factory.render.camera import Framing, fit, from_above, overview, towards
 from factory.render.video import VideoFile
+from factory.simulation.request import RunRequest
 from factory.simulation.simulation import Simulation
 from factory.support import gl
 from factory.support.errors import InputError, MissingError
@@ -58,7 +59,7 @@ def layout():
 def taken(layout, tmp_path_factory: pytest.TempPathFactory):
     """A run filmed, logged, and with a still of its finished product."""
     folder = tmp_path_factory.mktemp("taken")
-    simulation = Simulation(layout, "mujoco", 1)
+    simulation = Simulation(layout, RunRequest("mujoco", units=1))
     with (
         LogWriter(folder / "run.log", simulation) as log,
         Film(simulation, folder / "run.mp4", SMALL, FPS) as film,
@@ -98,7 +99,7 @@ def test_the_picture_is_not_blank_and_changes(taken) -> None:
 
 @needs_gl
 def test_filming_does_not_disturb_the_run(taken, layout, tmp_path: Path) -> None:
-    simulation = Simulation(layout, "mujoco", 1)
+    simulation = Simulation(layout, RunRequest("mujoco", units=1))
     with LogWriter(tmp_path / "plain.log", simulation) as log:
         again = simulation.run([log.observe])
     assert again.events == taken[1].events and again.physics == taken[1].physics
@@ -135,7 +136,7 @@ def test_a_log_gives_the_same_pictures_as_its_run(taken, tmp_path: Path) -> None
 @needs_gl
 @pytest.mark.parametrize("error", [KeyboardInterrupt, RuntimeError])
 def test_an_interruption_leaves_a_film_of_what_was(layout, tmp_path: Path, error) -> None:
-    simulation = Simulation(layout, "mujoco", 1)
+    simulation = Simulation(layout, RunRequest("mujoco", units=1))
 
     def interrupt(world, supervisor) -> None:
         if world.time >= 1.0:
@@ -228,7 +229,7 @@ def test_every_part_is_in_the_picture_of_the_product(taken, layout) -> None:
 
 @needs_gl
 def test_an_invisible_part_would_be_noticed(taken, layout, tmp_path: Path) -> None:
-    simulation = Simulation(layout, "mujoco", 1)
+    simulation = Simulation(layout, RunRequest("mujoco", units=1))
     m = simulation.world.m
     for g in range(m.ngeom):
         if m.geom(g).name.startswith("part/part2#"):
@@ -243,7 +244,7 @@ def test_an_invisible_part_would_be_noticed(taken, layout, tmp_path: Path) -> No
 @pytest.mark.parametrize("size", [(320, 120), (192, 192), (120, 320)])
 @pytest.mark.parametrize("camera", ["overview", "top"])
 def test_the_factory_fills_pictures_of_any_shape(layout, tmp_path: Path, size, camera) -> None:
-    simulation = Simulation(layout, "mujoco", 1)
+    simulation = Simulation(layout, RunRequest("mujoco", units=1))
     Still(simulation, tmp_path / "a.png", Picture(size, camera, caption=False)).close()
     picture = iio.imread(tmp_path / "a.png").astype(int)
     floor = np.median(picture.reshape(-1, 3), axis=0)
@@ -349,7 +350,7 @@ def test_an_unknown_camera_is_refused_with_the_nearest() -> None:
 
 
 def test_the_ideal_world_has_no_picture(layout, tmp_path: Path) -> None:
-    simulation = Simulation(layout, "ideal", 1)
+    simulation = Simulation(layout, RunRequest("ideal", units=1))
     with pytest.raises(InputError, match="ideal world"):
         Film(simulation, tmp_path / "a.mp4")
     with LogWriter(tmp_path / "log", simulation) as log:

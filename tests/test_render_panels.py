@@ -30,6 +30,7 @@ from factory.render.reel import Poster
 from factory.render.replay import moment_of, take_of
 from factory.render.rows import NEIGHBOURS, Rows, neighbourhood
 from factory.render.subject import Snapshot
+from factory.simulation.request import RunRequest
 from factory.simulation.simulation import Simulation
 from factory.support.errors import InputError
 from tests.command_line import PAPER, Terminal, files_in
@@ -46,7 +47,7 @@ def laid_out(name: str):
 
 def kept(layout, path: Path, world: str = "mujoco", units: int = 2, **options) -> Log:
     """The log of a run."""
-    simulation = Simulation(layout, world, units, **options)
+    simulation = Simulation(layout, RunRequest(world, units=units, **options))
     with LogWriter(path, simulation) as log:
         simulation.run([log.observe])
     return read_log(path)
@@ -221,7 +222,7 @@ def test_the_product_followed_is_the_same_when_parts_become_one_body(tmp_path: P
     layout = laid_out("paper")
     found = []
     for fuse in (False, True):
-        simulation = Simulation(layout, "mujoco", 2, fuse=fuse)
+        simulation = Simulation(layout, RunRequest("mujoco", units=2, fuse=fuse))
         followed = Followed(simulation.world.m, subject_of_run(simulation))
         track: list[np.ndarray] = []
 
@@ -241,7 +242,7 @@ def test_the_product_followed_is_the_same_when_parts_become_one_body(tmp_path: P
 
 @pytest.mark.parametrize("fuse", [False, True])
 def test_a_part_is_followed_from_its_feeder_to_the_dropoff(fuse: bool) -> None:
-    simulation = Simulation(laid_out("paper"), "mujoco", 2, fuse=fuse)
+    simulation = Simulation(laid_out("paper"), RunRequest("mujoco", units=2, fuse=fuse))
     followed = Followed(simulation.world.m, subject_of_run(simulation), "part1")
     ranks, labels = [], []
 
@@ -358,7 +359,7 @@ def test_the_poster_is_when_the_product_has_become_whole_and_most_is_there(paper
 
 @needs_gl
 def test_a_film_with_everything(tmp_path: Path) -> None:
-    simulation, size = Simulation(laid_out("paper"), "mujoco", 1), (560, 490)
+    simulation, size = Simulation(laid_out("paper"), RunRequest("mujoco", units=1)), (560, 490)
     picture = Picture(size, "part:part2", True, PANELS, "Title")
     log, film = tmp_path / "run.log", tmp_path / "run.mp4"
     with (

@@ -26,6 +26,7 @@ from factory.show.report.packing import json_inside
 from factory.show.report.page import SCRIPTS
 from factory.show.report.tree import assembly_tree
 from factory.show.report.words import proof
+from factory.simulation.request import RunRequest
 from factory.simulation.simulation import Simulation
 from factory.study.analysis import Timing, analyse
 from factory.study.analysis.recorded import logged_record
@@ -42,7 +43,7 @@ def log(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A log of two units of the paper's example."""
     path = tmp_path_factory.mktemp("log") / "paper.log"
     layout = factory.lay_out(factory.compile(factory.load_pag(PAPER)))
-    simulation = Simulation(layout, "mujoco", 2, 1, 0.2)
+    simulation = Simulation(layout, RunRequest("mujoco", units=2, seed=1, jitter=0.2))
     with LogWriter(path, simulation) as writer:
         simulation.run([writer.observe])
     return path
@@ -355,7 +356,7 @@ def test_a_log_that_was_cut_off_is_told_as_far_as_it_goes(log: Path, tmp_path: P
 def test_bodies_that_replace_others_are_no_hand_overs(tmp_path: Path) -> None:
     """In a fused run one body comes from out of sight into the place of those that were joined."""
     path = tmp_path / "fused.log"
-    simulation = Simulation(paper_layout(), units=2, fuse=True)
+    simulation = Simulation(paper_layout(), RunRequest(units=2, fuse=True))
     with LogWriter(path, simulation) as writer:
         run = simulation.run([writer.observe])
     figures = {f.key: f.value for f in fidelity(recording_of(path)).figures}

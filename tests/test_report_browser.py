@@ -14,6 +14,7 @@ import pytest
 import factory
 from factory.record.log import LogWriter, read_log
 from factory.show.report import page, recording_of
+from factory.simulation.request import RunRequest
 from factory.simulation.simulation import Simulation
 from tests.command_line import PAPER
 from tests.test_report import EVIL, altered
@@ -33,7 +34,7 @@ FLAGS = ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader
 def log(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("log") / "paper.log"
     layout = factory.lay_out(factory.compile(factory.load_pag(PAPER)))
-    simulation = Simulation(layout, "mujoco", 2)
+    simulation = Simulation(layout, RunRequest("mujoco", units=2))
     with LogWriter(path, simulation) as writer:
         simulation.run([writer.observe])
     return path

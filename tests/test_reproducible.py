@@ -15,6 +15,7 @@ import pytest
 
 from factory.record.log import MAGIC, LogWriter, read_log
 from factory.record.log.blocks import LENGTH
+from factory.simulation.request import RunRequest
 from factory.simulation.simulation import Simulation
 from factory.support.errors import MissingError
 from factory.support.gl import probe
@@ -40,7 +41,7 @@ with LogWriter(sys.argv[1], made, command=["factory"]) as log:
 
 
 def simulated(units: int = 2) -> Simulation:
-    return Simulation(layout("paper"), units=units, seed=5, jitter=0.3)
+    return Simulation(layout("paper"), RunRequest(units=units, seed=5, jitter=0.3))
 
 
 def digest(simulation: Simulation, observers=()) -> str:
@@ -114,7 +115,7 @@ def test_a_film_changes_nothing(here: str, tmp_path: Path) -> None:
 
 
 def test_another_seed_is_another_run(here: str) -> None:
-    assert digest(Simulation(layout("paper"), units=2, seed=6, jitter=0.3)) != here
+    assert digest(Simulation(layout("paper"), RunRequest(units=2, seed=6, jitter=0.3))) != here
 
 
 def test_a_log_says_what_made_it(tmp_path: Path) -> None:

@@ -17,6 +17,7 @@ from factory.mjcf.model import GRAVITY, HEAD_MASS
 from factory.simulation import supervisor
 from factory.simulation.mujoco import world as physics
 from factory.simulation.mujoco.drives import INPUTS, Told
+from factory.simulation.request import RunRequest
 from factory.simulation.simulation import Simulation
 from factory.support.engine import mujoco
 from factory.support.settings import Settings
@@ -131,7 +132,7 @@ def test_who_forgets_something_does_not(what: Callable[[Rewind], None]) -> None:
 def test_each_step_has_its_own_setpoints() -> None:
     """What a drive reads in a step is where its axis is then, under the acceleration of the
     tick."""
-    simulation = Simulation(layout_of("paper"), units=2)
+    simulation = Simulation(layout_of("paper"), RunRequest(units=2))
     world, supervisor = simulation.world, simulation.supervisor
     seen: dict[float, np.ndarray] = {}
     m, d = world.m, world.d
@@ -159,8 +160,8 @@ def test_each_step_has_its_own_setpoints() -> None:
                 continue
             x, v = before[axes], speed[axes]
             _, _, a = follow(supervisor.active.bundle, x, v, world.tick)
-            assert len(seen) == simulation.settings.substeps
-            half = simulation.settings.timestep / 2
+            assert len(seen) == simulation.request.settings.substeps
+            half = simulation.request.settings.timestep / 2
             for time, drives in seen.items():
                 t = time - begun
                 assert np.allclose(drives[axes, 0], x + v * t + a * t * t / 2, atol=1e-12)
@@ -173,8 +174,8 @@ def test_each_step_has_its_own_setpoints() -> None:
 def test_what_has_been_written_over_can_be_told_again() -> None:
     """The engine goes back in the middle of a tick that one axis has been told at its beginning,
     and another since. The samples of both are gone by then."""
-    simulation = Simulation(layout_of("paper"), units=2)
-    world, h = simulation.world, simulation.settings.timestep
+    simulation = Simulation(layout_of("paper"), RunRequest(units=2))
+    world, h = simulation.world, simulation.request.settings.timestep
     m, d, told = world.m, world.d, world.setpoints
     for _ in range(3):
         simulation.supervisor.step()
@@ -200,7 +201,7 @@ def test_what_has_been_written_over_can_be_told_again() -> None:
 def test_who_comes_to_rest_stands_for_ever_after() -> None:
     """Nobody tells a drive more than that: not while the samples last, nor later, nor when the
     engine goes back."""
-    simulation = Simulation(layout_of("paper"), units=2)
+    simulation = Simulation(layout_of("paper"), RunRequest(units=2))
     world, told = simulation.world, simulation.world.setpoints
     m, d, axis, tick = world.m, world.d, np.array([1]), world.tick
     x, rest, a = world.reference[axis], np.zeros(1), np.array([-2.0])
@@ -208,7 +209,7 @@ def test_who_comes_to_rest_stands_for_ever_after() -> None:
     end = x + 0.5 * 2.0 * tick**2
     told.tell(told.of(axis, [(x, -a * tick, a)], end, rest))
     mujoco.mj_step(m, d, world.steps)
-    for step in range(3 * simulation.settings.samples):
+    for step in range(3 * simulation.request.settings.samples):
         begin = Rewind(m, d)
         begin.save()
         for _ in range(1 + (step % 7 == 0)):
@@ -222,7 +223,7 @@ def test_who_comes_to_rest_stands_for_ever_after() -> None:
 
 def test_who_was_told_to_stand_and_then_went_elsewhere_stands_there() -> None:
     """Going back does not bring back what has been told before."""
-    simulation = Simulation(layout_of("paper"), units=2)
+    simulation = Simulation(layout_of("paper"), RunRequest(units=2))
     world, told = simulation.world, simulation.world.setpoints
     m, d, steps, begin = world.m, world.d, world.steps, Rewind(world.m, world.d)
     axis, rest = np.array([1]), np.zeros(1)
@@ -244,7 +245,7 @@ def test_who_was_told_to_stand_and_then_went_elsewhere_stands_there() -> None:
 
 def test_lifts_that_carry_more_than_before_are_told() -> None:
     """All whose robots have been given something; who stands does not sag."""
-    world = Simulation(layout_of("gearbox"), units=2).world
+    world = Simulation(layout_of("gearbox"), RunRequest(units=2)).world
     robots, told = [*world.lift][:2], world.setpoints
     axes = np.array([world.lift[robot] for robot in robots])
     assert not told.any_due
@@ -273,7 +274,7 @@ def test_a_course_is_the_same_when_it_is_kept(name: str, given: dict[str, Any]) 
 
 
 def test_steady_production_repeats_itself() -> None:
-    simulation = Simulation(layout_of("paper"), units=20)
+    simulation = Simulation(layout_of("paper"), RunRequest(units=20))
     world = simulation.world
     while world.delivered() < 5:
         simulation.supervisor.step()
@@ -308,7 +309,7 @@ def crept(seconds: float = 2.0) -> float:
     """How far the first robot under way gets behind its reference [m] at 0.5 mm/s, which the engine
     takes for rest."""
     settings = Settings(speed=0.0005)
-    simulation = Simulation(layout_of("paper"), settings=settings)
+    simulation = Simulation(layout_of("paper"), RunRequest(settings=settings))
     world, behind = simulation.world, 0.0
     while world.time < seconds:
         simulation.supervisor.step()
@@ -327,7 +328,7 @@ def test_who_creeps_stays_awake(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.mark.parametrize(("name", "stage"), [("chest", 0), ("gearbox", 1)])
 def test_who_waits_sleeps(name: str, stage: int) -> None:
     """A lift stops where its carriage goes ahead at once: the two are one tree."""
-    simulation = Simulation(layout_of(name), units=2, settings=Settings(stage=stage))
+    simulation = Simulation(layout_of(name), RunRequest(units=2, settings=Settings(stage=stage)))
     world, supervisor = simulation.world, simulation.supervisor
     asleep = 0
     for _ in range(600):
@@ -340,7 +341,7 @@ def test_who_waits_sleeps(name: str, stage: int) -> None:
 
 
 def test_a_lift_that_stands_does_not_put_its_carriage_to_sleep() -> None:
-    simulation = Simulation(layout_of("gearbox"), units=1)
+    simulation = Simulation(layout_of("gearbox"), RunRequest(units=1))
     world = simulation.world
     carriage, lift = world.axes_of(next(iter(world.lift)))
     on, off = np.array([True]), np.array([False])

@@ -16,6 +16,7 @@ from factory.nets.replay import replay
 from factory.pipeline import all_templates
 from factory.plant.programs import program_of, write_program
 from factory.simulation.distributed import Link
+from factory.simulation.request import RunRequest
 from factory.simulation.run import Event, busy_times
 from factory.simulation.simulation import Simulation
 from factory.support.settings import Settings
@@ -159,10 +160,14 @@ def test_the_cycle_time_under_wip_is_predicted(name: str, wip: int) -> None:
 
 
 def test_the_pool_is_what_the_net_says(paper: Layout) -> None:
-    model = Simulation(paper, units=50).model
+    model = Simulation(paper, RunRequest(units=50)).model
     assert model is not None
     assert dict(model.copies) == {"part1": 4, "part2": 4, "part3": 3}
-    assert dict(Simulation(paper, units=2).model.copies) == {"part1": 2, "part2": 2, "part3": 2}
+    assert dict(Simulation(paper, RunRequest(units=2)).model.copies) == {
+        "part1": 2,
+        "part2": 2,
+        "part3": 2,
+    }
 
 
 def test_runs_repeat_bit_for_bit(paper: Layout) -> None:
@@ -186,7 +191,7 @@ def test_the_replay_catches_a_record_out_of_order(paper: Layout) -> None:
 
 def test_robots_that_touch_are_seen_in_the_ideal_world(paper: Layout) -> None:
     """Planted fault: r5 and r6 stand at their meeting point."""
-    simulation = Simulation(paper, world="ideal", units=1)
+    simulation = Simulation(paper, RunRequest(world="ideal", units=1))
     while paper.factory.by_label["sub1"].index not in simulation.supervisor.active.operations:
         simulation.supervisor.step()
     simulation.world.x[[4, 5]] = 0.0
@@ -196,7 +201,7 @@ def test_robots_that_touch_are_seen_in_the_ideal_world(paper: Layout) -> None:
 
 def test_a_robot_reads_only_its_own_mode(paper: Layout) -> None:
     """Planted fault: r1 asks for the state of a mode it is not in."""
-    link = Link(Simulation(paper, world="ideal", units=1).world, paper.factory.axes)
+    link = Link(Simulation(paper, RunRequest(world="ideal", units=1)).world, paper.factory.axes)
     assert len(link.read(paper.factory.by_label["sub1"], 2)[0]) == 3
     with pytest.raises(AssertionError, match="not in the mode of sub1"):
         link.read(paper.factory.by_label["sub1"], 0)
@@ -204,7 +209,7 @@ def test_a_robot_reads_only_its_own_mode(paper: Layout) -> None:
 
 def test_an_event_that_is_not_enabled_cannot_fire(paper: Layout) -> None:
     """Planted fault: the supervisor is made to end an operation that has not begun."""
-    supervisor = Simulation(paper, world="ideal", units=1).supervisor
+    supervisor = Simulation(paper, RunRequest(world="ideal", units=1)).supervisor
     with pytest.raises(AssertionError, match="not all are enabled that fire: sub3_e"):
         supervisor._fire([], [paper.factory.by_label["sub3"].index])
 
@@ -229,7 +234,9 @@ def test_a_time_limit_names_robot_mode_and_line(paper: Layout) -> None:
 def test_a_carrier_goes_on_when_all_others_have_followed() -> None:
     """Whoever is in an operation, and looks seldom, finds that its carrier has not gone on."""
     layout = laid_out(PRODUCTS["kary"])
-    simulation = Simulation(layout, "ideal", units=3, seed=3, jitter=0.5, distributed=True)
+    simulation = Simulation(
+        layout, RunRequest("ideal", units=3, seed=3, jitter=0.5, distributed=True)
+    )
     supervisor, inside = simulation.supervisor, 0
     for process in supervisor.processes:
         process.period = 11 if process.program.robot in layout.factory.by_label["t"].robots else 3
@@ -246,7 +253,7 @@ def test_a_carrier_goes_on_when_all_others_have_followed() -> None:
 
 def test_a_contact_that_lasts_is_one(paper: Layout) -> None:
     """Robots driven into each other, looked at step by step."""
-    simulation = Simulation(paper, units=1)
+    simulation = Simulation(paper, RunRequest(units=1))
     world, onsets, before, lasted = simulation.world, 0, set(), 0
     for _ in range(50):
         simulation.supervisor.step()
@@ -284,7 +291,7 @@ def test_heavy_parts_do_not_swing(text: str, force: float) -> None:
 
 def test_a_stuck_robot_is_a_stall(paper: Layout) -> None:
     """Planted fault: robot r5's drive does nothing."""
-    simulation = Simulation(paper, units=1)
+    simulation = Simulation(paper, RunRequest(units=1))
     simulation.world.m.actuator_biasprm[4, 1:3] = 0.0
     simulation.world.m.actuator_gaintype[4] = 0
     simulation.world.m.actuator_gainprm[4] = 0.0
@@ -298,7 +305,7 @@ def test_a_stuck_robot_is_a_stall(paper: Layout) -> None:
 def test_an_unstable_engine_ends_the_run(paper: Layout) -> None:
     """Planted fault: a speed that is no number. The engine begins anew then, at time 0, which is
     nothing to be seen."""
-    simulation = Simulation(paper, units=1)
+    simulation = Simulation(paper, RunRequest(units=1))
     seen = []
 
     def plant(world: Any, _: object) -> None:
@@ -328,7 +335,7 @@ def test_short_steps_and_slow_starts_do_not_send_robots_to_sleep(paper: Layout) 
 
 def test_robots_stop_where_their_operation_ends(paper: Layout) -> None:
     """They may hand over at up to 10 mm/s, which as a setpoint would drag them out of the goal."""
-    simulation = Simulation(paper, units=2, settings=Settings(timestep=1e-4))
+    simulation = Simulation(paper, RunRequest(units=2, settings=Settings(timestep=1e-4)))
     run = simulation.run()
     assert_good(run)
     speeds = simulation.world.control[: simulation.world.tray] + 1
@@ -346,14 +353,14 @@ def test_a_payload_larger_than_the_layout_knew_is_a_contact() -> None:
     wide = laid_out(text.replace("box = (0.05, 0.05", "box = (0.12, 0.12"))
     solids = {**layout.product.solids, **{k: wide.product.solids[k] for k in ("w", "x")}}
     broken = replace(layout, product=replace(layout.product, solids=solids))
-    run = Simulation(broken, units=3).run(max_time=60)
+    run = Simulation(broken, RunRequest(units=3)).run(max_time=60)
     assert run.physics is not None
     assert run.physics.unintended_contacts > 0
 
 
 def test_a_shifted_weld_shows_in_the_gap(paper: Layout) -> None:
     """Planted fault: one nominal frame is 2 mm off."""
-    simulation = Simulation(paper, units=1)
+    simulation = Simulation(paper, RunRequest(units=1))
     simulation.world.m.eq_data[simulation.world.m.equality("grip/r3/part1").id, 3] += 0.002
     run = simulation.run()
     assert run.physics is not None
@@ -361,7 +368,7 @@ def test_a_shifted_weld_shows_in_the_gap(paper: Layout) -> None:
 
 
 def test_each_robot_has_its_own_speed(paper: Layout) -> None:
-    limits = Simulation(paper, world="ideal", jitter=0.3, seed=1).limits
+    limits = Simulation(paper, RunRequest(world="ideal", jitter=0.3, seed=1)).limits
     assert len(set(limits.speed)) == len(limits.speed)
     assert np.all((limits.speed >= 0.35) & (limits.speed <= 0.65))
 
@@ -392,7 +399,7 @@ def test_templates_of_the_user_run_without_a_change_of_code(tmp_path) -> None:
 
 
 def test_clocks_go_on_when_other_modes_begin() -> None:
-    simulation = Simulation(laid_out(KARY), units=2)
+    simulation = Simulation(laid_out(KARY), RunRequest(units=2))
     supervisor = simulation.supervisor
     while len(supervisor.active.operations) < 2 or not any(_clocks(supervisor).values()):
         supervisor.step()
@@ -413,7 +420,7 @@ def _clocks(supervisor: Any) -> dict[int, float]:
 def test_the_tray_is_looked_for_until_it_has_come_home() -> None:
     """Who has asked for it in vain does not ask again before something has changed; that it ought
     to be home is not enough, where something has held it."""
-    simulation = Simulation(laid_out(PAPER), units=1)
+    simulation = Simulation(laid_out(PAPER), RunRequest(units=1))
     world = simulation.world
     while not world.delivered():
         simulation.supervisor.step()
@@ -429,7 +436,7 @@ def test_the_tray_is_looked_for_until_it_has_come_home() -> None:
 
 def test_only_who_is_joined_may_touch() -> None:
     """Inputs of one unit in the hands of the robots of one operation, while it goes on."""
-    simulation = Simulation(laid_out(PAPER), units=2)
+    simulation = Simulation(laid_out(PAPER), RunRequest(units=2))
     inspection, operations = simulation.world.inspection, simulation.layout.factory.operations
     m, held = simulation.world.m, inspection.held
     join = next(o for o in operations if len(o.inputs) == 2)

@@ -34,6 +34,7 @@ from factory.nets.petri import PetriNet, Place, Transition
 from factory.problem.pag import NOPART
 from factory.record.monitor import beside
 from factory.simulation import simulation as simulations
+from factory.simulation.request import RunRequest
 from factory.simulation.simulation import Simulation
 from factory.study.analysis import Timing
 from factory.study.analysis.analysing import operation_slacks
@@ -202,14 +203,22 @@ def test_it_runs_at_that_pace(
     distributed: bool, size: int, seed: int, shape: str, style: str
 ) -> None:
     layout = random_layout(size, seed, shape, style)
-    record = Simulation(layout, "ideal", 12, seed, 0.2, STAGED, distributed=distributed).run()
+    record = Simulation(
+        layout,
+        RunRequest(
+            "ideal", units=12, seed=seed, jitter=0.2, settings=STAGED, distributed=distributed
+        ),
+    ).run()
     assert record.trouble is None and record.refines_net
     if not distributed:
         assert record.cycle_time_s is not None
         ticks = 2 * STAGED.tick * max(len(r.operations) for r in layout.factory.robots)
         assert abs(record.cycle_time_s - record.predicted_cycle_time_s) < ticks
     else:
-        still = Simulation(layout, "ideal", 12, seed, 0.2, STILL, distributed=True).run()
+        still = Simulation(
+            layout,
+            RunRequest("ideal", units=12, seed=seed, jitter=0.2, settings=STILL, distributed=True),
+        ).run()
         assert record.sim_time_s < still.sim_time_s + 12 * 0.1
 
 
@@ -219,7 +228,9 @@ def test_it_pays_in_mujoco(file: Path, distributed: bool) -> None:
     layout = laid_out(file)
     found = {}
     for chosen in (STILL, STAGED):
-        made = Simulation(layout, "mujoco", 8, settings=chosen, distributed=distributed)
+        made = Simulation(
+            layout, RunRequest("mujoco", units=8, settings=chosen, distributed=distributed)
+        )
         watcher = beside(made)
         record = found[chosen] = made.run([watcher.observe])
         assert watcher.report().refines_net and not watcher.report().violations
@@ -233,10 +244,11 @@ def test_it_pays_in_mujoco(file: Path, distributed: bool) -> None:
 
 
 def test_it_does_not_change_a_run_without_it(paper: Layout) -> None:
-    made = Simulation(paper, "mujoco", 2)
+    made = Simulation(paper, RunRequest("mujoco", units=2))
     record = made.run()
     assert [e.transition for e in record.events[:6]] == [
-        e.transition for e in Simulation(paper, "mujoco", 2, settings=STILL).run().events[:6]
+        e.transition
+        for e in Simulation(paper, RunRequest("mujoco", units=2, settings=STILL)).run().events[:6]
     ]
     assert made.supervisor.active.ahead == () and made.ways == {}
 
@@ -246,7 +258,7 @@ def test_it_does_not_change_a_run_without_it(paper: Layout) -> None:
 
 def test_who_has_come_there_costs_nothing_more(paper: Layout) -> None:
     """r3 is at its station long before its parts are; nothing moves it there."""
-    made = Simulation(paper, "mujoco", 1, settings=STAGED)
+    made = Simulation(paper, RunRequest("mujoco", units=1, settings=STAGED))
     numbers = [s.robot for s in stages(paper, made.modes)]
     count, seen = len(paper.factory.operations), []
     while made.world.delivered() < 1:
@@ -264,7 +276,7 @@ def test_a_robot_is_in_one_mode_at_a_time(world: Any) -> None:
     """It leaves its stage as its operation begins, or soon after it has come there. And setpoints
     are where the references are after each tick."""
     layout = laid_out(CHEST)
-    made = Simulation(layout, world, 3, settings=STAGED)
+    made = Simulation(layout, RunRequest(world, units=3, settings=STAGED))
     goals = [stage.goal for stage in stages(layout, made.modes)]
     robots = [stage.robot for stage in stages(layout, made.modes)]
     count, there, overtaken = len(layout.factory.operations), dict.fromkeys(range(99), 0), 0
@@ -287,7 +299,7 @@ def test_a_robot_is_in_one_mode_at_a_time(world: Any) -> None:
 
 def test_it_goes_on_without_a_stop_where_its_operation_begins(paper: Layout) -> None:
     """A robot under way keeps its speed when the mode of its operation takes it over."""
-    made = Simulation(paper, "mujoco", 6, settings=STAGED)
+    made = Simulation(paper, RunRequest("mujoco", units=6, settings=STAGED))
     world, taken = made.world, []
     before: set[int] = set()
     while made.world.delivered() < made.before + 6:
@@ -305,7 +317,7 @@ def test_it_goes_on_without_a_stop_where_its_operation_begins(paper: Layout) -> 
 
 
 def test_limits_may_change_on_the_way(paper: Layout) -> None:
-    made = Simulation(paper, "mujoco", 3, settings=STAGED)
+    made = Simulation(paper, RunRequest("mujoco", units=3, settings=STAGED))
     while made.world.time < 1.0 or not made.supervisor.active.ahead:
         made.supervisor.step()
     slower = replace(made.limits, speed=made.limits.speed * 0.5)
@@ -319,7 +331,7 @@ def test_limits_may_change_on_the_way(paper: Layout) -> None:
 def test_from_a_marking_robots_set_out_at_once(paper: Layout, marking: str) -> None:
     net = paper.factory.net
     chosen = frozenset(net.threaded.net.place_index[name] for name in marking.split(","))
-    made = Simulation(paper, "mujoco", 2, settings=STAGED, start=chosen)
+    made = Simulation(paper, RunRequest("mujoco", units=2, settings=STAGED, start=chosen))
     modes = operation_modes(paper, STAGED.eps)
     waiting = [s.robot for s in stages(paper, modes)]
     count = len(paper.factory.operations)
@@ -349,7 +361,7 @@ def test_the_monitor_blames_who_goes_ahead_with_a_part(
     monkeypatch.setattr(
         simulations, "stages_of", lambda layout, modes, settings: loaded_too(layout, modes)
     )
-    made = Simulation(paper, "mujoco", 3, settings=STAGED)
+    made = Simulation(paper, RunRequest("mujoco", units=3, settings=STAGED))
     watcher = beside(made)
     made.run([watcher.observe], max_time=20.0)
     assert {violation.code for violation in watcher.report().violations} & {"Order", "Early"}
@@ -362,7 +374,7 @@ def test_the_monitor_blames_who_goes_ahead_though_it_should_wait(
     monkeypatch.setattr(
         simulations, "stages_of", lambda layout, modes, settings: stages(layout, modes)
     )
-    made = Simulation(paper, "mujoco", 3, settings=STILL)
+    made = Simulation(paper, RunRequest("mujoco", units=3, settings=STILL))
     watcher = beside(made)
     made.run([watcher.observe])
     assert any(violation.code == "Order" for violation in watcher.report().violations)
@@ -430,13 +442,15 @@ def test_random_factories_in_mujoco(number: int) -> None:
     layout = random_layout(4 + number % 9, number, shape, style)
     made = Simulation(
         layout,
-        "mujoco",
-        3,
-        number,
-        0.3,
-        STAGED,
-        distributed=number % 3 == 0,
-        fuse=number % 2 == 0,
+        RunRequest(
+            "mujoco",
+            units=3,
+            seed=number,
+            jitter=0.3,
+            settings=STAGED,
+            distributed=number % 3 == 0,
+            fuse=number % 2 == 0,
+        ),
     )
     watcher = beside(made)
     record = made.run([watcher.observe])

@@ -13,6 +13,7 @@ from factory.control.navigation import Bundle
 from factory.simulation.disturbance import Gain, disturb
 from factory.simulation.mujoco import gaps, outfeed
 from factory.simulation.mujoco.world import MujocoWorld
+from factory.simulation.request import RunRequest
 from factory.simulation.run import Event, PhysicsFigures
 from factory.simulation.simulation import Simulation
 from factory.support.settings import LOOK, MOST, Settings
@@ -51,7 +52,7 @@ def followed(name: str, ticks: int, **given: Any) -> Course:
     world, d = simulation.world, simulation.world.d
     while world.delivered() < UNITS and world.time < 30.0:
         simulation.supervisor.step(ticks)
-        step = round(world.time / simulation.settings.timestep)
+        step = round(world.time / simulation.request.settings.timestep)
         course.states[step] = d.qpos.tobytes() + d.qvel.tobytes()
     course.events = [*simulation.supervisor.events]
     course.dropoffs, course.figures = [*world.dropoffs], world.inspection.figures()
@@ -136,14 +137,14 @@ def test_a_stride_is_no_longer_than_a_look(timestep: float, substeps: int) -> No
 
 def test_what_is_late_at_max_time_is_not_run() -> None:
     """Nobody looks, but no more is simulated than was asked for."""
-    run = Simulation(layout_of("paper"), units=5).run(max_time=1.23)
+    run = Simulation(layout_of("paper"), RunRequest(units=5)).run(max_time=1.23)
     assert run.sim_time_s == pytest.approx(1.23) and run.trouble is not None
 
 
 def test_a_glance_does_not_hold_a_run_up(monkeypatch: pytest.MonkeyPatch) -> None:
     """Who needs to be called now and then is; who observes sees every tick; the run is the same."""
     glanced, seen = list[float](), list[float]()
-    first, second = (Simulation(layout_of("chest"), units=1) for _ in range(2))
+    first, second = (Simulation(layout_of("chest"), RunRequest(units=1)) for _ in range(2))
     one = first.run(glances=[lambda world, _: glanced.append(world.time)])
     other = second.run([lambda world, _: seen.append(world.time)], glances=[lambda *_: None])
     assert glanced[-1] == seen[-1] and set(glanced) <= set(seen)
@@ -156,7 +157,7 @@ def test_what_acts_in_every_tick_is_let_to() -> None:
     not."""
     found = []
     for observers in ([], [lambda *_: None]):
-        simulation = disturb(Simulation(layout_of("paper"), units=2), Gain(0.5))
+        simulation = disturb(Simulation(layout_of("paper"), RunRequest(units=2)), Gain(0.5))
         run = simulation.run(observers)
         found.append((run.events, run.physics, simulation.world.d.qpos.tobytes()))
     assert found[0] == found[1]

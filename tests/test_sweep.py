@@ -24,6 +24,7 @@ from scipy import stats
 
 from factory.layout.embedding import lay_out
 from factory.pipeline import read
+from factory.simulation.request import RunRequest
 from factory.simulation.simulation import Simulation
 from factory.study import pool
 from factory.study.sweep import Recipe, points, read_axes, summarise, sweeping
@@ -178,7 +179,7 @@ def test_runs_that_share_a_model_are_the_runs_alone() -> None:
     layout = lay_out(source.compile(), source.product)
     for seed in (3, 1, 3):
         shared = runner.run((("seed", seed),))
-        alone = Simulation(layout, "mujoco", 2, seed, 0.3).run()
+        alone = Simulation(layout, RunRequest("mujoco", units=2, seed=seed, jitter=0.3)).run()
         assert shared.events == alone.events
         assert shared.physics == alone.physics
 

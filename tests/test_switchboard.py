@@ -13,12 +13,13 @@ from factory.plant.factory import Operation
 from factory.simulation.mujoco.fast import broad_phase as vicinity_of_what_moves
 from factory.simulation.mujoco.parts import Stock
 from factory.simulation.mujoco.welds import AWAKE, FRESH, Switchboard
+from factory.simulation.request import RunRequest
 from factory.simulation.simulation import Simulation
 from tests.test_vicinity import layout, states
 
 
 def a_board() -> tuple[Switchboard, Stock]:
-    simulation = Simulation(layout("paper"), units=2)
+    simulation = Simulation(layout("paper"), RunRequest(units=2))
     for _ in range(40):
         simulation.supervisor.step()
     return simulation.world.stock.board, simulation.world.stock
@@ -65,7 +66,7 @@ def test_what_is_said_last_of_a_body_holds() -> None:
 
 def test_what_is_put_somewhere_is_looked_at_there(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(vicinity_of_what_moves, "FEW", 0)
-    simulation = Simulation(layout("20"), units=2)
+    simulation = Simulation(layout("20"), RunRequest(units=2))
     for _ in range(40):
         simulation.supervisor.step()
     world = simulation.world
@@ -115,7 +116,7 @@ def test_one_after_the_other_is_the_same(
     name: str, given: dict[str, Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """To the last bit."""
-    at_once, singly = (Simulation(layout(name), units=4, **given) for _ in range(2))
+    at_once, singly = (Simulation(layout(name), RunRequest(units=4, **given)) for _ in range(2))
     expected = states(at_once, at_once.supervisor.step, 700)
     hand_over = Stock.hand_over
 

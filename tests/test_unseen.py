@@ -12,6 +12,7 @@ from factory.layout.layout import Layout
 from factory.mjcf import loading
 from factory.mjcf.unseen import leave_out_what_is_shown
 from factory.record.log import read_log
+from factory.simulation.request import RunRequest
 from factory.simulation.simulation import Simulation, physical_model
 from tests.command_line import PAPER, Terminal
 from tests.test_lift import FENCE
@@ -29,7 +30,7 @@ def the_layout(name: str) -> Layout:
 )
 def test_an_unseen_run_is_the_same_to_the_last_bit(name: str, given: dict[str, Any]) -> None:
     seen, unseen = (
-        Simulation(the_layout(name), units=2, seed=3, jitter=0.3, shown=shown, **given)
+        Simulation(the_layout(name), RunRequest(units=2, seed=3, jitter=0.3, shown=shown, **given))
         for shown in (True, False)
     )
     assert unseen.world.m.ngeom < seen.world.m.ngeom
@@ -42,7 +43,9 @@ def test_an_unseen_run_is_the_same_to_the_last_bit(name: str, given: dict[str, A
 
 @pytest.mark.parametrize("seed", range(3))
 def test_all_that_collides_is_there(seed: int) -> None:
-    seen, unseen = (Simulation(layout("20"), units=2, shown=shown) for shown in (True, False))
+    seen, unseen = (
+        Simulation(layout("20"), RunRequest(units=2, shown=shown)) for shown in (True, False)
+    )
     expected = states(seen, gone_wild(seen, seed), 150)
     assert states(unseen, gone_wild(unseen, seed), 150) == expected
     touched = [simulation.world.inspection.unintended for simulation in (seen, unseen)]

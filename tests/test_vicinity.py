@@ -20,6 +20,7 @@ from factory.simulation.mujoco import parts as stock
 from factory.simulation.mujoco.contacts import NOBODY
 from factory.simulation.mujoco.fast import broad_phase as vicinity
 from factory.simulation.mujoco.parts import Stock
+from factory.simulation.request import RunRequest
 from factory.simulation.simulation import Simulation
 from factory.study.fidelity.shadow import Shadow
 from factory.support.engine import mujoco
@@ -44,7 +45,7 @@ def layout(name: str) -> Layout:
 
 
 def ready(name: str, culls: bool, **given: object) -> Simulation:
-    simulation = Simulation(layout(name), units=2, seed=3, jitter=0.3, **given)  # type: ignore[arg-type]
+    simulation = Simulation(layout(name), RunRequest(units=2, seed=3, jitter=0.3, **given))  # type: ignore[arg-type]
     if not culls:
         simulation.world.vicinity.everything()
     return simulation
@@ -76,7 +77,7 @@ def test_a_run_is_the_same_to_the_last_bit(name: str, fuse: bool) -> None:
 
 
 def test_a_view_is_the_same_when_it_is_kept(monkeypatch: pytest.MonkeyPatch) -> None:
-    kept, made = (Simulation(layout("20"), units=6) for _ in range(2))
+    kept, made = (Simulation(layout("20"), RunRequest(units=6)) for _ in range(2))
     expected = [*seen(kept, 1200)]
     monkeypatch.setattr(vicinity, "KEPT", 1)
     looks = counted(made.world.vicinity)

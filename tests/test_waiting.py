@@ -8,6 +8,7 @@ import pytest
 
 from factory.control.mode import Array, Truth
 from factory.control.navigation import Bundle
+from factory.simulation.request import RunRequest
 from factory.simulation.simulation import Simulation
 from factory.support.settings import Settings
 from tests.test_vicinity import layout
@@ -30,7 +31,9 @@ LONG = 120.0
 @pytest.mark.parametrize(("name", "given"), RUNS)
 def test_nobody_need_be_asked_twice(name: str, given: dict[str, Any]) -> None:
     """A run is the same where everybody is asked in every tick."""
-    runs = [Simulation(layout(name), units=6, seed=3, jitter=0.3, **given) for _ in range(2)]
+    runs = [
+        Simulation(layout(name), RunRequest(units=6, seed=3, jitter=0.3, **given)) for _ in range(2)
+    ]
     for supervisor in (simulation.supervisor for simulation in runs):
         while supervisor.world.delivered() < 4:
             supervisor.enabled |= supervisor is runs[0].supervisor
@@ -43,7 +46,7 @@ def test_nobody_need_be_asked_twice(name: str, given: dict[str, Any]) -> None:
 @pytest.mark.parametrize(("name", "given"), RUNS)
 def test_nobody_is_asked_while_nothing_changes(name: str, given: dict[str, Any]) -> None:
     """But when something has fired, or the outfeed's tray has gone or come home."""
-    simulation = Simulation(layout(name), units=6, **given)
+    simulation = Simulation(layout(name), RunRequest(units=6, **given))
     supervisor, world = simulation.supervisor, simulation.world
     prepared, asked, ticks = world.prepared, set(), 0
 
@@ -64,7 +67,7 @@ def test_nobody_is_asked_while_nothing_changes(name: str, given: dict[str, Any])
 def test_who_is_not_in_the_domain_yet_is_asked_again(
     world: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    inside, simulation = Bundle.in_domain, Simulation(layout("paper"), world)
+    inside, simulation = Bundle.in_domain, Simulation(layout("paper"), RunRequest(world))
     supervisor = simulation.supervisor
 
     def late(bundle: Bundle, x: Array) -> Truth:

@@ -192,22 +192,23 @@ def _run(
     source: Any, timing: Timing, units: int, wip: int | None, quiet: bool
 ) -> tuple[RunRecord, int]:
     """A run on the spot; status 1 where it was troubled."""
+    from factory.simulation.request import RunRequest
     from factory.simulation.simulation import Simulation
     from factory.study.analysis.recorded import check_products, record_of
     from factory.support.interruption import Interruption
     from factory.support.progress import Progress
 
-    simulation = Simulation(
-        timing.layout,
+    request = RunRequest(
         timing.world,
         units,
         timing.seed,
         timing.jitter,
         timing.settings,
-        source.catalogue,
         wip=wip,
         shown=False,
+        catalogue=source.catalogue,
     )
+    simulation = Simulation(timing.layout, request)
     with ExitStack() as stack:
         stop, bar = Interruption(), Progress(units, quiet)
         glances = [stack.enter_context(stop).observe, stack.enter_context(bar).observe]

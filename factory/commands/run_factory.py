@@ -14,6 +14,7 @@ from factory.nets.history import legal_marking
 from factory.pipeline import Source
 from factory.plant.factory import Factory
 from factory.plant.fused_bodies import fusing_pays
+from factory.simulation.request import RunRequest
 from factory.simulation.run import Run
 from factory.simulation.simulation import Observer, Simulation
 from factory.support.console import say, table
@@ -41,20 +42,20 @@ def simulation(
     Raises InputError."""
     start, fuse = options.get("start"), options.get("fuse")
     net = layout.factory.net
-    return Simulation(
-        layout,
+    request = RunRequest(
         options.get("world", "mujoco"),
         options.get("units", 1),
         options.get("seed", 0),
         options.get("jitter", 0.0),
         settings,
-        source.catalogue,
         None if start is None else legal_marking(net, start),
         options.get("wip"),
         bool(options.get("distributed")),
-        fuse=fusing_pays(layout.factory, layout.product) if fuse is None else fuse,
-        shown=shown,
+        fusing_pays(layout.factory, layout.product) if fuse is None else fuse,
+        shown,
+        catalogue=source.catalogue,
     )
+    return Simulation(layout, request)
 
 
 def run_file(
@@ -110,7 +111,7 @@ def run_file(
             assert shown is not None
             film = Film(made, video, shown.picture, options["fps"], shown.poster)
             observers.append(stack.enter_context(film).observe)
-        glances.append(stack.enter_context(Progress(made.units, quiet)).observe)
+        glances.append(stack.enter_context(Progress(made.request.units, quiet)).observe)
         record = made.run(observers, options.get("max_time"), glances)
     if watcher is None:
         return record
@@ -170,7 +171,7 @@ def render_file(
         observers = [
             stack.enter_context(Interruption()).observe,
             stack.enter_context(picture).observe,
-            stack.enter_context(Progress(made.units, quiet)).observe,
+            stack.enter_context(Progress(made.request.units, quiet)).observe,
         ]
         enough = moment if is_still and moment != "end" else options.get("max_time")
         made.run(observers, enough)

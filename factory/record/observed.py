@@ -22,19 +22,11 @@ class ObservedModel(Protocol):
     def carried(self) -> FusedBodies: ...
 
 
-class Observed(Protocol):
-    """A simulation that a log or a monitor is kept of; `simulation.Simulation` is one.
-
-    `kind`: mujoco or ideal; `model`: None in the ideal world; `before`: products delivered before
-    the run began. `world` has `time` [s] and `delivered()`; in MuJoCo the engine's `m` and `d`, in
-    the ideal world positions `x` [m] and speeds `v` [m/s]. `supervisor` has `marked` (a byte
-    for each place) and `events`.
-    """
+class ObservedRequest(Protocol):
+    """What was asked of a run; `simulation.RunRequest` is one."""
 
     @property
-    def layout(self) -> Layout: ...
-    @property
-    def kind(self) -> str: ...
+    def world(self) -> str: ...
     @property
     def units(self) -> int: ...
     @property
@@ -45,6 +37,21 @@ class Observed(Protocol):
     def wip(self) -> int | None: ...
     @property
     def settings(self) -> Settings: ...
+
+
+class Observed(Protocol):
+    """A simulation that a log or a monitor is kept of; `simulation.Simulation` is one.
+
+    `model`: None in the ideal world; `start`: the marking the run began from; `before`: products
+    delivered before that. `world` has `time` [s] and `delivered()`; in MuJoCo the engine's `m` and
+    `d`, in the ideal world positions `x` [m] and speeds `v` [m/s]. `supervisor` has `marked` (a
+    byte for each place) and `events`.
+    """
+
+    @property
+    def layout(self) -> Layout: ...
+    @property
+    def request(self) -> ObservedRequest: ...
     @property
     def start(self) -> Marking: ...
     @property

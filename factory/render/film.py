@@ -29,7 +29,7 @@ class _Observer(Closing):
         picture.check([part.label for part in factory.leaves])
         subject = subject_of_run(simulation)
         m, self.history = simulation.physical.m, History(subject)
-        name, units = product_name(factory), simulation.units
+        name, units = product_name(factory), simulation.request.units
         self.take = Take(m, subject, name, units, picture, self.history)
         self.number = factory.net.threaded.net.transition_index
         self.last = self._moment()

@@ -61,8 +61,8 @@ class Process:
 
 class Record:
     """The record of a distributed run, in the terms of the net: X_s when the first robot enters an
-    operation, X_e when its carrier ends it. `marked`: 1 for each place that is. `last`: when something fired last, at first `time`
-    [s]."""
+    operation, X_e when its carrier ends it. `marked`: 1 for each place that is. `last`: when
+    something fired last, at first `time` [s]."""
 
     def __init__(self, factory: Factory, time: float) -> None:
         self._net, self.last, self.events = factory.net.threaded, time, list[Event]()

@@ -3,13 +3,15 @@ with the robots that carry them, transfers are instantaneous."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
 from factory.control.mode import Array, Index
 from factory.control.navigation import Bundle
+from factory.layout.layout import Layout
 from factory.plant.factory import Operation
+from factory.simulation.request import RunRequest
 from factory.simulation.run import PhysicsFigures
 from factory.simulation.world import Hooks, Job
 
@@ -19,20 +21,13 @@ class IdealWorld:
     touch."""
 
     def __init__(
-        self,
-        start: Array,
-        dropoff: int,
-        units: int,
-        tick: float,
-        delivered: int = 0,
-        wip: int | None = None,
-        timestep: float = 0.002,
+        self, layout: Layout, request: RunRequest, start: Array, counts: Mapping[int, int]
     ) -> None:
         self.time, self.supplied, self.physics_time, self.hooks = 0.0, True, 0.0, Hooks()
         self.x = np.array(start, float)
         self.v = np.zeros_like(self.x)
-        self.dropoff, self.units, self.tick = dropoff, units, tick
-        self.count, self.wip, self.timestep = delivered, wip, timestep
+        self._dropoff, self._request = layout.factory.dropoff, request
+        self._before = counts.get(self._dropoff.end, 0)
         self._plan = np.zeros((len(self.x), 4))
         self._plan[:, 1] = self.x
         self.dropoffs: list[float] = []
@@ -47,14 +42,15 @@ class IdealWorld:
             return False
         if operation.inputs:
             return True
-        return unit < self.units and (self.wip is None or unit < self.count + self.wip)
+        wip = self._request.wip
+        inside = wip is None or unit < self.delivered() + wip
+        return inside and unit < self._before + self._request.units
 
     def apply(self, started: Sequence[Job], ended: Sequence[Job]) -> None:
         """Parts follow labels; only finished products are counted."""
         for operation, _ in ended:
-            if operation.index == self.dropoff:
+            if operation.index == self._dropoff.index:
                 self.supplied = True
-                self.count += 1
                 self.dropoffs.append(self.time)
 
     def step(self, bundle: Bundle | None, axes: Index, ticks: int = 1) -> bool:
@@ -63,12 +59,12 @@ class IdealWorld:
         near = False
         if bundle is not None:
             x = self.x[axes]
-            x = x + bundle.field(x, self.tick) * self.tick
+            x = x + bundle.field(x, self._request.settings.tick) * self._request.settings.tick
             if not bundle.in_domain(x).all():
                 raise AssertionError("a configuration in Δ: two robots touch")
             self.x[axes] = x
             near = bundle.near_goal(x, 0.0)
-        self.time += self.tick
+        self.time += self._request.settings.tick
         return near
 
     def move(self, axes: Index, x: Array, v: Array, a: Array) -> None:
@@ -79,7 +75,7 @@ class IdealWorld:
     def advance(self, steps: int) -> None:
         """Timesteps of robots that move on their own (a distributed run)."""
         self._before_step()
-        self.time += steps * self.timestep
+        self.time += steps * self._request.settings.timestep
         begun, x, v, a = self._plan.T
         tau = self.time - begun
         self.x = x + tau * (v + 0.5 * tau * a)
@@ -93,7 +89,7 @@ class IdealWorld:
 
     def delivered(self) -> int:
         """Products dropped off."""
-        return self.count
+        return self._before + len(self.dropoffs)
 
     def unstable(self) -> str:
         """It is always stable."""

@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from time import perf_counter
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from factory.control.mode import Limits, Mode
 from factory.layout.layout import Layout
 from factory.modes.modes import operation_modes, robot_limits
-from factory.modes.staging import stages_of
+from factory.modes.staging import HeadStart, stages_of
 from factory.nets.history import firings
 from factory.nets.petri import Marking
 from factory.nets.replay import replay
@@ -20,6 +20,7 @@ from factory.plant.fused_bodies import bodies_of, fused_copies
 from factory.problem.robot_types import Catalogue, load_catalogue
 from factory.simulation.distributed import DistributedSupervisor
 from factory.simulation.ideal import IdealWorld
+from factory.simulation.request import RunRequest
 from factory.simulation.run import Run, busy_times
 from factory.simulation.supervisor import Supervisor
 from factory.simulation.world import World
@@ -59,82 +60,62 @@ class Simulation:
 
     Raises InputError where the engine refuses the model, or a mode starts outside its domain. A
     run that stalls or takes too long is a Run with its trouble; `require` makes that an error.
-    `compiled`: what it shares with earlier runs, made by `compiled` for the same layout, world,
-    units, settings, wip and `fuse`, from the beginning. `fuse`: parts that are joined
-    for good become one rigid body. `shown`: somebody will look at it, in a film, a log or live; if
-    not, the model has nothing that is only shown, and the run is the same and faster.
+    `compiled`: what it shares with earlier runs, made by `compiled` for the same layout and a
+    request that differs in seed and jitter alone. `counts`: how often each transition has fired
+    where it starts; `before`: products that had left by then. `ways`: what robots that go ahead
+    while they wait take [s].
     """
 
     def __init__(
         self,
         layout: Layout,
-        world: Literal["mujoco", "ideal"] = "mujoco",
-        units: int = 1,
-        seed: int = 0,
-        jitter: float = 0.0,
-        settings: Settings | None = None,
-        catalogue: Catalogue | None = None,
-        start: Marking | None = None,
-        wip: int | None = None,
-        distributed: bool = False,
+        request: RunRequest = RunRequest(),  # noqa: B008 (frozen)
         compiled: Compiled | None = None,
-        fuse: bool = False,
-        shown: bool = True,
-        fast: bool = True,
     ) -> None:
-        self.layout, self.kind, self.units = layout, world, units
-        self.seed, self.jitter, self.wip = seed, jitter, wip
-        self.settings = settings or Settings()
-        factory = layout.factory
-        self.modes = compiled.modes if compiled else operation_modes(layout, self.settings.eps)
-        self.limits, gains = robot_limits(layout, self.settings, seed, jitter)
-        self.stages = stages_of(layout, self.modes, self.settings)
-        self.delays = operation_delays(
-            layout, self.modes, self.limits, self.settings, world, self.stages
-        )
-        self.ways = ways_ahead(self.stages, self.limits, self.settings, world)
-        self.start = factory.net.initial_marking if start is None else start
-        self.counts = firings(factory.net, self.start)
-        positions = start_positions(layout, self.start)
+        self.layout, self.request = layout, request
+        settings, world, net = request.settings, request.world, layout.factory.net
+        self.modes = compiled.modes if compiled else operation_modes(layout, settings.eps)
+        self.limits, gains = robot_limits(layout, settings, request.seed, request.jitter)
+        stages = stages_of(layout, self.modes, settings)
+        self.delays = operation_delays(layout, self.modes, self.limits, settings, world, stages)
+        self.ways = ways_ahead(stages, self.limits, settings, world)
+        self.counts = firings(net, self.start)
         self.model: Model | None = None
         self.world: World
         if world == "ideal":
-            done = self.counts.get(factory.dropoff.end, 0)
             self.world = IdealWorld(
-                positions,
-                factory.dropoff.index,
-                units + done,
-                self.settings.tick,
-                done,
-                wip,
-                self.settings.timestep,
+                layout, request, start_positions(layout, self.start), self.counts
             )
         else:
-            loaded = compiled.loaded if compiled else None
-            self.model = compiled.model if compiled else None
-            self.model = self.model or physical_model(
-                layout, units, self.settings, catalogue, wip, self.under_way(), fuse, shown
-            )
-            self.world = _mujoco(
-                self.model, positions, gains, units, self.counts, wip, loaded, fast
-            )
-        self.before = self.world.delivered()
-        self.supervisor = self._distributed() if distributed else self._central()
+            from factory.simulation.mujoco.world import MujocoWorld
 
-    def _central(self) -> Supervisor:
+            self.model = (compiled and compiled.model) or _model(layout, request, self.under_way())
+            loaded = compiled.loaded if compiled else None
+            at = start_positions(layout, self.start)
+            self.world = MujocoWorld(self.model, request, at, gains, self.counts, loaded)
+        self.before = self.world.delivered()
+        self.supervisor = (self._distributed if request.distributed else self._central)(stages)
+
+    @property
+    def start(self) -> Marking:
+        """The marking that the run begins from."""
+        start = self.request.start
+        return self.layout.factory.net.initial_marking if start is None else start
+
+    def _central(self, stages: Sequence[HeadStart]) -> Supervisor:
         return Supervisor(
             self.layout.factory,
             self.modes,
             self.limits,
             self.world,
-            self.settings.tick,
+            self.request.settings.tick,
             self.start,
             self.counts,
-            self.stages,
+            stages,
         )
 
-    def _distributed(self) -> DistributedSupervisor:
-        settings, factory = self.settings, self.layout.factory
+    def _distributed(self, stages: Sequence[HeadStart]) -> DistributedSupervisor:
+        settings, factory = self.request.settings, self.layout.factory
         if self.start != factory.net.initial_marking:
             message = "a distributed run starts where every robot waits with no part"
             raise InputError(Diagnostic("BadMarking", message, None, "leave out --from"))
@@ -145,8 +126,8 @@ class Simulation:
             self.world,
             settings.timestep,
             settings.substeps,
-            self.seed,
-            self.stages,
+            self.request.seed,
+            stages,
         )
 
     @property
@@ -181,7 +162,7 @@ class Simulation:
         itself, at time 0: nobody is shown that, and the run has lasted until then."""
         patience = PATIENCE * max(self.delays)
         begin, watched, trouble = perf_counter(), 0.0, None
-        supervisor, world, goal = self.supervisor, self.world, self.before + self.units
+        supervisor, world, goal = self.supervisor, self.world, self.before + self.request.units
         while world.delivered() < goal and trouble is None:
             before = world.time
             supervisor.step(1 if observers else self._unseen(max_time))
@@ -205,17 +186,19 @@ class Simulation:
         """So many ticks may go by at once where nobody looks."""
         if max_time is None:
             return MOST
-        left = (max_time - float(self.world.time)) / self.settings.tick
+        left = (max_time - float(self.world.time)) / self.request.settings.tick
         return max(1, min(MOST, round(left)))
 
     def _record(self, wall: float, time: float, trouble: Diagnostic | None) -> Run:
         supervisor, world, factory = self.supervisor, self.world, self.layout.factory
-        physics = world.physics_time
-        predicted = predict(self.layout, self.delays, self.settings, self.kind, self.wip, self.ways)
+        request, physics = self.request, world.physics_time
+        predicted = predict(
+            self.layout, self.delays, request.settings, request.world, request.wip, self.ways
+        )
         verdict = replay(factory.net, [e.transition for e in supervisor.events], self.start)
         return Run(
-            self.kind,
-            self.units,
+            request.world,
+            request.units,
             world.delivered() - self.before,
             len(factory.robots),
             time,
@@ -229,8 +212,8 @@ class Simulation:
             tuple(world.dropoffs),
             busy_times(factory, supervisor.events),
             world.figures(),
-            self.seed,
-            self.jitter,
+            request.seed,
+            request.jitter,
             trouble,
         )
 
@@ -249,23 +232,29 @@ class Simulation:
         return Diagnostic(code, message, places[0].position if places else None, hint)
 
 
-def compiled(
-    layout: Layout,
-    world: Literal["mujoco", "ideal"],
-    units: int,
-    settings: Settings,
-    catalogue: Catalogue,
-    wip: int | None = None,
-    fuse: bool = False,
-) -> Compiled:
-    """What many runs that nobody looks at share. Raises InputError as `Simulation` does."""
-    modes = operation_modes(layout, settings.eps)
-    if world == "ideal":
+def compiled(layout: Layout, request: RunRequest) -> Compiled:
+    """What runs share whose requests differ in seed and jitter alone, and that begin at the
+    beginning. Raises InputError as `Simulation` does."""
+    modes = operation_modes(layout, request.settings.eps)
+    if request.world == "ideal":
         return Compiled(modes)
     from factory.mjcf.loading import load
 
-    model = physical_model(layout, units, settings, catalogue, wip, fuse=fuse, shown=False)
+    model = _model(layout, request, {})
     return Compiled(modes, model, load(model))
+
+
+def _model(layout: Layout, request: RunRequest, under_way: Mapping[str, int]) -> Model:
+    """The model that a run takes."""
+    units, settings, catalogue, wip = (
+        request.units,
+        request.settings,
+        request.catalogue,
+        request.wip,
+    )
+    return physical_model(
+        layout, units, settings, catalogue, wip, under_way, request.fuse, request.shown
+    )
 
 
 def physical_model(
@@ -305,12 +294,6 @@ def start_positions(layout: Layout, marking: Marking) -> np.ndarray:
         if robot.index in lifts and step:
             positions[lifts[robot.index]] = factory.strokes[robot.index]
     return positions
-
-
-def _mujoco(*arguments: Any) -> World:
-    from factory.simulation.mujoco.world import MujocoWorld
-
-    return MujocoWorld(*arguments)
 
 
 def require(run: Run) -> Run:

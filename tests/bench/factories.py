@@ -9,6 +9,7 @@ from typing import Any
 
 import factory
 from factory.layout.layout import Layout
+from factory.simulation.request import RunRequest
 from factory.simulation.simulation import Simulation
 from factory.support.settings import MOST, Settings
 
@@ -91,11 +92,13 @@ class Case:
         settings = Settings(timestep=self.timestep)
         return Simulation(
             layout,
-            units=ENDLESS,
-            settings=settings,
-            wip=self.wip,
-            fuse=self.fuse,
-            **{"shown": False, **given},
+            RunRequest(
+                units=ENDLESS,
+                settings=settings,
+                wip=self.wip,
+                fuse=self.fuse,
+                **{"shown": False, **given},
+            ),
         )
 
 
@@ -110,7 +113,7 @@ class Steady:
     @classmethod
     def of(cls, layout: Layout, wip: int | None) -> Steady:
         """Asks the ideal world, which takes seconds."""
-        simulation = Simulation(layout, "ideal", units=ENDLESS, wip=wip)
+        simulation = Simulation(layout, RunRequest("ideal", units=ENDLESS, wip=wip))
         while len(simulation.world.dropoffs) < SEEN:
             simulation.supervisor.step()
         times = simulation.world.dropoffs

@@ -8,6 +8,7 @@ from typing import Any
 from factory.compiler.mating import LEFT_OUT, NO_DEEPER, STRICT, TOLERANCE
 from factory.compiler.mating.overlaps import CLEAR
 from factory.pipeline import read
+from factory.simulation.request import RunRequest
 from factory.simulation.simulation import Simulation
 from tests.fidelity.products import BRICKS_NAMES, REAL, file_of, is_here, layout
 from tests.tables import table
@@ -27,7 +28,7 @@ def judged(name: str) -> dict[str, Any]:
     found = source.matings
     assert found is not None
     seconds = perf_counter() - begin
-    run = Simulation(layout(name), units=FORCED, jitter=0.3).run()
+    run = Simulation(layout(name), RunRequest(units=FORCED, jitter=0.3)).run()
     assert run.physics is not None
     forces = run.physics.mating_forces
     return {

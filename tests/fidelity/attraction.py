@@ -20,6 +20,7 @@ from factory.control.mode import REST, Array
 from factory.control.navigation import Bundle
 from factory.layout.layout import Layout
 from factory.nets.petri import Marking
+from factory.simulation.request import RunRequest
 from factory.simulation.simulation import Simulation
 from factory.support.engine import mujoco
 from tests.fidelity.products import CAMPAIGN, layout
@@ -53,7 +54,7 @@ class Bench:
     """One operation's mode in the engine, alone, to be started from anywhere in its domain."""
 
     def __init__(self, plan: Layout, number: int) -> None:
-        self.simulation = Simulation(plan, units=2, start=marking_at(plan, number))
+        self.simulation = Simulation(plan, RunRequest(units=2, start=marking_at(plan, number)))
         supervisor = self.simulation.supervisor
         assert supervisor.active.operations == (number,)
         assert supervisor.active.bundle is not None
@@ -61,7 +62,7 @@ class Bench:
         self.bundle: Bundle = supervisor.active.bundle
         self.mode = self.bundle.modes[0]
         self.world.apply([(plan.factory.operations[number], 0)], [])
-        self.tick = self.simulation.settings.tick
+        self.tick = self.simulation.request.settings.tick
         self.kept = mujoco.MjData(self.world.m)
         mujoco.mj_copyData(self.kept, self.world.m, self.world.d)
 
@@ -195,7 +196,7 @@ def try_mode(plan: Layout, number: int, count: int, seed: int = 0) -> list[Outco
 def chosen(plan: Layout) -> list[int]:
     """One operation of each template and pattern of gates in a factory."""
     found: dict[tuple[str, bool], int] = {}
-    simulation = Simulation(plan, units=1)
+    simulation = Simulation(plan, RunRequest(units=1))
     for operation in plan.factory.operations:
         gated = bool((simulation.modes[operation.index].gate >= 0).any())
         found.setdefault((operation.template.name, gated), operation.index)

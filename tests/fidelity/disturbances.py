@@ -25,6 +25,7 @@ from factory.simulation.disturbance import (
     Slowed,
     disturb,
 )
+from factory.simulation.request import RunRequest
 from factory.simulation.run import Run
 from factory.simulation.simulation import Simulation
 from tests.fidelity.products import SMALL, layout
@@ -179,7 +180,7 @@ def judge(run: Run) -> str:
 
 def trial(plan: Layout, make: Make | None, magnitude: float, seed: int, each: bool) -> Trial:
     """One run; `seed` is a robot's number where there is a trial for each."""
-    simulation = Simulation(plan, units=UNITS, seed=0 if each else seed, jitter=JITTER)
+    simulation = Simulation(plan, RunRequest(units=UNITS, seed=0 if each else seed, jitter=JITTER))
     disturb(simulation, *(make(simulation, magnitude, seed) if make else ()))
     run = simulation.run()
     assert run.physics is not None

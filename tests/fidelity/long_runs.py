@@ -22,6 +22,7 @@ from typing import Any
 import numpy as np
 
 from factory.mjcf import names
+from factory.simulation.request import RunRequest
 from factory.simulation.simulation import Simulation
 from tests.fidelity.products import PAPER, REAL, layout
 from tests.tables import table
@@ -132,7 +133,7 @@ def growth(memory: Sequence[float]) -> float:
 def long_run(product: str, units: int) -> dict:
     """One run, and what became of its figures."""
     gc.collect()
-    simulation = Simulation(layout(product), units=units)
+    simulation = Simulation(layout(product), RunRequest(units=units))
     assert simulation.model is not None
     fill = min(max(simulation.model.copies.values()), (units - 2 * TEN) // 2)
     diary = Diary(simulation)

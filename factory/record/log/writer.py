@@ -84,7 +84,7 @@ class LogWriter(Closing):
         self.before = int(simulation.before)
         net = simulation.layout.factory.net.threaded
         self.numbers = {t.name: n for n, t in enumerate(net.transitions)}
-        self.most = max(1, round(1.0 / simulation.settings.tick))
+        self.most = max(1, round(1.0 / simulation.request.settings.tick))
         self.events = 0
         self.ticks = _Ticks()
         try:
@@ -167,13 +167,13 @@ def _header(
     return {
         "versions": {"python": platform.python_version(), **_versions()},
         "command": list(sys.argv if command is None else command),
-        "world": simulation.kind,
-        "seed": simulation.seed,
-        "jitter": simulation.jitter,
-        "units": simulation.units,
-        "wip": simulation.wip,
+        "world": simulation.request.world,
+        "seed": simulation.request.seed,
+        "jitter": simulation.request.jitter,
+        "units": simulation.request.units,
+        "wip": simulation.request.wip,
         "start": sorted(simulation.start),
-        "settings": asdict(simulation.settings),
+        "settings": asdict(simulation.request.settings),
         "product": file.stem or "factory",
         "pag": {
             "file": str(file),

@@ -128,10 +128,10 @@ def subject_of_run(simulation: Observed) -> MonitorSubject:
     model = simulation.model
     return subject_of(
         simulation.layout,
-        simulation.settings,
-        simulation.jitter,
+        simulation.request.settings,
+        simulation.request.jitter,
         simulation.start,
-        simulation.wip,
+        simulation.request.wip,
         model.carried if model else None,
     )
 

@@ -15,6 +15,7 @@ from factory.nets.replay import replay
 from factory.record.monitor.record import watch_log
 from factory.record.monitor.report import Report
 from factory.show.report.recording import Recording
+from factory.simulation.request import RunRequest
 from factory.simulation.run import Event
 from factory.simulation.simulation import Simulation
 from factory.study.analysis.recorded import conditions
@@ -137,7 +138,15 @@ def _ideal(recording: Recording) -> dict[str, float | None]:
         return {}
     units = int(log.delivered[-1])
     thought = Simulation(
-        recording.layout, "ideal", units, made.seed, made.jitter, made.settings, wip=made.wip
+        recording.layout,
+        RunRequest(
+            "ideal",
+            units=units,
+            seed=made.seed,
+            jitter=made.jitter,
+            settings=made.settings,
+            wip=made.wip,
+        ),
     ).run()
     events = [Event(t, name) for t, name in log.events]
     apart = duration_differences(causal_record(net, thought.events), causal_record(net, events))

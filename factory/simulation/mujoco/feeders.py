@@ -10,12 +10,13 @@ from factory.mjcf.parts import presented_at
 from factory.problem.pag import NOPART
 from factory.simulation.mujoco.copies import Copies
 from factory.simulation.mujoco.welds import Welds
+from factory.simulation.request import RunRequest
 from factory.support.engine import mujoco
 
 
 class Feeders:
-    """The feeders of a factory, which make `units` products beside those that have been `released`
-    to the outfeed; at most `wip` units are let in at once. `counts`: how often each transition has
+    """The feeders of a factory, for as many products as are requested beside those that have been
+    `released` to the outfeed. `counts`: how often each transition has
     fired where the run starts.
 
     `welds` (by label): what holds the part that a feeder presents.
@@ -27,9 +28,8 @@ class Feeders:
         model: Model,
         copies: Copies,
         welds: Welds,
-        units: int,
+        request: RunRequest,
         counts: Mapping[int, int],
-        wip: int | None,
     ) -> None:
         self._copies, self._welds = copies, welds
         leaves, tray = model.factory.leaves, len(model.factory.robots) + 1
@@ -39,7 +39,7 @@ class Feeders:
         self._next = {o.label: counts.get(o.end, 0) for o in leaves}
         self._begun = {o.label: counts.get(o.start, 0) for o in leaves}
         self.released = counts.get(model.factory.dropoff.end, 0)
-        self._units, self._wip = self.released + units, wip
+        self._units, self._wip = self.released + request.units, request.wip
         self._shown: dict[str, int] = {}
         self._away: set[str] = set()
         self._refilled = _refilled(model)

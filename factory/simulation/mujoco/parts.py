@@ -17,6 +17,7 @@ from factory.simulation.mujoco.hands import Hands
 from factory.simulation.mujoco.joining import Joining
 from factory.simulation.mujoco.sleep import Sleep
 from factory.simulation.mujoco.welds import Welds
+from factory.simulation.request import RunRequest
 from factory.support.engine import mujoco
 
 
@@ -34,9 +35,8 @@ class Parts:
         d: mujoco.MjData,
         model: Model,
         sleep: Sleep,
-        units: int,
+        request: RunRequest,
         counts: Mapping[int, int],
-        wip: int | None,
     ) -> None:
         factory, body = model.factory, copies_of(m, model)
         self.model, self._d = model, d
@@ -46,7 +46,7 @@ class Parts:
         self.welds = Welds(m, d, self.masks, sleep)
         self.hold = {label: m.equality(names.hold(label)).id for label in self.labels}
         self.copies = Copies(m, model, body, self.welds)
-        self.feeders = Feeders(m, model, self.copies, self.welds, units, counts, wip)
+        self.feeders = Feeders(m, model, self.copies, self.welds, request, counts)
         self.hands = Hands(m, model, self.welds)
         self.joining = Joining(model, self.hands, self.copies, self.feeders, self.welds)
         self.joining.weigh(m, d)

@@ -21,6 +21,7 @@ from factory.simulation.mujoco.inspection import Inspection
 from factory.simulation.mujoco.motion import Motion
 from factory.simulation.mujoco.parts import Parts
 from factory.simulation.mujoco.stepping import SingleSteps
+from factory.simulation.request import RunRequest
 from factory.simulation.run import PhysicsFigures
 from factory.simulation.world import Hooks, Job
 from factory.support.engine import mujoco
@@ -37,21 +38,18 @@ class MujocoWorld:
 
     `start` [m] and `gains` (axes,): where each axis is, and a factor on its controller gain;
     `counts`: how often each transition has fired where the run starts; `loaded`: what `load` has
-    given for the model, of which a copy is run; `fast`: with several ticks in one call of the
-    engine. Raises InputError (BadMesh) where the engine refuses the model, with the engine's own
-    words.
+    given for the model, of which a copy is run. Raises InputError (BadMesh) where the
+    engine refuses the model, with the engine's own words.
     """
 
     def __init__(
         self,
         model: Model,
+        request: RunRequest,
         start: Array,
         gains: Array,
-        units: int,
         counts: Mapping[int, int],
-        wip: int | None = None,
         loaded: mujoco.MjModel | None = None,
-        fast: bool = True,
     ) -> None:
         self.model, self.hooks, self.supplied = model, Hooks(), True
         self.m = load(model) if loaded is None else copy(loaded)
@@ -60,7 +58,7 @@ class MujocoWorld:
         self._before = counts.get(model.factory.dropoff.end, 0)
         self._unseen = 0
         self.motion = Motion(self.m, self.d, model, start, gains)
-        self.parts = Parts(self.m, self.d, model, self.motion.sleep, units, counts, wip)
+        self.parts = Parts(self.m, self.d, model, self.motion.sleep, request, counts)
         self.inspection = Inspection(self.m, self.d, model, self.parts.masks)
         for operation in model.factory.operations:
             begun, over = (counts.get(t, 0) for t in (operation.start, operation.end))
@@ -69,7 +67,7 @@ class MujocoWorld:
         stepping = self.m, self.d, self.inspection, self.hooks, model.settings
         self.motion.stepping = (
             Strides(*stepping, Neighbours(self.m, self.d, self.parts, self.motion.axes))
-            if fast
+            if request.fast
             else SingleSteps(*stepping)
         )
         self.motion.begin(self.parts.hands.loads())

@@ -13,6 +13,7 @@ from factory.control.mode import Array
 from factory.layout.layout import Layout
 from factory.mjcf.model import product_name
 from factory.nets.gears import GearNet
+from factory.simulation.request import RunRequest
 from factory.simulation.run import Run
 from factory.simulation.simulation import Simulation
 from factory.study.analysis.steady import steady_units
@@ -104,8 +105,14 @@ def measure_seed(case: Case, seed: int) -> SeedRecord:
     """One seed in both worlds."""
     layout = case.layout
     units = case.units or steady_units(Timing(layout, case.settings, "mujoco", seed, case.jitter))
-    ideal = Simulation(layout, "ideal", units, seed, case.jitter, case.settings)
-    physical = Simulation(layout, "mujoco", units, seed, case.jitter, case.settings)
+    ideal = Simulation(
+        layout,
+        RunRequest("ideal", units=units, seed=seed, jitter=case.jitter, settings=case.settings),
+    )
+    physical = Simulation(
+        layout,
+        RunRequest("mujoco", units=units, seed=seed, jitter=case.jitter, settings=case.settings),
+    )
     if case.alter is not None:
         case.alter(physical.physical.m)
     measurement = Measurement(physical)

@@ -9,12 +9,13 @@ from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
 from functools import lru_cache
 from time import perf_counter
-from typing import Any, Literal, TypeVar
+from typing import Any, TypeVar
 
 from factory.layout.layout import Layout
 from factory.nets.verify import proved
 from factory.plant.fused_bodies import fusing_pays
 from factory.problem.robot_types import load_catalogue
+from factory.simulation.request import RunRequest
 from factory.simulation.run import Run
 from factory.simulation.simulation import Compiled, Simulation, compiled
 from factory.study.sweep.grid import SETTINGS, Point
@@ -96,20 +97,21 @@ class Runner:
         """The run at a point. Raises FactoryError."""
         values: dict[str, Any] = self.recipe.at(point)
         settings = Settings(**{name: values[name] for name in SETTINGS})
-        units, wip = values["units"], values["wip"]
-        layout = _or_raise(self._layout(settings))
-        shared = _or_raise(self._compiled(settings, values["world"], units, wip))
-        simulation = Simulation(
-            layout,
+        layout, fuse = _or_raise(self._layout(settings)), self.recipe.fuse
+        if fuse is None:
+            fuse = fusing_pays(layout.factory, layout.product)
+        request = RunRequest(
             values["world"],
-            units,
-            values["seed"],
-            values["jitter"],
-            settings,
-            self.catalogue,
-            wip=wip,
-            compiled=shared,
+            values["units"],
+            settings=settings,
+            wip=values["wip"],
+            fuse=fuse,
+            shown=False,
+            catalogue=self.catalogue,
         )
+        shared = _or_raise(self._compiled(request))
+        request = replace(request, seed=values["seed"], jitter=values["jitter"])
+        simulation = Simulation(layout, request, shared)
         return simulation.run(max_time=self.recipe.max_time)
 
     def _lay_out(self, settings: Settings) -> Layout | FactoryError:
@@ -122,14 +124,9 @@ class Runner:
         except FactoryError as error:
             return error
 
-    def _compile(
-        self, settings: Settings, world: Literal["mujoco", "ideal"], units: int, wip: int | None
-    ) -> Compiled | FactoryError:
+    def _compile(self, request: RunRequest) -> Compiled | FactoryError:
         try:
-            layout, fuse = _or_raise(self._layout(settings)), self.recipe.fuse
-            if fuse is None:
-                fuse = fusing_pays(layout.factory, layout.product)
-            return compiled(layout, world, units, settings, self.catalogue, wip, fuse)
+            return compiled(_or_raise(self._layout(request.settings)), request)
         except FactoryError as error:
             return error
 

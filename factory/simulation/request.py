@@ -1,0 +1,38 @@
+"""What is asked of a run."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Literal
+
+from factory.nets.petri import Marking
+from factory.problem.robot_types import Catalogue
+from factory.support.settings import Settings
+
+WorldName = Literal["mujoco", "ideal"]
+
+
+@dataclass(frozen=True, slots=True)
+class RunRequest:
+    """A run of a laid-out factory in a `world`, until `units` products are dropped off.
+
+    `seed` and `jitter` draw each robot's speed and gain within ± jitter. `start`: the marking it
+    begins from, m_0 where None. `wip`: most units inside at once. `distributed`: robots run their
+    own programs. `fuse`: parts joined for good become one rigid body. `shown`: it is filmed, logged
+    or watched; if not, the model has nothing that is only shown, and the run is the same and
+    faster. `fast`: with what only makes it faster. `catalogue`: robot types, the shipped ones where
+    None.
+    """
+
+    world: WorldName = "mujoco"
+    units: int = 1
+    seed: int = 0
+    jitter: float = 0.0
+    settings: Settings = field(default_factory=Settings)
+    start: Marking | None = None
+    wip: int | None = None
+    distributed: bool = False
+    fuse: bool = False
+    shown: bool = True
+    fast: bool = True
+    catalogue: Catalogue | None = None
