@@ -46,15 +46,19 @@ ENGINE_ROOMS = (
 )
 """Rooms, or parts of rooms, that may import the engine."""
 
-ENGINE_WRITERS = ("simulation/mujoco",)
-"""Where the engine's model and data are written."""
+ENGINE_WRITERS = ("simulation/mujoco", "mjcf")
+"""Where the engine's model and data are written: those of a run, and those of a replica that no run
+uses."""
 
 ENGINE_FIELDS = frozenset(
-    "qpos qvel qacc_warmstart act ctrl xfrc_applied qfrc_applied mocap_pos mocap_quat eq_active"
-    " eq_obj1id eq_obj2id eq_data eq_solref eq_solimp body_mass body_inertia body_contype"
-    " body_conaffinity geom_contype geom_conaffinity dof_armature dof_frictionloss dof_damping"
-    " actuator_biasprm actuator_gainprm actuator_forcerange exclude_signature"
-    " tree_sleep_policy history".split()
+    {
+        *("qpos", "qvel", "qacc_warmstart", "act", "ctrl", "history", "eq_active"),
+        *("xfrc_applied", "qfrc_applied", "mocap_pos", "mocap_quat", "exclude_signature"),
+        *("eq_obj1id", "eq_obj2id", "eq_data", "eq_solref", "eq_solimp", "tree_sleep_policy"),
+        *("body_mass", "body_inertia", "body_contype", "body_conaffinity"),
+        *("geom_contype", "geom_conaffinity", "dof_armature", "dof_frictionloss", "dof_damping"),
+        *("actuator_biasprm", "actuator_gainprm", "actuator_forcerange"),
+    }
 )
 """Fields of MjModel and MjData that a run may write."""
 
@@ -263,6 +267,13 @@ def long_modules(house: House) -> Iterator[str]:
         lines = len(module.text.splitlines())
         if lines > MOST_LINES:
             yield f"{module.name}: {lines} lines"
+
+
+def unexplained(house: House) -> Iterator[str]:
+    """Modules with code and no docstring."""
+    for module in house.modules.values():
+        if module.text.strip() and not ast.get_docstring(module.tree):
+            yield f"{module.name}: no docstring"
 
 
 def anys(house: House, name: str) -> Iterator[str]:

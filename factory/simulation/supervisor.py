@@ -36,7 +36,7 @@ class Active:
 
 
 @dataclass(slots=True)
-class Firings:
+class Fired:
     """What has fired: how often each transition, by number, and the events of this run."""
 
     count: list[int]
@@ -88,7 +88,7 @@ class Supervisor:
         starts = [operation.start for operation in factory.operations]
         self.threads = Threads(net.threaded, net.marking_of(start), starts)
         fired = [counts.get(number, 0) for number in range(len(net.threaded.transitions))]
-        self.firings = Firings(fired, world.time)
+        self.firings = Fired(fired, world.time)
         self.ahead, self.active = Ahead(factory, stages), Active()
         self.near = self.enabled = True
         marked = self.threads.marked

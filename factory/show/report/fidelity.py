@@ -21,7 +21,7 @@ from factory.simulation.simulation import Simulation
 from factory.study.analysis.recorded import conditions
 from factory.study.fidelity.causality import causal_record, duration_differences
 from factory.study.fidelity.quantities import QUANTITIES
-from factory.study.fidelity.welds import Welds
+from factory.study.fidelity.welds import ActiveWelds
 from factory.support.errors import InputError
 
 EVERY = 5
@@ -89,7 +89,7 @@ def _welds(recording: Recording) -> dict[str, float | None]:
     log, replica = recording.log, Replica(recording.motion.m)
     m, d = replica.m, replica.d
     replica.switch(log.active[0])
-    welds = Welds(m, d)
+    welds = ActiveWelds(m, d)
     gap = residual = product = 0.0
     handoffs, finished = 0, bool(log.delivered[-1])
     for row, switched in _rows(recording):

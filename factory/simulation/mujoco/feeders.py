@@ -34,8 +34,10 @@ class Feeders:
         self._copies, self._welds = copies, welds
         leaves, tray = model.factory.leaves, len(model.factory.robots) + 1
         self.welds = {o.label: m.equality(names.feed(o.label)).id for o in leaves}
-        self._code = {o.label: tray + 1 + n for n, o in enumerate(leaves)}
-        self._at = {o.label: presented_at(model.layout, o.label) for o in leaves}
+        self._code_at = {
+            o.label: (tray + 1 + n, presented_at(model.layout, o.label))
+            for n, o in enumerate(leaves)
+        }
         self._next = {o.label: counts.get(o.end, 0) for o in leaves}
         self._begun = {o.label: counts.get(o.start, 0) for o in leaves}
         self.released = counts.get(model.factory.dropoff.end, 0)
@@ -46,7 +48,7 @@ class Feeders:
 
     def grips(self) -> Iterator[tuple[int, int]]:
         """The welds that hold what is presented, each with the code of its feeder."""
-        return zip(self.welds.values(), self._code.values(), strict=True)
+        return ((weld, self._code_at[label][0]) for label, weld in self.welds.items())
 
     def presents(self, label: str, unit: int) -> bool:
         """Whether the feeder shows the part for that unit, and it may be let in."""
@@ -65,8 +67,9 @@ class Feeders:
         self._shown[label] = unit
         self._next[label] += 1
         body = self._copies.take(label, unit)
-        self._welds.place(body, self._at[label])
-        self._welds.hold([body], self._code[label])
+        code, at = self._code_at[label]
+        self._welds.place(body, at)
+        self._welds.hold([body], code)
         self._welds.join({self.welds[label]: body})
 
     def taken(self, label: str) -> None:

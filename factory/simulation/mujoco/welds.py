@@ -31,7 +31,6 @@ class Welds:
         self._m, self._d, self._sleep = m, d, sleep
         mujoco.mj_kinematics(m, d)
         self._frames = WeldFrames.of(m, d)
-        self._free = m.jnt_qposadr[m.body_jntadr][:, None] + np.arange(3)
         self._on: dict[int, int] = {}
         self._off: set[int] = set()
         self._gripped: dict[int, int] = {}
@@ -85,7 +84,8 @@ class Welds:
         """The largest distance [m] between where welds hold bodies and where those are: now, which
         `xpos` tells of where the last step began."""
         q, frames = self._d.qpos, self._frames.chosen(welds)
-        offset = q[self._free[bodies]] - frames.at(q[frames.along])
+        free = self._m.jnt_qposadr[self._m.body_jntadr[bodies]][:, None] + np.arange(3)
+        offset = q[free] - frames.at(q[frames.along])
         return float(np.linalg.norm(offset, axis=1).max())
 
     def _put(self) -> None:

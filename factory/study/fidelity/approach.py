@@ -16,7 +16,7 @@ from factory.layout.layout import Layout
 from factory.mjcf import names
 from factory.study.fidelity.record import ClosestApproach
 from factory.study.fidelity.shadow import Shadow
-from factory.study.fidelity.welds import Welds
+from factory.study.fidelity.welds import ActiveWelds
 
 ROBOT, PART, FEEDER, OUTFEED, NONE = range(5)
 KINDS = ("robot", "part", "feeder", "outfeed")
@@ -40,7 +40,7 @@ def certified(layout: Layout) -> Array:
 class Approaches:
     """The least distance for each pair of kinds, with the names of the two bodies."""
 
-    def __init__(self, world: Any, layout: Layout, welds: Welds, shadow: Shadow) -> None:
+    def __init__(self, world: Any, layout: Layout, welds: ActiveWelds, shadow: Shadow) -> None:
         m = world.m
         self.m, self.welds, self.shadow = m, welds, shadow
         self.certified = certified(layout)

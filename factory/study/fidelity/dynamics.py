@@ -1,4 +1,4 @@
-"""Drives, payloads and welds, tick by tick: tracking errors, forces, accelerations, residuals."""
+"""DriveFigures, payloads and welds, tick by tick: tracking errors, forces, accelerations, residuals."""
 
 from __future__ import annotations
 
@@ -9,14 +9,14 @@ import numpy as np
 from factory.control.mode import REST, Array
 from factory.mjcf.weld_frames import FEED, ROWS, Slides, residuals
 from factory.study.fidelity.histogram import Histogram
-from factory.study.fidelity.welds import Velocities, Welds
+from factory.study.fidelity.welds import ActiveWelds, Velocities
 from factory.support.engine import mujoco
 
 FULL = 0.999
 """Share of its limit from which a force is saturated."""
 
 
-class Drives:
+class DriveFigures:
     """Tracking errors [m], forces as a share of their limit, and work [J]."""
 
     def __init__(self, world: Any) -> None:
@@ -53,7 +53,7 @@ class Payload:
     and the tray. Parts in feeders and spare copies are left out, and with them the engine's only
     teleports."""
 
-    def __init__(self, welds: Welds, velocities: Velocities, timestep: float) -> None:
+    def __init__(self, welds: ActiveWelds, velocities: Velocities, timestep: float) -> None:
         self.welds, self.velocities, self.timestep = welds, velocities, timestep
         self.acceleration, self.jerk = Histogram(), Histogram()
         self._mean = np.zeros((len(welds.kind), 3))

@@ -9,7 +9,7 @@ from factory.mjcf import names
 from factory.mjcf.model import Model
 from factory.mjcf.weld_frames import HOLD
 from factory.study.fidelity.record import Misplaced
-from factory.study.fidelity.welds import Welds
+from factory.study.fidelity.welds import ActiveWelds
 
 
 class Finished:
@@ -30,8 +30,8 @@ class Finished:
         self.products = 0
         self._held: Index | None = None
 
-    def tick(self, welds: Welds, fresh: Index, xpos: Array, xmat: Array) -> None:
-        """Welds have been switched, with bodies at `xpos`, `xmat`, those in `fresh` on. A product
+    def tick(self, welds: ActiveWelds, fresh: Index, xpos: Array, xmat: Array) -> None:
+        """ActiveWelds have been switched, with bodies at `xpos`, `xmat`, those in `fresh` on. A product
         is measured when the outfeed takes it and when it has gone."""
         if self._held is not None and not (welds.kind[self._held] == HOLD).all():
             self.measure(self._held, xpos, xmat)

@@ -10,7 +10,7 @@ from factory.control.mode import Array, Index
 from factory.mjcf.weld_frames import gaps
 from factory.simulation.mujoco.fusing import rotations
 from factory.study.fidelity.record import HandOff
-from factory.study.fidelity.welds import Velocities, Welds
+from factory.study.fidelity.welds import ActiveWelds, Velocities
 from factory.support.engine import mujoco
 
 WINDOW = 0.05
@@ -24,7 +24,7 @@ class HandOffs:
     hand-offs are joined in arrays.
     """
 
-    def __init__(self, m: mujoco.MjModel, welds: Welds, velocities: Velocities) -> None:
+    def __init__(self, m: mujoco.MjModel, welds: ActiveWelds, velocities: Velocities) -> None:
         self.m, self.welds, self.velocities = m, welds, velocities
         self.turn = rotations(m.body_iquat)
         self.done: list[HandOff] = []
@@ -32,7 +32,7 @@ class HandOffs:
         self._join()
 
     def begin(self, fresh: Index, time: float, v: Array, xpos: Array, xmat: Array) -> None:
-        """Welds switched on at `time`, when the speeds were `v` (nv,) and bodies at `xpos`."""
+        """ActiveWelds switched on at `time`, when the speeds were `v` (nv,) and bodies at `xpos`."""
         self._finish([w for w in self._watched if self.welds.active[w.welds].all()])
         holders = self.m.eq_obj1id[fresh]
         apart = gaps(self.m, fresh, xpos, xmat)

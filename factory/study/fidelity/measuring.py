@@ -13,12 +13,12 @@ from factory.record.monitor import beside
 from factory.simulation.run import Run
 from factory.simulation.simulation import Simulation
 from factory.study.fidelity.approach import BEYOND, Approaches
-from factory.study.fidelity.dynamics import Drives, Payload, Residual
+from factory.study.fidelity.dynamics import DriveFigures, Payload, Residual
 from factory.study.fidelity.finished import Finished
 from factory.study.fidelity.handoffs import HandOffs
 from factory.study.fidelity.shadow import Shadow
 from factory.study.fidelity.steps import Steps
-from factory.study.fidelity.welds import Velocities, Welds
+from factory.study.fidelity.welds import ActiveWelds, Velocities
 
 
 class Measurement:
@@ -33,11 +33,11 @@ class Measurement:
         m, d = world.m, world.d
         self.simulation = simulation
         self.shadow = Shadow(m, d, layout.clearance + BEYOND)
-        self.welds = Welds(m, d)
+        self.welds = ActiveWelds(m, d)
         velocities = Velocities(m, self.shadow.d)
         self.handoffs = HandOffs(m, self.welds, velocities)
         self.payload = Payload(self.welds, velocities, float(m.opt.timestep))
-        self.drives = Drives(world)
+        self.drives = DriveFigures(world)
         self.approaches = Approaches(world, layout, self.welds, self.shadow)
         self.finished = Finished(model)
         self.residual = Residual(m, d, velocities.slides)

@@ -11,7 +11,7 @@ from factory.mjcf.weld_frames import GRIP, KINDS, Slides
 from factory.support.engine import mujoco
 
 
-class Welds:
+class ActiveWelds:
     """The active welds as of the last `scan`. `holder`, `kind` (nbody,): for each body the body
     that holds it and the kind of the weld; -1 for none."""
 
