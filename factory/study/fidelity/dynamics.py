@@ -1,4 +1,4 @@
-"""DriveFigures, payloads and welds, tick by tick: tracking errors, forces, accelerations, residuals."""
+"""Drives, payloads and welds, tick by tick: tracking errors, forces, accelerations, residuals."""
 
 from __future__ import annotations
 

@@ -31,7 +31,7 @@ class Finished:
         self._held: Index | None = None
 
     def tick(self, welds: ActiveWelds, fresh: Index, xpos: Array, xmat: Array) -> None:
-        """ActiveWelds have been switched, with bodies at `xpos`, `xmat`, those in `fresh` on. A product
+        """Welds have been switched, with bodies at `xpos`, `xmat`, those in `fresh` on. A product
         is measured when the outfeed takes it and when it has gone."""
         if self._held is not None and not (welds.kind[self._held] == HOLD).all():
             self.measure(self._held, xpos, xmat)

@@ -32,7 +32,7 @@ class HandOffs:
         self._join()
 
     def begin(self, fresh: Index, time: float, v: Array, xpos: Array, xmat: Array) -> None:
-        """ActiveWelds switched on at `time`, when the speeds were `v` (nv,) and bodies at `xpos`."""
+        """Welds switched on at `time`, when the speeds were `v` (nv,) and bodies at `xpos`."""
         self._finish([w for w in self._watched if self.welds.active[w.welds].all()])
         holders = self.m.eq_obj1id[fresh]
         apart = gaps(self.m, fresh, xpos, xmat)
