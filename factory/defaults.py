@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from factory.errors import Diagnostic, InputError, Position, did_you_mean
-from factory.settings import RANGES, WHOLE, Settings, wrong_type
+from factory.settings import RANGES, WHOLE, Settings, is_auto, wrong_type
 
 NAME = "factory.toml"
 
@@ -51,7 +51,9 @@ class Defaults:
     def settings(self) -> Settings:
         """The settings of the file, the built-in ones where it says nothing."""
         given = {k: v for k, v in self.values.items() if k in RANGES}
-        return Settings().with_options({k: v if k in WHOLE else float(v) for k, v in given.items()})
+        return Settings().with_options(
+            {k: v if k in WHOLE or is_auto(k, v) else float(v) for k, v in given.items()}
+        )
 
     def options(self) -> dict[str, Any]:
         """The values of options; folders are those beside the file."""

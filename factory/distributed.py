@@ -24,8 +24,8 @@ from factory.factory import Factory, Operation
 from factory.programs import Program, Step, program_of
 from factory.trace import Event
 
-RATES = (3, 11)
-"""Control periods are drawn from these, in timesteps of the engine."""
+PERIODS = (0.006, 0.02)
+"""Control periods are drawn from so long to so long [s], in whole timesteps, one at least."""
 
 
 @dataclass(slots=True)
@@ -118,7 +118,8 @@ class DistributedSupervisor:
         self.link = Link(world, factory.axes)
         self.programs = [program_of(factory, r.index) for r in factory.robots]
         self.cells = [Cell(p.steps[0].label) for p in self.programs]
-        periods = self.random.integers(*RATES, size=len(self.programs))
+        low, high = (max(1, round(period / timestep)) for period in PERIODS)
+        periods = self.random.integers(low, high + 1, size=len(self.programs))
         x = world.sense()[0]
         lifts = {robot: len(self.programs) + n for n, robot in enumerate(factory.strokes)}
         self.processes = []

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from time import perf_counter
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -15,13 +15,14 @@ from factory.control.staging import stages_of
 from factory.distributed import DistributedSupervisor
 from factory.errors import Diagnostic, InputError, RunError
 from factory.layout.plan import Layout
+from factory.mjcf.timestep import timed
 from factory.nets.history import firings
 from factory.nets.petri import Marking
 from factory.nets.pool import part_pool
 from factory.nets.replay import replay
 from factory.prediction import operation_delays, predict, ways_ahead
 from factory.robots import Catalogue, load_catalogue
-from factory.settings import MOST, Settings
+from factory.settings import AUTO, MOST, Settings
 from factory.supervisor import Supervisor
 from factory.trace import PhysicsFigures, Run, busy_times
 from factory.wholes import bodies_of, fused_copies
@@ -81,7 +82,10 @@ class Simulation:
     ) -> None:
         self.layout, self.kind, self.units = layout, world, units
         self.seed, self.jitter, self.wip = seed, jitter, wip
-        self.settings = settings or Settings()
+        asked = settings or Settings()
+        self.chosen = asked.timestep == AUTO
+        model = compiled.model if compiled else None
+        self.settings = model.settings if model else timed(asked, layout, world, jitter)
         factory = layout.factory
         self.modes = compiled.modes if compiled else operation_modes(layout, self.settings.eps)
         self.limits, gains = robot_limits(layout, self.settings, seed, jitter)
@@ -104,12 +108,11 @@ class Simulation:
                 self.settings.tick,
                 done,
                 wip,
-                self.settings.timestep,
+                self.settings.step,
             )
         else:
             loaded = compiled.loaded if compiled else None
-            self.model = compiled.model if compiled else None
-            self.model = self.model or physical_model(
+            self.model = model or physical_model(
                 layout, units, self.settings, catalogue, wip, self.under_way(), fuse, shown
             )
             self.world = _mujoco(self.model, positions, gains, units, self.counts, wip, loaded)
@@ -138,8 +141,8 @@ class Simulation:
             self.modes,
             self.limits,
             self.world,
-            settings.timestep,
-            settings.substeps,
+            settings.step,
+            settings.steps,
             self.seed,
             self.stages,
         )
@@ -197,7 +200,7 @@ class Simulation:
         verdict = replay(factory.net, [e.transition for e in supervisor.events], self.start)
         figures: PhysicsFigures | None = None
         if self.model is not None:
-            figures = world.inspection.figures()
+            figures = replace(world.inspection.figures(), timestep_chosen=self.chosen)
         return Run(
             self.kind,
             self.units,
@@ -274,7 +277,7 @@ def physical_model(
         copies = fused_copies(bodies, factory, units)
     else:
         copies = part_copies(part_pool(factory), units, wip, under_way)
-    catalogue, settings = catalogue or load_catalogue(), settings or Settings()
+    catalogue, settings = catalogue or load_catalogue(), timed(settings or Settings(), layout)
     return build_model(layout, catalogue, copies, settings, bodies, shown)
 
 

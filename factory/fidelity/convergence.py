@@ -10,6 +10,7 @@ from factory.engine import mujoco
 from factory.fidelity.comparing import Case, over_cases
 from factory.fidelity.quantities import QUANTITIES
 from factory.fidelity.record import Figures, SeedRecord
+from factory.mjcf.timestep import timed
 
 TIMESTEPS = (2.0, 1.0, 0.5, 0.25)
 """Factors on the timestep, the finest last."""
@@ -160,8 +161,8 @@ def _series(setting: str, factors: Sequence[float], records: Sequence[SeedRecord
 
 def _with_timestep(case: Case, factor: float) -> Case:
     """A case with another timestep; its tick stays as near as whole steps allow."""
-    settings = case.settings
-    substeps = max(1, round(settings.substeps / factor))
+    settings = timed(case.settings, case.layout, jitter=case.jitter)
+    substeps = max(1, round(settings.steps / factor))
     return replace(
-        case, settings=replace(settings, timestep=settings.timestep * factor, substeps=substeps)
+        case, settings=replace(settings, timestep=settings.step * factor, substeps=substeps)
     )

@@ -50,7 +50,7 @@ class Measurement:
         self._order = {part: place for place, part in enumerate(self.finished.parts)}
         self._product: Index | None = None
         self._seen = self._what_happened()
-        self._steps = Steps(self.m, self.d, simulation.settings.substeps)
+        self._steps = Steps(self.m, self.d, simulation.settings.steps)
 
     def run(self, max_time: float | None = None) -> Run:
         """Run the simulation, measuring, with a monitor beside it."""

@@ -188,12 +188,17 @@ def model_files(model: Model, path: Path) -> dict[Path, bytes]:
 
 def _drive(factory: Factory, robot: int, masses: Mapping[str, float], settings: Settings) -> Drive:
     """The drive for the heaviest load a robot carries."""
+    load = heaviest(factory, robot, masses)
+    return drive_for(CARRIAGE_MASS, load, settings.acceleration, settings)
+
+
+def heaviest(factory: Factory, robot: int, masses: Mapping[str, float]) -> float:
+    """The heaviest load that a robot (index) carries, by the masses of labels [kg]."""
     operations = factory.operations
-    load = max(
+    return max(
         masses.get(operations[o].after[operations[o].robots.index(robot)], 0.0)
         for o in factory.robots[robot].operations
     )
-    return drive_for(CARRIAGE_MASS, load, settings.acceleration, settings)
 
 
 def drive_for(
@@ -206,7 +211,7 @@ def drive_for(
     """Critically damped gains for what moves a load, and the load [kg]; the force that their
     acceleration [m/s²] takes; the inertia that the motor adds."""
     inertia = max(0.0, LEAST * load - own)
-    empty, rate = own + inertia, 1 / settings.timestep
+    empty, rate = own + inertia, 1 / settings.step
     mass = empty + load
     kp = min(mass * stiffness**2, PUSHED * empty * rate**2)
     kv = min(2 * mass * stiffness, DAMPED * empty * rate)
@@ -228,7 +233,7 @@ def _options(root: Element, settings: Settings, bodies: int) -> None:
     option = add(
         root,
         "option",
-        timestep=settings.timestep,
+        timestep=settings.step,
         integrator="Euler",
         cone="elliptic",
         impratio=1,

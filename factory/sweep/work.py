@@ -13,6 +13,7 @@ from typing import Any, Literal, TypeVar
 
 from factory.errors import FactoryError
 from factory.layout.plan import Layout
+from factory.mjcf.timestep import timed
 from factory.nets.verify import proved
 from factory.robots import load_catalogue
 from factory.settings import Settings
@@ -98,14 +99,15 @@ class Runner:
         settings = Settings(**settings_at(values))
         units, wip = values["units"], values["wip"]
         layout = _or_raise(self._layout(settings))
-        shared = _or_raise(self._compiled(settings, values["world"], units, wip))
+        made = timed(settings, layout, values["world"], values["jitter"])
+        shared = _or_raise(self._compiled(settings, made, values["world"], units, wip))
         simulation = Simulation(
             layout,
             values["world"],
             units,
             values["seed"],
             values["jitter"],
-            settings,
+            made,
             self.catalogue,
             wip=wip,
             compiled=shared,
@@ -123,13 +125,19 @@ class Runner:
             return error
 
     def _compile(
-        self, settings: Settings, world: Literal["mujoco", "ideal"], units: int, wip: int | None
+        self,
+        settings: Settings,
+        made: Settings,
+        world: Literal["mujoco", "ideal"],
+        units: int,
+        wip: int | None,
     ) -> Compiled | FactoryError:
+        """For settings, as they are `made` with a timestep of numbers."""
         try:
             layout, fuse = _or_raise(self._layout(settings)), self.recipe.fuse
             if fuse is None:
                 fuse = fusing_pays(layout.factory, layout.product)
-            return compiled(layout, world, units, settings, self.catalogue, wip, fuse)
+            return compiled(layout, world, units, made, self.catalogue, wip, fuse)
         except FactoryError as error:
             return error
 

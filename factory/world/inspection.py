@@ -121,4 +121,5 @@ class Inspection:
             dict(self.force),
             self.model.excluded,
             bool(self.model.carried.wholes),
+            float(self.m.opt.timestep),
         )

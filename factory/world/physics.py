@@ -80,7 +80,7 @@ class MujocoWorld:
         self.m.actuator_biasprm[actuator[: self.tray], 1:3] *= np.asarray(gains)[:, None]
         self._x = np.array(start, float)
         self._v = np.zeros_like(self._x)
-        self.tick, self.steps = self.settings.tick, self.settings.substeps
+        self.tick, self.steps = self.settings.tick, self.settings.steps
         self.stride, self.ticks = self.settings.stride, 0
         self.at_once = self.stride
         self.courses = Courses()
