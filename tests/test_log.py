@@ -17,6 +17,7 @@ from factory.engine import mujoco
 from factory.errors import InputError
 from factory.log import MAGIC, Log, LogWriter, is_log, read_log
 from factory.log.blocks import HEAD, LENGTH, pack_rows, unpack_rows
+from factory.settings import Settings
 from factory.simulation import Simulation
 
 PAPER = Path(__file__).parent.parent / "examples" / "paper.pag"
@@ -107,7 +108,7 @@ def test_a_log_without_setpoints_is_still_read(
         return {k: a for k, a in arrays(self).items() if not k.startswith("ctrl")}
 
     monkeypatch.setattr(LogWriter, "_arrays", older)
-    simulation = Simulation(layout, "mujoco", 1)
+    simulation = Simulation(layout, "mujoco", 1, settings=Settings(timestep=0.002))
     with LogWriter(tmp_path / "old", simulation) as writer:
         simulation.run([writer.observe], 0.1)
     log = read_log(tmp_path / "old")

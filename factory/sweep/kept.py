@@ -8,6 +8,7 @@ import sqlite3
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from factory.settings import AUTO
 from factory.sweep.grid import KEYS, WHOLE
 from factory.sweep.work import FIGURES
 
@@ -56,7 +57,7 @@ def _check_rows(connection: sqlite3.Connection, varied: Sequence[str]) -> None:
     faults.append("status NOT IN ('done', 'failed')")
     for name, kind in COLUMNS.items():
         types = "'text'" if kind.startswith("TEXT") else "'integer', 'real'"
-        faults.append(f"typeof({name}) NOT IN ('null', {types})")
+        faults.append(f"typeof({name}) NOT IN ('null', {types}) AND {name} IS NOT '{AUTO}'")
     bad = connection.execute(f"SELECT rowid FROM runs WHERE {' OR '.join(faults)} LIMIT 1")
     for (number,) in bad:
         raise sqlite3.DatabaseError(f"row {number} of its runs is none that a sweep writes")

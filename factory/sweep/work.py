@@ -107,7 +107,7 @@ class Runner:
             units,
             values["seed"],
             values["jitter"],
-            made,
+            settings,
             self.catalogue,
             wip=wip,
             compiled=shared,
