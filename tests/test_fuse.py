@@ -19,6 +19,7 @@ from factory.simulation.mujoco.fusing import Fusion, turned
 from factory.simulation.request import RunRequest
 from factory.simulation.simulation import Simulation, physical_model
 from factory.support.engine import mujoco
+from factory.support.settings import Settings
 from tests.command_line import PAPER, ROOT, Terminal
 from tests.test_simulation import laid_out
 
@@ -151,9 +152,10 @@ def test_turns_are_those_of_the_engine() -> None:
 
 @pytest.mark.parametrize(("name", "least"), [("paper", 1e-6), ("lamp", 1e-4), ("gearbox", 1e-4)])
 def test_a_fused_run_agrees_with_the_unfused(name: str, least: float) -> None:
-    layout = layout_of(name)
+    layout, fine = layout_of(name), Settings(timestep=0.002)
     one, other = (
-        Simulation(layout, RunRequest(units=2, jitter=0.3, seed=2, fuse=f)) for f in (False, True)
+        Simulation(layout, RunRequest(units=2, jitter=0.3, seed=2, settings=fine, fuse=f))
+        for f in (False, True)
     )
     apart, fused = one.run(), other.run()
     assert fused.products == apart.products == 2

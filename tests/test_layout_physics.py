@@ -42,7 +42,7 @@ def test_bodies_are_inside_their_regions(layout: Layout) -> None:
     from factory.problem.robot_types import load_catalogue
 
     copies = {leaf.label: 1 for leaf in layout.factory.leaves}
-    m = load(build_model(layout, load_catalogue(), copies, Settings()))
+    m = load(build_model(layout, load_catalogue(), copies, Settings(timestep=0.002)))
     d = mujoco.MjData(m)
     looked_at = set()
     for end in (0, 1):

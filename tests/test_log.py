@@ -20,6 +20,7 @@ from factory.simulation.request import RunRequest
 from factory.simulation.simulation import Simulation
 from factory.support.engine import mujoco
 from factory.support.errors import InputError
+from factory.support.settings import Settings
 
 PAPER = Path(__file__).parent.parent / "examples" / "paper.pag"
 
@@ -109,7 +110,9 @@ def test_a_log_without_setpoints_is_still_read(
         return {k: a for k, a in arrays(self).items() if not k.startswith("ctrl")}
 
     monkeypatch.setattr(writing._Ticks, "arrays", older)
-    simulation = Simulation(layout, RunRequest("mujoco", units=1))
+    simulation = Simulation(
+        layout, RunRequest("mujoco", units=1, settings=Settings(timestep=0.002))
+    )
     with LogWriter(tmp_path / "old", simulation) as writer:
         simulation.run([writer.observe], 0.1)
     log = read_log(tmp_path / "old")

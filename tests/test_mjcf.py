@@ -76,7 +76,7 @@ def shapes(tmp_path_factory: pytest.TempPathFactory) -> tuple[Layout, mujoco.MjM
     shell.update_faces(np.arange(len(shell.faces)) < 200)
     shell.export(folder / "shell.stl")
     layout = laid_out(folder / "shapes.pag", SHAPES)
-    return layout, compiled(physical_model(layout, 1), folder)
+    return layout, compiled(physical_model(layout, 1, Settings(timestep=0.002)), folder)
 
 
 # --- the file -------------------------------------------------------------------------------------
@@ -85,7 +85,7 @@ def shapes(tmp_path_factory: pytest.TempPathFactory) -> tuple[Layout, mujoco.MjM
 def test_the_papers_example_to_the_letter(
     paper: Layout, golden: Callable[[str, str], None]
 ) -> None:
-    golden("paper.xml", physical_model(paper, 1).xml)
+    golden("paper.xml", physical_model(paper, 1, Settings(timestep=0.002)).xml)
 
 
 DIGEST = """

@@ -174,8 +174,10 @@ def test_each_step_has_its_own_setpoints() -> None:
 def test_what_has_been_written_over_can_be_told_again() -> None:
     """The engine goes back in the middle of a tick that one axis has been told at its beginning,
     and another since. The samples of both are gone by then."""
-    simulation = Simulation(layout_of("paper"), RunRequest(units=2))
-    world, h = simulation.world, simulation.request.settings.timestep
+    simulation = Simulation(
+        layout_of("paper"), RunRequest(units=2, settings=Settings(timestep=0.002))
+    )
+    world, h = simulation.world, simulation.request.settings.step
     m, d, told = world.m, world.d, world.setpoints
     for _ in range(3):
         simulation.supervisor.step()

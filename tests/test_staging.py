@@ -394,7 +394,8 @@ def test_run_and_its_log(run: Terminal, tmp_path: Path) -> None:
 
 
 def test_analyze_against_a_run(run: Terminal, tmp_path: Path) -> None:
-    found = run("analyze", CHEST, "--stage", "--units", 10, "--run", "--json").json
+    words = ["--stage", "--units", 10, "--run", "--timestep", 0.002, "--json"]
+    found = run("analyze", CHEST, *words).json
     critical = found["circuits"][0]
     assert critical["pace_s"] == found["cycle_time_s"]
     assert all(operation["slack_s"] < 10 for operation in found["operations"])

@@ -109,6 +109,7 @@ def _told(layout: Layout, built: Built, settings: Settings, spent: float) -> dic
     """What there is to tell: the document of `--json`, the lines for people, the warnings."""
     from factory.layout.durations import Pace
     from factory.layout.gain import gain
+    from factory.support.settings import AUTO
 
     root, robots = layout.factory.pag.root, len(layout.factory.robots)
     model, gained = built.model, gain(layout, Pace.of(settings))
@@ -121,6 +122,7 @@ def _told(layout: Layout, built: Built, settings: Settings, spent: float) -> dic
         "welds": model.welds,
         "guidepath_length_m": round(layout.guidepath_length, 6),
         "area_m2": round(layout.area, 6),
+        "timestep_s": model.settings.step,
         "compile_s": spent,
         "clearance": built.clearance,
         "layout": gained.as_json(),
@@ -132,6 +134,8 @@ def _told(layout: Layout, built: Built, settings: Settings, spent: float) -> dic
         f"{model.welds} welds",
         f"floor {layout.area:.2f} m², guidepaths {layout.guidepath_length:.2f} m, "
         f"clearance {settings.clearance * 1000:g} mm proved",
+        f"timestep {1000 * model.settings.step:g} ms"
+        + (", chosen for what it carries (--timestep)" if settings.timestep == AUTO else ""),
         str(gained),
     ]
     warnings = [warning(diagnostic) for diagnostic in layout.product.warnings]

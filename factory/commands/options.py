@@ -84,12 +84,31 @@ class Number(click.FloatRange):
         return number
 
 
+class Timestep(click.ParamType[float | str]):
+    """A number, or AUTO."""
+
+    name = "number|auto"
+
+    def convert(self, value: Any, param: Any, ctx: Any) -> Any:
+        from factory.support.settings import is_auto
+
+        return value if is_auto("timestep", value) else click.FLOAT.convert(value, param, ctx)
+
+
 MOTION = options(
     click.option("--speed", type=float, help="Speed of a robot [m/s]."),
     click.option("--acceleration", type=float, help="Acceleration of a robot [m/s²]."),
     click.option("--force", type=float, help="Actuator limit, as a multiple of what is needed."),
-    click.option("--timestep", type=float, help="The engine's timestep [s]."),
-    click.option("--substeps", type=click.IntRange(1), help="Timesteps in a supervisor's tick."),
+    click.option(
+        "--timestep",
+        type=Timestep(),
+        help="The engine's timestep [s]; auto, the default: as long as the drives allow.",
+    ),
+    click.option(
+        "--substeps",
+        type=click.IntRange(1),
+        help="Timesteps in a supervisor's tick (of 10 ms by default).",
+    ),
     click.option(
         "--stage/--no-stage",
         default=None,

@@ -242,6 +242,9 @@ def summarise(record: Run, factory: Factory, verbose: bool) -> None:
     )
     physics = record.physics
     if physics is not None:
+        chosen = physics.timestep_chosen
+        how = "chosen for what it carries (--timestep)" if chosen else "as asked for"
+        say(f"timestep {1000 * physics.timestep_s:g} ms, {how}")
         error = physics.product_error_max_mm
         say(
             f"{physics.handoffs} hand-offs, gap at most {physics.handoff_gap_max_mm:.3f} mm; "

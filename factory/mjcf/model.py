@@ -133,7 +133,7 @@ def build_model(
         label: sum(bodies.mass[body] for body in found) for label, found in bodies.carried.items()
     }
     drives = tuple(
-        drive_for(CARRIAGE_MASS, _load(factory, robot, masses), settings.acceleration, settings)
+        drive_for(CARRIAGE_MASS, heaviest(factory, robot, masses), settings.acceleration, settings)
         for robot in factory.robots
     )
     root = Element("mujoco", {"model": product_name(factory)})
@@ -183,7 +183,7 @@ def model_files(model: Model, path: Path) -> dict[Path, bytes]:
     return {path: xml.encode(errors="surrogateescape"), **meshes}
 
 
-def _load(factory: Factory, robot: Robot, masses: Mapping[str, float]) -> float:
+def heaviest(factory: Factory, robot: Robot, masses: Mapping[str, float]) -> float:
     """The heaviest load that a robot carries [kg]."""
     operations = (factory.operations[number] for number in robot.operations)
     return max(masses.get(o.after[o.robots.index(robot.index)], 0.0) for o in operations)
@@ -199,7 +199,7 @@ def drive_for(
     """Critically damped gains for what moves a load, and the load [kg]; the force that their
     acceleration [m/s²] takes; the inertia that the motor adds."""
     inertia = max(0.0, LEAST * load - own)
-    empty, rate = own + inertia, 1 / settings.timestep
+    empty, rate = own + inertia, 1 / settings.step
     mass = empty + load
     kp = min(mass * stiffness**2, PUSHED * empty * rate**2)
     kv = min(2 * mass * stiffness, DAMPED * empty * rate)
@@ -218,7 +218,7 @@ def _hoists(factory: Factory, masses: Mapping[str, float], settings: Settings) -
 
 
 def _options(root: Element, settings: Settings, bodies: int) -> None:
-    how = {"timestep": settings.timestep, "integrator": "Euler", "cone": "elliptic", "impratio": 1}
+    how = {"timestep": settings.step, "integrator": "Euler", "cone": "elliptic", "impratio": 1}
     add(add(root, "option", **how), "flag", sleep="enable")
     add(root, "size", memory=f"{64 + prod((4, bodies, bodies)) // 2**20}M")
 

@@ -27,8 +27,8 @@ from factory.simulation.run import Event
 from factory.simulation.supervisor import Active
 from factory.simulation.world import World
 
-RATES = (3, 11)
-"""Control periods are drawn from these, in timesteps of the engine."""
+PERIODS = (0.006, 0.02)
+"""Control periods are drawn from so long to so long [s], in whole timesteps, one at least."""
 
 
 @dataclass(slots=True)
@@ -132,7 +132,9 @@ class DistributedSupervisor:
         self.count = 0
 
     def _processes(self, programs: Sequence[Program]) -> list[Process]:
-        periods, x = self.random.integers(*RATES, size=len(programs)), self.world.sense()[0]
+        low, high = (max(1, round(period / self.timestep)) for period in PERIODS)
+        periods = self.random.integers(low, high + 1, size=len(programs))
+        x = self.world.sense()[0]
         lifts = {robot: len(programs) + n for n, robot in enumerate(self.factory.strokes)}
         found = []
         for p, n in zip(programs, periods, strict=True):

@@ -75,7 +75,7 @@ class IdealWorld:
     def advance(self, steps: int) -> None:
         """Timesteps of robots that move on their own (a distributed run)."""
         self._before_step()
-        self.time += steps * self._request.settings.timestep
+        self.time += steps * self._request.settings.step
         begun, x, v, a = self._plan.T
         tau = self.time - begun
         self.x = x + tau * (v + 0.5 * tau * a)

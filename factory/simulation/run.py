@@ -42,7 +42,8 @@ class PhysicsFigures:
     """What only the engine can tell; see the specification of `run` for each.
 
     `mating_forces`: by operation, the largest force of a contact between inputs that it was
-    joining [N]; `excluded`: pairs of parts whose contact was off.
+    joining [N]; `excluded`: pairs of parts whose contact was off; `timestep_chosen`: by the
+    factory, not by the user.
     """
 
     handoffs: int = 0
@@ -55,6 +56,8 @@ class PhysicsFigures:
     mating_forces: Mapping[str, float] = field(default_factory=dict)
     excluded: tuple[Pair, ...] = ()
     fused: bool = False
+    timestep_s: float = 0.0
+    timestep_chosen: bool = False
 
     @property
     def mating_force_max_n(self) -> float:
@@ -127,6 +130,8 @@ class Run:
             "unintended_contacts",
             "engine_warnings",
             "mating_force_max_n",
+            "timestep_s",
+            "timestep_chosen",
         )
         return {
             "schema": 1,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from time import perf_counter
 from typing import TYPE_CHECKING, Any
 
@@ -11,6 +11,7 @@ import numpy as np
 
 from factory.control.mode import Limits, Mode
 from factory.layout.layout import Layout
+from factory.mjcf.timestep import timed
 from factory.modes.modes import operation_modes, robot_limits
 from factory.modes.staging import HeadStart, stages_of
 from factory.nets.history import firings
@@ -25,7 +26,7 @@ from factory.simulation.run import Run, busy_times
 from factory.simulation.supervisor import Supervisor
 from factory.simulation.world import World
 from factory.support.errors import Diagnostic, InputError, RunError
-from factory.support.settings import MOST, Settings
+from factory.support.settings import AUTO, MOST, Settings
 from factory.timing.pool import part_pool
 from factory.timing.prediction import operation_delays, predict, ways_ahead
 
@@ -62,7 +63,8 @@ class Simulation:
     run that stalls or takes too long is a Run with its trouble; `require` makes that an error.
     `compiled`: what it shares with earlier runs, made by `compiled` for the same layout and a
     request that differs in seed and jitter alone. `counts`: how often each transition has fired
-    where it starts; `before`: products that had left by then. `ways`: what robots that go ahead
+    where it starts; `before`: products that had left by then. `chosen`: the timestep was left to
+    the factory; that of `request` is a number. `ways`: what robots that go ahead
     while they wait take [s].
     """
 
@@ -72,7 +74,8 @@ class Simulation:
         request: RunRequest = RunRequest(),  # noqa: B008 (frozen)
         compiled: Compiled | None = None,
     ) -> None:
-        self.layout, self.request = layout, request
+        self.layout, self.chosen = layout, request.settings.timestep == AUTO
+        self.request = request = replace(request, settings=_timed(layout, request, compiled))
         settings, world, net = request.settings, request.world, layout.factory.net
         self.modes = compiled.modes if compiled else operation_modes(layout, settings.eps)
         self.limits, gains = robot_limits(layout, settings, request.seed, request.jitter)
@@ -124,8 +127,8 @@ class Simulation:
             self.modes,
             self.limits,
             self.world,
-            settings.timestep,
-            settings.substeps,
+            settings.step,
+            settings.steps,
             self.request.seed,
             stages,
         )
@@ -191,7 +194,7 @@ class Simulation:
 
     def _record(self, wall: float, time: float, trouble: Diagnostic | None) -> Run:
         supervisor, world, factory = self.supervisor, self.world, self.layout.factory
-        request, physics = self.request, world.physics_time
+        request, physics, figures = self.request, world.physics_time, world.figures()
         predicted = predict(
             self.layout, self.delays, request.settings, request.world, request.wip, self.ways
         )
@@ -211,7 +214,7 @@ class Simulation:
             tuple(supervisor.events),
             tuple(world.dropoffs),
             busy_times(factory, supervisor.events),
-            world.figures(),
+            figures and replace(figures, timestep_chosen=self.chosen),
             request.seed,
             request.jitter,
             trouble,
@@ -230,6 +233,13 @@ class Simulation:
         )
         message = f"{what}; {robots or 'no robot can start'}"
         return Diagnostic(code, message, places[0].position if places else None, hint)
+
+
+def _timed(layout: Layout, request: RunRequest, compiled: Compiled | None) -> Settings:
+    """The settings with a timestep that is a number."""
+    if compiled is not None and compiled.model is not None:
+        return compiled.model.settings
+    return timed(request.settings, layout, request.world, request.jitter)
 
 
 def compiled(layout: Layout, request: RunRequest) -> Compiled:
@@ -278,7 +288,7 @@ def physical_model(
         copies = fused_copies(bodies, factory, units)
     else:
         copies = part_copies(part_pool(factory), units, wip, under_way)
-    catalogue, settings = catalogue or load_catalogue(), settings or Settings()
+    catalogue, settings = catalogue or load_catalogue(), timed(settings or Settings(), layout)
     return build_model(layout, catalogue, copies, settings, bodies, shown)
 
 

@@ -5,6 +5,8 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from types import MappingProxyType
+from typing import Any, Literal
 
 from factory.support.errors import Diagnostic, InputError
 
@@ -22,6 +24,13 @@ RANGES = {
 }
 """Least and greatest value of each setting; beyond them a run overflows or never ends."""
 
+AUTO: Literal["auto"] = "auto"
+"""The timestep of settings that leave it to the factory."""
+
+TICK = 0.01
+"""Period of the supervisor [s] where nothing else is asked for; no other period is greater but that
+of a greater timestep, or where both timestep and substeps are given."""
+
 LOOK = 0.1
 """Longest time between two checks of what is not checked in every tick [s]."""
 
@@ -32,20 +41,28 @@ WHOLE = ("substeps", "stage")
 """Settings that are whole numbers."""
 
 
+EXAMPLES: Mapping[str, str] = MappingProxyType({"timestep": '0.002, or "auto"', "substeps": "5"})
+"""Values of the settings whose default is no number."""
+
+
 @dataclass(frozen=True, slots=True)
 class Settings:
     """Speed [m/s] and acceleration [m/s²] of a robot; `eps`, radius of a goal ball [m]; `timestep`
-    of the engine [s] and `substeps` of it in one tick of the supervisor; least `clearance` [m];
-    `force`: the actuators' limit as a multiple of what the payload needs; `settle`: time to come to
-    rest within eps [s], used only to predict; `outfeed` speed [m/s]; `stage`: 1 where robots that
-    wait empty-handed go ahead to where their next operation needs them.
+    of the engine [s], or AUTO, and `substeps` of it in one tick of the supervisor (None: as many as
+    TICK has room for; with AUTO at least so many); least `clearance` [m]; `force`: the actuators'
+    limit as a multiple of what the payload needs; `settle`: time to come to rest within eps [s],
+    used only to predict; `outfeed` speed [m/s]; `stage`: 1 where robots that wait empty-handed go
+    ahead to where their next operation needs them.
+
+    With AUTO a tick is TICK, whatever is chosen for a layout (`factory.mjcf.timestep`): so layouts
+    and predictions need not know.
     """
 
     speed: float = 0.5
     acceleration: float = 2.0
     eps: float = 2e-4
-    timestep: float = 0.002
-    substeps: int = 5
+    timestep: float | Literal["auto"] = AUTO
+    substeps: int | None = None
     clearance: float = 0.02
     force: float = 3.0
     settle: float = 0.0
@@ -58,9 +75,19 @@ class Settings:
         return 2 * self.acceleration
 
     @property
+    def step(self) -> float:
+        """The timestep [s]. Raises ValueError where it is still to be chosen."""
+        return float(self.timestep)
+
+    @property
+    def steps(self) -> int:
+        """Timesteps in a tick. Raises ValueError where the timestep is still to be chosen."""
+        return self.substeps or min(max(1, int(TICK / self.step * (1 + 1e-9))), 100)
+
+    @property
     def tick(self) -> float:
         """Period of the supervisor [s]."""
-        return self.timestep * self.substeps
+        return TICK if self.timestep == AUTO else self.step * self.steps
 
     @property
     def stride(self) -> int:
@@ -72,9 +99,9 @@ class Settings:
     def samples(self) -> int:
         """Setpoints in a drive's buffer: one for each step of a stride, the last one, which holds
         from then on, and one to spare."""
-        return self.stride * self.substeps + 2
+        return self.stride * self.steps + 2
 
-    def with_options(self, options: Mapping[str, float | int | None]) -> Settings:
+    def with_options(self, options: Mapping[str, float | str | None]) -> Settings:
         """These settings with every option that is not None.
 
         Raises InputError (BadValue) with every number that is not within its range.
@@ -86,17 +113,17 @@ class Settings:
         return replace(self, **given)  # type: ignore[arg-type]
 
 
-def environment() -> dict[str, float]:
+def environment() -> dict[str, float | str]:
     """The settings in the environment: `FACTORY_SPEED` and so on; an empty variable sets nothing.
     Raises InputError (BadValue) with every one that is no number within its range."""
-    found, faults = {}, []
+    found, faults = dict[str, float | str](), []
     for name in RANGES:
         variable = f"FACTORY_{name.upper()}"
         text = os.environ.get(variable, "").strip()
         if not text:
             continue
-        value = _number(text, int if name in WHOLE else float)
-        fault = _out_of_range(name, value) if value is not None else wrong_type(name, value)
+        value = text if is_auto(name, text) else _number(text, int if name in WHOLE else float)
+        fault = wrong_type(name, value)
         if fault is not None:
             faults.append(replace(fault, message=f"in the environment {variable}: {fault.message}"))
         elif value is not None:
@@ -113,17 +140,25 @@ def _number(text: str, kind: type[int] | type[float]) -> float | None:
         return None
 
 
+def is_auto(name: str, value: object) -> bool:
+    """Whether the value of a setting leaves it to the factory."""
+    return name == "timestep" and value == AUTO
+
+
 def wrong_type(name: str, value: object) -> Diagnostic | None:
-    """What is wrong with the value of a setting, if it is no number within its range."""
+    """What is wrong with the value of a setting, if it is no number within its range, nor AUTO
+    where that may be."""
+    if is_auto(name, value):
+        return None
     kind = "whole number" if name in WHOLE else "number"
     if isinstance(value, bool) or not isinstance(value, int if name in WHOLE else int | float):
         return Diagnostic("BadValue", f"{name} must be a {kind}", None, _example(name))
     return _out_of_range(name, value)
 
 
-def _out_of_range(name: str, value: float) -> Diagnostic | None:
+def _out_of_range(name: str, value: Any) -> Diagnostic | None:
     low, high = RANGES[name]
-    if low <= value <= high:
+    if is_auto(name, value) or low <= value <= high:
         return None
     shown = f"{value:g}" if isinstance(value, float) else f"{value}"[:20]
     message = f"{name} = {shown} is not between {low:g} and {high:g}"
@@ -131,4 +166,4 @@ def _out_of_range(name: str, value: float) -> Diagnostic | None:
 
 
 def _example(name: str) -> str:
-    return f"for example {name} = {getattr(Settings(), name)}"
+    return f"for example {name} = {EXAMPLES.get(name) or getattr(Settings(), name)}"

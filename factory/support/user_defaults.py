@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from factory.support.errors import Diagnostic, InputError, Position, did_you_mean
-from factory.support.settings import RANGES, WHOLE, Settings, wrong_type
+from factory.support.settings import RANGES, WHOLE, Settings, is_auto, wrong_type
 
 NAME = "factory.toml"
 
@@ -50,7 +50,9 @@ class Defaults:
     def settings(self) -> Settings:
         """The settings of the file, and the built-in ones where it has none."""
         given = {k: v for k, v in self.values.items() if k in RANGES}
-        return Settings().with_options({k: v if k in WHOLE else float(v) for k, v in given.items()})
+        return Settings().with_options(
+            {k: v if k in WHOLE or is_auto(k, v) else float(v) for k, v in given.items()}
+        )
 
     def options(self) -> dict[str, Any]:
         """The values of options; folders are those beside the file."""

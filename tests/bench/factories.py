@@ -5,7 +5,7 @@ from __future__ import annotations
 import tempfile
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import factory
 from factory.layout.layout import Layout
@@ -79,11 +79,11 @@ def laid_out(text: str) -> Layout:
 @dataclass(frozen=True)
 class Case:
     """A factory in MuJoCo that nobody looks at: so many robots or one more, the engine's timestep
-    [s], copies of each part let in at once (None: the whole pool), whether parts that are joined
-    become one body."""
+    [s] or AUTO, copies of each part let in at once (None: the whole pool), whether parts that are
+    joined become one body."""
 
     robots: int
-    timestep: float
+    timestep: float | Literal["auto"]
     wip: int | None = None
     fuse: bool = False
 

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict
 from functools import partial
 from time import perf_counter
-from typing import Any
+from typing import Any, Literal
 
 from factory.simulation.simulation import Simulation
+from factory.support.settings import AUTO
 from tests.bench.factories import (
     PATIENCE,
     Case,
@@ -24,10 +25,13 @@ from tests.tables import table
 AIMS: Sequence[tuple[Case, float, float]] = (
     (Case(40, 0.002), 20.0, 10.0),
     (Case(40, 0.002, None, True), 20.0, 10.0),
+    (Case(40, AUTO, None, True), 50.0, 25.0),
     (Case(300, 0.004), 3.5, 5.0),
     (Case(300, 0.002, None, True), 6.0, 5.0),
+    (Case(300, AUTO, None, True), 18.0, 15.0),
     (Case(1000, 0.004, 2), 0.7, 5.0),
     (Case(1000, 0.002, 2, True), 2.0, 5.0),
+    (Case(1000, AUTO, 2, True), 6.0, 15.0),
 )
 """What is measured, with the least multiple of real time and the greatest share of the supervisor
 in percent that are aimed at."""
@@ -69,7 +73,7 @@ class Upkeep:
 
 def work(
     robots: int,
-    timestep: float,
+    timestep: float | Literal["auto"],
     wip: int | None = None,
     fuse: bool = False,
     window: float | None = None,
@@ -98,7 +102,8 @@ def work(
         "realtime": simulated / wall,
         "supervisor_percent": 100 * (wall - engine) / wall,
         "own_percent": 100 * (again - physics - upkeep.seconds) / again,
-        "step_us": 1e6 * engine / (simulated / timestep),
+        "timestep_s": simulation.settings.step,
+        "step_us": 1e6 * engine / (simulated / simulation.settings.step),
         "memory_MB": resident(),
     }
 
@@ -145,7 +150,7 @@ def section(results: dict[str, Any]) -> str:
         rows.append(
             (
                 found["robots"],
-                f"{1000 * row['timestep']:g} ms",
+                _timestep(row["timestep"], found),
                 f"{found['bodies']}, {kind}",
                 "whole" if wip is None else f"`--wip {wip}`",
                 "on",
@@ -176,6 +181,13 @@ def section(results: dict[str, Any]) -> str:
             table(head, rows),
         ]
     )
+
+
+def _timestep(asked: float | str, found: Mapping[str, Any]) -> str:
+    """The timestep of a row, and whether it was chosen by the factory."""
+    if asked == AUTO:
+        return f"{1000 * found['timestep_s']:g} ms, by default"
+    return f"{1000 * float(asked):g} ms"
 
 
 if __name__ == "__main__":

@@ -67,7 +67,7 @@ class _Acting:
             case Noise():
                 act.mismeasure(_noise(disturbance, count))
             case Delay():
-                late = round(disturbance.seconds / self.world.model.settings.timestep)
+                late = round(disturbance.seconds / self.world.model.settings.step)
                 act.mismeasure(_late(deque(maxlen=late + 1)))
             case Slowed():
                 limits, axes = self.simulation.limits, self._axes((disturbance.robot,))
@@ -80,7 +80,7 @@ class _Acting:
 
     def push(self) -> None:
         """Before a timestep: the sum of the forces that act on each body in it."""
-        now, half = self.world.time, self.world.model.settings.timestep / 2
+        now, half = self.world.time, self.world.model.settings.step / 2
         forces = {body: np.zeros(3) for body, _ in self.pushes}
         for body, push in self.pushes:
             if push.at - half <= now < push.at + push.duration - half:

@@ -97,4 +97,5 @@ class Inspection:
             dict(self.force),
             self._model.excluded,
             bool(self._model.carried.wholes),
+            float(self._m.opt.timestep),
         )

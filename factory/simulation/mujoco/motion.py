@@ -39,8 +39,8 @@ class Motion:
         self.sleep = Sleep(m, d, self.axes.tree)
         x, v = np.append(start, 0.0), np.zeros(len(self.axes))
         d.qpos[self.axes.qpos] = x
-        self.robots = Follower(x, v, self.drives, self.settings.substeps)
-        tray = Follower(x, v, self.drives, self.settings.substeps)
+        self.robots = Follower(x, v, self.drives, self.settings.steps)
+        tray = Follower(x, v, self.drives, self.settings.steps)
         self.outfeed = Outfeed(d, model, self.axes, tray, self.drives)
         self.active: Index = np.empty(0, np.intp)
         self.plan = np.zeros((4, len(self.axes)))
@@ -92,7 +92,7 @@ class Motion:
         ticks = self.move_tray(ticks)
         if bundle is not None:
             self.robots.show(ticks)
-        self.stepping.advance(ticks * self.settings.substeps)
+        self.stepping.advance(ticks * self.settings.steps)
         return ticks
 
     def move_tray(self, ticks: int) -> int:
@@ -120,7 +120,7 @@ class Motion:
                 self.drives,
                 axes,
                 (x, v),
-                (settings.stride, settings.substeps),
+                (settings.stride, settings.steps),
                 along(bundle, settings.tick),
             ),
         )
@@ -142,7 +142,7 @@ class Motion:
             self.sleep.may_sleep(axes)
             return
         most = self.drives.most
-        ends = self._planned(axes, np.array([[0.0], [most * self.settings.timestep]]))
+        ends = self._planned(axes, np.array([[0.0], [most * self.settings.step]]))
         self.drives.follow(axes, self.drives.sampled(axes, *ends, self.plan[3:, axes], most))
         self.sleep.stay_awake(axes)
 
@@ -151,7 +151,7 @@ class Motion:
         axes = np.flatnonzero(self.plan[2:].any(axis=0))
         if len(axes):
             begun, *_, a = self.plan[:, axes]
-            reach = self.drives.most * self.settings.timestep
+            reach = self.drives.most * self.settings.step
             x, v = self._planned(axes, np.minimum(self.drives.time - begun, reach))
             self.robots.x[axes], self.robots.v[axes] = x, v
             force = self.drives.mass[axes] * a + self.drives.weight[axes]

@@ -62,7 +62,7 @@ class Outfeed:
     def course(self) -> Course:
         """A stride of its way, as fast as its limits allow, until it is nearly there."""
         x, v = self.follower.x[self.axis], self.follower.v[self.axis]
-        ticks = self._settings.stride, self._settings.substeps
+        ticks = self._settings.stride, self._settings.steps
         return planned(self._drives, self.axis, (x, v), ticks, self._go)
 
     def _go(self, x: Array, v: Array) -> Move:

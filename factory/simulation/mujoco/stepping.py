@@ -48,7 +48,7 @@ class SingleSteps:
         settings: Settings,
     ) -> None:
         self.m, self.d, self.seconds = m, d, 0.0
-        self.hooks, self.inspection, self._substeps = hooks, inspection, settings.substeps
+        self.hooks, self.inspection, self._substeps = hooks, inspection, settings.steps
 
     def turn(self, active: Index) -> None:
         """All bodies are looked at, whatever moves."""

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
+from factory.mjcf.timestep import timed
 from factory.mjcf.weld_frames import soften
 from factory.study.fidelity.comparing import Case, over_cases
 from factory.study.fidelity.quantities import QUANTITIES
@@ -152,8 +153,8 @@ def _series(setting: str, factors: Sequence[float], records: Sequence[SeedRecord
 
 def _with_timestep(case: Case, factor: float) -> Case:
     """A case with another timestep; its tick stays as near as whole steps allow."""
-    settings = case.settings
-    substeps = max(1, round(settings.substeps / factor))
+    settings = timed(case.settings, case.layout, jitter=case.jitter)
+    substeps = max(1, round(settings.steps / factor))
     return replace(
-        case, settings=replace(settings, timestep=settings.timestep * factor, substeps=substeps)
+        case, settings=replace(settings, timestep=settings.step * factor, substeps=substeps)
     )

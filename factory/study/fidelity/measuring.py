@@ -43,7 +43,7 @@ class Measurement:
         self.residual = Residual(m, d, velocities.slides)
         self.seconds = 0.0
         self._seen = self._what_happened()
-        self._steps = Steps(m, d, simulation.request.settings.substeps)
+        self._steps = Steps(m, d, simulation.request.settings.steps)
 
     def run(self, max_time: float | None = None) -> Run:
         """Run the simulation, measuring, with a monitor beside it."""

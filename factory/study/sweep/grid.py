@@ -12,7 +12,7 @@ from itertools import product
 from math import ceil, isfinite, prod
 
 from factory.support.errors import Diagnostic, InputError, did_you_mean
-from factory.support.settings import RANGES, Settings
+from factory.support.settings import RANGES, Settings, is_auto
 from factory.support.settings import WHOLE as WHOLE_SETTINGS
 
 Value = float | int | str | None
@@ -88,7 +88,7 @@ def points(axes: Sequence[Axis]) -> Iterator[Point]:
 def check_value(key: str, value: Value) -> Diagnostic | None:
     """The error of a value of a key: a number out of range, an unknown word; None for a good
     one."""
-    if key in SETTINGS and isinstance(value, int | float):
+    if key in SETTINGS and value is not None:
         try:
             Settings().with_options({key: value})
         except InputError as error:
@@ -126,7 +126,7 @@ def _read_axis(text: str) -> Axis:
 
 def _read_item(key: str, item: str) -> Iterator[Value]:
     """The values of one item of a list: a word, a number or a range."""
-    if key == "world":
+    if key == "world" or is_auto(key, item):
         yield item
     elif ":" in item:
         yield from _read_range(key, item)
@@ -168,7 +168,7 @@ def _number(key: str, word: str, item: str) -> int | float:
 def _example(key: str) -> str:
     """An example of the values of a key."""
     words = {"seed": "0:100", "jitter": "0.1,0.3", "units": "4,8", "wip": "1:4"}
-    words |= {"world": "ideal,mujoco"}
+    words |= {"world": "ideal,mujoco", "timestep": "auto,0.002", "substeps": "1,5"}
     return f"--vary {key}={words.get(key) or getattr(Settings(), key, '')}"
 
 

@@ -51,7 +51,8 @@ def _plot(found: Summary, key: str) -> Any:
     """A figure against the first number that varies, with confidence intervals; its histogram
     where only seeds, or words, vary."""
     groups = [group for group in found.groups if key in group.figures]
-    numbers = [k for k, v in groups[0].values if not isinstance(v, str)]
+    words = {k for group in groups for k, v in group.values if isinstance(v, str)}
+    numbers = [k for k, _ in groups[0].values if k not in words]
     across = next((k for k in numbers if len({dict(g.values)[k] for g in groups}) > 1), None)
     figure, ((axes,),) = figure_and_axes()
     if across is None:

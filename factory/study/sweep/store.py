@@ -19,6 +19,7 @@ from factory.study.sweep.recipe import name_of
 from factory.study.sweep.work import FIGURES, Outcome
 from factory.support.errors import Diagnostic, InputError
 from factory.support.resource import Closing
+from factory.support.settings import AUTO
 
 COLUMNS: Mapping[str, str] = {
     "point": "TEXT PRIMARY KEY",
@@ -196,7 +197,7 @@ def _check_rows(connection: sqlite3.Connection, varied: Sequence[str]) -> None:
     faults.append("status NOT IN ('done', 'failed')")
     for name, kind in COLUMNS.items():
         types = "'text'" if kind.startswith("TEXT") else "'integer', 'real'"
-        faults.append(f"typeof({name}) NOT IN ('null', {types})")
+        faults.append(f"typeof({name}) NOT IN ('null', {types}) AND {name} IS NOT '{AUTO}'")
     bad = connection.execute(f"SELECT rowid FROM runs WHERE {' OR '.join(faults)} LIMIT 1")
     for (number,) in bad:
         raise sqlite3.DatabaseError(f"row {number} of its runs is none that a sweep writes")

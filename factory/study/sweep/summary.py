@@ -121,7 +121,7 @@ def summarise(database: Path) -> Summary:
             parts[tuple(row[key] for key in shared)].add(row)
             if row["reason"]:
                 reasons[row["reason"]] += 1
-    places = sorted(parts)
+    places = sorted(parts, key=lambda place: [(isinstance(v, str), v) for v in place])
     columns = [{k: c for k, c in parts[place].columns.items() if c} for place in places]
     groups = [
         Group(

@@ -12,6 +12,7 @@ from time import perf_counter
 from typing import Any, TypeVar
 
 from factory.layout.layout import Layout
+from factory.mjcf.timestep import timed
 from factory.nets.verify import proved
 from factory.plant.fused_bodies import fusing_pays
 from factory.problem.robot_types import load_catalogue
@@ -103,13 +104,13 @@ class Runner:
         request = RunRequest(
             values["world"],
             values["units"],
-            settings=settings,
+            settings=timed(settings, layout, values["world"], values["jitter"]),
             wip=values["wip"],
             fuse=fuse,
             shown=False,
             catalogue=self.catalogue,
         )
-        shared = _or_raise(self._compiled(request))
+        shared = _or_raise(self._compiled(settings, request))
         request = replace(request, seed=values["seed"], jitter=values["jitter"])
         simulation = Simulation(layout, request, shared)
         return simulation.run(max_time=self.recipe.max_time)
@@ -124,9 +125,10 @@ class Runner:
         except FactoryError as error:
             return error
 
-    def _compile(self, request: RunRequest) -> Compiled | FactoryError:
+    def _compile(self, settings: Settings, request: RunRequest) -> Compiled | FactoryError:
+        """For a layout with settings, whose timestep the request has as a number."""
         try:
-            return compiled(_or_raise(self._layout(request.settings)), request)
+            return compiled(_or_raise(self._layout(settings)), request)
         except FactoryError as error:
             return error
 

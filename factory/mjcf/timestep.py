@@ -1,0 +1,131 @@
+"""The engine's timestep: the longest with which drives stay on their references.
+
+A reference changes its acceleration at once. In the step in which it does, a drive is told the
+speed of half a step before with the new acceleration, and pushes for the new one: it gets a wrong
+speed, which it then takes away. How far off it gets meanwhile is what is predicted. Hands that meet
+are no farther apart, and welds give no more, than drives are off (docs/decisions/timestep.md).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from math import sqrt
+
+from factory.control.profile import World
+from factory.layout.layout import Layout
+from factory.mjcf.model import (
+    CARRIAGE_MASS,
+    GRAVITY,
+    HOIST_MASS,
+    HOIST_STIFFNESS,
+    STIFFNESS,
+    drive_for,
+    heaviest,
+)
+from factory.mjcf.outfeed import TRAY_MASS
+from factory.support.settings import AUTO, TICK, Settings
+
+STEPS = (1, 2, 4, 5, 10, 20)
+"""So many timesteps may a tick have: 10, 5, 2.5, 2, 1 or 0.5 ms each."""
+
+USUAL = 5
+"""Timesteps of a tick where none is good, or there are no drives: 2 ms."""
+
+ALLOWED = 0.5e-3
+"""Half of what a good factory keeps of tracking errors, gaps and residuals (`fidelity`) [m]."""
+
+FRICTION = 0.2
+"""Dry friction of the axes of all robots (`mjcf/`) and of the tray [N]."""
+
+SURE = 1.25
+"""Measured errors are up to so many times the formula's: 630 random runs at 10 ms."""
+
+
+@dataclass(frozen=True, slots=True)
+class Axis:
+    """What a drive moves: its `own` mass and a `load` [kg], with an `acceleration` [m/s²] that
+    changes by up to twice its amount, times `jump`, at once; `push` [m/s²] is what its force is
+    for; its `stiffness` [rad/s] and the least `gain` that jitter draws for it."""
+
+    own: float
+    load: float
+    acceleration: float
+    push: float
+    stiffness: float
+    gain: float
+    jump: float = 1.0
+
+    def error(self, settings: Settings) -> float:
+        """How far it may get off its reference [m]: the speed that it misses, times the peak of a
+        drive's answer to a speed of 1, and on either side what friction holds it back by."""
+        drive = drive_for(self.own, self.load, self.push, settings, self.stiffness)
+        mass, h = self.own + drive.inertia + self.load, settings.step
+        stiff, damping = self.gain * drive.kp / mass, self.gain * drive.kv / mass
+        missed = self.jump * self.acceleration * h * abs(1 - damping * h)
+        return SURE * (missed / (sqrt(stiff) + 0.85 * damping) + 2 * self.rest(settings))
+
+    def rest(self, settings: Settings) -> float:
+        """How far off its reference friction may hold it for ever [m]."""
+        drive = drive_for(self.own, self.load, self.push, settings, self.stiffness)
+        return FRICTION / (self.gain * drive.kp)
+
+
+def timed(
+    settings: Settings, layout: Layout, world: World = "mujoco", jitter: float = 0.0
+) -> Settings:
+    """Settings whose timestep and substeps are numbers: what was asked for, or with AUTO the
+    longest timestep in which nothing goes as far as the certified clearance, with which no axis is
+    predicted to get off its reference by more than ALLOWED, and every robot gets into its goal
+    ball; 2 ms, or the longest below it that the clearance allows, where none does that."""
+    if settings.timestep != AUTO:
+        return replace(settings, substeps=settings.steps)
+    least = settings.substeps or 1
+    counts = [n for n in STEPS if n >= least] or [least]
+    found = [replace(settings, timestep=TICK / n, substeps=n) for n in counts]
+    if world == "ideal":
+        return _usual(found)
+    fastest = max(settings.speed * (1 + jitter), settings.outfeed)
+    found = [s for s in found if fastest * s.step < layout.clearance] or found[-1:]
+    axes = tuple(_axes(settings, layout, jitter))
+    return next((s for s in found if _good(s, axes)), _usual(found))
+
+
+def _usual(found: Sequence[Settings]) -> Settings:
+    """Those with the usual timestep, or the next shorter one that there is."""
+    return next(s for s in found if s.steps >= USUAL)
+
+
+def predicted_error(settings: Settings, layout: Layout, jitter: float = 0.0) -> float:
+    """The largest error of an axis against its reference that a run may show [m], and so the
+    largest gap and residual of a weld."""
+    return max(axis.error(settings) for axis in _axes(settings, layout, jitter))
+
+
+def _good(settings: Settings, axes: Sequence[Axis]) -> bool:
+    """Whether no error is beyond what is allowed, nor does friction keep any axis out of half its
+    goal ball, but for one that it keeps out with the usual timestep as well."""
+    usual = replace(settings, timestep=TICK / USUAL, substeps=USUAL)
+    return all(
+        axis.error(settings) < ALLOWED
+        and axis.rest(settings) <= max(settings.eps / 2, axis.rest(usual))
+        for axis in axes
+    )
+
+
+def _axes(settings: Settings, layout: Layout, jitter: float) -> Iterator[Axis]:
+    """Every robot, lift and the tray with the heaviest that it carries; those that are alike
+    once."""
+    factory, solids, a = layout.factory, layout.product.solids, settings.acceleration
+    masses: dict[str, float] = {}
+    for operation in reversed(factory.operations[:-1]):
+        inputs = [masses[label] for label in operation.inputs]
+        masses[operation.label] = sum(inputs) if inputs else solids[operation.label].mass
+    for load in sorted({heaviest(factory, robot, masses) for robot in factory.robots}):
+        yield Axis(CARRIAGE_MASS, load, a, a, STIFFNESS, 1 - jitter)
+    for load in sorted({masses[factory.delivered(robot)] for robot in factory.strokes}):
+        yield Axis(HOIST_MASS, load, a, a + GRAVITY, HOIST_STIFFNESS, 1 - jitter)
+    fast = settings.outfeed_acceleration
+    reverses = layout.outfeed_way * fast < 1.2 * settings.outfeed**2
+    jump = 1.0 if reverses else 0.7
+    yield Axis(TRAY_MASS, masses[factory.pag.root], fast, fast, STIFFNESS, 1.0, jump)
