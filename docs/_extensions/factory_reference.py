@@ -67,11 +67,16 @@ def commands() -> str:
     return "\n\n".join(lines)
 
 
+def _shown(value: float | str | None) -> str:
+    """What is built in for a setting."""
+    return value if isinstance(value, str) else "by the timestep" if value is None else f"{value:g}"
+
+
 def settings() -> str:
     """The settings with their ranges, and the options that have defaults of a user's own."""
     built_in = Settings()
     rows = [
-        (f"`{name}`", f"{getattr(built_in, name):g}", f"{low:g} to {high:g}", variable(name))
+        (f"`{name}`", _shown(getattr(built_in, name)), f"{low:g} to {high:g}", variable(name))
         for name, (low, high) in RANGES.items()
     ]
     shared = [(f"`{k}`", f"`{example!r}`", variable(k)) for k, example in OPTIONS.items()]

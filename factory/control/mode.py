@@ -22,6 +22,9 @@ REACH = 1.5
 REST = 0.01
 """Robots hand over only when slower than this [m/s]."""
 
+STILL = 0.99 * REST
+"""What is asked of a robot then [m/s]: its payload, on a weld, may go a little faster."""
+
 ROUNDING = 1e-9
 """Lengths [m] closer than this are the same."""
 

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from factory.control.governor import govern
-from factory.control.mode import REST, ROUNDING, Array, Index, Limits, Mode
+from factory.control.mode import ROUNDING, STILL, Array, Index, Limits, Mode
 from factory.control.navigation import Bundle
 from factory.modes.staging import HeadStart
 from factory.plant.factory import Factory, Operation
@@ -268,7 +268,7 @@ class DistributedSupervisor:
         """The carrier judges the goal of the whole mode, and keeps its clock."""
         x, v = self.link.read(step.operation, process.program.robot)
         bundle = self._bundle(step.operation)
-        if not bundle.at_goal(x)[0] or np.abs(v).max() >= REST:
+        if not bundle.at_goal(x)[0] or np.abs(v).max() >= STILL:
             process.clock = 0.0
             return False
         done = process.clock >= step.operation.dwell - 1e-9

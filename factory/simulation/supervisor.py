@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from factory.control.mode import REST, Array, Index, Limits, Mode
+from factory.control.mode import STILL, Array, Index, Limits, Mode
 from factory.control.navigation import Bundle
 from factory.modes.staging import HeadStart
 from factory.nets.petri import Marking
@@ -183,7 +183,7 @@ class Supervisor:
             active.clocks, there = clocks, active.bundle.finished(there, clocks)
             if not np.count_nonzero(there):
                 return []
-        still = np.logical_and.reduceat(np.abs(v[active.axes]) < REST, active.bundle.starts)
+        still = np.logical_and.reduceat(np.abs(v[active.axes]) < STILL, active.bundle.starts)
         numbers = (*active.operations, *active.ahead)
         return [numbers[number] for number in (there & still).nonzero()[0].tolist()]
 
