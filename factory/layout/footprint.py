@@ -59,7 +59,7 @@ class Footprint:
         part = self.shape.piles[self.operations[0].index]
         return round((part[0] + part[1]) / 2, 3)
 
-    @property
+    @cached_property
     def frontier(self) -> tuple[float, float, float]:
         """Where along the path, by layer, something may come to it from the side: behind the end of
         the boom."""
