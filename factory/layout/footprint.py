@@ -31,8 +31,10 @@ Strip = tuple[float, float, float]
 
 @dataclass(frozen=True)
 class Footprint:
-    """The footprint of a robot with a `shape`. `operations`: those after which it carries something;
-    the first may be a feeder's. `corridor`: whether its way ahead is kept free for its last pile.
+    """The footprint of a robot with a `shape`.
+
+    `operations`: those after which it carries something; the first may be a feeder's. `corridor`:
+    whether its way ahead is kept free for its last pile.
     """
 
     shape: Shape
