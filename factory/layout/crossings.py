@@ -118,7 +118,7 @@ def near(cells: NDArray[np.object_], *predicate: object) -> Iterator[tuple[Index
     tree = shapely.STRtree(cells)
     for start in range(0, len(cells), CHUNK):
         first, second = tree.query(cells[start : start + CHUNK], *predicate)
-        first = first + start
+        kept = first + start < second
+        first, second = first[kept] + start, second[kept]
         order = np.lexsort((second, first))
-        order = order[first[order] < second[order]]
         yield first[order], second[order]

@@ -31,9 +31,10 @@ Strip = tuple[float, float, float]
 
 @dataclass(frozen=True)
 class Footprint:
-    """The footprint of a robot with a `shape`. `operations`: those after which it carries
-    something; the first may be a feeder's. `corridor`: whether its way ahead is kept free for its
-    last pile.
+    """The footprint of a robot with a `shape`.
+
+    `operations`: those after which it carries something; the first may be a feeder's. `corridor`:
+    whether its way ahead is kept free for its last pile.
     """
 
     shape: Shape
@@ -60,7 +61,7 @@ class Footprint:
         part = self.shape.piles[self.operations[0].index]
         return round((part[0] + part[1]) / 2, 3)
 
-    @property
+    @cached_property
     def frontier(self) -> tuple[float, float, float]:
         """Where along the path, by layer, something may come to it from the side: behind the end of
         the boom."""

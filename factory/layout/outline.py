@@ -7,7 +7,7 @@ origin at its B station. Blocks are rectangles of one layer with half a clearanc
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from math import inf
 from operator import add
 
@@ -15,6 +15,8 @@ from factory.layout.dimensions import LAYERS, TOOL_TRAVEL, up
 from factory.layout.footprint import Block, Footprint, Placed, Strip
 from factory.layout.guidepath import hull
 from factory.layout.shapes import Shape
+
+NOWHERE: Block = (inf, -inf, inf, -inf)
 
 DETAILED = 4
 """Guests whose crowns an outline keeps apart; of more, all on one side are one block."""
@@ -45,7 +47,7 @@ class Outline:
     high: tuple[float, ...] = field(init=False)
 
     def __post_init__(self) -> None:
-        hulls = [hull(blocks) if blocks else (inf, -inf, inf, -inf) for blocks in self.blocks]
+        hulls = [hull(found) if len(found) > 1 else (*found, NOWHERE)[0] for found in self.blocks]
         _, front, low, high = zip(*hulls, strict=True)
         for name, values in (("front", front), ("low", low), ("high", high)):
             object.__setattr__(self, name, values)
@@ -73,11 +75,6 @@ class Outline:
         """How far the robot comes at the least to a path that takes a strip of the floor on its
         side, so that all of this is clear of it [m]."""
         return up(max(self.least, *map(add, self.front, strip)))
-
-    def boxed(self) -> Outline:
-        """The same with one block a layer."""
-        boxes = tuple((hull(found),) if len(found) > 1 else found for found in self.blocks)
-        return replace(self, blocks=boxes) if boxes != self.blocks else self
 
 
 @dataclass(frozen=True, slots=True)
@@ -123,10 +120,18 @@ def crowns(guests: Sequence[Guest], layer: int) -> list[Block]:
 
 
 def outlined(
-    own: Footprint, piles: Sequence[Placed], guests: Sequence[Guest], choice: Choice
+    own: Footprint,
+    piles: Sequence[Placed],
+    guests: Sequence[Guest],
+    choice: Choice,
+    boxed: bool = False,
 ) -> Outline:
-    """The outline of a robot with its piles and with those that deliver to it."""
-    taken = own.blocks(piles)
-    blocks = tuple((*taken[layer], *crowns(guests, layer)) for layer in LAYERS)
+    """The outline of a robot with its piles and with those that deliver to it; with one block a
+    layer if it is to be `boxed`."""
+    blocks = tuple(own.blocks(piles))
+    if guests:
+        blocks = tuple((*blocks[layer], *crowns(guests, layer)) for layer in LAYERS)
+        if boxed:
+            blocks = tuple((hull(found),) if found else () for found in blocks)
     least = max(TOOL_TRAVEL if own.shape.tool else 0.0, own.clearance.c)
     return Outline(own.shape, choice, blocks, least)

@@ -98,14 +98,12 @@ class Packing:
         return min(found, key=lambda pair: pair[0])[1]
 
     def _outlines(self, nested: bool) -> list[tuple[float, Outline]]:
-        ways = [_Way(0.0, self._empty(nested))]
+        empty = dict.fromkeys((-1, +1), Skyline.behind(self.own.frontier, nested))
+        ways = [_Way(0.0, empty)]
         for operation in self.own.operations:
             found = [longer for way in ways for longer in self._placed(way, operation)]
             ways = sorted(found, key=lambda way: way.cost)[: self.task.width]
-        return [pair for way in ways if (pair := self._finished(way, nested)) is not None]
-
-    def _empty(self, nested: bool) -> dict[int, Skyline]:
-        return dict.fromkeys((-1, +1), Skyline.behind(self.own.frontier, nested))
+        return [pair for way in ways if (pair := self._finished(way, empty)) is not None]
 
     def _placed(self, way: _Way, operation: Operation) -> Iterator[_Way]:
         """The ways to place one more operation."""
@@ -162,7 +160,7 @@ class Packing:
             moving = self.task.pace.rest(further) + further / self.task.pace.speed
             if way.cost + weight * moving > best + SPAN / self.task.pace.speed:
                 break
-            placed = [self._came(way.beside, guest, station) for guest in guests]
+            placed = [_came(way.beside, guest, station, guest.travel) for guest in guests]
             if max(guest.travel for guest in placed) < inf:
                 found = self._added(way, operation, station, placed)
                 best = min(best, found.cost)
@@ -174,27 +172,13 @@ class Packing:
             starts = way.beside[side].starts(outline, least)
             yield from (start for start in starts if start < least + ALIGN)
 
-    @staticmethod
-    def _came(beside: Mapping[int, Skyline], guest: Guest, station: float) -> Guest:
-        travel = beside[guest.side].travel(guest.outline, station, guest.travel)
-        return replace(guest, station=station, travel=travel)
-
-    @staticmethod
-    def _taken(beside: Mapping[int, Skyline], guests: Sequence[Guest]) -> dict[int, Skyline]:
-        """What is beside the path with robots that deliver at their stations."""
-        found = dict(beside)
-        for guest in guests:
-            skyline = found[guest.side]
-            found[guest.side] = skyline.taken(guest.outline, guest.station, guest.travel)
-        return found
-
     def _added(
         self, way: _Way, operation: Operation, station: float, guests: Sequence[Guest]
     ) -> _Way:
         time = self._time(way, operation, station, guests)
         return _Way(
             station,
-            self._taken(way.beside, guests),
+            _taken(way.beside, guests),
             (*way.guests, *guests),
             (*way.stations, station),
             (*way.piles, self.own.placed(operation, station)),
@@ -238,17 +222,16 @@ class Packing:
             cost += PATH * guest.travel / pace.speed
         return cost
 
-    def _finished(self, way: _Way, nested: bool) -> tuple[float, Outline] | None:
+    def _finished(self, way: _Way, beside: Mapping[int, Skyline]) -> tuple[float, Outline] | None:
         """A way with its cost and outline, every travel fixed. None where a path is blocked."""
-        strip, beside, guests = self.own.strip_at(way.piles), self._empty(nested), list[Guest]()
+        strip, guests = self.own.strip_at(way.piles), list[Guest]()
         for guest in way.guests:
             outline = guest.outline
             clear = outline.clear(strip(guest.side, guest.station + outline.high[PAYLOADS]))
-            least = replace(guest, travel=max(clear, guest.wanted))
-            guests.append(self._came(beside, least, guest.station))
+            guests.append(_came(beside, guest, guest.station, max(clear, guest.wanted)))
             if guests[-1].travel == inf:
                 return None
-            beside = self._taken(beside, guests[-1:])
+            beside = _taken(beside, guests[-1:])
         numbers = (operation.index for operation in self.own.operations)
         choice = Choice(
             {guest.robot: guest.side for guest in guests},
@@ -273,3 +256,18 @@ class Packing:
         breadth = task.breadth * (max(outline.high) - behind * min(outline.low))
         ways = weights[carrier] * breadth + PATH * sum(outline.choice.travels.values())
         return weights[self.robot] * time + ways / pace.speed
+
+
+def _came(beside: Mapping[int, Skyline], guest: Guest, station: float, least: float) -> Guest:
+    """A robot at a station, with what is beside the path already, at least so far out."""
+    travel = beside[guest.side].travel(guest.outline, station, least)
+    return replace(guest, station=station, travel=travel)
+
+
+def _taken(beside: Mapping[int, Skyline], guests: Sequence[Guest]) -> dict[int, Skyline]:
+    """What is beside the path with robots that deliver at their stations."""
+    found = dict(beside)
+    for guest in guests:
+        skyline = found[guest.side]
+        found[guest.side] = skyline.taken(guest.outline, guest.station, guest.travel)
+    return found

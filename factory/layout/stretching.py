@@ -48,7 +48,7 @@ def stretch(
         guests = builder.attached()
         for guest in guests:
             travel[guest.robot] = guest.travel
-        outlines[robot] = outlined(own, builder.piles, guests, Choice()).boxed()
+        outlines[robot] = outlined(own, builder.piles, guests, Choice(), boxed=True)
     travel[0] = outgoing(outlines[0], clearance)
     return Stretched(travel, stations, chosen)
 
