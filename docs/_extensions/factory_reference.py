@@ -67,16 +67,11 @@ def commands() -> str:
     return "\n\n".join(lines)
 
 
-def _shown(value: float | str | None) -> str:
-    """What is built in for a setting."""
-    return value if isinstance(value, str) else "by the timestep" if value is None else f"{value:g}"
-
-
 def settings() -> str:
     """The settings with their ranges, and the options that have defaults of a user's own."""
     built_in = Settings()
     rows = [
-        (f"`{name}`", _shown(getattr(built_in, name)), f"{low:g} to {high:g}", variable(name))
+        (f"`{name}`", built(getattr(built_in, name)), f"{low:g} to {high:g}", variable(name))
         for name, (low, high) in RANGES.items()
     ]
     shared = [(f"`{k}`", f"`{example!r}`", variable(k)) for k, example in OPTIONS.items()]
@@ -91,6 +86,11 @@ def settings() -> str:
             table(("option", "for example", "in the environment"), shared),
         ]
     )
+
+
+def built(value: float | str | None) -> str:
+    """The value that a setting has where none is given."""
+    return f"{value:g}" if isinstance(value, float | int) else value or "by the timestep"
 
 
 def variable(name: str) -> str:
