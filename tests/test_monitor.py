@@ -27,7 +27,8 @@ from factory.simulation.simulation import Simulation
 from factory.support.errors import InputError
 from factory.support.settings import Settings
 from tests.command_line import PAPER, ROOT, Terminal
-from tests.test_simulation import PRODUCTS, UNARY, laid_out, random_marking
+from tests.good_runs import random_marking
+from tests.pag_texts import PRODUCTS, UNARY, laid_out
 
 
 def watched(simulation: Simulation, max_time: float | None = None) -> tuple[Any, Report]:
