@@ -5,10 +5,17 @@ from __future__ import annotations
 import base64
 import gzip
 import json
+from collections.abc import Callable
 from html.parser import HTMLParser
+from pathlib import Path
 from typing import Any
 
 import numpy as np
+
+from factory.record.log.blocks import LENGTH, MAGIC
+
+EVIL = """</script></title><img src=x onerror="alert(1)">'"&<!--"""
+"""A name that would run a script if it were taken for anything but text."""
 
 
 class Page(HTMLParser):
@@ -68,3 +75,14 @@ class Page(HTMLParser):
             marked -= {p for p, after in enumerate(self.data["right"]) if event in after}
             marked |= {p for p, before in enumerate(self.data["left"]) if event in before}
         return marked
+
+
+def altered(log: Path, to: Path, change: Callable[[dict[str, Any]], object]) -> Path:
+    """A log with another header."""
+    data = log.read_bytes()[len(MAGIC) :]
+    (length,) = LENGTH.unpack_from(data)
+    header = json.loads(data[LENGTH.size : LENGTH.size + length])
+    change(header)
+    text = json.dumps(header).encode()
+    to.write_bytes(MAGIC + LENGTH.pack(len(text)) + text + data[LENGTH.size + length :])
+    return to

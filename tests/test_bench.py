@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from tests.bench import floors, production, replaying
 from tests.bench.__main__ import REPORT
 from tests.bench.factories import laid_out, robots_at_least
 
@@ -30,3 +31,32 @@ def test_the_report_is_that_of_all_that_was_kept() -> None:
 @pytest.mark.parametrize(("asked", "robots"), [(1, 1), (10, 11), (41, 41), (100, 101)])
 def test_a_factory_has_the_robots_asked_for_or_one_more(asked: int, robots: int) -> None:
     assert len(laid_out(robots_at_least(asked)).factory.robots) == robots
+
+
+@pytest.mark.parametrize("timestep", production.TIMESTEPS)
+@pytest.mark.parametrize("units", [None, 2])
+def test_production_is_measured(timestep: float | None, units: int | None) -> None:
+    found = production.work(4, timestep, fuse=True, units=units, window=0.5)
+    assert found["robots"] == 5 and found["realtime"] > 0
+    assert found["from_s"] == 0.0 if units else found["to_s"] - found["from_s"] >= 0.5
+    assert units is None or found["made"] == units
+
+
+@pytest.mark.parametrize("units", [None, 2])
+@pytest.mark.parametrize("fuse", [False, True])
+def test_the_bare_engine_comes_to_the_same_state(fuse: bool, units: int | None) -> None:
+    """`work` compares the state of the replay with that of the run."""
+    found = floors.work(4, None, fuse=fuse, units=units, window=0.5)
+    assert found["bare"] > 0 and found["run"] > 0
+
+
+def test_a_replay_that_leaves_something_out_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Planted fault: setpoints are not written."""
+    replay = replaying.replay
+
+    def forgetful(m, d, writes) -> float:
+        return replay(m, d, [([w for w in written if w[0] != 1], n) for written, n in writes])
+
+    monkeypatch.setattr(replaying, "replay", forgetful)
+    with pytest.raises(AssertionError, match="another state"):
+        floors.work(4, None, units=1)

@@ -17,7 +17,7 @@ from factory.pipeline import all_templates
 from factory.problem.robot_types import load_catalogue
 from factory.problem.template import Template
 from tests.command_line import ROOT, Terminal, files_in
-from tests.test_simulation import assert_good
+from tests.good_runs import assert_good
 
 TEMPLATES = sorted((ROOT / "templates").glob("*.op"))
 ROBOTS = list(tomllib.loads((ROOT / "mjcf" / "catalogue.toml").read_text("utf-8")))

@@ -13,7 +13,7 @@ from typing import Any
 import pytest
 
 from tests.command_line import PAPER, ROOT, Terminal, files_in
-from tests.test_template_language import MATE
+from tests.pag_texts import MATE
 
 BROKEN = sorted((ROOT / "tests" / "broken").glob("*.pag"))
 TEMPLATES = sorted((ROOT / "tests" / "broken").glob("*.op"))

@@ -8,15 +8,12 @@ import pytest
 from hypothesis import given
 
 from factory.compiler.compiler import compile_pag, expand
-from factory.lang import read_pag, read_template
-from factory.pipeline import all_templates
+from factory.lang import read_pag
 from factory.problem.pag import PAG
 from factory.problem.robot_types import Catalogue, RobotType, load_catalogue
 from factory.support.errors import InputError
+from tests.pag_texts import PAPER, TEMPLATES, compiled
 from tests.strategies import pags
-
-PAPER = """6 parts; root = sub3; sub3 = mate ( sub2, part3 ); sub2 = weld ( sub1 );
-sub1 = mate ( part1, part2 ); part1 = atomic(); part2 = atomic(); part3 = atomic()"""
 
 GEARS = [
     "r1: wait nopart · mate sub3 · wait sub3 · dropoff",
@@ -26,13 +23,6 @@ GEARS = [
     "r5: wait nopart · atomic part1 · wait part1 · mate sub1",
     "r6: wait nopart · atomic part2 · wait part2 · mate sub1",
 ]
-
-TEMPLATES = all_templates()
-
-
-def compiled(text: str, *templates: str, catalogue: Catalogue | None = None):
-    table = dict(TEMPLATES) | {t.name: t for t in map(read_template, templates)}
-    return compile_pag(read_pag(text, table), table, catalogue or load_catalogue())
 
 
 def codes(error: pytest.ExceptionInfo[InputError]) -> list[str]:

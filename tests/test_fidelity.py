@@ -37,8 +37,7 @@ from factory.study.fidelity.measuring import Measurement
 from factory.study.fidelity.report import write_report
 from factory.support.engine import mujoco
 from factory.support.settings import Settings
-from tests.command_line import PAPER, Terminal, files_in
-from tests.test_baselines import FOLDER
+from tests.command_line import PAPER, ROOT, Terminal, files_in
 
 STIFFNESS = 250.0
 """Natural frequency of a weld, 1 / its time constant [rad/s]."""
@@ -46,7 +45,7 @@ STIFFNESS = 250.0
 
 @cache
 def layout(name: str = "paper") -> Layout:
-    path = PAPER if name == "paper" else FOLDER / f"{name}.pag"
+    path = PAPER if name == "paper" else ROOT / "tests" / "baselines" / f"{name}.pag"
     return factory.lay_out(factory.compile(factory.load_pag(path)))
 
 

@@ -15,7 +15,7 @@ from factory.layout.layout import Layout
 from factory.layout.sides import admissible, admitted
 from factory.simulation.request import RunRequest
 from factory.simulation.simulation import Simulation
-from tests.test_compiler import PAPER, compiled
+from tests.pag_texts import PAPER, compiled
 
 BALANCED = """root = r; r = mate(s, t); s = mate(a, b); t = mate(c, d);
 a = atomic(); b = atomic(); c = atomic(); d = atomic()"""

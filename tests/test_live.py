@@ -9,18 +9,16 @@ import sys
 from collections.abc import Iterator
 from http.client import HTTPConnection
 from subprocess import PIPE
-from threading import Thread
 from time import monotonic, sleep
 from typing import Any
 from xml.etree import ElementTree
 
 import numpy as np
 import pytest
-from factory.simulation.disturbance.hands import Hands
 
 from factory.nets.replay import replay
 from factory.record.monitor import beside
-from factory.show.live import LiveFrame, Server, Session
+from factory.show.live import Server, Session
 from factory.show.live.commands import (
     KINDS,
     Block,
@@ -36,11 +34,13 @@ from factory.show.live.commands import (
 from factory.show.live.page import page, stage_of
 from factory.show.report.drawings import floor_plan
 from factory.show.report.links import labels_of
+from factory.simulation.disturbance.interventions import Interventions
 from factory.simulation.request import RunRequest
 from factory.simulation.simulation import Simulation
 from factory.support.errors import InputError
 from tests.command_line import PAPER, Terminal, started
 from tests.layout_values import paper_layout
+from tests.live_sessions import Running, a_session
 
 websockets = pytest.importorskip("websockets.sync.client", reason="pip install websockets")
 
@@ -93,54 +93,53 @@ def test_what_is_no_command_is_explained(message: str | bytes, words: str) -> No
     assert words in str(error.value)
 
 
-# --- hands -------------------------------------------------------------------------------------
+# --- interventions ------------------------------------------------------------------------------
 
 
 def moved(share: float) -> float:
     """The greatest distance that a push moves a waiting robot along its guidepath [m]."""
     simulation = Simulation(paper_layout(), RunRequest(units=10))
-    hands, world = Hands(simulation), simulation.world
-    hands.block("part1")
-    start = float(world.d.qpos[world.qpos[0]])
+    interventions, world = Interventions(simulation), simulation.physical
+    interventions.block("part1")
+    slide = world.motion.axes.qpos[0]
+    start = float(world.d.qpos[slide])
     found = [0.0]
     for tick in range(100):
         if tick == 10:
-            hands.push(0, share, 0.3)
+            interventions.push(0, share, 0.3)
         simulation.supervisor.step()
-        hands.let_go()
-        found.append(float(world.d.qpos[world.qpos[0]]) - start)
+        found.append(float(world.d.qpos[slide]) - start)
     assert abs(found[-1]) < 1e-4 < 5e-4 < abs(max(found, key=abs)), "it gives way and comes back"
     return max(found, key=abs)
 
 
-def test_a_push_is_given_way_to_and_made_good() -> None:
+def test_a_pushed_robot_gives_way_and_comes_back() -> None:
     """Robots wait at their B ends, and A, where they deliver, is 0."""
     assert moved(1.0) < 2 * moved(0.5) < 0 < moved(-1.0)
 
 
 @pytest.mark.parametrize("pushed", [False, True])
-def test_hands_in_a_run_break_no_law(pushed: bool) -> None:
+def test_a_run_with_interventions_refines_the_net(pushed: bool) -> None:
     """Slowed and blocked at random, and in one of two runs pushed, the run still refines the net
-    and makes its products; the monitor agrees where nobody is pushed, which it could not tell from
-    a fault."""
+    and makes its products. Without pushes, which the monitor cannot tell from faults, the monitor
+    agrees."""
     simulation = Simulation(paper_layout(), RunRequest(units=12))
-    hands, watcher, draw = Hands(simulation), beside(simulation), np.random.default_rng(5)
-    ticks = 0
+    interventions, watcher = Interventions(simulation), beside(simulation)
+    draw, ticks = np.random.default_rng(5), 0
 
     def act(world: Any, supervisor: Any) -> None:
         nonlocal ticks
         ticks += 1
-        hands.let_go()
         watcher.observe(world, supervisor)
         if ticks > 2500:
             for part in PARTS:
-                hands.free(part)
+                interventions.free(part)
         elif ticks % 40 == 0:
             robot, part = int(draw.integers(6)), PARTS[draw.integers(3)]
             if pushed:
-                hands.push(robot, float(draw.choice([-0.5, 0.5])), 0.1)
-            hands.slow(robot, float(draw.choice([0.1, 0.5, 1.0])))
-            (hands.block if draw.random() < 0.5 else hands.free)(part)
+                interventions.push(robot, float(draw.choice([-0.5, 0.5])), 0.1)
+            interventions.slow(robot, float(draw.choice([0.1, 0.5, 1.0])))
+            (interventions.block if draw.random() < 0.5 else interventions.free)(part)
 
     run = simulation.run([act])
     assert run.products == 12 and run.trouble is None and run.refines_net
@@ -148,52 +147,12 @@ def test_hands_in_a_run_break_no_law(pushed: bool) -> None:
     assert run.physics is not None and run.physics.product_error_max_mm < 0.1
 
 
-def test_the_ideal_world_cannot_be_touched() -> None:
+def test_the_ideal_world_has_nothing_to_push() -> None:
     with pytest.raises(InputError, match="nothing to push"):
-        Hands(Simulation(paper_layout(), RunRequest("ideal")))
+        Interventions(Simulation(paper_layout(), RunRequest("ideal")))
 
 
 # --- a session ---------------------------------------------------------------------------------
-
-
-class Stopped(Exception):
-    """Ends a session."""
-
-
-def a_session(playing: bool) -> Session:
-    """A session of the paper's example, without end; it does not run yet."""
-    return Session(lambda: Simulation(paper_layout(), RunRequest(units=10**9)), playing)
-
-
-class Running:
-    """A session that runs in a thread of its own."""
-
-    def __init__(self, playing: bool = True) -> None:
-        self.session = a_session(playing)
-        self.over = False
-        self.thread = Thread(target=self._run, daemon=True)
-        self.thread.start()
-
-    def _run(self) -> None:
-        with pytest.raises(Stopped):
-            self.session.run(self._observe)
-
-    def _observe(self, world: Any, supervisor: Any) -> None:
-        if self.over:
-            raise Stopped
-
-    def until(self, holds: Any, seconds: float = 20.0) -> LiveFrame:
-        """The first frame of which something holds."""
-        end = monotonic() + seconds
-        while not holds(frame := self.session.frame):
-            assert monotonic() < end, frame
-            sleep(0.01)
-        return frame
-
-    def close(self) -> None:
-        self.over = True
-        self.thread.join(10)
-        assert not self.thread.is_alive()
 
 
 @pytest.fixture

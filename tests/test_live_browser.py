@@ -11,10 +11,7 @@ import pytest
 
 from factory.show.live import Server
 from factory.show.live.page import page
-from tests.test_live import Running, a_session
-from tests.test_report_browser import CHROMIUM, browser  # noqa: F401
-
-pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="no chromium: apt-get install chromium")
+from tests.live_sessions import Running, a_session
 
 LONG = 20.0
 """Time limit for a browser that draws in software [s]."""
@@ -23,7 +20,7 @@ LONG = 20.0
 class Watched:
     """A running factory with a page open on it."""
 
-    def __init__(self, browser: Any, **options: Any) -> None:  # noqa: F811
+    def __init__(self, browser: Any, **options: Any) -> None:
         self.running = Running()
         self.server = Server(self.running.session, page(a_session(False)))
         self.context = browser.new_context(viewport={"width": 1400, "height": 900}, **options)
@@ -55,7 +52,7 @@ class Watched:
 
 
 @pytest.fixture
-def watched(browser: Any) -> Iterator[Watched]:  # noqa: F811
+def watched(browser: Any) -> Iterator[Watched]:
     made = Watched(browser)
     yield made
     made.close()
@@ -140,7 +137,7 @@ def test_it_comes_back_when_the_socket_does(watched: Watched) -> None:
     watched.seen("words => words === 'open'", said)
 
 
-def test_a_phone_shows_it_in_one_column(browser: Any) -> None:  # noqa: F811
+def test_a_phone_shows_it_in_one_column(browser: Any) -> None:
     watched = Watched(browser, device_scale_factor=2)
     watched.page.set_viewport_size({"width": 390, "height": 800})
     watched.until("f.count > 2")

@@ -44,19 +44,19 @@ def test_every_copy_is_somewhere_at_every_tick() -> None:
     assert seen == set(long_runs.HOLDERS.values())
 
 
-def test_a_copy_that_nobody_holds_is_noticed(running: Simulation) -> None:
+def test_a_copy_that_nothing_holds_is_noticed(running: Simulation) -> None:
     """Planted fault: a robot lets go."""
-    world = running.world
+    world = running.physical
     assert long_runs.misplaced(world) == []
     grips = [w for w in np.flatnonzero(world.d.eq_active) if "grip/" in world.m.equality(w).name]
     world.d.eq_active[grips[0]] = False
     (said,) = long_runs.misplaced(world)
-    assert said.endswith("nobody has it")
+    assert said.endswith("nothing holds it")
 
 
 def test_a_copy_that_two_hold_is_noticed(running: Simulation) -> None:
     """Planted fault: a weld that is not switched off."""
-    world = running.world
+    world = running.physical
     grips = [w for w in np.flatnonzero(world.d.eq_active) if "grip/" in world.m.equality(w).name]
     body = int(world.m.eq_obj2id[grips[0]])
     (park,) = (
@@ -69,12 +69,13 @@ def test_a_copy_that_two_hold_is_noticed(running: Simulation) -> None:
     assert "held and parked" in said
 
 
-def test_a_copy_that_the_stock_forgets_is_noticed(running: Simulation) -> None:
+def test_a_copy_that_is_in_no_list_is_noticed(running: Simulation) -> None:
     """Planted fault: a parked copy is not among those to spare."""
-    free = running.world.stock.free
+    free = running.physical.parts.copies.free
     label = next(label for label in free if free[label])
     free[label].pop()
-    assert [said for said in long_runs.misplaced(running.world) if "lost by the stock" in said]
+    said = long_runs.misplaced(running.physical)
+    assert [words for words in said if "neither to spare nor in a unit" in words]
 
 
 def test_a_drift_is_noticed() -> None:

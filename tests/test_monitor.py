@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import ast
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -27,7 +27,8 @@ from factory.simulation.simulation import Simulation
 from factory.support.errors import InputError
 from factory.support.settings import Settings
 from tests.command_line import PAPER, ROOT, Terminal
-from tests.test_simulation import PRODUCTS, UNARY, laid_out, random_marking
+from tests.good_runs import random_marking
+from tests.pag_texts import PRODUCTS, UNARY, laid_out
 
 
 def watched(simulation: Simulation, max_time: float | None = None) -> tuple[Any, Report]:
@@ -190,13 +191,13 @@ def address(simulation: Simulation, body: str) -> int:
 
 def test_a_weld_that_is_never_released(paper: Layout) -> None:
     simulation = Simulation(paper, RunRequest(units=1))
-    board, kept = simulation.world.stock.board, weld(simulation, "grip/r5/part1")
-    loose = board.loose
+    welds, kept = simulation.physical.parts.welds, weld(simulation, "grip/r5/part1")
+    loose = welds.loose
 
-    def sticky(welds: list[int]) -> None:
-        loose([number for number in welds if number != kept])
+    def sticky(off: Iterable[int]) -> None:
+        loose([number for number in off if number != kept])
 
-    board.loose = sticky
+    welds.loose = sticky  # type: ignore[method-assign]
     run, report = watched(simulation, 3)
     t = next(e.t for e in run.events if e.transition == "sub1_e")
     assert_caught(report, "TwoHolders", "r5", "part1", 6, t)
@@ -376,7 +377,7 @@ def test_an_operation_that_does_not_go_on(paper: Layout) -> None:
 def test_more_parts_let_in_than_allowed(paper: Layout) -> None:
     """The world lets in what it has; the bound in the monitor's subject is one unit at once."""
     simulation = Simulation(paper, RunRequest(units=2))
-    simulation.request.wip = 1
+    simulation.request = replace(simulation.request, wip=1)
     run, report = watched(simulation)
     t = [e.t for e in run.events if e.transition == "part1_s"][1]
     assert_caught(report, "Order", "r5", "part1", 6, t)
@@ -386,7 +387,7 @@ def test_more_parts_let_in_than_allowed(paper: Layout) -> None:
 def test_parts_that_the_marking_does_not_account_for(paper: Layout) -> None:
     start = legal_marking(paper.factory.net, "r3:sub1")
     simulation = Simulation(paper, RunRequest(units=1, start=start))
-    simulation.start = paper.factory.net.initial_marking
+    simulation.request = replace(simulation.request, start=None)
     monitor = beside(simulation)
     found = [(v.code, v.robot, v.label) for v in monitor.violations]
     assert ("Start", "r3", "part1") in found
@@ -507,14 +508,14 @@ def test_run_with_a_monitor(run: Terminal) -> None:
 
 def test_a_faulty_run_fails(run: Terminal, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Two parts are never let go: status 1, beside the run and from its log."""
-    from factory.simulation.mujoco.welds import Switchboard
+    from factory.simulation.mujoco.welds import Welds
 
-    loose = Switchboard.loose
+    loose = Welds.loose
 
-    def sticky(self: Switchboard, welds: list[int]) -> None:
-        loose(self, [n for n in welds if self.vicinity.m.equality(n).name != "grip/r5/part1"])
+    def sticky(self: Welds, off: Iterable[int]) -> None:
+        loose(self, [n for n in off if self._m.equality(n).name != "grip/r5/part1"])
 
-    monkeypatch.setattr(Switchboard, "loose", sticky)
+    monkeypatch.setattr(Welds, "loose", sticky)
     log = tmp_path / "log"
     done = run("run", PAPER, "--monitor", "--max-time", 1, "--json", "--log", log)
     assert done.status == 1 and not done.json["refines_net"]

@@ -31,23 +31,12 @@ from factory.simulation.request import RunRequest
 from factory.simulation.simulation import Simulation
 from factory.support import gl
 from factory.support.errors import InputError, MissingError
+from tests.opengl import needs_gl
 
 ROOT = Path(__file__).parent.parent
 PAPER = ROOT / "examples" / "paper.pag"
 SIZE, FPS = (160, 96), 10.0
 SMALL, PRODUCT = Picture(SIZE), Picture((240, 136), "product")
-
-
-def why_no_gl() -> str:
-    try:
-        gl.probe()
-    except MissingError as error:
-        return str(error)
-    return ""
-
-
-WHY = why_no_gl()
-needs_gl = pytest.mark.skipif(bool(WHY), reason=f"no headless OpenGL here: {WHY}")
 
 
 @pytest.fixture(scope="module")

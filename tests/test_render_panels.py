@@ -34,8 +34,8 @@ from factory.simulation.request import RunRequest
 from factory.simulation.simulation import Simulation
 from factory.support.errors import InputError
 from tests.command_line import PAPER, Terminal, files_in
+from tests.opengl import needs_gl
 from tests.strategies import random_pag_text
-from tests.test_render import needs_gl
 
 EXAMPLES = Path(__file__).parent.parent / "examples"
 SIZE = (560, 360)
@@ -233,7 +233,7 @@ def test_the_product_followed_is_the_same_when_parts_become_one_body(tmp_path: P
         simulation.run([look])
         found.append((np.array(track), simulation, followed))
     (apart, one, first), (fused, other, second) = found
-    assert other.world.inspection.figures().fused and not one.world.inspection.figures().fused
+    assert other.world.figures().fused and not one.world.figures().fused
     assert np.allclose(first.box, second.box, atol=1e-3)
     ticks = min(len(apart), len(fused))
     near = np.linalg.norm(apart[:ticks] - fused[:ticks], axis=1) < 0.01

@@ -16,7 +16,6 @@ import pytest
 import factory
 from factory.problem.pag import PAG, Assembly
 from factory.record.log import LogWriter, read_log
-from factory.record.log.blocks import LENGTH, MAGIC
 from factory.show.report import page, recording_of
 from factory.show.report.drawings import floor_plan
 from factory.show.report.fidelity import fidelity
@@ -33,9 +32,7 @@ from factory.study.analysis.recorded import logged_record
 from factory.support.errors import InputError
 from tests.command_line import PAPER, Terminal, files_in
 from tests.layout_values import paper_layout
-from tests.report_values import Page
-
-EVIL = """</script></title><img src=x onerror="alert(1)">'"&<!--"""
+from tests.report_values import EVIL, Page, altered
 
 
 @pytest.fixture(scope="module")
@@ -57,17 +54,6 @@ def recording(log: Path):
 @pytest.fixture(scope="module")
 def made(recording) -> Page:
     return Page(page(recording))
-
-
-def altered(log: Path, to: Path, change) -> Path:
-    """A log with another header."""
-    data = log.read_bytes()[len(MAGIC) :]
-    (length,) = LENGTH.unpack_from(data)
-    header = json.loads(data[LENGTH.size : LENGTH.size + length])
-    change(header)
-    text = json.dumps(header).encode()
-    to.write_bytes(MAGIC + LENGTH.pack(len(text)) + text + data[LENGTH.size + length :])
-    return to
 
 
 def test_nothing_outside_the_page_is_referred_to(made: Page) -> None:

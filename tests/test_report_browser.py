@@ -3,7 +3,6 @@ moves everything, and a click selects in all views."""
 
 from __future__ import annotations
 
-import shutil
 from collections.abc import Iterator
 from pathlib import Path
 from time import monotonic
@@ -17,17 +16,7 @@ from factory.show.report import page, recording_of
 from factory.simulation.request import RunRequest
 from factory.simulation.simulation import Simulation
 from tests.command_line import PAPER
-from tests.test_report import EVIL, altered
-
-playwright = pytest.importorskip(
-    "playwright.sync_api", reason="pip install 'klavins-factory[browser]'"
-)
-
-NAMES = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
-CHROMIUM = next(filter(None, map(shutil.which, NAMES)), None)
-pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="no chromium: apt-get install chromium")
-
-FLAGS = ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
+from tests.report_values import EVIL, altered
 
 
 @pytest.fixture(scope="module")
@@ -38,14 +27,6 @@ def log(tmp_path_factory: pytest.TempPathFactory) -> Path:
     with LogWriter(path, simulation) as writer:
         simulation.run([writer.observe])
     return path
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Any]:
-    with playwright.sync_playwright() as started:
-        found = started.chromium.launch(executable_path=CHROMIUM, args=FLAGS)
-        yield found
-        found.close()
 
 
 class Tab:

@@ -14,19 +14,12 @@ from strategies import templates as random_templates
 from factory.lang import load_templates, read_template, write_template
 from factory.problem.template import Law, Point, Template
 from factory.support.errors import Diagnostic, InputError
+from tests.pag_texts import MATE
 
 HERE = Path(__file__).parent
 BROKEN = HERE / "broken"
 SHIPPED = HERE.parent / "templates"
 TEMPLATES = load_templates([SHIPPED])
-MATE = """mate = (R, j, ~, <a; b>, F) where
-  R = < dot, dot, dot >;
-  j = 3;
-  ~ = { A1 = A2 = B3 };
-  <a; b> = < LAB1, LAB2, nopart; nopart, nopart, LAB3 >;
-  F = navigation on W to ( A1 + 2r, A2 + 2r, B3 ) within eps;
-  further = insert;
-"""
 
 
 def errors(text: str) -> tuple[Diagnostic, ...]:

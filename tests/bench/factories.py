@@ -1,14 +1,15 @@
-"""Factories of a given size in steady production."""
+"""Factories of a given size, from the empty factory on or in steady production."""
 
 from __future__ import annotations
 
 import tempfile
+from collections.abc import Callable, Hashable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal
 
 import factory
 from factory.layout.layout import Layout
+from factory.simulation.mujoco.courses import Course
 from factory.simulation.request import RunRequest
 from factory.simulation.simulation import Simulation
 from factory.support.settings import MOST, Settings
@@ -18,6 +19,8 @@ ENDLESS = 1000
 
 PATIENCE = 8
 """Cycles that production is given to repeat itself."""
+
+DEFAULT = Settings()
 
 SEEN = 3
 """Products that the ideal world makes to tell when production is steady."""
@@ -78,28 +81,25 @@ def laid_out(text: str) -> Layout:
 
 @dataclass(frozen=True)
 class Case:
-    """A factory in MuJoCo that nobody looks at: so many robots or one more, the engine's timestep
-    [s] or AUTO, copies of each part let in at once (None: the whole pool), whether parts that are
-    joined become one body."""
+    """A factory in MuJoCo that is neither filmed nor logged: so many robots or one more, the
+    engine's timestep [s] (None: that of DEFAULT), units let in at once (None: any number), whether
+    parts that are joined become one body, and how many units it makes from the empty factory (None:
+    it is measured in steady production)."""
 
     robots: int
-    timestep: float | Literal["auto"]
+    timestep: float | None
     wip: int | None = None
     fuse: bool = False
+    units: int | None = None
 
-    def simulation(self, layout: Layout, **given: Any) -> Simulation:
-        """A run of it, ready to go."""
-        settings = Settings(timestep=self.timestep)
-        return Simulation(
-            layout,
-            RunRequest(
-                units=ENDLESS,
-                settings=settings,
-                wip=self.wip,
-                fuse=self.fuse,
-                **{"shown": False, **given},
-            ),
+    def simulation(self, layout: Layout, shown: bool = False) -> Simulation:
+        """A run of it, ready to go; `shown` as in a RunRequest."""
+        settings = DEFAULT if self.timestep is None else Settings(timestep=self.timestep)
+        units = self.units or ENDLESS
+        request = RunRequest(
+            units=units, settings=settings, wip=self.wip, fuse=self.fuse, shown=shown
         )
+        return Simulation(layout, request)
 
 
 @dataclass(frozen=True)
@@ -122,18 +122,36 @@ class Steady:
 
 def run_in(simulation: Simulation, steady: Steady) -> float:
     """Tick until production repeats itself, or for `PATIENCE` cycles since it is steady; gives the
-    time [s]. It does when a cycle has gone by in which no reference did anything new."""
-    world = simulation.world
+    time [s]. It repeats itself when a cycle has gone by in which no course was planned."""
+    world, planned = simulation.physical, list[float]()
+    stepping = world.motion.stepping
+    course = stepping.course
+
+    def counted(begin: Hashable, make: Callable[[], Course]) -> Course:
+        def made() -> Course:
+            planned.append(world.time)
+            return make()
+
+        return course(begin, made)
+
     run_until(simulation, steady.since)
+    stepping.course = counted  # type: ignore[method-assign]
     for _ in range(PATIENCE):
-        known = len(world.courses)
+        planned.clear()
         run_until(simulation, world.time + steady.cycle)
-        if len(world.courses) == known:
+        if not planned:
             break
-    return float(world.time)
+    del stepping.course
+    return world.time
 
 
 def run_until(simulation: Simulation, time: float) -> None:
-    """Tick until this simulated time [s], as a run does that nobody looks at."""
+    """Tick until this simulated time [s], as a run does that has no observers."""
     while simulation.world.time < time:
+        simulation.supervisor.step(MOST)
+
+
+def produce(simulation: Simulation, units: int) -> None:
+    """Tick until so many units are delivered, as a run does that has no observers."""
+    while simulation.world.delivered() < units:
         simulation.supervisor.step(MOST)

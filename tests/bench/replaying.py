@@ -9,17 +9,16 @@ bit, which is asserted, so both did the same physics.
 from __future__ import annotations
 
 import copy
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass, field
 from time import perf_counter
 from typing import Any
 
 import numpy as np
 
-from factory.simulation.mujoco import world as physics
+from factory.layout.layout import Layout
+from factory.simulation.simulation import Simulation
 from factory.support.engine import mujoco
-from tests.bench.factories import Steady, run_in, run_until
+from tests.bench.factories import Case, Steady, produce, run_in, run_until
 
 DATA = ("ctrl", "history", "qpos", "qvel", "eq_active", "tree_asleep", "xpos", "xmat", "xquat")
 MODEL = (
@@ -46,19 +45,27 @@ class Recorder:
 
     def __post_init__(self) -> None:
         self.begin = copy.copy(self.m), copy.copy(self.d)
-        self.seen = [array.copy() for array in arrays(self.m, self.d)]
+        self.seen = self.before = self.now()
+        self.time = self.d.time
 
-    def step(self, m: mujoco.MjModel, d: mujoco.MjData, steps: int = 1) -> None:
-        """Takes the place of the engine's step."""
+    def now(self) -> list[Any]:
+        """Copies of all that a world ever writes to."""
+        return [array.copy() for array in arrays(self.m, self.d)]
+
+    def step(self, steps: int) -> None:
+        """Takes the place of the engine's step. A world that has gone back to where its last step
+        began takes that step again, so it is forgotten."""
+        if self.d.time < self.time:
+            self.writes.pop()
+            self.seen = self.before
         written: list[Write] = []
-        for number, (now, before) in enumerate(zip(arrays(m, d), self.seen, strict=True)):
-            at = np.flatnonzero(bits(now) != bits(before))
+        for number, (now, then) in enumerate(zip(arrays(self.m, self.d), self.seen, strict=True)):
+            at = np.flatnonzero(bits(now) != bits(then))
             if len(at):
                 written.append((number, at, now.reshape(-1)[at]))
         self.writes.append((written, steps))
-        mujoco.mj_step(m, d, steps)
-        for now, before in zip(arrays(m, d), self.seen, strict=True):
-            before[...] = now
+        mujoco.mj_step(self.m, self.d, steps)
+        self.before, self.seen, self.time = self.seen, self.now(), self.d.time
 
 
 def arrays(m: mujoco.MjModel, d: mujoco.MjData) -> list[Any]:
@@ -72,57 +79,51 @@ def bits(array: Any) -> Any:
     return flat.view(f"i{flat.itemsize}")
 
 
-class _Engine:
-    """The engine's module for a world, with another step."""
-
-    def __init__(self, step: Any) -> None:
-        self.mj_step = step
-
-    def __getattr__(self, name: str) -> Any:
-        return getattr(mujoco, name)
-
-
-@contextmanager
-def stepping(step: Any) -> Iterator[None]:
-    """The world steps by this function meanwhile."""
-    own = physics.mujoco
-    physics.mujoco = _Engine(step)
-    try:
-        yield
-    finally:
-        physics.mujoco = own
+def same(one: Any, other: Any) -> bool:
+    """Whether two arrays are the same to the last bit."""
+    return bool(np.array_equal(bits(one), bits(other)))
 
 
 @dataclass(frozen=True)
 class Floor:
-    """Seconds for the same window: the factory's run loop, the engine's steps in it, and the bare
-    replay; since when, and how many seconds were simulated."""
+    """Seconds for the same window, the factory's run loop and the bare replay; since when and until
+    when [s], and the engine's timestep [s]."""
 
     since: float
-    simulated: float
+    until: float
+    timestep: float
     run: float
-    physics: float
     bare: float
 
 
-def measure_floor(make: Any, steady: Steady, window: float) -> Floor:
-    """Both over a window [s] since production repeats itself, of two runs that are one to the last
-    bit: `make()` gives a simulation ready to go."""
-    timed, recorded = make(), make()
-    warm = run_in(timed, steady)
-    run_in(recorded, steady)
-    world = recorded.world
+def measure_floor(case: Case, layout: Layout, window: float) -> Floor:
+    """Both from the empty factory, or over a window [s] since production repeats itself: of two
+    runs that are one to the last bit."""
+    steady = Steady.of(layout, case.wip) if case.units is None else None
+    timed, recorded = case.simulation(layout), case.simulation(layout)
+    if steady is not None:
+        run_in(timed, steady)
+        run_in(recorded, steady)
+    world, since = recorded.physical, recorded.world.time
     recorder = Recorder(world.m, world.d)
-    with stepping(recorder.step):
-        run_until(recorded, warm + window)
-    before, begin = timed.world.physics_time, perf_counter()
-    run_until(timed, warm + window)
+    world.motion.stepping.step = recorder.step  # type: ignore[attr-defined]
+    _go(recorded, case.units, since + window)
+    begin = perf_counter()
+    _go(timed, case.units, since + window)
     run = perf_counter() - begin
     m, d = recorder.begin
     bare = replay(m, d, recorder.writes)
-    for own in (world.d, timed.world.d):
-        assert np.array_equal(d.qpos, own.qpos) and np.array_equal(d.qvel, own.qvel)
-    return Floor(warm, window, run, timed.world.physics_time - before, bare)
+    assert all(map(same, arrays(m, d), recorder.seen)), "the replay ends in another state"
+    pair = [arrays(own.m, own.d) for own in (world, timed.physical)]
+    assert all(map(same, *pair)), "two runs of one factory differ"
+    return Floor(since, timed.world.time, float(m.opt.timestep), run, bare)
+
+
+def _go(simulation: Simulation, units: int | None, until: float) -> None:
+    if units is None:
+        run_until(simulation, until)
+    else:
+        produce(simulation, units)
 
 
 def replay(m: mujoco.MjModel, d: mujoco.MjData, writes: list[tuple[list[Write], int]]) -> float:

@@ -58,7 +58,7 @@ class Bench:
         supervisor = self.simulation.supervisor
         assert supervisor.active.operations == (number,)
         assert supervisor.active.bundle is not None
-        self.world, self.axes = self.simulation.world, supervisor.active.axes
+        self.world, self.axes = self.simulation.physical, supervisor.active.axes
         self.bundle: Bundle = supervisor.active.bundle
         self.mode = self.bundle.modes[0]
         self.world.apply([(plan.factory.operations[number], 0)], [])
@@ -80,8 +80,7 @@ class Bench:
         mujoco.mj_copyData(d, m, self.kept)
         world.inspection.tick()
         still = np.zeros(len(x))
-        d.qpos[world.qpos[self.axes]] = x
-        world.reference[self.axes], world.speed[self.axes] = x, still
+        d.qpos[world.motion.axes.qpos[self.axes]] = x
         world.move(self.axes, x, still, still)
         mujoco.mj_kinematics(m, d)
         for weld in np.flatnonzero(d.eq_active):
@@ -104,11 +103,12 @@ class Bench:
         if touching := self.put(x):
             return Outcome(start, kind, "overlap", 0.0, tuple(touching))
         world, begun = self.world, self.world.time
+        axes = self.axes.copy()  # other axes than before: the mode begins anew
         seen, clock = len(world.inspection.unintended), np.zeros(1)
         result = "missed"
         while world.time - begun < self.patience:
-            world.step(self.bundle, self.axes)
-            q, v = (sensed[self.axes] for sensed in world.sense())
+            world.step(self.bundle, axes)
+            q, v = (sensed[axes] for sensed in world.sense())
             there = self.bundle.at_goal(q)
             clock += self.tick * there
             if self.bundle.finished(there, clock)[0] and (np.abs(v) < REST).all():

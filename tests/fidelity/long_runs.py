@@ -8,12 +8,12 @@ A figure is the same at the end as at the beginning when the means of the ten di
 three standard errors of that difference and a floor, below which nothing matters: 1 µm, and one
 tick. Memory may grow by what the record of a unit takes, at most `KIB_A_UNIT`, measured by a line
 through the second half of the run. The pool is whole when every copy has exactly one weld that
-holds it, of a robot, a feeder, the tray or its parking place, and the stock says the same."""
+holds it, of a robot, a feeder, the tray or its parking place, and is either to spare or in a
+unit."""
 
 from __future__ import annotations
 
 import gc
-from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -60,10 +60,9 @@ class Diary:
         self.seen = len(world.dropoffs)
         inspection = world.inspection
         self.error_mm.append(1e3 * (inspection.error or 0.0))
-        self.gap_mm.append(1e3 * inspection.gaps.largest())
+        self.gap_mm.append(1e3 * world.parts.welds.gap)
         self.residual_mm.append(1e3 * inspection.residual)
-        inspection.error, inspection.residual = None, 0.0
-        inspection.gaps.forget()
+        inspection.error, inspection.residual, world.parts.welds.gap = None, 0.0, 0.0
         self.memory_kib.append(resident_kib())
         self.lost += misplaced(world)
 
@@ -79,10 +78,10 @@ def resident_kib() -> float:
 
 
 def whereabouts(world: Any) -> dict[str, list[str]]:
-    """Who holds each copy, by the welds that are on: `held`, `fed`, `on the tray`, `parked`."""
-    m, d, stock = world.m, world.d, world.stock
+    """What holds each copy, by the welds that are on: `held`, `fed`, `on the tray`, `parked`."""
+    m, d, copies = world.m, world.d, world.parts.copies
     found: dict[str, list[str]] = {
-        m.body(body).name: [] for bodies in stock.body.values() for body in bodies
+        m.body(body).name: [] for bodies in copies.body.values() for body in bodies
     }
     for weld in np.flatnonzero(d.eq_active):
         body = m.body(m.eq_obj2id[weld]).name
@@ -93,17 +92,19 @@ def whereabouts(world: Any) -> dict[str, list[str]]:
 
 
 def misplaced(world: Any) -> list[str]:
-    """Copies that nobody holds, or two do, or of which the stock says something else."""
-    stock, wrong = world.stock, []
+    """Copies that nothing or more than one thing holds, or that are not either to spare or in one
+    unit."""
+    copies, wrong = world.parts.copies, list[str]()
     for name, holders in whereabouts(world).items():
         if len(holders) != 1:
-            wrong.append(f"{name}: {' and '.join(holders) or 'nobody has it'}")
-    for label, bodies in stock.body.items():
-        free = set(stock.free[label])
-        used = Counter(copy for (part, _), copy in stock.copy_of.items() if part == label)
-        for copy, _ in enumerate(bodies):
-            if (copy in free) + used[copy] != 1:
-                wrong.append(f"{names.part(label, copy + 1)}: lost by the stock")
+            wrong.append(f"{name}: {' and '.join(holders) or 'nothing holds it'}")
+    units = world.parts.masks.unit
+    for label, bodies in copies.body.items():
+        for copy, body in enumerate(bodies.tolist()):
+            part = label, int(units[body])
+            used = part in copies and copies[part] == body
+            if copies.free[label].count(copy) + used != 1:
+                wrong.append(f"{names.part(label, copy + 1)}: neither to spare nor in a unit")
     return wrong
 
 

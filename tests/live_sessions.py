@@ -1,0 +1,54 @@
+"""Sessions of a running factory, for tests of the live page."""
+
+from __future__ import annotations
+
+from threading import Thread
+from time import monotonic, sleep
+from typing import Any
+
+import pytest
+
+from factory.show.live import LiveFrame, Session
+from factory.simulation.request import RunRequest
+from factory.simulation.simulation import Simulation
+from tests.layout_values import paper_layout
+
+
+class Stopped(Exception):
+    """Ends a session."""
+
+
+def a_session(playing: bool) -> Session:
+    """A session of the paper's example, without end; it does not run yet."""
+    return Session(lambda: Simulation(paper_layout(), RunRequest(units=10**9)), playing)
+
+
+class Running:
+    """A session that runs in a thread of its own."""
+
+    def __init__(self, playing: bool = True) -> None:
+        self.session = a_session(playing)
+        self.over = False
+        self.thread = Thread(target=self._run, daemon=True)
+        self.thread.start()
+
+    def _run(self) -> None:
+        with pytest.raises(Stopped):
+            self.session.run(self._observe)
+
+    def _observe(self, world: Any, supervisor: Any) -> None:
+        if self.over:
+            raise Stopped
+
+    def until(self, holds: Any, seconds: float = 20.0) -> LiveFrame:
+        """The first frame of which something holds."""
+        end = monotonic() + seconds
+        while not holds(frame := self.session.frame):
+            assert monotonic() < end, frame
+            sleep(0.01)
+        return frame
+
+    def close(self) -> None:
+        self.over = True
+        self.thread.join(10)
+        assert not self.thread.is_alive()
