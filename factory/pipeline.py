@@ -9,7 +9,7 @@ from os import PathLike
 from pathlib import Path
 
 from factory.compiler.compiler import compile_pag
-from factory.compiler.mating import Matings, matings, shaped
+from factory.compiler.mating.mating import Matings, matings, shaped
 from factory.geometry.product import product_geometry
 from factory.geometry.solids import Product
 from factory.lang.pag_reader import load_pag

@@ -12,6 +12,7 @@ from factory.nets.gears import Gear, GearNet
 from factory.nets.marked import MarkedNet, marked
 from factory.nets.petri import Marking, PetriNet, Place, Transition
 from factory.nets.threaded import ThreadedNet
+from tests.token_game import enabled, follower
 
 
 def net_from(edges: list[tuple[str, str, int]]) -> MarkedNet:
@@ -106,12 +107,12 @@ def fair_run(net: GearNet, marking: Marking, steps: int, rng: random.Random) -> 
     fired = [0] * len(petri.transitions)
     record = []
     for _ in range(steps):
-        ready = petri.enabled(marking)
+        ready = enabled(petri, marking)
         if not ready:
             break
         least = min(fired[e] for e in ready)
         event = rng.choice([e for e in ready if fired[e] == least] + [rng.choice(ready)])
-        marking = petri.follower(marking, (event,))
+        marking = follower(petri, marking, (event,))
         fired[event] += 1
         record.append(event)
     return record

@@ -8,7 +8,7 @@ import pytest
 
 import factory.layout.arranging as arranging
 import factory.layout.optimising as optimising
-from factory.compiler.mating import judged
+from factory.compiler.mating.mating import judged
 from factory.geometry.product import product_geometry
 from factory.layout.embedding import lay_out
 from factory.layout.layout import Layout

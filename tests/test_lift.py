@@ -8,7 +8,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from factory.compiler.mating import matings
+from factory.compiler.mating.mating import matings
 from factory.geometry.product import product_geometry
 from factory.lang.pag_reader import read_pag
 from factory.layout.clearance import certify

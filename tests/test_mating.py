@@ -19,20 +19,19 @@ from hypothesis import strategies as st
 from scipy.spatial import ConvexHull
 
 from factory.compiler.compiler import expand
-from factory.compiler.mating import (
+from factory.compiler.mating.depth import deepest, exact, polytope, rough
+from factory.compiler.mating.mating import (
     BLOCKED,
     LEFT_OUT,
     NO_DEEPER,
     STRICT,
-    TOLERANCE,
     Mating,
     Matings,
     matings,
     shaped,
 )
-from factory.compiler.mating.depth import deepest, exact, polytope, rough
 from factory.compiler.mating.meetings import meetings
-from factory.compiler.mating.overlaps import CHUNK
+from factory.compiler.mating.overlaps import CHUNK, TOLERANCE
 from factory.export.clash_picture import draw, picture_names
 from factory.geometry.product import product_geometry
 from factory.geometry.solids import Product

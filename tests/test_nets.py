@@ -11,11 +11,12 @@ from hypothesis import strategies as st
 from factory.compiler.compiler import expand
 from factory.nets import threads as nets_threads
 from factory.nets.petri import PetriNet, Place, Transition
-from factory.nets.threaded import Slot, ThreadedMarking, ThreadedNet
+from factory.nets.threaded import Slot, ThreadedNet
 from factory.nets.threads import Threads
 from factory.plant.factory import Factory
 from tests.net_values import legal_markings, random_legal_marking
 from tests.pag_values import TEMPLATES, factories, factory_of, paper
+from tests.token_game import ThreadedMarking, enabled, follower
 
 _T = (Transition("a"), Transition("b"))
 _RING = PetriNet(_T, (Place("p", (0,), (1,)), Place("q", (1,), (0,))))
@@ -29,15 +30,15 @@ def test_presets_and_postsets() -> None:
 
 
 def test_an_event_needs_its_preset_and_an_empty_postset() -> None:
-    assert _RING.enabled(frozenset({1})) == (0,)
-    assert _RING.enabled(frozenset({0})) == (1,)
-    assert _RING.enabled(frozenset({0, 1})) == ()
-    assert _RING.follower(frozenset({1}), (0,)) == frozenset({0})
+    assert enabled(_RING, frozenset({1})) == (0,)
+    assert enabled(_RING, frozenset({0})) == (1,)
+    assert enabled(_RING, frozenset({0, 1})) == ()
+    assert follower(_RING, frozenset({1}), (0,)) == frozenset({0})
 
 
 def test_a_gear_of_one_place_is_dead() -> None:
     net = PetriNet((Transition("a"),), (Place("p", (0,), (0,)),))
-    assert net.enabled(frozenset({0})) == ()
+    assert enabled(net, frozenset({0})) == ()
 
 
 def test_equal_places_stay_two() -> None:
@@ -113,13 +114,14 @@ def test_counts_of_section_3(factory: Factory) -> None:
 @given(factories())
 def test_the_initial_marking_is_legal(factory: Factory) -> None:
     net = factory.net
-    assert net.marking_of(net.initial_marking).is_legal(net.threaded, len(net.gears))
+    marking = ThreadedMarking(net.threads_of(net.initial_marking))
+    assert marking.is_legal(net.threaded, len(net.gears))
     assert all(net.threaded.places[p].label == "nopart" for p in net.initial)
 
 
 def threads_of(factory: Factory, marked: frozenset[int]) -> Threads:
     starts = [operation.start for operation in factory.operations]
-    return Threads(factory.net.threaded, factory.net.marking_of(marked), starts)
+    return Threads(factory.net.threaded, factory.net.threads_of(marked), starts)
 
 
 @given(factories(), st.integers(0, 2**32))
@@ -127,25 +129,28 @@ def test_sets_fire_as_definition_3_4_says(factory: Factory, seed: int) -> None:
     """Maximal detached sets of enabled transitions, again and again, from any legal marking: the
     marking, the robot in each slot, and which operations may start are those of the follower."""
     rng, net = random.Random(seed), factory.net.threaded
-    here = factory.net.marking_of(random_legal_marking(factory.net, rng))
-    threads = threads_of(factory, here.marked)
+    marking = random_legal_marking(factory.net, rng)
+    here = ThreadedMarking(factory.net.threads_of(marking))
     kept = rng.choice((1, 2, 100))
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(nets_threads, "KEPT", kept)
+        threads = threads_of(factory, marking)
     for _ in range(20):
-        enabled = net.net.enabled(here.marked)
-        ready = [event for event in enabled if event % 2 == 0]
+        can = enabled(net.net, here.marked)
+        ready = [event for event in can if event % 2 == 0]
         assert threads.possible == {*ready}
         chosen = list[int]()
-        for event in rng.sample(enabled, len(enabled)):
+        for event in rng.sample(can, len(can)):
             if net.net.is_detached((*chosen, event)) and (not chosen or rng.random() < 0.7):
                 chosen.append(event)
         if not chosen:
             return
         there = here.follower(net, chosen)
-        new = {event for event in net.net.enabled(there.marked) if event % 2 == 0} - {*ready}
-        with pytest.MonkeyPatch.context() as patch:
-            patch.setattr(nets_threads, "KEPT", kept)
-            assert threads.fire(tuple(chosen)) == bool(new)
-        assert threads.threads() == there and len(threads._kept) <= kept
+        new = {event for event in enabled(net.net, there.marked) if event % 2 == 0} - {*ready}
+        assert threads.fire(tuple(chosen)) == bool(new)
+        assert threads.robots == there.threads
+        assert {p for p, marked in enumerate(threads.marked) if marked} == there.marked
+        assert threads._firing.cache_info().currsize <= kept
         here = there
 
 
@@ -153,7 +158,7 @@ def test_what_may_not_fire_does_not() -> None:
     factory = factory_of(paper())
     by_label = factory.by_label
     threads = threads_of(factory, factory.net.initial_marking)
-    before, start = threads.threads(), by_label["part1"].start
+    before, start = dict(threads.robots), by_label["part1"].start
     for events, words in (
         ((by_label["part1"].end,), "not all are enabled"),
         ((start, by_label["sub1"].start), "not all are enabled"),
@@ -161,7 +166,7 @@ def test_what_may_not_fire_does_not() -> None:
     ):
         with pytest.raises(AssertionError, match=words):
             threads.fire(events)
-        assert threads.threads() == before
+        assert threads.robots == before
     threads.fire((start,))
     with pytest.raises(AssertionError, match="not all are enabled"):
         threads.fire((start,))
@@ -171,7 +176,7 @@ def test_what_may_not_fire_does_not() -> None:
 def test_a_robot_that_is_not_where_its_token_is_does_not_fire(robots: dict[Slot, int]) -> None:
     """Elsewhere, nowhere, or where another is already."""
     net = ThreadedNet(_RING, ((((1, 0), (0, 0)),), (((0, 0), (1, 0)),)))
-    threads = Threads(net, ThreadedMarking(robots), (1,))
+    threads = Threads(net, robots, (1,))
     threads.marked[:] = bytes([1, 0])
     with pytest.raises(AssertionError, match="not legal"):
         threads.fire((1,))
@@ -182,7 +187,7 @@ def test_who_takes_the_token_leaves_none_for_others() -> None:
     places = (Place("p", (), (0, 1)), Place("q", (0,), ()), Place("r", (1,), ()))
     moves = ((((0, 0), (1, 0)),), (((0, 0), (2, 0)),))
     net = ThreadedNet(PetriNet(_T, places), moves)
-    threads = Threads(net, ThreadedMarking({(0, 0): 7}), (0, 1))
+    threads = Threads(net, {(0, 0): 7}, (0, 1))
     assert threads.possible == {0, 1}
     threads.fire((1,))
-    assert threads.possible == set() and threads.threads().threads == {(2, 0): 7}
+    assert threads.possible == set() and threads.robots == {(2, 0): 7}

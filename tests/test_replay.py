@@ -19,6 +19,7 @@ from factory.plant.factory import Factory
 from factory.support.errors import InputError
 from tests.net_values import fair_run, legal_markings, net_from, random_legal_marking
 from tests.pag_values import factories, factory_of, paper
+from tests.token_game import follower
 
 
 def names(net: GearNet, events: list[int]) -> list[str]:
@@ -34,7 +35,7 @@ def test_runs_refine_their_net(factory: Factory, rng: random.Random, elsewhere: 
     found = replay(net, names(net, record), start)
     marking = start
     for event in record:
-        marking = net.threaded.net.follower(marking, (event,))
+        marking = follower(net.threaded.net, marking, (event,))
     assert (found.refines, found.index, found.reason) == (True, None, "")
     assert found.marking == marking
     assert found.events == len(record)

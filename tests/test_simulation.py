@@ -22,6 +22,7 @@ from factory.simulation.simulation import Simulation
 from factory.support.settings import Settings
 from tests.bench.factories import laid_out as floor_of
 from tests.test_compiler import PAPER, compiled
+from tests.token_game import enabled, follower
 
 UNARY = """root = c; c = glue(b, dwell = 0.1); b = weld(a, dwell = 0.2);
 a = press(p, dwell = 0.1); p = atomic()"""
@@ -117,8 +118,8 @@ def random_marking(layout: Layout, seed: int) -> frozenset[int]:
     net, draw = layout.factory.net, random.Random(seed)
     marking = net.initial_marking
     for _ in range(draw.randrange(1, 60)):
-        event = draw.choice(net.threaded.net.enabled(marking))
-        marking = net.threaded.net.follower(marking, [event])
+        event = draw.choice(enabled(net.threaded.net, marking))
+        marking = follower(net.threaded.net, marking, [event])
     return marking
 
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 from factory.support.console import say
 
 if TYPE_CHECKING:
-    from factory.compiler.mating import Mating, Matings
+    from factory.compiler.mating.mating import Mating, Matings
 
 LEVELS = ("none", "left_out", "no_deeper", "strict")
 """The names of the levels, see `factory.compiler.mating.mating`."""
@@ -20,7 +20,7 @@ def approaches_json(matings: Matings | None) -> dict[str, Any] | None:
     """The key `approaches` of `check --json`."""
     if matings is None:
         return None
-    from factory.compiler.mating import TOLERANCE
+    from factory.compiler.mating.overlaps import TOLERANCE
 
     return {
         "operations": len(matings.all),

@@ -18,7 +18,7 @@ from factory.support.console import say, table
 from factory.support.files import is_net
 
 if TYPE_CHECKING:
-    from factory.compiler.mating import Matings
+    from factory.compiler.mating.mating import Matings
     from factory.geometry.solids import Product
     from factory.support.errors import Diagnostic
 

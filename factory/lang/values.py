@@ -39,17 +39,7 @@ class Kind:
         """Whether these finite numbers are a value of this kind."""
         if not 0 < len(numbers) == self.length or not (self.zero or any(numbers)):
             return False
-        small, large = min(numbers), max(numbers)
-        finite = math.isfinite(small) and math.isfinite(large)
-        return finite and self.allows(small) and self.allows(large)
-
-    def glimpse(self, token: Token) -> tuple[float, ...] | None:
-        """The value of a VECTOR token; None where it needs a closer look."""
-        words = [word.strip() for word in token[token.index("(") + 1 : -1].split(",")]
-        if self.length < 2 or not all(map(is_number, words)):
-            return None
-        numbers = tuple(map(float, words))
-        return numbers if self.fits(numbers) else None
+        return all(math.isfinite(value) and self.allows(value) for value in numbers)
 
     @property
     def wanted(self) -> str:
@@ -111,7 +101,7 @@ class ValueReader:
     def read(self, name: str, kind: Kind, raw: Token | Vector) -> Value | None:
         """The value of the parameter `name`, or None after an error (BadValue) has been noted."""
         if isinstance(raw, Token) and raw.type == "VECTOR":
-            return kind.glimpse(raw) or self._vector(name, kind, spelled(raw))
+            return self._vector(name, kind, spelled(raw))
         if isinstance(raw, Vector):
             return self._vector(name, kind, raw)
         if raw.type == "STRING" and kind.length == 0:

@@ -10,7 +10,7 @@ from __future__ import annotations
 from dataclasses import replace
 from math import ceil
 
-from factory.compiler.mating import judged
+from factory.compiler.mating.mating import judged
 from factory.geometry.solids import Product
 from factory.layout.certificate import KINDS, OUTFEED, STATIONS, Region
 from factory.layout.clearance import certify

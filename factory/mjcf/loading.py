@@ -1,32 +1,18 @@
-"""The engine's model of a factory: compiled, or from the cache."""
+"""The engine's model of a factory."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
-from factory.mjcf.binary import cached, keep
 from factory.mjcf.model import Model
 from factory.support.engine import mujoco
 from factory.support.errors import Diagnostic, InputError
 
 
 def load(model: Model) -> mujoco.MjModel:
-    """The engine's model of what `model_files` gives; from the user's cache if it is there. Raises
-    InputError (BadMesh, BadValue, Engine) where the engine refuses it."""
-    m = cached(model)
-    if m is None:
-        m = _compiled(model)
-        keep(model, m)
-    return m
-
-
-def _compiled(model: Model) -> mujoco.MjModel:
-    xml = model.xml
-    files: Mapping[str, bytes] = {
-        f"meshes/{name}": content for name, content in model.files.items()
-    }
+    """The engine's model of a factory. Raises InputError (BadMesh, BadValue, Engine) where the
+    engine refuses it."""
+    files = {f"meshes/{name}": content for name, content in model.files.items()}
     try:
-        return mujoco.MjModel.from_xml_string(xml, dict(files))
+        return mujoco.MjModel.from_xml_string(model.xml, files)
     except ValueError as error:
         raise InputError(_explained(model, str(error))) from error
 

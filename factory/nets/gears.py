@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 
 from factory.nets.petri import Marking
-from factory.nets.threaded import Slot, ThreadedMarking, ThreadedNet
+from factory.nets.threaded import Slot, ThreadedNet
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,9 +41,6 @@ class GearNet:
         """m_0."""
         return frozenset(self.initial)
 
-    def marking_of(self, marked: Marking) -> ThreadedMarking:
-        """(m, f_m) where every slot holds the robot that owns it."""
-        threads: dict[Slot, int] = {
-            (p, i): robot for p in sorted(marked) for i, robot in enumerate(self.slots[p])
-        }
-        return ThreadedMarking(threads)
+    def threads_of(self, marked: Marking) -> dict[Slot, int]:
+        """f_m of a marking: every slot holds the robot that owns it (Definition 3.3)."""
+        return {(p, i): robot for p in sorted(marked) for i, robot in enumerate(self.slots[p])}

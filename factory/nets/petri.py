@@ -77,25 +77,9 @@ class PetriNet:
                 found[event].append(index)
         return tuple(tuple(places) for places in found)
 
-    def enabled(self, marking: Marking) -> tuple[int, ...]:
-        """The transitions e with •e inside m and e• outside m (Definition 3.4, condition 1)."""
-        return tuple(e for e in range(len(self.transitions)) if self.is_enabled(e, marking))
-
-    def is_enabled(self, event: int, marking: Marking) -> bool:
-        """Whether •e is inside m and e• outside m (Definition 3.4, condition 1)."""
-        before, after = self.preset[event], self.postset[event]
-        return marking.issuperset(before) and marking.isdisjoint(after)
-
     def is_detached(self, events: Iterable[int]) -> bool:
         """Whether the presets are pairwise disjoint, and the postsets too (section 3.1)."""
         chosen = tuple(events)
         before = [p for e in chosen for p in self.preset[e]]
         after = [p for e in chosen for p in self.postset[e]]
         return len(before) == len(set(before)) and len(after) == len(set(after))
-
-    def follower(self, marking: Marking, events: Iterable[int]) -> Marking:
-        """m' = (m - •G) ∪ G• for a detached set G of enabled events (section 3.1)."""
-        chosen = tuple(events)
-        before = {p for e in chosen for p in self.preset[e]}
-        after = {p for e in chosen for p in self.postset[e]}
-        return (marking - before) | after

@@ -1,4 +1,4 @@
-"""Threaded Petri Nets: Definitions 3.2 to 3.4.
+"""Threaded Petri Nets: Definition 3.2; `factory.nets.threads` has 3.3 and 3.4.
 
 The dynamics F_p, domain D_p and goal G_p of a place are found by its mode and label in the factory
 (`factory.plant.factory`); the net itself keeps what the theory needs: sizes and redistribution.
@@ -6,12 +6,9 @@ The dynamics F_p, domain D_p and goal G_p of a place are found by its mode and l
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
-from functools import cached_property
-from types import MappingProxyType
 
-from factory.nets.petri import Marking, PetriNet, Place, Transition
+from factory.nets.petri import PetriNet, Place, Transition
 
 Slot = tuple[int, int]
 """(p, i): component i of the mode of place p; both counted from 0."""
@@ -51,44 +48,3 @@ class ThreadedNet:
     def places(self) -> tuple[Place, ...]:
         """P."""
         return self.net.places
-
-
-@dataclass(frozen=True)
-class ThreadedMarking:
-    """(m, f_m): the marked places and the robot in each of their slots (Definition 3.3)."""
-
-    threads: Mapping[Slot, int]
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "threads", MappingProxyType(dict(self.threads)))
-
-    @cached_property
-    def marked(self) -> Marking:
-        """m."""
-        return frozenset(place for place, _ in self.threads)
-
-    def is_legal(self, net: ThreadedNet, robots: int) -> bool:
-        """Whether f_m is a bijection from the slots of m to the robots 0 .. robots - 1."""
-        slots = sum(net.places[p].size for p in self.marked)
-        return (
-            slots == len(self.threads) == robots
-            and all(0 <= i < net.places[p].size for p, i in self.threads)
-            and sorted(self.threads.values()) == list(range(robots))
-        )
-
-    def follower(self, net: ThreadedNet, events: Iterable[int]) -> ThreadedMarking:
-        """The follower marking with respect to a detached set G of enabled events.
-
-        f_m'(q, j) = f_m(q, j) for q outside G•, else f_m(d_e^-1(q, j)), where e is the event in
-        •q ∩ G (the paper's text has q•). Raises ValueError where G is not detached or not enabled.
-        """
-        chosen = tuple(events)
-        if not net.net.is_detached(chosen):
-            raise ValueError("the events are not detached")
-        if not all(net.net.is_enabled(e, self.marked) for e in chosen):
-            raise ValueError("some event is not enabled")
-        threads = dict(self.threads)
-        moves = [pair for e in chosen for pair in net.redistribution[e]]
-        carried = [(after, threads.pop(before)) for before, after in moves]
-        threads.update(carried)
-        return ThreadedMarking(threads)

@@ -86,7 +86,7 @@ class Supervisor:
         self.bundles = Bundles([*modes, *(stage.mode for stage in stages)], axes_of, limits)
         net = factory.net
         starts = [operation.start for operation in factory.operations]
-        self.threads = Threads(net.threaded, net.marking_of(start), starts)
+        self.threads = Threads(net.threaded, net.threads_of(start), starts)
         fired = [counts.get(number, 0) for number in range(len(net.threaded.transitions))]
         self.firings = Fired(fired, world.time)
         self.ahead, self.active = Ahead(factory, stages), Active()

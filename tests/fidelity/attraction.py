@@ -25,6 +25,7 @@ from factory.simulation.simulation import Simulation
 from factory.support.engine import mujoco
 from tests.fidelity.products import CAMPAIGN, layout
 from tests.tables import table
+from tests.token_game import enabled, follower
 
 KINDS = ("inside", "stop", "touching", "gate")
 
@@ -129,8 +130,8 @@ def marking_at(plan: Layout, number: int) -> Marking:
     events.remove(factory.operations[number].end)
     marking = net.initial_marking
     while events:
-        event = next(e for e in net.threaded.net.enabled(marking) if e in events)
-        marking = net.threaded.net.follower(marking, [event])
+        event = next(e for e in enabled(net.threaded.net, marking) if e in events)
+        marking = follower(net.threaded.net, marking, [event])
         events.remove(event)
     return marking
 
