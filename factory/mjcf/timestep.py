@@ -47,7 +47,7 @@ acceleration, and so much more of the load's share in what moves, with any times
 
 
 @dataclass(frozen=True, slots=True)
-class Axis:
+class DrivenAxis:
     """What a drive moves: its `own` mass and a `load` [kg], with an `acceleration` [m/s²] that
     changes by up to twice its amount, times `jump`, at once; `push` [m/s²] is what its force is
     for; its `stiffness` [rad/s] and the least `gain` that jitter draws for it; `snap`: an
@@ -109,7 +109,7 @@ def predicted_error(settings: Settings, layout: Layout, jitter: float = 0.0) -> 
     return max(axis.error(settings) for axis in _axes(settings, layout, jitter))
 
 
-def _good(settings: Settings, axes: Sequence[Axis]) -> bool:
+def _good(settings: Settings, axes: Sequence[DrivenAxis]) -> bool:
     """Whether no error is beyond what is allowed, nor does friction keep any axis out of half its
     goal ball, but for one that it keeps out with the usual timestep as well."""
     usual = replace(settings, timestep=TICK / USUAL, substeps=USUAL)
@@ -120,7 +120,7 @@ def _good(settings: Settings, axes: Sequence[Axis]) -> bool:
     )
 
 
-def _axes(settings: Settings, layout: Layout, jitter: float) -> Iterator[Axis]:
+def _axes(settings: Settings, layout: Layout, jitter: float) -> Iterator[DrivenAxis]:
     """Every robot, lift and the tray with the heaviest that it carries; those that are alike
     once."""
     factory, solids, a = layout.factory, layout.product.solids, settings.acceleration
@@ -129,11 +129,11 @@ def _axes(settings: Settings, layout: Layout, jitter: float) -> Iterator[Axis]:
         inputs = [masses[label] for label in operation.inputs]
         masses[operation.label] = sum(inputs) if inputs else solids[operation.label].mass
     for load in sorted({heaviest(factory, robot, masses) for robot in factory.robots}):
-        yield Axis(CARRIAGE_MASS, load, a, a, STIFFNESS, 1 - jitter)
+        yield DrivenAxis(CARRIAGE_MASS, load, a, a, STIFFNESS, 1 - jitter)
     for load in sorted({masses[factory.delivered(robot)] for robot in factory.strokes}):
-        yield Axis(HOIST_MASS, load, a, a + GRAVITY, HOIST_STIFFNESS, 1 - jitter)
+        yield DrivenAxis(HOIST_MASS, load, a, a + GRAVITY, HOIST_STIFFNESS, 1 - jitter)
     fast = settings.outfeed_acceleration
     reverses = layout.outfeed_way * fast < 1.2 * settings.outfeed**2
     product = masses[factory.pag.root]
     snap = fast * (SNAP[0] + SNAP[1] * product / (product + TRAY_MASS))
-    yield Axis(TRAY_MASS, product, fast, fast, STIFFNESS, 1.0, 1.0 if reverses else 0.7, snap)
+    yield DrivenAxis(TRAY_MASS, product, fast, fast, STIFFNESS, 1.0, 1.0 if reverses else 0.7, snap)
