@@ -64,9 +64,14 @@ class Neighbours:
         self._seen = np.zeros_like(moves)
         self._include(moves.nonzero()[0].tolist())
 
+    @property
+    def complete(self) -> bool:
+        """Whether everything is looked at."""
+        return bool(self._seen.all())
+
     def astray(self) -> bool:
         """Whether a holder is off its way, and something is left out that it may meet there."""
-        if self._seen.all():
+        if self.complete:
             return False
         x, (low, high) = self._d.qpos[self._address], self._ways
         return bool(((x < low) | (x > high)).any())
@@ -87,7 +92,7 @@ class Neighbours:
     def everything(self) -> None:
         """Look at everything for a while, and until other modes begin."""
         self._calm = self._d.time + CALM
-        if not self._seen.all():
+        if not self.complete:
             self._seen[:] = True
             self._masks.look(self._seen)
 

@@ -54,6 +54,7 @@ class Strides(SingleSteps):
         self._neighbours.notice()
         if d.ncon or self.hooks.before_step:
             self._neighbours.everything()
+        if d.ncon or self.hooks.before_step or (steps == 1 and self._neighbours.complete):
             super().advance(steps)
             return
         mujoco.mj_copyData(self._before, self.m, d)
