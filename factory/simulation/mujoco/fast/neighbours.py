@@ -2,9 +2,10 @@
 
 The engine boxes every body that can collide in every step. Most of a factory rests, far from what
 moves. A holder (a robot, a feeder, the tray) sweeps one box with all that it ever holds, seen from
-above; those whose boxes are apart never meet. So the broad phase looks at what moves and its
-neighbours. No pair that could touch is left out: a run is the same to the last bit. Once anything
-touches, everything is looked at until other modes begin.
+above; those whose boxes are apart never meet. So the broad phase looks at what is awake and its
+neighbours. No pair that could touch is left out: a run is the same to the last bit. Where anything
+touches, is pushed or leaves its way, everything is looked at, until other modes begin after some
+time in which nothing does.
 """
 
 from __future__ import annotations
@@ -24,6 +25,12 @@ MARGIN = 5e-3
 """Nothing is further from its way than this, or from its place in the hand, unless it is touched
 [m]."""
 
+ASTRAY = 2e-3
+"""A holder has left its way when it is further than this beyond an end [m]."""
+
+CALM = 0.1
+"""What has been touched or pushed is back in its place in the hand so long after that [s]."""
+
 FEW = 120
 """Where there are fewer holders all bodies are looked at: choosing takes as long as it saves."""
 
@@ -33,25 +40,41 @@ class Neighbours:
     left out."""
 
     def __init__(self, m: mujoco.MjModel, d: mujoco.MjData, parts: Parts, axes: Axes) -> None:
-        self._masks, self._holder = parts.masks, _holders(parts, axes)
+        self._d, self._masks, self._holder = d, parts.masks, _holders(parts, axes)
         trees = dict(zip(axes.tree.tolist(), self._holder.tolist(), strict=True))
-        self._count = parts.masks.own(trees, parts.tray + len(parts.feeders.welds)) + 1
-        self.culls = self._count > FEW
-        self._seen, self._before = np.ones(self._count, bool), np.zeros(self._count, bool)
+        count = parts.masks.own(trees, parts.tray + len(parts.feeders.welds)) + 1
+        self.culls, self._calm = count > FEW, -np.inf
+        self._seen = np.ones(count, bool)
         self._met: dict[int, Truth] = {}
         if self.culls:
             mujoco.mj_kinematics(m, d)
-            self._low, self._high = _swept(m, d, parts, axes, self._holder, self._count)
+            self._box = _swept(m, d, parts, axes, self._holder, count)
+            self._bodies = _of_trees(m, parts.masks.code)
+            slides, lengths = _slides(parts, axes)
+            self._address, self._ways = axes.qpos[slides], (-ASTRAY, lengths + ASTRAY)
 
     def turn(self, active: Index) -> None:
-        """These axes move from now on; what has moved until now comes to rest."""
-        if not self.culls:
+        """These axes move from now on; what is awake may move, too."""
+        if not self.culls or self._d.time < self._calm:
             return
-        before = self._before
-        moves = np.zeros(self._count, bool)
+        moves = np.zeros_like(self._seen)
+        moves[self._masks.code[self._bodies[self._d.tree_asleep < 0]]] = True
         moves[self._holder[active]] = True
-        self._seen, self._before = np.zeros(self._count, bool), moves
-        self._include((moves | before).nonzero()[0].tolist())
+        moves[NOBODY] = False
+        self._seen = np.zeros_like(moves)
+        self._include(moves.nonzero()[0].tolist())
+
+    @property
+    def complete(self) -> bool:
+        """Whether everything is looked at."""
+        return bool(self._seen.all())
+
+    def astray(self) -> bool:
+        """Whether a holder is off its way, and something is left out that it may meet there."""
+        if self.complete:
+            return False
+        x, (low, high) = self._d.qpos[self._address], self._ways
+        return bool(((x < low) | (x > high)).any())
 
     def notice(self) -> None:
         """Look at holders that have been given something, too."""
@@ -67,8 +90,9 @@ class Neighbours:
         self._masks.look(self._seen)
 
     def everything(self) -> None:
-        """Look at everything until other modes begin."""
-        if not self._seen.all():
+        """Look at everything for a while, and until other modes begin."""
+        self._calm = self._d.time + CALM
+        if not self.complete:
             self._seen[:] = True
             self._masks.look(self._seen)
 
@@ -76,8 +100,8 @@ class Neighbours:
         """The holders whose boxes come near that of one."""
         found = self._met.get(holder)
         if found is None:
-            low, high = self._low[holder], self._high[holder]
-            found = ((self._low <= high) & (self._high >= low)).all(axis=1)
+            low, high = self._box
+            found = ((low <= high[holder]) & (high >= low[holder])).all(axis=1)
             found[holder] = True
             self._met[holder] = found
         return found
@@ -87,6 +111,22 @@ def _holders(parts: Parts, axes: Axes) -> Index:
     """The code of the holder that each axis (axes,) is of."""
     robots = len(parts.model.factory.robots)
     return np.array([*range(1, robots + 1), *(robot + 1 for robot in axes.lift), parts.tray])
+
+
+def _slides(parts: Parts, axes: Axes) -> tuple[Index, Array]:
+    """The axes along which holders go, and the lengths of their ways [m]."""
+    layout = parts.model.layout
+    lengths = [path.length for path in layout.guidepaths]
+    return np.r_[: len(lengths), axes.tray], np.array([*lengths, layout.outfeed_way])
+
+
+def _of_trees(m: mujoco.MjModel, code: Index) -> Index:
+    """For each kinematic tree a body that tells its holder."""
+    found = np.zeros(m.ntree, np.intp)
+    for bodies in (np.arange(m.nbody), np.flatnonzero(code != NOBODY)):
+        moving = bodies[m.body_treeid[bodies] >= 0]
+        found[m.body_treeid[moving]] = moving
+    return found
 
 
 def _swept(
@@ -105,11 +145,9 @@ def _swept(
     least, most = np.full((count, 2), np.inf), np.full((count, 2), -np.inf)
     np.minimum.at(least, code, place + low[which])
     np.maximum.at(most, code, place + high[which])
-    layout = parts.model.layout
-    lengths = [path.length for path in layout.guidepaths]
-    slides = np.r_[: len(lengths), axes.tray]
+    slides, lengths = _slides(parts, axes)
     at, way = d.qpos[axes.qpos[slides]], d.xaxis[m.body_jntadr[axes.body[slides]], :2]
-    ends = np.array([-at, [*lengths, layout.outfeed_way] - at])[:, :, None] * way
+    ends = np.array([-at, lengths - at])[:, :, None] * way
     least[holder[slides]] += ends.min(axis=0)
     most[holder[slides]] += ends.max(axis=0)
     return least - MARGIN, most + MARGIN

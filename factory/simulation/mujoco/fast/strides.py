@@ -3,7 +3,8 @@ looks at what can meet.
 
 Steady production repeats itself to the last bit, so after some cycles every course has been planned
 before. A call of many steps goes back to where it began if anything touched in it, and is taken
-again step by step, since contacts are inspected in every step.
+again step by step, since contacts are inspected in every step; so it does if a robot has left its
+way, where it might touch something that was left out.
 """
 
 from __future__ import annotations
@@ -48,18 +49,18 @@ class Strides(SingleSteps):
         self._neighbours.turn(active)
 
     def advance(self, steps: int) -> None:
-        """Some timesteps: at once, and one by one where anything touches."""
+        """Some timesteps: at once, and one by one where anything touches or leaves its way."""
         d = self.d
         self._neighbours.notice()
         if d.ncon or self.hooks.before_step:
             self._neighbours.everything()
-        if d.ncon or self.hooks.before_step or steps == 1:
+        if d.ncon or self.hooks.before_step or (steps == 1 and self._neighbours.complete):
             super().advance(steps)
             return
         mujoco.mj_copyData(self._before, self.m, d)
         d.maxuse_con = 0
         self.step(steps)
-        if d.maxuse_con:
+        if d.maxuse_con or self._neighbours.astray():
             mujoco.mj_copyData(d, self.m, self._before)
             self._neighbours.everything()
             super().advance(steps)

@@ -1,0 +1,175 @@
+"""Factories, runs and states for the tests of simulations."""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from functools import cache
+from typing import Any
+
+import numpy as np
+
+import factory
+from factory.compiler.compiler import compile_pag
+from factory.compiler.mating import matings
+from factory.geometry.product import product_geometry
+from factory.lang import read_pag
+from factory.layout.layout import Layout
+from factory.nets.petri import Marking
+from factory.pipeline import all_templates
+from factory.problem.robot_types import load_catalogue
+from factory.simulation.mujoco.stepping import SingleSteps
+from factory.simulation.request import RunRequest
+from factory.simulation.run import Run
+from factory.simulation.simulation import Simulation
+from factory.support.engine import mujoco
+from factory.support.settings import Settings
+from tests.bench.factories import balanced
+from tests.bench.factories import laid_out as floor_of
+from tests.command_line import ROOT
+
+PAPER = """6 parts; root = sub3; sub3 = mate ( sub2, part3 ); sub2 = weld ( sub1 );
+sub1 = mate ( part1, part2 ); part1 = atomic(); part2 = atomic(); part3 = atomic()"""
+UNARY = """root = c; c = glue(b, dwell = 0.1); b = weld(a, dwell = 0.2);
+a = press(p, dwell = 0.1); p = atomic()"""
+KARY = """root = s; s = mate(a, b, c, t, dd); t = mate(e, f); dd = inspect(d, dwell = 0.2);
+a = atomic(); b = atomic(); c = atomic(); d = atomic(); e = atomic(); f = atomic()"""
+CHAIN = """root = s4; s4 = mate(s3, e); s3 = mate(d, s2); s2 = mate(s1, c); s1 = mate(a, b);
+a = atomic(); b = atomic(); c = atomic(); d = atomic(); e = atomic()"""
+OVERLAP = """root = s; s = mate(u, v);  u = mate(a, b); v = mate(c, d);
+a = atomic(box = (0.2, 0.02, 0.05)); b = atomic(box = (0.02, 0.2, 0.06), pos = (0, 0.13, 0));
+c = atomic(cylinder = (0.03, 0.06), pos = (0.2, 0.1, 0));
+d = atomic(sphere = 0.04, pos = (-0.1, 0.1, 0.01))"""
+LONE = "root = p; p = atomic()"
+
+PRODUCTS = {
+    "paper": PAPER,
+    "unary": UNARY,
+    "kary": KARY,
+    "chain": CHAIN,
+    "overlap": OVERLAP,
+    "lone": LONE,
+}
+
+FENCE = """root = cup; cup = mate(bowl, ball, lid); bowl = mate(floor, wall1, wall2, wall3, wall4);
+floor = atomic(box = (0.1, 0.1, 0.01), pos = (0, 0, 0.005));
+wall1 = atomic(box = (0.01, 0.1, 0.03), pos = (0.045, 0, 0.0252));
+wall2 = atomic(box = (0.01, 0.1, 0.03), pos = (-0.045, 0, 0.0252));
+wall3 = atomic(box = (0.0796, 0.01, 0.03), pos = (0, 0.045, 0.0252));
+wall4 = atomic(box = (0.0796, 0.01, 0.03), pos = (0, -0.045, 0.0252));
+ball = atomic(sphere = 0.012, pos = (0, 0, 0.0224));
+lid = atomic(box = (0.1, 0.1, 0.005), pos = (0, 0, 0.0429))"""
+"""A ball that can only be lowered into its box; walls 3 and 4 come along x and fit between the
+others, so they are lowered too."""
+
+
+@cache
+def laid_out(text: str) -> Layout:
+    """The factory of a PAG's text on its floor; nothing is lowered."""
+    templates = all_templates()
+    return factory.lay_out(compile_pag(read_pag(text, templates), templates, load_catalogue()))
+
+
+@cache
+def laid_out_with_lifts(text: str) -> Layout:
+    """The factory of a PAG's text on its floor, with lifts for what must be lowered."""
+    templates = all_templates()
+    pag = read_pag(text, templates)
+    product = product_geometry(pag)
+    found = matings(pag, templates, product).approaches
+    made = compile_pag(pag, templates, load_catalogue(), found)
+    return factory.lay_out(made)
+
+
+@cache
+def layout_of(name: str) -> Layout:
+    """The factory of an example, of a balanced product of so many parts, or the fence's, on its
+    floor."""
+    if name.isdigit():
+        return floor_of(balanced(int(name)))
+    if name == "fence":
+        return laid_out_with_lifts(FENCE)
+    file = ROOT / "examples" / f"{name}.pag"
+    return factory.lay_out(factory.compile(factory.load_pag(file)))
+
+
+FINE = Settings(timestep=0.002, substeps=5)
+"""Five timesteps a tick, whatever a factory would choose."""
+
+
+def ready(made: str | Layout, **given: Any) -> Simulation:
+    """A run of two units in MuJoCo, whose robots differ, ready to go: of a layout, or of a factory
+    by its name."""
+    asked: dict[str, Any] = {"units": 2, "seed": 3, "jitter": 0.3, "settings": FINE, **given}
+    return Simulation(layout_of(made) if isinstance(made, str) else made, RunRequest(**asked))
+
+
+def state(simulation: Simulation) -> bytes:
+    """Where everything is and how fast, to the last bit, and how many contacts there have been."""
+    world = simulation.physical
+    d, seen = world.d, len(world.inspection.unintended)
+    return d.qpos.tobytes() + d.qvel.tobytes() + bytes([d.ncon % 256, seen % 256])
+
+
+def states(simulation: Simulation, tick: Callable[[], object], ticks: int) -> list[bytes]:
+    """The state after each tick."""
+    return [(tick(), state(simulation))[1] for _ in range(ticks)]
+
+
+def gone_wild(simulation: Simulation, seed: int) -> Callable[[], None]:
+    """After a second some robots run wherever they like, and through what rests there; gives what
+    a tick is from then on."""
+    world, rng = simulation.physical, np.random.default_rng(seed)
+    for _ in range(100):
+        simulation.supervisor.step()
+    axes = rng.choice(world.motion.axes.tray, min(6, world.motion.axes.tray), replace=False)
+    at = world.motion.robots.x[axes]
+    world.move(axes, at, rng.uniform(-0.5, 0.5, len(axes)), np.zeros(len(axes)))
+    return lambda: world.advance(5)
+
+
+@contextmanager
+def stepping(step: Callable[..., object]) -> Iterator[None]:
+    """The engine is stepped by this function (m, d, steps) meanwhile."""
+    own = SingleSteps.step
+
+    def instead(self: SingleSteps, steps: int) -> None:
+        step(self.m, self.d, steps)
+
+    SingleSteps.step = instead  # type: ignore[method-assign]
+    try:
+        yield
+    finally:
+        SingleSteps.step = own  # type: ignore[method-assign]
+
+
+def read_by(simulation: Simulation, axes: Any) -> np.ndarray:
+    """What the drives of axes read now (axes, 3): position [m], speed [m/s], force [N]."""
+    world = simulation.physical
+    m, d = world.m, world.d
+    actuators, read = world.motion.axes.actuator[axes], np.zeros((3, 1))
+    return np.array([mujoco.mj_readCtrl(m, d, int(n), d.time, read, -1) for n in actuators])
+
+
+def random_marking(layout: Layout, seed: int) -> Marking:
+    """A legal marking: the token game played at random for a while."""
+    net, draw = layout.factory.net, random.Random(seed)
+    marking = net.initial_marking
+    for _ in range(draw.randrange(1, 60)):
+        event = draw.choice(net.threaded.net.enabled(marking))
+        marking = net.threaded.net.follower(marking, [event])
+    return marking
+
+
+def assert_good(run: Run) -> None:
+    """The figures that every MuJoCo run must reach."""
+    assert run.trouble is None
+    assert run.refines_net
+    physics = run.physics
+    assert physics is not None
+    assert physics.handoff_gap_max_mm <= 1.0
+    assert physics.product_error_max_mm is not None
+    assert physics.product_error_max_mm <= 0.1
+    assert physics.unintended_contacts == 0, physics.contacts
+    assert physics.engine_warnings == 0
