@@ -12,7 +12,7 @@ import numpy as np
 
 import factory
 from factory.compiler.compiler import compile_pag
-from factory.compiler.mating import matings
+from factory.compiler.mating.mating import matings
 from factory.geometry.product import product_geometry
 from factory.lang import read_pag
 from factory.layout.layout import Layout

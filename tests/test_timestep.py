@@ -12,25 +12,26 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pytest
-from factory.assets import mjcf_folder
-from factory.errors import InputError
-from factory.fidelity.quantities import QUANTITIES
-from factory.layout.plan import Layout
-from factory.pag import PAG, Parameter
-from factory.planning import Ground
-from factory.settings import AUTO, TICK, Settings
 from hypothesis import given
 from hypothesis import strategies as st
-from layout_values import STYLES, shaped
-from pag_values import SHAPES, random_pag
 
 import factory
-from factory.geometry import product_geometry
+from factory.geometry.product import product_geometry
+from factory.layout.layout import Layout
+from factory.layout.request import Ground
 from factory.mjcf import timestep
 from factory.mjcf.timestep import ALLOWED, FRICTION, STEPS, USUAL, predicted_error, timed
-from factory.simulation import Simulation, physical_model
+from factory.problem.pag import PAG, Parameter
+from factory.simulation.request import RunRequest
+from factory.simulation.simulation import Simulation, physical_model
+from factory.study.fidelity.quantities import QUANTITIES
+from factory.support.errors import InputError
+from factory.support.resources import mjcf_folder
+from factory.support.settings import AUTO, TICK, Settings
 from tests.command_line import PAPER, Terminal
-from tests.test_fuse import layout_of
+from tests.layout_values import STYLES, shaped
+from tests.pag_values import SHAPES, random_pag
+from tests.simulation_values import layout_of
 
 layout = cache(layout_of)
 
@@ -203,10 +204,10 @@ def test_it_is_the_longest_that_is_good(
 @pytest.mark.parametrize("name", ["paper", "truck", "gearbox", "chest"])
 @pytest.mark.parametrize("seed", [0, 1])
 def test_products_keep_half_their_limits(name: str, seed: int) -> None:
-    simulation = Simulation(layout(name), units=2, seed=seed, jitter=0.3)
+    simulation = Simulation(layout(name), RunRequest(units=2, seed=seed, jitter=0.3))
     found = measured(simulation)
-    assert simulation.settings.timestep == TICK
-    error = 1e3 * predicted_error(simulation.settings, layout(name), 0.3)
+    assert simulation.request.settings.timestep == TICK
+    error = 1e3 * predicted_error(simulation.request.settings, layout(name), 0.3)
     assert max(found.values()) < error < 1e3 * ALLOWED
 
 
@@ -226,8 +227,10 @@ def outcomes(seeds: range = SEEDS) -> list[tuple[float, float, float]]:
         made = timed(settings, floor, jitter=jitter)
         error = predicted_error(made, floor, jitter)
         if error < ALLOWED:
-            simulation = Simulation(floor, units=2, seed=seed, jitter=jitter, settings=settings)
-            assert simulation.settings == made
+            simulation = Simulation(
+                floor, RunRequest(units=2, seed=seed, jitter=jitter, settings=settings)
+            )
+            assert simulation.request.settings == made
             found.append((made.step, 1e3 * error, max(measured(simulation).values())))
     return found
 
@@ -314,8 +317,10 @@ def test_a_sweep_may_vary_it(run: Terminal, tmp_path: Path) -> None:
 @pytest.mark.parametrize("seed", range(3))
 def test_robots_that_run_their_programs_by_themselves_do_so_with_it(seed: int) -> None:
     """Their control periods stay 6 to 20 ms, in whole timesteps."""
-    simulation = Simulation(layout("paper"), units=4, seed=seed, jitter=0.3, distributed=True)
+    simulation = Simulation(
+        layout("paper"), RunRequest(units=4, seed=seed, jitter=0.3, distributed=True)
+    )
     periods = [process.period for process in simulation.supervisor.processes]
-    assert simulation.settings.timestep == TICK
+    assert simulation.request.settings.timestep == TICK
     assert {*periods} <= {1, 2}
     assert max(measured(simulation).values()) < 1e3 * ALLOWED
