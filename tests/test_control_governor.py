@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from factory.control.governor import follow, govern
 from factory.control.mode import Array, Limits, Mode
 from factory.control.navigation import Bundle
-from factory.control.profile import landing_speed, trapezoid_time
+from factory.control.profile import SpeedProfile, landing_speed
 
 EPS = 2e-4
 TICKS = st.floats(1e-3, 20e-3)
@@ -40,7 +40,8 @@ def test_lands_at_rest_without_overshoot_in_the_trapezoid_time(dt: float, seed: 
     speed, acceleration = rng.uniform(0.05, 3.0, count), rng.uniform(0.2, 20.0, count)
     distance = np.minimum(10 ** rng.uniform(-3.0, np.log10(5.0), count), 15.0 * speed)
     bundle = couriers(distance, speed, acceleration)
-    ideal = trapezoid_time(distance, speed, acceleration)
+    each = zip(distance.tolist(), speed.tolist(), acceleration.tolist(), strict=True)
+    ideal = np.array([SpeedProfile(v, a).rest(way) for way, v, a in each])
     xs, vs, accelerations = run(bundle, distance - bundle.goal, dt, ideal.max())
     left = np.abs(bundle.goal - xs)
     assert (np.diff(left, axis=0) <= noise).all()

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from factory.control.governor import follow
 from factory.control.mode import Array, Limits, Mode
 from factory.control.navigation import Bundle
-from factory.control.profile import ideal_time, mode_time, staged_time, trapezoid_time, travelled
+from factory.control.profile import SpeedProfile, mode_time
 
 R, EPS = 0.06, 2e-4
 
@@ -66,12 +66,9 @@ def test_mode_time_is_that_of_the_integrated_mode(world: str, dt: float) -> None
 
 
 def test_known_times() -> None:
-    assert trapezoid_time(2.0, 1.0, 1.0) == 3.0
-    assert trapezoid_time(0.25, 1.0, 1.0) == 1.0
-    assert ideal_time(2.0, 1.0, 1.0) == 2.5
-    assert ideal_time(0.125, 1.0, 1.0) == 0.5
-    assert trapezoid_time(0.0, 1.0, 1.0) == 0.0
-    assert trapezoid_time(np.array([2.0, 0.25]), 1.0, 1.0).tolist() == [3.0, 1.0]
+    profile = SpeedProfile(1.0, 1.0)
+    assert [profile.rest(distance) for distance in (2.0, 0.25, 0.0)] == [3.0, 1.0, 0.0]
+    assert [profile.landing(distance) for distance in (2.0, 0.125, 0.0)] == [2.5, 0.5, 0.0]
 
 
 @settings(max_examples=200, deadline=None)
@@ -82,24 +79,25 @@ def test_known_times() -> None:
 def test_staged_time_lies_between_going_through_and_stopping(
     distance: float, share: float, opens: float, v: float, a: float
 ) -> None:
-    standoff = share * distance
-    direct = trapezoid_time(distance, v, a)
-    found = staged_time(distance, standoff, opens, v, a)
-    stopped = np.maximum(opens, trapezoid_time(distance - standoff, v, a))
-    assert direct - 1e-6 <= found <= stopped + trapezoid_time(standoff, v, a) + 1e-6
-    assert staged_time(distance, standoff, 0.0, v, a) == pytest.approx(float(direct))
+    standoff, profile = share * distance, SpeedProfile(v, a)
+    direct = profile.rest(distance)
+    found = profile.staged(distance, standoff, opens)
+    stopped = max(opens, profile.rest(distance - standoff))
+    assert direct - 1e-6 <= found <= stopped + profile.rest(standoff) + 1e-6
+    assert profile.staged(distance, standoff, 0.0) == pytest.approx(direct)
     late = 1e3
-    expected = late + float(trapezoid_time(standoff, v, a))
-    assert staged_time(distance, standoff, late, v, a) == pytest.approx(expected, abs=1e-3)
+    expected = late + profile.rest(standoff)
+    assert profile.staged(distance, standoff, late) == pytest.approx(expected, abs=1e-3)
 
 
 @settings(max_examples=100, deadline=None)
 @given(st.floats(0.001, 5.0), st.floats(0.05, 2.0), st.floats(0.2, 9.0), st.floats(0.0, 1.0))
-def test_travelled_ends_at_the_distance_at_rest(d: float, v: float, a: float, part: float) -> None:
-    total = trapezoid_time(d, v, a)
-    way, speed = travelled(d, v, a, 0.0, total)
+def test_a_way_ends_at_the_distance_at_rest(d: float, v: float, a: float, part: float) -> None:
+    profile = SpeedProfile(v, a)
+    total = profile.rest(d)
+    way, speed = profile.gone(d, total)
     assert way == pytest.approx(d) and speed == pytest.approx(0.0, abs=1e-9)
-    half, speed = travelled(d, v, a, 0.0, part * total)
+    half, speed = profile.gone(d, part * total)
     assert -1e-12 <= half <= d + 1e-9 and speed <= v + 1e-12
 
 

@@ -6,13 +6,14 @@ the ideal world it has its speed at once and only brakes.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from math import sqrt
 from typing import Literal
 
 import numpy as np
 
 from factory.control.mode import Array, Limits, Mode
 
-Reals = float | Array
 World = Literal["ideal", "mujoco"]
 
 
@@ -32,50 +33,58 @@ def landing_speed(distance: Array, acceleration: Array, dt: float) -> Array:
     return w
 
 
-def travel_time(distance: Reals, v: Reals, a: Reals, start: Reals) -> Array:
-    """The least time [s] to come to rest `distance` [m] ahead from the speed `start` [m/s]."""
-    return np.asarray(sum(_phases(distance, v, a, start)[:3]))
+@dataclass(frozen=True, slots=True)
+class SpeedProfile:
+    """The trapezoids of a robot with a speed [m/s] and an acceleration limit [m/s²]."""
 
+    speed: float = 0.5
+    acceleration: float = 2.0
 
-def trapezoid_time(distance: Reals, v: Reals, a: Reals) -> Array:
-    """The least time [s] from rest to rest over `distance` [m]."""
-    return travel_time(distance, v, a, 0.0)
+    def rest(self, distance: float, start: float = 0.0) -> float:
+        """The least time [s] to come to rest `distance` [m] ahead from the speed `start` [m/s]."""
+        a, peak = self.acceleration, self._peak(distance, start)
+        if not peak:
+            return 0.0
+        cruise = max(distance - (2 * peak * peak - start * start) / (2 * a), 0.0)
+        return (2 * peak - start) / a + cruise / peak
 
+    def landing(self, distance: float) -> float:
+        """The least time [s] to come to rest `distance` [m] ahead, from whatever speed: that of a
+        robot in the ideal world, which has no ramp at the start."""
+        return self.rest(distance, self.braking(distance))
 
-def ideal_time(distance: Reals, v: Reals, a: Reals) -> Array:
-    """The time [s] to rest over `distance` [m] where ẋ = F exactly: no ramp at the start."""
-    return travel_time(distance, v, a, _instant(distance, v, a))
+    def braking(self, distance: float) -> float:
+        """The greatest speed [m/s] from which a robot comes to rest in `distance` [m]."""
+        return min(self.speed, sqrt(2.0 * self.acceleration * distance))
 
+    def staged(
+        self, distance: float, standoff: float, opens: float, instant: bool = False
+    ) -> float:
+        """The time [s] at which a gated robot rests at its goal, `distance` [m] ahead, if its gate
+        opens at `opens` [s]: it makes for its standoff, and goes on from where it then is, moving
+        or not. `instant`: it has any speed at once."""
+        stage = max(distance - standoff, 0.0)
+        way, speed = self.gone(stage, opens, self.braking(stage) if instant else 0.0)
+        left = max(distance - way, 0.0)
+        return opens + self.rest(left, self.braking(left) if instant else speed)
 
-def travelled(
-    distance: Reals, v: Reals, a: Reals, start: Reals, time: Reals
-) -> tuple[Array, Array]:
-    """How far [m] a robot has come after `time` [s] of its way over `distance`, and its speed."""
-    gaining, cruising, braking, peak = _phases(distance, v, a, start)
-    left = np.maximum(time, 0.0)
-    g = np.minimum(left, gaining)
-    c = np.clip(left - gaining, 0.0, cruising)
-    b = np.clip(left - gaining - cruising, 0.0, braking)
-    way = g * (start + a * g / 2) + peak * c + b * (peak - a * b / 2)
-    return np.asarray(way), np.asarray(start + a * g - a * b)
+    def gone(self, distance: float, time: float, start: float = 0.0) -> tuple[float, float]:
+        """How far [m] a robot has come after `time` [s] of its way over `distance`, and its
+        speed."""
+        a, peak = self.acceleration, self._peak(distance, start)
+        left, gaining = self.rest(distance, start) - time, (peak - start) / a
+        if left <= 0:
+            return distance, 0.0
+        if time < gaining:
+            return start * time + a * time * time / 2, start + a * time
+        if left < peak / a:
+            return distance - a * left * left / 2, a * left
+        return peak * (time - gaining / 2) + start * gaining / 2, peak
 
-
-def staged_time(
-    distance: Reals,
-    standoff: Reals,
-    opens: Reals,
-    v: Reals,
-    a: Reals,
-    world: World = "mujoco",
-) -> Array:
-    """The time [s] at which a gated robot rests at its goal, `distance` [m] ahead, if its gate
-    opens at `opens` [s]: it makes for its standoff, and goes on from where it then is, moving or
-    not."""
-    stage = np.maximum(np.asarray(distance) - standoff, 0.0)
-    instant = world == "ideal"
-    way, speed = travelled(stage, v, a, _instant(stage, v, a) if instant else 0.0, opens)
-    rest = np.maximum(distance - way, 0.0)
-    return opens + travel_time(rest, v, a, _instant(rest, v, a) if instant else speed)
+    def _peak(self, distance: float, start: float) -> float:
+        """The greatest speed on the way."""
+        v, a = self.speed, self.acceleration
+        return max(min(v, sqrt(a * distance + start * start / 2)), start)
 
 
 def mode_time(mode: Mode, x0: Array, limits: Limits, world: World = "mujoco") -> float:
@@ -87,27 +96,12 @@ def mode_time(mode: Mode, x0: Array, limits: Limits, world: World = "mujoco") ->
     """
     if mode.is_still:
         return mode.dwell
-    distance = np.abs(x0 - mode.goals)
-    tail = ideal_time(mode.eps, limits.speed, limits.acceleration)
-    rested, entered = np.zeros(mode.size), np.zeros(mode.size)
+    distance, instant = np.abs(x0 - mode.goals).tolist(), world == "ideal"
+    rested, entered = [0.0] * mode.size, [0.0] * mode.size
     for i in mode.order:
-        v, a, gate = limits.speed[i], limits.acceleration[i], mode.gate[i]
-        opens = entered[gate] if gate >= 0 else 0.0
-        standoff = mode.standoff[i] if gate >= 0 else 0.0
-        rested[i] = staged_time(distance[i], standoff, opens, v, a, world)
-        entered[i] = max(rested[i] - tail[i], 0.0)
-    return float(np.max(entered if world == "ideal" else rested)) + mode.dwell
-
-
-def _instant(distance: Reals, v: Reals, a: Reals) -> Array:
-    """The speed of the ideal world: at once as fast as the limit or the braking profile allows."""
-    return np.asarray(np.minimum(v, np.sqrt(2.0 * a * np.asarray(distance))))
-
-
-def _phases(distance: Reals, v: Reals, a: Reals, start: Reals) -> tuple[Array, Array, Array, Array]:
-    """The times spent gaining speed, cruising and braking, and the peak speed."""
-    distance, v, a, start = np.broadcast_arrays(distance, v, a, start)
-    peak = np.maximum(np.minimum(v, np.sqrt(a * distance + start**2 / 2)), start)
-    cruise = np.maximum(distance - (2 * peak**2 - start**2) / (2 * a), 0.0)
-    time = np.divide(cruise, peak, out=np.zeros_like(peak), where=peak > 0)
-    return (peak - start) / a, time, peak / a, peak
+        profile = SpeedProfile(float(limits.speed[i]), float(limits.acceleration[i]))
+        gate = mode.gate[i]
+        opens, standoff = (entered[gate], float(mode.standoff[i])) if gate >= 0 else (0.0, 0.0)
+        rested[i] = profile.staged(distance[i], standoff, opens, instant)
+        entered[i] = max(rested[i] - profile.landing(mode.eps), 0.0)
+    return max(entered if instant else rested) + mode.dwell

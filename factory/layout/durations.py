@@ -1,6 +1,6 @@
 """How long robots take, from lengths alone: what the layout is optimised by.
 
-A robot goes from rest to rest along a trapezoid of speed. `timing/prediction.py` predicts the run
+`timing/prediction.py` predicts the run
 itself, from the modes; the tests hold the two together.
 """
 
@@ -9,6 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from math import sqrt
 
+from factory.control.profile import SpeedProfile
 from factory.layout.layout import Layout
 from factory.plant.factory import Operation
 from factory.problem.pag import NOPART
@@ -16,13 +17,11 @@ from factory.support.settings import Settings
 
 
 @dataclass(frozen=True, slots=True)
-class Pace:
+class Pace(SpeedProfile):
     """Speed [m/s] and acceleration [m/s²] of the robots, radius eps of a goal ball [m], and the
     time [s] lost between two operations; `ahead`: that lost on the way of a robot that goes ahead
     while it waits (`modes/staging.py`), None where none does."""
 
-    speed: float = 0.5
-    acceleration: float = 2.0
     eps: float = 2e-4
     lost: float = 0.01
     ahead: float | None = None
@@ -37,45 +36,9 @@ class Pace:
         """Whether the robot in a slot need not go its way within an operation."""
         return self.ahead is not None and operation.awaits_empty(slot)
 
-    def rest(self, distance: float, start: float = 0.0) -> float:
-        """The least time [s] to come to rest `distance` [m] ahead from the speed `start`."""
-        v, a = self.speed, self.acceleration
-        peak = max(min(v, sqrt(a * distance + start * start / 2)), start)
-        if not peak:
-            return 0.0
-        cruise = max(distance - (2 * peak * peak - start * start) / (2 * a), 0.0)
-        return (2 * peak - start) / a + cruise / peak
-
-    def landing(self, distance: float) -> float:
-        """The least time [s] to come to rest `distance` [m] ahead, from whatever speed."""
-        return self.rest(distance, min(self.speed, sqrt(2 * self.acceleration * distance)))
-
-    def staged(self, distance: float, standoff: float, opens: float) -> float:
-        """The time [s] at which a robot rests `distance` [m] ahead that may go beyond its standoff
-        when its gate `opens` [s] and not before."""
-        stage = max(distance - standoff, 0.0)
-        way, speed = self._gone(stage, opens)
-        return opens + self.rest(max(distance - way, 0.0), speed)
-
     def entered(self, rested: float) -> float:
         """When a robot enters its goal ball that comes to rest at `rested` [s]."""
         return max(rested - sqrt(2 * self.eps / self.acceleration), 0.0)
-
-    def _gone(self, distance: float, time: float) -> tuple[float, float]:
-        """How far [m] and how fast a robot is after a time on its way from rest to rest."""
-        v, a = self.speed, self.acceleration
-        peak = min(v, sqrt(a * distance))
-        if not peak:
-            return 0.0, 0.0
-        left = self.rest(distance) - time
-        if left <= 0:
-            return distance, 0.0
-        ramp = peak / a
-        if time < ramp:
-            return a * time * time / 2, a * time
-        if left < ramp:
-            return distance - a * left * left / 2, a * left
-        return peak * (time - ramp / 2), peak
 
 
 def gear_times(layout: Layout, pace: Pace) -> list[float]:

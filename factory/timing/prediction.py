@@ -13,7 +13,7 @@ from types import MappingProxyType
 import numpy as np
 
 from factory.control.mode import Limits, Mode
-from factory.control.profile import World, mode_time, trapezoid_time
+from factory.control.profile import SpeedProfile, World, mode_time
 from factory.layout.layout import Layout
 from factory.modes.modes import operation_starts
 from factory.modes.staging import HeadStart, staged
@@ -82,8 +82,9 @@ def predict(
     factory = layout.factory
     found = [cycle_time(factory, delays, ways)]
     if world == "mujoco":
-        way = trapezoid_time(layout.outfeed_way, settings.outfeed, settings.outfeed_acceleration)
-        found.append(CycleTime(delays[-1] + 2 * (float(way) + settings.tick), "outfeed"))
+        tray = SpeedProfile(settings.outfeed, settings.outfeed_acceleration)
+        away = 2 * (tray.rest(layout.outfeed_way) + settings.tick)
+        found.append(CycleTime(delays[-1] + away, "outfeed"))
     if wip is not None:
         most = min(wip, len(factory.robots))  # no more are inside without a bound
         bounded = with_wip(factory, most)

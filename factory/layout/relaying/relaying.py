@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import replace
 
+from factory.control.profile import SpeedProfile
 from factory.lang.template_reader import load_templates
 from factory.layout.clearance import certify
 from factory.layout.dimensions import Clearance
@@ -120,10 +121,10 @@ class _Search:
         does where that is longer."""
         pace, settings = Pace.of(self.settings), self.settings
         found = gear_times(layout, pace)
-        tray = Pace(settings.outfeed, settings.outfeed_acceleration).rest(layout.outfeed_way)
+        tray = SpeedProfile(settings.outfeed, settings.outfeed_acceleration)
         dropoff = layout.factory.dropoff.index
         way = layout.home(0, dropoff) - layout.goal(dropoff, 0)
-        outfeed = pace.rest(way) + pace.lost + 2 * (tray + settings.tick)
+        outfeed = pace.rest(way) + pace.lost + 2 * (tray.rest(layout.outfeed_way) + settings.tick)
         found[0] = max(found[0], outfeed)
         return found
 

@@ -10,7 +10,7 @@ from types import MappingProxyType
 import numpy as np
 
 from factory.control.mode import Array, Limits, Mode
-from factory.control.profile import World, ideal_time, mode_time, trapezoid_time
+from factory.control.profile import SpeedProfile, World, mode_time
 from factory.layout.layout import Layout
 from factory.modes.modes import operation_modes, operation_starts, robot_limits
 from factory.modes.staging import HeadStart, staged, stages_of
@@ -161,11 +161,12 @@ class Timing:
         """How long one robot moves in an operation, without stops on its way [s]."""
         mode = self.modes[number]
         axis = self.factory.axes[number][slot]
-        v, a = float(self.limits.speed[axis]), float(self.limits.acceleration[axis])
+        limits = self.limits
+        profile = SpeedProfile(float(limits.speed[axis]), float(limits.acceleration[axis]))
         way = 0.0 if mode.is_still else abs(float(self.left[number][slot] - mode.goals[slot]))
         if self.world == "mujoco":
-            return float(trapezoid_time(way, v, a))
-        return max(0.0, float(ideal_time(way, v, a) - ideal_time(mode.eps, v, a)))
+            return profile.rest(way)
+        return max(0.0, profile.landing(way) - profile.landing(mode.eps))
 
     @cached_property
     def outfeed(self) -> float:
@@ -179,8 +180,8 @@ class Timing:
         """How long a product takes from its dropoff until it counts [s]; 0 in the ideal world."""
         if self.world == "ideal":
             return 0.0
-        speed, gain = self.settings.outfeed, self.settings.outfeed_acceleration
-        return float(trapezoid_time(self.layout.outfeed_way, speed, gain)) + self.settings.tick
+        tray = SpeedProfile(self.settings.outfeed, self.settings.outfeed_acceleration)
+        return tray.rest(self.layout.outfeed_way) + self.settings.tick
 
     def _of(self, number: int) -> tuple[int, ...]:
         """The robot of each axis of an operation."""
