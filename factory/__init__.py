@@ -66,10 +66,9 @@ def load_pag(path: str | PathLike[str], templates: Sequence[Path] = ()) -> PAG:
 
 def compile(pag: PAG, templates: Sequence[Path] = ()) -> Factory:
     """The factory (R, ~, N) that makes a product (paper, section 5). Raises InputError."""
-    from factory.pipeline import Source, all_templates
-    from factory.problem.robot_types import load_catalogue
+    from factory.pipeline import Project, all_templates
 
-    return Source(pag, all_templates(templates), load_catalogue()).compile()
+    return Project(pag, all_templates(templates)).plain
 
 
 def verify(plan: Factory) -> Verdict:

@@ -1,12 +1,13 @@
-"""The first stages in a row, for the command line and the Python API: templates, PAG, factory."""
+"""The stages from a PAG to a laid-out factory, for the command line and the Python API."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from os import PathLike
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from factory.compiler.compiler import compile_pag
 from factory.compiler.mating.mating import Matings, matings, shaped
@@ -14,6 +15,7 @@ from factory.geometry.product import product_geometry
 from factory.geometry.solids import Product
 from factory.lang.pag_reader import load_pag
 from factory.lang.template_reader import load_templates
+from factory.layout.request import Ground
 from factory.plant.approaches import Approach
 from factory.plant.factory import Factory
 from factory.problem.pag import PAG
@@ -21,22 +23,45 @@ from factory.problem.robot_types import Catalogue, load_catalogue
 from factory.problem.template import Template
 from factory.support.errors import Diagnostic, InputError
 from factory.support.resources import templates_folder
+from factory.support.settings import Settings
+
+if TYPE_CHECKING:
+    from factory.layout.layout import Layout
 
 
 @dataclass(frozen=True)
-class Source:
-    """A PAG with the templates and robot types it is to be compiled with."""
+class Project:
+    """A PAG with all that follows from it: its geometry, factory and layout, each computed when it
+    is first used. `templates` and `catalogue` are what it is compiled with, `settings` and
+    `ground` what it is laid out for."""
 
     pag: PAG
-    templates: Mapping[str, Template]
-    catalogue: Catalogue
+    templates: Mapping[str, Template] = field(repr=False)
+    catalogue: Catalogue = field(default_factory=load_catalogue, repr=False)
+    settings: Settings = field(default_factory=Settings)
+    ground: Ground = field(default_factory=Ground)
+
+    @property
+    def file(self) -> Path:
+        """The file of the PAG."""
+        return Path(self.pag.file)
+
+    @property
+    def name(self) -> str:
+        """What files about it are called: the name of the PAG's file without its ending."""
+        return self.file.stem or "factory"
 
     @cached_property
     def product(self) -> Product:
         """The solids of its parts. Raises InputError where a mesh cannot be read."""
         return product_geometry(self.pag)
 
-    @cached_property
+    @property
+    def has_geometry(self) -> bool:
+        """Whether its solids have been computed."""
+        return "product" in self.__dict__
+
+    @property
     def approaches(self) -> Mapping[str, Approach]:
         """How the inputs of its operations can come together; empty for a product none of whose
         parts has a shape of its own: its default boxes can always slide."""
@@ -47,8 +72,9 @@ class Source:
         """What was found of how its inputs come together; None for a product of default boxes."""
         return matings(self.pag, self.templates, self.product) if shaped(self.pag) else None
 
-    def compile(self) -> Factory:
-        """Compile(P). Raises InputError where there is no such factory."""
+    @cached_property
+    def plain(self) -> Factory:
+        """Compile(P), without relays. Raises InputError where there is no such factory."""
         factory = compile_pag(self.pag, self.templates, self.catalogue, self.approaches)
         own = {name for name, template in self.templates.items() if not _is_shipped(template)}
         tried = own and own & {operation.template.name for operation in factory.operations}
@@ -57,6 +83,18 @@ class Source:
 
             check_modes(factory, [self.templates[name] for name in sorted(tried)], self.product)
         return factory
+
+    @cached_property
+    def layout(self) -> Layout:
+        """The factory laid out, with relays where its ground asks for them. Raises InputError,
+        RunError (Layout) where there is no room."""
+        return self.ground.lay_out(self.plain, self.product, self.settings)
+
+    @property
+    def factory(self) -> Factory:
+        """The factory with the relays of its layout if its ground asks for them, else the plain
+        one. Raises as these do."""
+        return self.layout.factory if self.ground.relays else self.plain
 
 
 def _is_shipped(template: Template) -> bool:
@@ -76,7 +114,14 @@ def all_templates(folders: Sequence[Path] = ()) -> Mapping[str, Template]:
     return load_templates([*map(Path, folders), templates_folder()])
 
 
-def read(path: str | PathLike[str], folders: Sequence[Path] = ()) -> Source:
-    """A PAG file with what it needs. Raises InputError with every error found."""
+def read(
+    path: str | PathLike[str],
+    folders: Sequence[Path] = (),
+    settings: Settings | None = None,
+    ground: Ground = Ground(),  # noqa: B008 (frozen)
+) -> Project:
+    """The project of a PAG file. Raises InputError with every error found in the file."""
     templates = all_templates(folders)
-    return Source(load_pag(path, templates), templates, load_catalogue())
+    return Project(
+        load_pag(path, templates), templates, load_catalogue(), settings or Settings(), ground
+    )

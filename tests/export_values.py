@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import subprocess
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -14,6 +14,8 @@ import pytest
 
 from factory.export import Made, Subject, exporters
 from factory.layout.layout import Layout
+from factory.pipeline import Project, read
+from factory.record.log import Log, LogWriter, is_log, read_log
 from factory.simulation.request import RunRequest
 from factory.simulation.simulation import Simulation
 from tests.command_line import PAPER, ROOT
@@ -24,24 +26,23 @@ PYTHON = ROOT / ".oracles" / "bin" / "python"
 ORACLES = Path(__file__).parent / "oracles"
 
 
-def subject(file: Path = PAPER, of: str = "", name: str = "") -> Subject:
-    """A file as exporters get it; read, compiled and laid out once."""
-    known = _read(file)
-    found = replace(known, of=of, name=name)
-    found.__dict__.update({k: v for k, v in known.__dict__.items() if k in SHARED})
+@cache
+def project(file: Path = PAPER) -> Project:
+    """A PAG with its layout."""
+    found = read(file)
+    assert found.layout
     return found
 
 
-SHARED = ("kind", "source", "factory", "layout", "log")
+def subject(file: Path = PAPER, of: str = "", name: str = "") -> Subject:
+    """A file as exporters get it; read, compiled and laid out once."""
+    return Subject(file, _log(file) if is_log(file) else project(file), of, name)
 
 
 @cache
-def _read(file: Path) -> Subject:
-    found = Subject(file)
-    if found.kind == "a log":
-        assert len(found.log)
-    else:
-        assert found.layout
+def _log(file: Path) -> Log:
+    found = read_log(file)
+    assert len(found)
     return found
 
 
@@ -64,8 +65,6 @@ def write(made: Made, path: Path) -> Path:
 
 def kept_log(layout: Layout, path: Path, **options: Any) -> Path:
     """A log of a run."""
-    from factory.record.log import LogWriter
-
     simulation = Simulation(layout, RunRequest(**options))
     with LogWriter(path, simulation) as log:
         simulation.run(observers=[log])

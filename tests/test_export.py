@@ -42,7 +42,7 @@ from factory.nets.marked import MarkedNet, marked
 from factory.nets.petri import PetriNet, Place, Transition
 from factory.plant.factory import Factory
 from tests.command_line import PAPER, ROOT, Terminal, files_in
-from tests.export_values import LAMP, MESHES, kept_log, made, subject
+from tests.export_values import LAMP, MESHES, kept_log, made, project, subject
 from tests.net_values import net_from, planted
 from tests.pag_values import factories
 
@@ -52,7 +52,7 @@ TEXTS = ("pnml", "tina", "dot", "graphml", "svg", "dxf", "st")
 @pytest.fixture(scope="module")
 def log(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("log") / "paper.log"
-    return kept_log(subject(PAPER).layout, path, world="ideal", units=2)
+    return kept_log(project(PAPER).layout, path, world="ideal", units=2)
 
 
 # the catalogue
@@ -83,7 +83,8 @@ def test_the_docs_list_them_all() -> None:
 def test_the_order_of_hashing_does_not_show() -> None:
     code = (
         "import hashlib, pathlib; from factory.export import Subject, exporters;"
-        f"s = Subject(pathlib.Path({str(PAPER)!r}));"
+        "from factory.pipeline import read;"
+        f"file = pathlib.Path({str(PAPER)!r}); s = Subject(file, read(file));"
         "made = [e.export(s) for e in exporters().values() if e.takes != 'log'];"
         "print(*(hashlib.sha256(str(m).encode()).hexdigest() for m in made))"
     )
@@ -196,7 +197,7 @@ def test_a_library_that_is_missing(
 
 
 def test_a_folder_gets_every_label(run: Terminal, out: Path) -> None:
-    labels = {node.label for node in subject(LAMP).source.pag.nodes}
+    labels = {node.label for node in project(LAMP).pag.nodes}
     for form, ending in (("stl", "stl"), ("gltf", "glb")):
         folder = out / form
         assert run("export", LAMP, "--format", form, "-o", folder).status == 0
@@ -346,11 +347,11 @@ def test_trees_are_drawn(made_factory: Factory) -> None:
 
 
 def test_identifiers_are_legal_and_differ() -> None:
-    found = subject(PAPER)
+    found = project(PAPER)
     text = made("st")
     labels = re.findall(r"LABEL : \((.*)\);", text)[0].split(", ")
     assert labels[0] == "NOPART"
-    assert len({name.upper() for name in labels}) == len(labels) == len(found.source.pag) + 1
+    assert len({name.upper() for name in labels}) == len(labels) == len(found.pag) + 1
     assert all(re.fullmatch("[A-Za-z](_?[A-Za-z0-9])*", name) for name in labels)
 
 
@@ -372,7 +373,7 @@ def test_a_dwell_is_a_timer() -> None:
 
 def test_gates_are_kept() -> None:
     """What must wait for another axis stays short of its goal until that one stands."""
-    chosen, text = subject(LAMP), made("st", LAMP)
+    chosen, text = project(LAMP), made("st", LAMP)
     gates = 0
     for mode, axes in zip(operation_modes(chosen.layout, 2e-4), chosen.factory.axes, strict=True):
         for slot, gate in enumerate(mode.gate):

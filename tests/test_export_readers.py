@@ -21,7 +21,18 @@ from factory.nets.marked import MarkedNet, marked
 from factory.nets.replay import replay
 from factory.simulation.simulation import physical_model
 from tests.command_line import PAPER, ROOT
-from tests.export_values import LAMP, MESHES, READERS, ask, kept_log, made, reads, subject, table
+from tests.export_values import (
+    LAMP,
+    MESHES,
+    READERS,
+    ask,
+    kept_log,
+    made,
+    project,
+    reads,
+    subject,
+    table,
+)
 from tests.export_values import write as written
 from tests.structured_text import Controller
 
@@ -44,7 +55,7 @@ def arcs_of(net: MarkedNet) -> list[list[str]]:
 
 @pytest.fixture(scope="module")
 def log(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return kept_log(subject(LAMP).layout, tmp_path_factory.mktemp("log") / "lamp.log", units=2)
+    return kept_log(project(LAMP).layout, tmp_path_factory.mktemp("log") / "lamp.log", units=2)
 
 
 # nets
@@ -80,7 +91,7 @@ def dot_by_pydot(folder: Path) -> None:
     edges = [[ids[e.get_source()], ids[e.get_destination()]] for e in graph.get_edges()]
     assert sorted(edges) == arcs_of(net)
     (tree,) = pydot.graph_from_dot_data(made("dot", PAPER, "tree"))
-    pag = subject(PAPER).source.pag
+    pag = project(PAPER).pag
     assert len(tree.get_edges()) == len(pag) - 1
 
 
@@ -113,7 +124,7 @@ def graphml_by_networkx(folder: Path) -> None:
     assert lines == [f"{where.file}:{where.line}" if where else "" for where in at]
     assert any(line.endswith("paper.pag:3") for line in lines)
     tree = nx.read_graphml(written(made("graphml", PAPER, "tree"), folder / "tree.graphml"))
-    pag = subject(PAPER).source.pag
+    pag = project(PAPER).pag
     assert nx.is_arborescence(tree.reverse())
     for node in pag.nodes:
         before = sorted(tree.in_edges(node.label, data="input"), key=lambda edge: edge[2])
@@ -144,7 +155,7 @@ def svg_by_svgelements(folder: Path) -> None:
         assert 0 <= x0 < x1 <= float(page.width)
         assert 0 <= y0 < y1 <= float(page.height)
     tree = list(SVG.parse(written(made("svg", PAPER, "tree"), folder / "t.svg")).elements())
-    assert {n.label for n in subject(PAPER).source.pag.nodes} <= {
+    assert {n.label for n in project(PAPER).pag.nodes} <= {
         e.text for e in tree if isinstance(e, Text)
     }
 
@@ -158,7 +169,7 @@ def dxf_by_ezdxf(folder: Path) -> None:
     (the library that writes it)"""
     import ezdxf
 
-    layout = subject(LAMP).layout
+    layout = project(LAMP).layout
     document = ezdxf.readfile(written(made("dxf", LAMP), folder / "lamp.dxf"))
     audit = document.audit()
     assert (audit.errors, audit.fixes, document.units) == ([], [], 4)
@@ -177,7 +188,7 @@ def dxf_by_trimesh(folder: Path) -> None:
     """millimetres, the floor's extents, the guidepaths' total length"""
     import trimesh
 
-    layout = subject(LAMP).layout
+    layout = project(LAMP).layout
     path = trimesh.load_path(written(made("dxf", LAMP), folder / "lamp.dxf"))
     xlo, xhi, ylo, yhi = layout.floor
     assert path.units == "millimeters"
@@ -210,7 +221,7 @@ def st_by_an_executor(folder: Path) -> None:
     """run with drives that go straight to their set-points, blocks scanned in random order: what
     fires refines the net, and products are made"""
     for file in (PAPER, LAMP, MESHES):
-        layout = subject(file).layout
+        layout = project(file).layout
         fired = _execute(made("st", file), layout, units=3)
         names = [layout.factory.net.threaded.transitions[n].name for n in fired]
         assert names.count("dropoff_e") >= 3
@@ -262,7 +273,7 @@ def _execute(text: str, layout: Layout, units: int, scans: int = 20_000) -> list
 def test_faults_planted_in_the_programs_show(old: str, new: str) -> None:
     text, count = re.subn(old, new, made("st"))
     assert count
-    layout = subject(PAPER).layout
+    layout = project(PAPER).layout
     names = [t.name for t in layout.factory.net.threaded.transitions]
     try:
         fired = _execute(text, layout, 3, scans=2_000)
@@ -280,11 +291,11 @@ def stl_by_trimesh(folder: Path) -> None:
     import trimesh
 
     for file in (MESHES, LAMP):
-        chosen = subject(file)
-        for label in (node.label for node in chosen.source.pag.nodes):
+        chosen = project(file)
+        for label in (node.label for node in chosen.pag.nodes):
             mesh = trimesh.load(written(made("stl", file, label), folder / "x.stl"))
             assert mesh.is_watertight, label
-            solids = [chosen.product.solids[p] for p in parts_of(chosen.source.pag, label)]
+            solids = [chosen.product.solids[p] for p in parts_of(chosen.pag, label)]
             low, high = np.min([s.low for s in solids], 0), np.max([s.high for s in solids], 0)
             assert np.allclose(mesh.bounds, 1e3 * np.array([low, high]), atol=0.2), label
 
@@ -294,12 +305,12 @@ def gltf_by_trimesh(folder: Path) -> None:
     """the assembly tree as its scene graph, in metres, y upwards (the library that writes it)"""
     import trimesh
 
-    chosen = subject(MESHES)
+    chosen = project(MESHES)
     for ending in ("glb", "gltf"):
         content = made("gltf", MESHES, "", f"x.{ending}")
         scene = trimesh.load_scene(written(content, folder / f"x.{ending}"))
         tree = {child: parent for parent, child, _ in scene.graph.to_edgelist()}
-        for node in chosen.source.pag.nodes:
+        for node in chosen.pag.nodes:
             assert all(tree[label] == node.label for label in node.inputs)
         low, high = chosen.product.low, chosen.product.high
         upright = [[low[0], low[2], -high[1]], [high[0], high[2], -low[1]]]
@@ -315,9 +326,9 @@ def gltf_by_pygltflib(folder: Path) -> None:
     content = made("gltf", MESHES, "", "x.glb")
     document = GLTF2().load(str(written(content, folder / "x.glb")))
     validate(document)
-    chosen = subject(MESHES)
+    chosen = project(MESHES)
     nodes = {node.name: node for node in document.nodes}
-    for part in parts_of(chosen.source.pag, chosen.source.pag.root):
+    for part in parts_of(chosen.pag, chosen.pag.root):
         solid = chosen.product.solids[part]
         primitive = document.meshes[nodes[part].mesh].primitives[0]
         colour = document.materials[primitive.material].pbrMetallicRoughness.baseColorFactor
@@ -337,7 +348,7 @@ def urdf_by_mujoco(folder: Path) -> None:
 
     for file in (MESHES, LAMP):
         path = written(made("urdf", file, "", "x.urdf"), folder / file.stem / "x.urdf")
-        one = load(physical_model(subject(file).layout, 1, subject(file).settings))
+        one = load(physical_model(project(file).layout, 1, project(file).settings))
         other = mujoco.MjModel.from_xml_path(str(path))
         bodies = {one.body(n).name for n in range(one.nbody)} - {COMPASS}
         assert bodies == {other.body(n).name for n in range(other.nbody)}
@@ -374,7 +385,7 @@ def urdf_by_yourdfpy(folder: Path) -> None:
     import mujoco
 
     path = written(made("urdf", MESHES, "", "x.urdf"), folder / "x.urdf")
-    m = load(physical_model(subject(MESHES).layout, 1, subject(MESHES).settings))
+    m = load(physical_model(project(MESHES).layout, 1, project(MESHES).settings))
     values, d = _random_joints(m), mujoco.MjData(m)
     for joint, value in values.items():
         d.joint(joint).qpos[0] = value
@@ -383,7 +394,7 @@ def urdf_by_yourdfpy(folder: Path) -> None:
     assert found["valid"]
     kinds = Counter(found["joints"].values())
     assert kinds["prismatic"] == len(values)
-    assert kinds["floating"] == len(subject(MESHES).factory.leaves)
+    assert kinds["floating"] == len(project(MESHES).factory.leaves)
     for name in values:
         body = m.body(int(m.jnt_bodyid[m.joint(name).id])).name
         assert np.allclose(found["at"][body], d.body(body).xpos, atol=1e-8), body
@@ -414,7 +425,7 @@ def _table_by_duckdb(log: Path, form: str) -> None:
     events = subject(log).log.events
     assert [(t, name) for t, name, *_ in found] == [(round(t, 9), name) for t, name in events]
     assert max(unit for _, _, unit, *_ in found) == 2
-    operations = {o.label: o for o in subject(LAMP).factory.operations}
+    operations = {o.label: o for o in project(LAMP).factory.operations}
     for _, name, _, robots, line in found:
         operation = operations[name[:-2]]
         shown = robots if form == "parquet" else robots.split()
@@ -459,7 +470,7 @@ def mcap_by_mcap(log: Path) -> None:
             place = d.xpos[parent] + rotation(d.xquat[parent]) @ moved
             assert np.abs(place - d.xpos[body]).max() < 1e-4, (time, m.body(body).name)
     drawn = {e.id for _, update in topics["/scene"] for e in update.entities}
-    assert {f"part/{o.label}#1" for o in subject(LAMP).factory.leaves} <= drawn
+    assert {f"part/{o.label}#1" for o in project(LAMP).factory.leaves} <= drawn
 
 
 @reads("mcap", "Rerun", "Apache-2.0 or MIT, a process of its own")
@@ -495,7 +506,7 @@ def usd_by_usd_core(log: Path) -> None:
     for row, code in ((0, 0), (-1, stage.GetEndTimeCode() - 1)):
         d.qpos[:] = kept.qpos[row]
         mujoco.mj_kinematics(m, d)
-        for robot in subject(LAMP).factory.robots:
+        for robot in project(LAMP).factory.robots:
             geom = m.geom(f"{robot.name}/carriage").id
             prim = drawn[f"Mesh_Xform_{robot.name}_carriage_id{geom}_geom"]
             place = UsdGeom.Xformable(prim).ComputeLocalToWorldTransform(code).ExtractTranslation()

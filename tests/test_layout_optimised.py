@@ -82,8 +82,8 @@ def test_times_are_those_of_the_modes(size: int, seed: int, shape: str, style: s
 )
 def test_what_the_examples_gain(name: str, figures: tuple[float, float, float]) -> None:
     """Cycle times [s] of the first layout and the one found, and the bound."""
-    source = read(EXAMPLES / f"{name}.pag")
-    found = gain(lay_out(source.compile(), source.product), PACE)
+    project = read(EXAMPLES / f"{name}.pag")
+    found = gain(lay_out(project.plain, project.product), PACE)
     first, chosen = found.first.predicted_cycle_time_s, found.chosen.predicted_cycle_time_s
     assert (first, chosen, found.bound) == pytest.approx(figures, abs=6e-4)
 
@@ -101,7 +101,7 @@ def test_large_factories_are_packed_once(monkeypatch: pytest.MonkeyPatch) -> Non
         layout = random_layout(8 + seed, seed, SHAPES[seed % 4], STYLES[seed % len(STYLES)])
         assert layout.certificate is not None and layout.certificate.holds
     chest = read(EXAMPLES / "chest.pag")
-    assert cycle(lay_out(chest.compile(), chest.product)) < 7.0
+    assert cycle(lay_out(chest.plain, chest.product)) < 7.0
 
 
 def test_the_output_robot_need_not_pass_the_branches_ahead() -> None:
@@ -123,20 +123,20 @@ def test_the_output_robot_need_not_pass_the_branches_ahead() -> None:
 
 def test_slower_robots_get_another_layout() -> None:
     """The pace is part of what is optimised; the same pace gives the same layout."""
-    source = read(EXAMPLES / "gearbox.pag")
-    factory, slow = source.compile(), replace(PACE, speed=0.1)
-    one, again = (lay_out(factory, source.product, pace=slow) for _ in range(2))
+    project = read(EXAMPLES / "gearbox.pag")
+    factory, slow = project.plain, replace(PACE, speed=0.1)
+    one, again = (lay_out(factory, project.product, pace=slow) for _ in range(2))
     assert one.guidepaths == again.guidepaths
-    assert one.guidepaths != lay_out(factory, source.product).guidepaths
+    assert one.guidepaths != lay_out(factory, project.product).guidepaths
     assert one.certificate is not None
-    first = first_feasible(one.factory, source.product, Clearance())
+    first = first_feasible(one.factory, project.product, Clearance())
     assert max(gear_times(one, slow)) < max(gear_times(first, slow))
 
 
 def test_a_floor_that_only_the_first_layout_fits() -> None:
     """Nested branches are deeper; on a floor that is too shallow they are laid out as boxes."""
-    source = read(EXAMPLES / "shelf.pag")
-    factory, product = source.compile(), source.product
+    project = read(EXAMPLES / "shelf.pag")
+    factory, product = project.plain, project.product
     xlo, xhi, ylo, yhi = lay_out(factory, product).floor
     shallow = (10.0, yhi - ylo - 0.01)
     found = lay_out(factory, product, floor=shallow)
@@ -222,9 +222,9 @@ def test_build_tells_what_was_gained(run: Terminal) -> None:
 
 def test_a_factory_is_laid_out_at_the_pace_of_its_settings() -> None:
     """At a crawl, ways cost more than gates: the shelf's factory is another one then."""
-    source = read(ROOT / "examples" / "shelf.pag", ())
+    project = read(ROOT / "examples" / "shelf.pag", ())
     usual, slow = (
-        Ground().lay_out(source.compile(), source.product, Settings(speed=speed))
+        Ground().lay_out(project.plain, project.product, Settings(speed=speed))
         for speed in (0.5, 0.05)
     )
     assert slow.guidepath_length < usual.guidepath_length

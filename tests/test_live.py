@@ -387,14 +387,14 @@ def test_the_command_serves_until_it_is_interrupted() -> None:
 
 def test_other_hosts_need_a_word(run: Terminal, monkeypatch: pytest.MonkeyPatch) -> None:
     """The error comes before anything is laid out."""
-    monkeypatch.setattr(sys.modules["factory.commands.view"], "plan", None)
+    monkeypatch.setattr("factory.pipeline.read", None)
     done = run("view", PAPER, "--host", "0.0.0.0", "--json")
     assert done.status == 2 and done.codes == ["BadValue"]
     assert "--expose" in done.json["errors"][0]["hint"]
 
 
 def test_what_is_missing_is_said_first(run: Terminal, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(sys.modules["factory.commands.view"], "plan", None)
+    monkeypatch.setattr("factory.pipeline.read", None)
     monkeypatch.setitem(sys.modules, "websockets.sync.server", None)
     done = run("view", PAPER, "--json")
     assert done.status == 3 and done.codes == ["Missing"]

@@ -124,7 +124,7 @@ def test_firings_are_seen_to_a_tick(paper: Layout) -> None:
 
 
 def test_robots_that_lower_what_they_bring_are_explained() -> None:
-    layout = factory.lay_out(read(ROOT / "examples" / "gearbox.pag").compile())
+    layout = factory.lay_out(read(ROOT / "examples" / "gearbox.pag").plain)
     lifts = [r for r in layout.factory.robots if r.type == "lift"]
     assert lifts
     simulation = Simulation(layout, RunRequest(units=1, seed=2, jitter=0.3))

@@ -227,8 +227,8 @@ def test_two_bodies_may_be_made_in_one_tick_of_what_is_alike() -> None:
 
 def test_what_is_lowered_can_be_relayed() -> None:
     """The robots of a lifted way carry it at its height; the last one has the lift."""
-    source = read(EXAMPLES / "gearbox.pag")
-    plain = lay_out(source.compile(), source.product)
+    project = read(EXAMPLES / "gearbox.pag")
+    plain = lay_out(project.plain, project.product)
     assert plain.factory.strokes
     layout, found = cuttable(plain)
     lifted = {o.approach.lowered for o in plain.factory.operations if o.approach}

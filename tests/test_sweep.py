@@ -42,9 +42,9 @@ SOON = 90.0
 
 
 def recipe_of(kind: type[Recipe] = Recipe, **fixed: Value) -> Recipe:
-    source = read(PAPER)
+    project = read(PAPER)
     settings = {name: getattr(Settings(), name) for name in Settings.__dataclass_fields__}
-    return kind(source.compile(), source.product, {**settings, "world": "ideal", **fixed})
+    return kind(project.plain, project.product, {**settings, "world": "ideal", **fixed})
 
 
 def rows_of(path: Path, columns: str = "point") -> list[tuple[Any, ...]]:
@@ -175,8 +175,8 @@ def test_seeds_vary_fastest_and_settings_slowest() -> None:
 def test_runs_that_share_a_model_are_the_runs_alone() -> None:
     """A run writes into its model; no other run may see that."""
     runner = Runner(recipe_of(world="mujoco", jitter=0.3, units=2))
-    source = read(PAPER)
-    layout = lay_out(source.compile(), source.product)
+    project = read(PAPER)
+    layout = lay_out(project.plain, project.product)
     for seed in (3, 1, 3):
         shared = runner.run((("seed", seed),))
         alone = Simulation(layout, RunRequest("mujoco", units=2, seed=seed, jitter=0.3)).run()

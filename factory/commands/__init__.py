@@ -13,17 +13,21 @@ import click
 
 from factory.commands.analyze import analyze
 from factory.commands.build import build
-from factory.commands.check import check, programs
+from factory.commands.check import check
 from factory.commands.defaults import from_environment, with_defaults
+from factory.commands.doctor import doctor
 from factory.commands.explain import Code, tell_code
 from factory.commands.export import export
 from factory.commands.fidelity import fidelity
-from factory.commands.import_new import import_, new
+from factory.commands.import_ import import_
 from factory.commands.monitor import monitor
+from factory.commands.new import new
+from factory.commands.programs import programs
+from factory.commands.render import render
 from factory.commands.report import report
-from factory.commands.run import render, run
+from factory.commands.run import run
 from factory.commands.sweep import sweep
-from factory.commands.templates import doctor, templates
+from factory.commands.templates import templates
 from factory.commands.view import view
 from factory.support.console import emit, fail, say
 from factory.support.errors import Diagnostic, FactoryError, InputError, MissingError, did_you_mean

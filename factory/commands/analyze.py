@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import sys
-from contextlib import ExitStack
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
@@ -16,21 +16,69 @@ from factory.commands.options import (
     OUTPUT,
     PATH,
     RELAY,
+    RUNS,
     SOURCE,
     WIP,
     for_a_pag,
-    plan,
-    settings_of,
+    gathered,
 )
-from factory.commands.options import writable as check_writable
+from factory.commands.outputs import writable
+from factory.commands.requests import OutputOptions, ProjectOptions, RunOptions
+from factory.commands.run import carry_out
 from factory.support.console import emit, say, table, warn
 from factory.support.errors import Diagnostic, InputError, did_you_mean
 
 if TYPE_CHECKING:
+    from factory.pipeline import Project
     from factory.plant.factory import Factory
-    from factory.study.analysis import Change, Timing
+    from factory.record.log import Log
+    from factory.study.analysis import Analysis, Change, Timing
     from factory.study.analysis.measured import RunRecord
-    from factory.study.analysis.recorded import Conditions
+
+
+@dataclass(frozen=True, slots=True)
+class AnalyzeOptions:
+    """What an analysis is compared with, and the changes that it is to foresee."""
+
+    measured: Path | None
+    on_the_spot: bool
+    seconds: tuple[str, ...]
+    faster: tuple[str, ...]
+    shorter: tuple[str, ...]
+
+    def log(self) -> Log | None:
+        """The log to compare with. Raises InputError."""
+        if self.measured is None:
+            return None
+        if self.on_the_spot:
+            message = "--measured LOG and --run exclude each other"
+            raise InputError(Diagnostic("Usage", message, None, "leave one out"))
+        from factory.record.log import read_log
+
+        return read_log(self.measured)
+
+    def change(self, factory: Factory) -> tuple[str, Change] | None:
+        """The change that is asked about, in words before it. Raises InputError."""
+        from factory.study.analysis import Change
+
+        robots = {robot.name: robot.index for robot in factory.robots}
+        copies = {_robot(robots, name): 1 for name in self.seconds}
+        for name in self.seconds:
+            copies[robots[name]] += 1
+        speed = dict(_percent(robots, text, "--faster", 1e6) for text in self.faster)
+        way = dict(_percent(robots, text, "--shorter", 100.0) for text in self.shorter)
+        names = factory.robots
+        words = [f"{count} × {names[r].name}" for r, count in copies.items()]
+        words += [f"{names[r].name} {100 * share:g} % faster" for r, share in speed.items()]
+        words += [f"ways of {names[r].name} {100 * share:g} % shorter" for r, share in way.items()]
+        if not words:
+            return None
+        change = Change(
+            speed={robot: 1 + share for robot, share in speed.items()},
+            way={robot: 1 - share for robot, share in way.items()},
+            copies=copies,
+        )
+        return ", ".join(words), change
 
 
 @click.command()
@@ -51,37 +99,34 @@ if TYPE_CHECKING:
 @click.option("--run", "on_the_spot", is_flag=True, help="Compare with a run of these units.")
 @click.option("--delays", type=PATH, help="For a net in PNML: a TOML file of place = seconds.")
 @click.option("-o", "--output", type=PATH, help="A picture: .svg or .png.")
+@gathered(AnalyzeOptions, "study")
+@RUNS
 @FLOOR
 @RELAY
 @MOTION
 @OUTPUT
 def analyze(
-    file: Path,
-    folders: tuple[Path, ...],
+    given: ProjectOptions,
+    asked: RunOptions,
+    study: AnalyzeOptions,
+    out: OutputOptions,
     delays: Path | None,
     output: Path | None,
-    as_json: bool,
-    quiet: bool,
-    verbose: bool,
-    **options: Any,
 ) -> int:
     """Say what sets the pace of FILE.pag (or of a net in FILE.pnml), and what would change it."""
     from factory.support.files import is_net
 
-    if is_net(file):
-        for_a_pag(file, "a net in PNML", "delays", "output")
-        return _analyze_net(file, delays, output, as_json, quiet, verbose)
+    if is_net(given.file):
+        for_a_pag(given.file, "a net in PNML", "delays", "output")
+        return _analyze_net(given.file, delays, output, out)
     if delays is not None:
         message = "--delays is for a net in PNML; of a PAG, delays follow from its layout"
         raise InputError(Diagnostic("Usage", message, None, "leave it out"))
-    return _analyze_pag(file, folders, output, as_json, quiet, verbose, options)
+    return _analyze_pag(given, asked, study, output, out)
 
 
-def _analyze_net(
-    file: Path, delays: Path | None, output: Path | None, as_json: bool, quiet: bool, verbose: bool
-) -> int:
-    from factory.foreign_nets.pnml_reader import read_pnml
-    from factory.lang.source import read_text
+def _analyze_net(file: Path, delays: Path | None, output: Path | None, out: OutputOptions) -> int:
+    from factory.foreign_nets.pnml_reader import load_net
     from factory.study.analysis.general import analyse_net, net_document, net_tables, read_delays
 
     if output is not None:
@@ -91,61 +136,66 @@ def _analyze_net(
         message = "a net needs a table of delays"
         hint = '--delays FILE.toml, with lines as "p1" = 0.5'
         raise InputError(Diagnostic("Usage", message, None, hint))
-    net = read_pnml(read_text(file), str(file))
+    net = load_net(file)
     found = analyse_net(net, read_delays(delays, net), str(file))
-    if as_json:
+    if out.as_json:
         emit(net_document(file.stem, found))
-    elif not quiet:
+    elif not out.quiet:
         say(f"{file.stem}: cycle time {found.pace:.6g} s")
-        for made in net_tables(found, verbose):
+        for made in net_tables(found, out.verbose):
             table(made.title, made.columns, made.rows)
     return 0
 
 
 def _analyze_pag(
-    file: Path,
-    folders: tuple[Path, ...],
+    given: ProjectOptions,
+    asked: RunOptions,
+    study: AnalyzeOptions,
     output: Path | None,
-    as_json: bool,
-    quiet: bool,
-    verbose: bool,
-    options: dict[str, Any],
+    out: OutputOptions,
 ) -> int:
     from factory.nets.verify import proved
+    from factory.pipeline import read
     from factory.study.analysis import Timing, analyse
     from factory.study.analysis.document import document
     from factory.study.analysis.picture import check_picture, picture
+    from factory.study.analysis.recorded import Conditions, conditions
     from factory.support.files import write_bytes
 
-    check_writable(file, output)
+    writable(given.file, output)
     check_picture(output)
-    log = _log(options["measured"], options["on_the_spot"])
-    made = _conditions(file, log, options)
-    source, factory, layout = plan(file, folders, made.settings, options["floor"], options)
-    proved(factory.net)
-    warn(layout.product.warnings, quiet)
+    log = study.log()
+    made = (
+        Conditions(given.settings(), asked.world, asked.seed, asked.jitter, asked.wip)
+        if log is None
+        else conditions(log.header)
+    )
+    project = read(given.file, given.folders, made.settings, given.ground())
+    layout = project.layout
+    proved(layout.factory.net)
+    warn(layout.product.warnings, out.quiet)
     timing = Timing(layout, made.settings, made.world, made.seed, made.jitter)
-    asked = _asked(factory, options)
+    change = study.change(layout.factory)
     record: RunRecord | None = None
     status = 0
     if log is not None:
-        record = _logged(str(options["measured"]), log, factory)
-    elif options["on_the_spot"]:
-        record, status = _run(source, timing, options["units"], made.wip, quiet or as_json)
-    units = len(record.dropoffs) if record else options["units"]
-    found = analyse(timing, units, made.wip, asked, record)
+        record = _logged(str(study.measured), log, layout.factory)
+    elif study.on_the_spot:
+        record, status = _run(project, timing, asked, out.silent)
+    units = len(record.dropoffs) if record else asked.units
+    found = analyse(timing, units, made.wip, change, record)
     if output is not None:
         write_bytes(output, picture(found, output.suffix))
-    if as_json:
+    if out.as_json:
         emit({**document(found), "picture": str(output) if output else None})
-    elif not quiet:
-        _tell(found, verbose)
+    elif not out.quiet:
+        _tell(found, out.verbose)
         if output is not None:
             say(f"wrote {output}")
     return status
 
 
-def _tell(found: Any, verbose: bool) -> None:
+def _tell(found: Analysis, verbose: bool) -> None:
     from factory.study.analysis.tables import summary, tables
 
     for line in summary(found):
@@ -156,30 +206,7 @@ def _tell(found: Any, verbose: bool) -> None:
             say(f"{made.note}\n")
 
 
-def _log(path: Path | None, on_the_spot: bool) -> Any:
-    if path is None:
-        return None
-    if on_the_spot:
-        message = "--measured LOG and --run exclude each other"
-        raise InputError(Diagnostic("Usage", message, None, "leave one out"))
-    from factory.record.log import read_log
-
-    return read_log(path)
-
-
-def _conditions(file: Path, log: Any, options: dict[str, Any]) -> Conditions:
-    """How the run was made, or is to be made."""
-    from factory.study.analysis.recorded import Conditions, conditions
-
-    if log is not None:
-        return conditions(log.header)
-    settings = settings_of(file, options)
-    return Conditions(
-        settings, options["world"], options["seed"], options["jitter"], options["wip"]
-    )
-
-
-def _logged(name: str, log: Any, factory: Factory) -> RunRecord:
+def _logged(name: str, log: Log, factory: Factory) -> RunRecord:
     from factory.study.analysis.recorded import check_log, check_products, logged_record
 
     check_log(name, log.header, factory)
@@ -189,59 +216,19 @@ def _logged(name: str, log: Any, factory: Factory) -> RunRecord:
 
 
 def _run(
-    source: Any, timing: Timing, units: int, wip: int | None, quiet: bool
+    project: Project, timing: Timing, asked: RunOptions, silent: bool
 ) -> tuple[RunRecord, int]:
-    """A run on the spot; status 1 where it was troubled."""
-    from factory.simulation.request import RunRequest
+    """A run on the spot, in which no parts fuse; status 1 where it was troubled."""
     from factory.simulation.simulation import Simulation
     from factory.study.analysis.recorded import check_products, record_of
-    from factory.support.interruption import Interruption
-    from factory.support.progress import Progress
 
-    request = RunRequest(
-        timing.world,
-        units,
-        timing.seed,
-        timing.jitter,
-        timing.settings,
-        wip=wip,
-        shown=False,
-        catalogue=source.catalogue,
-    )
-    simulation = Simulation(timing.layout, request)
-    with ExitStack() as stack:
-        stop, bar = Interruption(), Progress(units, quiet)
-        glances = [stack.enter_context(stop).observe, stack.enter_context(bar).observe]
-        run = simulation.run(glances=glances)
+    request = replace(asked, fuse=False).request(project, shown=False)
+    run = carry_out(Simulation(timing.layout, request), silent)
     if run.trouble is not None:
         print(run.trouble, file=sys.stderr)
     record = record_of(run)
     check_products(record)
     return record, 0 if run.trouble is None else 1
-
-
-def _asked(factory: Factory, options: dict[str, Any]) -> tuple[str, Change] | None:
-    """The change that the options ask about, in words. Raises InputError."""
-    from factory.study.analysis import Change
-
-    robots = {robot.name: robot.index for robot in factory.robots}
-    copies = {_robot(robots, name): 1 for name in options["seconds"]}
-    for name in options["seconds"]:
-        copies[robots[name]] += 1
-    speed = dict(_percent(robots, text, "--faster", 1e6) for text in options["faster"])
-    way = dict(_percent(robots, text, "--shorter", 100.0) for text in options["shorter"])
-    names = factory.robots
-    words = [f"{count} × {names[r].name}" for r, count in copies.items()]
-    words += [f"{names[r].name} {100 * share:g} % faster" for r, share in speed.items()]
-    words += [f"ways of {names[r].name} {100 * share:g} % shorter" for r, share in way.items()]
-    if not words:
-        return None
-    change = Change(
-        speed={robot: 1 + share for robot, share in speed.items()},
-        way={robot: 1 - share for robot, share in way.items()},
-        copies=copies,
-    )
-    return ", ".join(words), change
 
 
 def _robot(robots: dict[str, int], name: str) -> int:

@@ -4,36 +4,25 @@ from __future__ import annotations
 
 import os
 import sys
+from dataclasses import asdict
 from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from factory.commands.options import (
-    FLOOR,
-    MOTION,
-    OUTPUT,
-    PATH,
-    RELAY,
-    SOURCE,
-    WIP,
-    plan,
-    settings_of,
-    writable,
-    writable_folder,
-)
+from factory.commands.options import FLOOR, MOTION, OUTPUT, PATH, RELAY, SOURCE, WIP
+from factory.commands.outputs import writable, writable_folder
+from factory.commands.requests import OutputOptions, ProjectOptions
 from factory.support.collector import collector_paused
 from factory.support.console import emit, say, warning
 
 if TYPE_CHECKING:
-    from factory.commands.build_factory import Built
-    from factory.layout.layout import Layout
-    from factory.pipeline import Source
-    from factory.support.settings import Settings
+    from factory.export.build import Built
+    from factory.pipeline import Project
 
 SHOWN = 20
-"""So many files are listed, unless `-v` asks for all."""
+"""The most files that are listed, unless `-v` asks for all."""
 
 
 @click.command()
@@ -50,49 +39,47 @@ SHOWN = 20
 @OUTPUT
 @collector_paused()
 def build(
-    file: Path,
-    folders: tuple[Path, ...],
+    given: ProjectOptions,
+    out: OutputOptions,
     mjcf: Path | None,
     output: Path | None,
     units: int | None,
     wip: int | None,
-    floor: str | None,
-    as_json: bool,
-    quiet: bool,
-    verbose: bool,
-    **options: Any,
 ) -> int:
     """Compile, verify and lay out FILE.pag; write the MJCF model, the floor plan, the net."""
-    from factory.commands.build_factory import build_all
-    from factory.nets.verify import proved
-    from factory.support import build_cache as receipt
+    from factory.support import build_cache
 
     begin = perf_counter()
-    writable(file, mjcf)
+    writable(given.file, mjcf)
     writable_folder(output)
-    settings = settings_of(file, options)
-    wanted = {"folders": folders, "mjcf": mjcf, "output": output, "units": units, "wip": wip}
-    name = receipt.request(file, {**options, **wanted, "floor": floor, "settings": settings})
-    told, news = receipt.find(name), ""
+    wanted = {"mjcf": mjcf, "output": output, "units": units, "wip": wip}
+    settings = given.settings()
+    name = build_cache.request(given.file, {**asdict(given), **wanted, "settings": settings})
+    told = build_cache.find(name)
+    is_kept = told is not None
     if told is None:
-        source, factory, layout = plan(file, folders, settings, floor, options)
-        verdict = proved(factory.net)
+        from factory.export.build import BuildRequest, files_read
+        from factory.export.build import build as build_files
+        from factory.nets.verify import proved
+
+        project = given.project()
+        verdict = proved(project.layout.factory.net)
         spent = perf_counter() - begin
-        built = build_all(source, layout, settings, mjcf, output, units, wip, verdict)
-        told = _told(layout, built, settings, spent)
-        receipt.keep(name, _inputs(source, folders), built.files, told)
+        built = build_files(project, verdict, BuildRequest(mjcf, output, units, wip))
+        told = _told(project, built, spent)
+        inputs = (*files_read(project), *_shipped_and_own(given.folders))
+        build_cache.keep(name, inputs, built.files, told)
     else:
         told["document"]["compile_s"] = perf_counter() - begin
-        news = "nothing has changed since: these files are up to date"
-    for text in [] if quiet else told["warnings"]:
+    for text in [] if out.quiet else told["warnings"]:
         print(text, file=sys.stderr)
-    if as_json:
+    if out.as_json:
         emit(told["document"])
-    elif not quiet:
-        for line in (*told["lines"], *_listed(told["document"]["files"], verbose)):
+    elif not out.quiet:
+        for line in (*told["lines"], *_listed(told["document"]["files"], out.verbose)):
             say(line)
-        if news:
-            say(news)
+        if is_kept:
+            say("nothing has changed since: these files are up to date")
     return 0
 
 
@@ -105,14 +92,15 @@ def _listed(files: list[str], verbose: bool) -> list[str]:
     return [f"  {path}" for path in shown] + [f"  and {more} more: -v lists them"] * (more > 0)
 
 
-def _told(layout: Layout, built: Built, settings: Settings, spent: float) -> dict[str, Any]:
+def _told(project: Project, built: Built, spent: float) -> dict[str, Any]:
     """What there is to tell: the document of `--json`, the lines for people, the warnings."""
     from factory.layout.durations import Pace
     from factory.layout.gain import gain
     from factory.support.settings import AUTO
 
+    layout, settings, model = project.layout, project.settings, built.model
     root, robots = layout.factory.pag.root, len(layout.factory.robots)
-    model, gained = built.model, gain(layout, Pace.of(settings))
+    gained = gain(layout, Pace.of(settings))
     document = {
         "product": root,
         "mjcf": str(built.mjcf) if built.mjcf else None,
@@ -124,7 +112,7 @@ def _told(layout: Layout, built: Built, settings: Settings, spent: float) -> dic
         "area_m2": round(layout.area, 6),
         "timestep_s": model.settings.step,
         "compile_s": spent,
-        "clearance": built.clearance,
+        "clearance": built.clearance.summary(),
         "layout": gained.as_json(),
         "files": [str(path) for path in built.files],
         "warnings": [d.as_json() for d in layout.product.warnings],
@@ -142,11 +130,10 @@ def _told(layout: Layout, built: Built, settings: Settings, spent: float) -> dic
     return {"document": document, "lines": lines, "warnings": warnings}
 
 
-def _inputs(source: Source, folders: tuple[Path, ...]) -> tuple[Path, ...]:
-    """Every file and folder a build reads: if one changes, the receipt no longer holds."""
-    from factory.commands.build_factory import files_read
+def _shipped_and_own(folders: tuple[Path, ...]) -> tuple[Path, ...]:
+    """The folders of operations and of robot types, and the files in them."""
     from factory.support.resources import mjcf_folder, templates_folder
 
-    given = (*folders, templates_folder(), mjcf_folder())
-    inside = (path for folder in given for path in folder.iterdir() if path.is_file())
-    return (*files_read(source), *given, *inside)
+    every = (*folders, templates_folder(), mjcf_folder())
+    inside = (path for folder in every for path in folder.iterdir() if path.is_file())
+    return (*every, *inside)

@@ -7,6 +7,11 @@ import sys
 from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, version
 
+import click
+
+from factory.commands.options import OUTPUT
+from factory.commands.requests import OutputOptions
+from factory.support.console import emit, say
 from factory.support.errors import FactoryError
 
 PACKAGES = (
@@ -23,6 +28,29 @@ PACKAGES = (
     "click",
     "rich",
 )
+
+
+@click.command()
+@OUTPUT
+def doctor(out: OutputOptions) -> int:
+    """Say what works on this machine, and what would mend the rest."""
+    findings = examine()
+    good = all(f.ok for f in findings)
+    if out.as_json:
+        emit(
+            {
+                "ok": good,
+                "checks": [
+                    {"name": f.name, "ok": f.ok, "found": f.found, "mend": f.mend} for f in findings
+                ],
+            }
+        )
+    else:
+        for finding in findings:
+            say(f"{'ok     ' if finding.ok else 'MISSING'} {finding.name}: {finding.found}")
+            if not finding.ok:
+                say(f"        {finding.mend}")
+    return 0 if good else 3
 
 
 @dataclass(frozen=True, slots=True)

@@ -4,27 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
-from factory.commands.options import (
-    FLOOR,
-    MOTION,
-    OUTPUT,
-    PATH,
-    RELAY,
-    SOURCE,
-    ground,
-    settings_of,
-    writable,
-    writable_folder,
-)
+from factory.commands.options import FLOOR, MOTION, OUTPUT, PATH, RELAY, SOURCE
+from factory.commands.outputs import writable, writable_folder
+from factory.commands.requests import OutputOptions, ProjectOptions
 from factory.support.console import emit, say, warn
 from factory.support.errors import Diagnostic, InputError, did_you_mean
 
 if TYPE_CHECKING:
-    from factory.export import Exporter, Made, Subject
+    from factory.export import Exporter, Made
+    from factory.export.subject import Source
+
+TAKEN = {"net": ("a PAG", "a net in PNML"), "pag": ("a PAG",), "log": ("a log",)}
+"""The kinds of file that an exporter can take."""
 
 
 class _Listing(click.Command):
@@ -47,41 +42,55 @@ class _Listing(click.Command):
 @MOTION
 @OUTPUT
 def export(
-    file: Path,
-    folders: tuple[Path, ...],
-    form: str,
-    output: Path | None,
-    of: str,
-    floor: str | None,
-    as_json: bool,
-    quiet: bool,
-    verbose: bool,
-    **options: Any,
+    given: ProjectOptions, out: OutputOptions, form: str, output: Path | None, of: str
 ) -> int:
     """Write FILE.pag, a net in FILE.pnml or a LOG of a run for other tools."""
     from factory.export import Subject
+    from factory.pipeline import Project
     from factory.support.files import write_all
 
     chosen = _exporter(form, of)
     whole = chosen.folder and output is not None and _is_folder(output)
-    _writable(file, output, whole, chosen)
-    subject = Subject(
-        file,
-        folders,
-        settings_of(file, options),
-        ground(floor, options),
-        of,
-        output.name if output else "",
-        whole,
-    )
-    subject.require(form, chosen.takes)
-    made = chosen.export(subject)
-    _warn(subject, quiet)
+    _writable(given.file, output, whole, chosen)
+    source = _source(given, chosen)
+    name = output.name if output else ""
+    made = chosen.export(Subject(given.file, source, of, name, whole))
+    if isinstance(source, Project) and source.has_geometry:
+        warn(source.product.warnings, out.quiet)
     files = _files(made, output, whole)
     if output is not None:
         write_all(files)
-    _tell(form, made, output, list(files), as_json)
+    if out.as_json:
+        text = {"text": made} if output is None else {}
+        shown = str(output) if output else None
+        emit({"format": form, "output": shown, "files": [str(f) for f in files], **text})
+    elif output is None and isinstance(made, str):
+        say(made.rstrip("\n"))
     return 0
+
+
+def _source(given: ProjectOptions, chosen: Exporter) -> Source:
+    """What an exporter makes a file of. Raises InputError, of code Usage where the exporter does
+    not take such a file."""
+    from factory.foreign_nets.pnml_reader import load_net
+    from factory.pipeline import read
+    from factory.record.log import is_log, read_log
+    from factory.support.files import is_net
+
+    file, settings, ground = given.file, given.settings(), given.ground()
+    kind = "a log" if is_log(file) else "a net in PNML" if is_net(file) else "a PAG"
+    wanted = TAKEN[chosen.takes]
+    if kind not in wanted:
+        message = f"{chosen.format} is made from {' or '.join(wanted)}; '{file}' is {kind}"
+        hint = f"give {wanted[0]}"
+        if chosen.takes == "log":
+            hint = "keep one first: `factory run FILE.pag --log OUT`"
+        raise InputError(Diagnostic("Usage", message, None, hint))
+    if kind == "a log":
+        return read_log(file)
+    if kind == "a PAG":
+        return read(file, given.folders, settings, ground)
+    return load_net(file)
 
 
 def _exporter(form: str, of: str) -> Exporter:
@@ -113,13 +122,6 @@ def _writable(file: Path, output: Path | None, whole: bool, chosen: Exporter) ->
         writable(file, output)
 
 
-def _warn(subject: Subject, quiet: bool) -> None:
-    """Warnings of the geometry, where an exporter looked at it."""
-    source = subject.__dict__.get("source")
-    if source is not None and "product" in source.__dict__:
-        warn(source.product.warnings, quiet)
-
-
 def _files(made: Made, output: Path | None, whole: bool) -> dict[Path, bytes]:
     """What is to be written where. Raises InputError (Usage) where several files have no place."""
     if not isinstance(made, Mapping):
@@ -130,12 +132,3 @@ def _files(made: Made, output: Path | None, whole: bool) -> dict[Path, bytes]:
         raise InputError(Diagnostic("Usage", message, None, "give -o OUT for the first of them"))
     folder = output if whole else output.parent
     return {folder / name if name else output: content for name, content in made.items()}
-
-
-def _tell(form: str, made: Made, output: Path | None, files: list[Path], as_json: bool) -> None:
-    text = {"text": made} if output is None else {}
-    if as_json:
-        shown = str(output) if output else None
-        emit({"format": form, "output": shown, "files": [str(f) for f in files], **text})
-    elif output is None and isinstance(made, str):
-        say(made.rstrip("\n"))

@@ -4,24 +4,18 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
 import click
 
-from factory.commands.options import (
-    FLOOR,
-    MOTION,
-    OUTPUT,
-    PATH,
-    RELAY,
-    SOURCE,
-    Number,
-    plan,
-    settings_of,
-    writable,
-    writable_folder,
-)
+from factory.commands.options import FLOOR, MOTION, OUTPUT, PATH, RELAY, SOURCE, Number
+from factory.commands.outputs import writable, writable_folder
+from factory.commands.requests import OutputOptions, ProjectOptions
 from factory.support.console import emit, say, table, warn
+
+if TYPE_CHECKING:
+    from factory.study.fidelity.convergence import Study
+    from factory.study.fidelity.record import Fidelity
 
 
 @click.command()
@@ -52,8 +46,8 @@ from factory.support.console import emit, say, table, warn
 @MOTION
 @OUTPUT
 def fidelity(
-    file: Path,
-    folders: tuple[Path, ...],
+    given: ProjectOptions,
+    out: OutputOptions,
     seeds: int,
     units: int | None,
     jitter: float,
@@ -61,11 +55,6 @@ def fidelity(
     convergence: bool,
     output: Path | None,
     max_time: float | None,
-    floor: str | None,
-    as_json: bool,
-    quiet: bool,
-    verbose: bool,
-    **options: Any,
 ) -> int:
     """Compare FILE.pag in MuJoCo with the ideal world over the same seeds."""
     from factory.nets.verify import proved
@@ -79,13 +68,13 @@ def fidelity(
     check_report(output)
     if output is not None:
         is_file = output.suffix.lower() == ".json"
-        writable(file, output) if is_file else writable_folder(output)
-    settings = settings_of(file, options)
-    _, factory, layout = plan(file, folders, settings, floor, options)
-    proved(factory.net)
-    warn(layout.product.warnings, quiet)
+        writable(given.file, output) if is_file else writable_folder(output)
+    project = given.project()
+    layout, settings = project.layout, project.settings
+    proved(layout.factory.net)
+    warn(layout.product.warnings, out.quiet)
     jobs = jobs or cores()
-    with RunsBar(seeds + (runs() if convergence else 0), 0, quiet or as_json) as bar:
+    with RunsBar(seeds + (runs() if convergence else 0), 0, out.silent) as bar:
 
         def done(finished: int) -> None:
             bar.advance()
@@ -94,10 +83,10 @@ def fidelity(
         case = Case(layout, units, jitter, settings, max_time)
         studied = study(case, 0, jobs, done) if convergence else None
     written = [] if output is None else write_report(output, found, studied)
-    if as_json:
+    if out.as_json:
         emit(document(found, studied))
-    elif not quiet:
-        _tell(found, studied, verbose)
+    elif not out.quiet:
+        _tell(found, studied, out.verbose)
         for path in written:
             say(f"wrote {path}")
     for trouble in (t for record in found.seeds for t in record.trouble):
@@ -105,7 +94,7 @@ def fidelity(
     return 0 if found.passed else 1
 
 
-def _tell(found: Any, studied: Any, verbose: bool) -> None:
+def _tell(found: Fidelity, studied: Study | None, verbose: bool) -> None:
     """The figures as a table for people."""
     from factory.study.fidelity import QUANTITIES
     from factory.study.fidelity.report import remark, shown

@@ -2,26 +2,34 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
 from factory.commands.options import OUTPUT, PATH
+from factory.commands.requests import OutputOptions
 from factory.support.console import emit, say
+
+if TYPE_CHECKING:
+    from factory.record.monitor import Report
+
+SHOWN = 8
+"""The most violations that are printed, unless `-v` asks for all."""
 
 
 @click.command()
 @click.argument("file", metavar="LOG", type=PATH)
 @OUTPUT
-def monitor(file: Path, as_json: bool, quiet: bool, verbose: bool) -> int:
+def monitor(file: Path, out: OutputOptions) -> int:
     """Judge the run in a LOG that `run --log` has kept against its net, from its states alone."""
-    from factory.commands.run_factory import say_violations, verdict
     from factory.record.log import read_log
     from factory.record.monitor.record import watch_log
 
     log = read_log(file)
     report, subject = watch_log(log)
-    if as_json:
+    if out.as_json:
         document = {
             "log": str(file),
             "product": subject.factory.pag.root,
@@ -31,11 +39,25 @@ def monitor(file: Path, as_json: bool, quiet: bool, verbose: bool) -> int:
             "monitor_time_s": report.time_s,
         }
         emit(document)
-    elif not quiet:
+    elif not out.quiet:
         say(verdict(report))
-        for firing in (*report.seen, *report.inferred) if verbose else ():
+        for firing in (*report.seen, *report.inferred) if out.verbose else ():
             how = "inferred" if firing.seen is None else "seen"
             span = f"{firing.earliest:.3f} to {firing.latest:.3f} s"
             say(f"  {firing.transition} of unit {firing.unit}: {how}, {span}")
-    say_violations(report, len(report.violations) if verbose else 8)
+    say_violations(report, len(report.violations) if out.verbose else SHOWN)
     return 0 if report.refines_net else 1
+
+
+def verdict(report: Report) -> str:
+    """What a monitor found, in a line for people."""
+    counts = f"{len(report.seen)} firings seen, {len(report.inferred)} inferred"
+    if report.refines_net:
+        return f"monitor: {counts}; they explain the run"
+    return f"monitor: {counts}; {len(report.violations)} VIOLATIONS"
+
+
+def say_violations(report: Report | None, shown: int = SHOWN) -> None:
+    """The first violations, on stderr."""
+    for violation in report.violations[:shown] if report else ():
+        print(violation.diagnostic(), file=sys.stderr)

@@ -5,9 +5,12 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-import numpy as np
+import click
 
-from factory.problem.pag import RESERVED
+from factory.commands.options import OUTPUT, PATH
+from factory.commands.outputs import writable_folder
+from factory.commands.requests import OutputOptions
+from factory.support.console import emit, say
 from factory.support.errors import Diagnostic, InputError
 
 TEXTS = {"{name}.pag": "product.pag", "factory.toml": "factory.toml", "README.md": "README.md"}
@@ -16,10 +19,44 @@ TEXTS = {"{name}.pag": "product.pag", "factory.toml": "factory.toml", "README.md
 LABELS = ("bell", "neck", "grip", "knob", "top", "stem")
 """What the parts of the product are called."""
 
+BELL = "0 50, 17 50, 22 30, 36 0, 40 0, 40 4, 26 30, 22 52, 16 60, 0 60"
+GRIP = "0 0, 9 0, 12 15, 13 32, 10 52, 7 60, 0 60"
+"""Radius and height along the outlines of turned parts [mm]."""
+
+
+@click.command()
+@click.argument("name", type=PATH)
+@OUTPUT
+def new(name: Path, out: OutputOptions) -> int:
+    """Write a small product to start from in a new folder NAME."""
+    from factory.support.files import write_all
+
+    files = {name / path: content for path, content in starter(name.name).items()}
+    if name.is_symlink() or (name.exists() and not _is_empty(name)):
+        message, hint = f"'{name}' is there already", "choose another name"
+        raise InputError(Diagnostic("BadFile", message, None, hint))
+    writable_folder(name)
+    write_all(files)
+    if out.as_json:
+        emit({"folder": str(name), "files": [str(path) for path in files]})
+    elif not out.quiet:
+        say(f"{name}: {len(files)} files")
+        for path in files if out.verbose else ():
+            say(f"  {path}")
+        say(f"  cd {name}")
+        say(f"  factory run {name.name}.pag --units 3")
+    return 0
+
+
+def _is_empty(folder: Path) -> bool:
+    return folder.is_dir() and not any(folder.iterdir())
+
 
 def starter(name: str) -> dict[str, bytes]:
     """The files of a product called `name`, by their paths. Raises InputError (BadValue) for a name
     that no product can have."""
+    from factory.problem.pag import RESERVED
+
     if not re.fullmatch(r"[A-Za-z0-9_][A-Za-z0-9_\-]{0,60}", name) or name in (*RESERVED, *LABELS):
         message = f"'{name}' cannot be the name of a product"
         hint = "letters, digits, '_' and '-'; not the name of one of its parts"
@@ -33,13 +70,9 @@ def starter(name: str) -> dict[str, bytes]:
     return {path: text.encode() for path, text in files.items()} | meshes
 
 
-BELL = "0 50, 17 50, 22 30, 36 0, 40 0, 40 4, 26 30, 22 52, 16 60, 0 60"
-GRIP = "0 0, 9 0, 12 15, 13 32, 10 52, 7 60, 0 60"
-"""Radius and height along the outlines of turned parts [mm]."""
-
-
 def turned(outline: str) -> bytes:
     """A binary STL of what a lathe makes of an outline, in millimetres."""
+    import numpy as np
     import trimesh
 
     points = np.array([point.split() for point in outline.split(",")], float)

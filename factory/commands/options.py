@@ -3,20 +3,19 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable
+from dataclasses import fields
+from functools import wraps
 from math import isfinite
 from pathlib import Path
-from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import Any, TypeVar, cast
 
 import click
 from click.core import ParameterSource
 from click.shell_completion import CompletionItem
 
+from factory.commands.requests import OutputOptions, PictureOptions, ProjectOptions, RunOptions
 from factory.support.errors import Diagnostic, InputError
-
-if TYPE_CHECKING:
-    from factory.layout.request import Ground
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -49,6 +48,8 @@ PAG_PATH = PagPath(path_type=Path, readable=False)
 
 
 def options(*decorators: Callable[[F], F]) -> Callable[[F], F]:
+    """Several decorators as one."""
+
     def decorate(function: F) -> F:
         for decorator in reversed(decorators):
             function = decorator(function)
@@ -57,11 +58,28 @@ def options(*decorators: Callable[[F], F]) -> Callable[[F], F]:
     return decorate
 
 
+def gathered(kind: type, name: str) -> Callable[[F], F]:
+    """Gives a command the options that are fields of a dataclass as one value, by this name."""
+    names = [field.name for field in fields(kind)]
+
+    def decorate(command: F) -> F:
+        @wraps(command)
+        def call(**given: Any) -> Any:
+            own = {key: given.pop(key) for key in names if key in given}
+            return command(**given, **{name: kind(**own)})
+
+        return cast("F", call)
+
+    return decorate
+
+
 OUTPUT = options(
     click.option("--json", "as_json", is_flag=True, help="One JSON document on stdout."),
     click.option("-q", "--quiet", is_flag=True, help="No progress, no warnings."),
     click.option("-v", "--verbose", is_flag=True, help="Say more."),
+    gathered(OutputOptions, "out"),
 )
+PROJECT = gathered(ProjectOptions, "given")
 SOURCE = options(
     click.argument("file", type=PAG_PATH),
     click.option(
@@ -71,6 +89,7 @@ SOURCE = options(
         type=PATH,
         help="A folder of further operations, searched first (repeatable).",
     ),
+    PROJECT,
 )
 
 
@@ -132,6 +151,7 @@ RELAY = options(
 WIP = click.option(
     "--wip", type=click.IntRange(1, 10**9), help="Copies of each part let in at once."
 )
+RUNS = gathered(RunOptions, "asked")
 DRAW = options(
     click.option("--seed", type=click.IntRange(0), default=0, help="Of what jitter draws."),
     click.option(
@@ -162,6 +182,7 @@ RUN = options(
     click.option(
         "--max-time", type=Number(0, min_open=True), help="Stop after this simulated time [s]."
     ),
+    RUNS,
 )
 PICTURE = options(
     click.option("--size", default="1280x720", help="Of the picture, as 1280x720."),
@@ -176,23 +197,10 @@ PICTURE = options(
     ),
     click.option("--title", default="", help="Shown at the beginning of a film."),
     click.option("--poster", type=PATH, help="A still of a film's best moment (.png)."),
+    gathered(PictureOptions, "shown"),
 )
-OF_A_PICTURE = ("size", "fps", "camera", "panels", "title", "poster")
+OF_A_PICTURE = tuple(field.name for field in fields(PictureOptions))
 """The parameters of PICTURE."""
-
-
-def settings_of(file: Path, options: dict[str, Any]) -> Any:
-    """Options before the environment, that before the `factory.toml` beside the PAG or in the
-    current folder."""
-    from factory.support.settings import environment
-    from factory.support.user_defaults import defaults_for
-
-    names = ("speed", "acceleration", "force", "timestep", "substeps", "clearance")
-    given = {name: options.get(name) for name in names}
-    if (stage := options.get("stage")) is not None:
-        given["stage"] = int(stage)
-    settings = defaults_for(file).settings().with_options(environment())
-    return settings.with_options(given)
 
 
 def for_a_pag(file: Path, kind: str, *but: str) -> None:
@@ -210,93 +218,3 @@ def for_a_pag(file: Path, kind: str, *but: str) -> None:
     if given:
         messages = [f"{option} is for a PAG; '{file}' is {kind}" for option in given]
         raise InputError(Diagnostic("Usage", told, None, "leave it out") for told in messages)
-
-
-def pair(text: str | None, option: str, example: str, number: type) -> tuple[Any, Any] | None:
-    """`4x3` as two positive numbers."""
-    if text is None:
-        return None
-    try:
-        width, depth = (number(word) for word in text.lower().split("x"))
-        if "_" in text or not (0 < width < float("inf") and 0 < depth < float("inf")):
-            raise ValueError
-    except ValueError:
-        message = f"{option} takes two positive numbers, not '{text}'"
-        raise InputError(
-            Diagnostic("BadValue", message, None, f"for example {option} {example}")
-        ) from None
-    return width, depth
-
-
-def plan(
-    file: Path,
-    folders: Sequence[Path],
-    settings: Any,
-    floor: str | None,
-    options: Mapping[str, Any] = MappingProxyType({}),
-) -> tuple[Any, Any, Any]:
-    """PAG to layout; warnings on stderr. Gives source, factory and layout. `options`: those of
-    RELAY, where a command has them."""
-    from factory.pipeline import read
-
-    source = read(file, folders)
-    factory, product = source.compile(), source.product
-    layout = ground(floor, options).lay_out(factory, product, settings)
-    return source, layout.factory, layout
-
-
-def ground(floor: str | None, options: Mapping[str, Any]) -> Ground:
-    """What FLOOR and RELAY ask for. Raises InputError (Usage)."""
-    from factory.layout.request import Ground
-
-    room = pair(floor, "--floor", "4x3", float)
-    return Ground(room, bool(options.get("relay")), options.get("cycle"))
-
-
-def writable(file: Path | None, *outputs: Path | None) -> None:
-    """Output files must be such that they can be written: their folder there and writable,
-    themselves no folder, all different, and none the input. Raises InputError (BadFile) with every
-    fault."""
-    taken = {} if file is None else {os.path.realpath(file): "the input"}
-    faults = []
-    for path in outputs:
-        if path is None:
-            continue
-        trouble = _unwritable(path)
-        place = os.path.realpath(path)
-        if trouble is None and place in taken:
-            trouble = f"'{path}' is {taken[place]}", "give another name"
-        if trouble is not None:
-            faults.append(Diagnostic("BadFile", trouble[0], None, trouble[1]))
-        elif path.exists() and not path.is_file():
-            continue
-        taken[place] = "given twice"
-    if faults:
-        raise InputError(faults)
-
-
-def _unwritable(path: Path) -> tuple[str, str] | None:
-    """What is wrong with an output file, and what would mend it."""
-    folder = path.parent
-    if path.is_dir():
-        return f"'{path}' is a folder", "give the name of a file"
-    if not folder.exists():
-        return f"the folder '{folder}' does not exist", f"mkdir -p {folder}"
-    if not folder.is_dir():
-        return f"'{folder}' is not a folder", "choose another place"
-    if not os.access(path if path.exists() else folder, os.W_OK):
-        return f"'{path}' may not be written", "choose another place, or change its permissions"
-    return None
-
-
-def writable_folder(path: Path | None) -> None:
-    """A folder to be written into, or made. Raises InputError (BadFile)."""
-    if path is None:
-        return
-    there = next(f for f in (path, *path.absolute().parents) if f.exists())
-    if not there.is_dir():
-        message, hint = f"'{there}' is a file, not a folder", "-o takes the name of a folder"
-        raise InputError(Diagnostic("BadFile", message, None, hint))
-    if not os.access(there, os.W_OK | os.X_OK):
-        message, hint = f"'{there}' may not be written", "choose another place"
-        raise InputError(Diagnostic("BadFile", message, None, hint))

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import sys
+from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
@@ -16,17 +17,19 @@ from factory.commands.options import (
     OUTPUT,
     PATH,
     RELAY,
+    RUNS,
     SOURCE,
     WIP,
     Number,
     for_a_pag,
-    plan,
-    settings_of,
-    writable,
 )
+from factory.commands.outputs import writable
+from factory.commands.requests import OutputOptions, ProjectOptions, RunOptions
+from factory.commands.run import run_project, summarise
 from factory.support.console import emit, say, warn
 
 if TYPE_CHECKING:
+    from factory.show.report.recording import Recording
     from factory.simulation.run import Run
 
 
@@ -37,32 +40,24 @@ if TYPE_CHECKING:
 @DRAW
 @WIP
 @click.option("--max-time", type=Number(0, min_open=True), help="Stop after this time [s].")
+@RUNS
 @FLOOR
 @RELAY
 @MOTION
 @OUTPUT
-def report(
-    file: Path,
-    folders: tuple[Path, ...],
-    output: Path,
-    floor: str | None,
-    as_json: bool,
-    quiet: bool,
-    verbose: bool,
-    **options: Any,
-) -> int:
+def report(given: ProjectOptions, asked: RunOptions, out: OutputOptions, output: Path) -> int:
     """Write one HTML page about a run of FILE.pag, or the run in a LOG that `run --log` kept."""
     from factory.record.log import is_log
     from factory.show.report import page, recording_of
     from factory.support.files import write_text
 
-    writable(file, output)
+    writable(given.file, output)
     run = None
-    if is_log(file):
-        for_a_pag(file, "a log", "output")
-        recording = recording_of(file)
+    if is_log(given.file):
+        for_a_pag(given.file, "a log", "output")
+        recording = recording_of(given.file)
     else:
-        recording, run = _run(file, folders, floor, quiet, as_json, options)
+        recording, run = _run(given, asked, out)
     text = page(recording)
     write_text(output, text)
     size = len(text.encode())
@@ -73,39 +68,28 @@ def report(
         "sim_time_s": round(recording.end, 6),
         "predicted": recording.layout is not None,
     }
-    if as_json:
+    if out.as_json:
         emit(document)
-    elif not quiet:
+    elif not out.quiet:
         say(f"{output}: {size / 1e6:.1f} MB, {recording.end:.2f} s of a run")
         if recording.missing:
             say(f"  no predictions: {recording.missing}")
-        if run is not None and verbose:
-            from factory.commands.run_factory import summarise
-
-            summarise(run, recording.factory, verbose)
+        if run is not None and out.verbose:
+            summarise(run, recording.factory, out.verbose)
     return 0 if run is None or run.succeeded else 1
 
 
-def _run(
-    file: Path,
-    folders: tuple[Path, ...],
-    floor: str | None,
-    quiet: bool,
-    as_json: bool,
-    options: dict[str, Any],
-) -> tuple[Any, Run]:
-    """A run to be told about, with its log in a folder that is gone afterwards."""
-    from factory.commands.run_factory import run_file
+def _run(given: ProjectOptions, asked: RunOptions, out: OutputOptions) -> tuple[Recording, Run]:
+    """A run in which no parts fuse, as the report follows each part by itself; its log is in a
+    folder that is removed afterwards."""
     from factory.show.report import recording_of
 
-    settings = settings_of(file, options)
-    options = {**options, "fuse": False}  # each part is told of by itself
-    source, _, layout = plan(file, folders, settings, floor, options)
-    warn(layout.product.warnings, quiet)
+    project = given.project()
+    warn(project.layout.product.warnings, out.quiet)
     with TemporaryDirectory(prefix="factory-") as folder:
         log = Path(folder) / "run.log"
-        run = run_file(source, layout, settings, None, log, None, quiet or as_json, options)
-        recording = recording_of(log, layout)
+        run = run_project(project, replace(asked, fuse=False), out.silent, log)
+        recording = recording_of(log, project.layout)
     if run.trouble is not None:
         print(run.trouble, file=sys.stderr)
     return recording, run

@@ -1,30 +1,39 @@
-"""The commands `run` and `render`."""
+"""The command `run`, and how a simulation is carried out for any command."""
 
 from __future__ import annotations
 
 import sys
+from collections.abc import Callable, Sequence
+from contextlib import AbstractContextManager, ExitStack
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
-from factory.commands.options import (
-    FLOOR,
-    MOTION,
-    OF_A_PICTURE,
-    OUTPUT,
-    PATH,
-    PICTURE,
-    RELAY,
-    RUN,
-    SOURCE,
-    for_a_pag,
-    pair,
-    plan,
-    settings_of,
-    writable,
+from factory.commands.monitor import say_violations, verdict
+from factory.commands.options import FLOOR, MOTION, OUTPUT, PATH, PICTURE, RELAY, RUN, SOURCE
+from factory.commands.outputs import writable
+from factory.commands.requests import (
+    OutputOptions,
+    PictureOptions,
+    ProjectOptions,
+    RunOptions,
+    check_ideal,
 )
-from factory.support.console import emit, say, warn
+from factory.support.console import emit, say, table, warn
+from factory.support.errors import Diagnostic, InputError
+
+if TYPE_CHECKING:
+    from factory.pipeline import Project
+    from factory.plant.factory import Factory
+    from factory.render import Film
+    from factory.simulation.run import Run
+    from factory.simulation.simulation import Observer, Simulation
+
+    Filming = Callable[[Simulation], Film]
+    Recorder = Callable[[], AbstractContextManager[Any]]
+    """Opens what observes a run within a context, such as a log."""
 
 
 @click.command()
@@ -44,88 +53,149 @@ from factory.support.console import emit, say, warn
 @MOTION
 @OUTPUT
 def run(
-    file: Path,
-    folders: tuple[Path, ...],
+    given: ProjectOptions,
+    asked: RunOptions,
+    shown: PictureOptions,
+    out: OutputOptions,
     video: Path | None,
     log: Path | None,
-    floor: str | None,
-    as_json: bool,
-    quiet: bool,
-    verbose: bool,
-    **options: Any,
+    monitor: bool,
 ) -> int:
     """Run FILE.pag until its products are dropped off."""
-    from factory.commands.run_factory import run_file, say_violations
-
-    writable(file, video, log, options["poster"])
-    settings = settings_of(file, options)
-    source, factory, layout = plan(file, folders, settings, floor, options)
-    warn(layout.product.warnings, quiet)
-    size = pair(options["size"], "--size", "1280x720", int)
-    record = run_file(source, layout, settings, video, log, size, quiet or as_json, options)
-    if as_json:
+    writable(given.file, video, log, shown.poster)
+    project = given.project()
+    layout = project.layout
+    warn(layout.product.warnings, out.quiet)
+    shown.area()
+    if asked.world == "ideal":
+        check_ideal(asked.fuse, monitor)
+    film = _film(project, asked, video, shown)
+    record = run_project(project, asked, out.silent, log, film, monitor)
+    if out.as_json:
         document = record.as_json()
         document.pop("schema")
         trouble = [record.trouble.as_json()] if record.trouble else []
         emit({**document, **({"errors": trouble} if trouble else {})})
-    elif not quiet:
-        from factory.commands.run_factory import summarise
-
-        summarise(record, factory, verbose)
+    elif not out.quiet:
+        summarise(record, layout.factory, out.verbose)
     say_violations(record.monitor)
     if record.trouble is not None:
         print(record.trouble, file=sys.stderr)
     return 0 if record.succeeded else 1
 
 
-@click.command()
-@SOURCE
-@click.option(
-    "-o",
-    "--output",
-    type=PATH,
-    required=True,
-    help="OUT.mp4, or OUT.png for a still.",
-)
-@click.option("--at", default="end", help="Time of a still [s], or `end`.")
-@RUN
-@PICTURE
-@FLOOR
-@RELAY
-@MOTION
-@OUTPUT
-def render(
-    file: Path,
-    folders: tuple[Path, ...],
-    output: Path,
-    at: str,
-    floor: str | None,
-    as_json: bool,
-    quiet: bool,
-    verbose: bool,
-    **options: Any,
-) -> int:
-    """Film FILE.pag, or a LOG that `run --log` has kept, headless through EGL."""
-    from factory.commands.run_factory import render_file, simulation
-    from factory.record.log import is_log
+def _film(
+    project: Project, asked: RunOptions, video: Path | None, shown: PictureOptions
+) -> Filming | None:
+    """What films a run as the options ask; None without a film. Raises InputError for what cannot
+    be filmed, MissingError where there is no GL."""
+    if video is None:
+        if shown.poster is not None:
+            message = "--poster is of a film, and there is none"
+            raise InputError(Diagnostic("Usage", message, None, "give --video OUT.mp4 as well"))
+        return None
+    if asked.world == "ideal":
+        message = "the ideal world has no bodies to film"
+        raise InputError(Diagnostic("Usage", message, None, "leave out --world ideal"))
+    from factory.render import Film, check_output
+    from factory.support.gl import probe
 
-    if is_log(file):
-        for_a_pag(file, "a log", "output", "at", *OF_A_PICTURE)
-    writable(file, output, options["poster"])
-    size = pair(options["size"], "--size", "1280x720", int) or (1280, 720)
+    check_output(video, shown.area(), shown.fps)
+    picture = shown.picture([part.label for part in project.factory.leaves])
+    probe()
+    return lambda made: Film(made, video, picture, shown.fps, shown.poster)
 
-    def prepare() -> Any:
-        settings = settings_of(file, options)
-        source, _, layout = plan(file, folders, settings, floor, options)
-        warn(layout.product.warnings, quiet)
-        return simulation(source, layout, settings, options)
 
-    document = render_file(file, output, at, size, quiet or as_json, options, prepare)
-    if as_json:
-        emit(document)
-    elif not quiet:
+def run_project(
+    project: Project,
+    asked: RunOptions,
+    silent: bool,
+    log: Path | None = None,
+    film: Filming | None = None,
+    monitor: bool = False,
+) -> Run:
+    """One run, with the log, the film and the judgement of a monitor that are asked for."""
+    from factory.nets.verify import proved
+    from factory.simulation.simulation import Simulation
+
+    proved(project.factory.net)
+    seen = log is not None or film is not None or monitor
+    made = Simulation(project.layout, asked.request(project, seen))
+    recorders: list[Recorder] = []
+    if log is not None:
+        from factory.record.log import LogWriter
+
+        recorders.append(lambda: LogWriter(log, made, project.pag))
+    if film is not None:
+        recorders.append(lambda: film(made))
+    if not monitor:
+        return carry_out(made, silent, asked.max_time, recorders)
+    from factory.record.monitor import beside
+
+    watcher = beside(made)
+    record = carry_out(made, silent, asked.max_time, recorders, [watcher.observe])
+    report = watcher.report()
+    return replace(record, monitor=report, refines_net=record.refines_net and report.refines_net)
+
+
+def carry_out(
+    made: Simulation,
+    silent: bool,
+    max_time: float | None = None,
+    recorders: Sequence[Recorder] = (),
+    watchers: Sequence[Observer] = (),
+) -> Run:
+    """A run with a progress bar. A signal ends it at the end of a tick, so that the recorders'
+    files are complete."""
+    from factory.support.interruption import Interruption
+    from factory.support.progress import Progress
+
+    with Interruption() as stop, ExitStack() as stack:
+        opened = [stack.enter_context(recorder()).observe for recorder in recorders]
+        bar = stack.enter_context(Progress(made.request.units, silent))
+        return made.run([*watchers, *opened], max_time, [stop.observe, bar.observe])
+
+
+def summarise(record: Run, factory: Factory, verbose: bool) -> None:
+    """A run in a few lines for people."""
+    cycle = f"{record.cycle_time_s:.3f} s" if record.cycle_time_s is not None else "not yet steady"
+    say(
+        f"{record.products} of {record.units} products in {record.sim_time_s:.2f} s "
+        f"({record.realtime_factor:.1f} times real time, {record.world})"
+    )
+    say(
+        f"cycle time {cycle}, predicted {record.predicted_cycle_time_s:.3f} s; "
+        f"bottleneck {record.bottleneck}"
+    )
+    say(
+        f"{len(record.events)} transitions fired, "
+        f"the record {'refines' if record.refines_net else 'DOES NOT REFINE'} the net"
+    )
+    physics = record.physics
+    if physics is not None:
+        chosen = physics.timestep_chosen
+        how = "chosen for what it carries (--timestep)" if chosen else "as asked for"
+        say(f"timestep {1000 * physics.timestep_s:g} ms, {how}")
+        error = physics.product_error_max_mm
         say(
-            f"{output}: {document['frames']} frames of {document['width']}x{document['height']}, "
-            f"{document['seconds']:.1f} s"
+            f"{physics.handoffs} hand-offs, gap at most {physics.handoff_gap_max_mm:.3f} mm; "
+            f"product error {'none measured' if error is None else f'{error:.3f} mm'}; "
+            f"{physics.unintended_contacts} unintended contacts, "
+            f"{physics.engine_warnings} engine warnings"
         )
-    return 0
+        for pair in physics.contacts[:8]:
+            say(f"  touched: {pair}")
+        if physics.mating_forces:
+            most = max(physics.mating_forces, key=physics.mating_forces.__getitem__)
+            say(f"inputs pressed on each other with {physics.mating_force_max_n:.3f} N in {most}")
+        if physics.excluded:
+            say(f"{len(physics.excluded)} pairs that clash when joined pass through each other")
+        for one, other in physics.excluded if verbose else ():
+            say(f"  left out: {one} - {other}")
+        if physics.fused:
+            say("parts joined for good are one rigid body (--no-fuse keeps them apart)")
+    if record.monitor is not None:
+        say(verdict(record.monitor))
+    busy = sorted(zip(factory.robots, record.utilisation, strict=True), key=lambda p: -p[1])
+    rows = [(r.name, r.type, f"{100 * u:.0f} %") for r, u in (busy if verbose else busy[:6])]
+    table("Utilisation", ("robot", "type", "busy"), rows)

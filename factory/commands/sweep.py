@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -13,15 +14,14 @@ from factory.commands.options import (
     MOTION,
     OUTPUT,
     PATH,
+    PROJECT,
     RELAY,
     WIP,
     Number,
-    ground,
-    plan,
-    settings_of,
-    writable,
-    writable_folder,
+    gathered,
 )
+from factory.commands.outputs import writable, writable_folder
+from factory.commands.requests import OutputOptions, ProjectOptions, check_ideal
 from factory.support.console import emit, say, table, warn
 from factory.support.errors import Diagnostic, InputError
 
@@ -30,11 +30,27 @@ if TYPE_CHECKING:
     from factory.study.sweep.sweeping import Tally
 
 SHOWN = 8
-"""So many reasons of failed runs are told."""
+"""The most reasons of failed runs that are printed."""
+
+
+@dataclass(frozen=True, slots=True)
+class SweepOptions:
+    """What all runs of a sweep share, None where it is not given, and how they are carried out."""
+
+    world: str | None
+    units: int | None
+    seed: int | None
+    jitter: float | None
+    wip: int | None
+    max_time: float | None
+    fuse: bool | None
+    jobs: int | None
+    on: str
+    retry: bool
 
 
 @click.command()
-@click.argument("file", type=PATH, required=False)
+@click.argument("source", metavar="[FILE]", type=PATH, required=False)
 @click.option("--templates", "folders", multiple=True, type=PATH, help="As of `run`.")
 @click.option(
     "--vary",
@@ -55,20 +71,21 @@ SHOWN = 8
 @WIP
 @click.option("--max-time", type=Number(0, min_open=True), help="Stop a run after this time [s].")
 @click.option("--fuse/--no-fuse", default=None, help="As of `run`.")
+@gathered(SweepOptions, "runs")
+@PROJECT
 @FLOOR
 @RELAY
 @MOTION
 @OUTPUT
 def sweep(
-    file: Path | None,
+    given: ProjectOptions,
+    runs: SweepOptions,
+    out: OutputOptions,
+    source: Path | None,
     database: Path | None,
     vary: tuple[str, ...],
     summary: bool,
     plots: Path | None,
-    as_json: bool,
-    quiet: bool,
-    verbose: bool,
-    **options: Any,
 ) -> int:
     """Run FILE.pag many times, over all combinations of what varies, into an SQLite database.
 
@@ -84,77 +101,71 @@ def sweep(
     document: dict[str, Any] = {}
     failed = False
     if vary:
-        tally, database = _carry_out(file, database, vary, quiet or as_json, options)
+        if source is None:
+            raise InputError(Diagnostic("Usage", "there is no FILE.pag", None, "see sweep --help"))
+        if database is None:
+            message, hint = "there is no database for the results", "for example -o results.db"
+            raise InputError(Diagnostic("Usage", message, None, hint))
+        tally = _carry_out(replace(given, file=source), runs, database, vary, out.silent)
         failed = tally.failed + tally.there_failed > 0
-        document = _document(tally, database, options)
-        if not (as_json or quiet):
+        document = _document(tally, database, runs.on)
+        if not out.silent:
             _tell(tally, database)
     elif not told:
         message, hint = "nothing varies", "for example --vary seed=0:100"
         raise InputError(Diagnostic("Usage", message, None, hint))
     if told:
-        document |= _summarise(database or file, plots, as_json or quiet, verbose)
-    if as_json:
+        document |= _summarise(database or source, plots, out)
+    if out.as_json:
         emit(document)
     return 1 if failed else 0
 
 
 def _carry_out(
-    file: Path | None,
-    database: Path | None,
+    given: ProjectOptions,
+    runs: SweepOptions,
+    database: Path,
     vary: tuple[str, ...],
-    quiet: bool,
-    options: dict[str, Any],
-) -> tuple[Tally, Path]:
+    silent: bool,
+) -> Tally:
     """Plan, prove and run. Raises InputError for what cannot be."""
-    from factory.commands.run_factory import check_ideal
     from factory.nets.verify import proved
-    from factory.pipeline import read
     from factory.study.pool import cores
     from factory.study.sweep.grid import DEFAULTS, SETTINGS, read_axes
     from factory.study.sweep.recipe import Recipe
     from factory.study.sweep.sweeping import LOCAL, sweep
 
-    if file is None:
-        raise InputError(Diagnostic("Usage", "there is no FILE.pag", None, "see sweep --help"))
-    if database is None:
-        message, hint = "there is no database for the results", "for example -o results.db"
-        raise InputError(Diagnostic("Usage", message, None, hint))
-    if options["on"] != LOCAL:
+    if runs.on != LOCAL:
         from factory.study.sweep.cluster import address_of
 
-        address_of(options["on"])
-    writable(file, database)
+        address_of(runs.on)
+    writable(given.file, database)
     axes = read_axes(vary)
+    asked = asdict(given) | asdict(runs)
     for axis in axes:
-        if options.get(axis.key) is not None:
+        if asked.get(axis.key) is not None:
             message = f"{axis.key} is both given and varied"
             raise InputError(Diagnostic("Usage", message, None, "leave one of them out"))
-    worlds = next((axis.values for axis in axes if axis.key == "world"), (options["world"],))
+    worlds = next((axis.values for axis in axes if axis.key == "world"), (runs.world,))
     if set(worlds) == {"ideal"}:
-        check_ideal(options)
-    settings = settings_of(file, options)
-    if any(axis.key == "clearance" for axis in axes):
-        source = read(file, options["folders"])
-        factory = source.compile()
-    else:  # a layout that cannot be is told before anything is run
-        source, factory, _ = plan(file, options["folders"], settings, options["floor"], options)
+        check_ideal(runs.fuse)
+    project = given.project()
+    varies = any(axis.key == "clearance" for axis in axes)
+    # a layout that cannot be is told before anything is run
+    factory = project.plain if varies else project.layout.factory
     proved(factory.net)
-    warn(source.product.warnings, quiet)
-    fixed = {name: getattr(settings, name) for name in SETTINGS}
-    fixed |= {k: options[k] for k in DEFAULTS if options[k] is not None}
-    most, room = options["max_time"], ground(options["floor"], options)
-    recipe = Recipe(source.compile(), source.product, fixed, most, room, options["fuse"])
-    jobs = options["jobs"] or cores()
-    done = sweep(recipe, axes, database, jobs, options["on"], options["retry"], quiet)
-    return done, database
+    warn(project.product.warnings, silent)
+    fixed = {name: getattr(project.settings, name) for name in SETTINGS}
+    fixed |= {key: asked[key] for key in DEFAULTS if asked[key] is not None}
+    recipe = Recipe(project.plain, project.product, fixed, runs.max_time, project.ground, runs.fuse)
+    return sweep(recipe, axes, database, runs.jobs or cores(), runs.on, runs.retry, silent)
 
 
-def _document(tally: Tally, database: Path, options: dict[str, Any]) -> dict[str, Any]:
+def _document(tally: Tally, database: Path, on: str) -> dict[str, Any]:
     """The keys of `sweep --json`."""
     return {
         "database": str(database),
-        "on": options["on"],
+        "on": on,
         "runs": tally.runs,
         "there": tally.there,
         "there_failed": tally.there_failed,
@@ -182,9 +193,7 @@ def _tell(tally: Tally, database: Path) -> None:
         )
 
 
-def _summarise(
-    database: Path | None, folder: Path | None, quiet: bool, verbose: bool
-) -> dict[str, Any]:
+def _summarise(database: Path | None, folder: Path | None, out: OutputOptions) -> dict[str, Any]:
     """Summarise a database, and draw it. Gives the keys of `sweep --summary --json`."""
     from factory.study.sweep.summary import summarise
     from factory.support.files import write_all
@@ -199,8 +208,8 @@ def _summarise(
 
         drawn = {folder / name: picture for name, picture in plots(found).items()}
         write_all(drawn)
-    if not quiet:
-        _tell_summary(found, verbose)
+    if not out.silent:
+        _tell_summary(found, out.verbose)
         for path in drawn:
             say(f"wrote {path}")
     return {"summary": found.as_json(), "files": [str(path) for path in drawn]}

@@ -1,4 +1,4 @@
-"""The commands `templates` and `doctor`."""
+"""The command `templates`."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from pathlib import Path
 import click
 
 from factory.commands.options import OUTPUT, PATH
+from factory.commands.requests import OutputOptions
 from factory.support.console import emit, say, table
 
 
@@ -15,14 +16,14 @@ from factory.support.console import emit, say, table
     "--templates", "folders", multiple=True, type=PATH, help="A folder of further operations."
 )
 @OUTPUT
-def templates(folders: tuple[Path, ...], as_json: bool, quiet: bool, verbose: bool) -> int:
+def templates(folders: tuple[Path, ...], out: OutputOptions) -> int:
     """List the operations and robot types there are."""
     from factory.lang.writer import write_template
     from factory.pipeline import all_templates
     from factory.problem.robot_types import load_catalogue
 
     found, catalogue = all_templates(folders), load_catalogue()
-    if as_json:
+    if out.as_json:
         emit(
             {
                 "templates": [
@@ -60,32 +61,7 @@ def templates(folders: tuple[Path, ...], as_json: bool, quiet: bool, verbose: bo
         ("name", "extends", "what it is"),
         ((r.name, r.extends, r.summary) for r in catalogue.types.values()),
     )
-    if verbose:
+    if out.verbose:
         for template in found.values():
             say(write_template(template))
     return 0
-
-
-@click.command()
-@OUTPUT
-def doctor(as_json: bool, quiet: bool, verbose: bool) -> int:
-    """Say what works on this machine, and what would mend the rest."""
-    from factory.commands.doctor import examine
-
-    findings = examine()
-    good = all(f.ok for f in findings)
-    if as_json:
-        emit(
-            {
-                "ok": good,
-                "checks": [
-                    {"name": f.name, "ok": f.ok, "found": f.found, "mend": f.mend} for f in findings
-                ],
-            }
-        )
-    else:
-        for finding in findings:
-            say(f"{'ok     ' if finding.ok else 'MISSING'} {finding.name}: {finding.found}")
-            if not finding.ok:
-                say(f"        {finding.mend}")
-    return 0 if good else 3

@@ -3,26 +3,20 @@
 from __future__ import annotations
 
 import sys
-from pathlib import Path
-from typing import Any
+from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import click
 
-from factory.commands.options import (
-    DRAW,
-    FLOOR,
-    MOTION,
-    OUTPUT,
-    RELAY,
-    SOURCE,
-    WIP,
-    plan,
-    settings_of,
-)
+from factory.commands.options import DRAW, FLOOR, MOTION, OUTPUT, RELAY, RUNS, SOURCE, WIP
+from factory.commands.requests import OutputOptions, ProjectOptions, RunOptions
 from factory.support.console import emit, say, warn
 
+if TYPE_CHECKING:
+    from factory.show.live import Server
+
 FOR_EVER = 10**9
-"""Units of a run that nobody has finished yet."""
+"""Units of a run that does not end by itself."""
 
 
 @click.command()
@@ -33,40 +27,37 @@ FOR_EVER = 10**9
 @click.option("--paused", is_flag=True, help="Wait for somebody to press Play.")
 @DRAW
 @WIP
+@RUNS
 @FLOOR
 @RELAY
 @MOTION
 @OUTPUT
 def view(
-    file: Path,
-    folders: tuple[Path, ...],
+    given: ProjectOptions,
+    asked: RunOptions,
+    out: OutputOptions,
     port: int,
     host: str,
     expose: bool,
     paused: bool,
-    floor: str | None,
-    as_json: bool,
-    quiet: bool,
-    verbose: bool,
-    **options: Any,
 ) -> int:
     """Run FILE.pag for ever and show it in a browser: pause it, push robots, block feeders."""
-    from factory.commands.run_factory import simulation
     from factory.nets.verify import proved
     from factory.show.live import Server, Session
     from factory.show.live.page import page
     from factory.show.live.server import check_server
+    from factory.simulation.simulation import Simulation
     from factory.support.interruption import Interruption
 
     check_server(host, expose)
-    settings = settings_of(file, options)
-    source, factory, layout = plan(file, folders, settings, floor, options)
-    proved(factory.net)
-    warn(layout.product.warnings, quiet)
-    options |= {"units": FOR_EVER, "fuse": False}
-    session = Session(lambda: simulation(source, layout, settings, options), not paused)
+    project = given.project()
+    layout = project.layout
+    proved(layout.factory.net)
+    warn(layout.product.warnings, out.quiet)
+    request = replace(asked, units=FOR_EVER, fuse=False).request(project)
+    session = Session(lambda: Simulation(layout, request), not paused)
     with Interruption() as stop, Server(session, page(session), host, port, expose) as server:
-        if as_json:
+        if out.as_json:
             emit({"address": server.address, "host": host, "port": server.port})
         else:
             _tell(server, host, expose)
@@ -75,8 +66,8 @@ def view(
     return 0
 
 
-def _tell(server: Any, host: str, expose: bool) -> None:
-    """Where to look; also with --quiet, for it cannot be guessed."""
+def _tell(server: Server, host: str, expose: bool) -> None:
+    """The address; printed with --quiet too, since it cannot be guessed."""
     say(f"{server.address}  (Ctrl-C ends it)")
     if not expose:
         there = f"ssh -L {server.port}:127.0.0.1:{server.port} THIS-MACHINE"

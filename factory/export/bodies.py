@@ -58,7 +58,7 @@ def parts_of(pag: PAG, label: str) -> list[str]:
 
 def label_of(subject: Subject) -> str:
     """The label that is asked for, the product's root where none is. Raises InputError."""
-    pag = subject.source.pag
+    pag = subject.project.pag
     return subject.choose(
         [pag.root, *(n.label for n in pag.nodes if n.label != pag.root)], "labels"
     )
@@ -71,7 +71,7 @@ def wanted(subject: Subject, ending: str) -> Iterator[tuple[str, str]]:
         yield label_of(subject), ""
         return
     taken: set[str] = set()
-    for node in subject.source.pag.postorder():
+    for node in subject.project.pag.postorder():
         name = file_name(node.label, taken)
         yield node.label, f"{name}{ending}"
 

@@ -40,7 +40,7 @@ LETTER = 17.0
 
 def export(subject: Subject) -> str:
     """The floor plan. Raises MissingError where there is no ezdxf."""
-    return write_dxf(subject.layout)
+    return write_dxf(subject.project.layout)
 
 
 def write_dxf(layout: Layout) -> str:

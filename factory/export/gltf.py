@@ -27,7 +27,7 @@ WORLD, PRODUCT = "/world", "/product"
 
 def export(subject: Subject) -> bytes | Mapping[str, bytes]:
     """The file, or those of a folder."""
-    pag, product = subject.source.pag, subject.product
+    pag, product = subject.project.pag, subject.project.product
     binary = subject.whole or subject.name.lower().endswith(".glb")
     made = {
         name: write_gltf(pag, product, label, binary) for label, name in wanted(subject, ".glb")

@@ -30,8 +30,8 @@ WAIT, RUN, LEAVE = range(3)
 
 def export(subject: Subject) -> str:
     """The programs of all robots. Raises InputError where a mode cannot be entered."""
-    layout = subject.layout
-    modes = operation_modes(layout, subject.settings.eps)
+    layout = subject.project.layout
+    modes = operation_modes(layout, subject.project.settings.eps)
     return write_st(layout, modes, subject.stem)
 
 

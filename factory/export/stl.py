@@ -24,6 +24,6 @@ def export(subject: Subject) -> bytes | Mapping[str, bytes]:
 
 def write_stl(subject: Subject, label: str) -> bytes:
     """A sub-assembly as one STL."""
-    solids = subject.product.solids
-    mesh = joined([placed(solids[p]) for p in parts_of(subject.source.pag, label)], label)
+    solids = subject.project.product.solids
+    mesh = joined([placed(solids[p]) for p in parts_of(subject.project.pag, label)], label)
     return stl(Mesh(label, mesh.vertices * MILLIMETRES, mesh.faces))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from factory.export.subject import Subject
 from factory.geometry.solids import colour
+from factory.pipeline import Project
 from factory.problem.pag import PAG, Assembly
 from factory.support.canvas import Canvas, Point, hexadecimal, shortened
 from factory.support.errors import Diagnostic, InputError
@@ -28,8 +29,8 @@ def view_of(subject: Subject) -> str:
 
 def pag_of(subject: Subject) -> PAG:
     """The assembly tree. Raises InputError (Usage) where there is none, in a net from elsewhere."""
-    if subject.kind != "a PAG":
-        message = f"'{subject.file}' is {subject.kind}, in which there is no assembly tree"
+    if not isinstance(subject.source, Project):
+        message = f"'{subject.file}' is a net in PNML, in which there is no assembly tree"
         raise InputError(Diagnostic("Usage", message, None, "give a PAG, or --of net"))
     return subject.source.pag
 

@@ -34,10 +34,11 @@ def export(subject: Subject) -> str | Mapping[str, bytes]:
     """The URDF; with its meshes, where there are any."""
     from factory.mjcf.loading import load
 
-    layout = subject.layout
-    model = physical_model(layout, 1, subject.settings, subject.source.catalogue)
+    project = subject.project
+    layout = project.layout
+    model = physical_model(layout, 1, project.settings, project.catalogue)
     folder = f"{subject.name.rpartition('.')[0] or subject.name or subject.stem}_meshes"
-    writer = _Writer(load(model), layout, subject.settings.speed, folder)
+    writer = _Writer(load(model), layout, project.settings.speed, folder)
     text = writer.text(subject.stem)
     if not writer.files:
         return text

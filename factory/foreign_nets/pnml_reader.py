@@ -5,9 +5,11 @@ from __future__ import annotations
 import re
 from collections import Counter
 from collections.abc import Iterable
+from pathlib import Path
 
 from factory.foreign_nets.pnml_gears import NetNotes, claimed
 from factory.foreign_nets.xml_tree import Element, XmlDocument
+from factory.lang.source import read_text
 from factory.nets.gears import GearNet
 from factory.nets.marked import MarkedNet
 from factory.nets.petri import PetriNet, Place, Transition
@@ -37,6 +39,12 @@ def read_pnml(text: str, file: str = "<text>") -> GearNet | MarkedNet:
     """
     document = XmlDocument(file, text.split("\n"))
     return _Reader(document).net(document.read(text, DRAWN))
+
+
+def load_net(file: Path) -> GearNet | MarkedNet:
+    """The net in a PNML file. Raises InputError as `read_pnml` does, and where the file cannot be
+    read."""
+    return read_pnml(read_text(file), str(file))
 
 
 class _Reader:

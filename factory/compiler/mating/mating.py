@@ -13,6 +13,7 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from math import ceil
 from types import MappingProxyType
+from typing import Any, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,6 +31,9 @@ from factory.support.errors import Position
 
 STRICT, NO_DEEPER, LEFT_OUT, BLOCKED = 3, 2, 1, 0
 """The levels, the strictest first."""
+
+LEVELS = ("none", "left_out", "no_deeper", "strict")
+"""The names of the levels in documents."""
 
 UPRIGHT = 2
 """The axis z, along which inputs are lowered."""
@@ -68,6 +72,39 @@ class Mating:
         """The best level of all."""
         return max(self.slide, self.lower)
 
+    def as_json(self) -> dict[str, Any]:
+        """The approach and its levels."""
+        approach = self.approach
+        return {
+            "label": self.label,
+            "inputs": list(self.inputs),
+            "kind": approach.kind,
+            "axis": "xy"[approach.axis],
+            "sides": list(approach.sides),
+            "lowered": approach.lowered or None,
+            "stroke_m": approach.stroke,
+            "level": LEVELS[self.level],
+            "slides": LEVELS[self.slide],
+            "excluded": [len(pairs) for pairs in approach.excluded],
+        }
+
+    def clashes_as_json(self) -> list[dict[str, Any]]:
+        """The pairs that clash."""
+        return [
+            {
+                "label": self.label,
+                "parts": list(clash.parts),
+                "depth_mm": round(clash.depth * 1e3, 4),
+                "finished_mm": round(clash.finished * 1e3, 4),
+                "shift_mm": round(clash.shift * 1e3, 4),
+                "side": self.approach.sides[0],
+                "file": self.position.file if self.position else None,
+                "line": self.position.line if self.position else None,
+                "col": self.position.column if self.position else None,
+            }
+            for clash in self.clashes
+        ]
+
 
 @dataclass(frozen=True)
 class Matings:
@@ -89,6 +126,16 @@ class Matings:
     def of_kind(self, kind: Kind) -> tuple[Mating, ...]:
         """The operations whose approach is of a kind."""
         return tuple(mating for mating in self.all if mating.approach.kind == kind)
+
+    def as_json(self) -> dict[str, Any]:
+        """How many operations are of each kind and attain each level, and all approaches."""
+        return {
+            "operations": len(self.all),
+            **{kind: len(self.of_kind(kind)) for kind in get_args(Kind)},
+            **{name: self.count(level) for level, name in enumerate(LEVELS) if level},
+            "tolerance_mm": TOLERANCE * 1e3,
+            "list": [mating.as_json() for mating in self.all],
+        }
 
 
 def shaped(pag: PAG) -> bool:

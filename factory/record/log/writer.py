@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from factory.lang import write_pag, write_template
-from factory.pipeline import Source
+from factory.problem.pag import PAG
 from factory.record.log.blocks import LENGTH, MAGIC, Arrays, bad_log, block, pack_rows
 from factory.record.monitor.observation import EngineView
 from factory.record.monitor.subject import subject_of_run
@@ -68,7 +68,7 @@ class _Ticks:
 class LogWriter(Closing):
     """Writes a log; to be closed, or used as a context manager.
 
-    `source`: the PAG as it was read, where the factory was compiled from more; `command`: the
+    `pag`: the PAG as it was read, where the factory was compiled from more; `command`: the
     command line, that of this process unless given. Raises InputError (BadLog) where the file
     cannot be written."""
 
@@ -76,7 +76,7 @@ class LogWriter(Closing):
         self,
         path: Path | str,
         simulation: Observed,
-        source: Source | None = None,
+        pag: PAG | None = None,
         command: Sequence[str] | None = None,
     ) -> None:
         self.path, self.world = Path(path), simulation.world
@@ -93,7 +93,7 @@ class LogWriter(Closing):
         except OSError as error:
             raise InputError(bad_log(self.path, f"cannot be written: {error.strerror}")) from error
         sizes = [len(values) for values in self._state()[:2]]
-        header = json.dumps(_header(simulation, source, command, *sizes)).encode()
+        header = json.dumps(_header(simulation, pag, command, *sizes)).encode()
         self.file.write(MAGIC + LENGTH.pack(len(header)) + header)
         if simulation.model is not None:
             files = {f"mesh/{name}": content for name, content in simulation.model.files.items()}
@@ -155,11 +155,11 @@ def _ragged(name: str, rows: Sequence[tuple[int, Any]], shape: tuple[int, ...]) 
 
 
 def _header(
-    simulation: Observed, source: Source | None, command: Sequence[str] | None, nq: int, nv: int
+    simulation: Observed, pag: PAG | None, command: Sequence[str] | None, nq: int, nv: int
 ) -> dict[str, Any]:
     layout, net = simulation.layout, simulation.layout.factory.net.threaded
     factory, plain = layout.factory, layout.plain or layout
-    given = source.pag if source else plain.factory.pag
+    given = plain.factory.pag if pag is None else pag
     file = Path(given.file)
     said = file.read_text("utf-8", errors="replace") if file.is_file() else write_pag(given)
     text = said if layout.plain is None else write_pag(factory.pag)

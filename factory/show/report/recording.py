@@ -19,12 +19,11 @@ from factory.geometry.meshes import Array
 from factory.lang import read_pag, read_template
 from factory.layout.layout import Layout
 from factory.layout.request import Ground
-from factory.pipeline import Source
+from factory.pipeline import Project
 from factory.plant.factory import Factory, Operation
 from factory.problem.pag import PAG
-from factory.problem.robot_types import load_catalogue
 from factory.problem.template import Template
-from factory.record.log import Log
+from factory.record.log import Log, read_log
 from factory.record.monitor import subject_of
 from factory.show.report.stage import DrawnFactory, stations
 from factory.study.analysis.recorded import conditions
@@ -95,7 +94,7 @@ class Recording:
 def recording_of(path: Path, layout: Layout | None = None) -> Recording:
     """The recording in a log, with the `layout` that it was made with, if given, else with one that
     is made again. Raises InputError (BadLog) where it is not a log of a run in MuJoCo."""
-    subject = Subject(path)
+    subject = Subject(path, read_log(path))
     motion, factory = motion_of(subject), compiled(subject)
     if layout is not None:
         return Recording(str(path), subject.log, motion, layout.factory, layout)
@@ -115,11 +114,10 @@ def _laid_out(log: Log, beside: Path) -> Layout:
     layout."""
     header, made = log.header, conditions(log.header)
     templates = {word: read_template(text, word) for word, text in header["templates"].items()}
-    source = Source(_pag(header["pag"], templates, beside), templates, load_catalogue())
-    factory, product = source.compile(), source.product
-    ground = header.get("ground", {})
-    floor = ground.get("floor") and tuple(map(float, ground["floor"]))
-    layout = Ground(**{**ground, "floor": floor}).lay_out(factory, product, made.settings)
+    pag, kept = _pag(header["pag"], templates, beside), header.get("ground", {})
+    floor = kept.get("floor") and tuple(map(float, kept["floor"]))
+    ground = Ground(**{**kept, "floor": floor})
+    layout = Project(pag, templates, settings=made.settings, ground=ground).layout
     goals = subject_of(layout, made.settings, made.jitter, None, made.wip).as_json()["goals"]
     if goals != header["monitor"]["goals"]:
         raise ValueError("the run was in another layout than the one its PAG gets now")

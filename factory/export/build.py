@@ -1,82 +1,86 @@
-"""The command `build`: write the model, the floor plan, the programs, the net and its proof."""
+"""The files of a build: the model, the floor plan, the programs, the net and the proofs."""
 
 from __future__ import annotations
 
 import json
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
+from factory.export.certificate.writer import certificate
+from factory.export.dot import write_dot
+from factory.export.floor_sheet import write_svg
+from factory.export.pnml import write_pnml
 from factory.layout.certificate import Certificate
-from factory.layout.layout import Layout
+from factory.layout.clearance import certify
 from factory.mjcf.binary import beside, kept, key_of, packed, seal_of, sealed
 from factory.mjcf.model import Model, model_files
+from factory.modes.modes import operation_modes
 from factory.nets.verdict import Verdict
-from factory.pipeline import Source
+from factory.pipeline import Project
+from factory.plant.programs import program_of, write_program
 from factory.simulation.simulation import physical_model
 from factory.support.errors import RunError
 from factory.support.files import own_names, write_all
-from factory.support.settings import Settings
+
+
+@dataclass(frozen=True, slots=True)
+class BuildRequest:
+    """What a build writes: the model at `mjcf`, and everything into the folder `output`. The model
+    has parts for so many `units` (None: for ever) with `wip` units inside at once."""
+
+    mjcf: Path | None = None
+    output: Path | None = None
+    units: int | None = None
+    wip: int | None = None
 
 
 @dataclass(frozen=True)
 class Built:
-    """What was built and its files, those included that were there already; `clearance`: the
-    certificate's figures."""
+    """A build's model, its clearance certificate and its files, those included that were there
+    already; `mjcf`: that of the model."""
 
     model: Model
+    clearance: Certificate
     mjcf: Path | None
     files: tuple[Path, ...]
-    clearance: dict[str, Any]
 
 
-def build_all(
-    source: Source,
-    layout: Layout,
-    settings: Settings,
-    mjcf: Path | None,
-    output: Path | None,
-    units: int | None,
-    wip: int | None,
-    verdict: Verdict,
-) -> Built:
+def build(project: Project, verdict: Verdict, request: BuildRequest) -> Built:
     """Build the model and write what is asked for, with the proof of the net's `verdict`.
 
     Raises RunError where the layout is not certified; InputError where an operation cannot reach
     its goal in it, where the engine refuses the model, and where a file whose name is our choice
     would be written through a link, or over what was read. Nothing is written then."""
-    from factory.layout.clearance import certify
-    from factory.modes.modes import operation_modes
-
+    layout, settings, output = project.layout, project.settings, request.output
     operation_modes(layout, settings.eps)
-    certificate = layout.certificate or certify(layout)
-    if not certificate.holds:
-        raise RunError(fault.diagnostic() for fault in certificate.faults)
-    model = physical_model(layout, units, settings, source.catalogue, wip)
-    files: dict[Path, bytes] = {}
-    typed, read = mjcf, files_read(source)
+    clearance = layout.certificate or certify(layout)
+    if not clearance.holds:
+        raise RunError(fault.diagnostic() for fault in clearance.faults)
+    model = physical_model(layout, request.units, settings, project.catalogue, request.wip)
+    mjcf, read = request.mjcf, files_read(project)
     if output is not None:
-        mjcf = mjcf or output / f"{_stem(source)}.xml"
+        mjcf = mjcf or output / f"{project.name}.xml"
     path = beside(mjcf) if mjcf else None
     binary = _binary(model, path)
+    files: dict[Path, bytes] = {}
     if mjcf is not None:
         files |= model_files(model, mjcf)
-        own_names(mjcf.parent, (files.keys() | binary.keys()) - {typed}, read)
+        own_names(mjcf.parent, (files.keys() | binary.keys()) - {request.mjcf}, read)
     if output is not None:
-        texts = _documents(layout, certificate, verdict)
-        documents = {output / f"{_stem(source)}.{end}": t.encode() for end, t in texts.items()}
+        texts = _documents(project, clearance, verdict)
+        documents = {output / f"{project.name}.{end}": t.encode() for end, t in texts.items()}
         own_names(output, documents, read)
         files |= documents
     write_all(files | binary)
     named = (*files, path, seal_of(path)) if path else tuple(files)
-    return Built(model, mjcf, named, certificate.summary())
+    return Built(model, clearance, mjcf, named)
 
 
-def files_read(source: Source) -> tuple[Path, ...]:
+def files_read(project: Project) -> tuple[Path, ...]:
     """The PAG's file, and those of its meshes."""
-    named = (node.parameter("mesh") for node in source.pag.parts())
-    meshes = (Path(source.pag.folder) / str(mesh) for mesh in named if mesh)
-    return (Path(source.pag.file), *meshes)
+    named = (node.parameter("mesh") for node in project.pag.parts())
+    meshes = (Path(project.pag.folder) / str(mesh) for mesh in named if mesh)
+    return (project.file, *meshes)
 
 
 def _binary(model: Model, path: Path | None) -> dict[Path, bytes]:
@@ -90,25 +94,16 @@ def _binary(model: Model, path: Path | None) -> dict[Path, bytes]:
     return sealed(path, key_of(model), packed(m)) if path else {}
 
 
-def _stem(source: Source) -> str:
-    return Path(source.pag.file).stem or "factory"
-
-
-def _documents(layout: Layout, clear: Certificate, verdict: Verdict) -> dict[str, str]:
+def _documents(project: Project, clearance: Certificate, verdict: Verdict) -> dict[str, str]:
     """Everything about the factory but the model, as texts by the endings of their files."""
-    from factory.export.certificate.writer import certificate
-    from factory.export.dot import write_dot
-    from factory.export.floor_sheet import write_svg
-    from factory.export.pnml import write_pnml
-    from factory.plant.programs import program_of, write_program
-
+    layout = project.layout
     factory = layout.factory
     programs = (write_program(program_of(factory, r.index)) for r in factory.robots)
     return {
         "svg": write_svg(layout),
         "programs.txt": "\n\n".join(programs) + "\n",
         "proof.json": _json(certificate(factory.net, verdict)),
-        "clearance.json": _json(clear.as_json()),
+        "clearance.json": _json(clearance.as_json()),
         "dot": write_dot(factory.net),
         "pnml": write_pnml(factory.net),
     }

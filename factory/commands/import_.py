@@ -1,4 +1,4 @@
-"""The commands `import` and `new`: how a product gets into the house."""
+"""The command `import`."""
 
 from __future__ import annotations
 
@@ -8,7 +8,9 @@ from typing import TYPE_CHECKING, cast
 
 import click
 
-from factory.commands.options import OUTPUT, PATH, writable_folder
+from factory.commands.options import OUTPUT, PATH
+from factory.commands.outputs import writable_folder
+from factory.commands.requests import OutputOptions
 from factory.support.console import emit, say, warn
 from factory.support.errors import Diagnostic, InputError
 
@@ -42,6 +44,7 @@ UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254}
 )
 @OUTPUT
 def import_(
+    out: OutputOptions,
     source: Path,
     output: Path | None,
     library: Path | None,
@@ -50,9 +53,6 @@ def import_(
     unit: str,
     mates: str,
     folders: tuple[Path, ...],
-    as_json: bool,
-    quiet: bool,
-    verbose: bool,
 ) -> int:
     """Make a PAG of SOURCE: an LDraw model (.ldr, .mpd), a tree of meshes (.json, .yaml), a bill of
     materials with levels (.csv), or a folder with one of these."""
@@ -73,9 +73,9 @@ def import_(
     write_all(files)
     pag, meshes_made = next(iter(files)), len(files) - 1
     warnings = (*product.warnings, *_shape_warnings(pag, templates))
-    warn(warnings, quiet)
+    warn(warnings, out.quiet)
     parts = sum(1 for _ in product.pag.parts())
-    if as_json:
+    if out.as_json:
         emit(
             {
                 "pag": str(pag),
@@ -87,10 +87,10 @@ def import_(
                 "warnings": [d.as_json() for d in warnings],
             }
         )
-    elif not quiet:
+    elif not out.quiet:
         operations = len(product.pag) - parts
         say(f"{pag}: parts {parts}, operations {operations}, meshes {meshes_made}")
-        for path in files if verbose else ():
+        for path in files if out.verbose else ():
             say(f"  {path}")
     return 0
 
@@ -110,37 +110,3 @@ def _require_folder(folder: Path | None, option: str) -> None:
     if folder is not None and not folder.is_dir():
         message = f"{option}: there is no folder '{folder}'"
         raise InputError(Diagnostic("BadFile", message, None, "give the name of a folder"))
-
-
-@click.command()
-@click.argument("name", type=PATH)
-@OUTPUT
-def new(name: Path, as_json: bool, quiet: bool, verbose: bool) -> int:
-    """Write a small product to start from in a new folder NAME."""
-    from factory.commands.new import starter
-    from factory.support.files import write_all
-
-    files = {name / path: content for path, content in starter(name.name).items()}
-    _require_new(name)
-    writable_folder(name)
-    write_all(files)
-    if as_json:
-        emit({"folder": str(name), "files": [str(path) for path in files]})
-    elif not quiet:
-        say(f"{name}: {len(files)} files")
-        for path in files if verbose else ():
-            say(f"  {path}")
-        say(f"  cd {name}")
-        say(f"  factory run {name.name}.pag --units 3")
-    return 0
-
-
-def _require_new(folder: Path) -> None:
-    """Raises InputError (BadFile) where there is something already."""
-    if folder.is_symlink() or (folder.exists() and not _is_empty(folder)):
-        message, hint = f"'{folder}' is there already", "choose another name"
-        raise InputError(Diagnostic("BadFile", message, None, hint))
-
-
-def _is_empty(folder: Path) -> bool:
-    return folder.is_dir() and not any(folder.iterdir())

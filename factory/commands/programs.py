@@ -1,0 +1,34 @@
+"""The command `programs`."""
+
+from __future__ import annotations
+
+import click
+
+from factory.commands.check import project_of
+from factory.commands.options import OUTPUT, RELAY, SOURCE
+from factory.commands.requests import OutputOptions, ProjectOptions
+from factory.support.console import emit, say
+from factory.support.errors import Diagnostic, InputError, did_you_mean
+
+
+@click.command()
+@SOURCE
+@click.option("--robot", help="Only this robot, as r3.")
+@RELAY
+@OUTPUT
+def programs(given: ProjectOptions, out: OutputOptions, robot: str | None) -> int:
+    """Print each robot's program, in the paper's form."""
+    from factory.plant.programs import program_of, write_program
+
+    factory = project_of(given).factory
+    names = [r.name for r in factory.robots]
+    if robot is not None and robot not in names:
+        hint = did_you_mean(robot, names, "robots")
+        raise InputError(Diagnostic("Usage", f"there is no robot '{robot}'", None, hint))
+    chosen = [r for r in factory.robots if robot in (None, r.name)]
+    texts = {r.name: write_program(program_of(factory, r.index)) for r in chosen}
+    if out.as_json:
+        emit({"programs": texts})
+    else:
+        say("\n\n".join(texts.values()))
+    return 0

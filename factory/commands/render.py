@@ -1,0 +1,115 @@
+"""The command `render`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal
+
+import click
+
+from factory.commands.options import (
+    FLOOR,
+    MOTION,
+    OF_A_PICTURE,
+    OUTPUT,
+    PATH,
+    PICTURE,
+    RELAY,
+    RUN,
+    SOURCE,
+    for_a_pag,
+)
+from factory.commands.outputs import writable
+from factory.commands.requests import OutputOptions, PictureOptions, ProjectOptions, RunOptions
+from factory.commands.run import carry_out
+from factory.support.console import emit, say, warn
+from factory.support.errors import Diagnostic, InputError
+
+if TYPE_CHECKING:
+    from factory.simulation.simulation import Simulation
+
+    Moment = float | Literal["end"]
+
+
+@click.command()
+@SOURCE
+@click.option(
+    "-o",
+    "--output",
+    type=PATH,
+    required=True,
+    help="OUT.mp4, or OUT.png for a still.",
+)
+@click.option("--at", default="end", help="Time of a still [s], or `end`.")
+@RUN
+@PICTURE
+@FLOOR
+@RELAY
+@MOTION
+@OUTPUT
+def render(
+    given: ProjectOptions,
+    asked: RunOptions,
+    shown: PictureOptions,
+    out: OutputOptions,
+    output: Path,
+    at: str,
+) -> int:
+    """Film FILE.pag, or a LOG that `run --log` has kept, headless through EGL."""
+    from factory.record.log import is_log, read_log
+    from factory.render import Film, Still, check_output, render_log
+    from factory.support.gl import probe
+
+    file = given.file
+    if is_log(file):
+        for_a_pag(file, "a log", "output", "at", *OF_A_PICTURE)
+    writable(file, output, shown.poster)
+    size, moment = shown.area(), _moment(at)
+    is_still = check_output(output, size, shown.fps, still=None)
+    picture = shown.picture()
+    if is_still and shown.poster is not None:
+        message = "--poster is of a film; this is a still"
+        raise InputError(Diagnostic("Usage", message, None, "leave out --poster"))
+    probe()
+    if is_log(file):
+        frames = render_log(read_log(file), output, picture, shown.fps, moment, shown.poster)
+    else:
+        made = _simulation(given, asked, out.quiet)
+        taken = (
+            Still(made, output, picture, moment)
+            if is_still
+            else Film(made, output, picture, shown.fps, shown.poster)
+        )
+        enough = moment if is_still and moment != "end" else asked.max_time
+        carry_out(made, out.silent, enough, [lambda: taken])
+        frames = taken.frames if isinstance(taken, Film) else 1
+    seconds = 0.0 if is_still else round(frames / shown.fps, 6)
+    if out.as_json:
+        width, height = size
+        document = {"output": str(output), "frames": frames, "width": width, "height": height}
+        emit({**document, "fps": shown.fps, "seconds": seconds})
+    elif not out.quiet:
+        say(f"{output}: {frames} frames of {size[0]}x{size[1]}, {seconds:.1f} s")
+    return 0
+
+
+def _simulation(given: ProjectOptions, asked: RunOptions, quiet: bool) -> Simulation:
+    from factory.simulation.simulation import Simulation
+
+    project = given.project()
+    warn(project.layout.product.warnings, quiet)
+    return Simulation(project.layout, asked.request(project))
+
+
+def _moment(at: str) -> Moment:
+    """The time of a still [s], or the end. Raises InputError (BadValue)."""
+    if at == "end":
+        return "end"
+    try:
+        seconds = float(at)
+        if not 0 <= seconds < float("inf"):
+            raise ValueError
+    except ValueError:
+        message = f"--at takes seconds or `end`, not '{at}'"
+        raise InputError(Diagnostic("BadValue", message, None, "for example --at 2.5")) from None
+    return seconds

@@ -1,0 +1,165 @@
+"""What the options that several commands share ask for, as values."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from factory.support.errors import Diagnostic, InputError
+
+if TYPE_CHECKING:
+    from factory.layout.request import Ground
+    from factory.pipeline import Project
+    from factory.render import Picture
+    from factory.simulation.request import RunRequest, WorldName
+    from factory.support.settings import Settings
+
+
+@dataclass(frozen=True, slots=True)
+class OutputOptions:
+    """What a command prints: one JSON document, or lines for people; `quiet`: neither progress nor
+    warnings."""
+
+    as_json: bool = False
+    quiet: bool = False
+    verbose: bool = False
+
+    @property
+    def silent(self) -> bool:
+        """Whether there is no progress to be shown."""
+        return self.quiet or self.as_json
+
+
+@dataclass(frozen=True, slots=True)
+class ProjectOptions:
+    """A PAG's file, folders of further operations, and the options of SOURCE, FLOOR, RELAY and
+    MOTION that a command has; None for what was not given."""
+
+    file: Path = Path()
+    folders: tuple[Path, ...] = ()
+    speed: float | None = None
+    acceleration: float | None = None
+    force: float | None = None
+    timestep: float | None = None
+    substeps: int | None = None
+    stage: bool | None = None
+    clearance: float | None = None
+    floor: str | None = None
+    relay: bool = False
+    cycle: float | None = None
+
+    def settings(self) -> Settings:
+        """Options before the environment, that before the `factory.toml` beside the PAG or in the
+        current folder. Raises InputError."""
+        from factory.support.settings import environment
+        from factory.support.user_defaults import defaults_for
+
+        names = ("speed", "acceleration", "force", "timestep", "substeps", "clearance")
+        given = {name: getattr(self, name) for name in names}
+        given["stage"] = None if self.stage is None else int(self.stage)
+        settings = defaults_for(self.file).settings().with_options(environment())
+        return settings.with_options(given)
+
+    def ground(self) -> Ground:
+        """What FLOOR and RELAY ask for. Raises InputError (BadValue)."""
+        from factory.layout.request import Ground
+
+        floor = None if self.floor is None else pair(self.floor, "--floor", "4x3", float)
+        return Ground(floor, self.relay, self.cycle)
+
+    def project(self) -> Project:
+        """The project that the options describe. Raises InputError."""
+        from factory.pipeline import read
+
+        settings = self.settings()
+        return read(self.file, self.folders, settings, self.ground())
+
+
+@dataclass(frozen=True, slots=True)
+class RunOptions:
+    """The options of RUN, DRAW and WIP that a command has."""
+
+    world: WorldName = "mujoco"
+    units: int = 1
+    seed: int = 0
+    jitter: float = 0.0
+    wip: int | None = None
+    start: str | None = None
+    fuse: bool | None = None
+    max_time: float | None = None
+    distributed: bool = False
+
+    def request(self, project: Project, shown: bool = True) -> RunRequest:
+        """The run that is asked for, and whether it is to be `shown`. Raises InputError."""
+        from factory.nets.history import legal_marking
+        from factory.plant.fused_bodies import fusing_pays
+        from factory.simulation.request import RunRequest
+
+        layout, start = project.layout, self.start
+        return RunRequest(
+            self.world,
+            self.units,
+            self.seed,
+            self.jitter,
+            project.settings,
+            None if start is None else legal_marking(layout.factory.net, start),
+            self.wip,
+            self.distributed,
+            fusing_pays(layout.factory, layout.product) if self.fuse is None else self.fuse,
+            shown,
+            catalogue=project.catalogue,
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class PictureOptions:
+    """The options of PICTURE."""
+
+    size: str
+    fps: int
+    camera: str
+    panels: str | None
+    title: str
+    poster: Path | None
+
+    def area(self) -> tuple[int, int]:
+        """Width and height [px]. Raises InputError (BadValue)."""
+        return pair(self.size, "--size", "1280x720", int)
+
+    def picture(self, parts: Sequence[str] | None = None) -> Picture:
+        """The picture that is asked for, whose camera may follow one of the `parts`, or any where
+        None. Raises InputError (BadValue) for a name that does not exist, a size without room for
+        the panels, or a poster that cannot be a still."""
+        from factory.render import Picture, camera_named, check_output, panels_named
+        from factory.render.picture import shared
+
+        size = self.area()
+        camera, panels = camera_named(self.camera, parts), panels_named(self.panels)
+        shared(size, panels)
+        if self.poster is not None:
+            check_output(self.poster, size, still=True)
+        return Picture(size, camera, panels=panels, title=self.title)
+
+
+def pair(text: str, option: str, example: str, number: type) -> tuple[Any, Any]:
+    """`4x3` as two positive numbers. Raises InputError (BadValue)."""
+    try:
+        width, depth = (number(word) for word in text.lower().split("x"))
+        if "_" in text or not (0 < width < float("inf") and 0 < depth < float("inf")):
+            raise ValueError
+    except ValueError:
+        message = f"{option} takes two positive numbers, not '{text}'"
+        raise InputError(
+            Diagnostic("BadValue", message, None, f"for example {option} {example}")
+        ) from None
+    return width, depth
+
+
+def check_ideal(fuse: bool | None, monitor: bool = False) -> None:
+    """Raises InputError (Usage) for options that the ideal world has no bodies for."""
+    for given, purpose in ((monitor, "for a monitor to observe"), (fuse, "that could become one")):
+        if given:
+            message = f"the ideal world has no bodies {purpose}"
+            raise InputError(Diagnostic("Usage", message, None, "leave out --world ideal"))
