@@ -81,10 +81,11 @@ def laid(seed: int) -> Layout:
 
 def measured(simulation: Simulation, max_time: float | None = None) -> dict[str, float]:
     """The figures that a timestep is chosen by, of a run that goes well."""
-    world, worst = simulation.world, [0.0]
+    world, worst = simulation.physical, [0.0]
+    qpos, control = world.motion.axes.qpos, world.motion.drives.control
 
     def observe(*_: Any) -> None:
-        error = np.abs(world.d.qpos[world.qpos] - world.d.ctrl[world.control])
+        error = np.abs(world.d.qpos[qpos] - world.d.ctrl[control])
         worst[0] = max(worst[0], float(error.max()))
 
     run = simulation.run([observe], max_time)

@@ -7,7 +7,7 @@ import csv
 import io
 from dataclasses import astuple
 
-from factory.export.events import COLUMNS, compiled, rows
+from factory.export.events import COLUMNS, rows
 from factory.export.subject import Subject
 
 FORMAT, TAKES = "csv", "log"
@@ -18,6 +18,6 @@ def export(subject: Subject) -> str:
     text = io.StringIO(newline="")
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(COLUMNS)
-    for row in rows(subject.log, compiled(subject)):
+    for row in rows(subject.log):
         writer.writerow([" ".join(v) if isinstance(v, tuple) else v for v in astuple(row)])
     return text.getvalue()

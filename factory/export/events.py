@@ -6,12 +6,8 @@ from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from factory.export.subject import Subject
-from factory.plant.factory import Factory
 from factory.record.log import Log
-from factory.record.log.blocks import bad_log
 from factory.record.log.recompiled import factory_of
-from factory.support.errors import InputError
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,19 +32,10 @@ COLUMNS = tuple(EventRow.__dataclass_fields__)
 """The names of the columns."""
 
 
-def compiled(subject: Subject) -> Factory:
-    """The factory of a log. Raises InputError (BadLog) where the log is not of the factory that its
-    header describes."""
-    try:
-        return factory_of(subject.log.header)
-    except (ValueError, KeyError, TypeError, AttributeError, IndexError) as error:
-        words = f"is not of the factory in its header: {error}"
-        raise InputError(bad_log(subject.file, words)) from error
-
-
-def rows(log: Log, factory: Factory) -> Iterator[EventRow]:
-    """The events in the order in which they were recorded."""
-    units: Counter[int] = Counter()
+def rows(log: Log) -> Iterator[EventRow]:
+    """The events in the order in which they were recorded. Raises InputError (BadLog) where the log
+    is not of the factory that its header describes."""
+    factory, units = factory_of(log.header), Counter[int]()
     for time, number in zip(log.fired_t.tolist(), log.fired.tolist(), strict=True):
         units[number] += 1
         operation = factory.operations[number // 2]

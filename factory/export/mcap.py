@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from factory.control.mode import Truth
-from factory.export.events import EventRow, compiled, rows
+from factory.export.events import EventRow, rows
 from factory.export.motion import BodyMotion, motion_of
 from factory.export.subject import Subject
 from factory.geometry.meshes import Array
@@ -29,7 +29,7 @@ def export(subject: Subject) -> bytes:
     """The whole log. Raises MissingError where there is no foxglove-sdk."""
     foxglove = optional("foxglove", "foxglove-sdk", "MCAP", "export")
     motion = motion_of(subject)
-    events = list(rows(subject.log, compiled(subject)))
+    events = list(rows(subject.log))
     content = io.BytesIO()
     context = foxglove.Context()
     options = foxglove.mcap.MCAPWriteOptions(compression_threads=0)

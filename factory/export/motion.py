@@ -13,7 +13,6 @@ from factory.export.subject import Subject
 from factory.geometry.meshes import Array, Indices
 from factory.mjcf.parts import HIDDEN
 from factory.record.log import Log
-from factory.support.errors import Diagnostic, InputError
 
 if TYPE_CHECKING:
     from factory.support.engine import mujoco
@@ -65,12 +64,6 @@ def motion_of(subject: Subject) -> BodyMotion:
     from factory.record.log.model import model_of
 
     log = subject.log
-    if not log.xml:
-        message = f"'{subject.file}' is of the ideal world, which has no bodies to show"
-        hint = "keep a log of a run in MuJoCo: `factory run FILE.pag --log OUT`"
-        raise InputError(Diagnostic("BadLog", message, None, hint))
-    if not len(log):
-        raise InputError(Diagnostic("BadLog", "the log has no tick", None, "run for longer"))
     m = model_of(log)
     replica, rows = Replica(m), _frames(log)
     d = replica.d

@@ -5,7 +5,7 @@ from __future__ import annotations
 import io
 from dataclasses import asdict
 
-from factory.export.events import COLUMNS, compiled, rows
+from factory.export.events import COLUMNS, rows
 from factory.export.subject import Subject
 from factory.support.extras import optional
 
@@ -24,7 +24,7 @@ def export(subject: Subject) -> bytes:
         "column": pyarrow.int32(),
     }
     schema = pyarrow.schema([(name, types.get(name, pyarrow.string())) for name in COLUMNS])
-    found = [asdict(row) for row in rows(subject.log, compiled(subject))]
+    found = [asdict(row) for row in rows(subject.log)]
     content = io.BytesIO()
     parquet.write_table(pyarrow.Table.from_pylist(found, schema), content)
     return content.getvalue()

@@ -2,24 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 from factory.layout.layout import Layout
 from factory.nets.petri import Marking
-from factory.plant.fused_bodies import FusedBodies
 from factory.support.settings import Settings
 
-
-class ObservedModel(Protocol):
-    """The model of a simulation in MuJoCo: its text, its mesh files, its bodies."""
-
-    @property
-    def xml(self) -> str: ...
-    @property
-    def files(self) -> Mapping[str, bytes]: ...
-    @property
-    def carried(self) -> FusedBodies: ...
+if TYPE_CHECKING:
+    from factory.mjcf.model import Model
 
 
 class ObservedRequest(Protocol):
@@ -57,7 +47,7 @@ class Observed(Protocol):
     @property
     def before(self) -> int: ...
     @property
-    def model(self) -> ObservedModel | None: ...
+    def model(self) -> Model | None: ...
     @property
     def world(self) -> Any: ...
     @property

@@ -8,15 +8,13 @@ import numpy as np
 
 from factory.record.log import Log
 from factory.record.log.model import model_of
-from factory.record.monitor.record import AGAIN, recorded_subject
-from factory.record.monitor.subject import MonitorSubject
+from factory.record.monitor.record import recorded_subject
 from factory.render.camerawork import Moment, Take, When, pictureless
 from factory.render.history import History
 from factory.render.picture import USUAL, Picture
 from factory.render.reel import Reel, save
 from factory.render.subject import Snapshot, held
 from factory.render.video import FPS, check_output
-from factory.support.errors import Diagnostic, InputError
 
 
 def render_log(
@@ -52,12 +50,9 @@ def take_of(log: Log, picture: Picture) -> Take:
     """What pictures of a log are taken of, with nothing fired yet."""
     if not log.xml:
         raise pictureless()
-    if not len(log):
-        raise InputError(Diagnostic("BadLog", "the log has no tick", None, "run for longer"))
-    subject = _subject(log)
+    m, subject = model_of(log), recorded_subject(log.header)
     picture.check([part.label for part in subject.factory.leaves])
-    product, units = log.header["product"], log.header["units"]
-    return Take(model_of(log), subject, product, units, picture, History(subject))
+    return Take(m, subject, log.header["product"], log.header["units"], picture, History(subject))
 
 
 def moment_of(log: Log, row: int) -> Moment:
@@ -74,12 +69,3 @@ def _row(log: Log, take: Take, at: When) -> int:
         return min(int(np.searchsorted(log.time, at - 1e-9)), last)
     rows = range(last, -1, -1) if take.picture.camera == "product" else ()
     return next((row for row in rows if held(take.m, moment_of(log, row).shown)), last)
-
-
-def _subject(log: Log) -> MonitorSubject:
-    """The factory that a log is of."""
-    try:
-        return recorded_subject(log.header)
-    except (ValueError, KeyError, TypeError, AttributeError, IndexError) as error:
-        message = f"the log is not of the factory in its header: {error}"
-        raise InputError(Diagnostic("BadLog", message, None, AGAIN)) from error

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from factory.record.log.blocks import LENGTH, MAGIC, Arrays, bad_log, blocks, unpack_rows
 from factory.record.log.header import check_header
-from factory.record.log.ticks import Sizes, check_course
+from factory.record.log.ticks import check_block, check_course, state_bytes
 from factory.support.errors import InputError
 
 Index = NDArray[np.int32]
@@ -104,7 +104,7 @@ def _read(data: memoryview) -> Log:
     (length,) = LENGTH.unpack_from(data)
     header = json.loads(bytes(data[LENGTH.size : LENGTH.size + length]))
     check_header(header)
-    sizes, left = Sizes.of(header), ROOM + FOLD * len(data)
+    left = ROOM + FOLD * len(data)
     xml, files, complete = "", {}, False
     ticks: list[Arrays] = []
     for kind, arrays in blocks(data[LENGTH.size + length :]):
@@ -112,8 +112,8 @@ def _read(data: memoryview) -> Log:
             xml = arrays["xml"].tobytes().decode()
             files = {k[5:]: a.tobytes() for k, a in arrays.items() if k.startswith("mesh/")}
         elif kind == b"T":
-            sizes.check(arrays)
-            left -= sizes.states(arrays)
+            check_block(arrays, header)
+            left -= state_bytes(arrays)
             if left < 0:
                 raise ValueError("its states take too much memory for a file of its size")
             ticks.append(arrays)
@@ -128,8 +128,8 @@ def _read(data: memoryview) -> Log:
         MappingProxyType(files),
         time,
         delivered,
-        _states("qpos", sizes.nq, ticks),
-        _states("qvel", sizes.nv, ticks),
+        _states("qpos", header["nq"], ticks),
+        _states("qvel", header["nv"], ticks),
         _lasting("marking", ticks, counts),
         _lasting("active", ticks, counts),
         _single("contact", "contact", ticks, counts),

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -28,47 +27,34 @@ RAGGED = ("marking", "active", "contact")
 """Arrays with any number of rows for a tick."""
 
 
-@dataclass(frozen=True, slots=True)
-class Sizes:
-    """Numbers of coordinates, speeds, places and transitions in a log."""
+PAIRS = (("time", "delivered"), ("contact", "contact_dist"), ("fired", "fired_t"))
+"""Arrays of equal length."""
 
-    nq: int
-    nv: int
-    places: int
-    transitions: int
 
-    @classmethod
-    def of(cls, header: Mapping[str, Any]) -> Sizes:
-        """Those that a header states."""
-        return cls(header["nq"], header["nv"], len(header["places"]), len(header["transitions"]))
+def check_block(arrays: Arrays, header: Mapping[str, Any]) -> None:
+    """Raises ValueError where the arrays of a block do not fit each other or the header, KeyError
+    where one is missing."""
+    for name, (kind, row) in ARRAYS.items():
+        _check_kind(name, arrays[name], kind, row)
+    count = len(arrays["time"])
+    for name, width in (("qpos", header["nq"]), ("qvel", header["nv"]), ("ctrl", None)):
+        if f"{name}_first" in arrays or width is not None:
+            _check_rows(name, arrays, width)
+    for name in RAGGED:
+        _check_ragged(name, arrays, count)
+    for one, other in PAIRS:
+        if len(arrays[one]) != len(arrays[other]):
+            raise ValueError(f"{one} and {other} differ in length")
+    _check_range("time", arrays["time"], LARGE)
+    _check_range("fired_t", arrays["fired_t"], LARGE)
+    _check_range("marking", arrays["marking"], len(header["places"]) - 1)
+    _check_range("fired", arrays["fired"], len(header["transitions"]) - 1)
 
-    def check(self, arrays: Arrays) -> None:
-        """Raises ValueError where the arrays of a block do not fit each other or these sizes,
-        KeyError where one is missing."""
-        for name, (kind, row) in ARRAYS.items():
-            _check_kind(name, arrays[name], kind, row)
-        count = len(arrays["time"])
-        for name, width in (("qpos", self.nq), ("qvel", self.nv), ("ctrl", None)):
-            if f"{name}_first" in arrays or width is not None:
-                _check_rows(name, arrays, width)
-        for name in RAGGED:
-            _check_ragged(name, arrays, count)
-        for one, other in (
-            ("time", "delivered"),
-            ("contact", "contact_dist"),
-            ("fired", "fired_t"),
-        ):
-            if len(arrays[one]) != len(arrays[other]):
-                raise ValueError(f"{one} and {other} differ in length")
-        _check_range("time", arrays["time"], LARGE)
-        _check_range("fired_t", arrays["fired_t"], LARGE)
-        _check_range("marking", arrays["marking"], self.places - 1)
-        _check_range("fired", arrays["fired"], self.transitions - 1)
 
-    def states(self, arrays: Arrays) -> int:
-        """Number of bytes of the states of a block."""
-        wide = self.nq + self.nv + len(arrays.get("ctrl_first", ()))
-        return 8 * wide * len(arrays["time"])
+def state_bytes(arrays: Arrays) -> int:
+    """Number of bytes of the states of a block."""
+    wide = sum(len(arrays.get(f"{name}_first", ())) for name in ("qpos", "qvel", "ctrl"))
+    return 8 * wide * len(arrays["time"])
 
 
 def check_course(time: NDArray[np.float64], delivered: NDArray[np.int32]) -> None:

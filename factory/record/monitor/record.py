@@ -10,15 +10,13 @@ import numpy as np
 from factory.record.log.header import settings_of
 from factory.record.log.model import model_of
 from factory.record.log.reader import Log
-from factory.record.log.recompiled import factory_of
+from factory.record.log.recompiled import AGAIN, factory_of, of_its_factory
 from factory.record.monitor.anatomy import Anatomy
 from factory.record.monitor.monitor import Monitor
 from factory.record.monitor.observation import Observation
 from factory.record.monitor.report import Report
 from factory.record.monitor.subject import MonitorSubject, subject_from
 from factory.support.errors import Diagnostic, InputError
-
-AGAIN = "record it again: `factory run FILE.pag --log OUT`"
 
 
 def watch_log(log: Log) -> tuple[Report, MonitorSubject]:
@@ -27,22 +25,16 @@ def watch_log(log: Log) -> tuple[Report, MonitorSubject]:
     The log's events and markings are not read. Raises InputError (BadLog) for a log of the ideal
     world, of an older version, or of another factory than its header says.
     """
-    if not log.xml:
-        raise InputError(
-            _bad("the log is of the ideal world, in which there is nothing to observe")
-        )
+    m = model_of(log)
     if log.ctrl is None or "monitor" not in log.header:
-        raise InputError(_bad("the log was kept by an older version, without setpoints"))
-    if not len(log):
-        raise InputError(_bad("the log has no tick"))
-    try:
+        message = "the log was kept by an older version, without setpoints"
+        raise InputError(Diagnostic("BadLog", message, None, AGAIN))
+    with of_its_factory():
         subject = recorded_subject(log.header)
-        anatomy, seen = Anatomy.of(model_of(log, AGAIN), subject.factory), observations(log)
-        monitor = Monitor(subject, anatomy, next(seen))
+        seen = observations(log)
+        monitor = Monitor(subject, Anatomy.of(m, subject.factory), next(seen))
         for observation in seen:
             monitor.see(observation)
-    except (ValueError, KeyError, TypeError, AttributeError, IndexError) as error:
-        raise InputError(_bad(f"the log is not of the factory in its header: {error}")) from error
     return monitor.report(), subject
 
 
@@ -60,13 +52,9 @@ def observations(log: Log) -> Iterator[Observation]:
         yield Observation(float(log.time[row]), log.qpos[row], log.qvel[row], log.ctrl[row], welds)
 
 
+@of_its_factory()
 def recorded_subject(header: Mapping[str, Any]) -> MonitorSubject:
-    """The factory that a log is of. Raises ValueError, KeyError, TypeError or AttributeError where
-    the header is of none."""
+    """The factory that a log is of. Raises InputError (BadLog) where the header is of none."""
     factory = factory_of(header)
     kept, start, wip = header["monitor"], header["start"], header["wip"]
     return subject_from(factory, kept, settings_of(header), start, wip)
-
-
-def _bad(words: str) -> Diagnostic:
-    return Diagnostic("BadLog", words, None, AGAIN)

@@ -4,7 +4,6 @@ no operation."""
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
 
 from factory.mjcf.weld_frames import FEED, GRIP, HOLD, PARK
 from factory.plant.factory import Operation
@@ -17,27 +16,18 @@ Blame = Callable[[str, int, str, str], None]
 """Records a violation: its code, the robot (-1 for none), the label, and the message."""
 
 
-@dataclass(slots=True)
 class Transfers:
     """What holds each copy, the unit it is for (the k-th one that a feeder presents is
     for unit k), and how often each operation that moves parts has ended."""
 
-    subject: MonitorSubject
-    anatomy: Anatomy
-    blame: Blame
-    at: list[Holder | None] = field(init=False, repr=False)
-    unit: list[int] = field(init=False, repr=False)
-    ended: list[int] = field(init=False, repr=False)
-    presented: dict[str, int] = field(init=False, repr=False)
-    load: dict[Holder, set[int]] = field(init=False, repr=False)
-
-    def __post_init__(self) -> None:
-        factory, counts = self.subject.factory, self.subject.counts
-        copies = len(self.anatomy.copies)
-        self.at, self.unit = [None] * copies, [-1] * copies
+    def __init__(self, subject: MonitorSubject, anatomy: Anatomy, blame: Blame) -> None:
+        self.subject, self.anatomy, self.blame = subject, anatomy, blame
+        factory, counts = subject.factory, subject.counts
+        self.at: list[Holder | None] = [None] * len(anatomy.copies)
+        self.unit = [-1] * len(anatomy.copies)
         self.ended = [counts.get(o.end, 0) for o in factory.operations]
         self.presented = {o.label: counts.get(o.end, 0) for o in factory.leaves}
-        self.load = {}
+        self.load: dict[Holder, set[int]] = {}
 
     def begin(self, switches: Sequence[Switch]) -> None:
         """Record what is held at the start; blame what the marking does not account for."""
@@ -150,9 +140,7 @@ class Transfers:
         to. Blame what no operation does."""
         factory, label = self.subject.factory, self.anatomy.label[copy]
         found: Operation | None = None
-        if after[0] == FEED and before and before[0] in (PARK, HOLD):
-            return None
-        if after[0] == PARK and before and before[0] == HOLD:
+        if before and (before[0], after[0]) in ((PARK, FEED), (HOLD, FEED), (HOLD, PARK)):
             return None
         if after[0] == GRIP and before and before[0] == FEED:
             found = factory.by_label[label]

@@ -12,7 +12,6 @@ from pathlib import Path
 
 import numpy as np
 
-from factory.export.events import compiled
 from factory.export.motion import BodyMotion, motion_of
 from factory.export.subject import Subject
 from factory.geometry.meshes import Array
@@ -24,6 +23,7 @@ from factory.plant.factory import Factory, Operation
 from factory.problem.pag import PAG
 from factory.problem.template import Template
 from factory.record.log import Log, read_log
+from factory.record.log.recompiled import factory_of
 from factory.record.monitor import subject_of
 from factory.show.report.stage import DrawnFactory, stations
 from factory.study.analysis.recorded import conditions
@@ -95,7 +95,7 @@ def recording_of(path: Path, layout: Layout | None = None) -> Recording:
     """The recording in a log, with the `layout` that it was made with, if given, else with one that
     is made again. Raises InputError (BadLog) where it is not a log of a run in MuJoCo."""
     subject = Subject(path, read_log(path))
-    motion, factory = motion_of(subject), compiled(subject)
+    motion, factory = motion_of(subject), factory_of(subject.log.header)
     if layout is not None:
         return Recording(str(path), subject.log, motion, layout.factory, layout)
     try:

@@ -1,7 +1,8 @@
 """What a factory is not told of: pushes, wrong masses, weak drives, friction, noise, delay, slow
 robots.
 
-    simulation = disturb(Simulation(layout, units=3), Push("r1/carriage", (5, 0, 0), 1.0, 0.1))
+    simulation = Simulation(layout, RunRequest(units=3))
+    disturb(simulation, Push("r1/carriage", (5, 0, 0), 1.0, 0.1))
     run = simulation.run()
 
 A disturbance changes the physics (MuJoCo) or what is sensed of it; supervisor, drives and the

@@ -15,7 +15,6 @@ from factory.layout.layout import Layout
 from factory.mjcf.timestep import timed
 from factory.nets.verify import proved
 from factory.plant.fused_bodies import fusing_pays
-from factory.problem.robot_types import load_catalogue
 from factory.simulation.request import RunRequest
 from factory.simulation.run import Run
 from factory.simulation.simulation import Compiled, Simulation, compiled
@@ -73,7 +72,6 @@ class Runner:
 
     def __init__(self, recipe: Recipe) -> None:
         self.recipe = recipe
-        self.catalogue = load_catalogue()
         self._layout = lru_cache(KEPT)(self._lay_out)
         self._compiled = lru_cache(KEPT)(self._compile)
 
@@ -108,7 +106,6 @@ class Runner:
             wip=values["wip"],
             fuse=fuse,
             shown=False,
-            catalogue=self.catalogue,
         )
         shared = _or_raise(self._compiled(settings, request))
         request = replace(request, seed=values["seed"], jitter=values["jitter"])
