@@ -147,9 +147,11 @@ def stepping(step: Callable[..., object]) -> Iterator[None]:
 def read_by(simulation: Simulation, axes: Any) -> np.ndarray:
     """What the drives of axes read now (axes, 3): position [m], speed [m/s], force [N]."""
     world = simulation.physical
-    m, d = world.m, world.d
-    actuators, read = world.motion.axes.actuator[axes], np.zeros((3, 1))
-    return np.array([mujoco.mj_readCtrl(m, d, int(n), d.time, read, -1) for n in actuators])
+    m, d, actuators = world.m, world.d, world.motion.axes.actuator[axes]
+    found = np.empty((len(actuators), 3))
+    for row, actuator in zip(found, actuators.tolist(), strict=True):
+        row[:] = mujoco.mj_readCtrl(m, d, actuator, d.time, np.zeros((3, 1)), -1)
+    return found
 
 
 def random_marking(layout: Layout, seed: int) -> Marking:
