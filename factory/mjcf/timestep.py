@@ -41,17 +41,12 @@ FRICTION = 0.2
 SURE = 1.25
 """Measured errors are up to so many times the formula's: 630 random runs at 10 ms."""
 
-SNAP = (0.02e-3, 0.045e-3)
-"""The tray's reference stands a tick early. The error that comes of it is so much of its
-acceleration, and so much more of the load's share in what moves, with any timestep [s²]."""
-
 
 @dataclass(frozen=True, slots=True)
 class DrivenAxis:
     """What a drive moves: its `own` mass and a `load` [kg], with an `acceleration` [m/s²] that
     changes by up to twice its amount, times `jump`, at once; `push` [m/s²] is what its force is
-    for; its `stiffness` [rad/s] and the least `gain` that jitter draws for it; `snap`: an
-    error that it makes with any timestep [m]."""
+    for; its `stiffness` [rad/s] and the least `gain` that jitter draws for it."""
 
     own: float
     load: float
@@ -60,7 +55,6 @@ class DrivenAxis:
     stiffness: float
     gain: float
     jump: float = 1.0
-    snap: float = 0.0
 
     def error(self, settings: Settings) -> float:
         """How far it may get off its reference [m]: the speed that it misses, times the peak of a
@@ -69,8 +63,7 @@ class DrivenAxis:
         mass, h = self.own + drive.inertia + self.load, settings.step
         stiff, damping = self.gain * drive.kp / mass, self.gain * drive.kv / mass
         missed = self.jump * self.acceleration * h * abs(1 - damping * h)
-        answer = missed / (sqrt(stiff) + 0.85 * damping) + 2 * self.rest(settings)
-        return max(SURE * answer, self.snap)
+        return SURE * (missed / (sqrt(stiff) + 0.85 * damping) + 2 * self.rest(settings))
 
     def rest(self, settings: Settings) -> float:
         """How far off its reference friction may hold it for ever [m]."""
@@ -135,5 +128,4 @@ def _axes(settings: Settings, layout: Layout, jitter: float) -> Iterator[DrivenA
     fast = settings.outfeed_acceleration
     reverses = layout.outfeed_way * fast < 1.2 * settings.outfeed**2
     product = masses[factory.pag.root]
-    snap = fast * (SNAP[0] + SNAP[1] * product / (product + TRAY_MASS))
-    yield DrivenAxis(TRAY_MASS, product, fast, fast, STIFFNESS, 1.0, 1.0 if reverses else 0.7, snap)
+    yield DrivenAxis(TRAY_MASS, product, fast, fast, STIFFNESS, 1.0, 1.0 if reverses else 0.7)

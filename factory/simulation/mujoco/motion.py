@@ -97,18 +97,23 @@ class Motion:
 
     def move_tray(self, ticks: int) -> int:
         """The tray follows its way for some ticks, but not past the end of a course; gives how
-        many. Come to its goal, it stands."""
-        outfeed, follower = self.outfeed, self.outfeed.follower
-        if not outfeed.moves:
-            if follower.course is not None:
-                follower.stop(outfeed.axis)
-                self.sleep.may_sleep(outfeed.axis)
+        many."""
+        self.plan_tray()
+        follower = self.outfeed.follower
+        if not self.outfeed.moves:
             return ticks
-        if not follower.left:
-            follower.begin(outfeed.axis, self.stepping.course(outfeed.beginning, outfeed.course))
         ticks = min(ticks, follower.left)
         follower.show(ticks)
         return ticks
+
+    def plan_tray(self) -> None:
+        """The tray's next course begins where one is over. Come to its goal, it stands."""
+        outfeed, follower = self.outfeed, self.outfeed.follower
+        if outfeed.moves and not follower.left:
+            follower.begin(outfeed.axis, self.stepping.course(outfeed.beginning, outfeed.course))
+        elif not outfeed.moves and follower.course is not None:
+            follower.stop(outfeed.axis)
+            self.sleep.may_sleep(outfeed.axis)
 
     def _plan(self, bundle: Bundle) -> None:
         """The next stride of the active modes. The load of each robot is that of its operation."""
@@ -146,8 +151,11 @@ class Motion:
         self.drives.follow(axes, self.drives.sampled(axes, *ends, self.plan[3:, axes], most))
         self.sleep.stay_awake(axes)
 
-    def show_moves(self) -> None:
-        """The references of axes that `move` has set going are where they are now."""
+    def settle(self) -> None:
+        """A tick of axes that `move` has set going, and of the tray, is over: their references are
+        where they are now."""
+        if self.outfeed.follower.left:
+            self.outfeed.follower.show(1)
         axes = np.flatnonzero(self.plan[2:].any(axis=0))
         if len(axes):
             begun, *_, a = self.plan[:, axes]

@@ -71,5 +71,5 @@ class Outfeed:
         wanted = np.minimum(landing_speed(np.abs(left), limit, dt), self._settings.outfeed)
         x1, v1, a = govern(x, v, np.copysign(wanted, left), limit, dt)
         if abs(x1[0] - self.goal) < ROUNDING and abs(v1[0]) < ROUNDING:
-            x1, v1, a = np.array([self.goal]), np.zeros(1), np.zeros(1)
+            x1, v1 = np.array([self.goal]), np.zeros(1)
         return x1, v1, a, abs(float(x1[0]) - self.goal) < CLOSE

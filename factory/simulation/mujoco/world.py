@@ -136,9 +136,9 @@ class MujocoWorld:
 
     def settle(self) -> None:
         """A tick's timesteps are over, and the tray's next tick begins."""
-        self.motion.show_moves()
+        self.motion.settle()
         self._settle(1)
-        self.motion.move_tray(1)
+        self.motion.plan_tray()
 
     def _settle(self, ticks: int) -> None:
         """After some ticks: at the end of a course look at what is not looked at in every tick, and
