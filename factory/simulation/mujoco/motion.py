@@ -53,7 +53,8 @@ class Motion:
         self.robots.stop(every)
 
     def load(self, robots: Sequence[int], loads: Sequence[float]) -> None:
-        """From their next courses on robots (index) carry so much [kg]."""
+        """From now on robots (index) carry so much [kg]: those with a lift that stands hold it at
+        once, all others from their next courses on."""
         if not robots:
             return
         lift, mass = self.axes.lift, np.array(loads)
@@ -62,6 +63,9 @@ class Motion:
         if lifts:
             axes = np.array([lift[robots[n]] for n in lifts])
             self.drives.load(axes, mass[lifts], (HEAD_MASS + mass[lifts]) * GRAVITY)
+            stand = axes[self.robots.v[axes] == 0.0]
+            if len(stand):
+                self.drives.stand(stand, self.robots.x[stand])
 
     def turn(self, active: Index) -> None:
         """Other modes are active. Robots whose operation has ended stop where their reference is:
@@ -111,6 +115,7 @@ class Motion:
         outfeed, follower = self.outfeed, self.outfeed.follower
         if outfeed.moves and not follower.left:
             follower.begin(outfeed.axis, self.stepping.course(outfeed.beginning, outfeed.course))
+            follower.show(0)
         elif not outfeed.moves and follower.course is not None:
             follower.stop(outfeed.axis)
             self.sleep.may_sleep(outfeed.axis)
