@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import hashlib
 import random
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from functools import cache
 from typing import Any
@@ -152,6 +153,23 @@ def read_by(simulation: Simulation, axes: Any) -> np.ndarray:
     for row, actuator in zip(found, actuators.tolist(), strict=True):
         row[:] = mujoco.mj_readCtrl(m, d, actuator, d.time, np.zeros((3, 1)), -1)
     return found
+
+
+def reproduced(units: int = 2) -> Simulation:
+    """A run that is made more than once, here or in another process."""
+    return ready("paper", units=units, seed=5)
+
+
+def digest(simulation: Simulation, observers: Sequence[Any] = ()) -> str:
+    """Of the model, all events and the engine's last state, to the bit."""
+    run = simulation.run(observers)
+    assert run.refines_net and simulation.model is not None
+    found = hashlib.sha256(simulation.model.xml.encode())
+    found.update(repr([(e.t.hex(), e.transition) for e in run.events]).encode())
+    d = simulation.physical.d
+    for state in (d.qpos, d.qvel, d.qacc):
+        found.update(state.tobytes())
+    return found.hexdigest()
 
 
 def random_marking(layout: Layout, seed: int) -> Marking:
