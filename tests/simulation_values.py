@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import hashlib
 import random
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from functools import cache
 from typing import Any
@@ -28,6 +29,7 @@ from factory.support.settings import Settings
 from tests.bench.factories import balanced
 from tests.bench.factories import laid_out as floor_of
 from tests.command_line import ROOT
+from tests.token_game import enabled, follower
 
 PAPER = """6 parts; root = sub3; sub3 = mate ( sub2, part3 ); sub2 = weld ( sub1 );
 sub1 = mate ( part1, part2 ); part1 = atomic(); part2 = atomic(); part3 = atomic()"""
@@ -154,13 +156,30 @@ def read_by(simulation: Simulation, axes: Any) -> np.ndarray:
     return found
 
 
+def reproduced(units: int = 2) -> Simulation:
+    """A run that is made more than once, here or in another process."""
+    return ready("paper", units=units, seed=5)
+
+
+def digest(simulation: Simulation, observers: Sequence[Any] = ()) -> str:
+    """Of the model, all events and the engine's last state, to the bit."""
+    run = simulation.run(observers)
+    assert run.refines_net and simulation.model is not None
+    found = hashlib.sha256(simulation.model.xml.encode())
+    found.update(repr([(e.t.hex(), e.transition) for e in run.events]).encode())
+    d = simulation.physical.d
+    for state in (d.qpos, d.qvel, d.qacc):
+        found.update(state.tobytes())
+    return found.hexdigest()
+
+
 def random_marking(layout: Layout, seed: int) -> Marking:
     """A legal marking: the token game played at random for a while."""
     net, draw = layout.factory.net, random.Random(seed)
     marking = net.initial_marking
     for _ in range(draw.randrange(1, 60)):
-        event = draw.choice(net.threaded.net.enabled(marking))
-        marking = net.threaded.net.follower(marking, [event])
+        event = draw.choice(enabled(net.threaded.net, marking))
+        marking = follower(net.threaded.net, marking, [event])
     return marking
 
 

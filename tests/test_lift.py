@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import cache
 
 import numpy as np
 import pytest
@@ -12,18 +11,15 @@ from factory.compiler.mating.mating import matings
 from factory.geometry.product import product_geometry
 from factory.lang.pag_reader import read_pag
 from factory.layout.clearance import certify
-from factory.layout.embedding import lay_out
-from factory.layout.layout import Layout
 from factory.modes.modes import operation_modes, operation_starts
 from factory.nets.verify import verify
 from factory.pipeline import all_templates
 from factory.plant.approaches import MARGIN
 from factory.plant.factory import Factory
-from factory.problem.robot_types import load_catalogue
 from factory.simulation.request import RunRequest
 from factory.simulation.simulation import Simulation
 from factory.support.errors import InputError
-from tests.test_compiler import compiled
+from tests.simulation_values import FENCE, laid_out, laid_out_with_lifts
 
 CASTLE = """root = castle; castle = mate(lower, roof, flag); lower = weld(walls, dwell = 0.2);
 walls = mate(tub, keep); roof = mate(tiles, ridge);
@@ -33,17 +29,6 @@ tiles = atomic(box = (0.08, 0.08, 0.01), pos = (0, 0, 0.0854));
 ridge = atomic(box = (0.02, 0.02, 0.02), pos = (0, 0, 0.1006));
 flag = atomic(box = (0.01, 0.03, 0.03), pos = (0.02, 0, 0.1056))"""
 """Blocks that all slide over each other."""
-
-FENCE = """root = cup; cup = mate(bowl, ball, lid); bowl = mate(floor, wall1, wall2, wall3, wall4);
-floor = atomic(box = (0.1, 0.1, 0.01), pos = (0, 0, 0.005));
-wall1 = atomic(box = (0.01, 0.1, 0.03), pos = (0.045, 0, 0.0252));
-wall2 = atomic(box = (0.01, 0.1, 0.03), pos = (-0.045, 0, 0.0252));
-wall3 = atomic(box = (0.0796, 0.01, 0.03), pos = (0, 0.045, 0.0252));
-wall4 = atomic(box = (0.0796, 0.01, 0.03), pos = (0, -0.045, 0.0252));
-ball = atomic(sphere = 0.012, pos = (0, 0, 0.0224));
-lid = atomic(box = (0.1, 0.1, 0.005), pos = (0, 0, 0.0429))"""
-"""A ball that can only be lowered into its box; walls 3 and 4 come along x and fit between the
-others, so they are lowered too."""
 
 NESTED = """root = n; n = mate(outer, inside); outer = mate(f1, w1, w2, w3, w4);
 f1 = atomic(box = (0.14, 0.14, 0.01), pos = (0, 0, 0.005));
@@ -61,17 +46,6 @@ ball = atomic(sphere = 0.012, pos = (0, 0, 0.0329))"""
 """A ball in a box in a box: a lift that serves a lift."""
 
 
-@cache
-def laid_out(text: str) -> Layout:
-    templates = all_templates()
-    pag = read_pag(text, templates)
-    product = product_geometry(pag)
-    found = matings(pag, templates, product).approaches
-    from factory.compiler.compiler import compile_pag
-
-    return lay_out(compile_pag(pag, templates, load_catalogue(), found), product)
-
-
 def lifts(factory: Factory) -> dict[str, str]:
     """What each robot with a lift lowers."""
     return {factory.robots[r].name: factory.delivered(r) for r in factory.strokes}
@@ -87,7 +61,7 @@ def lifts(factory: Factory) -> dict[str, str]:
     ids=["fence", "nested", "castle"],
 )
 def test_what_cannot_slide_is_brought_by_a_lift(text: str, lowered: set[str]) -> None:
-    factory = laid_out(text).factory
+    factory = laid_out_with_lifts(text).factory
     assert set(lifts(factory).values()) == lowered
     for robot in factory.robots:
         assert (robot.type == "lift") == (robot.name in lifts(factory))
@@ -99,7 +73,7 @@ def test_what_cannot_slide_is_brought_by_a_lift(text: str, lowered: set[str]) ->
 @pytest.mark.parametrize("world", ["ideal", "mujoco"])
 def test_lifts_lower_in_either_world(text: str, distributed: bool, world: str) -> None:
     """With every robot at a speed of its own; contact is on for all parts."""
-    layout = laid_out(text)
+    layout = laid_out_with_lifts(text)
     simulation = Simulation(
         layout, RunRequest(world, units=4, seed=5, jitter=0.3, distributed=distributed)
     )
@@ -108,6 +82,7 @@ def test_lifts_lower_in_either_world(text: str, distributed: bool, world: str) -
     assert run.products == 4 and run.refines_net
     if world == "mujoco":
         assert layout.excluded == ()
+        assert run.physics is not None
         assert run.physics.unintended_contacts == 0, run.physics.contacts
         assert run.physics.mating_force_max_n == 0.0
         assert run.physics.product_error_max_mm < 0.01
@@ -117,7 +92,7 @@ def test_lifts_lower_in_either_world(text: str, distributed: bool, world: str) -
 
 
 def test_what_a_lift_serves_is_made_at_its_height() -> None:
-    layout = laid_out(NESTED)
+    layout = laid_out_with_lifts(NESTED)
     factory = layout.factory
     robot = {label: factory.by_label[label].carrier for label in ("n", "inside", "bowl", "f2")}
     up = layout.elevations
@@ -132,7 +107,7 @@ def test_what_a_lift_serves_is_made_at_its_height() -> None:
 
 
 def test_a_lift_is_up_but_for_what_it_delivers_to() -> None:
-    layout = laid_out(FENCE)
+    layout = laid_out_with_lifts(FENCE)
     factory = layout.factory
     (robot, stroke), *_ = factory.strokes.items()
     axis = len(factory.robots)
@@ -151,7 +126,7 @@ def test_a_lift_is_up_but_for_what_it_delivers_to() -> None:
 def test_it_is_lowered_only_when_all_others_stand() -> None:
     """In physics: while the head is not up, every robot of the operation is within eps of its goal;
     while any other moves, the parts keep the margin."""
-    layout = laid_out(FENCE)
+    layout = laid_out_with_lifts(FENCE)
     factory = layout.factory
     robot = next(iter(factory.strokes))
     last = factory.operations[factory.robots[robot].operations[-1]]
@@ -171,7 +146,7 @@ def test_it_is_lowered_only_when_all_others_stand() -> None:
 
 
 def test_runs_start_from_any_marking_of_a_factory_with_lifts() -> None:
-    layout = laid_out(FENCE)
+    layout = laid_out_with_lifts(FENCE)
     ideal = Simulation(layout, RunRequest("ideal", units=2))
     places = set()
     while ideal.world.delivered() < 2:
@@ -188,7 +163,7 @@ def test_runs_start_from_any_marking_of_a_factory_with_lifts() -> None:
 
 def test_a_stroke_too_short_fails_the_certificate() -> None:
     """Planted fault: what is lowered comes only 5 mm above the others."""
-    layout = laid_out(FENCE)
+    layout = laid_out_with_lifts(FENCE)
     factory = layout.factory
     operations = tuple(
         o
@@ -203,8 +178,7 @@ def test_a_stroke_too_short_fails_the_certificate() -> None:
 
 
 def test_without_a_lift_the_ball_is_blocked_and_its_pairs_left_out() -> None:
-    plan = compiled(FENCE)
-    layout = lay_out(plan, product_geometry(plan.pag))
+    layout = laid_out(FENCE)
     kinds = {o.label: o.approach.kind for o in layout.factory.operations if o.approach}
     assert "blocked" in kinds.values()
     assert any("ball" in pair for pair in layout.excluded)

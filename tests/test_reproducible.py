@@ -15,24 +15,22 @@ import pytest
 
 from factory.record.log import MAGIC, LogWriter, read_log
 from factory.record.log.blocks import LENGTH
-from factory.simulation.request import RunRequest
-from factory.simulation.simulation import Simulation
 from factory.support.errors import MissingError
 from factory.support.gl import probe
 from tests.command_line import PAPER, ROOT
-from tests.fidelity.products import layout
+from tests.simulation_values import digest, ready, reproduced
 
 DIGEST = """
 import sys
-from tests.test_reproducible import digest, simulated
-print(digest(simulated()))
+from tests.simulation_values import digest, reproduced
+print(digest(reproduced()))
 """
 
 LOGGED = """
 import sys
 from factory.record.log import LogWriter
-from tests.test_reproducible import simulated
-made = simulated(1000000)
+from tests.simulation_values import reproduced
+made = reproduced(1000000)
 def tell(world, supervisor):
     print(world.time, flush=True)
 with LogWriter(sys.argv[1], made, command=["factory"]) as log:
@@ -40,25 +38,10 @@ with LogWriter(sys.argv[1], made, command=["factory"]) as log:
 """
 
 
-def simulated(units: int = 2) -> Simulation:
-    return Simulation(layout("paper"), RunRequest(units=units, seed=5, jitter=0.3))
-
-
-def digest(simulation: Simulation, observers=()) -> str:
-    """Of the model, all events and the engine's last state, to the bit."""
-    run = simulation.run(observers)
-    assert run.refines_net and simulation.model is not None
-    found = hashlib.sha256(simulation.model.xml.encode())
-    found.update(repr([(e.t.hex(), e.transition) for e in run.events]).encode())
-    for state in (simulation.world.d.qpos, simulation.world.d.qvel, simulation.world.d.qacc):
-        found.update(state.tobytes())
-    return found.hexdigest()
-
-
 @pytest.fixture(scope="module")
 def here() -> str:
     """What this process makes of it."""
-    return digest(simulated())
+    return digest(reproduced())
 
 
 @pytest.mark.parametrize(
@@ -84,7 +67,9 @@ def test_another_process_gives_the_same(here: str, environment: dict[str, str]) 
 
 def test_a_run_beside_others_gives_the_same(here: str) -> None:
     found: list[str] = []
-    threads = [threading.Thread(target=lambda: found.append(digest(simulated()))) for _ in range(3)]
+    threads = [
+        threading.Thread(target=lambda: found.append(digest(reproduced()))) for _ in range(3)
+    ]
     for thread in threads:
         thread.start()
     for thread in threads:
@@ -95,7 +80,7 @@ def test_a_run_beside_others_gives_the_same(here: str) -> None:
 def test_a_log_changes_nothing_and_is_the_same_every_time(here: str, tmp_path: Path) -> None:
     bodies = []
     for number in range(2):
-        path, made = tmp_path / f"{number}.log", simulated()
+        path, made = tmp_path / f"{number}.log", reproduced()
         with LogWriter(path, made, command=["factory"]) as log:
             assert digest(made, [log.observe]) == here
         bodies.append(path.read_bytes())
@@ -109,13 +94,13 @@ def test_a_film_changes_nothing(here: str, tmp_path: Path) -> None:
         pytest.skip("no GL here")
     from factory.render import Film, Picture
 
-    made = simulated()
+    made = reproduced()
     with Film(made, tmp_path / "f.mp4", Picture((64, 48)), 2.0) as film:
         assert digest(made, [film.observe]) == here
 
 
 def test_another_seed_is_another_run(here: str) -> None:
-    assert digest(Simulation(layout("paper"), RunRequest(units=2, seed=6, jitter=0.3))) != here
+    assert digest(ready("paper", seed=6)) != here
 
 
 def test_a_log_says_what_made_it(tmp_path: Path) -> None:
@@ -145,7 +130,7 @@ def test_a_killed_run_leaves_a_log_up_to_its_last_second(tmp_path: Path) -> None
     assert not kept.complete
     assert told[-1] - 1.02 <= kept.time[-1] <= told[-1] + 0.02
 
-    again = simulated(1000000)
+    again = reproduced(1000000)
     with LogWriter(tmp_path / "whole.log", again, command=["factory"]) as log:
         again.run([log.observe], max_time=float(kept.time[-1]) + 0.5)
     whole = read_log(tmp_path / "whole.log")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import random
 from dataclasses import replace
 from typing import Any
 
@@ -21,51 +20,21 @@ from factory.simulation.run import Event, busy_times
 from factory.simulation.simulation import Simulation
 from factory.support.settings import Settings
 from tests.bench.factories import laid_out as floor_of
-from tests.test_compiler import PAPER, compiled
-from tests.token_game import enabled, follower
-
-UNARY = """root = c; c = glue(b, dwell = 0.1); b = weld(a, dwell = 0.2);
-a = press(p, dwell = 0.1); p = atomic()"""
-KARY = """root = s; s = mate(a, b, c, t, dd); t = mate(e, f); dd = inspect(d, dwell = 0.2);
-a = atomic(); b = atomic(); c = atomic(); d = atomic(); e = atomic(); f = atomic()"""
-CHAIN = """root = s4; s4 = mate(s3, e); s3 = mate(d, s2); s2 = mate(s1, c); s1 = mate(a, b);
-a = atomic(); b = atomic(); c = atomic(); d = atomic(); e = atomic()"""
-OVERLAP = """root = s; s = mate(u, v);  u = mate(a, b); v = mate(c, d);
-a = atomic(box = (0.2, 0.02, 0.05)); b = atomic(box = (0.02, 0.2, 0.06), pos = (0, 0.13, 0));
-c = atomic(cylinder = (0.03, 0.06), pos = (0.2, 0.1, 0));
-d = atomic(sphere = 0.04, pos = (-0.1, 0.1, 0.01))"""
-LONE = "root = p; p = atomic()"
-
-PRODUCTS = {
-    "paper": PAPER,
-    "unary": UNARY,
-    "kary": KARY,
-    "chain": CHAIN,
-    "overlap": OVERLAP,
-    "lone": LONE,
-}
-
-
-def laid_out(text: str) -> Layout:
-    return factory.lay_out(compiled(text))
+from tests.simulation_values import (
+    LONE,
+    OVERLAP,
+    PAPER,
+    PRODUCTS,
+    assert_good,
+    laid_out,
+    random_marking,
+    ready,
+)
 
 
 @pytest.fixture(scope="module")
 def paper() -> Layout:
     return laid_out(PAPER)
-
-
-def assert_good(run: factory.trace.Run) -> None:
-    """The figures that every MuJoCo run must reach."""
-    assert run.trouble is None
-    assert run.refines_net
-    physics = run.physics
-    assert physics is not None
-    assert physics.handoff_gap_max_mm <= 1.0
-    assert physics.product_error_max_mm is not None
-    assert physics.product_error_max_mm <= 0.1
-    assert physics.unintended_contacts == 0, physics.contacts
-    assert physics.engine_warnings == 0
 
 
 @pytest.mark.parametrize("name", PRODUCTS)
@@ -111,16 +80,6 @@ def test_a_hundred_units_of_the_papers_example(paper: Layout) -> None:
 def test_the_ideal_world_has_the_predicted_cycle_time(name: str) -> None:
     run = factory.run(laid_out(PRODUCTS[name]), world="ideal", units=12)
     assert run.cycle_time_s == pytest.approx(run.predicted_cycle_time_s, rel=0.02)
-
-
-def random_marking(layout: Layout, seed: int) -> frozenset[int]:
-    """A legal marking: play the token game at random for a while."""
-    net, draw = layout.factory.net, random.Random(seed)
-    marking = net.initial_marking
-    for _ in range(draw.randrange(1, 60)):
-        event = draw.choice(enabled(net.threaded.net, marking))
-        marking = follower(net.threaded.net, marking, [event])
-    return marking
 
 
 @pytest.mark.parametrize("world", ["mujoco", "ideal"])
@@ -208,13 +167,6 @@ def test_a_robot_reads_only_its_own_mode(paper: Layout) -> None:
         link.read(paper.factory.by_label["sub1"], 0)
 
 
-def test_an_event_that_is_not_enabled_cannot_fire(paper: Layout) -> None:
-    """Planted fault: the supervisor is made to end an operation that has not begun."""
-    supervisor = Simulation(paper, RunRequest(world="ideal", units=1)).supervisor
-    with pytest.raises(AssertionError, match="not all are enabled that fire: sub3_e"):
-        supervisor._fire([], [paper.factory.by_label["sub3"].index])
-
-
 def test_the_outfeed_may_be_the_bottleneck() -> None:
     layout = laid_out(LONE)
     slow = factory.run(layout, units=8, settings=factory.Settings(outfeed=0.1))
@@ -233,7 +185,7 @@ def test_a_time_limit_names_robot_mode_and_line(paper: Layout) -> None:
 
 
 def test_a_carrier_goes_on_when_all_others_have_followed() -> None:
-    """Whoever is in an operation, and looks seldom, finds that its carrier has not gone on."""
+    """A robot in an operation that looks seldom finds that its carrier has not gone on."""
     layout = laid_out(PRODUCTS["kary"])
     simulation = Simulation(
         layout, RunRequest("ideal", units=3, seed=3, jitter=0.5, distributed=True)
@@ -244,22 +196,23 @@ def test_a_carrier_goes_on_when_all_others_have_followed() -> None:
     while simulation.world.delivered() < 3:
         supervisor.step()
         for process in supervisor.processes:
-            operation, unit = process.step.operation, supervisor._unit(process)
+            operation, unit = process.step.operation, process.unit
             carrier = supervisor.processes[operation.carrier]
             if process.stage == "run" and process is not carrier:
-                assert carrier.turns <= supervisor._turn(operation.carrier, operation, unit)
+                assert carrier.turns <= supervisor.cells.turn(operation.carrier, operation, unit)
                 inside += carrier.stage == "leave"
     assert inside, "some carrier has waited for others"
 
 
 def test_a_contact_that_lasts_is_one(paper: Layout) -> None:
     """Robots driven into each other, looked at step by step."""
-    simulation = Simulation(paper, RunRequest(units=1))
-    world, onsets, before, lasted = simulation.world, 0, set(), 0
+    simulation = ready(paper, units=1, distributed=True)
+    world, onsets, before, lasted = simulation.physical, 0, set(), 0
     for _ in range(50):
         simulation.supervisor.step()
-    axes = np.arange(world.tray)
-    world.move(axes, world.reference[axes], np.where(axes % 2, 0.3, -0.3), np.zeros(len(axes)))
+    axes = np.arange(world.motion.axes.tray)
+    at, speed = world.motion.robots.x[axes], np.where(axes % 2, 0.3, -0.3)
+    world.move(axes, at, speed, np.zeros(len(axes)))
     for _ in range(800):
         world.advance(1)
         world.inspection.tick()
@@ -293,9 +246,10 @@ def test_heavy_parts_do_not_swing(text: str, force: float) -> None:
 def test_a_stuck_robot_is_a_stall(paper: Layout) -> None:
     """Planted fault: robot r5's drive does nothing."""
     simulation = Simulation(paper, RunRequest(units=1))
-    simulation.world.m.actuator_biasprm[4, 1:3] = 0.0
-    simulation.world.m.actuator_gaintype[4] = 0
-    simulation.world.m.actuator_gainprm[4] = 0.0
+    m = simulation.physical.m
+    m.actuator_biasprm[4, 1:3] = 0.0
+    m.actuator_gaintype[4] = 0
+    m.actuator_gainprm[4] = 0.0
     run = simulation.run()
     assert run.trouble is not None
     assert run.trouble.code == "Stalled"
@@ -312,7 +266,7 @@ def test_an_unstable_engine_ends_the_run(paper: Layout) -> None:
     def plant(world: Any, _: object) -> None:
         seen.append(world.time)
         if world.time > 1.0:
-            world.d.qvel[world.dof[2]] = float("nan")
+            world.d.qvel[world.motion.axes.dof[2]] = float("nan")
 
     run = simulation.run([plant])
     assert run.trouble is not None
@@ -323,24 +277,15 @@ def test_an_unstable_engine_ends_the_run(paper: Layout) -> None:
     assert seen == sorted(seen)
 
 
-def test_short_steps_and_slow_starts_do_not_send_robots_to_sleep(paper: Layout) -> None:
-    """The engine puts to sleep what is slow for ten steps, in the middle of a trajectory too."""
-    for settings in (
-        Settings(timestep=1e-4, substeps=20, acceleration=0.2),
-        Settings(acceleration=0.002, speed=0.05),
-    ):
-        run = factory.run(paper, units=1, settings=settings)
-        assert run.products == 1
-        assert_good(run)
-
-
 def test_robots_stop_where_their_operation_ends(paper: Layout) -> None:
     """They may hand over at up to 10 mm/s, which as a setpoint would drag them out of the goal."""
-    simulation = Simulation(paper, RunRequest(units=2, settings=Settings(timestep=1e-4)))
+    settings = Settings(timestep=1e-4, substeps=5)
+    simulation = Simulation(paper, RunRequest(units=2, settings=settings))
     run = simulation.run()
     assert_good(run)
-    speeds = simulation.world.control[: simulation.world.tray] + 1
-    assert np.all(simulation.world.d.ctrl[speeds] == 0.0)
+    motion, d = simulation.physical.motion, simulation.physical.d
+    assert np.all(d.ctrl[motion.drives.control[: motion.axes.tray] + 1] == 0.0)
+    assert np.all(motion.robots.v[: motion.axes.tray] == 0.0)
 
 
 def test_a_payload_larger_than_the_layout_knew_is_a_contact() -> None:
@@ -362,7 +307,8 @@ def test_a_payload_larger_than_the_layout_knew_is_a_contact() -> None:
 def test_a_shifted_weld_shows_in_the_gap(paper: Layout) -> None:
     """Planted fault: one nominal frame is 2 mm off."""
     simulation = Simulation(paper, RunRequest(units=1))
-    simulation.world.m.eq_data[simulation.world.m.equality("grip/r3/part1").id, 3] += 0.002
+    m = simulation.physical.m
+    m.eq_data[m.equality("grip/r3/part1").id, 3] += 0.002
     run = simulation.run()
     assert run.physics is not None
     assert run.physics.handoff_gap_max_mm > 1.0
@@ -399,66 +345,63 @@ def test_templates_of_the_user_run_without_a_change_of_code(tmp_path) -> None:
     assert_good(factory.run(factory.lay_out(plan), units=2))
 
 
-def test_clocks_go_on_when_other_modes_begin() -> None:
-    simulation = Simulation(laid_out(KARY), RunRequest(units=2))
-    supervisor = simulation.supervisor
-    while len(supervisor.active.operations) < 2 or not any(_clocks(supervisor).values()):
-        supervisor.step()
-    active, run = supervisor.active, _clocks(supervisor)
-    supervisor._activate(reversed(active.operations), reversed(active.ahead))
-    assert _clocks(supervisor) == run
-
-
-def _clocks(supervisor: Any) -> dict[int, float]:
-    """The clock [s] of every mode under way, by its number."""
-    active = supervisor.active
-    if active.clocks is None:
-        return {}
-    numbers = (*active.operations, *active.ahead)
-    return dict(zip(numbers, active.clocks.tolist(), strict=True))
-
-
 def test_the_tray_is_looked_for_until_it_has_come_home() -> None:
-    """Who has asked for it in vain does not ask again before something has changed; that it ought
+    """What has asked for it in vain does not ask again before something has changed; that it ought
     to be home is not enough, where something has held it."""
-    simulation = Simulation(laid_out(PAPER), RunRequest(units=1))
-    world = simulation.world
+    simulation = ready("paper", units=1)
+    world, dropoff = simulation.physical, simulation.layout.factory.dropoff
+    outfeed = world.motion.outfeed
     while not world.delivered():
         simulation.supervisor.step()
-    assert not world.prepared(simulation.layout.factory.dropoff, 1)
-    assert not world.outfeed.home
+    assert not world.prepared(dropoff, 1)
+    assert outfeed.goal == 0.0 and outfeed.busy and not outfeed.rests()
     until = world.time + 3.0
     while world.time < until:
         if world.time < until - 1.0:
             world.d.joint("outfeed/slide").qpos = 0.01
+            assert outfeed.busy
         simulation.supervisor.step()
-    assert world.outfeed.home and world.outfeed.idle
+    assert world.prepared(dropoff, 1) and not outfeed.busy
 
 
-def test_only_who_is_joined_may_touch() -> None:
+def test_only_what_is_joined_may_touch() -> None:
     """Inputs of one unit in the hands of the robots of one operation, while it goes on."""
-    simulation = Simulation(laid_out(PAPER), RunRequest(units=2))
-    inspection, operations = simulation.world.inspection, simulation.layout.factory.operations
-    m, held = simulation.world.m, inspection.held
+    simulation = ready("paper")
+    inspection, operations = simulation.physical.inspection, simulation.layout.factory.operations
+    m, masks = simulation.physical.m, simulation.physical.parts.masks
     join = next(o for o in operations if len(o.inputs) == 2)
     other = next(r for r in range(len(simulation.layout.factory.robots)) if r not in join.robots)
-    one, two = (int(body) for body in [*held.solid][:2])
+    one, two = (int(body) for body in [*masks.solid][:2])
     geoms = int(m.body_geomadr[one]), int(m.body_geomadr[two])
     inspection.joining = {join.index: 7}
-    for unit, robots, expected in (
+    for units, robots, expected in (
         ((7, 7), join.robots[:2], join.label),
         ((7, 7), (join.robots[0], other), None),
         ((7, 7), (other, join.robots[0]), None),
         ((8, 8), join.robots[:2], None),
         ((7, 8), join.robots[:2], None),
     ):
-        held.unit[[one, two]] = unit
-        held.code[[one, two]] = np.array(robots) + 1
+        masks.unit[[one, two]] = units
+        masks.code[[one, two]] = np.array(robots) + 1
         assert inspection._joined(*geoms) == expected
-    inspection.ended(join)
-    held.unit[[one, two]] = 7
-    held.code[[one, two]] = np.array(join.robots[:2]) + 1
+    masks.unit[[one, two]] = 7
+    masks.code[[one, two]] = np.array(join.robots[:2]) + 1
+    assert inspection._joined(*geoms) == join.label
+    inspection.joining = {}
     assert inspection._joined(*geoms) is None
+
+
+def test_what_is_under_way_is_what_is_being_joined() -> None:
+    """In every tick: the operations under way, with their units."""
+    simulation = ready("paper", start=random_marking(laid_out(PAPER), 3))
+    world, supervisor = simulation.physical, simulation.supervisor
+    while world.delivered() < simulation.before + 2:
+        joining = world.inspection.joining
+        assert set(joining) == set(supervisor.active.operations)
+        fired = supervisor.firings.count
+        for number, unit in joining.items():
+            assert fired[simulation.layout.factory.operations[number].end] == unit
+        supervisor.step()
 
 
 def test_busy_times_are_those_of_operations_that_have_ended() -> None:

@@ -7,6 +7,7 @@ import random
 import sqlite3
 from contextlib import closing
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -14,8 +15,6 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from layout_values import STYLES, random_layout
-from pag_values import SHAPES
 
 import factory
 from factory.control.mode import Mode
@@ -46,6 +45,8 @@ from factory.support.settings import Settings
 from factory.timing.cycle_time import cycle_time
 from factory.timing.prediction import operation_delays, predict, ways_ahead
 from tests.command_line import PAPER, ROOT, Terminal
+from tests.layout_values import STYLES, random_layout
+from tests.pag_values import SHAPES
 
 STAGED, STILL = Settings(stage=1), Settings()
 CHEST = ROOT / "examples" / "chest.pag"
@@ -55,6 +56,7 @@ shapes, styles = st.sampled_from(SHAPES), st.sampled_from(STYLES)
 worlds: Any = st.sampled_from(["ideal", "mujoco"])
 
 
+@cache
 def laid_out(file: Path) -> Layout:
     return factory.lay_out(factory.compile(factory.load_pag(file)))
 
@@ -64,7 +66,7 @@ def paper() -> Layout:
     return laid_out(PAPER)
 
 
-def test_who_goes_ahead_in_the_papers_example(paper: Layout) -> None:
+def test_what_goes_ahead_in_the_papers_example(paper: Layout) -> None:
     """r1 and r3 go back with nothing, and wait there for what they are to carry; r2, r5 and r6 wait
     for no robot at their feeders; r4 is a tool, and stays at its station."""
     modes = operation_modes(paper, STAGED.eps)
@@ -87,7 +89,7 @@ def test_only_empty_hands_go_ahead_and_only_to_others(
         assert stage.goal == layout.goal(operation.index, stage.slot) != stage.start
 
 
-def test_who_would_meet_somebody_on_its_way_does_not_go(
+def test_what_would_meet_another_on_its_way_does_not_go(
     paper: Layout, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     modes = operation_modes(paper, STAGED.eps)
@@ -256,7 +258,7 @@ def test_it_does_not_change_a_run_without_it(paper: Layout) -> None:
 # --- robots on their way --------------------------------------------------------------------------
 
 
-def test_who_has_come_there_costs_nothing_more(paper: Layout) -> None:
+def test_what_has_come_there_costs_nothing_more(paper: Layout) -> None:
     """r3 is at its station long before its parts are; nothing moves it there."""
     made = Simulation(paper, RunRequest("mujoco", units=1, settings=STAGED))
     numbers = [s.robot for s in stages(paper, made.modes)]
@@ -292,28 +294,30 @@ def test_a_robot_is_in_one_mode_at_a_time(world: Any) -> None:
         gone = set(before.ahead) - set(active.ahead)
         overtaken += sum(abs(x[robots[n - count]] - goals[n - count]) > 0.01 for n in gone)
         if world == "mujoco":
-            driven = made.world.d.ctrl[made.world.control[active.axes]]
-            assert (driven == made.world.reference[active.axes]).all()
+            motion = made.physical.motion
+            driven = made.physical.d.ctrl[motion.drives.control[active.axes]]
+            assert (driven == motion.robots.x[active.axes]).all()
     assert overtaken > 2
 
 
-def test_it_goes_on_without_a_stop_where_its_operation_begins(paper: Layout) -> None:
+def test_it_goes_on_without_a_stop_where_its_operation_begins() -> None:
     """A robot under way keeps its speed when the mode of its operation takes it over."""
-    made = Simulation(paper, RunRequest("mujoco", units=6, settings=STAGED))
-    world, taken = made.world, []
+    layout = laid_out(CHEST)
+    made = Simulation(layout, RunRequest("mujoco", units=3, settings=STAGED))
+    robots, taken = made.physical.motion.robots, []
     before: set[int] = set()
-    while made.world.delivered() < made.before + 6:
-        speeds = world.speed.copy()
+    while made.world.delivered() < 2:
+        speeds = robots.v.copy()
         made.supervisor.step()
         active = made.supervisor.active
         started = set(active.operations) - before
         for number in started:
-            for robot in paper.factory.operations[number].robots:
+            for robot in layout.factory.operations[number].robots:
                 if abs(speeds[robot]) > 0.1:
-                    taken.append(abs(world.speed[robot] - speeds[robot]))
+                    taken.append(abs(robots.v[robot] - speeds[robot]))
         before = set(active.operations)
     most = STAGED.acceleration * STAGED.tick
-    assert all(change < most + 1e-9 for change in taken)
+    assert taken and all(change < most + 1e-9 for change in taken)
 
 
 def test_limits_may_change_on_the_way(paper: Layout) -> None:
@@ -355,7 +359,7 @@ def loaded_too(layout: Layout, modes: Any) -> Any:
     return tuple(found)
 
 
-def test_the_monitor_blames_who_goes_ahead_with_a_part(
+def test_the_monitor_blames_what_goes_ahead_with_a_part(
     paper: Layout, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(
@@ -367,7 +371,7 @@ def test_the_monitor_blames_who_goes_ahead_with_a_part(
     assert {violation.code for violation in watcher.report().violations} & {"Order", "Early"}
 
 
-def test_the_monitor_blames_who_goes_ahead_though_it_should_wait(
+def test_the_monitor_blames_what_goes_ahead_though_it_should_wait(
     paper: Layout, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The monitor goes by the settings of the run, not by what its supervisor does."""

@@ -8,20 +8,12 @@ from xml.etree import ElementTree
 
 import pytest
 
-from factory.layout.layout import Layout
 from factory.mjcf import loading
 from factory.mjcf.unseen import leave_out_what_is_shown
 from factory.record.log import read_log
-from factory.simulation.request import RunRequest
 from factory.simulation.simulation import Simulation, physical_model
 from tests.command_line import PAPER, Terminal
-from tests.test_lift import FENCE
-from tests.test_simulation import laid_out
-from tests.test_vicinity import gone_wild, layout, states
-
-
-def the_layout(name: str) -> Layout:
-    return laid_out(FENCE) if name == "fence" else layout(name)
+from tests.simulation_values import gone_wild, layout_of, ready, states
 
 
 @pytest.mark.parametrize(
@@ -29,26 +21,20 @@ def the_layout(name: str) -> Layout:
     [("paper", {}), ("gearbox", {}), ("20", {"fuse": True}), ("fence", {"distributed": True})],
 )
 def test_an_unseen_run_is_the_same_to_the_last_bit(name: str, given: dict[str, Any]) -> None:
-    seen, unseen = (
-        Simulation(the_layout(name), RunRequest(units=2, seed=3, jitter=0.3, shown=shown, **given))
-        for shown in (True, False)
-    )
-    assert unseen.world.m.ngeom < seen.world.m.ngeom
-    assert unseen.world.m.nbody < seen.world.m.nbody
+    seen, unseen = (ready(name, shown=shown, **given) for shown in (True, False))
+    assert unseen.physical.m.ngeom < seen.physical.m.ngeom
+    assert unseen.physical.m.nbody < seen.physical.m.nbody
     expected = states(seen, seen.supervisor.step, 500)
     assert states(unseen, unseen.supervisor.step, 500) == expected
-    one, other = seen.world.inspection.figures(), unseen.world.inspection.figures()
-    assert one == other
+    assert unseen.physical.figures() == seen.physical.figures()
 
 
 @pytest.mark.parametrize("seed", range(3))
 def test_all_that_collides_is_there(seed: int) -> None:
-    seen, unseen = (
-        Simulation(layout("20"), RunRequest(units=2, shown=shown)) for shown in (True, False)
-    )
+    seen, unseen = (ready("20", shown=shown, distributed=True) for shown in (True, False))
     expected = states(seen, gone_wild(seen, seed), 150)
     assert states(unseen, gone_wild(unseen, seed), 150) == expected
-    touched = [simulation.world.inspection.unintended for simulation in (seen, unseen)]
+    touched = [simulation.physical.inspection.unintended for simulation in (seen, unseen)]
     assert touched[0] and touched[0] == touched[1]
 
 
@@ -73,7 +59,7 @@ def test_nothing_that_weighs_or_touches_is_left_out() -> None:
 
 
 def test_only_meshes_that_are_drawn_are_left_out() -> None:
-    full, bare = (physical_model(layout("gearbox"), 1, shown=shown) for shown in (True, False))
+    full, bare = (physical_model(layout_of("gearbox"), 1, shown=shown) for shown in (True, False))
     assert loading.load(bare).nmesh < loading.load(full).nmesh
 
 
@@ -81,5 +67,5 @@ def test_what_is_logged_can_be_looked_at(run: Terminal, tmp_path: Path) -> None:
     log = tmp_path / "run.log"
     assert run("run", PAPER, "--log", log, "-q").status == 0
     assert "r1/rail" in read_log(log).xml
-    assert "r1/rail" in Simulation(layout("paper")).model.xml  # type: ignore[union-attr]
-    assert "r1/rail" not in physical_model(layout("paper"), 1, shown=False).xml
+    assert "r1/rail" in Simulation(layout_of("paper")).model.xml  # type: ignore[union-attr]
+    assert "r1/rail" not in physical_model(layout_of("paper"), 1, shown=False).xml

@@ -41,6 +41,7 @@ class Welds:
         """Switch welds off."""
         for weld in welds:
             self._on.pop(weld, None)
+            self._gripped.pop(weld, None)
             self._off.add(weld)
 
     def join(self, welds: Mapping[int, int]) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from pathlib import Path
 
 import numpy as np
@@ -11,23 +12,17 @@ from hypothesis import strategies as st
 
 import factory
 from factory.geometry.product import product_geometry
-from factory.layout.layout import Layout
 from factory.plant.fused_bodies import FUSE_FROM, bodies_of, fused_copies, fusing_pays
 from factory.record.monitor import beside
 from factory.simulation.disturbance import Mass, disturb
-from factory.simulation.mujoco.fusing import Fusion, turned
+from factory.simulation.mujoco.feeders import Feeders
+from factory.simulation.mujoco.fusing import SETTLING, Fusion, rotations
 from factory.simulation.request import RunRequest
 from factory.simulation.simulation import Simulation, physical_model
 from factory.support.engine import mujoco
 from factory.support.settings import Settings
-from tests.command_line import PAPER, ROOT, Terminal
-from tests.test_simulation import laid_out
-
-EXAMPLES = ROOT / "examples"
-
-
-def layout_of(name: str) -> Layout:
-    return factory.lay_out(factory.compile(factory.load_pag(EXAMPLES / f"{name}.pag")))
+from tests.command_line import PAPER, Terminal
+from tests.simulation_values import laid_out, layout_of, ready
 
 
 def free_bodies(rng: np.random.Generator, count: int) -> tuple[mujoco.MjModel, mujoco.MjData, int]:
@@ -98,18 +93,19 @@ def test_a_rigid_motion_goes_over_unchanged() -> None:
 
 
 def test_what_has_become_heavier_keeps_its_momentum() -> None:
-    simulation = Simulation(layout_of("gearbox"), RunRequest(units=1, fuse=True))
-    m, d, stock = simulation.world.m, simulation.world.d, simulation.world.stock
-    disturb(simulation, Mass(2.0, tuple(stock.feed)[:2]))
-    whole = int(next(stock.body[label][0] for label in stock.body if label not in stock.feed))
-    bodies = [int(stock.body[label][0]) for label in [*stock.feed][:2]]
+    simulation = Simulation(layout_of("truck"), RunRequest(units=1, fuse=True))
+    world, parts = simulation.physical, simulation.physical.parts
+    m, d, of_label, fed = world.m, world.d, parts.copies.body, [*parts.feeders.welds]
+    disturb(simulation, Mass(2.0, tuple(fed[:2])))
+    whole = int(next(of_label[label][0] for label in of_label if label not in fed))
+    bodies = [int(of_label[label][0]) for label in fed[:2]]
     for body in bodies:
         at = m.body_dofadr[body]
         d.qvel[at : at + 6] = np.random.default_rng(body).normal(0, 1, 6)
     m.body_mass[whole] = m.body_mass[bodies].sum()
     mujoco.mj_setConst(m, mujoco.MjData(m))
     before = momentum(m, d, bodies)
-    stock.fusion.fuse(bodies, whole)
+    parts.joining.fusion.fuse(bodies, whole)
     assert np.allclose(momentum(m, d, [whole]), before, atol=1e-9)
 
 
@@ -131,14 +127,15 @@ def test_misfit_sees_a_shift_and_a_turn() -> None:
     m, d, _ = free_bodies(np.random.default_rng(1), 2)
     mujoco.mj_forward(m, d)
     fusion, both = Fusion(m, d, d.xpos.copy(), np.full(m.nbody, 0.1)), [1, 2]
-    assert fusion.misfit(both) < 1e-12
+    assert fusion.misfits([both])[0] < 1e-12
     d.qpos[7] += 1e-5
     mujoco.mj_forward(m, d)
-    assert fusion.misfit(both) == pytest.approx(1e-5)
+    assert fusion.misfits([both])[0] == pytest.approx(1e-5)
+    assert fusion.misfits([[1], both, [2]]) == pytest.approx([0.0, 1e-5, 0.0])
     d.qpos[7] -= 1e-5
     d.qpos[10:14] = np.cos(5e-4), 0, 0, np.sin(5e-4)
     mujoco.mj_forward(m, d)
-    assert fusion.misfit(both) > 1e-3 * 0.1
+    assert fusion.misfits([both])[0] > 1e-3 * 0.1
 
 
 def test_turns_are_those_of_the_engine() -> None:
@@ -147,16 +144,14 @@ def test_turns_are_those_of_the_engine() -> None:
     matrix = np.empty(9)
     for quaternion in quaternions:
         mujoco.mju_quat2Mat(matrix, quaternion)
-        assert np.allclose(turned(*quaternion), matrix, rtol=0, atol=1e-15)
+        found = rotations(quaternion[None])[0].ravel()
+        assert np.allclose(found, matrix, rtol=0, atol=1e-15)
 
 
 @pytest.mark.parametrize(("name", "least"), [("paper", 1e-6), ("lamp", 1e-4), ("gearbox", 1e-4)])
 def test_a_fused_run_agrees_with_the_unfused(name: str, least: float) -> None:
-    layout, fine = layout_of(name), Settings(timestep=0.002)
-    one, other = (
-        Simulation(layout, RunRequest(units=2, jitter=0.3, seed=2, settings=fine, fuse=f))
-        for f in (False, True)
-    )
+    fine = Settings(timestep=0.002)
+    one, other = (ready(name, seed=2, settings=fine, fuse=f) for f in (False, True))
     apart, fused = one.run(), other.run()
     assert fused.products == apart.products == 2
     assert [e.transition for e in fused.events] == [e.transition for e in apart.events]
@@ -229,23 +224,24 @@ def test_the_monitor_explains_a_fused_run(name: str) -> None:
     assert report.refines_net, [str(v) for v in report.violations]
 
 
-def test_the_monitor_catches_a_body_made_of_another_unit() -> None:
+def test_the_monitor_catches_a_body_made_of_another_unit(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     """Planted: the product appears in the output robot's hands, but one input stays there."""
     simulation = Simulation(layout_of("paper"), RunRequest(units=2, fuse=True))
-    stock = simulation.world.stock
-    retire = stock._retire
+    parts, retire = simulation.physical.parts, Feeders.retire
     kept: list[str] = []
 
-    def faulty(labels: list[str], unit: int) -> None:
-        retire(labels, unit)
+    def faulty(self: Feeders, labels: Iterable[str], unit: int) -> None:
+        retire(self, labels, unit)
         if "part1" in labels and not kept:
             kept.append("part1")
             robot = simulation.layout.factory.by_label["sub1"].carrier
-            grip = stock.grip[robot, "part1"]
-            stock.board.loose([stock.park["part1", stock.free["part1"][0]]])
-            stock.board.join([grip], [stock.m.eq_obj2id[grip]])
+            grip = parts.hands.grip[robot, "part1"]
+            parts.welds.loose([parts.copies._park["part1", parts.copies.free["part1"][0]]])
+            parts.welds.join({grip: int(simulation.physical.m.eq_obj2id[grip])})
 
-    stock._retire = faulty
+    monkeypatch.setattr(Feeders, "retire", faulty)
     monitor = beside(simulation)
     simulation.run([monitor.observe], max_time=20)
     assert kept and not monitor.report().refines_net
@@ -289,28 +285,72 @@ def test_a_body_that_has_just_become_free_can_take_the_place_of_others(
 ) -> None:
     """The only copy of a sub-assembly is still joined to something else when the next one is
     made; both become one in the same tick, in either order."""
-    monkeypatch.setattr("factory.simulation.mujoco.parts.SETTLING", np.inf)
+    monkeypatch.setattr("factory.simulation.mujoco.joining.SETTLING", np.inf)
     simulation = Simulation(layout_of("chest"), RunRequest(units=4, fuse=True))
-    world, stock = simulation.world, simulation.world.stock
+    world, parts = simulation.physical, simulation.physical.parts
+    hands = parts.hands.of
     found: list[tuple[int, int]] = []
     while not found:
         simulation.supervisor.step()
         assert world.time < 60
-        made = {robot: label for robot, (label, _) in stock.joining.items()}
+        made = {robot: label for robot, (label, _) in parts.joining.waiting.items()}
         found = [
             (consumer, maker)
             for maker, label in made.items()
-            if not stock.free[label]
+            if not parts.copies.free[label]
             for consumer in made
-            if label in stock.load[consumer].labels
+            if label in hands[consumer].bodies
         ]
     consumer, maker = found[0]
-    unit, held = stock.load[maker].unit, stock.load[maker].bodies
+    unit, held = hands[maker].unit, [*hands[maker].bodies.values()]
     centre = world.m.body_mass[held] @ world.d.xpos[held] / world.m.body_mass[held].sum()
-    stock.fuse([consumer, maker] if first == "consumer" else [maker, consumer])
-    stock.board.write()
-    (label,) = stock.load[maker].labels
-    at = world.m.jnt_qposadr[world.m.body_jntadr[stock.body_of(label, unit)]]
+    parts.joining.fuse([consumer, maker] if first == "consumer" else [maker, consumer])
+    parts.welds.write()
+    (label,) = hands[maker].bodies
+    at = world.m.jnt_qposadr[world.m.body_jntadr[parts.copies[label, unit]]]
     assert np.linalg.norm(world.d.qpos[at : at + 3] - centre) < 0.005
     done = simulation.run()
     assert done.products == 4 and done.physics and done.physics.unintended_contacts == 0
+
+
+def test_what_has_not_settled_is_not_one_body_yet(monkeypatch: pytest.MonkeyPatch) -> None:
+    """It becomes one when its parts are within RIGID of their places, or when its robot's next
+    operation ends; its misfit is kept, and is part of the product's error."""
+    simulation = ready("paper", fuse=True)
+    world, joining = simulation.physical, simulation.physical.parts.joining
+    monkeypatch.setattr("factory.simulation.mujoco.joining.RIGID", 0.0)
+    waited: list[float] = []
+    while not world.delivered():
+        simulation.supervisor.step()
+        waited += [world.time - since for _, since in joining.waiting.values()]
+    late = max(waited)
+    error = world.figures().product_error_max_mm
+    monkeypatch.undo()
+    simulation = ready("paper", fuse=True)
+    world, joining = simulation.physical, simulation.physical.parts.joining
+    waited = []
+    while not world.delivered():
+        simulation.supervisor.step()
+        waited += [world.time - since for _, since in joining.waiting.values()]
+    assert SETTLING < max(waited) < 0.3 < late
+    assert error is not None and 0.0 < error < 0.002
+
+
+def test_a_misfit_is_part_of_the_error(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Planted: parts are 3 mm out of place when they become one body."""
+    misfits = Fusion.misfits
+    monkeypatch.setattr(Fusion, "misfits", lambda self, groups: misfits(self, groups) + 3e-3)
+    simulation = ready("paper", fuse=True, units=1)
+    run = simulation.run()
+    assert run.physics is not None
+    assert run.physics.product_error_max_mm == pytest.approx(3.0, abs=0.01)
+
+
+def test_a_fusion_that_loses_momentum_shows() -> None:
+    """Planted: a body of other mass than those in whose place it is has another momentum."""
+    m, d, whole = free_bodies(np.random.default_rng(3), 2)
+    d.qvel[:12] = 1.0
+    m.body_mass[whole] *= 1.1
+    before = momentum(m, d, [1, 2])
+    nowhere(m, d).fuse([1, 2], whole)
+    assert not np.allclose(momentum(m, d, [whole]), before, atol=1e-3)
