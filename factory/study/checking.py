@@ -7,8 +7,6 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from factory.foreign_nets.general import analyse
-from factory.foreign_nets.pnml_reader import load_net
 from factory.geometry.limits import is_plain
 from factory.nets.gears import Gear, GearNet
 from factory.nets.marked import MarkedNet, marked
@@ -87,5 +85,8 @@ def check_project(project: Project, wip: int | None = None) -> Checked:
 
 def check_net(file: Path) -> Checked:
     """Check a net in PNML, which need not be that of a factory. Raises InputError."""
+    from factory.foreign_nets.general import analyse
+    from factory.foreign_nets.pnml_reader import load_net
+
     net = load_net(file)
     return Checked(file.stem, net, analyse(net))

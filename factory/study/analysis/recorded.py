@@ -15,7 +15,6 @@ from factory.study.analysis.measured import RunRecord, dropoff_times
 from factory.support.errors import Diagnostic, InputError
 from factory.support.settings import Settings
 
-
 HINT = "`factory run FILE.pag --log OUT` writes one that fits"
 
 
