@@ -163,7 +163,7 @@ def test_a_stage_of_a_sub_assembly_is_about_that() -> None:
 
 def test_what_is_measured_is_what_analyze_says(recording) -> None:
     log, layout = recording.log, recording.layout
-    record = logged_record("log", log.events, log.time, log.delivered)
+    record = logged_record("log", log, layout.factory)
     timing = Timing(layout, seed=1, jitter=0.2)
     told = analyse(timing, 2, record=record).measured
     found = measured(recording)

@@ -14,7 +14,7 @@ import click
 from factory.commands.analyze import analyze
 from factory.commands.build import build
 from factory.commands.check import check
-from factory.commands.defaults import from_environment, with_defaults
+from factory.commands.defaults import set_in_advance, with_defaults
 from factory.commands.doctor import doctor
 from factory.commands.explain import Code, tell_code
 from factory.commands.export import export
@@ -111,6 +111,8 @@ def _refusal(error: BaseException) -> FactoryError:
 
 def _usage(error: click.ClickException) -> Diagnostic:
     """A usage error of click as a diagnostic."""
+    if isinstance(error, click.BadParameter) and (fault := set_in_advance(error)):
+        return fault
     context = getattr(error, "ctx", None)
     hint = f"see {context.command_path if context else 'factory'} --help"
     message = error.format_message()
@@ -118,8 +120,6 @@ def _usage(error: click.ClickException) -> Diagnostic:
         message = f"there is no option '{error.option_name}'"
         if error.possibilities:
             hint = did_you_mean(error.option_name, sorted(error.possibilities), "options")
-    if isinstance(error, click.BadParameter):
-        message += from_environment(error)
     return Diagnostic("Usage", message, None, hint)
 
 
@@ -169,26 +169,10 @@ def cli(ctx: click.Context, version: bool, explain: str | None, as_json: bool) -
         raise click.UsageError("--json comes after the command", ctx)
 
 
-for _command in (
-    new,
-    import_,
-    check,
-    build,
-    run,
-    render,
-    view,
-    fidelity,
-    analyze,
-    report,
-    sweep,
-    monitor,
-    programs,
-    export,
-    templates,
-    doctor,
-):
+ON_A_FILE = check, build, run, render, view, fidelity, analyze, report, programs, export
+"""The commands whose options may be set in advance for a FILE."""
+
+for _command in (*map(with_defaults, ON_A_FILE), new, import_, sweep, monitor, templates, doctor):
     cli.add_command(_command)
-for _command in (check, build, run, render, view, fidelity, analyze, report, programs, export):
-    with_defaults(_command)
 
 __all__ = ["cli", "main", "run_command"]

@@ -159,7 +159,7 @@ def _analyze_pag(
     from factory.study.analysis import Timing, analyse
     from factory.study.analysis.document import document
     from factory.study.analysis.picture import check_picture, picture
-    from factory.study.analysis.recorded import Conditions, conditions
+    from factory.study.analysis.recorded import Conditions, conditions, logged_record
     from factory.support.files import write_bytes
 
     writable(given.file, output)
@@ -179,7 +179,7 @@ def _analyze_pag(
     record: RunRecord | None = None
     status = 0
     if log is not None:
-        record = _logged(str(study.measured), log, layout.factory)
+        record = logged_record(str(study.measured), log, layout.factory)
     elif study.on_the_spot:
         record, status = _run(project, timing, asked, out.silent)
     units = len(record.dropoffs) if record else asked.units
@@ -206,29 +206,18 @@ def _tell(found: Analysis, verbose: bool) -> None:
             say(f"{made.note}\n")
 
 
-def _logged(name: str, log: Log, factory: Factory) -> RunRecord:
-    from factory.study.analysis.recorded import check_log, check_products, logged_record
-
-    check_log(name, log.header, factory)
-    record = logged_record(name, log.events, log.time, log.delivered)
-    check_products(record)
-    return record
-
-
 def _run(
     project: Project, timing: Timing, asked: RunOptions, silent: bool
 ) -> tuple[RunRecord, int]:
     """A run on the spot, in which no parts fuse; status 1 where it was troubled."""
     from factory.simulation.simulation import Simulation
-    from factory.study.analysis.recorded import check_products, record_of
+    from factory.study.analysis.recorded import record_of
 
     request = replace(asked, fuse=False).request(project, shown=False)
     run = carry_out(Simulation(timing.layout, request), silent)
     if run.trouble is not None:
         print(run.trouble, file=sys.stderr)
-    record = record_of(run)
-    check_products(record)
-    return record, 0 if run.trouble is None else 1
+    return record_of(run), 0 if run.trouble is None else 1
 
 
 def _robot(robots: dict[str, int], name: str) -> int:

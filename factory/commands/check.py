@@ -1,12 +1,10 @@
-"""The command `check`: what a PAG compiles to and what is proved of it, or of a net in PNML."""
+"""The command `check`."""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
@@ -19,12 +17,8 @@ from factory.support.files import is_net
 
 if TYPE_CHECKING:
     from factory.compiler.mating.mating import Mating, Matings
-    from factory.geometry.solids import Product
-    from factory.nets.gears import Gear, GearNet
-    from factory.nets.marked import MarkedNet
-    from factory.nets.petri import Place
-    from factory.nets.verdict import Verdict
     from factory.pipeline import Project
+    from factory.study.checking import Checked
 
 SHOWN = 24
 """The most robots, and blocked operations, that are printed, unless `-v` asks for all."""
@@ -52,6 +46,7 @@ def check(
     clashes: Path | None,
 ) -> int:
     """Parse, compile and prove FILE.pag (or a net in FILE.pnml)."""
+    from factory.study.checking import check_net, check_project
     from factory.support.files import own_names, write_all, write_text
 
     file = given.file
@@ -59,15 +54,18 @@ def check(
         for_a_pag(file, "a net in PNML", "certificate")
     writable(file, certificate)
     writable_folder(clashes)
-    checked = _check_net(file) if is_net(file) else _check_project(given, wip)
+    checked = check_net(file) if is_net(file) else check_project(project_of(given), wip)
     warnings = checked.product.warnings if checked.product else ()
     warn(warnings, out.quiet)
     if clashes is not None:
-        files = checked.pictures(clashes)
+        files = _pictures(checked, clashes)
         own_names(clashes, files, [file])
         write_all(files)
     if certificate is not None:
-        write_text(certificate, checked.certificate())
+        from factory.export.certificate.writer import certificate as document
+
+        proof = document(checked.net, checked.verdict)
+        write_text(certificate, json.dumps(proof, ensure_ascii=False) + "\n")
     if out.as_json:
         emit({**checked.as_json(), "warnings": [d.as_json() for d in warnings]})
     elif not out.quiet:
@@ -75,67 +73,13 @@ def check(
     return 0 if checked.verdict.holds else 1
 
 
-@dataclass(frozen=True)
-class Checked:
-    """A net with its verdict, of a PAG called `name` or read from PNML. `pool`: copies of each part
-    that are inside at once; `matings`: how its inputs come together, None where no part has a shape
-    of its own; `product`: None where every part is a default box."""
+def _pictures(checked: Checked, folder: Path) -> dict[Path, bytes]:
+    """The files that `--clashes` writes, one for each blocked operation."""
+    from factory.export.clash_picture import pictures
 
-    name: str
-    net: GearNet | MarkedNet
-    verdict: Verdict
-    labels: int = 0
-    pool: Mapping[str, int] = field(default_factory=dict)
-    matings: Matings | None = None
-    product: Product | None = None
-
-    def certificate(self) -> str:
-        """The proof as a document that another program can check."""
-        from factory.export.certificate.writer import certificate
-
-        return json.dumps(certificate(self.net, self.verdict), ensure_ascii=False) + "\n"
-
-    def pictures(self, folder: Path) -> dict[Path, bytes]:
-        """The files that `check --clashes` writes, one for each blocked operation."""
-        from factory.export.clash_picture import pictures
-
-        if self.matings is None or self.product is None:
-            return {}
-        return pictures(folder, self.matings, self.product)
-
-    def as_json(self) -> dict[str, Any]:
-        """The keys of `check --json`."""
-        from factory.nets.marked import marked
-
-        subject = marked(self.net)
-        places = subject.net.places
-        blocked = self.matings.of_kind("blocked") if self.matings else ()
-        return {
-            "product": self.name,
-            "labels": self.labels,
-            "robots": len(self.verdict.gears),
-            "places": len(places),
-            "transitions": len(subject.net.transitions),
-            "tokens": sum(subject.tokens),
-            "largest_mode": max((p.size for p in places), default=0),
-            **self.verdict.as_json(),
-            "gears": [_gear_json(gear, places) for gear in self.verdict.gears],
-            "part_pool": dict(self.pool),
-            "approaches": self.matings.as_json() if self.matings else None,
-            "clashes": [clash for mating in blocked for clash in mating.clashes_as_json()],
-        }
-
-
-def _gear_json(gear: Gear, places: Sequence[Place]) -> dict[str, Any]:
-    """One robot's gear as `check --json` lists it."""
-    return {
-        "robot": gear.robot,
-        "type": gear.type,
-        "places": [
-            {"name": places[p].name, "mode": places[p].mode, "label": places[p].label}
-            for p in gear.places
-        ],
-    }
+    if checked.matings is None or checked.product is None:
+        return {}
+    return pictures(folder, checked.matings, checked.product)
 
 
 def project_of(given: ProjectOptions) -> Project:
@@ -144,35 +88,6 @@ def project_of(given: ProjectOptions) -> Project:
     from factory.pipeline import read
 
     return given.project() if given.ground().relays else read(given.file, given.folders)
-
-
-def _check_project(given: ProjectOptions, wip: int | None) -> Checked:
-    """Check a PAG. Raises InputError."""
-    from factory.geometry.limits import is_plain
-    from factory.nets.verify import verify
-    from factory.timing.pool import part_pool
-
-    project = project_of(given)
-    factory = project.factory
-    sources = {r.name: r.position for r in factory.robots if r.position}
-    return Checked(
-        project.pag.root,
-        factory.net,
-        verify(factory.net, sources),
-        len(factory.pag),
-        part_pool(factory, wip),
-        project.matings,
-        None if is_plain(project.pag) else project.product,
-    )
-
-
-def _check_net(file: Path) -> Checked:
-    """Check a net from elsewhere; it may well fail. Raises InputError."""
-    from factory.foreign_nets.general import analyse
-    from factory.foreign_nets.pnml_reader import load_net
-
-    net = load_net(file)
-    return Checked(file.stem, net, analyse(net))
 
 
 def _describe(checked: Checked, verbose: bool) -> None:

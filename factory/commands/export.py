@@ -72,7 +72,6 @@ def export(
 def _source(given: ProjectOptions, chosen: Exporter) -> Source:
     """What an exporter makes a file of. Raises InputError, of code Usage where the exporter does
     not take such a file."""
-    from factory.foreign_nets.pnml_reader import load_net
     from factory.pipeline import read
     from factory.record.log import is_log, read_log
     from factory.support.files import is_net
@@ -90,6 +89,8 @@ def _source(given: ProjectOptions, chosen: Exporter) -> Source:
         return read_log(file)
     if kind == "a PAG":
         return read(file, given.folders, settings, ground)
+    from factory.foreign_nets.pnml_reader import load_net
+
     return load_net(file)
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, astuple, dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -26,7 +26,7 @@ from factory.support.console import emit, say, table, warn
 from factory.support.errors import Diagnostic, InputError
 
 if TYPE_CHECKING:
-    from factory.study.sweep.summary import Statistic, Summary
+    from factory.study.sweep.summary import Summary
     from factory.study.sweep.sweeping import Tally
 
 SHOWN = 8
@@ -108,7 +108,7 @@ def sweep(
             raise InputError(Diagnostic("Usage", message, None, hint))
         tally = _carry_out(replace(given, file=source), runs, database, vary, out.silent)
         failed = tally.failed + tally.there_failed > 0
-        document = _document(tally, database, runs.on)
+        document = {"database": str(database), "on": runs.on, **tally.as_json()}
         if not out.silent:
             _tell(tally, database)
     elif not told:
@@ -161,24 +161,6 @@ def _carry_out(
     return sweep(recipe, axes, database, runs.jobs or cores(), runs.on, runs.retry, silent)
 
 
-def _document(tally: Tally, database: Path, on: str) -> dict[str, Any]:
-    """The keys of `sweep --json`."""
-    return {
-        "database": str(database),
-        "on": on,
-        "runs": tally.runs,
-        "there": tally.there,
-        "there_failed": tally.there_failed,
-        "done": tally.done,
-        "failed": tally.failed,
-        "wall_time_s": tally.wall_time_s,
-        "runs_per_s": tally.rate,
-        "loops_time_s": tally.loops_time_s,
-        "rows_time_s": tally.rows_time_s,
-        "overhead_percent": None if tally.overhead is None else 100 * tally.overhead,
-    }
-
-
 def _tell(tally: Tally, database: Path) -> None:
     """What a sweep did, for people."""
     there = f"{tally.there} of {tally.runs} were there"
@@ -224,7 +206,7 @@ def _tell_summary(found: Summary, verbose: bool) -> None:
         at = ", ".join(f"{key} {value}" for key, value in group.values) or found.product
         failed = f", {group.failed} failed" if group.failed else ""
         rows = [
-            (key, *map(_shown, _cells(s)))
+            (key, *map(_shown, astuple(s)[1:]))
             for key, s in group.figures.items()
             if verbose or s.least != s.greatest or key == "cycle_time_s"
         ]
@@ -232,10 +214,6 @@ def _tell_summary(found: Summary, verbose: bool) -> None:
         table(title, heads, rows) if rows else say(title)
     for reason, count in list(found.reasons.items())[:SHOWN]:
         print(f"{count} failed: {reason}", file=sys.stderr)
-
-
-def _cells(s: Statistic) -> tuple[float | None, ...]:
-    return s.mean, s.deviation, s.confidence_low, s.confidence_high, s.least, s.greatest
 
 
 def _shown(value: float | None) -> str:

@@ -8,6 +8,7 @@ from contextlib import closing
 from dataclasses import dataclass, replace
 from pathlib import Path
 from time import perf_counter
+from typing import Any
 
 from factory.study.bar import RunsBar
 from factory.study.pool import over_processes
@@ -50,6 +51,22 @@ class Tally:
     def rate(self) -> float:
         """Runs per second, from the start of the first worker."""
         return (self.done + self.failed) / self.wall_time_s if self.wall_time_s else 0.0
+
+    def as_json(self) -> dict[str, Any]:
+        """The figures, with the rate and the overhead."""
+        overhead = self.overhead
+        return {
+            "runs": self.runs,
+            "there": self.there,
+            "there_failed": self.there_failed,
+            "done": self.done,
+            "failed": self.failed,
+            "wall_time_s": self.wall_time_s,
+            "runs_per_s": self.rate,
+            "loops_time_s": self.loops_time_s,
+            "rows_time_s": self.rows_time_s,
+            "overhead_percent": None if overhead is None else 100 * overhead,
+        }
 
     def count(self, outcome: Outcome) -> None:
         """One more outcome."""

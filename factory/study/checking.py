@@ -1,0 +1,92 @@
+"""What a PAG compiles to and what is proved of it, or of a net in PNML."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from factory.geometry.limits import is_plain
+from factory.nets.gears import Gear, GearNet
+from factory.nets.marked import MarkedNet, marked
+from factory.nets.petri import Place
+from factory.nets.verdict import Verdict
+from factory.nets.verify import verify
+from factory.pipeline import Project
+from factory.timing.pool import part_pool
+
+if TYPE_CHECKING:
+    from factory.compiler.mating.mating import Matings
+    from factory.geometry.solids import Product
+
+
+@dataclass(frozen=True)
+class Checked:
+    """A net with its verdict, of a PAG called `name` or read from PNML. `pool`: copies of each part
+    that are inside at once; `matings`: how its inputs come together, None where no part has a shape
+    of its own; `product`: None where every part is a default box."""
+
+    name: str
+    net: GearNet | MarkedNet
+    verdict: Verdict
+    labels: int = 0
+    pool: Mapping[str, int] = field(default_factory=dict)
+    matings: Matings | None = None
+    product: Product | None = None
+
+    def as_json(self) -> dict[str, Any]:
+        """The keys of `check --json`."""
+        subject = marked(self.net)
+        places = subject.net.places
+        blocked = self.matings.of_kind("blocked") if self.matings else ()
+        return {
+            "product": self.name,
+            "labels": self.labels,
+            "robots": len(self.verdict.gears),
+            "places": len(places),
+            "transitions": len(subject.net.transitions),
+            "tokens": sum(subject.tokens),
+            "largest_mode": max((p.size for p in places), default=0),
+            **self.verdict.as_json(),
+            "gears": [_gear_json(gear, places) for gear in self.verdict.gears],
+            "part_pool": dict(self.pool),
+            "approaches": self.matings.as_json() if self.matings else None,
+            "clashes": [clash for mating in blocked for clash in mating.clashes_as_json()],
+        }
+
+
+def _gear_json(gear: Gear, places: Sequence[Place]) -> dict[str, Any]:
+    """One robot's gear as `check --json` lists it."""
+    return {
+        "robot": gear.robot,
+        "type": gear.type,
+        "places": [
+            {"name": places[p].name, "mode": places[p].mode, "label": places[p].label}
+            for p in gear.places
+        ],
+    }
+
+
+def check_project(project: Project, wip: int | None = None) -> Checked:
+    """Check a PAG, with at most `wip` units inside at once. Raises InputError."""
+    factory = project.factory
+    sources = {r.name: r.position for r in factory.robots if r.position}
+    return Checked(
+        project.pag.root,
+        factory.net,
+        verify(factory.net, sources),
+        len(factory.pag),
+        part_pool(factory, wip),
+        project.matings,
+        None if is_plain(project.pag) else project.product,
+    )
+
+
+def check_net(file: Path) -> Checked:
+    """Check a net in PNML, which need not be that of a factory. Raises InputError."""
+    from factory.foreign_nets.general import analyse
+    from factory.foreign_nets.pnml_reader import load_net
+
+    net = load_net(file)
+    return Checked(file.stem, net, analyse(net))
