@@ -28,7 +28,7 @@ FORMAT, TAKES, BINARY = "mcap", "log", True
 def export(subject: Subject) -> bytes:
     """The whole log. Raises MissingError where there is no foxglove-sdk."""
     foxglove = optional("foxglove", "foxglove-sdk", "MCAP", "export")
-    motion = motion_of(subject)
+    motion = motion_of(subject.log)
     events = list(rows(subject.log))
     content = io.BytesIO()
     context = foxglove.Context()

@@ -4,7 +4,6 @@ thing stands for."""
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
 from hashlib import sha256
 from typing import Any
 
@@ -20,17 +19,6 @@ from factory.support.engine import mujoco
 
 ROUND = 28
 """Sides of a cylinder."""
-
-
-@dataclass(frozen=True)
-class Look:
-    """Triangles in the frame of a body: `vertices` (n, 3) [m], `faces` (k, 3), `colours` (n, 3)
-    from 0 to 255; `alpha`: how opaque it is."""
-
-    vertices: Floats = field(repr=False)
-    faces: NDArray[np.int64] = field(repr=False)
-    colours: NDArray[np.uint8] = field(repr=False)
-    alpha: float = 1.0
 
 
 def triangles(m: mujoco.MjModel, geom: int) -> tuple[Floats, NDArray[np.int64]]:
@@ -51,22 +39,22 @@ def triangles(m: mujoco.MjModel, geom: int) -> tuple[Floats, NDArray[np.int64]]:
     return points @ rotation(m.geom_quat[geom]).T + m.geom_pos[geom], corners
 
 
-def look(m: mujoco.MjModel, geoms: Sequence[int]) -> Look:
-    """Several geoms of a body as one."""
+def _look(m: mujoco.MjModel, geoms: Sequence[int]) -> tuple[list[NDArray[Any]], float]:
+    """Several geoms of a body as one: vertices (n, 3) [m] in its frame, faces (k, 3), colours
+    (n, 3) from 0 to 255; and how opaque it is."""
     found = [triangles(m, geom) for geom in geoms]
-    paints = [paint(m, geom) for geom in geoms]
-    starts = np.cumsum([0, *(len(points) for points, _ in found)])
-    return Look(
-        np.concatenate([points for points, _ in found]),
-        np.concatenate([faces + start for (_, faces), start in zip(found, starts, strict=False)]),
-        np.concatenate(
-            [
-                np.tile(np.round(255 * np.clip(rgba[:3], 0, 1)).astype(np.uint8), (len(points), 1))
-                for (points, _), rgba in zip(found, paints, strict=True)
-            ]
-        ),
-        float(min(rgba[3] for rgba in paints)),
-    )
+    paints = np.array([paint(m, geom) for geom in geoms])
+    counts = [len(points) for points, _ in found]
+    starts = np.cumsum([0, *counts])
+    vertices = np.concatenate([points for points, _ in found])
+    faces = [faces + start for (_, faces), start in zip(found, starts, strict=False)]
+    colours = np.round(255 * np.clip(paints[:, :3], 0, 1)).astype(np.uint8)
+    made = [
+        vertices.astype(np.float32),
+        np.concatenate(faces).astype(np.uint32),
+        np.repeat(colours, counts, axis=0),
+    ]
+    return made, float(paints[:, 3].min())
 
 
 def scene(stage: DrawnFactory, labels: dict[str, int], pack: Pack) -> dict[str, Any]:
@@ -78,14 +66,12 @@ def scene(stage: DrawnFactory, labels: dict[str, int], pack: Pack) -> dict[str, 
     alphas: list[float] = []
     things = []
     for body, geoms in _groups(m):
-        made = look(m, geoms)
-        vertices, faces = made.vertices.astype(np.float32), made.faces.astype(np.uint32)
-        parts: tuple[NDArray[Any], ...] = vertices, faces, made.colours
-        key = sha256(b"".join(a.tobytes() for a in parts) + repr(made.alpha).encode()).digest()
+        made, alpha = _look(m, geoms)
+        key = sha256(b"".join(a.tobytes() for a in made) + repr(alpha).encode()).digest()
         if key not in shapes:
             shapes[key] = number = len(shapes)
-            alphas.append(round(made.alpha, 3))
-            for letter, values in zip("vfc", parts, strict=True):
+            alphas.append(round(alpha, 3))
+            for letter, values in zip("vfc", made, strict=True):
                 pack.add(f"{letter}{number}", values)
         name = owner(m.geom(geoms[0]).name) if body == 0 else m.body(body).name
         things.append({"shape": shapes[key], "body": body, **stands_for(name, robots, labels)})

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -114,5 +114,5 @@ class _Watched:
         self.peak = max(self.peak, float(energy.max()))
 
     def result(self) -> HandOff:
-        energy = max(0.0, self.peak - (self.first or 0.0))
-        return self.made.after(1e3 * self.impulse, 1e3 * energy / self.made.mass_kg)
+        energy = 1e3 * max(0.0, self.peak - (self.first or 0.0)) / self.made.mass_kg
+        return replace(self.made, impulse_mNs=1e3 * self.impulse, energy_mJ_per_kg=energy)
