@@ -210,11 +210,11 @@ def test_pause_step_and_play(running: Running) -> None:
     still = running.until(lambda f: not f.playing)
     sleep(0.2)
     assert running.session.frame.time == still.time
-    fired = still.fired
+    fired = still.count
     for _ in range(4):
         send(PlayToFiring())
-        after = running.until(lambda f, n=fired: f.fired > n and not f.playing)
-        fired = after.fired
+        after = running.until(lambda f, n=fired: f.count > n and not f.playing)
+        fired = after.count
         (last,) = {t for t, _ in running.session.fired(after.run, fired - 1, fired)}
         assert after.time - last < 0.011, "it stops within a tick of the firing"
     assert after.time > still.time
@@ -246,7 +246,7 @@ def test_a_blocked_feeder_stops_the_net_and_frees_it_again(running: Running) -> 
     waits = {factory.net.threaded.places[p].mode for p in quiet.marked}
     assert waits == {"wait"}, "every token waits"
     sleep(0.2)
-    assert running.session.frame.fired == quiet.fired
+    assert running.session.frame.count == quiet.count
     send(Block("part2", False))
     running.until(lambda f: f.products > quiet.products + 1 and not f.note)
 
@@ -255,11 +255,11 @@ def test_begin_anew(running: Running) -> None:
     send = running.session.send
     send(Speed(0.0))
     send(Slow(2, 0.5))
-    before = running.until(lambda f: f.fired > 20 and f.slowed == {2: 0.5})
+    before = running.until(lambda f: f.count > 20 and f.slowed == {2: 0.5})
     send(Pause())
     send(Restart())
     fresh = running.until(lambda f: f.run == 1)
-    assert (fresh.time, fresh.fired, fresh.slowed, fresh.playing) == (0.0, 0, {}, False)
+    assert (fresh.time, fresh.count, fresh.slowed, fresh.playing) == (0.0, 0, {}, False)
     assert running.session.fired(before.run, 0, 5) == []
 
 
@@ -340,7 +340,7 @@ def test_no_more_may_watch_than_it_can_serve(
 
 
 def test_watchers_see_frames_and_are_obeyed(server: Server, running: Running) -> None:
-    running.until(lambda f: f.fired > 3)
+    running.until(lambda f: f.count > 3)
     with socket_of(server) as one, socket_of(server) as other:
         frame, poses = unpacked(one.recv(10))
         assert poses.size == 7 * len(running.session.bodies) and np.isfinite(poses).all()

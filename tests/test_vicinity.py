@@ -22,7 +22,7 @@ from factory.simulation.mujoco.fast import broad_phase as vicinity
 from factory.simulation.mujoco.parts import Stock
 from factory.simulation.request import RunRequest
 from factory.simulation.simulation import Simulation
-from factory.study.fidelity.shadow import Shadow
+from factory.study.fidelity.readings import Shadow
 from factory.support.engine import mujoco
 from factory.support.settings import MOST, Settings
 from tests.bench.factories import balanced

@@ -43,17 +43,17 @@ LOOK = 0.05
 
 @dataclass(frozen=True, slots=True)
 class LiveFrame:
-    """The state at an instant. `number`: of the frame; `run`: number of restarts;
-    `poses`: positions [m] and quaternions (bodies, 7) as float32; `marked` places; `fired`: how
-    many transitions have; `rhythm`: between the last two products [s]; `pace`: simulated seconds in
-    a second; `note`: what is wrong, if anything."""
+    """The state at an instant, as the page is told it. `number`: of the frame; `run`: number of
+    restarts; `poses`: positions [m] and quaternions (bodies, 7) as float32; `marked` places;
+    `count`: how many transitions have fired; `rhythm`: between the last two products [s]; `pace`:
+    simulated seconds in a second; `note`: what is wrong, if anything."""
 
     number: int
     run: int
     time: float
     poses: bytes = field(repr=False)
     marked: tuple[int, ...] = field(repr=False)
-    fired: int
+    count: int
     products: int
     rhythm: float | None
     playing: bool
@@ -219,7 +219,7 @@ class Session:
         frame = LiveFrame(
             self._number,
             self._runs,
-            world.time,
+            round(world.time, 4),
             poses.astype("<f4").tobytes(),
             tuple(np.flatnonzero(np.frombuffer(supervisor.marked, np.uint8)).tolist()),
             len(supervisor.events),
@@ -227,7 +227,7 @@ class Session:
             round(left[-1] - left[-2], 4) if len(left) > 1 else None,
             self._playing or self._stepping,
             self._clock.speed,
-            self._clock.pace,
+            round(self._clock.pace, 3),
             dict(self.interventions.slowed),
             tuple(sorted(self.interventions.blocked)),
             self._trouble or self._waits(),

@@ -20,7 +20,7 @@ from factory.simulation.run import Event
 from factory.simulation.simulation import Simulation
 from factory.study.analysis.recorded import conditions
 from factory.study.fidelity.causality import causal_record, duration_differences
-from factory.study.fidelity.welds import ActiveWelds
+from factory.study.fidelity.readings import ActiveWelds
 from factory.support.errors import InputError
 
 EVERY = 5

@@ -25,7 +25,7 @@ from factory.problem.template import Template
 from factory.record.log import Log, read_log
 from factory.record.log.recompiled import factory_of
 from factory.record.monitor import subject_of
-from factory.show.report.stage import DrawnFactory, stations
+from factory.show.report.scene import DrawnFactory, stations
 from factory.study.analysis.recorded import conditions
 from factory.support.errors import InputError, RunError
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from factory.control.mode import REST, Array
 from factory.mjcf.weld_frames import FEED, ROWS, Slides, residuals
-from factory.study.fidelity.welds import ActiveWelds, Velocities
+from factory.study.fidelity.readings import ActiveWelds, Velocities
 from factory.support.engine import mujoco
 
 FULL = 0.999

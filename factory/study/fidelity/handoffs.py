@@ -9,8 +9,8 @@ import numpy as np
 from factory.control.mode import Array, Index
 from factory.mjcf.weld_frames import gaps
 from factory.simulation.mujoco.fusing import rotations
+from factory.study.fidelity.readings import ActiveWelds, Velocities
 from factory.study.fidelity.record import HandOff
-from factory.study.fidelity.welds import ActiveWelds, Velocities
 from factory.support.engine import mujoco
 
 WINDOW = 0.05
