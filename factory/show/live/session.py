@@ -13,18 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from factory.show.live.commands import (
-    PUSH,
-    Block,
-    Command,
-    Pause,
-    Play,
-    PlayToFiring,
-    PushRobot,
-    Restart,
-    Slow,
-    Speed,
-)
+from factory.show.live.commands import PUSH, Command
 from factory.simulation.disturbance.interventions import Interventions
 from factory.simulation.simulation import Observer, Simulation
 
@@ -187,24 +176,25 @@ class Session:
             obeyed = True
 
     def _do(self, command: Command) -> None:
-        match command:
-            case Pause():
+        hands = self.interventions
+        match command.do:
+            case "pause":
                 self._playing = self._stepping = False
-            case Play():
+            case "play":
                 self._playing, self._stepping = True, False
-            case PlayToFiring():
+            case "step":
                 self._stepping, self._playing = True, False
-            case Restart():
+            case "restart":
                 self._runs += 1
                 self._begin()
-            case Speed(factor):
-                self._clock.speed = factor
-            case PushRobot(robot, share):
-                self.interventions.push(robot, share, PUSH)
-            case Slow(robot, factor):
-                self.interventions.slow(robot, factor)
-            case Block(part, blocked):
-                (self.interventions.block if blocked else self.interventions.free)(part)
+            case "speed":
+                self._clock.speed = command.factor
+            case "push":
+                hands.push(command.robot, command.share, PUSH)
+            case "slow":
+                hands.slow(command.robot, command.factor)
+            case "block":
+                (hands.block if command.blocked else hands.free)(command.part)
         self._clock.start(self.simulation.world.time)
 
     def _publish(self) -> None:
