@@ -30,9 +30,8 @@ from factory.simulation.run import Run
 from factory.simulation.simulation import Simulation
 from factory.study.analysis import Change, Timing, analyse
 from factory.study.analysis.firing import earliest_firings, settled_firings
-from factory.study.analysis.flow import flow
+from factory.study.analysis.flow import flow, reached
 from factory.study.analysis.slack import circuits, slacks
-from factory.study.analysis.steady import reached
 from factory.study.analysis.timed import timed_net
 from factory.study.analysis.what_if import scenarios, wip_curve
 from factory.support.settings import Settings

@@ -7,6 +7,7 @@ import signal
 import socket
 import sys
 from collections.abc import Iterator
+from dataclasses import fields
 from http.client import HTTPConnection
 from subprocess import PIPE
 from time import monotonic, sleep
@@ -19,18 +20,7 @@ import pytest
 from factory.nets.replay import replay
 from factory.record.monitor import beside
 from factory.show.live import Server, Session
-from factory.show.live.commands import (
-    KINDS,
-    Block,
-    Pause,
-    Play,
-    PlayToFiring,
-    PushRobot,
-    Restart,
-    Slow,
-    Speed,
-    command_of,
-)
+from factory.show.live.commands import KEYS, Command, command_of
 from factory.show.live.page import page, stage_of
 from factory.show.report.drawings import floor_plan
 from factory.show.report.links import labels_of
@@ -53,12 +43,15 @@ PARTS = ("part1", "part2", "part3")
 @pytest.mark.parametrize(
     ("message", "command"),
     [
-        ('{"do": "pause"}', Pause()),
-        ('{"do": "step", "more": 1}', PlayToFiring()),
-        ('{"do": "speed", "factor": 0}', Speed(0)),
-        ('{"do": "push", "robot": 5, "share": -1}', PushRobot(5, -1)),
-        ('{"do": "slow", "robot": 0, "factor": 0.1}', Slow(0, 0.1)),
-        ('{"do": "block", "part": "part2", "blocked": false}', Block("part2", False)),
+        ('{"do": "pause"}', Command("pause")),
+        ('{"do": "step", "more": 1}', Command("step")),
+        ('{"do": "speed", "factor": 0}', Command("speed", factor=0)),
+        ('{"do": "push", "robot": 5, "share": -1}', Command("push", robot=5, share=-1)),
+        ('{"do": "slow", "robot": 0, "factor": 0.1}', Command("slow", robot=0, factor=0.1)),
+        (
+            '{"do": "block", "part": "part2", "blocked": false}',
+            Command("block", part="part2", blocked=False),
+        ),
     ],
 )
 def test_commands_are_read(message: str, command: object) -> None:
@@ -165,27 +158,27 @@ def running() -> Iterator[Running]:
 def test_pause_step_and_play(running: Running) -> None:
     send = running.session.send
     running.until(lambda f: f.time > 0.2)
-    send(Pause())
+    send(Command("pause"))
     still = running.until(lambda f: not f.playing)
     sleep(0.2)
     assert running.session.frame.time == still.time
-    fired = still.fired
+    fired = still.count
     for _ in range(4):
-        send(PlayToFiring())
-        after = running.until(lambda f, n=fired: f.fired > n and not f.playing)
-        fired = after.fired
+        send(Command("step"))
+        after = running.until(lambda f, n=fired: f.count > n and not f.playing)
+        fired = after.count
         (last,) = {t for t, _ in running.session.fired(after.run, fired - 1, fired)}
         assert after.time - last < 0.011, "it stops within a tick of the firing"
     assert after.time > still.time
     names = [e.transition for e in running.session.simulation.supervisor.events]
     assert replay(paper_layout().factory.net, names).refines
-    send(Play())
+    send(Command("play"))
     running.until(lambda f: f.time > after.time + 0.2)
 
 
 def test_it_keeps_in_step_with_the_clock(running: Running) -> None:
     for speed in (1.0, 2.0, 0.25):
-        running.session.send(Speed(speed))
+        running.session.send(Command("speed", factor=speed))
         running.until(lambda f, s=speed: f.speed == s)
         sleep(0.3)
         before, begun = running.session.frame.time, monotonic()
@@ -196,29 +189,29 @@ def test_it_keeps_in_step_with_the_clock(running: Running) -> None:
 
 def test_a_blocked_feeder_stops_the_net_and_frees_it_again(running: Running) -> None:
     send = running.session.send
-    send(Speed(0.0))
+    send(Command("speed", factor=0.0))
     running.until(lambda f: f.products > 0)
-    send(Block("part2", True))
+    send(Command("block", part="part2", blocked=True))
     quiet = running.until(lambda f: "feeder of part2" in f.note)
     assert quiet.blocked == ("part2",)
     factory = running.session.simulation.layout.factory
     waits = {factory.net.threaded.places[p].mode for p in quiet.marked}
     assert waits == {"wait"}, "every token waits"
     sleep(0.2)
-    assert running.session.frame.fired == quiet.fired
-    send(Block("part2", False))
+    assert running.session.frame.count == quiet.count
+    send(Command("block", part="part2", blocked=False))
     running.until(lambda f: f.products > quiet.products + 1 and not f.note)
 
 
 def test_begin_anew(running: Running) -> None:
     send = running.session.send
-    send(Speed(0.0))
-    send(Slow(2, 0.5))
-    before = running.until(lambda f: f.fired > 20 and f.slowed == {2: 0.5})
-    send(Pause())
-    send(Restart())
+    send(Command("speed", factor=0.0))
+    send(Command("slow", robot=2, factor=0.5))
+    before = running.until(lambda f: f.count > 20 and f.slowed == {2: 0.5})
+    send(Command("pause"))
+    send(Command("restart"))
     fresh = running.until(lambda f: f.run == 1)
-    assert (fresh.time, fresh.fired, fresh.slowed, fresh.playing) == (0.0, 0, {}, False)
+    assert (fresh.time, fresh.count, fresh.slowed, fresh.playing) == (0.0, 0, {}, False)
     assert running.session.fired(before.run, 0, 5) == []
 
 
@@ -226,7 +219,7 @@ def test_it_says_when_the_engine_gives_up(running: Running) -> None:
     running.session.simulation.world.d.qvel[:] = np.nan
     note = running.until(lambda f: bool(f.note)).note
     assert "unstable" in note and "begin anew" in note
-    running.session.send(Restart())
+    running.session.send(Command("restart"))
     running.until(lambda f: f.run == 1 and not f.note and f.time > 0.1)
 
 
@@ -299,7 +292,7 @@ def test_no_more_may_watch_than_it_can_serve(
 
 
 def test_watchers_see_frames_and_are_obeyed(server: Server, running: Running) -> None:
-    running.until(lambda f: f.fired > 3)
+    running.until(lambda f: f.count > 3)
     with socket_of(server) as one, socket_of(server) as other:
         frame, poses = unpacked(one.recv(10))
         assert poses.size == 7 * len(running.session.bodies) and np.isfinite(poses).all()
@@ -318,7 +311,7 @@ def test_watchers_see_frames_and_are_obeyed(server: Server, running: Running) ->
 
 def test_every_firing_is_told_once(server: Server, running: Running) -> None:
     with socket_of(server) as watcher:
-        running.session.send(Speed(0.0))
+        running.session.send(Command("speed", factor=0.0))
         told: list[tuple[float, int]] = []
         while len(told) < 150:
             frame, _ = unpacked(watcher.recv(10))
@@ -401,7 +394,6 @@ def test_what_is_missing_is_said_first(run: Terminal, monkeypatch: pytest.Monkey
     assert done.json["errors"][0]["hint"] == "pip install 'klavins-factory[live]'"
 
 
-def test_every_kind_has_a_name() -> None:
-    assert set(KINDS.values()) == {
-        *(Pause, Play, PlayToFiring, Restart, Speed, PushRobot, Slow, Block)
-    }
+def test_every_key_of_a_command_is_checked() -> None:
+    keys = {key for keys in KEYS.values() for key in keys}
+    assert keys == {field.name for field in fields(Command)} - {"do"}

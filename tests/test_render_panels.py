@@ -20,6 +20,7 @@ from factory.render.camera import Framing, orbit
 from factory.render.camerawork import Moment
 from factory.render.caption import FADES, SHOWN, draw_title, strength
 from factory.render.colours import GROUND, operation_colours, robot_colours
+from factory.render.film import moment_of, take_of
 from factory.render.following import Followed
 from factory.render.gantt_panel import GanttPanel
 from factory.render.history import History, OperationProgress, depths, followed
@@ -27,7 +28,6 @@ from factory.render.ink import Ink, fitted, width
 from factory.render.net_panel import NetPanel
 from factory.render.picture import PANELS, shared
 from factory.render.reel import Poster
-from factory.render.replay import moment_of, take_of
 from factory.render.rows import NEIGHBOURS, Rows, neighbourhood
 from factory.render.subject import Snapshot
 from factory.simulation.request import RunRequest

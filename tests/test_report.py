@@ -7,6 +7,7 @@ import base64
 import hashlib
 import json
 import re
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 
@@ -20,15 +21,16 @@ from factory.show.report import page, recording_of
 from factory.show.report.drawings import floor_plan
 from factory.show.report.fidelity import fidelity
 from factory.show.report.links import labels_of, links
-from factory.show.report.measured import measured
+from factory.show.report.pace import measured
 from factory.show.report.packing import json_inside
 from factory.show.report.page import SCRIPTS
-from factory.show.report.tree import assembly_tree
+from factory.show.report.sections import assembly_tree
 from factory.show.report.words import proof
 from factory.simulation.request import RunRequest
 from factory.simulation.simulation import Simulation
 from factory.study.analysis import Timing, analyse
 from factory.study.analysis.recorded import logged_record
+from factory.study.fidelity.quantities import QUANTITIES
 from factory.support.errors import InputError
 from tests.command_line import PAPER, Terminal, files_in
 from tests.layout_values import paper_layout
@@ -190,11 +192,15 @@ def test_a_broken_proof_is_told(recording) -> None:
     assert any(claim.holds is False and claim.why for claim in told.claims)
 
 
+def _exceeded(figures: Mapping[str, float | None]) -> dict[str, float | None]:
+    return {k: value for k, value in figures.items() if QUANTITIES[k].exceeded(value)}
+
+
 def test_a_good_run_has_good_figures(recording) -> None:
     found = fidelity(recording)
     assert found.refines and found.monitor is not None and found.monitor.refines_net
-    figures = {figure.key: figure.value for figure in found.figures}
-    assert not [figure for figure in found.figures if figure.exceeded]
+    figures = found.figures
+    assert not _exceeded(figures)
     assert figures["handoffs"] == 22
     assert 0 < figures["handoff_gap_max_mm"] < 0.2 and 0 < figures["weld_residual_max_mm"] < 0.2
     assert 0 < figures["tracking_error_max_mm"] < 0.5
@@ -208,7 +214,7 @@ def test_planted_faults_show_in_the_figures(recording) -> None:
     qpos[:, joint] += 2e-3
     ctrl[:, m.actuator_ctrladr[0]] += 5e-3
     found = fidelity(replace(recording, log=replace(log, qpos=qpos, ctrl=ctrl), layout=None))
-    bad = {figure.key: figure.value for figure in found.figures if figure.exceeded}
+    bad = _exceeded(found.figures)
     assert bad["product_position_max_mm"] == pytest.approx(2, abs=0.2)
     assert bad["weld_residual_max_mm"] == pytest.approx(2, abs=0.2)
     assert bad["tracking_error_max_mm"] == pytest.approx(5, abs=0.5)
@@ -345,7 +351,7 @@ def test_bodies_that_replace_others_are_no_hand_overs(tmp_path: Path) -> None:
     simulation = Simulation(paper_layout(), RunRequest(units=2, fuse=True))
     with LogWriter(path, simulation) as writer:
         run = simulation.run([writer.observe])
-    figures = {f.key: f.value for f in fidelity(recording_of(path)).figures}
+    figures = fidelity(recording_of(path)).figures
     assert run.physics is not None
     assert figures["handoffs"] == run.physics.handoffs
     assert figures["handoff_gap_max_mm"] == pytest.approx(run.physics.handoff_gap_max_mm, abs=0.02)

@@ -44,15 +44,11 @@ def exporters() -> Mapping[str, Exporter]:
 
 def _exporter(module: ModuleType) -> Exporter:
     summary = " ".join((module.__doc__ or "").strip().partition("\n\n")[0].split())
-    return Exporter(
-        module.FORMAT,
-        module.TAKES,
-        summary,
-        module.export,
-        getattr(module, "BINARY", False),
-        getattr(module, "OF", ""),
-        getattr(module, "FOLDER", False),
-    )
+    names = [
+        name for name in ("FORMAT", "TAKES", "BINARY", "OF", "FOLDER") if hasattr(module, name)
+    ]
+    given = {name.lower(): getattr(module, name) for name in names}
+    return Exporter(**given, summary=summary, export=module.export)
 
 
 __all__ = ["Exporter", "Made", "Subject", "exporters"]

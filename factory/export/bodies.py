@@ -56,22 +56,15 @@ def parts_of(pag: PAG, label: str) -> list[str]:
     return found
 
 
-def label_of(subject: Subject) -> str:
-    """The label that is asked for, the product's root where none is. Raises InputError."""
-    pag = subject.project.pag
-    return subject.choose(
-        [pag.root, *(n.label for n in pag.nodes if n.label != pag.root)], "labels"
-    )
-
-
 def wanted(subject: Subject, ending: str) -> Iterator[tuple[str, str]]:
-    """The labels to be written with the names of their files: the one asked for under "", else, for
-    a whole folder, every sub-assembly and part."""
+    """The labels to be written with the names of their files: the one asked for, or the product,
+    under ""; for a whole folder every sub-assembly and part. Raises InputError."""
+    pag = subject.project.pag
     if not subject.whole:
-        yield label_of(subject), ""
+        yield subject.choose(list(dict.fromkeys((pag.root, *pag.by_label))), "labels"), ""
         return
     taken: set[str] = set()
-    for node in subject.project.pag.postorder():
+    for node in pag.postorder():
         name = file_name(node.label, taken)
         yield node.label, f"{name}{ending}"
 

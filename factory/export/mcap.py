@@ -7,6 +7,7 @@ Frames and joints are named as the links and joints of the URDF, and have the sa
 from __future__ import annotations
 
 import io
+from collections import deque
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -28,7 +29,7 @@ FORMAT, TAKES, BINARY = "mcap", "log", True
 def export(subject: Subject) -> bytes:
     """The whole log. Raises MissingError where there is no foxglove-sdk."""
     foxglove = optional("foxglove", "foxglove-sdk", "MCAP", "export")
-    motion = motion_of(subject)
+    motion = motion_of(subject.log)
     events = list(rows(subject.log))
     content = io.BytesIO()
     context = foxglove.Context()
@@ -53,21 +54,18 @@ class _Recorder:
 
     def record(self, events: list[EventRow]) -> None:
         """Everything."""
-        parked, coming = self.motion.parked(), iter([*events, None])
-        event = next(coming)
+        parked, coming = self.motion.parked(), deque(events)
         before = np.ones(parked.shape[1], bool)
         for frame, bodies in enumerate(self.motion.shown()):
             time = float(self.log.time[self.motion.rows[frame]])
-            while event is not None and event.time_s <= time:
-                self._event(event)
-                event = next(coming)
+            while coming and coming[0].time_s <= time:
+                self._event(coming.popleft())
             self._scene(time, before, parked[frame])
             before = parked[frame]
             self._transforms(time, frame, bodies)
             self._joints(time, int(self.motion.rows[frame]))
-        for late in (event, *coming):
-            if late is not None:
-                self._event(late)
+        for late in coming:
+            self._event(late)
 
     def _transforms(self, time: float, frame: int, bodies: list[int]) -> None:
         found = []

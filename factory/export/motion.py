@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from factory.control.mode import Truth
-from factory.export.subject import Subject
 from factory.geometry.meshes import Array, Indices
 from factory.mjcf.parts import HIDDEN
 from factory.record.log import Log
@@ -58,12 +57,11 @@ class BodyMotion:
         return np.asarray(self.position[:, :, 2] < HIDDEN)
 
 
-def motion_of(subject: Subject) -> BodyMotion:
+def motion_of(log: Log) -> BodyMotion:
     """The motion of a log. Raises InputError for a log of the ideal world or one without a tick."""
     from factory.mjcf.replica import Replica
     from factory.record.log.model import model_of
 
-    log = subject.log
     m = model_of(log)
     replica, rows = Replica(m), _frames(log)
     d = replica.d

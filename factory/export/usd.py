@@ -23,7 +23,7 @@ NAME = "usd"
 def export(subject: Subject) -> Mapping[str, bytes]:
     """The stage and its textures. Raises MissingError where there is no usd-core."""
     usd = optional("pxr.Usd", "usd-core", "USD", "usd")
-    motion = motion_of(subject)
+    motion = motion_of(subject.log)
     textures = f"{Path(subject.name or subject.stem).stem}_textures"
     with tempfile.TemporaryDirectory() as folder:
         _record(motion, subject.log, folder)

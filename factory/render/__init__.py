@@ -1,9 +1,8 @@
 """Pictures without a screen: films and stills of a run, or of its log."""
 
 from factory.render.camera import CAMERAS, Camera, camera_named
-from factory.render.film import Film, Still
+from factory.render.film import Film, Still, render_log
 from factory.render.picture import PANELS, PanelName, Picture, panels_named
-from factory.render.replay import render_log
 from factory.render.video import FILMS, FPS, STILLS, check_output
 
 __all__ = [

@@ -1,4 +1,5 @@
-"""From moments to pictures: what films and stills of runs and of logs have in common."""
+"""From moments to pictures, with the panels beside the 3-D: what films and stills of runs and of
+logs have in common."""
 
 from __future__ import annotations
 
@@ -7,13 +8,17 @@ from typing import Literal
 
 import numpy as np
 
+from factory.control.mode import Array
+from factory.mjcf import names
 from factory.record.monitor.subject import MonitorSubject
 from factory.render.caption import Caption, draw_title
+from factory.render.gantt_panel import GanttPanel
 from factory.render.history import History
 from factory.render.ink import Pixels
+from factory.render.net_panel import NetPanel
 from factory.render.painter import Painter
-from factory.render.panels import Panels
-from factory.render.picture import Picture, shared
+from factory.render.picture import Area, PanelName, Picture, Size, shared
+from factory.render.rows import Rows
 from factory.render.subject import Snapshot
 from factory.support.engine import mujoco
 from factory.support.errors import Diagnostic, InputError
@@ -89,6 +94,35 @@ class Camerawork(Closing):
     def close(self) -> None:
         """Gives the GL context back."""
         self.painter.close()
+
+
+KINDS: dict[PanelName, type[NetPanel] | type[GanttPanel]] = {"net": NetPanel, "gantt": GanttPanel}
+
+
+class Panels:
+    """Puts panels into their areas of a picture of a size, beside one of the 3-D."""
+
+    def __init__(
+        self, m: mujoco.MjModel, size: Size, areas: dict[PanelName, Area], history: History
+    ) -> None:
+        self.size, self.rows = size, Rows(history)
+        scale = min(max(size) / 1280, min(size) / 720)
+        self.shown = [
+            (area, KINDS[name]((area.width, area.height), scale, history, self.rows))
+            for name, area in areas.items()
+        ]
+        slides = [m.joint(names.slide(robot.name)).qposadr[0] for robot in history.factory.robots]
+        self.slides = np.array(slides, np.intp)
+
+    def compose(self, scene: Pixels, time: float, qpos: Array, elapsed: float) -> Pixels:
+        """The picture with its panels at a time; `elapsed` [s] since the last."""
+        self.rows.advance(time, elapsed)
+        found = np.empty((self.size[1], self.size[0], 3), np.uint8)
+        found[: scene.shape[0], : scene.shape[1]] = scene
+        for area, panel in self.shown:
+            drawn = panel.draw(time, qpos[self.slides], elapsed)
+            found[area.top : area.top + area.height, area.left : area.left + area.width] = drawn
+        return found
 
 
 def _count(number: int, noun: str) -> str:

@@ -40,7 +40,7 @@ class Caption:
         right = self.width - edge
         left = right - round(draw.textlength("0000.0 s", self.font)) - self.points
         room = self.width - 2 * edge - draw.textlength(f"{count}   000.0 s", self.font)
-        name = self._shortened(product, draw, room)
+        name = fitted(product, self.points, room)
         for x, words, anchor in (
             (edge, name, "lm"),
             (right, f"{time:.1f} s", "rm"),
@@ -51,14 +51,6 @@ class Caption:
         found = pixels.copy()
         found[-self.strip :] = np.asarray(below)
         return found
-
-    def _shortened(self, text: str, draw: ImageDraw.ImageDraw, room: float) -> str:
-        """The beginning of a text that fits."""
-        if draw.textlength(text, self.font) <= room:
-            return text
-        while text and draw.textlength(f"{text}…", self.font) > room:
-            text = text[:-1]
-        return f"{text}…" if text else ""
 
 
 def strength(time: float) -> float:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 
 from factory.mjcf.replica import Replica
@@ -102,8 +104,7 @@ class _Renderer(Closing):
         scene.flags[mujoco.mjtRndFlag.mjRND_SHADOW] = shadows
         scene.flags[mujoco.mjtRndFlag.mjRND_REFLECTION] = False
         scene.flags[mujoco.mjtRndFlag.mjRND_HAZE] = False
-        shift = _halton(sample[0] + 1) - 0.5 if sample else np.zeros(2)
-        self._aim(view, shift)
+        self._aim(view, _spread(sample[1])[sample[0]] - 0.5 if sample else np.zeros(2))
         self._light(view, sample)
         self.held.make_current()
         mujoco.mjr_render(self.rectangle, scene, self.drawing)
@@ -148,15 +149,9 @@ def _moved(direction: Array, sample: Sample) -> Array:
     return np.asarray(moved / np.linalg.norm(moved))
 
 
-def _halton(n: int) -> Array:
-    """The n-th point of an even sequence in the unit square."""
-    return np.array([_radical(n, 2), _radical(n, 3)])
+@cache
+def _spread(count: int) -> Array:
+    """Points (count, 2) that are spread evenly over the unit square, all within it."""
+    from scipy.stats.qmc import Halton
 
-
-def _radical(n: int, base: int) -> float:
-    value, weight = 0.0, 1.0
-    while n:
-        weight /= base
-        n, digit = divmod(n, base)
-        value += weight * digit
-    return value
+    return np.asarray(Halton(2, scramble=False).random(count + 1)[1:])

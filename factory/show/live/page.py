@@ -18,9 +18,8 @@ from factory.show.report.drawings import floor_plan, net_drawing
 from factory.show.report.links import data, labels_of
 from factory.show.report.packing import Pack
 from factory.show.report.page import filled, options
-from factory.show.report.scene import scene
-from factory.show.report.stage import DrawnFactory, stations
-from factory.show.report.tree import assembly_tree
+from factory.show.report.scene import DrawnFactory, scene, stations
+from factory.show.report.sections import assembly_tree
 from factory.simulation.simulation import Simulation
 
 SCRIPTS = (

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import logging
-from collections.abc import Mapping
+from dataclasses import asdict
 from http import HTTPStatus
 from ipaddress import ip_address
 from secrets import token_urlsafe
@@ -139,10 +139,10 @@ class Server(Closing):
             while True:
                 frame = self._session.wait(number, PATIENCE)
                 if frame.run != run:
-                    run, told = frame.run, max(0, frame.fired - RECENT)
-                fired = self._session.fired(run, told, frame.fired)
+                    run, told = frame.run, max(0, frame.count - RECENT)
+                fired = self._session.fired(run, told, frame.count)
                 connection.send(packed(frame, fired))
-                number, told = frame.number, frame.fired
+                number, told = frame.number, frame.count
         except ConnectionClosed:
             pass
         finally:
@@ -176,21 +176,8 @@ def _silent() -> logging.Logger:
 def packed(frame: LiveFrame, fired: list[tuple[float, int]]) -> bytes:
     """A frame as the page reads it: the length of a JSON text (4 bytes, little-endian), the text,
     padded to a multiple of 4, and the poses."""
-    told: Mapping[str, object] = {
-        "run": frame.run,
-        "time": round(frame.time, 4),
-        "marked": frame.marked,
-        "fired": fired,
-        "count": frame.fired,
-        "products": frame.products,
-        "rhythm": frame.rhythm,
-        "playing": frame.playing,
-        "speed": frame.speed,
-        "pace": round(frame.pace, 3),
-        "slowed": frame.slowed,
-        "blocked": frame.blocked,
-        "note": frame.note,
-    }
+    told = {**asdict(frame), "fired": fired}
+    del told["number"], told["poses"]
     text = json.dumps(told, separators=(",", ":")).encode()
     text += b" " * (-len(text) % 4)
     return len(text).to_bytes(4, "little") + text + frame.poses

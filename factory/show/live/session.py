@@ -13,18 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from factory.show.live.commands import (
-    PUSH,
-    Block,
-    Command,
-    Pause,
-    Play,
-    PlayToFiring,
-    PushRobot,
-    Restart,
-    Slow,
-    Speed,
-)
+from factory.show.live.commands import PUSH, Command
 from factory.simulation.disturbance.interventions import Interventions
 from factory.simulation.simulation import Observer, Simulation
 
@@ -43,17 +32,17 @@ LOOK = 0.05
 
 @dataclass(frozen=True, slots=True)
 class LiveFrame:
-    """The state at an instant. `number`: of the frame; `run`: number of restarts;
-    `poses`: positions [m] and quaternions (bodies, 7) as float32; `marked` places; `fired`: how
-    many transitions have; `rhythm`: between the last two products [s]; `pace`: simulated seconds in
-    a second; `note`: what is wrong, if anything."""
+    """The state at an instant, as the page is told it. `number`: of the frame; `run`: number of
+    restarts; `poses`: positions [m] and quaternions (bodies, 7) as float32; `marked` places;
+    `count`: how many transitions have fired; `rhythm`: between the last two products [s]; `pace`:
+    simulated seconds in a second; `note`: what is wrong, if anything."""
 
     number: int
     run: int
     time: float
     poses: bytes = field(repr=False)
     marked: tuple[int, ...] = field(repr=False)
-    fired: int
+    count: int
     products: int
     rhythm: float | None
     playing: bool
@@ -187,24 +176,25 @@ class Session:
             obeyed = True
 
     def _do(self, command: Command) -> None:
-        match command:
-            case Pause():
+        hands = self.interventions
+        match command.do:
+            case "pause":
                 self._playing = self._stepping = False
-            case Play():
+            case "play":
                 self._playing, self._stepping = True, False
-            case PlayToFiring():
+            case "step":
                 self._stepping, self._playing = True, False
-            case Restart():
+            case "restart":
                 self._runs += 1
                 self._begin()
-            case Speed(factor):
-                self._clock.speed = factor
-            case PushRobot(robot, share):
-                self.interventions.push(robot, share, PUSH)
-            case Slow(robot, factor):
-                self.interventions.slow(robot, factor)
-            case Block(part, blocked):
-                (self.interventions.block if blocked else self.interventions.free)(part)
+            case "speed":
+                self._clock.speed = command.factor
+            case "push":
+                hands.push(command.robot, command.share, PUSH)
+            case "slow":
+                hands.slow(command.robot, command.factor)
+            case "block":
+                (hands.block if command.blocked else hands.free)(command.part)
         self._clock.start(self.simulation.world.time)
 
     def _publish(self) -> None:
@@ -219,7 +209,7 @@ class Session:
         frame = LiveFrame(
             self._number,
             self._runs,
-            world.time,
+            round(world.time, 4),
             poses.astype("<f4").tobytes(),
             tuple(np.flatnonzero(np.frombuffer(supervisor.marked, np.uint8)).tolist()),
             len(supervisor.events),
@@ -227,7 +217,7 @@ class Session:
             round(left[-1] - left[-2], 4) if len(left) > 1 else None,
             self._playing or self._stepping,
             self._clock.speed,
-            self._clock.pace,
+            round(self._clock.pace, 3),
             dict(self.interventions.slowed),
             tuple(sorted(self.interventions.blocked)),
             self._trouble or self._waits(),

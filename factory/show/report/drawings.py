@@ -15,8 +15,7 @@ from factory.mjcf.replica import Floats, paint, shown
 from factory.nets.marked import marked
 from factory.plant.factory import Factory
 from factory.show.report.links import about
-from factory.show.report.scene import owner, stands_for, triangles
-from factory.show.report.stage import DrawnFactory
+from factory.show.report.scene import DrawnFactory, owner, stands_for, triangles
 from factory.support.canvas import Canvas, Point, hexadecimal, hull, millimetres
 
 MARGIN = 80.0

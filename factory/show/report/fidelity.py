@@ -3,7 +3,7 @@ there is a layout."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,33 +20,19 @@ from factory.simulation.run import Event
 from factory.simulation.simulation import Simulation
 from factory.study.analysis.recorded import conditions
 from factory.study.fidelity.causality import causal_record, duration_differences
-from factory.study.fidelity.quantities import QUANTITIES
-from factory.study.fidelity.welds import ActiveWelds
+from factory.study.fidelity.readings import ActiveWelds
 from factory.support.errors import InputError
 
 EVERY = 5
 """Residuals of welds are measured every so many ticks."""
 
 
-@dataclass(frozen=True, slots=True)
-class Figure:
-    """A figure by the key of its definition; `value` None where there is none."""
-
-    key: str
-    value: float | None
-
-    @property
-    def exceeded(self) -> bool:
-        """Whether it is beyond its limit."""
-        return QUANTITIES[self.key].exceeded(self.value)
-
-
 @dataclass(frozen=True)
 class RecordedFidelity:
-    """The figures, whether the record refines the net, and the verdict of the monitor, None where
-    the log is not one to be judged."""
+    """The figures by the keys of their definitions, whether the record refines the net, and the
+    verdict of the monitor, None where the log is not one to be judged."""
 
-    figures: tuple[Figure, ...]
+    figures: Mapping[str, float | None]
     refines: bool
     monitor: Report | None
 
@@ -67,8 +53,7 @@ def fidelity(recording: Recording) -> RecordedFidelity:
         "tracking_error_max_mm": _tracking(recording),
         **_ideal(recording),
     }
-    figures = tuple(Figure(key, value) for key, value in found.items() if key in QUANTITIES)
-    return RecordedFidelity(figures, record.refines, monitor)
+    return RecordedFidelity(found, record.refines, monitor)
 
 
 def _tracking(recording: Recording) -> float | None:

@@ -13,12 +13,12 @@ from factory.show.report.drawings import floor_plan, net_drawing
 from factory.show.report.fidelity import fidelity
 from factory.show.report.frames import frames
 from factory.show.report.links import data, labels_of
-from factory.show.report.measured import measured
+from factory.show.report.pace import measured, predicted
 from factory.show.report.packing import Pack, json_inside
-from factory.show.report.prediction import predicted
 from factory.show.report.recording import Recording
 from factory.show.report.scene import scene
 from factory.show.report.sections import (
+    assembly_tree,
     fidelity_words,
     heading,
     made_how,
@@ -26,7 +26,6 @@ from factory.show.report.sections import (
     proof_words,
     utilisation,
 )
-from factory.show.report.tree import assembly_tree
 from factory.show.report.words import proof
 
 SCRIPTS = (

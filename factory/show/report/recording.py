@@ -13,7 +13,6 @@ from pathlib import Path
 import numpy as np
 
 from factory.export.motion import BodyMotion, motion_of
-from factory.export.subject import Subject
 from factory.geometry.meshes import Array
 from factory.lang import read_pag, read_template
 from factory.layout.layout import Layout
@@ -25,7 +24,7 @@ from factory.problem.template import Template
 from factory.record.log import Log, read_log
 from factory.record.log.recompiled import factory_of
 from factory.record.monitor import subject_of
-from factory.show.report.stage import DrawnFactory, stations
+from factory.show.report.scene import DrawnFactory, stations
 from factory.study.analysis.recorded import conditions
 from factory.support.errors import InputError, RunError
 
@@ -94,18 +93,16 @@ class Recording:
 def recording_of(path: Path, layout: Layout | None = None) -> Recording:
     """The recording in a log, with the `layout` that it was made with, if given, else with one that
     is made again. Raises InputError (BadLog) where it is not a log of a run in MuJoCo."""
-    subject = Subject(path, read_log(path))
-    motion, factory = motion_of(subject), factory_of(subject.log.header)
-    if layout is not None:
-        return Recording(str(path), subject.log, motion, layout.factory, layout)
-    try:
-        layout = _laid_out(subject.log, path.parent)
-    except (InputError, RunError) as error:
-        why = error.diagnostics[0].message
-        return Recording(str(path), subject.log, motion, factory, None, why)
-    except (KeyError, TypeError, ValueError, AttributeError) as error:
-        return Recording(str(path), subject.log, motion, factory, None, str(error))
-    return Recording(str(path), subject.log, motion, layout.factory, layout)
+    log, missing = read_log(path), ""
+    motion, factory = motion_of(log), factory_of(log.header)
+    if layout is None:
+        try:
+            layout = _laid_out(log, path.parent)
+        except (InputError, RunError) as error:
+            missing = error.diagnostics[0].message
+        except (KeyError, TypeError, ValueError, AttributeError) as error:
+            missing = str(error)
+    return Recording(str(path), log, motion, layout.factory if layout else factory, layout, missing)
 
 
 def _laid_out(log: Log, beside: Path) -> Layout:
@@ -134,6 +131,3 @@ def _pag(kept: Mapping[str, str], templates: Mapping[str, Template], beside: Pat
         with suppress(InputError):
             return read_pag(text, templates, file, str(beside))
         raise
-
-
-__all__ = ["Recording", "recording_of"]

@@ -1,10 +1,11 @@
-"""The 3-D view's things: triangles in colours, shared by bodies that look alike, and what each
-thing stands for."""
+"""What there is to be drawn of a factory in the engine, and the 3-D view of it: triangles in
+colours, shared by bodies that look alike, and what each thing stands for."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from hashlib import sha256
 from typing import Any
 
@@ -13,9 +14,10 @@ from numpy.typing import NDArray
 
 from factory.geometry.solids import rotation
 from factory.mjcf import names
-from factory.mjcf.replica import Floats, half_sizes, mesh_of, paint, shown
+from factory.mjcf.replica import Floats, Replica, half_sizes, mesh_of, paint, shown
+from factory.mjcf.robots import ROLES
+from factory.plant.factory import Factory, Operation
 from factory.show.report.packing import Pack
-from factory.show.report.stage import DrawnFactory
 from factory.support.engine import mujoco
 
 ROUND = 28
@@ -23,14 +25,55 @@ ROUND = 28
 
 
 @dataclass(frozen=True)
-class Look:
-    """Triangles in the frame of a body: `vertices` (n, 3) [m], `faces` (k, 3), `colours` (n, 3)
-    from 0 to 255; `alpha`: how opaque it is."""
+class DrawnFactory:
+    """A factory and the engine's model `m` of it. `position` (bodies, 3) [m] and `quaternion`
+    (bodies, 4) of each body at the start, of one that has a parent relative to that or, of a run
+    that is not over, to the world; `reach` (2, bodies, 3): the least and the greatest position;
+    `places`: where the body of each part is in the finished product [m]; `stations`: where the
+    payload is held as operations of several robots end (x, y) [m], each with the labels they make.
+    """
 
-    vertices: Floats = field(repr=False)
-    faces: NDArray[np.int64] = field(repr=False)
-    colours: NDArray[np.uint8] = field(repr=False)
-    alpha: float = 1.0
+    factory: Factory
+    m: mujoco.MjModel = field(repr=False)
+    position: Floats = field(repr=False)
+    quaternion: Floats = field(repr=False)
+    reach: Floats = field(repr=False)
+    places: Mapping[str, Iterable[float]] = field(repr=False)
+    stations: Mapping[tuple[float, float], list[str]] = field(repr=False)
+
+    @cached_property
+    def roles(self) -> tuple[str, ...]:
+        """What each robot is for, as its paint shows: output, carrier, fed or tool, else shared."""
+        m = self.m
+        paints = {i: m.mat(i).name.removeprefix("role/") for i in range(m.nmat)}
+        found = []
+        for robot in self.factory.robots:
+            body = m.body(names.carriage(robot.name))
+            first = int(body.geomadr[0])
+            worn = (int(m.geom_matid[g]) for g in range(first, first + int(body.geomnum[0])))
+            roles = (paints[paint] for paint in worn if paints.get(paint) in ROLES)
+            found.append(next(roles, "shared"))
+        return tuple(found)
+
+
+def stations(
+    factory: Factory, m: mujoco.MjModel, ends: Iterable[tuple[Operation, Floats]]
+) -> dict[tuple[float, float], list[str]]:
+    """The stations of operations, each with the state of the engine (nq,) as it ends."""
+    replica = Replica(m)
+    found: dict[tuple[float, float], list[str]] = {}
+    for operation, qpos in ends:
+        nest = f"{factory.robots[operation.carrier].name}/nest"
+        if len(operation.robots) < 2 or not _has_site(m, nest):
+            continue
+        replica.place(qpos)
+        x, y = (round(float(v), 3) for v in replica.d.site_xpos[m.site(nest).id][:2])
+        found.setdefault((x, y), []).append(operation.label)
+    return found
+
+
+def _has_site(m: mujoco.MjModel, name: str) -> bool:
+    return int(mujoco.mj_name2id(m, mujoco.mjtObj.mjOBJ_SITE.value, name)) >= 0
 
 
 def triangles(m: mujoco.MjModel, geom: int) -> tuple[Floats, NDArray[np.int64]]:
@@ -51,22 +94,22 @@ def triangles(m: mujoco.MjModel, geom: int) -> tuple[Floats, NDArray[np.int64]]:
     return points @ rotation(m.geom_quat[geom]).T + m.geom_pos[geom], corners
 
 
-def look(m: mujoco.MjModel, geoms: Sequence[int]) -> Look:
-    """Several geoms of a body as one."""
+def _look(m: mujoco.MjModel, geoms: Sequence[int]) -> tuple[list[NDArray[Any]], float]:
+    """Several geoms of a body as one: vertices (n, 3) [m] in its frame, faces (k, 3), colours
+    (n, 3) from 0 to 255; and how opaque it is."""
     found = [triangles(m, geom) for geom in geoms]
-    paints = [paint(m, geom) for geom in geoms]
-    starts = np.cumsum([0, *(len(points) for points, _ in found)])
-    return Look(
-        np.concatenate([points for points, _ in found]),
-        np.concatenate([faces + start for (_, faces), start in zip(found, starts, strict=False)]),
-        np.concatenate(
-            [
-                np.tile(np.round(255 * np.clip(rgba[:3], 0, 1)).astype(np.uint8), (len(points), 1))
-                for (points, _), rgba in zip(found, paints, strict=True)
-            ]
-        ),
-        float(min(rgba[3] for rgba in paints)),
-    )
+    paints = np.array([paint(m, geom) for geom in geoms])
+    counts = [len(points) for points, _ in found]
+    starts = np.cumsum([0, *counts])
+    vertices = np.concatenate([points for points, _ in found])
+    faces = [faces + start for (_, faces), start in zip(found, starts, strict=False)]
+    colours = np.round(255 * np.clip(paints[:, :3], 0, 1)).astype(np.uint8)
+    made = [
+        vertices.astype(np.float32),
+        np.concatenate(faces).astype(np.uint32),
+        np.repeat(colours, counts, axis=0),
+    ]
+    return made, float(paints[:, 3].min())
 
 
 def scene(stage: DrawnFactory, labels: dict[str, int], pack: Pack) -> dict[str, Any]:
@@ -78,14 +121,12 @@ def scene(stage: DrawnFactory, labels: dict[str, int], pack: Pack) -> dict[str, 
     alphas: list[float] = []
     things = []
     for body, geoms in _groups(m):
-        made = look(m, geoms)
-        vertices, faces = made.vertices.astype(np.float32), made.faces.astype(np.uint32)
-        parts: tuple[NDArray[Any], ...] = vertices, faces, made.colours
-        key = sha256(b"".join(a.tobytes() for a in parts) + repr(made.alpha).encode()).digest()
+        made, alpha = _look(m, geoms)
+        key = sha256(b"".join(a.tobytes() for a in made) + repr(alpha).encode()).digest()
         if key not in shapes:
             shapes[key] = number = len(shapes)
-            alphas.append(round(made.alpha, 3))
-            for letter, values in zip("vfc", parts, strict=True):
+            alphas.append(round(alpha, 3))
+            for letter, values in zip("vfc", made, strict=True):
                 pack.add(f"{letter}{number}", values)
         name = owner(m.geom(geoms[0]).name) if body == 0 else m.body(body).name
         things.append({"shape": shapes[key], "body": body, **stands_for(name, robots, labels)})

@@ -6,10 +6,10 @@ from collections.abc import Iterable, Iterator
 from html import escape
 
 from factory.plant.factory import Factory
+from factory.problem.pag import PAG
 from factory.show.report.fidelity import RecordedFidelity
 from factory.show.report.links import words_of
-from factory.show.report.measured import MeasuredPace
-from factory.show.report.prediction import Predicted
+from factory.show.report.pace import MeasuredPace, Predicted
 from factory.show.report.recording import Recording
 from factory.show.report.words import Proof
 from factory.study.fidelity.quantities import QUANTITIES
@@ -149,6 +149,28 @@ def utilisation(recording: Recording, run: MeasuredPace, plan: Predicted | None)
     return f'<div class="uses">{"".join(rows)}</div>{note}'
 
 
+def assembly_tree(pag: PAG, labels: dict[str, int]) -> str:
+    """The assembly tree as nested lists, the product first; each label has room for its picture."""
+    made: dict[str, str] = {}
+    for node in pag.postorder():
+        inside = "".join(made.pop(label) for label in node.inputs)
+        below = f"<ul>{inside}</ul>" if inside else ""
+        made[node.label] = (
+            f"<li>{_node(node.label, node.operation, labels, bool(inside))}{below}</li>"
+        )
+    return f'<ul class="tree">{made[pag.root]}</ul>'
+
+
+def _node(label: str, operation: str, labels: dict[str, int], whole: bool) -> str:
+    kind = "whole" if whole else "part"
+    number = labels[label]
+    return (
+        f'<button class="node {kind}" data-label="{number}"><span class="picture"'
+        f' data-picture="{number}"></span><span class="words"><b>{escape(label)}</b>'
+        f"<small>{escape(operation)}</small></span></button>"
+    )
+
+
 def proof_words(proof: Proof) -> str:
     """The proof, claim by claim."""
     items = "".join(
@@ -169,11 +191,11 @@ def proof_words(proof: Proof) -> str:
 def fidelity_words(found: RecordedFidelity) -> str:
     """The figures in a table, and the verdict of the monitor."""
     rows = "".join(
-        f'<tr class="{"bad" if figure.exceeded else ""}">'
-        f"<th>{escape(_title(figure.key))}<p>{escape(QUANTITIES[figure.key].definition)}</p></th>"
-        f"<td>{_shown(figure.value)}</td><td>{_shown(QUANTITIES[figure.key].limit)}</td>"
-        f"<td>{escape(QUANTITIES[figure.key].unit)}</td></tr>"
-        for figure in found.figures
+        f'<tr class="{"bad" if QUANTITIES[key].exceeded(value) else ""}">'
+        f"<th>{escape(_title(key))}<p>{escape(QUANTITIES[key].definition)}</p></th>"
+        f"<td>{_shown(value)}</td><td>{_shown(QUANTITIES[key].limit)}</td>"
+        f"<td>{escape(QUANTITIES[key].unit)}</td></tr>"
+        for key, value in found.figures.items()
     )
     table = _table(("", "found", "limit", ""), rows)
     return "".join(_judged(found)) + table

@@ -7,11 +7,18 @@ from math import inf
 
 from factory.study.analysis.flow import Flow, flow
 from factory.study.analysis.measured import Comparison, RunRecord, compare
-from factory.study.analysis.sensitivity import Sensitivity, sensitivities
 from factory.study.analysis.slack import slacks
 from factory.study.analysis.timed import TimedNet, timed_net
 from factory.study.analysis.timing import AS_IT_IS, Change, Timing
-from factory.study.analysis.what_if import Scenario, WipCurve, scenario, scenarios, wip_curve
+from factory.study.analysis.what_if import (
+    Scenario,
+    Sensitivity,
+    WipCurve,
+    scenario,
+    scenarios,
+    sensitivities,
+    wip_curve,
+)
 
 
 @dataclass(frozen=True)

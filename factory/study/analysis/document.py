@@ -76,30 +76,27 @@ def _circuits(found: Analysis) -> list[dict[str, Any]]:
 
 
 def _robots(found: Analysis) -> list[dict[str, Any]]:
-    rows = []
-    for robot, share, gain in zip(
-        found.timing.factory.robots, found.flow.shares, found.sensitivities, strict=True
-    ):
-        rows.append(
-            {
-                "robot": robot.name,
-                "type": robot.type,
-                "moving_s": share.moving,
-                "working_s": share.working,
-                "standing_s": share.standing,
-                "waiting_s": share.waiting,
-                "busy": share.busy,
-                "slack_s": gain.slack,
-                "gain_10_percent_slower_s": gain.slower,
-                "gain_10_percent_faster_s": gain.faster,
-                "gain_10_percent_acceleration_s": gain.quicker,
-                "gain_10_percent_shorter_s": gain.shorter,
-                "gain_no_speed_limit_s": gain.most,
-                "enough_speed_factor": gain.enough,
-                "gain_second_robot_s": gain.copy,
-            }
-        )
-    return rows
+    robots = found.timing.factory.robots
+    return [
+        {
+            "robot": robot.name,
+            "type": robot.type,
+            "moving_s": share.moving,
+            "working_s": share.working,
+            "standing_s": share.standing,
+            "waiting_s": share.waiting,
+            "busy": share.busy,
+            "slack_s": gain.slack,
+            "gain_10_percent_slower_s": gain.slower,
+            "gain_10_percent_faster_s": gain.faster,
+            "gain_10_percent_acceleration_s": gain.quicker,
+            "gain_10_percent_shorter_s": gain.shorter,
+            "gain_no_speed_limit_s": gain.most,
+            "enough_speed_factor": gain.enough,
+            "gain_second_robot_s": gain.copy,
+        }
+        for robot, share, gain in zip(robots, found.flow.shares, found.sensitivities, strict=True)
+    ]
 
 
 def _measured(found: Analysis, run: Comparison) -> dict[str, Any]:

@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from math import isfinite
 from pathlib import Path
+from typing import Any
 
 from factory.nets.cycle_ratio import max_cycle_ratio
 from factory.nets.gears import GearNet
@@ -62,31 +63,33 @@ def net_document(name: str, found: NetAnalysis) -> dict[str, object]:
     return {
         "net": name,
         "cycle_time_s": found.pace,
-        "circuits": [
-            {
-                "seconds": sum(found.seconds[p] for p in c.circuit),
-                "tokens": sum(found.net.tokens[p] for p in c.circuit),
-                "slack_s": c.seconds,
-                "places": [places[p].name for p in c.circuit],
-            }
-            for c in found.circuits
-        ],
+        "circuits": _circuits(found),
         "slack_s": {places[p].name: slack.seconds for p, slack in found.slack.items()},
     }
+
+
+def _circuits(found: NetAnalysis) -> list[dict[str, Any]]:
+    places = found.net.net.places
+    return [
+        {
+            "seconds": sum(found.seconds[p] for p in c.circuit),
+            "tokens": sum(found.net.tokens[p] for p in c.circuit),
+            "slack_s": c.seconds,
+            "places": [places[p].name for p in c.circuit],
+        }
+        for c in found.circuits
+    ]
 
 
 def net_tables(found: NetAnalysis, verbose: bool) -> Iterator[PrintedTable]:
     """The tables of circuits and of places with little slack."""
     places, most = found.net.net.places, None if verbose else SHOWN
-    rows = []
-    for c in found.circuits:
-        seconds = sum(found.seconds[p] for p in c.circuit)
-        tokens = sum(found.net.tokens[p] for p in c.circuit)
-        names = " · ".join(places[p].name for p in c.circuit)
-        rows.append((f"{c.seconds:.6g}", f"{seconds:.6g}", str(tokens), names))
-    yield cut(
-        "Circuits, the critical first", ("slack [s]", "time [s]", "tokens", "places"), rows, most
-    )
+    heads = ("slack [s]", "time [s]", "tokens", "places")
+    rows = [
+        (f"{c['slack_s']:.6g}", f"{c['seconds']:.6g}", str(c["tokens"]), " · ".join(c["places"]))
+        for c in _circuits(found)
+    ]
+    yield cut("Circuits, the critical first", heads, rows, most)
     ordered = sorted(found.slack.items(), key=lambda item: item[1].seconds)
     slack = [(places[p].name, f"{found.seconds[p]:.6g}", f"{s.seconds:.6g}") for p, s in ordered]
     yield cut("Places", ("place", "time [s]", "slack [s]"), slack, most)

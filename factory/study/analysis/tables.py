@@ -73,23 +73,17 @@ def tables(found: Analysis, verbose: bool) -> Iterator[PrintedTable]:
 
 
 def _shares(found: Analysis, most: int | None) -> PrintedTable:
-    run = found.measured
-    columns: tuple[str, ...]
+    run, shares = found.measured, found.flow.shares
     columns = ("robot", "type", "moving", "working", "standing", "waiting", "busy")
-    rows: list[tuple[float, tuple[str, ...]]] = []
-    for number, share in enumerate(found.flow.shares):
+    rows = []
+    for number in sorted(range(len(shares)), key=lambda n: -shares[n].busy):
+        share, robot = shares[number], found.timing.factory.robots[number]
         times = (share.moving, share.working, share.standing, share.waiting)
-        robot = found.timing.factory.robots[number]
-        row: tuple[str, ...]
-        row = (robot.name, robot.type, *(f"{t:.3f}" for t in times), _percent(share.busy))
-        if run is not None:
-            pair = run.busy[number]
-            row = (*row, _percent(pair.predicted), _percent(pair.measured))
-        rows.append((share.busy, row))
-    if run is not None:
-        columns = (*columns, "in that run", "measured")
-    ordered = [row for _, row in sorted(rows, key=lambda item: -item[0])]
-    return cut("Where the time of a cycle goes [s]", columns, ordered, most)
+        busy = (run.busy[number].predicted, run.busy[number].measured) if run else ()
+        percents = map(_percent, (share.busy, *busy))
+        rows.append((robot.name, robot.type, *(f"{t:.3f}" for t in times), *percents))
+    added = ("in that run", "measured") if run else ()
+    return cut("Where the time of a cycle goes [s]", (*columns, *added), rows, most)
 
 
 def _gains(found: Analysis, most: int | None) -> PrintedTable:

@@ -14,9 +14,8 @@ from factory.control.mode import Array, Index, Truth
 from factory.layout.clearance import certify
 from factory.layout.layout import Layout
 from factory.mjcf import names
+from factory.study.fidelity.readings import ActiveWelds, Shadow
 from factory.study.fidelity.record import ClosestApproach
-from factory.study.fidelity.shadow import Shadow
-from factory.study.fidelity.welds import ActiveWelds
 
 ROBOT, PART, FEEDER, OUTFEED, NONE = range(5)
 KINDS = ("robot", "part", "feeder", "outfeed")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from time import perf_counter
 
 import numpy as np
@@ -16,7 +16,7 @@ from factory.nets.gears import GearNet
 from factory.simulation.request import RunRequest
 from factory.simulation.run import Run
 from factory.simulation.simulation import Simulation
-from factory.study.analysis.steady import steady_units
+from factory.study.analysis.flow import steady_units
 from factory.study.analysis.timing import Timing
 from factory.study.fidelity.causality import (
     causal_record,
@@ -105,14 +105,9 @@ def measure_seed(case: Case, seed: int) -> SeedRecord:
     """One seed in both worlds."""
     layout = case.layout
     units = case.units or steady_units(Timing(layout, case.settings, "mujoco", seed, case.jitter))
-    ideal = Simulation(
-        layout,
-        RunRequest("ideal", units=units, seed=seed, jitter=case.jitter, settings=case.settings),
-    )
-    physical = Simulation(
-        layout,
-        RunRequest("mujoco", units=units, seed=seed, jitter=case.jitter, settings=case.settings),
-    )
+    asked = RunRequest("mujoco", units, seed, case.jitter, case.settings)
+    physical = Simulation(layout, asked)
+    ideal = Simulation(layout, replace(asked, world="ideal"))
     if case.alter is not None:
         case.alter(physical.physical.m)
     measurement = Measurement(physical)

@@ -8,8 +8,8 @@ from factory.control.mode import Array, Index
 from factory.mjcf import names
 from factory.mjcf.model import Model
 from factory.mjcf.weld_frames import HOLD
+from factory.study.fidelity.readings import ActiveWelds
 from factory.study.fidelity.record import Misplaced
-from factory.study.fidelity.welds import ActiveWelds
 
 
 class Finished:

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from factory.control.mode import Array, Index
 from factory.mjcf.weld_frames import gaps
 from factory.simulation.mujoco.fusing import rotations
+from factory.study.fidelity.readings import ActiveWelds, Velocities
 from factory.study.fidelity.record import HandOff
-from factory.study.fidelity.welds import ActiveWelds, Velocities
 from factory.support.engine import mujoco
 
 WINDOW = 0.05
@@ -114,5 +114,5 @@ class _Watched:
         self.peak = max(self.peak, float(energy.max()))
 
     def result(self) -> HandOff:
-        energy = max(0.0, self.peak - (self.first or 0.0))
-        return self.made.after(1e3 * self.impulse, 1e3 * energy / self.made.mass_kg)
+        energy = 1e3 * max(0.0, self.peak - (self.first or 0.0)) / self.made.mass_kg
+        return replace(self.made, impulse_mNs=1e3 * self.impulse, energy_mJ_per_kg=energy)

@@ -16,9 +16,7 @@ from factory.study.fidelity.approach import BEYOND, Approaches
 from factory.study.fidelity.dynamics import DriveFigures, Payload, Residual
 from factory.study.fidelity.finished import Finished
 from factory.study.fidelity.handoffs import HandOffs
-from factory.study.fidelity.shadow import Shadow
-from factory.study.fidelity.steps import Steps
-from factory.study.fidelity.welds import ActiveWelds, Velocities
+from factory.study.fidelity.readings import ActiveWelds, Shadow, Steps, Velocities
 
 
 class Measurement:

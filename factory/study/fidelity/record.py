@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import asdict, dataclass, field
 from types import MappingProxyType
 from typing import Any
 
@@ -27,10 +27,6 @@ class HandOff:
     speed_step_mm_s: float
     impulse_mNs: float = 0.0
     energy_mJ_per_kg: float = 0.0
-
-    def after(self, impulse: float, energy: float) -> HandOff:
-        """The same, with what followed."""
-        return replace(self, impulse_mNs=impulse, energy_mJ_per_kg=energy)
 
 
 @dataclass(frozen=True, slots=True)

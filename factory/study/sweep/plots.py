@@ -56,8 +56,9 @@ def _plot(found: Summary, key: str) -> Any:
     across = next((k for k in numbers if len({dict(g.values)[k] for g in groups}) > 1), None)
     figure, ((axes,),) = figure_and_axes()
     if across is None:
-        columns = [c[key] for c in found.columns if key in c]
-        _histograms(axes, groups, columns)
+        for group in groups[:MOST]:
+            color, label = None if group.values else BLUE, _words(group.values)
+            axes.hist(group.columns[key], bins=40, color=color, alpha=0.7, label=label)
         axes.set_xlabel(_label(key))
         axes.set_ylabel("runs")
     else:
@@ -98,12 +99,6 @@ def _lines(axes: Any, groups: Sequence[Group], key: str, across: str) -> None:
             color=None if rest else BLUE,
             label=_words(rest),
         )
-
-
-def _histograms(axes: Any, groups: Sequence[Group], columns: Sequence[Sequence[float]]) -> None:
-    for group, column in list(zip(groups, columns, strict=True))[:MOST]:
-        color = None if group.values else BLUE
-        axes.hist(column, bins=40, color=color, alpha=0.7, label=_words(group.values))
 
 
 def _words(values: Sequence[tuple[str, Any]]) -> str | None:

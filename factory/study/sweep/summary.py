@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from array import array
-from collections import Counter, defaultdict
+from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
+from functools import cached_property
 from math import sqrt
 from pathlib import Path
 from typing import Any
@@ -39,15 +40,30 @@ class Statistic:
     greatest: float
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass
 class Group:
     """The runs that differ in their seeds alone: what they share of the keys that vary, how many
-    are done and failed, and a statistic of each figure of those that are done."""
+    are done and failed, and the values of each figure of those that are done."""
 
     values: tuple[tuple[str, Value], ...]
-    done: int
-    failed: int
-    figures: Mapping[str, Statistic]
+    done: int = 0
+    failed: int = 0
+    columns: dict[str, array[float]] = field(default_factory=dict, repr=False)
+
+    def add(self, row: Mapping[str, Any]) -> None:
+        """One more run."""
+        if row["status"] == "failed":
+            self.failed += 1
+            return
+        self.done += 1
+        for key in SUMMED:
+            if row[key] is not None:
+                self.columns.setdefault(key, array("d")).append(row[key])
+
+    @cached_property
+    def figures(self) -> Mapping[str, Statistic]:
+        """The statistic of each figure, once all runs are there."""
+        return {key: statistic(self.columns[key]) for key in SUMMED if key in self.columns}
 
     def as_json(self) -> dict[str, Any]:
         """Under the keys of `sweep --summary --json`."""
@@ -60,13 +76,12 @@ class Group:
 @dataclass(frozen=True, slots=True)
 class Summary:
     """A sweep's groups, in the order of their values; `reasons`: why runs failed, with how many
-    each; `columns`: the values of each figure in each group."""
+    each."""
 
     product: str
     varied: tuple[str, ...]
     groups: tuple[Group, ...]
     reasons: Mapping[str, int]
-    columns: tuple[Mapping[str, Sequence[float]], ...]
 
     @property
     def done(self) -> int:
@@ -91,49 +106,24 @@ class Summary:
         }
 
 
-class _Part:
-    """The rows of one group."""
-
-    def __init__(self) -> None:
-        self.done = self.failed = 0
-        self.columns = {key: array("d") for key in SUMMED}
-
-    def add(self, row: Mapping[str, Any]) -> None:
-        """One more row."""
-        if row["status"] == "failed":
-            self.failed += 1
-            return
-        self.done += 1
-        for key, column in self.columns.items():
-            if row[key] is not None:
-                column.append(row[key])
-
-
 def summarise(database: Path) -> Summary:
     """The summary of a database, also while a sweep still writes it. Raises InputError
     (BadFile)."""
-    parts: defaultdict[tuple[Value, ...], _Part] = defaultdict(_Part)
+    groups: dict[tuple[tuple[str, Value], ...], Group] = {}
     reasons: Counter[str] = Counter()
     with reading(database) as (identity, rows):
         varied = tuple(identity["varied"])
         shared = [key for key in varied if key != "seed"]
         for row in rows:
-            parts[tuple(row[key] for key in shared)].add(row)
+            values = tuple((key, row[key]) for key in shared)
+            if values not in groups:
+                groups[values] = Group(values)
+            groups[values].add(row)
             if row["reason"]:
                 reasons[row["reason"]] += 1
-    places = sorted(parts, key=lambda place: [(isinstance(v, str), v) for v in place])
-    columns = [{k: c for k, c in parts[place].columns.items() if c} for place in places]
-    groups = [
-        Group(
-            tuple(zip(shared, place, strict=True)),
-            parts[place].done,
-            parts[place].failed,
-            {key: statistic(column) for key, column in found.items()},
-        )
-        for place, found in zip(places, columns, strict=True)
-    ]
-    told = dict(reasons.most_common())
-    return Summary(str(identity["product"]), varied, tuple(groups), told, tuple(columns))
+    places = sorted(groups, key=lambda values: [(isinstance(v, str), v) for _, v in values])
+    ordered = tuple(groups[values] for values in places)
+    return Summary(str(identity["product"]), varied, ordered, dict(reasons.most_common()))
 
 
 def statistic(values: Sequence[float]) -> Statistic:
