@@ -79,7 +79,7 @@ class Project:
         own = {name for name, template in self.templates.items() if not _is_shipped(template)}
         tried = own and own & {operation.template.name for operation in factory.operations}
         if tried:
-            from factory.modes.preparing import check_modes
+            from factory.modes.modes import check_modes
 
             check_modes(factory, [self.templates[name] for name in sorted(tried)], self.product)
         return factory

@@ -7,7 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from factory.control.laws import LAWS, Setting, mode_of
+from factory.control.laws import LAWS, Setting, law_of
+from factory.control.mode import Mode
 from factory.problem.template import Law, Point, Template
 from factory.support.errors import InputError
 
@@ -21,8 +22,21 @@ MATE = Template(
     law=Law("navigation", (Point("A", 1, 2.0), Point("A", 2, 2.0), Point("B", 3))),
 )
 SETTING = Setting(
-    lower=np.zeros(3), upper=np.array([1.0, 1.2, 0.8]), r=np.array([0.05, 0.05, 0.1]), eps=1e-3
+    lower=np.zeros(3),
+    upper=np.array([1.0, 1.2, 0.8]),
+    r=np.array([0.05, 0.05, 0.1]),
+    eps=1e-3,
+    station=np.full(3, np.nan),
+    width=np.array([0.05, 0.05, 0.1]),
+    dwell=0.0,
+    gate=np.full(3, -1),
+    standoff=np.zeros(3),
 )
+
+
+def mode_of(template: Template, setting: Setting) -> Mode:
+    """The mode that a template's F gives."""
+    return law_of(template)(template, setting)
 
 
 def test_navigation_takes_goals_pairs_and_meetings_from_the_template() -> None:

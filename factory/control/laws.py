@@ -7,7 +7,7 @@ one: write the function, and a line in `LAWS`.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from itertools import combinations
 from types import MappingProxyType
 
@@ -24,25 +24,21 @@ class Setting:
 
     `lower`, `upper` (k,): A and B of each [m]; `station` (k,): S, its interior station, NaN where
     it has none; `r` (k,): the length [m] that multiples in the template's points count. Two robots
-    touch at the mean of their `width` (k,) [m], r if left out. `eps` [m]: the factory's own, used
-    where the template says so; `dwell` [s]; `gate`, `standoff` (k,) as in `Mode`.
+    touch at the mean of their `width` (k,) [m]. `eps` [m]: the factory's own, used where the
+    template says so; `dwell` [s]; `gate`, `standoff` (k,) as in `Mode`.
     """
 
     lower: Array
     upper: Array
     r: Array
     eps: float
-    station: Array = field(default_factory=lambda: np.empty(0))
-    width: Array = field(default_factory=lambda: np.empty(0))
-    dwell: float = 0.0
-    gate: Index = field(default_factory=lambda: np.empty(0, np.intp))
-    standoff: Array = field(default_factory=lambda: np.empty(0))
+    station: Array
+    width: Array
+    dwell: float
+    gate: Index
+    standoff: Array
 
     def __post_init__(self) -> None:
-        if not np.size(self.station):
-            object.__setattr__(self, "station", np.full(np.shape(self.lower), np.nan))
-        if not np.size(self.width):
-            object.__setattr__(self, "width", self.r)
         for name in ("lower", "upper", "r", "station", "width", "standoff"):
             object.__setattr__(self, name, lock(getattr(self, name)))
         object.__setattr__(self, "gate", lock_index(self.gate))
@@ -108,14 +104,6 @@ def law_of(template: Template) -> Law:
         message = f"{template.name}: unknown control law '{name}'"
         raise InputError(Diagnostic("BadTemplate", message, template.law_position, hint))
     return LAWS[name]
-
-
-def mode_of(template: Template, setting: Setting) -> Mode:
-    """The mode a template's F gives on the guidepaths of `setting`.
-
-    Raises InputError: BadTemplate for a law that is not in the table, NotPrepared for no mode.
-    """
-    return law_of(template)(template, setting)
 
 
 def _meetings(

@@ -143,20 +143,6 @@ class Bundle:
             None if self.moving is None else self.moving[robots],
         )
 
-    def potential(self, x: Array) -> Array:
-        """phi (modes,) in [0, 1]: 0 at the goal, 1 on Δ."""
-        terms = self._terms(x)
-        gamma = terms.way / self.span
-        return np.asarray(gamma / (gamma**KAPPA + terms.beta) ** (1 / KAPPA))
-
-    def gradient(self, x: Array) -> Array:
-        """D phi (n,) [1/m], each robot's by its own mode's phi."""
-        terms = self._terms(x)
-        gamma = terms.way / self.span
-        outer = (gamma**KAPPA + terms.beta) ** (-1 / KAPPA - 1)
-        rise = (terms.pull + terms.opening) * (terms.beta / self.span)[self.owner]
-        return np.asarray((rise - terms.push * (gamma / KAPPA)[self.owner]) * outer[self.owner])
-
     def field(self, x: Array, dt: float) -> Array:
         """F (n,) [m/s] for a world of ticks dt [s]; dt shapes only the landing in the goal.
 

@@ -9,8 +9,8 @@ from math import floor
 
 from factory.geometry.solids import Product
 from factory.layout.certificate import ALWAYS, ARM_BODY, CARRIAGE_BODY, MAST_BODY, OUTFEED, Region
-from factory.layout.dimensions import CARRIAGE, Clearance, up
-from factory.layout.guidepath import Box, Extent, Guidepath, hull
+from factory.layout.dimensions import Clearance, up
+from factory.layout.guidepath import Box, Extent, Guidepath
 from factory.layout.layout import Layout, carriers
 from factory.layout.shapes import Shape, headings
 from factory.layout.stretching import Stretched
@@ -85,10 +85,9 @@ def _spare(layout: Layout) -> float:
     beside its own course, of the product in the making, and of no more [whole mm]."""
     start, _, low, high = layout.outfeed
     c = layout.clearance
-    found = piles(layout.factory, layout.product)
     ahead = [
         region.box[1]
-        for region in regions(layout, found, _beside(layout))
+        for region in regions(layout, piles(layout.factory, layout.product))
         if region.kind != OUTFEED
         and (region.robot != 0 or region.mode == ALWAYS)
         and region.box[2] < high + c
@@ -97,22 +96,6 @@ def _spare(layout: Layout) -> float:
     ]
     spare = start - c - max(ahead)
     return min(floor(spare * 1000 + 1e-6) / 1000, layout.guidepaths[0].travel - up(c))
-
-
-def _beside(layout: Layout) -> list[int]:
-    """The robots that may come near the outfeed's course with what they carry, or their feeders
-    with a post."""
-    _, _, low, high = layout.outfeed
-    whole = hull(list(layout.payloads.values()))
-    room = layout.clearance + 2 * (whole[1] - whole[0] + whole[3] - whole[2] + 2 * CARRIAGE)
-    room += max(map(abs, whole))
-    near = [0]
-    for robot, path in enumerate(layout.guidepaths[1:], start=1):
-        far = room + 2 * path.reach
-        y = path.a[1] - path.heading[1] * path.length
-        if min(y, path.a[1]) < high + far and max(y, path.a[1]) > low - far:
-            near.append(robot)
-    return near
 
 
 def _runs_under(region: Region) -> bool:

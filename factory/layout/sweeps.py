@@ -10,7 +10,7 @@ they are in every mode.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 from factory.geometry.solids import Product
@@ -74,19 +74,14 @@ def piles(factory: Factory, product: Product) -> dict[str, Pile]:
     return found
 
 
-def regions(
-    layout: Layout, found: Mapping[str, Pile], robots: Collection[int] | None = None
-) -> list[Region]:
-    """Every region of a layout, robot by robot, or those of some robots. Linear in the sum of the
-    gears' lengths."""
+def regions(layout: Layout, found: Mapping[str, Pile]) -> list[Region]:
+    """Every region of a layout, robot by robot. Linear in the sum of the gears' lengths."""
     result: list[Region] = []
-    for robot in range(len(layout.guidepaths)) if robots is None else robots:
+    for robot in range(len(layout.guidepaths)):
         result.extend(_bodies(layout, robot))
         result.extend(_payloads(layout, robot, found))
-    chosen = None if robots is None else set(robots)
     for leaf in layout.factory.leaves:
-        if chosen is None or leaf.carrier in chosen:
-            result.extend(_feeder(layout, leaf.label, leaf.carrier))
+        result.extend(_feeder(layout, leaf.label, leaf.carrier))
     top = max(pile.z[1] for pile in found.values())
     result.extend(_upright(0, OUTFEED, layout.outfeed, top, ""))
     return result

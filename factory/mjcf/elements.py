@@ -34,18 +34,27 @@ def add(parent: Element, tag: str, **attributes: object) -> Element:
     """A child element. Tuples are written as numbers; None is left out; a trailing `_` is
     dropped."""
     child = SubElement(parent, tag)
-    for name, value in attributes.items():
-        if value is None:
-            continue
-        text = value if isinstance(value, str) else _text(value)
-        child.set(name.rstrip("_"), text)
+    fill(child, **attributes)
     return child
+
+
+def fill(element: Element, **attributes: object) -> None:
+    """Give an element attributes, written as those of a child are."""
+    for name, value in attributes.items():
+        if value is not None:
+            text = value if isinstance(value, str) else _text(value)
+            element.set(name.rstrip("_"), text)
 
 
 def add_shown(parent: Element, name: str, shape: str, **attributes: object) -> Element:
     """A geom that is only shown. Of a body that collides the engine boxes every geom
     in every step, so what is only shown of one that stands still is not in it."""
     return add(parent, "geom", name=name, class_="shown", type=shape, **attributes)
+
+
+def add_station(parent: Element, name: str, **attributes: object) -> Element:
+    """A box of something that stands still, and that parts collide with."""
+    return add(parent, "geom", name=name, class_="station", type="box", **attributes)
 
 
 def _text(value: object) -> str:

@@ -10,7 +10,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from math import prod
 from pathlib import Path
 from types import MappingProxyType
 from xml.etree import ElementTree
@@ -19,17 +18,20 @@ from xml.sax.saxutils import quoteattr
 
 from factory.layout.layout import Layout
 from factory.mjcf import names
-from factory.mjcf.elements import add
+from factory.mjcf.elements import add, fill
 from factory.mjcf.outfeed import TRAY_MASS, add_tray
 from factory.mjcf.parts import add_meshes, add_parts, add_wholes
 from factory.mjcf.robots import Drive, Hoist, add_paints, instantiate, load_robot_model
-from factory.mjcf.scene import add_assets, add_follower, add_scene, add_visuals
+from factory.mjcf.scene import add_follower, add_scene
 from factory.mjcf.unseen import leave_out_what_is_shown
-from factory.mjcf.welds import add_welds, exclusions, held_at
+from factory.mjcf.welds import add_exclusions, add_welds, held_at
 from factory.plant.factory import Factory, Robot
 from factory.plant.fused_bodies import FusedBodies, bodies_of
 from factory.problem.robot_types import Catalogue
 from factory.support.settings import Settings
+
+SKELETON = Path(__file__).with_name("skeleton.xml")
+"""What every model has, whatever the factory."""
 
 CARRIAGE_MASS = 1.9
 """What a `dot` weighs without payload [kg]."""
@@ -136,29 +138,28 @@ def build_model(
         drive_for(CARRIAGE_MASS, heaviest(factory, robot, masses), settings.acceleration, settings)
         for robot in factory.robots
     )
-    root = Element("mujoco", {"model": product_name(factory)})
-    add(root, "compiler", angle="radian", autolimits=True, meshdir="meshes")
-    _options(root, settings, sum(copies.values()) + len(factory.robots))
-    add_visuals(root, layout)
-    defaults = _defaults(root)
-    asset = add(root, "asset")
-    add_assets(asset)
-    add_paints(asset)
-    files = add_meshes(asset, product)
-    world = add(root, "worldbody")
-    add_scene(world, layout)
-    equality, actuator = Element("equality"), Element("actuator")
+    root = ElementTree.parse(SKELETON).getroot()
+    root.set("model", product_name(factory))
+    section = {child.tag: child for child in root}
+    world, equality, actuator = (section[tag] for tag in ("worldbody", "equality", "actuator"))
+    fill(section["option"], timestep=settings.step)
+    awake = sum(copies.values()) + len(factory.robots)
+    fill(section["size"], memory=f"{64 + 4 * awake**2 // 2**20}M")
+    add_paints(section["asset"])
+    files = add_meshes(section["asset"], product)
+    add_scene(world, section["statistic"], layout)
     hoists = _hoists(factory, masses, settings)
-    _robots(layout, catalogue, drives, hoists, defaults, asset, world, actuator)
+    _robots(layout, catalogue, drives, hoists, section)
     load = masses[factory.pag.root]
     drive = drive_for(TRAY_MASS, load, settings.outfeed_acceleration, settings)
     add_tray(world, actuator, layout, drive)
     add_parts(world, layout, copies)
     add_wholes(world, layout, bodies, copies)
     add_welds(equality, layout, bodies, copies)
-    contact = exclusions(layout, bodies, copies)
-    root.extend([*([contact] if len(contact) else []), equality, actuator])
-    _home(add(root, "keyframe"), layout, actuator)
+    add_exclusions(section["contact"], layout, bodies, copies)
+    if not len(section["contact"]):
+        root.remove(section["contact"])
+    _home(section["keyframe"], layout, actuator)
     if not shown:
         leave_out_what_is_shown(root)
     ElementTree.indent(root)
@@ -217,42 +218,20 @@ def _hoists(factory: Factory, masses: Mapping[str, float], settings: Settings) -
     return found
 
 
-def _options(root: Element, settings: Settings, bodies: int) -> None:
-    how = {"timestep": settings.step, "integrator": "Euler", "cone": "elliptic", "impratio": 1}
-    add(add(root, "option", **how), "flag", sleep="enable")
-    add(root, "size", memory=f"{64 + prod((4, bodies, bodies)) // 2**20}M")
-
-
-def _defaults(root: Element) -> Element:
-    default = add(root, "default")
-    add(default, "equality", solref="0.004 1", solimp="0.999 0.9999 0.001 0.5 2")
-    rough = {"condim": 3, "friction": "0.6 0.005 0.0001"}
-    for name, what in (
-        ("part", {"contype": 2, "conaffinity": 1, **rough, "group": 0}),
-        ("station", {"contype": 1, "conaffinity": 1, "group": 0}),
-        ("shown", {"contype": 0, "conaffinity": 0, "mass": 0, "group": 1}),
-    ):
-        add(add(default, "default", class_=name), "geom", **what)
-    return default
-
-
 def _robots(
     layout: Layout,
     catalogue: Catalogue,
     drives: tuple[Drive, ...],
     hoists: Mapping[int, Hoist],
-    defaults: Element,
-    asset: Element,
-    world: Element,
-    actuator: Element,
+    section: Mapping[str, Element],
 ) -> None:
     factory, product = layout.factory, layout.product
     models = {}
     for robot, path, drive in zip(factory.robots, layout.guidepaths, drives, strict=True):
         if robot.type not in models:
             model = models[robot.type] = load_robot_model(catalogue[robot.type])
-            defaults.append(model.defaults)
-            asset.extend(model.assets)
+            section["default"].append(model.defaults)
+            section["asset"].extend(model.assets)
         carried = factory.delivered(robot.index)
         parts = factory.contents[carried] if carried else ()
         low = min((float(product.solids[p].low[2]) for p in parts), default=float(product.low[2]))
@@ -267,8 +246,8 @@ def _robots(
         )
         if robot.index == 0:
             add_follower(body, layout)
-        world.append(body)
-        actuator.extend(actuators)
+        section["worldbody"].append(body)
+        section["actuator"].extend(actuators)
 
 
 def _home(keyframe: Element, layout: Layout, actuator: Element) -> None:

@@ -11,7 +11,7 @@ from xml.etree.ElementTree import Element
 from factory.layout.dimensions import BELT_GAP, FINGER_TOP, PAYLOAD, TRAY
 from factory.layout.layout import Layout, Point2
 from factory.mjcf import names
-from factory.mjcf.elements import add, add_shown
+from factory.mjcf.elements import add, add_shown, add_station
 from factory.mjcf.robots import Drive, add_inertia
 
 TRAY_MASS = 4.0
@@ -34,25 +34,17 @@ def add_tray(world: Element, actuator: Element, layout: Layout, drive: Drive) ->
     slide = names.OUTFEED_SLIDE
     joint = add(body, "joint", name=slide, type="slide", axis="1 0 0", frictionloss=0.2)
     add_inertia(joint, drive)
-    add(
+    add_shown(
         body,
-        "geom",
-        name=names.OUTFEED_TRAY,
-        class_="shown",
-        type="box",
+        names.OUTFEED_TRAY,
+        "box",
         mass=TRAY_MASS,
         pos=((xlo + xhi) / 2, (ylo + yhi) / 2, PAYLOAD - BELT_GAP - TRAY / 2),
         size=(*_plate((xhi - xlo) / 2, (yhi - ylo) / 2), TRAY / 2 - 1e-4),
         material="tray",
     )
-    add(
-        actuator,
-        "pid",
-        name=names.OUTFEED_DRIVE,
-        joint=slide,
-        input="pos vel ff",
-        **drive.attributes(),
-    )
+    gains = drive.attributes()
+    add(actuator, "pid", name=names.OUTFEED_DRIVE, joint=slide, input="pos vel ff", **gains)
 
 
 def add_outfeed(world: Element, layout: Layout) -> None:
@@ -62,16 +54,8 @@ def add_outfeed(world: Element, layout: Layout) -> None:
     thick = (top - FINGER_TOP) * 0.8
     (x, y), half = ((xlo + xhi) / 2, (ylo + yhi) / 2), ((xhi - xlo) / 2, (yhi - ylo) / 2)
     body = add(world, "body", name="outfeed", pos=(x, y, 0.0))
-    add(
-        body,
-        "geom",
-        name="outfeed/belt",
-        class_="station",
-        type="box",
-        pos=(0, 0, top - thick / 2),
-        size=(*_plate(*half), thick / 2),
-        material="belt",
-    )
+    size = (*_plate(*half), thick / 2)
+    add_station(body, "outfeed/belt", pos=(0, 0, top - thick / 2), size=size, material="belt")
     tall = float(layout.product.high[2] - layout.product.low[2])
     length = layout.product_length + 0.1
     shed, wall = half[0] - length / 2, top + tall / 2 + 0.005

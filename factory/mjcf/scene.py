@@ -8,13 +8,14 @@ from xml.etree.ElementTree import Element
 
 from factory.layout.dimensions import BOOM, BOOM_HEIGHT, CARRIAGE, PAYLOAD, POST
 from factory.layout.layout import Layout
-from factory.mjcf.elements import add, add_shown, numbers
+from factory.mjcf.elements import add, add_shown, add_station, fill, numbers
 from factory.mjcf.names import COMPASS, feeder
 from factory.mjcf.outfeed import add_outfeed
 from factory.mjcf.robots import heading_quaternion
 
 VIEW = 32.0
-"""Vertical field of view of the cameras [degrees]: narrow, for a calm perspective."""
+"""Vertical field of view of the cameras [degrees]: narrow, for a calm perspective. The free
+camera's is the same (skeleton.xml)."""
 
 FAR = 1e5
 """How far away the ends of the compass are [m]."""
@@ -29,64 +30,10 @@ KEY, FILL = (0.40, 0.48, -0.78), (-0.65, 0.30, -0.70)
 """Directions of the two lights; the first casts the shadows."""
 
 
-def add_visuals(root: Element, layout: Layout) -> None:
-    """Sky, haze and the quality of light."""
-    visual = add(root, "visual")
-    add(visual, "headlight", ambient="0.38 0.38 0.39", diffuse="0.16 0.16 0.16", specular="0 0 0")
-    add(visual, "quality", shadowsize=2048, offsamples=4)
-    add(visual, "map", znear=0.02, zfar=60, shadowclip=1.0)
-    add(visual, "global", offwidth=1920, offheight=1080, fovy=VIEW)
+def add_scene(world: Element, statistic: Element, layout: Layout) -> None:
+    """Everything that stands still, and how large it is."""
     x, y, radius = _floor(layout)
-    add(root, "statistic", center=(x, y, 0.1), extent=radius)
-
-
-def add_assets(asset: Element) -> None:
-    """The materials of the hall."""
-    add(
-        asset,
-        "texture",
-        name="sky",
-        type="skybox",
-        builtin="gradient",
-        rgb1="0.93 0.95 0.97",
-        rgb2="0.80 0.84 0.88",
-        width=64,
-        height=384,
-    )
-    add(
-        asset,
-        "texture",
-        name="floor",
-        type="2d",
-        builtin="flat",
-        mark="edge",
-        rgb1="0.93 0.935 0.94",
-        markrgb="0.84 0.85 0.86",
-        width=256,
-        height=256,
-    )
-    add(
-        asset,
-        "material",
-        name="floor",
-        texture="floor",
-        texuniform="true",
-        texrepeat="4 4",
-        specular=0,
-        shininess=0,
-    )
-    for name, rgba, specular, shininess in (
-        ("rail", "0.55 0.58 0.62 1", 0.2, 0.4),
-        ("post", "0.80 0.82 0.84 1", 0.1, 0.3),
-        ("tray", "0.45 0.48 0.52 1", 0.2, 0.3),
-        ("belt", "0.24 0.26 0.29 1", 0, 0),
-        ("frame", "0.70 0.73 0.76 1", 0.2, 0.4),
-    ):
-        add(asset, "material", name=name, rgba=rgba, specular=specular, shininess=shininess)
-
-
-def add_scene(world: Element, layout: Layout) -> None:
-    """Everything that stands still."""
+    fill(statistic, center=(x, y, 0.1), extent=radius)
     _floor_and_light(world, layout)
     _cameras(world, layout)
     for robot, path in zip(layout.factory.robots, layout.guidepaths, strict=True):
@@ -130,7 +77,7 @@ def _floor_and_light(world: Element, layout: Layout) -> None:
     # awake body against a plane, but only what comes near against a box.
     ground = add(world, "body", name="ground", pos=(x, y, -GROUND))
     size = (radius * 20, radius * 20, GROUND)
-    add(ground, "geom", name="ground", class_="station", type="box", size=size, group=3)
+    add_station(ground, "ground", size=size, group=3)
     _compass(world, layout)
     for name, ray, shadow, diffuse, specular in (
         ("key", KEY, True, "0.50 0.49 0.47", "0.12 0.12 0.12"),
@@ -217,24 +164,13 @@ def _feeder(world: Element, layout: Layout, label: str) -> None:
     body = add(world, "body", name=name, pos=(x, y, 0.0), quat=quat)
     back, ahead, across = found.back, found.ahead, found.across * path.left
     top, beam = found.height, BOOM_HEIGHT
+    post = (POST / 2, POST / 2, (top + beam) / 2)
+    boom = ((ahead - back) / 2, BOOM / 2, beam / 2)
     for kind, at, size in (
-        ("post", (back, across, (top + beam) / 2), (POST / 2, POST / 2, (top + beam) / 2)),
-        (
-            "boom",
-            ((back + ahead) / 2, across, top + beam / 2),
-            ((ahead - back) / 2, BOOM / 2, beam / 2),
-        ),
+        ("post", (back, across, (top + beam) / 2), post),
+        ("boom", ((back + ahead) / 2, across, top + beam / 2), boom),
     ):
-        add(
-            body,
-            "geom",
-            name=f"{name}/{kind}",
-            class_="station",
-            type="box",
-            pos=at,
-            size=size,
-            material="post",
-        )
+        add_station(body, f"{name}/{kind}", pos=at, size=size, material="post")
     for kind, along, z, shape, shown in (
         ("cap", back, top + beam, "box", (POST / 2 + 0.001, POST / 2 + 0.001, 0.002)),
         ("head", ahead, top + beam / 2, "cylinder", (0.012, beam / 2 + 0.002)),

@@ -48,20 +48,15 @@ def _park(equality: Element, layout: Layout, label: str, copies: int, used: int)
         _weld(equality, names.park(label, n), "world", names.part(label, n), at, n > used)
 
 
-def exclusions(layout: Layout, bodies: FusedBodies, copies: Mapping[str, int]) -> Element:
+def add_exclusions(
+    contact: Element, layout: Layout, bodies: FusedBodies, copies: Mapping[str, int]
+) -> None:
     """The pairs of bodies that pass through each other when they are joined, a slot for each unit
     that can be inside: a run aims them at the copies of one unit."""
-    contact = Element("contact")
     for one, other in bodies.lifted(layout.factory, layout.excluded):
         for n in range(1, min(copies[one], copies[other]) + 1):
-            add(
-                contact,
-                "exclude",
-                name=names.exclusion(one, other, n),
-                body1=names.part(one, n),
-                body2=names.part(other, n),
-            )
-    return contact
+            name, pair = names.exclusion(one, other, n), (names.part(one, n), names.part(other, n))
+            add(contact, "exclude", name=name, body1=pair[0], body2=pair[1])
 
 
 def held_at(layout: Layout, robot: int) -> float:

@@ -5,17 +5,21 @@ Stretching changes B - A alone, never r, eps or a speed (paper, section 5.1).
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
 
-from factory.control.laws import Setting, mode_of
+from factory.compiler.domains import EXAMPLE
+from factory.control.laws import Setting, hold, law_of
 from factory.control.mode import Array, Limits, Mode
 from factory.control.navigation import Bundle
-from factory.layout.dimensions import CARRIAGE
+from factory.geometry.solids import Product
+from factory.layout.dimensions import CARRIAGE, Clearance
 from factory.layout.layout import Layout
-from factory.plant.factory import Operation
+from factory.layout.optimising import first_feasible
+from factory.plant.factory import Factory, Operation
 from factory.problem.pag import NOPART
 from factory.problem.template import Point, Template
 from factory.support.errors import Diagnostic, InputError
@@ -44,6 +48,26 @@ def operation_modes(layout: Layout, eps: float) -> tuple[Mode, ...]:
     if faults:
         raise InputError(faults)
     return modes
+
+
+def check_modes(factory: Factory, own: Iterable[Template], product: Product) -> None:
+    """Try templates of the user's `own` when they are compiled, on the first feasible layout: their
+    goal balls, and which robots may hold up which, are measured in metres. Of the shipped ones it
+    is known, whatever the layout.
+
+    Raises InputError: BadTemplate for an F that is no control law, NotPrepared where an operation
+    cannot reach its goal, or what is joined, or changes hands, does not come together.
+    """
+    for template in own:
+        if law_of(template) is hold:
+            message = (
+                f"{template.name}: F = {template.law.name} moves no robot, so they never come to"
+                " their goals"
+            )
+            raise InputError(Diagnostic("NotPrepared", message, template.law_position, EXAMPLE))
+    settings = Settings()
+    layout = first_feasible(factory, product, Clearance(settings.clearance))
+    operation_modes(layout, settings.eps)
 
 
 def operation_starts(layout: Layout) -> list[Array]:
@@ -105,7 +129,7 @@ def operation_mode(layout: Layout, operation: Operation, eps: float) -> Mode:
     template = operation.template
     if template.before[carrier] != NOPART:
         template = _inside(template)
-    mode = mode_of(template, setting)
+    mode = law_of(template)(template, setting)
     if operation.inputs and operation.index != layout.factory.dropoff.index:
         guests = np.arange(len(paths)) != carrier
         mode = replace(mode, lower=np.where(guests, mode.goals, mode.lower))

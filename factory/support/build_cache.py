@@ -30,7 +30,8 @@ def request(file: Path, wanted: Mapping[str, Any]) -> str:
     own = Path(__file__).resolve().parents[1]
     program = sorted(
         (str(path.relative_to(own)), path.stat().st_size, path.stat().st_mtime_ns)
-        for path in own.rglob("*.py")
+        for path in own.rglob("*.*")
+        if path.suffix in (".py", ".lark", ".xml")
     )
     versions = []
     for package in ENGINES:
