@@ -106,7 +106,7 @@ def test_a_floor_that_is_large_enough() -> None:
     ("floor", "words"),
     [
         ((0.85, 1.0), ["0.037 m too wide (along the output robot's path)", "to the outfeed"]),
-        ((2.0, 0.4), ["0.128 m too deep (across it)", "the feeder of 'part3' (r2)"]),
+        ((2.0, 0.4), ["0.128 m too deep (across it)", "the post of 'part3''s feeder"]),
         ((0.5, 0.5), ["0.387 m too wide", "0.028 m too deep"]),
     ],
 )

@@ -38,6 +38,15 @@ class Region:
     label: str = ""
     mode: int = ALWAYS
 
+    def named(self, factory: Factory) -> str:
+        """What is there, in words."""
+        if self.kind == OUTFEED:
+            return "the outfeed"
+        if self.kind in STATIONS:
+            return f"the {KINDS[self.kind]} of '{self.label}''s feeder"
+        label = f" '{self.label}'" if self.label else ""
+        return f"{factory.robots[self.robot].name}'s {KINDS[self.kind]}{label}"
+
 
 @dataclass(frozen=True, slots=True)
 class Fault:

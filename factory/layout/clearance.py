@@ -20,7 +20,6 @@ import shapely
 from factory.layout.certificate import (
     ALWAYS,
     BOOM,
-    KINDS,
     NAMES,
     OUTFEED,
     PAYLOAD_BODY,
@@ -179,22 +178,13 @@ class _Search:
     def _fault(self, one: Region, other: Region) -> Fault:
         c = self.layout.clearance
         gap = separation(one.box, other.box)
-        names = [self._words(region) for region in (one, other)]
+        names = [region.named(self.layout.factory) for region in (one, other)]
         found = f"are {gap * 1000:.1f} mm apart" if gap > 0 else f"overlap by {-gap * 1000:.1f} mm"
         message = (
             f"{names[0]} and {names[1]} {found} in the layer of {NAMES[one.layer]};"
             f" {c * 1000:g} mm are needed"
         )
         return fault(self.layout.factory, message, one, other, lacking=c - gap)
-
-    def _words(self, region: Region) -> str:
-        name = self.layout.factory.robots[region.robot].name
-        if region.kind == OUTFEED:
-            return "the outfeed"
-        if region.kind in STATIONS:
-            return f"the {KINDS[region.kind]} of '{region.label}''s feeder"
-        label = f" '{region.label}'" if region.label else ""
-        return f"{name}'s {KINDS[region.kind]}{label}"
 
 
 def _standoffs(layout: Layout, found: Mapping[str, Pile]) -> Iterator[Fault]:

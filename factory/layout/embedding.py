@@ -12,7 +12,7 @@ from math import ceil
 
 from factory.compiler.mating.mating import judged
 from factory.geometry.solids import Product
-from factory.layout.certificate import KINDS, OUTFEED, STATIONS, Region
+from factory.layout.certificate import Region
 from factory.layout.clearance import certify
 from factory.layout.dimensions import Clearance
 from factory.layout.durations import Pace
@@ -76,10 +76,4 @@ def _check_floor(layout: Layout, found: tuple[Region, ...], wanted: Point2) -> N
 def _at_edge(layout: Layout, found: tuple[Region, ...], edge: int) -> str:
     """What reaches the farthest at one edge of the floor, in words."""
     outwards = 1 if edge % 2 else -1
-    region = max(found, key=lambda r: outwards * r.box[edge])
-    if region.kind == OUTFEED:
-        return "the outfeed"
-    name = layout.factory.robots[region.robot].name
-    if region.kind in STATIONS:
-        return f"the feeder of '{region.label}' ({name})"
-    return f"{name}'s {KINDS[region.kind]}"
+    return max(found, key=lambda r: outwards * r.box[edge]).named(layout.factory)

@@ -18,9 +18,9 @@ from factory.layout.dimensions import Clearance
 from factory.layout.drafting import LayoutDraft
 from factory.layout.durations import Pace, gear_times
 from factory.layout.guidepath import Box, Point2, hull
-from factory.layout.layout import Layout
+from factory.layout.layout import Layout, carriers
 from factory.layout.packing import Task
-from factory.layout.shapes import Sides, exact_shapes, headings, payload_boxes, symmetric_shapes
+from factory.layout.shapes import Sides, headings, oriented_shape, payload_boxes, symmetric_shapes
 from factory.layout.sides import admissible
 from factory.layout.stretching import stretch
 from factory.layout.sweeps import piles, regions
@@ -45,7 +45,8 @@ def first_feasible(
     """The layout of the simple construction."""
     payloads = payload_boxes(factory, product)
     sides = _first_sides(factory, payloads, c)
-    shapes = exact_shapes(factory, payloads, headings(factory, sides), c, wide)
+    lying = enumerate(zip(carriers(factory), headings(factory, sides), strict=True))
+    shapes = [oriented_shape(factory, payloads, r, on, frame, c, wide) for r, (on, frame) in lying]
     stretched = stretch(factory, shapes, c, sides)
     return LayoutDraft(factory, product, c, payloads, shapes, stretched).layout()
 

@@ -3,7 +3,7 @@ them, arms, lanes."""
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 
 from factory.geometry.solids import Product
@@ -74,20 +74,6 @@ def symmetric_shapes(factory: Factory, payloads: Mapping[str, Box], c: Clearance
         tool = is_tool(factory, robot)
         found.append(Shape(boxes, _last(boxes), 0.0, c.rim, c.reach(c.rim), 0.0, tool))
     return found
-
-
-def exact_shapes(
-    factory: Factory,
-    payloads: Mapping[str, Box],
-    frames: Sequence[Frame],
-    c: Clearance,
-    wide: Collection[int] = (),
-) -> list[Shape]:
-    """Shapes from the payloads as they lie in the world: parts never turn."""
-    return [
-        oriented_shape(factory, payloads, robot, carrier, frames[robot], c, wide)
-        for robot, carrier in enumerate(carriers(factory))
-    ]
 
 
 def oriented_shape(
