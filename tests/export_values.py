@@ -68,7 +68,7 @@ def kept_log(layout: Layout, path: Path, **options: Any) -> Path:
 
     simulation = Simulation(layout, RunRequest(**options))
     with LogWriter(path, simulation) as log:
-        simulation.run(observers=[log])
+        simulation.run([log.observe])
     return path
 
 
