@@ -67,7 +67,7 @@ def kept_log(layout: Layout, path: Path, **options: Any) -> Path:
     """A log of a run."""
     simulation = Simulation(layout, RunRequest(**options))
     with LogWriter(path, simulation) as log:
-        simulation.run(observers=[log])
+        simulation.run([log.observe])
     return path
 
 

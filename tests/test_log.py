@@ -91,7 +91,8 @@ def test_the_header_has_all_that_made_the_run(recorded) -> None:
     assert header["settings"]["timestep"] == simulation.request.settings.timestep
     assert header["wip"] is None and len(header["start"]) == 6
     assert set(header["templates"]) == {"atomic", "mate", "weld", "dropoff"}
-    assert header["places"] == [p.name for p in simulation.supervisor.net.places]
+    places = simulation.layout.factory.net.threaded.places
+    assert header["places"] == [place.name for place in places]
 
 
 def test_the_model_in_a_log_is_the_engines(recorded) -> None:

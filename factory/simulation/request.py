@@ -35,4 +35,4 @@ class RunRequest:
     fuse: bool = False
     shown: bool = True
     fast: bool = True
-    catalogue: Catalogue | None = None
+    catalogue: Catalogue | None = field(default=None, hash=False)

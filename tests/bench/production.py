@@ -28,16 +28,20 @@ TIMESTEPS = (0.002, None)
 UNITS = (5, 20)
 """Units made from the empty factory."""
 
-FACTORIES = ((40, None, 20.0), (300, None, 6.0), (1000, 2, 2.0))
+FACTORIES = (
+    (40, None, (20.0, 50.0)),
+    (300, None, (6.0, 18.0)),
+    (1000, 2, (2.0, 6.0)),
+)
 """Robots; units let in at once in steady production; the least multiple of real time aimed at there
-with a timestep of 2 ms."""
+with each timestep."""
 
 CASES: Sequence[tuple[Case, float | None]] = tuple(
     case
-    for robots, wip, aim in FACTORIES
-    for timestep in TIMESTEPS
+    for robots, wip, aims in FACTORIES
+    for timestep, aim in zip(TIMESTEPS, aims, strict=True)
     for case in (
-        (Case(robots, timestep, wip, True), aim if timestep else None),
+        (Case(robots, timestep, wip, True), aim),
         *((Case(robots, timestep, None, True, units), None) for units in UNITS),
     )
 )
@@ -78,7 +82,7 @@ def measured(simulation: Simulation, go: Callable[[], None]) -> dict[str, Any]:
     start, made, physics, begin = world.time, world.delivered(), world.physics_time, perf_counter()
     go()
     wall, engine = perf_counter() - begin, world.physics_time - physics
-    simulated, timestep = world.time - start, world.model.settings.timestep
+    simulated, timestep = world.time - start, float(world.m.opt.timestep)
     return {
         "robots": len(layout.factory.robots),
         "bodies": world.model.bodies,

@@ -93,7 +93,8 @@ class Motion:
                 if self.outfeed.moves:  # its courses end with those of the robots
                     self.outfeed.follower.course = None
             ticks = min(ticks, self.robots.left)
-        ticks = self.move_tray(ticks)
+        ticks = 1 if self.outfeed.loading else self.move_tray(ticks)
+        self.outfeed.loading = False
         if bundle is not None:
             self.robots.show(ticks)
         self.stepping.advance(ticks * self.settings.steps)

@@ -24,12 +24,14 @@ CLOSE = NEAR + AHEAD
 
 class Outfeed:
     """The tray and its way. `goal` [m]: where it goes, 0 is home. `busy`: it is away, or has not
-    been seen at rest at home since."""
+    been seen at rest at home since. `loading`: it has just been given a product, and leaves a tick
+    later."""
 
     def __init__(
         self, d: mujoco.MjData, model: Model, axes: Axes, follower: Follower, drives: Drives
     ) -> None:
-        self.follower, self.goal, self.busy = follower, 0.0, False
+        self.follower, self.goal = follower, 0.0
+        self.busy = self.loading = False
         self.axis = np.array([axes.tray])
         self._d, self._drives, self._settings = d, drives, model.settings
         self._address = int(axes.qpos[-1]), int(axes.dof[-1])
@@ -38,7 +40,7 @@ class Outfeed:
 
     def send(self, loaded: bool) -> None:
         """From now on it carries a product, or none, and goes away, or home."""
-        self.goal, self.busy = self._way if loaded else 0.0, True
+        self.goal, self.busy, self.loading = self._way if loaded else 0.0, True, loaded
         self._drives.load(self.axis, np.array([loaded * self._product]), np.zeros(1))
         self.follower.course = None
 

@@ -93,7 +93,10 @@ class MujocoWorld:
             return False
         if operation.label in self.parts.feeders.welds:
             return self.parts.feeders.presents(operation.label, unit)
-        return operation.index != self.model.factory.dropoff.index or not self.motion.outfeed.busy
+        if operation.index != self.model.factory.dropoff.index:
+            return True
+        outfeed = self.motion.outfeed
+        return self.parts.on_tray is None and (not outfeed.busy or outfeed.rests())
 
     def apply(self, started: Sequence[Job], ended: Sequence[Job]) -> None:
         """Hand the parts of ended operations over: welds off and on in one tick."""

@@ -95,10 +95,9 @@ class DriveFigures:
     def tick(self, v: Array, force: Array) -> None:
         """The steps of a tick: speeds (n + 1, nv), forces (n, nu)."""
         d, motion = self.world.d, self.world.motion
-        control = motion.drives.control
-        error = np.abs(d.qpos[motion.axes.qpos] - d.ctrl[control])
+        error = np.abs(d.qpos[motion.axes.qpos] - motion.robots.x)
         self.error = max(self.error, float(error.max()))
-        self.tracking.add(error[d.ctrl[control + 1] != 0.0])
+        self.tracking.add(error[motion.robots.v != 0.0])
         share = np.abs(force) / self.limit
         self.peak = max(self.peak, float(share.max()))
         self.saturated += (share >= FULL).sum(axis=0)
