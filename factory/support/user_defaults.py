@@ -62,11 +62,8 @@ class Defaults:
         return found
 
     def at(self, key: str) -> Position:
-        """The place of a key: its first mention at the start of a line, or in a header."""
-        for number, line in enumerate(self.text.splitlines(), 1):
-            if found := re.match(rf"""\s*\[*\s*["']?({re.escape(key)})\b""", line):
-                return Position(str(self.path), number, found.start(1) + 1, line)
-        return Position(str(self.path), 1, 1)
+        """The place of a key."""
+        return key_position(self.path, self.text, key)
 
 
 def defaults_for(file: Path) -> Defaults:
@@ -87,7 +84,7 @@ def load_defaults(path: Path) -> Defaults:
         text = path.read_bytes().decode("utf-8-sig")
         found = Defaults(path, text, tomllib.loads(text))
     except (OSError, ValueError, RecursionError) as error:
-        raise InputError(_broken(path, error)) from error
+        raise InputError(broken_toml(path, error, "see https://toml.io")) from error
     faults = []
     for key, value in found.values.items():
         fault = _fault(key, value)
@@ -116,15 +113,23 @@ def _fault(key: str, value: object) -> Diagnostic | None:
     return Diagnostic("BadValue", message, None, f"for example {key} = {example}")
 
 
-def _broken(path: Path, error: Exception) -> Diagnostic:
+def key_position(path: Path, text: str, key: str) -> Position:
+    """The place of a key in TOML: its first mention at the start of a line, or in a header."""
+    for number, line in enumerate(text.splitlines(), 1):
+        if found := re.match(rf"""\s*\[*\s*["']?({re.escape(key)})\b""", line):
+            return Position(str(path), number, found.start(1) + 1, line)
+    return Position(str(path), 1, 1)
+
+
+def broken_toml(path: Path, error: Exception, hint: str) -> Diagnostic:
     """The error of tomllib, at the place that it names."""
     words = getattr(error, "strerror", None) or str(error)
     if isinstance(error, RecursionError):
         words = "the file is nested too deeply"
     found = re.search(r" \(at line (\d+), column (\d+)\)", words)
     if found is None:
-        return Diagnostic("Syntax", words, Position(str(path), 1, 1), "see https://toml.io")
+        return Diagnostic("Syntax", words, Position(str(path), 1, 1), hint)
     line, column = int(found[1]), int(found[2])
     text = path.read_text("utf-8-sig").splitlines()[line - 1]
     at = Position(str(path), line, column, text)
-    return Diagnostic("Syntax", words.replace(found[0], ""), at, "see https://toml.io")
+    return Diagnostic("Syntax", words.replace(found[0], ""), at, hint)

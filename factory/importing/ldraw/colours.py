@@ -26,10 +26,10 @@ _CLEAR = """
 
 def common_colours() -> Colours:
     """The colours that models use without a library."""
-    solid, clear = _COMMON.split(), _CLEAR.split()
-    found = {int(c): rgba_of(int(v, 16)) for c, v in zip(solid[::2], solid[1::2], strict=True)}
-    for code, value in zip(clear[::2], clear[1::2], strict=True):
-        found[int(code)] = rgba_of(int(value, 16), 128)
+    found: Colours = {}
+    for words, alpha in ((_COMMON.split(), 255), (_CLEAR.split(), 128)):
+        for code, value in zip(words[::2], words[1::2], strict=True):
+            found[int(code)] = rgba_of(int(value, 16), alpha)
     return found
 
 

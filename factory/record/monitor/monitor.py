@@ -18,7 +18,6 @@ from factory.record.monitor.observation import EngineView, Observation
 from factory.record.monitor.report import Report, Violation
 from factory.record.monitor.subject import MonitorSubject
 from factory.record.monitor.transfers import Transfers
-from factory.support.errors import Position
 
 MOST = 100
 """Number of violations that are kept, the first ones: a fault is often followed by others."""
@@ -248,15 +247,10 @@ class Monitor:
         if len(self.violations) >= MOST:
             return
         t = self.clock.now if since is None else since
-        name = self.factory.robots[robot].name if robot >= 0 else ""
-        where = self._position(label, robot)
+        at_fault = self.factory.robots[robot] if robot >= 0 else None
+        source = self.factory.by_label.get(label, at_fault)
+        name, where = at_fault.name if at_fault else "", source.position if source else None
         self.violations.append(Violation(t, name, label, code, message, where))
-
-    def _position(self, label: str, robot: int) -> Position | None:
-        operation = self.factory.by_label.get(label)
-        if operation is not None:
-            return operation.position
-        return self.factory.robots[robot].position if robot >= 0 else None
 
 
 class EngineMonitor(Monitor):

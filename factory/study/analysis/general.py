@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 import tomllib
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -15,7 +14,8 @@ from factory.nets.gears import GearNet
 from factory.nets.marked import MarkedNet, marked
 from factory.study.analysis.slack import Slack, circuits, slacks
 from factory.study.analysis.tables import SHOWN, PrintedTable, cut
-from factory.support.errors import Diagnostic, InputError, Position, did_you_mean
+from factory.support.errors import Diagnostic, InputError, did_you_mean
+from factory.support.user_defaults import broken_toml, key_position
 
 MOST = 1_000
 """Number of places whose slack is computed; of larger nets, those on the critical circuit."""
@@ -108,11 +108,11 @@ def read_delays(path: Path, net: GearNet | MarkedNet) -> dict[str, float]:
         message = f"'{path}' cannot be read: {error.strerror}"
         raise InputError(Diagnostic("BadFile", message, None, "check the path")) from error
     except ValueError as error:
-        raise InputError(_broken(path, str(error))) from error
+        raise InputError(broken_toml(path, error, 'write lines as "p1" = 0.5')) from error
     index = marked(net).net.place_index
     faults = []
     for name, value in table.items():
-        where = _line(path, text, name)
+        where = key_position(path, text, name)
         if name not in index:
             hint = did_you_mean(name, list(index), "places")
             faults.append(Diagnostic("BadValue", f"the net has no place '{name}'", where, hint))
@@ -127,19 +127,3 @@ def read_delays(path: Path, net: GearNet | MarkedNet) -> dict[str, float]:
 
 
 EXAMPLE = 'seconds, for example "p1" = 0.5'
-
-
-def _broken(path: Path, words: str) -> Diagnostic:
-    """The error of tomllib, at its position."""
-    at = re.search(r" \(at line (\d+), column (\d+)\)", words)
-    line, column = (int(at[1]), int(at[2])) if at else (1, 1)
-    words = words.replace(at[0], "") if at else words
-    position = Position(str(path), line, column)
-    return Diagnostic("Syntax", words, position, 'write lines as "p1" = 0.5')
-
-
-def _line(path: Path, text: str, name: str) -> Position:
-    for number, line in enumerate(text.splitlines(), 1):
-        if found := re.match(rf"""\s*\[*\s*["']?({re.escape(name)})\b""", line):
-            return Position(str(path), number, found.start(1) + 1, line)
-    return Position(str(path), 1, 1)

@@ -127,18 +127,11 @@ def study(
     """The same seed with other timesteps, then with other stiffnesses."""
     finer = [_with_timestep(case, factor) for factor in timesteps]
     half = _with_timestep(case, 0.5)
-    softened = [replace(half, alter=partial(soften, factor=f)) for f in stiffnesses]
-    stiffer = [half if f == 1.0 else c for f, c in zip(stiffnesses, softened, strict=True)]
-    cases = list({id(c): c for c in (*finer, *stiffer)}.values())
-    records = over_cases([(c, seed) for c in cases], jobs, done)
-    by_case = {id(c): record for c, record in zip(cases, records, strict=True)}
-    return Study(
-        seed,
-        (
-            _series("timestep", timesteps, [by_case[id(c)] for c in finer]),
-            _series("weld time constant", stiffnesses, [by_case[id(c)] for c in stiffer]),
-        ),
-    )
+    stiffer = [replace(half, alter=partial(soften, factor=f)) for f in stiffnesses]
+    records = over_cases([(c, seed) for c in (*finer, *stiffer)], jobs, done)
+    first, second = records[: len(finer)], records[len(finer) :]
+    series = _series("timestep", timesteps, first)
+    return Study(seed, (series, _series("weld time constant", stiffnesses, second)))
 
 
 def runs(timesteps: Sequence[float] = TIMESTEPS, stiffnesses: Sequence[float] = STIFFNESSES) -> int:
