@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from factory.compiler.mating import matings
+from factory.compiler.mating.mating import matings
 from factory.geometry.product import product_geometry
 from factory.lang.pag_reader import read_pag
 from factory.layout.clearance import certify
@@ -19,7 +19,8 @@ from factory.plant.factory import Factory
 from factory.simulation.request import RunRequest
 from factory.simulation.simulation import Simulation
 from factory.support.errors import InputError
-from tests.simulation_values import FENCE, laid_out, laid_out_with_lifts
+from tests.pag_texts import laid_out
+from tests.simulation_values import FENCE, laid_out_with_lifts
 
 CASTLE = """root = castle; castle = mate(lower, roof, flag); lower = weld(walls, dwell = 0.2);
 walls = mate(tub, keep); roof = mate(tiles, ridge);

@@ -20,8 +20,9 @@ from factory.simulation.simulation import Simulation
 from factory.study.fidelity.shadow import Shadow
 from factory.support.engine import mujoco
 from factory.support.settings import MOST, Settings
+from tests.good_runs import random_marking
 from tests.layout_values import random_layout
-from tests.simulation_values import gone_wild, layout_of, random_marking, ready, stepping
+from tests.simulation_values import gone_wild, layout_of, ready, stepping
 
 IS_AWAKE = int(mujoco.mjtSleepState.mjS_AWAKE)
 

@@ -1,0 +1,32 @@
+"""What every run in MuJoCo must reach, and markings for runs to start from."""
+
+from __future__ import annotations
+
+import random
+
+from factory.layout.layout import Layout
+from factory.nets.petri import Marking
+from factory.simulation.run import Run
+
+
+def assert_good(run: Run) -> None:
+    """The figures that every MuJoCo run must reach."""
+    assert run.trouble is None
+    assert run.refines_net
+    physics = run.physics
+    assert physics is not None
+    assert physics.handoff_gap_max_mm <= 1.0
+    assert physics.product_error_max_mm is not None
+    assert physics.product_error_max_mm <= 0.1
+    assert physics.unintended_contacts == 0, physics.contacts
+    assert physics.engine_warnings == 0
+
+
+def random_marking(layout: Layout, seed: int) -> Marking:
+    """A legal marking: play the token game at random for a while."""
+    net, draw = layout.factory.net, random.Random(seed)
+    marking = net.initial_marking
+    for _ in range(draw.randrange(1, 60)):
+        event = draw.choice(net.threaded.net.enabled(marking))
+        marking = net.threaded.net.follower(marking, [event])
+    return marking
