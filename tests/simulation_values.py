@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import random
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from functools import cache
@@ -17,42 +16,16 @@ from factory.compiler.mating.mating import matings
 from factory.geometry.product import product_geometry
 from factory.lang import read_pag
 from factory.layout.layout import Layout
-from factory.nets.petri import Marking
 from factory.pipeline import all_templates
 from factory.problem.robot_types import load_catalogue
 from factory.simulation.mujoco.stepping import SingleSteps
 from factory.simulation.request import RunRequest
-from factory.simulation.run import Run
 from factory.simulation.simulation import Simulation
 from factory.support.engine import mujoco
 from factory.support.settings import Settings
 from tests.bench.factories import balanced
 from tests.bench.factories import laid_out as floor_of
 from tests.command_line import ROOT
-from tests.token_game import enabled, follower
-
-PAPER = """6 parts; root = sub3; sub3 = mate ( sub2, part3 ); sub2 = weld ( sub1 );
-sub1 = mate ( part1, part2 ); part1 = atomic(); part2 = atomic(); part3 = atomic()"""
-UNARY = """root = c; c = glue(b, dwell = 0.1); b = weld(a, dwell = 0.2);
-a = press(p, dwell = 0.1); p = atomic()"""
-KARY = """root = s; s = mate(a, b, c, t, dd); t = mate(e, f); dd = inspect(d, dwell = 0.2);
-a = atomic(); b = atomic(); c = atomic(); d = atomic(); e = atomic(); f = atomic()"""
-CHAIN = """root = s4; s4 = mate(s3, e); s3 = mate(d, s2); s2 = mate(s1, c); s1 = mate(a, b);
-a = atomic(); b = atomic(); c = atomic(); d = atomic(); e = atomic()"""
-OVERLAP = """root = s; s = mate(u, v);  u = mate(a, b); v = mate(c, d);
-a = atomic(box = (0.2, 0.02, 0.05)); b = atomic(box = (0.02, 0.2, 0.06), pos = (0, 0.13, 0));
-c = atomic(cylinder = (0.03, 0.06), pos = (0.2, 0.1, 0));
-d = atomic(sphere = 0.04, pos = (-0.1, 0.1, 0.01))"""
-LONE = "root = p; p = atomic()"
-
-PRODUCTS = {
-    "paper": PAPER,
-    "unary": UNARY,
-    "kary": KARY,
-    "chain": CHAIN,
-    "overlap": OVERLAP,
-    "lone": LONE,
-}
 
 FENCE = """root = cup; cup = mate(bowl, ball, lid); bowl = mate(floor, wall1, wall2, wall3, wall4);
 floor = atomic(box = (0.1, 0.1, 0.01), pos = (0, 0, 0.005));
@@ -64,13 +37,6 @@ ball = atomic(sphere = 0.012, pos = (0, 0, 0.0224));
 lid = atomic(box = (0.1, 0.1, 0.005), pos = (0, 0, 0.0429))"""
 """A ball that can only be lowered into its box; walls 3 and 4 come along x and fit between the
 others, so they are lowered too."""
-
-
-@cache
-def laid_out(text: str) -> Layout:
-    """The factory of a PAG's text on its floor; nothing is lowered."""
-    templates = all_templates()
-    return factory.lay_out(compile_pag(read_pag(text, templates), templates, load_catalogue()))
 
 
 @cache
@@ -171,26 +137,3 @@ def digest(simulation: Simulation, observers: Sequence[Any] = ()) -> str:
     for state in (d.qpos, d.qvel, d.qacc):
         found.update(state.tobytes())
     return found.hexdigest()
-
-
-def random_marking(layout: Layout, seed: int) -> Marking:
-    """A legal marking: the token game played at random for a while."""
-    net, draw = layout.factory.net, random.Random(seed)
-    marking = net.initial_marking
-    for _ in range(draw.randrange(1, 60)):
-        event = draw.choice(enabled(net.threaded.net, marking))
-        marking = follower(net.threaded.net, marking, [event])
-    return marking
-
-
-def assert_good(run: Run) -> None:
-    """The figures that every MuJoCo run must reach."""
-    assert run.trouble is None
-    assert run.refines_net
-    physics = run.physics
-    assert physics is not None
-    assert physics.handoff_gap_max_mm <= 1.0
-    assert physics.product_error_max_mm is not None
-    assert physics.product_error_max_mm <= 0.1
-    assert physics.unintended_contacts == 0, physics.contacts
-    assert physics.engine_warnings == 0

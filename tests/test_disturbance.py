@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from factory.simulation.mujoco.fast.reference_cache import Courses
 
 from factory.simulation.disturbance import (
     Delay,
@@ -21,20 +20,23 @@ from factory.simulation.request import RunRequest
 from factory.simulation.simulation import Simulation
 from factory.support.engine import mujoco
 from factory.support.errors import InputError
+from factory.support.settings import MOST
 from tests.fidelity import attraction, disturbances
 from tests.fidelity.products import PAPER, layout
+from tests.simulation_values import FINE, read_by, stepping
 
 
 def simulated(*wanted, **options) -> Simulation:
-    return disturb(Simulation(layout(PAPER), RunRequest(units=1, **options)), *wanted)
+    given = {"settings": FINE, **options}
+    return disturb(Simulation(layout(PAPER), RunRequest(units=1, **given)), *wanted)
 
 
 def final(simulation: Simulation) -> np.ndarray:
-    return np.concatenate([simulation.world.d.qpos, simulation.world.d.qvel])
+    return np.concatenate([simulation.physical.d.qpos, simulation.physical.d.qvel])
 
 
 def test_without_disturbances_a_run_is_the_same_to_the_bit() -> None:
-    plain, other = simulated(), disturb(Simulation(layout(PAPER), RunRequest(units=1)), *())
+    plain, other = simulated(), disturb(simulated(), *())
     one, two = plain.run(), other.run()
     assert one.events == two.events and one.physics == two.physics
     assert (final(plain) == final(other)).all()
@@ -54,8 +56,8 @@ def test_a_disturbance_of_no_size_changes_next_to_nothing(nothing) -> None:
 
 
 def test_what_they_write_into_the_model() -> None:
-    plain = simulated().world.m
-    m = simulated(Mass(1.5, ("part1",)), Gain(0.7, ("r2",)), Friction(1.5, ("r3",))).world.m
+    plain = simulated().physical.m
+    m = simulated(Mass(1.5, ("part1",)), Gain(0.7, ("r2",)), Friction(1.5, ("r3",))).physical.m
     one, two = (m.body(f"part/part{n}#1").id for n in (1, 2))
     assert m.body_mass[one] == 1.5 * plain.body_mass[one]
     assert (m.body_inertia[one] == 1.5 * plain.body_inertia[one]).all()
@@ -69,11 +71,9 @@ def test_what_they_write_into_the_model() -> None:
 
 def test_a_weak_drive_scales_its_whole_force() -> None:
     simulation = simulated(Gain(0.5, ("r2",)))
-    world = simulation.world
-    still, weight = np.zeros(1), world.setpoints.weight
-    weight[1] = 2.0
-    world.move(np.array([1]), world.reference[[1]] + 1e-4, still, still)
-    world.setpoints.update(1)
+    world, axis = simulation.physical, np.array([1])
+    world.motion.drives.load(axis, np.zeros(1), np.array([2.0]))
+    world.motion.drives.stand(axis, world.motion.robots.x[axis] + 1e-4)
     world.advance(1)
     kp = -world.m.actuator_biasprm[world.m.actuator("r2/drive").id, 1]
     assert world.d.actuator_force[world.m.actuator("r2/drive").id] == pytest.approx(
@@ -83,31 +83,29 @@ def test_a_weak_drive_scales_its_whole_force() -> None:
 
 def test_a_weak_drive_is_as_weak_when_it_brakes() -> None:
     """In every step it pushes with half of what a whole one would, until its robot rests."""
-    world = (weak := simulated(Gain(0.5, ("r5",)))).world
-    drive, (q, v) = world.m.actuator("r5/drive").id, (world.qpos[4], world.dof[4])
-    kp, kv = np.array(simulated().world.m.actuator_biasprm[drive, 1:3])
-    advance, pushed = world.advance, list[float]()
+    weak = simulated(Gain(0.5, ("r5",)))
+    world, axis, pushed = weak.physical, np.array([4]), list[float]()
+    axes, drive = world.motion.axes, world.m.actuator("r5/drive").id
+    kp, kv = np.array(simulated().physical.m.actuator_biasprm[drive, 1:3])
 
-    def watched(steps: int) -> None:
-        for _ in range(steps):
-            told = np.zeros((3, 1))
-            told = mujoco.mj_readCtrl(world.m, world.d, drive, world.d.time, told, -1).copy()
-            x, speed = world.d.qpos[q], world.d.qvel[v]
-            advance(1)
-            if world.d.tree_asleep[world.tree[4]] < 0:
-                whole = -kp * (told[0] - x) - kv * (told[1] - speed) + told[2]
-                assert world.d.actuator_force[drive] == pytest.approx(0.5 * whole, abs=1e-9)
-                pushed.append(told[2])
+    def step(m: mujoco.MjModel, d: mujoco.MjData, steps: int) -> None:
+        assert steps == 1
+        told, x, speed = read_by(weak, axis)[0], d.qpos[axes.qpos[4]], d.qvel[axes.dof[4]]
+        mujoco.mj_step(m, d)
+        if d.tree_asleep[axes.tree[4]] < 0:
+            whole = -kp * (told[0] - x) - kv * (told[1] - speed) + told[2]
+            assert d.actuator_force[drive] == pytest.approx(0.5 * whole, abs=1e-9)
+            pushed.append(told[2])
 
-    world.advance = watched
-    for _ in range(150):
-        weak.supervisor.step()
+    with stepping(step):
+        for _ in range(150):
+            weak.supervisor.step(MOST)
     assert min(pushed) < 0.0 < max(pushed)
 
 
 def test_a_push_lasts_as_long_as_it_says() -> None:
     simulation = simulated(Push("r2/carriage", (3.0, 4.0, 0.0), 0.1, 0.05))
-    world = simulation.world
+    world = simulation.physical
     body, steps = world.m.body("r2/carriage").id, []
     for _ in range(100):
         world.advance(1)
@@ -117,22 +115,23 @@ def test_a_push_lasts_as_long_as_it_says() -> None:
 
 def test_noise_reaches_the_drive_and_the_supervisor() -> None:
     simulation = simulated(Noise(1e-4, 0.0, 1))
-    world, seen, moved = simulation.world, [], []
+    world, seen, moved = simulation.physical, [], []
+    reference, address = world.motion.robots.x[1], world.motion.axes.qpos[1]
     for _ in range(400):
         world.advance(1)
-        seen.append(world.sense()[0][1] - world.reference[1])
-        moved.append(world.d.qpos[world.qpos[1]] - world.reference[1])
+        seen.append(world.sense()[0][1] - reference)
+        moved.append(world.d.qpos[address] - reference)
     assert np.std(seen) == pytest.approx(1e-4, rel=0.2)
     assert 1e-6 < np.std(moved) < 1e-4
 
 
 def test_delay_shows_the_past() -> None:
     simulation = simulated(Delay(0.006))
-    world = simulation.world
+    world = simulation.physical
     true = []
-    world.move(np.array([1]), world.reference[[1]], np.array([-0.1]), np.zeros(1))
+    world.move(np.array([1]), world.motion.robots.x[[1]], np.array([-0.1]), np.zeros(1))
     for _ in range(20):
-        true.append(world.d.qpos[world.qpos[1]])
+        true.append(world.d.qpos[world.motion.axes.qpos[1]])
         world.advance(1)
         assert world.sense()[0][1] == true[max(0, len(true) - 1 - 3)]
 
@@ -252,7 +251,6 @@ def test_a_law_that_does_not_come_to_its_goal_is_a_defect(monkeypatch) -> None:
     start = bench.mode.upper.copy()
     assert bench.reach(start).result == "reached"
     monkeypatch.setattr(type(bench.bundle), "field", lambda self, x, dt: np.zeros_like(x))
-    bench.world.courses = Courses()
     assert bench.reach(start).result == "missed"
     said = attraction.summary(PAPER, "mate", "sub1", [bench.reach(start)])
     assert said["share_reached"] == 0 and said["defects_by_kind"] == {"inside": 1}

@@ -22,19 +22,11 @@ from factory.simulation.simulation import Simulation
 from factory.support.engine import mujoco
 from factory.support.settings import LOOK, MOST, Settings
 from tests.command_line import PAPER, Terminal
+from tests.good_runs import random_marking
 from tests.layout_values import random_layout
+from tests.pag_texts import OVERLAP, laid_out
 from tests.pag_values import SHAPES
-from tests.simulation_values import (
-    FINE,
-    OVERLAP,
-    gone_wild,
-    laid_out,
-    random_marking,
-    ready,
-    state,
-    states,
-    stepping,
-)
+from tests.simulation_values import FINE, gone_wild, ready, state, states, stepping
 
 LONG = 60.0
 """No run of these tests lasts that long [s]."""

@@ -22,7 +22,8 @@ from factory.simulation.simulation import Simulation, physical_model
 from factory.support.engine import mujoco
 from factory.support.settings import Settings
 from tests.command_line import PAPER, Terminal
-from tests.simulation_values import laid_out, layout_of, ready
+from tests.pag_texts import laid_out
+from tests.simulation_values import layout_of, ready
 
 
 def free_bodies(rng: np.random.Generator, count: int) -> tuple[mujoco.MjModel, mujoco.MjData, int]:

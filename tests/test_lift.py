@@ -19,7 +19,8 @@ from factory.plant.factory import Factory
 from factory.simulation.request import RunRequest
 from factory.simulation.simulation import Simulation
 from factory.support.errors import InputError
-from tests.simulation_values import FENCE, laid_out, laid_out_with_lifts
+from tests.pag_texts import laid_out
+from tests.simulation_values import FENCE, laid_out_with_lifts
 
 CASTLE = """root = castle; castle = mate(lower, roof, flag); lower = weld(walls, dwell = 0.2);
 walls = mate(tub, keep); roof = mate(tiles, ridge);

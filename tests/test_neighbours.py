@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from factory.study.fidelity.shadow import Shadow
 
 from factory.layout.layout import Layout
 from factory.simulation.disturbance import Push, disturb
@@ -17,11 +18,11 @@ from factory.simulation.mujoco.fast.neighbours import CALM, Neighbours
 from factory.simulation.mujoco.fast.strides import Strides
 from factory.simulation.mujoco.parts import Parts
 from factory.simulation.simulation import Simulation
-from factory.study.fidelity.shadow import Shadow
 from factory.support.engine import mujoco
 from factory.support.settings import MOST, Settings
+from tests.good_runs import random_marking
 from tests.layout_values import random_layout
-from tests.simulation_values import gone_wild, layout_of, random_marking, ready, stepping
+from tests.simulation_values import gone_wild, layout_of, ready, stepping
 
 IS_AWAKE = int(mujoco.mjtSleepState.mjS_AWAKE)
 

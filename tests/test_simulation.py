@@ -20,16 +20,9 @@ from factory.simulation.run import Event, busy_times
 from factory.simulation.simulation import Simulation
 from factory.support.settings import Settings
 from tests.bench.factories import laid_out as floor_of
-from tests.simulation_values import (
-    LONE,
-    OVERLAP,
-    PAPER,
-    PRODUCTS,
-    assert_good,
-    laid_out,
-    random_marking,
-    ready,
-)
+from tests.good_runs import assert_good, random_marking
+from tests.pag_texts import LONE, OVERLAP, PAPER, PRODUCTS, laid_out
+from tests.simulation_values import ready
 
 
 @pytest.fixture(scope="module")

@@ -12,7 +12,8 @@ from factory.simulation.mujoco import sleep
 from factory.simulation.mujoco.sleep import AWAKE, FRESH, MAY_SLEEP, STAYS_AWAKE, Sleep
 from factory.simulation.simulation import Simulation
 from factory.support.settings import Settings
-from tests.simulation_values import FINE, assert_good, layout_of, ready
+from tests.good_runs import assert_good
+from tests.simulation_values import FINE, layout_of, ready
 
 
 def crept(fast: bool, seconds: float = 1.5) -> float:

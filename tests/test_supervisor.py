@@ -12,7 +12,8 @@ from factory.control.navigation import Bundle
 from factory.simulation.request import RunRequest
 from factory.simulation.simulation import Simulation
 from factory.support.settings import Settings
-from tests.simulation_values import KARY, laid_out, layout_of
+from tests.pag_texts import KARY, laid_out
+from tests.simulation_values import layout_of
 
 RUNS: list[tuple[str, dict[str, Any]]] = [
     ("paper", {}),

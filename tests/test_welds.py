@@ -14,7 +14,9 @@ from factory.simulation.mujoco.contacts import ALL, LAST, NOBODY
 from factory.simulation.mujoco.parts import Parts
 from factory.simulation.mujoco.sleep import AWAKE, FRESH
 from factory.simulation.mujoco.world import MujocoWorld
-from tests.simulation_values import FENCE, laid_out, layout_of, random_marking, ready, states
+from tests.good_runs import random_marking
+from tests.pag_texts import laid_out
+from tests.simulation_values import FENCE, layout_of, ready, states
 
 
 def under_way(name: str = "paper", **given: Any) -> MujocoWorld:
