@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from factory.study.fidelity.shadow import Shadow
+from factory.study.fidelity.readings import Shadow
 
 from factory.layout.layout import Layout
 from factory.simulation.disturbance import Push, disturb
