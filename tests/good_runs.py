@@ -7,6 +7,7 @@ import random
 from factory.layout.layout import Layout
 from factory.nets.petri import Marking
 from factory.simulation.run import Run
+from tests.token_game import enabled, follower
 
 
 def assert_good(run: Run) -> None:
@@ -27,6 +28,6 @@ def random_marking(layout: Layout, seed: int) -> Marking:
     net, draw = layout.factory.net, random.Random(seed)
     marking = net.initial_marking
     for _ in range(draw.randrange(1, 60)):
-        event = draw.choice(net.threaded.net.enabled(marking))
-        marking = net.threaded.net.follower(marking, [event])
+        event = draw.choice(enabled(net.threaded.net, marking))
+        marking = follower(net.threaded.net, marking, [event])
     return marking

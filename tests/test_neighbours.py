@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from factory.study.fidelity.readings import Shadow
 
 from factory.layout.layout import Layout
 from factory.simulation.disturbance import Push, disturb
@@ -18,6 +17,7 @@ from factory.simulation.mujoco.fast.neighbours import CALM, Neighbours
 from factory.simulation.mujoco.fast.strides import Strides
 from factory.simulation.mujoco.parts import Parts
 from factory.simulation.simulation import Simulation
+from factory.study.fidelity.readings import Shadow
 from factory.support.engine import mujoco
 from factory.support.settings import MOST, Settings
 from tests.good_runs import random_marking
