@@ -1,4 +1,4 @@
-"""The command line: thin. Each command reads, calls the stages and writes; see the README."""
+"""The command line. Each command, a module, reads, calls the stages and writes."""
 
 from __future__ import annotations
 
@@ -74,7 +74,7 @@ def run_command(words: list[str]) -> int:
         return result if isinstance(result, int) else 0
     except click.exceptions.Exit as done:
         return done.exit_code
-    except (BrokenPipeError, SystemExit):  # click exits where nobody reads its stdout any more
+    except (BrokenPipeError, SystemExit):  # click exits where its stdout is closed
         return 0
     except (Exception, KeyboardInterrupt) as error:
         return fail(_refusal(error), "--json" in words)
@@ -85,7 +85,7 @@ class _Interrupted(FactoryError):
 
 
 def _refusal(error: BaseException) -> FactoryError:
-    """Whatever went wrong, as an error for the user."""
+    """Any exception as an error for the user."""
     if isinstance(error, FactoryError):
         return error
     if isinstance(error, KeyboardInterrupt | click.Abort):
@@ -172,7 +172,7 @@ def cli(ctx: click.Context, version: bool, explain: str | None, as_json: bool) -
 ON_A_FILE = check, build, run, render, view, fidelity, analyze, report, programs, export
 """The commands whose options may be set in advance for a FILE."""
 
-for _command in (*map(with_defaults, ON_A_FILE), new, import_, sweep, monitor, templates, doctor):
+for _command in (new, import_, *map(with_defaults, ON_A_FILE), sweep, monitor, templates, doctor):
     cli.add_command(_command)
 
 __all__ = ["cli", "main", "run_command"]

@@ -55,9 +55,9 @@ def build(
     wanted = {"mjcf": mjcf, "output": output, "units": units, "wip": wip}
     settings = given.settings()
     name = build_cache.request(given.file, {**asdict(given), **wanted, "settings": settings})
-    told = build_cache.find(name)
-    is_kept = told is not None
-    if told is None:
+    kept = build_cache.find(name)
+    is_current = kept is not None
+    if kept is None:
         from factory.export.build import BuildRequest, files_read
         from factory.export.build import build as build_files
         from factory.nets.verify import proved
@@ -66,19 +66,19 @@ def build(
         verdict = proved(project.layout.factory.net)
         spent = perf_counter() - begin
         built = build_files(project, verdict, BuildRequest(mjcf, output, units, wip))
-        told = _told(project, built, spent)
+        kept = _printed(project, built, spent)
         inputs = (*files_read(project), *_shipped_and_own(given.folders))
-        build_cache.keep(name, inputs, built.files, told)
+        build_cache.keep(name, inputs, built.files, kept)
     else:
-        told["document"]["compile_s"] = perf_counter() - begin
-    for text in [] if out.quiet else told["warnings"]:
+        kept["document"]["compile_s"] = perf_counter() - begin
+    for text in [] if out.quiet else kept["warnings"]:
         print(text, file=sys.stderr)
     if out.as_json:
-        emit(told["document"])
+        emit(kept["document"])
     elif not out.quiet:
-        for line in (*told["lines"], *_listed(told["document"]["files"], out.verbose)):
+        for line in (*kept["lines"], *_listed(kept["document"]["files"], out.verbose)):
             say(line)
-        if is_kept:
+        if is_current:
             say("nothing has changed since: these files are up to date")
     return 0
 
@@ -92,8 +92,8 @@ def _listed(files: list[str], verbose: bool) -> list[str]:
     return [f"  {path}" for path in shown] + [f"  and {more} more: -v lists them"] * (more > 0)
 
 
-def _told(project: Project, built: Built, spent: float) -> dict[str, Any]:
-    """What there is to tell: the document of `--json`, the lines for people, the warnings."""
+def _printed(project: Project, built: Built, spent: float) -> dict[str, Any]:
+    """What a build prints: the document of `--json`, the lines for people, the warnings."""
     from factory.layout.durations import Pace
     from factory.layout.gain import gain
     from factory.support.settings import AUTO

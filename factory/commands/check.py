@@ -83,7 +83,7 @@ def _pictures(checked: Checked, folder: Path) -> dict[Path, bytes]:
 
 
 def project_of(given: ProjectOptions) -> Project:
-    """The project of a command without options of motion: settings matter to relays alone, whose
+    """The project of a command without options of motion. It reads settings only for relays, whose
     number depends on the layout. Raises InputError."""
     from factory.pipeline import read
 

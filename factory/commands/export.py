@@ -23,7 +23,7 @@ TAKEN = {"net": ("a PAG", "a net in PNML"), "pag": ("a PAG",), "log": ("a log",)
 
 
 class _Listing(click.Command):
-    """A command whose help ends with what every exporter says of itself."""
+    """A command whose help ends with the summary of every exporter."""
 
     def format_epilog(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         from factory.export import exporters

@@ -21,7 +21,7 @@ F = TypeVar("F", bound=Callable[..., Any])
 
 
 PATH = click.Path(path_type=Path, readable=False)
-"""A path as it is given; what is wrong with it the stage that opens it says, as a diagnostic."""
+"""A path as it is given; the stage that opens it reports its faults, as diagnostics."""
 
 
 class PagPath(click.Path):
@@ -204,9 +204,9 @@ OF_A_PICTURE = tuple(field.name for field in fields(PictureOptions))
 
 
 def for_a_pag(file: Path, kind: str, *but: str) -> None:
-    """Options of a command that mean nothing for a FILE that is no PAG but, say, a log: all that
-    are given `but` these, and those of OUTPUT. Raises InputError (Usage) with every one; what a
-    user has set beforehand is not meant for this file alone."""
+    """Refuses the options that mean nothing for a FILE that is no PAG but, say, a log: all that are
+    given on the command line `but` these, and those of OUTPUT. Raises InputError (Usage) with every
+    one."""
     context = click.get_current_context()
     given = [
         max(option.opts, key=len)
@@ -217,4 +217,4 @@ def for_a_pag(file: Path, kind: str, *but: str) -> None:
     ]
     if given:
         messages = [f"{option} is for a PAG; '{file}' is {kind}" for option in given]
-        raise InputError(Diagnostic("Usage", told, None, "leave it out") for told in messages)
+        raise InputError(Diagnostic("Usage", text, None, "leave it out") for text in messages)

@@ -42,7 +42,7 @@ class ProjectOptions:
     speed: float | None = None
     acceleration: float | None = None
     force: float | None = None
-    timestep: float | None = None
+    timestep: float | str | None = None
     substeps: int | None = None
     stage: bool | None = None
     clearance: float | None = None

@@ -97,7 +97,7 @@ def sweep(
         from factory.study.fidelity.plots import check_plots
 
         check_plots()
-    told = summary or plots is not None
+    is_summary = summary or plots is not None
     document: dict[str, Any] = {}
     failed = False
     if vary:
@@ -111,10 +111,10 @@ def sweep(
         document = {"database": str(database), "on": runs.on, **tally.as_json()}
         if not out.silent:
             _tell(tally, database)
-    elif not told:
+    elif not is_summary:
         message, hint = "nothing varies", "for example --vary seed=0:100"
         raise InputError(Diagnostic("Usage", message, None, hint))
-    if told:
+    if is_summary:
         document |= _summarise(database or source, plots, out)
     if out.as_json:
         emit(document)
@@ -151,7 +151,7 @@ def _carry_out(
         check_ideal(runs.fuse)
     project = given.project()
     varies = any(axis.key == "clearance" for axis in axes)
-    # a layout that cannot be is told before anything is run
+    # a factory that does not fit its floor is refused before the first run
     factory = project.plain if varies else project.layout.factory
     proved(factory.net)
     warn(project.product.warnings, silent)

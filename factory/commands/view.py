@@ -24,7 +24,7 @@ FOR_EVER = 10**9
 @click.option("--port", type=click.IntRange(0, 65535), default=8765, help="0: a free one.")
 @click.option("--host", default="127.0.0.1", help="Listen here; only this machine can come.")
 @click.option("--expose", is_flag=True, help="Let HOST be one that other machines can reach.")
-@click.option("--paused", is_flag=True, help="Wait for somebody to press Play.")
+@click.option("--paused", is_flag=True, help="Do not run before Play is pressed.")
 @DRAW
 @WIP
 @RUNS
@@ -74,7 +74,7 @@ def _tell(server: Server, host: str, expose: bool) -> None:
         say(f"from elsewhere: {there}, then the same address there")
         return
     print(
-        f"warning: who can reach {host} and knows this address can push this factory's robots; "
-        "nothing is encrypted",
+        f"warning: everyone that reaches {host} and knows this address can push this factory's "
+        "robots; nothing is encrypted",
         file=sys.stderr,
     )

@@ -49,7 +49,7 @@ def build(project: Project, verdict: Verdict, request: BuildRequest) -> Built:
     """Build the model and write what is asked for, with the proof of the net's `verdict`.
 
     Raises RunError where the layout is not certified; InputError where an operation cannot reach
-    its goal in it, where the engine refuses the model, and where a file whose name is our choice
+    its goal in it, where the engine refuses the model, and where a file whose name is chosen here
     would be written through a link, or over what was read. Nothing is written then."""
     layout, settings, output = project.layout, project.settings, request.output
     operation_modes(layout, settings.eps)
