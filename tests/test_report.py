@@ -102,7 +102,7 @@ def test_the_token_game_ends_in_the_marking_of_the_log(made: Page, recording) ->
 def test_every_view_has_every_robot_label_transition_and_place(made: Page, recording) -> None:
     wanted = {
         "robot": len(recording.factory.robots),
-        "label": len(recording.pag.nodes),
+        "label": len(recording.factory.pag.nodes),
         "transition": len(recording.factory.net.threaded.transitions),
         "place": len(recording.factory.net.threaded.places),
     }

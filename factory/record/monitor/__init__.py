@@ -5,9 +5,8 @@ It sees positions, speeds, setpoints and active constraints; it never reads the 
 events or its marking. It works beside a run, or on a log (`factory.record.monitor.record`)."""
 
 from factory.record.monitor.anatomy import Anatomy
-from factory.record.monitor.monitor import EngineMonitor, Monitor
-from factory.record.monitor.observation import Observation
-from factory.record.monitor.report import Firing, Report, Violation
+from factory.record.monitor.monitor import EngineMonitor
+from factory.record.monitor.report import Report
 from factory.record.monitor.subject import MonitorSubject, subject_of, subject_of_run
 from factory.record.observed import Observed
 
@@ -20,16 +19,4 @@ def beside(simulation: Observed) -> EngineMonitor:
     return EngineMonitor(subject_of_run(simulation), anatomy, m, d)
 
 
-__all__ = [
-    "Anatomy",
-    "EngineMonitor",
-    "Firing",
-    "Monitor",
-    "MonitorSubject",
-    "Observation",
-    "Report",
-    "Violation",
-    "beside",
-    "subject_of",
-    "subject_of_run",
-]
+__all__ = ["MonitorSubject", "Report", "beside", "subject_of"]

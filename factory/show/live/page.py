@@ -17,7 +17,7 @@ from factory.show.live.session import Session
 from factory.show.report.drawings import floor_plan, net_drawing
 from factory.show.report.links import data, labels_of
 from factory.show.report.packing import Pack
-from factory.show.report.page import filled, options
+from factory.show.report.page import counts, filled, options
 from factory.show.report.scene import DrawnFactory, scene, stations
 from factory.show.report.sections import assembly_tree
 from factory.simulation.simulation import Simulation
@@ -39,8 +39,7 @@ def page(session: Session) -> bytes:
     """The page, for as long as the session lasts."""
     stage, pack = stage_of(session.simulation), Pack()
     factory = stage.factory
-    labels, net = labels_of(factory), factory.net.threaded
-    name = factory.pag.root
+    labels, name = labels_of(factory), factory.pag.root
     document = {
         **data(factory),
         "name": name,
@@ -59,13 +58,9 @@ def page(session: Session) -> bytes:
         },
         "arrays": pack.index,
     }
-    counts = (
-        f"{len(factory.leaves)} parts, {len(factory.robots)} robots, {len(net.places)} places, "
-        f"{len(net.transitions)} transitions, proved live"
-    )
     fields = {
         "name": escape(name, quote=True),
-        "counts": escape(counts),
+        "counts": escape(f"{counts(factory)}, proved live"),
         "tree": assembly_tree(factory.pag, labels),
         "floor": floor_plan(stage, labels),
         "net": net_drawing(factory, stage.roles),

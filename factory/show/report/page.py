@@ -9,6 +9,7 @@ from html import escape
 from importlib.resources import files
 from typing import Any
 
+from factory.plant.factory import Factory
 from factory.show.report.drawings import floor_plan, net_drawing
 from factory.show.report.fidelity import fidelity
 from factory.show.report.frames import frames
@@ -63,9 +64,9 @@ def page(recording: Recording) -> str:
     }
     fields = {
         "name": escape(recording.name, quote=True),
-        "counts": escape(_counts(recording)),
+        "counts": escape(counts(recording.factory)),
         "heading": heading(recording, run, plan, proved, found),
-        "tree": assembly_tree(recording.pag, labels),
+        "tree": assembly_tree(recording.factory.pag, labels),
         "floor": floor_plan(recording.stage, labels),
         "net": net_drawing(recording.factory, recording.stage.roles),
         "pace": pace(recording, run, plan),
@@ -79,8 +80,9 @@ def page(recording: Recording) -> str:
     return filled("report/report.html", fields, document, pack.text(), SCRIPTS, STYLES)
 
 
-def _counts(recording: Recording) -> str:
-    factory, net = recording.factory, recording.factory.net.threaded
+def counts(factory: Factory) -> str:
+    """How large a factory and its net are."""
+    net = factory.net.threaded
     return (
         f"{len(factory.leaves)} parts, {len(factory.robots)} robots, {len(net.places)} places, "
         f"{len(net.transitions)} transitions"

@@ -56,11 +56,6 @@ class Recording:
         return frozenset(self.start) == self.factory.net.initial_marking
 
     @property
-    def pag(self) -> PAG:
-        """The assembly tree."""
-        return self.factory.pag
-
-    @property
     def end(self) -> float:
         """When the run ended [s]."""
         return float(self.log.time[-1])
