@@ -251,6 +251,7 @@ def test_a_law_that_does_not_come_to_its_goal_is_a_defect(monkeypatch) -> None:
     start = bench.mode.upper.copy()
     assert bench.reach(start).result == "reached"
     monkeypatch.setattr(type(bench.bundle), "field", lambda self, x, dt: np.zeros_like(x))
+    bench.world.motion.stepping._courses.clear()  # planned with the good law
     assert bench.reach(start).result == "missed"
     said = attraction.summary(PAPER, "mate", "sub1", [bench.reach(start)])
     assert said["share_reached"] == 0 and said["defects_by_kind"] == {"inside": 1}
