@@ -228,7 +228,7 @@ def test_the_search_finds_the_last_point_that_holds() -> None:
 def test_the_quick_campaign_of_disturbances() -> None:
     results = disturbances.measure(quick=True)
     assert all(r["survived"] for r in results["products"][PAPER]["required"])
-    assert "all of it is" in disturbances.section(results)
+    assert "**all are.**" in disturbances.section(results)
 
 
 # --- domains of attraction ------------------------------------------------------------------------
