@@ -391,7 +391,7 @@ def test_what_is_under_way_is_what_is_being_joined() -> None:
     while world.delivered() < simulation.before + 2:
         joining = world.inspection.joining
         assert set(joining) == set(supervisor.active.operations)
-        fired = supervisor.firings.count
+        fired = supervisor.fired
         for number, unit in joining.items():
             assert fired[simulation.layout.factory.operations[number].end] == unit
         supervisor.step()

@@ -61,11 +61,10 @@ class Process:
 
 class Record:
     """The record of a distributed run, in the terms of the net: X_s when the first robot enters an
-    operation, X_e when its carrier ends it. `marked`: 1 for each place that is. `last`: when
-    something fired last, at first `time` [s]."""
+    operation, X_e when its carrier ends it. `marked`: 1 for each place that is."""
 
-    def __init__(self, factory: Factory, time: float) -> None:
-        self._net, self.last, self.events = factory.net.threaded, time, list[Event]()
+    def __init__(self, factory: Factory) -> None:
+        self._net, self.events = factory.net.threaded, list[Event]()
         self.marked = bytearray(len(self._net.places))
         for place in factory.net.initial_marking:
             self.marked[place] = 1
@@ -100,7 +99,6 @@ class Record:
         for place in net.postset[transition]:
             self.marked[place] = 1
         self.events.append(Event(time, self._net.transitions[transition].name))
-        self.last = time
 
 
 class DistributedSupervisor:
@@ -128,7 +126,7 @@ class DistributedSupervisor:
         self.link = Link(world, factory.axes)
         self.cells = Cells(factory, [program.steps[0].label for program in programs])
         self.processes = self._processes(programs)
-        self.record = Record(factory, world.time)
+        self.record = Record(factory)
         self.count = 0
 
     def _processes(self, programs: Sequence[Program]) -> list[Process]:
@@ -147,11 +145,6 @@ class DistributedSupervisor:
     def events(self) -> list[Event]:
         """The record so far."""
         return self.record.events
-
-    @property
-    def last_event(self) -> float:
-        """When something fired last, or when the run began [s]."""
-        return self.record.last
 
     @property
     def active(self) -> Active:

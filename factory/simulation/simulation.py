@@ -100,6 +100,12 @@ class Simulation:
         self.supervisor = (self._distributed if request.distributed else self._central)(stages)
 
     @property
+    def silent(self) -> float:
+        """How long nothing has fired since the last event, or since time 0 [s]."""
+        events = self.supervisor.events
+        return self.world.time - (events[-1].t if events else 0.0)
+
+    @property
     def start(self) -> Marking:
         """The marking that the run begins from."""
         start = self.request.start
@@ -177,7 +183,7 @@ class Simulation:
                 for observe in (*observers, *glances):
                     observe(world, supervisor)
                 watched += perf_counter() - pause
-            if world.time - supervisor.last_event > patience:
+            if self.silent > patience:
                 what = f"nothing fired for {patience:.2f} s of simulated time"
                 trouble = self._trouble("Stalled", what, LOOK)
             elif max_time is not None and world.time >= max_time:

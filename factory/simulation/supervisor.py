@@ -35,15 +35,6 @@ class Active:
     clocks: Array | None = None
 
 
-@dataclass(slots=True)
-class Fired:
-    """What has fired: how often each transition, by number, and the events of this run."""
-
-    count: list[int]
-    last: float
-    events: list[Event] = field(default_factory=list)
-
-
 class Ahead:
     """The stages of robots that go ahead while they wait, numbered after the operations: by the
     operation that each is `of`, and by the one that it is `after`; `place`: where each is."""
@@ -87,8 +78,8 @@ class Supervisor:
         net = factory.net
         starts = [operation.start for operation in factory.operations]
         self.threads = Threads(net.threaded, net.threads_of(start), starts)
-        fired = [counts.get(number, 0) for number in range(len(net.threaded.transitions))]
-        self.firings = Fired(fired, world.time)
+        self.fired = [counts.get(number, 0) for number in range(len(net.threaded.transitions))]
+        self.events: list[Event] = []
         self.ahead, self.active = Ahead(factory, stages), Active()
         self.near = self.enabled = True
         marked = self.threads.marked
@@ -96,16 +87,6 @@ class Supervisor:
             [o.index for o in factory.operations if marked[o.place]],
             [number for number, place in self.ahead.place.items() if marked[place]],
         )
-
-    @property
-    def events(self) -> list[Event]:
-        """What has fired in this run."""
-        return self.firings.events
-
-    @property
-    def last_event(self) -> float:
-        """When something fired last, or when the run began [s]."""
-        return self.firings.last
 
     @property
     def limits(self) -> Limits:
@@ -161,7 +142,7 @@ class Supervisor:
         asked again where there was none and nothing has changed."""
         if not (self.enabled or self.world.supplied):
             return ()
-        prepared, fired = self.world.prepared, self.firings.count
+        prepared, fired = self.world.prepared, self.fired
         found = tuple(o.index for o in self.awaited() if prepared(o, fired[o.start]))
         self.enabled, self.world.supplied = bool(found), False
         return found
@@ -188,16 +169,15 @@ class Supervisor:
         return [numbers[number] for number in (there & still).nonzero()[0].tolist()]
 
     def _fire(self, started: list[int], ended: list[int]) -> None:
-        operations, now, firings = self.factory.operations, self.world.time, self.firings
-        starts = [(operations[o], firings.count[operations[o].start]) for o in started]
-        ends = [(operations[o], firings.count[operations[o].end]) for o in ended]
+        operations, now, fired = self.factory.operations, self.world.time, self.fired
+        starts = [(operations[o], fired[operations[o].start]) for o in started]
+        ends = [(operations[o], fired[operations[o].end]) for o in ended]
         events = (*(o.start for o, _ in starts), *(o.end for o, _ in ends))
         self.enabled |= self.threads.fire(events)
         transitions = self.factory.net.threaded.transitions
         for event in events:
-            firings.count[event] += 1
-            firings.events.append(Event(now, transitions[event].name))
-        firings.last = now
+            fired[event] += 1
+            self.events.append(Event(now, transitions[event].name))
         self.world.apply(starts, ends)
 
     def _going_ahead(self, started: list[int], ended: list[int], over: list[int]) -> list[int]:

@@ -8,7 +8,6 @@ from dataclasses import dataclass, field
 from queue import Empty, SimpleQueue
 from threading import Condition
 from time import perf_counter
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -228,8 +227,7 @@ class Session:
 
     def _waits(self) -> str:
         """Which robots wait for what, where nothing has fired for a long time."""
-        supervisor: Any = self.simulation.supervisor
-        silent = self.simulation.world.time - supervisor.last_event
+        supervisor, silent = self.simulation.supervisor, self.simulation.silent
         if silent < QUIET * max(self.simulation.delays):
             return ""
         robots = self.simulation.layout.factory.robots
