@@ -123,7 +123,7 @@ def _printed(project: Project, built: Built, spent: float) -> dict[str, Any]:
         f"floor {layout.area:.2f} m², guidepaths {layout.guidepath_length:.2f} m, "
         f"clearance {settings.clearance * 1000:g} mm proved",
         f"timestep {1000 * model.settings.step:g} ms"
-        + (", chosen for what it carries (--timestep)" if settings.timestep == AUTO else ""),
+        + (", chosen automatically (--timestep)" if settings.timestep == AUTO else ""),
         str(gained),
     ]
     warnings = [warning(diagnostic) for diagnostic in layout.product.warnings]

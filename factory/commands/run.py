@@ -174,7 +174,7 @@ def summarise(record: Run, factory: Factory, verbose: bool) -> None:
     physics = record.physics
     if physics is not None:
         chosen = physics.timestep_chosen
-        how = "chosen for what it carries (--timestep)" if chosen else "as asked for"
+        how = "chosen automatically (--timestep)" if chosen else "as asked for"
         say(f"timestep {1000 * physics.timestep_s:g} ms, {how}")
         error = physics.product_error_max_mm
         say(
