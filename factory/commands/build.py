@@ -66,7 +66,7 @@ def build(
         verdict = proved(project.layout.factory.net)
         spent = perf_counter() - begin
         built = build_files(project, verdict, BuildRequest(mjcf, output, units, wip))
-        kept = _printed(project, built, spent)
+        kept = _printed(project, built, spent, wip)
         inputs = (*files_read(project), *_shipped_and_own(given.folders))
         build_cache.keep(name, inputs, built.files, kept)
     else:
@@ -92,10 +92,11 @@ def _listed(files: list[str], verbose: bool) -> list[str]:
     return [f"  {path}" for path in shown] + [f"  and {more} more: -v lists them"] * (more > 0)
 
 
-def _printed(project: Project, built: Built, spent: float) -> dict[str, Any]:
+def _printed(project: Project, built: Built, spent: float, wip: int | None) -> dict[str, Any]:
     """What a build prints: the document of `--json`, the lines for people, the warnings."""
     from factory.layout.durations import Pace
     from factory.layout.gain import gain
+    from factory.support.console import POOL_BOUND
     from factory.support.settings import AUTO
 
     layout, settings, model = project.layout, project.settings, built.model
@@ -108,6 +109,7 @@ def _printed(project: Project, built: Built, spent: float) -> dict[str, Any]:
         "parts": model.bodies,
         "joints": model.joints,
         "welds": model.welds,
+        "wip": model.wip,
         "guidepath_length_m": round(layout.guidepath_length, 6),
         "area_m2": round(layout.area, 6),
         "timestep_s": model.settings.step,
@@ -126,6 +128,8 @@ def _printed(project: Project, built: Built, spent: float) -> dict[str, Any]:
         + (", chosen automatically (--timestep)" if settings.timestep == AUTO else ""),
         str(gained),
     ]
+    if wip is None and model.wip is not None:
+        lines.insert(1, f"parts for at most {model.wip} units inside at once: {POOL_BOUND}")
     warnings = [warning(diagnostic) for diagnostic in layout.product.warnings]
     return {"document": document, "lines": lines, "warnings": warnings}
 

@@ -21,7 +21,7 @@ from factory.commands.requests import (
     RunOptions,
     check_ideal,
 )
-from factory.support.console import emit, say, table, warn
+from factory.support.console import POOL_BOUND, emit, say, table, warn
 from factory.support.errors import Diagnostic, InputError
 
 if TYPE_CHECKING:
@@ -176,6 +176,8 @@ def summarise(record: Run, factory: Factory, verbose: bool) -> None:
         chosen = physics.timestep_chosen
         how = "chosen automatically (--timestep)" if chosen else "as asked for"
         say(f"timestep {1000 * physics.timestep_s:g} ms, {how}")
+        if physics.wip_chosen:
+            say(f"at most {physics.wip_chosen} units inside at once: {POOL_BOUND}")
         error = physics.product_error_max_mm
         say(
             f"{physics.handoffs} hand-offs, gap at most {physics.handoff_gap_max_mm:.3f} mm; "

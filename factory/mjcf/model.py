@@ -59,6 +59,13 @@ LEAST = 0.5
 bodies is heavy, and a heavy payload would swing on it. A motor's inertia makes up for what is
 missing."""
 
+MOST_BODIES = 8000
+"""A pool of parts has at most so many bodies, unless told how many units may be inside: the engine
+takes minutes to compile more."""
+
+ARENA = 64
+"""The engine's memory for contacts and constraints [MiB], without that for pairs of bodies."""
+
 GRAVITY = 9.81
 """[m/s²]; the engine's own."""
 
@@ -68,7 +75,8 @@ class Model:
     """A factory as MJCF: the XML, its mesh files by name, and the numbers the run needs.
 
     `carried`: what bodies there are, `copies`: how many of each; `masses`: of each label carried
-    [kg]; `drives`: of each robot.
+    [kg]; `drives`: of each robot; `wip`: the most units inside at once that they are enough for,
+    None where more never are.
     """
 
     layout: Layout
@@ -81,6 +89,7 @@ class Model:
     files: Mapping[str, bytes] = field(repr=False)
     joints: int = 0
     welds: int = 0
+    wip: int | None = None
 
     def __post_init__(self) -> None:
         for name in ("copies", "masses", "files"):
@@ -118,6 +127,19 @@ def part_copies(
     return copies
 
 
+def fitting_wip(pool: Mapping[str, int], units: int | None) -> int | None:
+    """The most units that can be inside at once with at most MOST_BODIES bodies of parts, at least
+    one; None where the whole pool has no more."""
+    if sum(part_copies(pool, units).values()) <= MOST_BODIES:
+        return None
+    least, most = 1, max(pool.values())
+    while most - least > 1:
+        wip = (least + most) // 2
+        fits = sum(part_copies(pool, units, wip).values()) <= MOST_BODIES
+        least, most = (wip, most) if fits else (least, wip)
+    return least
+
+
 def build_model(
     layout: Layout,
     catalogue: Catalogue,
@@ -125,10 +147,11 @@ def build_model(
     settings: Settings,
     bodies: FusedBodies | None = None,
     shown: bool = True,
+    wip: int | None = None,
 ) -> Model:
     """The model of a laid-out factory, of one body a part unless other `bodies` are given; without
-    what is only there to be `shown`, if it is not. Raises InputError where the MJCF of a robot type
-    is unusable."""
+    what is only there to be `shown`, if it is not. The `copies` are enough for `wip` units inside
+    at once. Raises InputError where the MJCF of a robot type is unusable."""
     factory, product = layout.factory, layout.product
     bodies = bodies or bodies_of(factory, product)
     masses = {
@@ -143,8 +166,6 @@ def build_model(
     section = {child.tag: child for child in root}
     world, equality, actuator = (section[tag] for tag in ("worldbody", "equality", "actuator"))
     fill(section["option"], timestep=settings.step)
-    awake = sum(copies.values()) + len(factory.robots)
-    fill(section["size"], memory=f"{64 + 4 * awake**2 // 2**20}M")
     add_paints(section["asset"])
     files = add_meshes(section["asset"], product)
     add_scene(world, section["statistic"], layout)
@@ -162,12 +183,20 @@ def build_model(
     _home(section["keyframe"], layout, actuator)
     if not shown:
         leave_out_what_is_shown(root)
+    fill(section["size"], memory=f"{ARENA + _pairs(root) // 2**20}M")
     ElementTree.indent(root)
     xml = ElementTree.tostring(root, encoding="unicode") + "\n"
     joints = len(factory.robots) + len(hoists) + 1 + sum(copies.values())
     return Model(
-        layout, settings, bodies, copies, masses, drives, xml, files, joints, len(equality)
+        layout, settings, bodies, copies, masses, drives, xml, files, joints, len(equality), wip
     )
+
+
+def _pairs(root: Element) -> int:
+    """What the engine's broad phase sets aside [bytes]: two arrays with four bytes for each pair of
+    bodies. Only what is written to is taken from the machine's memory."""
+    bodies = sum(1 for _ in root.iter("body")) + 1
+    return 2 * 4 * bodies * (bodies - 1) // 2
 
 
 def product_name(factory: Factory) -> str:

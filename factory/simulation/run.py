@@ -43,7 +43,8 @@ class PhysicsFigures:
 
     `mating_forces`: by operation, the largest force of a contact between inputs that it was
     joining [N]; `excluded`: pairs of parts whose contact was off; `timestep_chosen`: by the
-    factory, not by the user.
+    factory, not by the user; `wip_chosen`: the bound on units inside at once where the factory
+    chose one.
     """
 
     handoffs: int = 0
@@ -58,6 +59,7 @@ class PhysicsFigures:
     fused: bool = False
     timestep_s: float = 0.0
     timestep_chosen: bool = False
+    wip_chosen: int | None = None
 
     @property
     def mating_force_max_n(self) -> float:
@@ -132,6 +134,7 @@ class Run:
             "mating_force_max_n",
             "timestep_s",
             "timestep_chosen",
+            "wip_chosen",
         )
         return {
             "schema": 1,

@@ -64,8 +64,9 @@ class Simulation:
     `compiled`: what it shares with earlier runs, made by `compiled` for the same layout and a
     request that differs in seed and jitter alone. `counts`: how often each transition has fired
     where it starts; `before`: products that had left by then. `chosen`: the timestep was left to
-    the factory; that of `request` is a number. `ways`: what robots that go ahead
-    while they wait take [s].
+    the factory; that of `request` is a number. `bounded`: so was the bound `wip`, which that of
+    `request` has where the pool of parts is too large. `ways`: what robots that go ahead while they
+    wait take [s].
     """
 
     def __init__(
@@ -75,6 +76,7 @@ class Simulation:
         compiled: Compiled | None = None,
     ) -> None:
         self.layout, self.chosen = layout, request.settings.timestep == AUTO
+        self.bounded = request.wip is None
         self.request = request = replace(request, settings=_timed(layout, request, compiled))
         settings, world, net = request.settings, request.world, layout.factory.net
         self.modes = compiled.modes if compiled else operation_modes(layout, settings.eps)
@@ -93,6 +95,7 @@ class Simulation:
             from factory.simulation.mujoco.world import MujocoWorld
 
             self.model = (compiled and compiled.model) or _model(layout, request, self.under_way())
+            self.request = request = replace(request, wip=self.model.wip)
             loaded = compiled.loaded if compiled else None
             at = start_positions(layout, self.start)
             self.world = MujocoWorld(self.model, request, at, gains, self.counts, loaded)
@@ -220,7 +223,12 @@ class Simulation:
             tuple(supervisor.events),
             tuple(world.dropoffs),
             busy_times(factory, supervisor.events),
-            figures and replace(figures, timestep_chosen=self.chosen),
+            figures
+            and replace(
+                figures,
+                timestep_chosen=self.chosen,
+                wip_chosen=request.wip if self.bounded else None,
+            ),
             request.seed,
             request.jitter,
             trouble,
@@ -284,18 +292,21 @@ def physical_model(
     shown: bool = True,
 ) -> Model:
     """The MJCF model of a layout with the bodies it needs for `units` (None: for ever): the pool of
-    parts, or with `fuse` bodies of sub-assemblies too, and then few parts. `shown`: with what is
-    only shown, too."""
-    from factory.mjcf.model import build_model, part_copies
+    parts, or with `fuse` bodies of sub-assemblies too, and then few parts. Where the pool is too
+    large, at most so many units are inside as `fitting_wip` says, unless `wip` is given. `shown`:
+    with what is only shown, too."""
+    from factory.mjcf.model import build_model, fitting_wip, part_copies
 
     factory = layout.factory
     bodies = bodies_of(factory, layout.product, fuse)
     if bodies.wholes:
         copies = fused_copies(bodies, factory, units)
     else:
-        copies = part_copies(part_pool(factory), units, wip, under_way)
+        pool = part_pool(factory)
+        wip = wip or fitting_wip(pool, units)
+        copies = part_copies(pool, units, wip, under_way)
     catalogue, settings = catalogue or load_catalogue(), timed(settings or Settings(), layout)
-    return build_model(layout, catalogue, copies, settings, bodies, shown)
+    return build_model(layout, catalogue, copies, settings, bodies, shown, wip)
 
 
 def start_positions(layout: Layout, marking: Marking) -> np.ndarray:

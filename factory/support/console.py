@@ -17,6 +17,9 @@ from factory.support.errors import Diagnostic, FactoryError
 
 SCHEMA = 1
 
+POOL_BOUND = "more take too many bodies for the engine, unless --wip asks for them"
+"""Why the factory bounds the units inside at once."""
+
 
 def emit(document: Mapping[str, Any]) -> None:
     """One JSON document on stdout, in ASCII whatever the locale; null for what is not finite."""
