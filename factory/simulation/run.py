@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from factory.plant.approaches import Pair
 from factory.plant.factory import Factory
+from factory.record.ending import CutOff
 from factory.support.errors import Diagnostic
 
 if TYPE_CHECKING:
@@ -97,6 +98,14 @@ class Run:
         return self.trouble is None and self.refines_net
 
     @property
+    def cut_off(self) -> CutOff | None:
+        """How far a run came that did not reach its end."""
+        if self.trouble is None:
+            return None
+        why = self.trouble.code, self.trouble.message
+        return CutOff(self.sim_time_s, self.products, self.units, *why)
+
+    @property
     def realtime_factor(self) -> float:
         """Simulated seconds per second of the run loop."""
         return self.sim_time_s / self.wall_time_s if self.wall_time_s else 0.0
@@ -118,7 +127,7 @@ class Run:
 
     def as_json(self) -> dict[str, object]:
         """The document that `run --json` prints."""
-        physics, monitor = self.physics, self.monitor
+        physics, monitor, cut = self.physics, self.monitor, self.cut_off
         watched = (
             {"monitor_time_s": monitor.time_s, "monitor": monitor.as_json()} if monitor else {}
         )
@@ -138,6 +147,7 @@ class Run:
             "world": self.world,
             "units": self.units,
             "products": self.products,
+            "cut_off": cut and cut.as_json(),
             "robots": self.robots,
             "seed": self.seed,
             "jitter": self.jitter,
