@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -20,6 +20,19 @@ class Event(NamedTuple):
 
     t: float
     transition: str
+
+
+STEADY = 4
+"""Number of products from which on a cycle time is measured: the last half has two intervals."""
+
+
+def mean_interval(left: Sequence[float]) -> float | None:
+    """The mean interval [s] over the last half of the products that left at these times; None for
+    fewer than STEADY."""
+    if len(left) < STEADY:
+        return None
+    tail = left[len(left) // 2 - 1 :]
+    return (tail[-1] - tail[0]) / (len(tail) - 1)
 
 
 def busy_times(factory: Factory, events: Iterable[Event]) -> tuple[float, ...]:
@@ -113,11 +126,7 @@ class Run:
     @property
     def cycle_time_s(self) -> float | None:
         """Mean interval between dropoffs over the last half of the units; None below 4."""
-        if len(self.dropoffs) < 4:
-            return None
-        start = len(self.dropoffs) // 2
-        last = self.dropoffs[start - 1 :]
-        return (last[-1] - last[0]) / (len(last) - 1)
+        return mean_interval(self.dropoffs)
 
     @property
     def utilisation(self) -> tuple[float, ...]:

@@ -13,6 +13,7 @@ from factory.show.report.links import words_of
 from factory.show.report.pace import MeasuredPace, Predicted
 from factory.show.report.recording import Recording
 from factory.show.report.words import Proof
+from factory.simulation.run import STEADY
 from factory.study.fidelity.quantities import QUANTITIES
 
 SIGNS = {True: "✓", False: "✗", None: "?"}
@@ -95,7 +96,7 @@ def pace(recording: Recording, run: MeasuredPace, plan: Predicted | None) -> str
     if plan is None:
         note = f'<p class="note">No prediction: {escape(recording.missing)}.</p>'
     elif run.cycle is None:
-        note = '<p class="note">A cycle time is measured from 4 products on.</p>'
+        note = f'<p class="note">A cycle time is measured from {STEADY} products on.</p>'
     return _table(names, body) + note + _gears(recording, run, plan)
 
 
