@@ -140,9 +140,9 @@ class VideoFile(Closing):
                 self.coder.shutdown()
                 self.container.close()
                 self.container = None
-            if not self.frames:
-                self.path.unlink(missing_ok=True)
-            elif self.path.suffix.lower() == ".mp4":
+                if not self.encoded:
+                    self.path.unlink(missing_ok=True)
+            if self.encoded and self.path.suffix.lower() == ".mp4":
                 _rewrap(self.path, self.rate)
 
     @contextmanager

@@ -29,11 +29,14 @@ def claimed(path: Path) -> FileIO:
 
 
 def is_claimed(path: Path) -> bool:
-    """Whether another process, or this one, holds a file at the moment. Raises OSError."""
-    if not path.is_file():
+    """Whether another process, or this one, holds a file at the moment, as far as can be seen."""
+    try:
+        if not path.is_file():
+            return False
+        with FileIO(path) as file:
+            return not _lock(file)
+    except OSError:
         return False
-    with FileIO(path) as file:
-        return not _lock(file)
 
 
 def _lock(file: FileIO) -> bool:
