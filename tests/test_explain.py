@@ -20,7 +20,7 @@ CODE = re.compile(r"[A-Z][A-Za-z]+")
 NOT_PROVOKED = {
     *("Assets", "Engine", "Internal", "Interrupted", "Killed", "Missing", "NoGL", "NoVideo"),
     *("Dropped", "Early", "Exchanged", "Frame", "Order", "Start", "Stuck", "TwoHolders"),
-    *("NotProved", "Stalled", "Unstable"),
+    *("CutOff", "NotProved", "Stalled", "Unstable"),
 }
 """Codes that need a broken machine, run or factory, which other tests make."""
 

@@ -27,6 +27,7 @@ from factory.show.report.page import SCRIPTS
 from factory.show.report.sections import assembly_tree
 from factory.show.report.words import proof
 from factory.simulation.request import RunRequest
+from factory.simulation.run import STEADY
 from factory.simulation.simulation import Simulation
 from factory.study.analysis import Timing, analyse
 from factory.study.analysis.recorded import logged_record
@@ -311,6 +312,18 @@ def test_a_pag_is_run_first_and_leaves_nothing_but_the_page(run, out: Path, monk
     assert len(written["paper.html"]) == done.json["bytes"] < 1_000_000
 
 
+def test_a_pag_is_run_for_as_long_as_its_figures_need(run: Terminal, out: Path) -> None:
+    """A cycle time is measured from four products on, and the report makes as many by itself."""
+    done = run("report", PAPER, "-o", out / "a.html", "--json")
+    assert done.status == 0 and done.json["products"] == STEADY
+    assert done.json["cut_off"] is None
+    words = Page((out / "a.html").read_text("utf-8")).words
+    rows = {words[n]: words[n + 1 : n + 3] for n in range(len(words) - 2)}
+    for name in ("Cycle time", "Throughput", "First product", f"Product {STEADY}"):
+        predicted, measured = map(float, rows[name])
+        assert measured == pytest.approx(predicted, rel=0.02)
+
+
 def test_what_cannot_be_told_is_refused(run, log: Path, out: Path, tmp_path: Path) -> None:
     ideal = tmp_path / "ideal.log"
     assert run("run", PAPER, "--world", "ideal", "--log", ideal, "--quiet").status == 0
@@ -340,9 +353,11 @@ def test_a_log_says_which_floor_its_layout_was_made_for(run: Terminal, tmp_path:
 def test_a_log_that_was_cut_off_is_told_as_far_as_it_goes(log: Path, tmp_path: Path) -> None:
     cut = tmp_path / "cut.log"
     cut.write_bytes(log.read_bytes()[:-4000])
-    assert not read_log(cut).complete
+    kept = read_log(cut)
+    assert not kept.complete and kept.cut_off is not None
     found = Page(page(recording_of(cut)))
-    assert any("cut off" in words for words in found.words)
+    assert kept.cut_off.told in found.words
+    assert any("they explain the run, as far as it goes." in words for words in found.words)
 
 
 def test_bodies_that_replace_others_are_no_hand_overs(tmp_path: Path) -> None:

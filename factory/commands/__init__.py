@@ -29,8 +29,16 @@ from factory.commands.run import run
 from factory.commands.sweep import sweep
 from factory.commands.templates import templates
 from factory.commands.view import view
-from factory.support.console import emit, fail, say
-from factory.support.errors import Diagnostic, FactoryError, InputError, MissingError, did_you_mean
+from factory.support.console import STDOUT, emit, fail, say
+from factory.support.errors import (
+    Diagnostic,
+    FactoryError,
+    InputError,
+    MissingError,
+    StoppedError,
+    did_you_mean,
+)
+from factory.support.files import NO_ROOM
 from factory.support.interruption import stop_on_signals
 from factory.support.version import __version__
 
@@ -48,6 +56,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     except OSError as error:
         os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
         if not isinstance(error, BrokenPipeError):
+            error.filename = STDOUT
             status = fail(_unwritten(error), False)
     try:
         sys.stderr.flush()
@@ -80,16 +89,12 @@ def run_command(words: list[str]) -> int:
         return fail(_refusal(error), "--json" in words)
 
 
-class _Interrupted(FactoryError):
-    exit_status = 130
-
-
 def _refusal(error: BaseException) -> FactoryError:
     """Any exception as an error for the user."""
     if isinstance(error, FactoryError):
         return error
     if isinstance(error, KeyboardInterrupt | click.Abort):
-        return _Interrupted(Diagnostic("Interrupted", "stopped by the user"))
+        return StoppedError(Diagnostic("Interrupted", "stopped by the user"))
     if isinstance(error, click.ClickException):
         return InputError(_usage(error))
     if isinstance(error, ImportError) and not (error.name or "").startswith("factory"):
@@ -132,8 +137,7 @@ def _missing_package(error: ImportError) -> MissingError:
 def _unwritten(error: OSError) -> InputError:
     where = f"{error.filename}: " if error.filename else ""
     message = f"{where}{error.strerror or error}"
-    hint = "check the path, its permissions and the space on the disk"
-    return InputError(Diagnostic("BadFile", message, None, hint))
+    return InputError(Diagnostic("BadFile", message, None, NO_ROOM))
 
 
 class _Commands(click.Group):

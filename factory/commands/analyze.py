@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from factory.commands.logs import cut_off, read_partly
 from factory.commands.options import (
     DRAW,
     FLOOR,
@@ -46,16 +47,14 @@ class AnalyzeOptions:
     faster: tuple[str, ...]
     shorter: tuple[str, ...]
 
-    def log(self) -> Log | None:
+    def log(self, silent: bool) -> Log | None:
         """The log to compare with. Raises InputError."""
         if self.measured is None:
             return None
         if self.on_the_spot:
             message = "--measured LOG and --run exclude each other"
             raise InputError(Diagnostic("Usage", message, None, "leave one out"))
-        from factory.record.log import read_log
-
-        return read_log(self.measured)
+        return read_partly(self.measured, silent)
 
     def change(self, factory: Factory) -> tuple[str, Change] | None:
         """The change that is asked about, in words before it. Raises InputError."""
@@ -164,7 +163,7 @@ def _analyze_pag(
 
     writable(given.file, output)
     check_picture(output)
-    log = study.log()
+    log = study.log(out.silent)
     made = (
         Conditions(given.settings(), asked.world, asked.seed, asked.jitter, asked.wip)
         if log is None
@@ -187,7 +186,8 @@ def _analyze_pag(
     if output is not None:
         write_bytes(output, picture(found, output.suffix))
     if out.as_json:
-        emit({**document(found), "picture": str(output) if output else None})
+        drawn = str(output) if output else None
+        emit({**document(found), "picture": drawn, **cut_off(log)})
     elif not out.quiet:
         _tell(found, out.verbose)
         if output is not None:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from factory.commands.logs import cut_off, read_partly
 from factory.commands.options import FLOOR, MOTION, OUTPUT, PATH, RELAY, SOURCE
 from factory.commands.outputs import writable, writable_folder
 from factory.commands.requests import OutputOptions, ProjectOptions
@@ -47,12 +48,13 @@ def export(
     """Write FILE.pag, a net in FILE.pnml or a LOG of a run for other tools."""
     from factory.export import Subject
     from factory.pipeline import Project
+    from factory.record.log import Log
     from factory.support.files import write_all
 
     chosen = _exporter(form, of)
     whole = chosen.folder and output is not None and _is_folder(output)
     _writable(given.file, output, whole, chosen)
-    source = _source(given, chosen)
+    source = _source(given, chosen, out.silent)
     name = output.name if output else ""
     made = chosen.export(Subject(given.file, source, of, name, whole))
     if isinstance(source, Project) and source.has_geometry:
@@ -63,17 +65,19 @@ def export(
     if out.as_json:
         text = {"text": made} if output is None else {}
         shown = str(output) if output else None
-        emit({"format": form, "output": shown, "files": [str(f) for f in files], **text})
+        log = cut_off(source if isinstance(source, Log) else None)
+        listed = [str(f) for f in files]
+        emit({"format": form, "output": shown, "files": listed, **log, **text})
     elif output is None and isinstance(made, str):
         say(made.rstrip("\n"))
     return 0
 
 
-def _source(given: ProjectOptions, chosen: Exporter) -> Source:
+def _source(given: ProjectOptions, chosen: Exporter, silent: bool) -> Source:
     """What an exporter makes a file of. Raises InputError, of code Usage where the exporter does
     not take such a file."""
     from factory.pipeline import read
-    from factory.record.log import is_log, read_log
+    from factory.record.log import is_log
     from factory.support.files import is_net
 
     file, settings, ground = given.file, given.settings(), given.ground()
@@ -86,7 +90,7 @@ def _source(given: ProjectOptions, chosen: Exporter) -> Source:
             hint = "keep one first: `factory run FILE.pag --log OUT`"
         raise InputError(Diagnostic("Usage", message, None, hint))
     if kind == "a log":
-        return read_log(file)
+        return read_partly(file, silent)
     if kind == "a PAG":
         return read(file, given.folders, settings, ground)
     from factory.foreign_nets.pnml_reader import load_net

@@ -13,6 +13,7 @@ from factory.commands.requests import OutputOptions
 from factory.support.console import emit, say
 
 if TYPE_CHECKING:
+    from factory.record.ending import CutOff
     from factory.record.monitor import Report
 
 SHOWN = 8
@@ -23,7 +24,10 @@ SHOWN = 8
 @click.argument("file", metavar="LOG", type=PATH)
 @OUTPUT
 def monitor(file: Path, out: OutputOptions) -> int:
-    """Judge the run in a LOG that `run --log` has kept against its net, from its states alone."""
+    """Judge the run in a LOG that `run --log` has kept against its net, from its states alone.
+
+    The status is 1 for a run that does not follow its net, or was cut off before its units were
+    made, and 2 for a LOG that ends before there is anything to judge."""
     from factory.record.log import read_log
     from factory.record.monitor.record import watch_log
 
@@ -35,26 +39,30 @@ def monitor(file: Path, out: OutputOptions) -> int:
             "product": subject.factory.pag.root,
             "sim_time_s": round(float(log.time[-1]), 6),
             "complete": log.complete,
+            "cut_off": log.cut_off and log.cut_off.as_json(),
             **report.as_json(),
             "monitor_time_s": report.time_s,
         }
         emit(document)
     elif not out.quiet:
-        say(verdict(report))
+        say(verdict(report, log.cut_off))
         for firing in (*report.seen, *report.inferred) if out.verbose else ():
             how = "inferred" if firing.seen is None else "seen"
             span = f"{firing.earliest:.3f} to {firing.latest:.3f} s"
             say(f"  {firing.transition} of unit {firing.unit}: {how}, {span}")
     say_violations(report, len(report.violations) if out.verbose else SHOWN)
-    return 0 if report.refines_net else 1
+    if log.cut_off:
+        print(log.cut_off.diagnostic(file), file=sys.stderr)
+    return 0 if report.refines_net and not log.cut_off else 1
 
 
-def verdict(report: Report) -> str:
+def verdict(report: Report, cut_off: CutOff | None) -> str:
     """What a monitor found, in a line for people."""
     counts = f"{len(report.seen)} firings seen, {len(report.inferred)} inferred"
+    judged = f"{len(report.violations)} VIOLATIONS"
     if report.refines_net:
-        return f"monitor: {counts}; they explain the run"
-    return f"monitor: {counts}; {len(report.violations)} VIOLATIONS"
+        judged = f"they explain the run{' as far as it goes' if cut_off else ''}"
+    return f"monitor: {counts}; {judged}" + (f", {cut_off}" if cut_off else "")
 
 
 def say_violations(report: Report | None, shown: int = SHOWN) -> None:

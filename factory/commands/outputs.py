@@ -5,13 +5,14 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
+from factory.support.claim import IN_USE, is_claimed
 from factory.support.errors import Diagnostic, InputError
 
 
 def writable(file: Path | None, *outputs: Path | None) -> None:
     """Output files must be such that they can be written: their folder there and writable,
-    themselves no folder, all different, and none the input. Raises InputError (BadFile) with every
-    fault."""
+    themselves no folder, all different, none the input, and none being written by a run. Raises
+    InputError (BadFile) with every fault."""
     taken = {} if file is None else {os.path.realpath(file): "the input"}
     faults = []
     for path in outputs:
@@ -41,6 +42,8 @@ def _unwritable(path: Path) -> tuple[str, str] | None:
         return f"'{folder}' is not a folder", "choose another place"
     if not os.access(path if path.exists() else folder, os.W_OK):
         return f"'{path}' may not be written", "choose another place, or change its permissions"
+    if is_claimed(path):
+        return f"'{path}' {IN_USE[0]}", IN_USE[1]
     return None
 
 

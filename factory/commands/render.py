@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Literal
 
 import click
 
+from factory.commands.logs import cut_off, read_partly
 from factory.commands.options import (
     FLOOR,
     MOTION,
@@ -56,7 +57,7 @@ def render(
     at: str,
 ) -> int:
     """Film FILE.pag, or a LOG that `run --log` has kept, headless through EGL."""
-    from factory.record.log import is_log, read_log
+    from factory.record.log import is_log
     from factory.render import Film, Still, check_output, render_log
     from factory.support.gl import probe
 
@@ -71,8 +72,10 @@ def render(
         message = "--poster is of a film; this is a still"
         raise InputError(Diagnostic("Usage", message, None, "leave out --poster"))
     probe()
+    log = None
     if is_log(file):
-        frames = render_log(read_log(file), output, picture, shown.fps, moment, shown.poster)
+        log = read_partly(file, out.silent)
+        frames = render_log(log, output, picture, shown.fps, moment, shown.poster)
     else:
         made = _simulation(given, asked, out.quiet)
         taken = (
@@ -87,7 +90,7 @@ def render(
     if out.as_json:
         width, height = size
         document = {"output": str(output), "frames": frames, "width": width, "height": height}
-        emit({**document, "fps": shown.fps, "seconds": seconds})
+        emit({**document, "fps": shown.fps, "seconds": seconds, **cut_off(log)})
     elif not out.quiet:
         say(f"{output}: {frames} frames of {size[0]}x{size[1]}, {seconds:.1f} s")
     return 0

@@ -36,7 +36,12 @@ if TYPE_CHECKING:
 @click.command()
 @SOURCE
 @click.option("-o", "--output", type=PATH, required=True, help="The page: OUT.html.")
-@click.option("--units", type=click.IntRange(1, 10_000), default=3, help="Products of the run.")
+@click.option(
+    "--units",
+    type=click.IntRange(1, 10_000),
+    default=4,
+    help="Products of the run; a cycle time is measured from 4 on.",
+)
 @DRAW
 @WIP
 @click.option("--max-time", type=Number(0, min_open=True), help="Stop after this time [s].")
@@ -46,7 +51,10 @@ if TYPE_CHECKING:
 @MOTION
 @OUTPUT
 def report(given: ProjectOptions, asked: RunOptions, out: OutputOptions, output: Path) -> int:
-    """Write one HTML page about a run of FILE.pag, or the run in a LOG that `run --log` kept."""
+    """Write one HTML page about a run of FILE.pag, or the run in a LOG that `run --log` kept.
+
+    The status is 1 for a run that failed, or was cut off before its units were made; the page is
+    written, and says so."""
     from factory.record.log import is_log
     from factory.show.report import page, recording_of
     from factory.support.files import write_text
@@ -60,12 +68,13 @@ def report(given: ProjectOptions, asked: RunOptions, out: OutputOptions, output:
         recording, run = _run(given, asked, out)
     text = page(recording)
     write_text(output, text)
-    size = len(text.encode())
+    size, cut = len(text.encode()), recording.log.cut_off
     document = {
         "output": str(output),
         "bytes": size,
         "products": int(recording.log.delivered[-1]),
         "sim_time_s": round(recording.end, 6),
+        "cut_off": cut and cut.as_json(),
         "predicted": recording.layout is not None,
     }
     if out.as_json:
@@ -76,7 +85,9 @@ def report(given: ProjectOptions, asked: RunOptions, out: OutputOptions, output:
             say(f"  no predictions: {recording.missing}")
         if run is not None and out.verbose:
             summarise(run, recording.factory, out.verbose)
-    return 0 if run is None or run.succeeded else 1
+    if cut and run is None:
+        print(cut.diagnostic(given.file), file=sys.stderr)
+    return 0 if not cut and (run is None or run.succeeded) else 1
 
 
 def _run(given: ProjectOptions, asked: RunOptions, out: OutputOptions) -> tuple[Recording, Run]:

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Sequence
-from contextlib import AbstractContextManager, ExitStack
+from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
@@ -22,18 +22,19 @@ from factory.commands.requests import (
     check_ideal,
 )
 from factory.support.console import POOL_BOUND, emit, say, table, warn
-from factory.support.errors import Diagnostic, InputError
+from factory.support.errors import Diagnostic, InputError, StoppedError
 
 if TYPE_CHECKING:
     from factory.pipeline import Project
     from factory.plant.factory import Factory
+    from factory.record.observed import Recorder
     from factory.render import Film
     from factory.simulation.run import Run
     from factory.simulation.simulation import Observer, Simulation
 
     Filming = Callable[[Simulation], Film]
-    Recorder = Callable[[], AbstractContextManager[Any]]
-    """Opens what observes a run within a context, such as a log."""
+    Opening = Callable[[], Recorder]
+    """Opens what records a run within a context, such as a log."""
 
 
 @click.command()
@@ -121,7 +122,7 @@ def run_project(
     proved(project.factory.net)
     seen = log is not None or film is not None or monitor
     made = Simulation(project.layout, asked.request(project, seen))
-    recorders: list[Recorder] = []
+    recorders: list[Opening] = []
     if log is not None:
         from factory.record.log import LogWriter
 
@@ -142,18 +143,27 @@ def carry_out(
     made: Simulation,
     silent: bool,
     max_time: float | None = None,
-    recorders: Sequence[Recorder] = (),
+    recorders: Sequence[Opening] = (),
     watchers: Sequence[Observer] = (),
 ) -> Run:
     """A run with a progress bar. A signal ends it at the end of a tick, so that the recorders'
-    files are complete."""
+    files are complete; StoppedError then says how far it came."""
+    from factory.record.ending import CutOff
     from factory.support.interruption import Interruption
     from factory.support.progress import Progress
 
-    with Interruption() as stop, ExitStack() as stack:
-        opened = [stack.enter_context(recorder()).observe for recorder in recorders]
-        bar = stack.enter_context(Progress(made.request.units, silent))
-        return made.run([*watchers, *opened], max_time, [stop.observe, bar.observe])
+    try:
+        with Interruption() as stop, ExitStack() as stack:
+            opened = [stack.enter_context(recorder()) for recorder in recorders]
+            bar = stack.enter_context(Progress(made.request.units, silent))
+            seeing = [*watchers, *(recorder.observe for recorder in opened)]
+            record = made.run(seeing, max_time, [stop.observe, bar.observe])
+            for recorder in opened:
+                recorder.end(record.trouble)
+            return record
+    except KeyboardInterrupt as error:
+        came = CutOff(made.world.time, made.world.delivered() - made.before, made.request.units)
+        raise StoppedError(Diagnostic("Interrupted", f"stopped by the user, {came}")) from error
 
 
 def summarise(record: Run, factory: Factory, verbose: bool) -> None:
@@ -197,7 +207,7 @@ def summarise(record: Run, factory: Factory, verbose: bool) -> None:
         if physics.fused:
             say("parts joined for good are one rigid body (--no-fuse keeps them apart)")
     if record.monitor is not None:
-        say(verdict(record.monitor))
+        say(verdict(record.monitor, record.cut_off))
     busy = sorted(zip(factory.robots, record.utilisation, strict=True), key=lambda p: -p[1])
     rows = [(r.name, r.type, f"{100 * u:.0f} %") for r, u in (busy if verbose else busy[:6])]
     table("Utilisation", ("robot", "type", "busy"), rows)

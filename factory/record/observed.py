@@ -6,6 +6,8 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 from factory.layout.layout import Layout
 from factory.nets.petri import Marking
+from factory.support.errors import Diagnostic
+from factory.support.resource import Closing
 from factory.support.settings import Settings
 
 if TYPE_CHECKING:
@@ -52,3 +54,14 @@ class Observed(Protocol):
     def world(self) -> Any: ...
     @property
     def supervisor(self) -> Any: ...
+
+
+class Recorder(Closing):
+    """What keeps a run in a file: an observer of it, and a context manager."""
+
+    def observe(self, world: Any, supervisor: Any) -> None:
+        """Record the state after a tick."""
+        raise NotImplementedError
+
+    def end(self, trouble: Diagnostic | None) -> None:
+        """The run is over; `trouble`: what ended it early."""

@@ -13,20 +13,20 @@ from factory.record.log import Log
 from factory.record.log.model import model_of
 from factory.record.monitor.record import recorded_subject
 from factory.record.monitor.subject import subject_of_run
+from factory.record.observed import Recorder
 from factory.render.camerawork import Moment, Take, When, pictureless
 from factory.render.history import History
 from factory.render.picture import USUAL, Picture
 from factory.render.reel import Reel, save
 from factory.render.subject import Snapshot, held
 from factory.render.video import FPS, check_output
-from factory.support.resource import Closing
 
 if TYPE_CHECKING:
     from factory.simulation.simulation import Simulation
 
 
-class _Observer(Closing):
-    """What films and stills of a run have in common: an observer, and a context manager."""
+class _Observer(Recorder):
+    """What films and stills of a run have in common."""
 
     def __init__(self, simulation: Simulation, picture: Picture) -> None:
         if simulation.model is None:
@@ -39,9 +39,6 @@ class _Observer(Closing):
         self.take = Take(m, subject, name, units, picture, self.history)
         self.number = factory.net.threaded.net.transition_index
         self.last = self._moment()
-
-    def observe(self, world: Any, supervisor: Any) -> None:
-        raise NotImplementedError
 
     def _moment(self) -> Moment:
         world, events = self.simulation.physical, self.simulation.supervisor.events
@@ -148,7 +145,7 @@ def render_log(
 
 def take_of(log: Log, picture: Picture) -> Take:
     """What pictures of a log are taken of, with nothing fired yet."""
-    if not log.xml:
+    if log.header["world"] == "ideal":
         raise pictureless()
     m, subject = model_of(log), recorded_subject(log.header)
     picture.check([part.label for part in subject.factory.leaves])

@@ -11,15 +11,18 @@ less (docs/decisions/films.md)."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
+from contextlib import contextmanager
 from fractions import Fraction
 from math import isfinite
 from pathlib import Path
 from typing import Any
 
 from factory.render.ink import Pixels
+from factory.support.claim import claimed
 from factory.support.errors import Diagnostic, InputError, MissingError
-from factory.support.files import partial_of
+from factory.support.files import partial_of, unwritten
 from factory.support.resource import Closing
 
 FPS = 30.0
@@ -66,8 +69,8 @@ def _bad(message: str, hint: str) -> InputError:
 
 
 class VideoFile(Closing):
-    """An H.264 video (yuv420p) of exact size and rate. Raises InputError where it cannot be
-    written."""
+    """An H.264 video (yuv420p) of exact size and rate, which no other process writes meanwhile.
+    Raises InputError where it cannot be written."""
 
     def __init__(self, path: Path, size: tuple[int, int], fps: float) -> None:
         check_output(path, size, fps)
@@ -78,6 +81,7 @@ class VideoFile(Closing):
         self.rate = rate = Fraction(fps).limit_denominator(1001)
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
+            self.claim = claimed(path)
             kind, options = FRAGMENTS[path.suffix.lower()]
             options = {**options, "flush_packets": "1"}
             self.container: Any = av.open(str(path), "w", format=kind, options=options)
@@ -101,7 +105,8 @@ class VideoFile(Closing):
         """Add a frame (height, width, 3). It is encoded on a thread of its own while the next is
         drawn. On the thread that draws, one encoding in five came out different from the same
         pictures (measured, not explained: the floating-point state is untouched)."""
-        self._wait()
+        with self._room():
+            self._wait()
         self.pending = self.coder.submit(self._encode, pixels)
         self.frames += 1
 
@@ -122,21 +127,31 @@ class VideoFile(Closing):
         self.container.mux(self.stream.encode(None))
 
     def close(self) -> None:
-        """Finish the file and give it its name; without a single frame there is none."""
+        """Finish the file and give it its name; without a single frame there is none. Raises
+        InputError (BadFile) where there is no room for it."""
         if self.container is None:
             return
+        with self.claim, self._room():
+            try:
+                self._wait()
+                if self.encoded:
+                    self.coder.submit(self._flush).result()
+            finally:
+                self.coder.shutdown()
+                self.container.close()
+                self.container = None
+                if not self.encoded:
+                    self.path.unlink(missing_ok=True)
+            if self.encoded and self.path.suffix.lower() == ".mp4":
+                _rewrap(self.path, self.rate)
+
+    @contextmanager
+    def _room(self) -> Iterator[None]:
+        """What fails to be written within it is this file."""
         try:
-            self._wait()
-            if self.encoded:
-                self.coder.submit(self._flush).result()
-        finally:
-            self.coder.shutdown()
-            self.container.close()
-            self.container = None
-        if not self.frames:
-            self.path.unlink(missing_ok=True)
-        elif self.path.suffix.lower() == ".mp4":
-            _rewrap(self.path, self.rate)
+            yield
+        except OSError as error:
+            raise unwritten(self.path, error) from error
 
 
 def _rewrap(path: Path, rate: Fraction) -> None:

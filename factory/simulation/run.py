@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, NamedTuple
 
 from factory.plant.approaches import Pair
 from factory.plant.factory import Factory
+from factory.record.ending import CutOff
 from factory.support.errors import Diagnostic
 
 if TYPE_CHECKING:
@@ -19,6 +20,19 @@ class Event(NamedTuple):
 
     t: float
     transition: str
+
+
+STEADY = 4
+"""Number of products from which on a cycle time is measured: the last half has two intervals."""
+
+
+def mean_interval(left: Sequence[float]) -> float | None:
+    """The mean interval [s] over the last half of the products that left at these times; None for
+    fewer than STEADY."""
+    if len(left) < STEADY:
+        return None
+    tail = left[len(left) // 2 - 1 :]
+    return (tail[-1] - tail[0]) / (len(tail) - 1)
 
 
 def busy_times(factory: Factory, events: Iterable[Event]) -> tuple[float, ...]:
@@ -99,6 +113,14 @@ class Run:
         return self.trouble is None and self.refines_net
 
     @property
+    def cut_off(self) -> CutOff | None:
+        """How far a run came that did not reach its end."""
+        if self.trouble is None:
+            return None
+        why = self.trouble.code, self.trouble.message
+        return CutOff(self.sim_time_s, self.products, self.units, *why)
+
+    @property
     def realtime_factor(self) -> float:
         """Simulated seconds per second of the run loop."""
         return self.sim_time_s / self.wall_time_s if self.wall_time_s else 0.0
@@ -106,11 +128,7 @@ class Run:
     @property
     def cycle_time_s(self) -> float | None:
         """Mean interval between dropoffs over the last half of the units; None below 4."""
-        if len(self.dropoffs) < 4:
-            return None
-        start = len(self.dropoffs) // 2
-        last = self.dropoffs[start - 1 :]
-        return (last[-1] - last[0]) / (len(last) - 1)
+        return mean_interval(self.dropoffs)
 
     @property
     def utilisation(self) -> tuple[float, ...]:
@@ -120,7 +138,7 @@ class Run:
 
     def as_json(self) -> dict[str, object]:
         """The document that `run --json` prints."""
-        physics, monitor = self.physics, self.monitor
+        physics, monitor, cut = self.physics, self.monitor, self.cut_off
         watched = (
             {"monitor_time_s": monitor.time_s, "monitor": monitor.as_json()} if monitor else {}
         )
@@ -141,6 +159,7 @@ class Run:
             "world": self.world,
             "units": self.units,
             "products": self.products,
+            "cut_off": cut and cut.as_json(),
             "robots": self.robots,
             "seed": self.seed,
             "jitter": self.jitter,

@@ -7,8 +7,8 @@ from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Iterable, Mapping
-from contextlib import suppress
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager, suppress
 from dataclasses import replace
 from math import isfinite
 from typing import Any
@@ -20,6 +20,9 @@ SCHEMA = 1
 POOL_BOUND = "more take too many bodies for the engine, unless --wip asks for them"
 """Why the factory bounds the units inside at once."""
 
+STDOUT = "what is printed"
+"""The name of stdout in messages."""
+
 
 def emit(document: Mapping[str, Any]) -> None:
     """One JSON document on stdout, in ASCII whatever the locale; null for what is not finite."""
@@ -28,7 +31,7 @@ def emit(document: Mapping[str, Any]) -> None:
         text = json.dumps(document, allow_nan=False)
     except ValueError:
         text = json.dumps(finite(document), allow_nan=False)
-    print(text)
+    say(text)
 
 
 def finite(value: Any) -> Any:
@@ -41,8 +44,19 @@ def finite(value: Any) -> Any:
 
 
 def say(text: str = "") -> None:
-    """A line for people on stdout."""
-    print(text)
+    """A line on stdout."""
+    with _named():
+        print(text)
+
+
+@contextmanager
+def _named() -> Iterator[None]:
+    """Errors of stdout within it name that."""
+    try:
+        yield
+    except OSError as error:
+        error.filename = STDOUT
+        raise
 
 
 def warn(diagnostics: Iterable[Diagnostic], quiet: bool = False) -> None:
@@ -84,6 +98,7 @@ def table(title: str, columns: tuple[str, ...], rows: Iterable[tuple[str, ...]])
     for row in rows:
         made.add_row(*(Text(cell) for cell in row))
     console = Console(width=None if sys.stdout.isatty() else 160, highlight=False)
-    with console.capture() as printed:
-        console.print(made)
-    print(printed.get(), end="")
+    with _named():
+        with console.capture() as printed:
+            console.print(made)
+        print(printed.get(), end="")

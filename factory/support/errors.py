@@ -99,6 +99,12 @@ class MissingError(FactoryError):
     exit_status = 3
 
 
+class StoppedError(FactoryError):
+    """The user, or the system, has stopped the program. Exit status 130."""
+
+    exit_status = 130
+
+
 def did_you_mean(found: str, valid: Sequence[str], noun: str = "") -> str:
     """A hint that suggests the nearest valid name, or lists what there is (at most twelve)."""
     near = get_close_matches(found, valid, n=1, cutoff=0.6)

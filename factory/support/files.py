@@ -16,6 +16,9 @@ LOG = b"factory-log "
 """The first bytes of a log of a run, in every version."""
 
 
+NO_ROOM = "check the path, its permissions and the space on the disk"
+
+
 def write_bytes(path: Path, content: bytes) -> None:
     """Write a file atomically. Raises OSError."""
     write_all({path: content})
@@ -56,6 +59,12 @@ def write_all(contents: Mapping[Path, bytes]) -> None:
         if isinstance(error, OSError) and error.filename is None:
             error.filename = str(path)
         raise
+
+
+def unwritten(path: Path, error: OSError) -> InputError:
+    """The error of a file that could not be written to its end."""
+    message = f"'{path}' cannot be written: {error.strerror or error}"
+    return InputError(Diagnostic("BadFile", message, None, NO_ROOM))
 
 
 def make_folder(folder: Path) -> list[Path]:

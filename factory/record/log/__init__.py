@@ -20,10 +20,11 @@ appended to.
        contact_at, _count, contact        rows with contacts, how many, pairs of geoms
        contact_dist                       their distances [m]
        fired_at, fired, fired_t           row, number and time [s] of the transitions fired
-    E  the end, empty: the file was closed properly
+    E  the end: the file was closed properly. Where the run ended before its units were made:
+       code, message, bytes             what ended it, as a diagnostic has it
 
-Every block stands for itself. What was written is flushed with each, so a file that ends in the
-middle of one lacks at most the last second."""
+Every block stands for itself and is written at once, so a file that ends in the middle of one lacks
+at most the last second. While it is written it is locked (`flock`)."""
 
 from factory.record.log.blocks import MAGIC
 from factory.record.log.reader import Log, Ragged, is_log, read_log

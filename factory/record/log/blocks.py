@@ -44,16 +44,23 @@ def block(kind: bytes, arrays: Mapping[str, NDArray[Any]], level: int = 1) -> by
     return HEAD.pack(kind, len(content), zlib.crc32(content)) + content
 
 
-def blocks(data: memoryview) -> Iterator[tuple[bytes, Arrays]]:
-    """The blocks in a file's tail, up to the first that is cut off or damaged."""
-    at = 0
+def blocks(data: memoryview, at: int) -> Iterator[tuple[bytes, Arrays, int]]:
+    """The blocks in a file from byte `at` on, up to the first that is cut off or damaged, each with
+    the byte at which the next begins."""
     while at + HEAD.size <= len(data):
         kind, length, check = HEAD.unpack_from(data, at)
         content = data[at + HEAD.size : at + HEAD.size + length]
         if len(content) != length or zlib.crc32(content) != check:
             return
-        yield kind, unpacked(content)
         at += HEAD.size + length
+        yield kind, unpacked(content), at
+
+
+def is_cut(data: memoryview, at: int) -> bool:
+    """Whether a file ends within the block that begins at byte `at`."""
+    if at + HEAD.size > len(data):
+        return True
+    return at + HEAD.size + int(HEAD.unpack_from(data, at)[1]) > len(data)
 
 
 def unpacked(content: memoryview) -> Arrays:

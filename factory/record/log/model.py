@@ -9,13 +9,15 @@ from factory.support.errors import Diagnostic, InputError
 
 
 def model_of(log: Log) -> mujoco.MjModel:
-    """The model in a log. Raises InputError (BadLog) for a log of the ideal world or without a
-    tick, and where the engine refuses the model or its states are not those of the log."""
-    if not log.xml:
+    """The model in a log. Raises InputError (BadLog) for a log of the ideal world, or one that ends
+    before its first ticks, and where the engine refuses the model or its states are not those of
+    the log."""
+    if log.header["world"] == "ideal":
         hint = "keep a log of a run in MuJoCo: `factory run FILE.pag --log OUT`"
         raise _bad("the log is of the ideal world, which has no bodies to show", hint)
     if not len(log):
-        raise _bad("the log has no tick", "run for longer")
+        why = f": {log.cut_off.message}" if log.cut_off else ""
+        raise _bad(f"the log is cut off before its first simulated second{why}")
     files = {f"meshes/{name}": content for name, content in log.files.items()}
     try:
         m = mujoco.MjModel.from_xml_string(log.xml, files)

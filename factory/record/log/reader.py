@@ -13,9 +13,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from factory.record.log.blocks import LENGTH, MAGIC, Arrays, bad_log, blocks, unpack_rows
+from factory.record.ending import CutOff
+from factory.record.log.blocks import LENGTH, MAGIC, Arrays, bad_log, blocks, is_cut, unpack_rows
 from factory.record.log.header import check_header
 from factory.record.log.ticks import check_block, check_course, state_bytes
+from factory.support.claim import is_claimed
 from factory.support.errors import InputError
 
 Index = NDArray[np.int32]
@@ -44,7 +46,8 @@ class Log:
     `marking[i]`: numbers of the marked places; `active[i]` (k, 3): active constraints, and the two
     bodies each joins; `contacts[i]` (k, 2) geoms, `distances[i]` (k,) [m]; `fired` and `fired_t`:
     transitions by number and time [s]. `ctrl`: the setpoints; None in the ideal world, and in
-    logs of older versions. `complete`: whether the file was closed properly."""
+    logs of older versions. `complete`: whether the file was closed properly; `cut_off`: how far the
+    run came, None where all of its units were made and the log has all of it."""
 
     header: Mapping[str, Any] = field(repr=False)
     xml: str = field(repr=False)
@@ -61,6 +64,7 @@ class Log:
     fired_t: NDArray[np.float64] = field(repr=False)
     ctrl: NDArray[np.float64] | None = field(default=None, repr=False)
     complete: bool = True
+    cut_off: CutOff | None = None
 
     def __len__(self) -> int:
         return len(self.time)
@@ -76,13 +80,13 @@ def read_log(path: Path | str) -> Log:
     """The log in a file, whole or cut off. Raises InputError (BadLog) where it is not one."""
     path = Path(path)
     try:
-        data = path.read_bytes()
+        written, data = is_claimed(path), path.read_bytes()
     except OSError as error:
         raise InputError(bad_log(path, f"cannot be read: {error.strerror}")) from error
     if not data.startswith(MAGIC):
         raise InputError(bad_log(path, "is no log of factory"))
     try:
-        return _read(memoryview(data)[len(MAGIC) :])
+        return _read(memoryview(data), written)
     except MemoryError as error:
         raise InputError(bad_log(path, f"takes more memory than there is: {error}")) from error
     except (ValueError, KeyError, IndexError, TypeError, OverflowError, RecursionError) as error:
@@ -98,16 +102,18 @@ def is_log(path: Path | str) -> bool:
         return False
 
 
-def _read(data: memoryview) -> Log:
-    if len(data) < LENGTH.size:
-        raise ValueError("it ends in its header")
-    (length,) = LENGTH.unpack_from(data)
-    header = json.loads(bytes(data[LENGTH.size : LENGTH.size + length]))
+def _read(data: memoryview, written: bool) -> Log:
+    begin = len(MAGIC) + LENGTH.size
+    kept = begin + (LENGTH.unpack_from(data, len(MAGIC))[0] if begin <= len(data) else 0)
+    if kept > len(data) or begin > len(data):
+        raise ValueError(f"it ends in its header, at byte {len(data)}")
+    header = json.loads(bytes(data[begin:kept]))
     check_header(header)
     left = ROOM + FOLD * len(data)
     xml, files, complete = "", {}, False
+    trouble: Arrays = {}
     ticks: list[Arrays] = []
-    for kind, arrays in blocks(data[LENGTH.size + length :]):
+    for kind, arrays, end in blocks(data, kept):
         if kind == b"M":
             xml = arrays["xml"].tobytes().decode()
             files = {k[5:]: a.tobytes() for k, a in arrays.items() if k.startswith("mesh/")}
@@ -117,10 +123,19 @@ def _read(data: memoryview) -> Log:
             if left < 0:
                 raise ValueError("its states take too much memory for a file of its size")
             ticks.append(arrays)
-        complete = kind == b"E"
+        complete, kept = kind == b"E", end
+        trouble = arrays if complete else {}
     counts = [len(a["time"]) for a in ticks]
     time, delivered = _joined("time", ticks, np.float64), _joined("delivered", ticks, np.int32)
     check_course(time, delivered)
+    why = ("", "")
+    if not complete:
+        why = "BadLog", _broken(data, kept, written)
+    elif trouble:
+        why = trouble["code"].tobytes().decode(), trouble["message"].tobytes().decode()
+    made, units = int(delivered[-1]) if len(time) else 0, header["units"]
+    last = float(time[-1]) if len(time) else 0.0
+    cut = made < units or any(why)
     wide = len(ticks[0]["ctrl_first"]) if ticks and "ctrl_first" in ticks[0] else None
     return Log(
         MappingProxyType(header),
@@ -138,7 +153,19 @@ def _read(data: memoryview) -> Log:
         _joined("fired_t", ticks, np.float64),
         _states("ctrl", wide, ticks) if wide is not None else None,
         complete,
+        CutOff(last, made, units, *why) if cut else None,
     )
+
+
+def _broken(data: memoryview, kept: int, written: bool) -> str:
+    """Why a file that was read up to byte `kept` has no end, and where it stops."""
+    if written:
+        return f"its run is still going on, and has written {kept} bytes"
+    if kept == len(data):
+        return f"its run was killed: the log ends at byte {kept} and was not closed"
+    if is_cut(data, kept):
+        return f"the log ends at byte {len(data)}, within the block that begins at byte {kept}"
+    return f"the log is damaged in the block that begins at byte {kept} of {len(data)}"
 
 
 def _states(name: str, width: int, ticks: Sequence[Arrays]) -> Any:

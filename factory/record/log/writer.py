@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import asdict
 from importlib.metadata import PackageNotFoundError, version
+from os import SEEK_CUR
 from pathlib import Path
 from typing import Any
 
@@ -21,9 +22,10 @@ from factory.problem.pag import PAG
 from factory.record.log.blocks import LENGTH, MAGIC, Arrays, bad_log, block, pack_rows
 from factory.record.monitor.observation import EngineView
 from factory.record.monitor.subject import subject_of_run
-from factory.record.observed import Observed
-from factory.support.errors import InputError
-from factory.support.resource import Closing
+from factory.record.observed import Observed, Recorder
+from factory.support.claim import claimed
+from factory.support.errors import Diagnostic, FactoryError, InputError
+from factory.support.files import unwritten
 
 STATES = ("qpos", "qvel", "ctrl")
 
@@ -65,12 +67,14 @@ class _Ticks:
         }
 
 
-class LogWriter(Closing):
-    """Writes a log; to be closed, or used as a context manager.
+class LogWriter(Recorder):
+    """Writes a log; to be closed, or used as a context manager. Other processes cannot write the
+    same file meanwhile.
 
     `pag`: the PAG as it was read, where the factory was compiled from more; `command`: the
-    command line, that of this process unless given. Raises InputError (BadLog) where the file
-    cannot be written."""
+    command line, that of this process unless given. `trouble`: what ended the run early, if
+    something has. Raises InputError where the file cannot be written (BadLog), another run writes
+    it, or there is no more room for it (BadFile)."""
 
     def __init__(
         self,
@@ -87,22 +91,25 @@ class LogWriter(Closing):
         self.most = max(1, round(1.0 / simulation.request.settings.tick))
         self.events = 0
         self.ticks = _Ticks()
-        try:
-            self.path.parent.mkdir(parents=True, exist_ok=True)
-            self.file = self.path.open("wb")
-        except OSError as error:
-            raise InputError(bad_log(self.path, f"cannot be written: {error.strerror}")) from error
+        self.trouble: Diagnostic | None = None
         sizes = [len(values) for values in self._state()[:2]]
         header = json.dumps(_header(simulation, pag, command, *sizes)).encode()
-        self.file.write(MAGIC + LENGTH.pack(len(header)) + header)
-        if simulation.model is not None:
-            files = {f"mesh/{name}": content for name, content in simulation.model.files.items()}
-            packed = {"xml": simulation.model.xml.encode(), **files}
-            self.file.write(block(b"M", {k: np.frombuffer(v, "u1") for k, v in packed.items()}, 6))
+        content = MAGIC + LENGTH.pack(len(header)) + header + _model(simulation)
+        try:
+            self.path.parent.mkdir(parents=True, exist_ok=True)
+            self.file = claimed(self.path)
+        except OSError as error:
+            raise InputError(bad_log(self.path, f"cannot be written: {error.strerror}")) from error
+        try:
+            self._append(content)
+        except InputError:
+            if self.path.is_file():
+                self.path.unlink()
+            self.file.close()
+            raise
         self.observe(simulation.world, simulation.supervisor)
 
     def observe(self, world: Any, supervisor: Any) -> None:
-        """Record the state after a tick."""
         ticks, row = self.ticks, len(self.ticks.time)
         ticks.time.append(world.time)
         ticks.delivered.append(world.delivered() - self.before)
@@ -126,17 +133,50 @@ class LogWriter(Closing):
 
     def flush(self) -> None:
         """Write the ticks since the last block."""
-        if self.ticks.time:
-            self.file.write(block(b"T", self.ticks.arrays()))
-            self.file.flush()
-            self.ticks = _Ticks()
+        ticks, self.ticks = self.ticks, _Ticks()
+        if ticks.time:
+            self._append(block(b"T", ticks.arrays()))
+
+    def end(self, trouble: Diagnostic | None) -> None:
+        self.trouble = trouble
+
+    def __exit__(self, *raised: object) -> None:
+        error = raised[1]
+        if isinstance(error, KeyboardInterrupt):
+            self.end(Diagnostic("Interrupted", "stopped by the user"))
+        elif isinstance(error, FactoryError):
+            self.end(error.diagnostics[0])
+        elif error is not None:
+            self.end(Diagnostic("Internal", f"{type(error).__name__}: {error}"))
+        self.close()
 
     def close(self) -> None:
         """Write what is left, and the end."""
-        if not self.file.closed:
+        if self.file.closed:
+            return
+        try:
             self.flush()
-            self.file.write(block(b"E", {}))
-            self.file.close()
+        finally:
+            with self.file:
+                self._append(block(b"E", self._end()))
+
+    def _end(self) -> Arrays:
+        """The arrays of the last block."""
+        if self.trouble is None:
+            return {}
+        texts = {"code": self.trouble.code, "message": self.trouble.message}
+        return {name: np.frombuffer(text.encode(), "u1") for name, text in texts.items()}
+
+    def _append(self, content: bytes) -> None:
+        """Write all of it or, where there is no room, nothing, so that the file can be closed."""
+        left = memoryview(content)
+        try:
+            while left:
+                left = left[self.file.write(left) :]
+        except OSError as error:
+            with suppress(OSError):
+                self.file.truncate(self.file.seek(len(left) - len(content), SEEK_CUR))
+            raise unwritten(self.path, error) from error
 
     def _state(self) -> tuple[NDArray[np.float64], ...]:
         if self.view is None:
@@ -152,6 +192,15 @@ def _ragged(name: str, rows: Sequence[tuple[int, Any]], shape: tuple[int, ...]) 
         f"{name}_count": np.array([len(v) for _, v in rows], np.int32),
         name: np.concatenate(values),
     }
+
+
+def _model(simulation: Observed) -> bytes:
+    """The block of the engine's model; nothing in the ideal world."""
+    if simulation.model is None:
+        return b""
+    files = {f"mesh/{name}": content for name, content in simulation.model.files.items()}
+    packed = {"xml": simulation.model.xml.encode(), **files}
+    return block(b"M", {k: np.frombuffer(v, "u1") for k, v in packed.items()}, 6)
 
 
 def _header(

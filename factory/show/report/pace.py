@@ -8,14 +8,10 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from factory.show.report.recording import Recording
+from factory.simulation.run import mean_interval
 from factory.study.analysis import Timing
 from factory.study.analysis.flow import busy_until, flow, lasting
-from factory.study.analysis.measured import (
-    dropoff_times,
-    mean_interval,
-    operation_times,
-    robot_times,
-)
+from factory.study.analysis.measured import dropoff_times, operation_times, robot_times
 from factory.study.analysis.recorded import conditions
 from factory.study.analysis.timed import timed_net
 

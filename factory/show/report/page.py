@@ -20,6 +20,7 @@ from factory.show.report.recording import Recording
 from factory.show.report.scene import scene
 from factory.show.report.sections import (
     assembly_tree,
+    ending,
     fidelity_words,
     heading,
     made_how,
@@ -65,6 +66,7 @@ def page(recording: Recording) -> str:
     fields = {
         "name": escape(recording.name, quote=True),
         "counts": escape(counts(recording.factory)),
+        "ending": ending(recording.log.cut_off),
         "heading": heading(recording, run, plan, proved, found),
         "tree": assembly_tree(recording.factory.pag, labels),
         "floor": floor_plan(recording.stage, labels),
@@ -72,7 +74,7 @@ def page(recording: Recording) -> str:
         "pace": pace(recording, run, plan),
         "utilisation": utilisation(recording, run, plan),
         "proof": proof_words(proved),
-        "fidelity": fidelity_words(found),
+        "fidelity": fidelity_words(found, recording.log.cut_off),
         "how": made_how(recording),
         "options": options(document),
     }

@@ -7,14 +7,24 @@ from html import escape
 
 from factory.plant.factory import Factory
 from factory.problem.pag import PAG
+from factory.record.ending import CutOff
 from factory.show.report.fidelity import RecordedFidelity
 from factory.show.report.links import words_of
 from factory.show.report.pace import MeasuredPace, Predicted
 from factory.show.report.recording import Recording
 from factory.show.report.words import Proof
+from factory.simulation.run import STEADY
 from factory.study.fidelity.quantities import QUANTITIES
 
 SIGNS = {True: "✓", False: "✗", None: "?"}
+
+
+def ending(cut: CutOff | None) -> str:
+    """The notice of a run that was cut off; nothing of a whole one."""
+    if cut is None:
+        return ""
+    words = escape(cut.told, quote=True)
+    return f'<p class="notice" role="note">{words[0].upper()}{words[1:]}.</p>'
 
 
 def heading(
@@ -41,7 +51,12 @@ def heading(
     cards.append(("Net", *_verdict(proof.holds, "proved", "not proved"), "live, safe, reversible"))
     held = found.refines and (found.monitor is None or found.monitor.refines_net)
     judge = "record only" if found.monitor is None else "record and monitor agree"
-    cards.append(("Run", *_verdict(held, "follows the net", "does not follow the net"), judge))
+    cut = recording.log.cut_off
+    if held and cut:
+        judge = f"follows the net until then; {judge}"
+        cards.append(("Run", *_verdict(False, "", f"cut off at {cut.t:.2f} s"), judge))
+    else:
+        cards.append(("Run", *_verdict(held, "follows the net", "does not follow the net"), judge))
     return "".join(_card(*card) for card in cards)
 
 
@@ -81,7 +96,7 @@ def pace(recording: Recording, run: MeasuredPace, plan: Predicted | None) -> str
     if plan is None:
         note = f'<p class="note">No prediction: {escape(recording.missing)}.</p>'
     elif run.cycle is None:
-        note = '<p class="note">A cycle time is measured from 4 products on.</p>'
+        note = f'<p class="note">A cycle time is measured from {STEADY} products on.</p>'
     return _table(names, body) + note + _gears(recording, run, plan)
 
 
@@ -188,7 +203,7 @@ def proof_words(proof: Proof) -> str:
     return f'<ul class="claims">{items}</ul>{digest}{save}'
 
 
-def fidelity_words(found: RecordedFidelity) -> str:
+def fidelity_words(found: RecordedFidelity, cut: CutOff | None) -> str:
     """The figures in a table, and the verdict of the monitor."""
     rows = "".join(
         f'<tr class="{"bad" if QUANTITIES[key].exceeded(value) else ""}">'
@@ -198,10 +213,10 @@ def fidelity_words(found: RecordedFidelity) -> str:
         for key, value in found.figures.items()
     )
     table = _table(("", "found", "limit", ""), rows)
-    return "".join(_judged(found)) + table
+    return "".join(_judged(found, cut)) + table
 
 
-def _judged(found: RecordedFidelity) -> Iterator[str]:
+def _judged(found: RecordedFidelity, cut: CutOff | None) -> Iterator[str]:
     yield "<p>The record of firings " + ("refines" if found.refines else "does not refine")
     yield " the net. "
     if found.monitor is None:
@@ -210,7 +225,8 @@ def _judged(found: RecordedFidelity) -> Iterator[str]:
     report = found.monitor
     yield f"The monitor, which sees the engine alone, saw {len(report.seen)} firings and inferred "
     yield f"{len(report.inferred)}; "
-    yield "they explain the run.</p>" if report.refines_net else "some things nothing explains:</p>"
+    explain = f"they explain the run{', as far as it goes' if cut else ''}.</p>"
+    yield explain if report.refines_net else "some things nothing explains:</p>"
     if report.violations:
         words = (escape(str(v.diagnostic())) for v in report.violations[:8])
         yield "<ul class='violations'>" + "".join(f"<li>{w}</li>" for w in words) + "</ul>"
@@ -235,8 +251,8 @@ def made_how(recording: Recording) -> str:
         ("Settings", settings),
         ("Versions", versions),
     ]
-    if not recording.log.complete:
-        rows.append(("Log", "cut off: the run was stopped before its end"))
+    if recording.log.cut_off:
+        rows.append(("Log", recording.log.cut_off.told))
     body = "".join(f"<dt>{name}</dt><dd>{escape(str(words))}</dd>" for name, words in rows)
     return f"<dl>{body}</dl>"
 

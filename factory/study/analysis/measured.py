@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from factory.plant.factory import Factory
-from factory.simulation.run import Event
+from factory.simulation.run import Event, mean_interval
 from factory.study.analysis.firing import Floats
 from factory.study.analysis.flow import Flow, busy_until, durations, lasting
 from factory.study.analysis.timed import TimedNet
@@ -136,11 +136,3 @@ def _duration(label: str, predicted: float, spent: Sequence[float]) -> Duration:
         float(counted.max()),
         len(counted),
     )
-
-
-def mean_interval(left: Sequence[float]) -> float | None:
-    """The mean interval [s] over the last half of the products; None below 4."""
-    if len(left) < 4:
-        return None
-    tail = left[len(left) // 2 - 1 :]
-    return (tail[-1] - tail[0]) / (len(tail) - 1)

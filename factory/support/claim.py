@@ -1,0 +1,52 @@
+"""Files that are written as long as a run takes, by one process at a time."""
+
+from __future__ import annotations
+
+from io import FileIO
+from pathlib import Path
+
+from factory.support.errors import Diagnostic, InputError
+
+IN_USE = "is being written by another run", "give another name, or wait until that run ends"
+"""What is wrong with a file that is claimed, and what would mend it."""
+
+
+def claimed(path: Path) -> FileIO:
+    """A file to append to, empty, that no other process can claim as long as it is open.
+
+    The claim is a lock of the operating system, which ends with the process, however that ends. A
+    pipe or a device is not claimed. Raises InputError (BadFile) where another process holds it,
+    which leaves that one's file as it is, and OSError where it cannot be opened.
+    """
+    file = FileIO(path, "a")
+    if path.is_file():
+        if not _lock(file):
+            file.close()
+            words, hint = IN_USE
+            raise InputError(Diagnostic("BadFile", f"'{path}' {words}", None, hint))
+        file.truncate(0)
+    return file
+
+
+def is_claimed(path: Path) -> bool:
+    """Whether another process, or this one, holds a file at the moment, as far as can be seen."""
+    try:
+        if not path.is_file():
+            return False
+        with FileIO(path) as file:
+            return not _lock(file)
+    except OSError:
+        return False
+
+
+def _lock(file: FileIO) -> bool:
+    """Whether an open file could be locked."""
+    try:
+        from fcntl import LOCK_EX, LOCK_NB, flock
+
+        flock(file, LOCK_EX | LOCK_NB)
+    except BlockingIOError:
+        return False
+    except (ImportError, OSError):  # a system, or a file system, that has no such locks
+        return True
+    return True
