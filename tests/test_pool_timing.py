@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import random
+import re
 from fractions import Fraction
 
 import networkx as nx
@@ -10,9 +11,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+import factory
 from factory.foreign_nets.behaviour import behaviour
+from factory.mjcf import model
 from factory.nets.marked import MarkedNet, marked
 from factory.plant.factory import Factory
+from factory.simulation.request import RunRequest
+from factory.simulation.simulation import Simulation, physical_model
 from factory.support.errors import InputError
 from factory.timing.cycle_time import cycle_time, marked_graph_cycle_time
 from factory.timing.pool import part_pool, with_wip
@@ -164,3 +169,28 @@ def test_wip_can_slow_a_factory_down() -> None:
 def test_only_live_marked_graphs_have_a_cycle_time(rows: list[tuple[str, str, int]]) -> None:
     with pytest.raises(ValueError, match=r"live marked graph|no circuit"):
         marked_graph_cycle_time(net_from(rows), {})
+
+
+def test_a_pool_too_large_for_the_engine_bounds_the_units_inside(monkeypatch) -> None:
+    layout = factory.lay_out(factory.compile(factory.load_pag("examples/gearbox.pag")))
+    pool = part_pool(layout.factory)
+    whole = physical_model(layout)
+    assert whole.wip is None and whole.bodies == sum(pool.values()) + len(pool)
+    monkeypatch.setattr(model, "MOST_BODIES", whole.bodies - 1)
+    fewer = physical_model(layout)
+    assert fewer.wip == max(pool.values()) - 1 and fewer.bodies < whole.bodies
+    monkeypatch.setattr(model, "MOST_BODIES", 1)
+    assert physical_model(layout).wip == 1
+    assert physical_model(layout, wip=3).wip == 3
+    made = Simulation(layout, RunRequest(units=4))
+    assert made.request.wip == 1 and made.run(max_time=1.0).physics.wip_chosen == 1
+    asked = Simulation(layout, RunRequest(units=4, wip=2))
+    assert asked.request.wip == 2 and asked.run(max_time=1.0).physics.wip_chosen is None
+
+
+def test_the_engine_has_memory_for_all_pairs_of_bodies() -> None:
+    layout = factory.lay_out(factory.compile(factory.load_pag("examples/gearbox.pag")))
+    made = physical_model(layout, 4)
+    bodies = made.xml.count("<body ") + 1
+    memory = int(re.search(r'memory="(\d+)M"', made.xml)[1])
+    assert memory * 2**20 >= 64 * 2**20 + 4 * bodies * (bodies - 1) - 2**20

@@ -1,14 +1,25 @@
-"""The progress bar: shown on a terminal only, and harmless to a run."""
+"""Progress: a bar on a terminal, lines elsewhere, and signals that are heard meanwhile."""
 
 from __future__ import annotations
 
 import io
+import signal
+import subprocess
 import sys
+import time
+from collections.abc import Callable
+from itertools import count
+from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
 
-from factory.support.progress import Progress
+import factory
+from factory.simulation.request import RunRequest
+from factory.simulation.simulation import Simulation
+from factory.support import progress
+from factory.support.interruption import awaited
+from factory.support.progress import Progress, Waiting
 
 
 class Terminal(io.StringIO):
@@ -22,11 +33,30 @@ def watch(progress: Progress) -> None:
             progress.observe(SimpleNamespace(time=float(n), delivered=lambda n=n: n), None)
 
 
-@pytest.mark.parametrize(("stream", "quiet"), [(io.StringIO(), False), (Terminal(), True)])
-def test_it_is_silent_without_a_terminal_or_when_quiet(monkeypatch, stream, quiet: bool) -> None:
+@pytest.mark.parametrize("stream", [io.StringIO(), Terminal()])
+def test_it_is_silent_when_quiet(monkeypatch, stream) -> None:
     monkeypatch.setattr(sys, "stderr", stream)
-    watch(Progress(3, quiet))
+    monkeypatch.setattr(progress, "LINES", 0.0)
+    watch(Progress(3, True, 5.0))
     assert stream.getvalue() == ""
+
+
+def test_a_short_run_says_nothing_without_a_terminal(monkeypatch) -> None:
+    stream = io.StringIO()
+    monkeypatch.setattr(sys, "stderr", stream)
+    watch(Progress(3, False, 5.0))
+    assert stream.getvalue() == ""
+
+
+def test_a_long_run_writes_a_line_now_and_then_without_a_terminal(monkeypatch) -> None:
+    stream = io.StringIO()
+    monkeypatch.setattr(sys, "stderr", stream)
+    clock = count(0, 20)
+    monkeypatch.setattr(progress, "perf_counter", lambda: next(clock))
+    watch(Progress(3, False, 5.0))
+    first, second = stream.getvalue().splitlines()
+    assert first == "1 of 3 units, 1.0 s simulated, 0.0 x real time, at most 2:40 min left"
+    assert second.startswith("3 of 3 units, 3.0 s simulated")
 
 
 def test_it_shows_units_and_speed(monkeypatch) -> None:
@@ -34,3 +64,53 @@ def test_it_shows_units_and_speed(monkeypatch) -> None:
     monkeypatch.setattr(sys, "stderr", stream)
     watch(Progress(3))
     assert "3/3" in stream.getvalue() and "real time" in stream.getvalue()
+
+
+@pytest.mark.parametrize(("stream", "said"), [(Terminal(), "at work"), (io.StringIO(), "so far")])
+def test_what_takes_long_is_said(monkeypatch, stream, said: str) -> None:
+    monkeypatch.setattr(sys, "stderr", stream)
+    monkeypatch.setattr(progress, "LINES", 0.01)
+    with Waiting("at work"):
+        until(lambda: said in stream.getvalue())
+    told = stream.getvalue()
+    assert said in told
+    with Waiting("quiet work", quiet=True):
+        time.sleep(0.05)
+    assert stream.getvalue() == told
+
+
+def until(holds: Callable[[], bool]) -> None:
+    """Wait until something holds, for ten seconds at most."""
+    end = time.monotonic() + 10
+    while not holds() and time.monotonic() < end:
+        time.sleep(0.01)
+
+
+@pytest.mark.parametrize("name", ["paper", "gearbox", "chest"])
+def test_a_run_takes_no_longer_than_expected(name: str) -> None:
+    layout = factory.lay_out(factory.compile(factory.load_pag(f"examples/{name}.pag")))
+    for units in (1, 4):
+        made = Simulation(layout, RunRequest("ideal", units))
+        assert made.run().sim_time_s <= made.duration <= 2 * made.run().sim_time_s + 5
+
+
+def test_a_signal_is_heard_while_the_engine_works(tmp_path: Path) -> None:
+    script = tmp_path / "waits.py"
+    script.write_text(
+        "import time\n"
+        "from factory.support.interruption import awaited\n"
+        "try:\n    print('begun', flush=True)\n    awaited(lambda: time.sleep(60))\n"
+        "except KeyboardInterrupt:\n    print('heard', flush=True)\n"
+    )
+    command = [sys.executable, str(script)]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as child:
+        assert child.stdout is not None and child.stdout.readline() == "begun\n"
+        child.send_signal(signal.SIGINT)
+        assert child.stdout.readline() == "heard\n"
+        assert child.wait(10) == 0
+
+
+def test_what_fails_in_awaited_work_is_raised() -> None:
+    assert awaited(lambda: 7) == 7
+    with pytest.raises(ValueError, match="no such"):
+        awaited(lambda: int("no such"))

@@ -61,11 +61,14 @@ def build(
         from factory.export.build import BuildRequest, files_read
         from factory.export.build import build as build_files
         from factory.nets.verify import proved
+        from factory.support.progress import Waiting
 
         project = given.project()
-        verdict = proved(project.layout.factory.net)
+        with Waiting("reading the shapes and laying out", out.silent):
+            verdict = proved(project.layout.factory.net)
         spent = perf_counter() - begin
-        built = build_files(project, verdict, BuildRequest(mjcf, output, units, wip))
+        with Waiting("compiling the model", out.silent):
+            built = build_files(project, verdict, BuildRequest(mjcf, output, units, wip))
         kept = _printed(project, built, spent, wip)
         inputs = (*files_read(project), *_shipped_and_own(given.folders))
         build_cache.keep(name, inputs, built.files, kept)

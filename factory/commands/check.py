@@ -14,6 +14,7 @@ from factory.commands.requests import OutputOptions, ProjectOptions
 from factory.support.collector import collector_paused
 from factory.support.console import emit, say, table, warn
 from factory.support.files import is_net
+from factory.support.progress import Waiting
 
 if TYPE_CHECKING:
     from factory.compiler.mating.mating import Mating, Matings
@@ -54,7 +55,8 @@ def check(
         for_a_pag(file, "a net in PNML", "certificate")
     writable(file, certificate)
     writable_folder(clashes)
-    checked = check_net(file) if is_net(file) else check_project(project_of(given), wip)
+    with Waiting("reading the shapes and proving", out.silent):
+        checked = check_net(file) if is_net(file) else check_project(project_of(given), wip)
     warnings = checked.product.warnings if checked.product else ()
     warn(warnings, out.quiet)
     if clashes is not None:

@@ -13,6 +13,7 @@ from factory.commands.outputs import writable_folder
 from factory.commands.requests import OutputOptions
 from factory.support.console import emit, say, warn
 from factory.support.errors import Diagnostic, InputError
+from factory.support.progress import Waiting
 
 if TYPE_CHECKING:
     from factory.problem.template import Template
@@ -65,14 +66,16 @@ def import_(
         _require_folder(folder, option)
     options = Options(library, boxes, meshes, UNITS[unit], cast("Mates", mates))
     templates = all_templates(folders)
-    product = import_product(source, templates, options)
+    with Waiting(f"reading {source.name}", out.silent):
+        product = import_product(source, templates, options)
     folder = output or Path(product.name)
     writable_folder(folder)
     files = {folder / name: content for name, content in product.files.items()}
     own_names(folder, files)
     write_all(files)
     pag, meshes_made = next(iter(files)), len(files) - 1
-    warnings = (*product.warnings, *_shape_warnings(pag, templates))
+    with Waiting("looking at the shapes", out.silent):
+        warnings = (*product.warnings, *_shape_warnings(pag, templates))
     warn(warnings, out.quiet)
     parts = sum(1 for _ in product.pag.parts())
     if out.as_json:

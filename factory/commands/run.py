@@ -23,6 +23,7 @@ from factory.commands.requests import (
 )
 from factory.support.console import POOL_BOUND, emit, say, table, warn
 from factory.support.errors import Diagnostic, InputError, StoppedError
+from factory.support.progress import Progress, Waiting
 
 if TYPE_CHECKING:
     from factory.pipeline import Project
@@ -65,7 +66,8 @@ def run(
     """Run FILE.pag until its products are dropped off."""
     writable(given.file, video, log, shown.poster)
     project = given.project()
-    layout = project.layout
+    with Waiting("reading the shapes and laying out", out.silent):
+        layout = project.layout
     warn(layout.product.warnings, out.quiet)
     shown.area()
     if asked.world == "ideal":
@@ -121,7 +123,8 @@ def run_project(
 
     proved(project.factory.net)
     seen = log is not None or film is not None or monitor
-    made = Simulation(project.layout, asked.request(project, seen))
+    with Waiting("compiling the model", silent):
+        made = Simulation(project.layout, asked.request(project, seen))
     recorders: list[Opening] = []
     if log is not None:
         from factory.record.log import LogWriter
@@ -150,12 +153,11 @@ def carry_out(
     files are complete; StoppedError then says how far it came."""
     from factory.record.ending import CutOff
     from factory.support.interruption import Interruption
-    from factory.support.progress import Progress
 
     try:
         with Interruption() as stop, ExitStack() as stack:
             opened = [stack.enter_context(recorder()) for recorder in recorders]
-            bar = stack.enter_context(Progress(made.request.units, silent))
+            bar = stack.enter_context(Progress(made.request.units, silent, made.duration))
             seeing = [*watchers, *(recorder.observe for recorder in opened)]
             record = made.run(seeing, max_time, [stop.observe, bar.observe])
             for recorder in opened:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from factory.mjcf.model import Model
 from factory.support.engine import mujoco
 from factory.support.errors import Diagnostic, InputError
+from factory.support.interruption import awaited
 
 
 def load(model: Model) -> mujoco.MjModel:
@@ -12,7 +13,7 @@ def load(model: Model) -> mujoco.MjModel:
     engine refuses it."""
     files = {f"meshes/{name}": content for name, content in model.files.items()}
     try:
-        return mujoco.MjModel.from_xml_string(model.xml, files)
+        return awaited(lambda: mujoco.MjModel.from_xml_string(model.xml, files))
     except ValueError as error:
         raise InputError(_explained(model, str(error))) from error
 

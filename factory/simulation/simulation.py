@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from time import perf_counter
 from typing import TYPE_CHECKING, Any
 
@@ -27,8 +28,9 @@ from factory.simulation.supervisor import Supervisor
 from factory.simulation.world import World
 from factory.support.errors import Diagnostic, InputError, RunError
 from factory.support.settings import AUTO, MOST, Settings
+from factory.timing.cycle_time import CycleTime
 from factory.timing.pool import part_pool
-from factory.timing.prediction import operation_delays, predict, ways_ahead
+from factory.timing.prediction import duration, operation_delays, predict, ways_ahead
 
 if TYPE_CHECKING:
     from factory.mjcf.model import Model
@@ -107,6 +109,19 @@ class Simulation:
         """How long nothing has fired since the last event, or since time 0 [s]."""
         events = self.supervisor.events
         return self.world.time - (events[-1].t if events else 0.0)
+
+    @cached_property
+    def cycle(self) -> CycleTime:
+        """The predicted cycle time, and what allows no less."""
+        request = self.request
+        return predict(
+            self.layout, self.delays, request.settings, request.world, request.wip, self.ways
+        )
+
+    @property
+    def duration(self) -> float:
+        """At most how long the run is expected to take [s]."""
+        return duration(self.layout, self.delays, self.cycle.seconds, self.request.units)
 
     @property
     def start(self) -> Marking:
@@ -204,9 +219,7 @@ class Simulation:
     def _record(self, wall: float, time: float, trouble: Diagnostic | None) -> Run:
         supervisor, world, factory = self.supervisor, self.world, self.layout.factory
         request, physics, figures = self.request, world.physics_time, world.figures()
-        predicted = predict(
-            self.layout, self.delays, request.settings, request.world, request.wip, self.ways
-        )
+        predicted = self.cycle
         verdict = replay(factory.net, [e.transition for e in supervisor.events], self.start)
         return Run(
             request.world,

@@ -4,10 +4,14 @@ from __future__ import annotations
 
 import signal
 from collections.abc import Callable, Mapping
+from concurrent.futures import Future
+from threading import Thread
 from types import FrameType
-from typing import Any, Self
+from typing import Any, Self, TypeVar
 
 from factory.support.resource import Closing
+
+T = TypeVar("T")
 
 SIGNALS = [
     getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)
@@ -25,6 +29,22 @@ def stop_on_signals(handler: Callable[[int, FrameType | None], Any]) -> Mapping[
     except ValueError:  # not in the main thread
         return {}
     return heard
+
+
+def awaited(work: Callable[[], T]) -> T:
+    """What `work` gives, done in a thread of its own: a long call of the engine, which lets the
+    interpreter go on meanwhile, does not keep signals waiting. Raises as `work` does. Work that is
+    interrupted is left alone, and ends with the program."""
+    done: Future[T] = Future()
+
+    def do() -> None:
+        try:
+            done.set_result(work())
+        except BaseException as error:
+            done.set_exception(error)
+
+    Thread(target=do, daemon=True).start()
+    return done.result()
 
 
 class Interruption(Closing):

@@ -1,26 +1,36 @@
-"""Progress bars on stderr; that of a run shows simulated time, units made, speed, time left."""
+"""Progress on stderr: bars on a terminal, elsewhere a line now and then.
+
+That of a run shows simulated time, units made, speed, time left.
+"""
 
 from __future__ import annotations
 
 import sys
+from threading import Event, Thread
 from time import perf_counter
 from typing import TYPE_CHECKING, Any, Self
 
 from factory.support.resource import Closing
 
 if TYPE_CHECKING:
+    from rich.console import Console
     from rich.progress import Progress as Bar
     from rich.progress import TaskID
 
 PERIOD = 0.1
 """Least time between two updates of the bar [s]."""
 
+LINES = 30.0
+"""Time between two lines where stderr is no terminal [s]."""
+
 
 class ProgressBar(Closing):
-    """A bar that is shown within its context; not where `quiet`, or where stderr is no terminal."""
+    """A bar that is shown within its context; not where `quiet`, or where stderr is no terminal.
+    `told`: lines take its place there."""
 
     def __init__(self, quiet: bool) -> None:
         self.shown = not quiet and sys.stderr.isatty()
+        self.told = not quiet and not self.shown
         self.bar: Bar | None = None
 
     def __enter__(self) -> Self:
@@ -43,7 +53,6 @@ class ProgressBar(Closing):
 
 def counter(after: str, before: str = "") -> Bar:
     """A bar between words, with the number done, the number in all and the time left."""
-    from rich.console import Console
     from rich.progress import (
         BarColumn,
         MofNCompleteColumn,
@@ -58,35 +67,101 @@ def counter(after: str, before: str = "") -> Bar:
         MofNCompleteColumn(),
         TextColumn(after),
         TimeRemainingColumn(),
-        console=Console(file=sys.stderr),
+        console=_stderr(),
         transient=True,
     )
 
 
-class Progress(ProgressBar):
-    """The bar of a run, which it observes."""
+class Waiting(ProgressBar):
+    """Says `what` goes on within its context, and since when."""
 
-    def __init__(self, units: int, quiet: bool = False) -> None:
+    def __init__(self, what: str, quiet: bool = False) -> None:
         super().__init__(quiet)
-        self.units = units
+        self.what = what
+        self.over = Event()
+
+    def __enter__(self) -> Self:
+        super().__enter__()
+        if self.told:
+            Thread(target=self._tell, daemon=True).start()
+        return self
+
+    def drawn(self) -> tuple[Bar, TaskID]:
+        """A spinner, and the time gone by."""
+        from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+
+        columns = SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn()
+        bar = Progress(*columns, console=_stderr(), transient=True)
+        return bar, bar.add_task(self.what)
+
+    def close(self) -> None:
+        """Remove the spinner."""
+        self.over.set()
+        super().close()
+
+    def _tell(self) -> None:
+        while not self.over.wait(LINES):
+            print(f"{self.what}, {perf_counter() - self.begin:.0f} s so far", file=sys.stderr)
+
+
+class Progress(ProgressBar):
+    """The bar of a run, which it observes. `seconds`: how long it is expected to take [simulated
+    s]; it tells the time left, and is too long rather than too short."""
+
+    def __init__(self, units: int, quiet: bool = False, seconds: float = 0.0) -> None:
+        super().__init__(quiet)
+        self.units, self.seconds = units, seconds
         self.next = 0.0
         self.before: int | None = None
 
     def drawn(self) -> tuple[Bar, TaskID]:
         """Simulated time before the bar, units and speed behind."""
-        bar = counter("units, {task.fields[speed]}, left", "{task.fields[time]}")
-        return bar, bar.add_task("", total=self.units, time="0.0 s", speed="")
+        from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+
+        behind = "{task.fields[units]} units, {task.fields[speed]}, left"
+        columns = TextColumn("{task.fields[time]}"), BarColumn(), TextColumn(behind)
+        bar = Progress(*columns, TimeRemainingColumn(), console=_stderr(), transient=True)
+        units, total = f"0/{self.units}", self.seconds or None
+        return bar, bar.add_task("", total=total, time="0.0 s", units=units, speed="")
 
     def observe(self, world: Any, supervisor: Any) -> None:
-        """Update the bar, at most once a period."""
-        if self.bar is None:
+        """Update the bar, or write a line, at most once a period."""
+        if self.bar is None and not self.told:
             return
         if self.before is None:
             self.before = int(world.delivered())
         now = perf_counter()
         made = int(world.delivered()) - self.before
-        if now < self.next and made < self.units:
+        if self.bar is None:
+            self._line(made, world.time, now - self.begin)
+        elif now >= self.next or made >= self.units:
+            self.next = now + PERIOD
+            self.bar.update(
+                self.task,
+                completed=self.seconds if made >= self.units else min(world.time, self.seconds),
+                time=f"{world.time:.1f} s",
+                units=f"{made}/{self.units}",
+                speed=f"{world.time / max(now - self.begin, 1e-9):.1f} x real time",
+            )
+
+    def _line(self, made: int, time: float, wall: float) -> None:
+        if wall < self.next + LINES:
             return
-        self.next = now + PERIOD
-        speed = f"{world.time / max(now - self.begin, 1e-9):.1f} x real time"
-        self.bar.update(self.task, completed=made, time=f"{world.time:.1f} s", speed=speed)
+        self.next = wall
+        left = f", at most {_clock(wall * (self.seconds / time - 1))} left"
+        print(
+            f"{made} of {self.units} units, {time:.1f} s simulated, {time / wall:.1f} x real time"
+            f"{left if time < self.seconds else ''}",
+            file=sys.stderr,
+        )
+
+
+def _clock(seconds: float) -> str:
+    minutes, rest = divmod(round(seconds), 60)
+    return f"{minutes}:{rest:02d} min"
+
+
+def _stderr() -> Console:
+    from rich.console import Console
+
+    return Console(file=sys.stderr)

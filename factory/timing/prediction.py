@@ -67,6 +67,18 @@ def way_time(
     return mode_time(stage.mode, np.array([start]), limits, world) + settle
 
 
+def duration(layout: Layout, delays: Sequence[float], cycle: float, units: int) -> float:
+    """At most how long it takes to make so many `units` from the empty factory [s]: the first by
+    the slowest chain of operations from a part to dropoff, a `cycle` for each that follows."""
+    factory = layout.factory
+    ready = [0.0] * len(factory.robots)
+    for operation in reversed(factory.operations[:-1]):
+        done = max(ready[robot] for robot in operation.robots) + delays[operation.index]
+        for robot in operation.robots:
+            ready[robot] = done
+    return max(ready) + delays[-1] + (units - 1) * cycle
+
+
 def predict(
     layout: Layout,
     delays: Sequence[float],
