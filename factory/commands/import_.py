@@ -11,7 +11,8 @@ import click
 from factory.commands.options import OUTPUT, PATH
 from factory.commands.outputs import writable_folder
 from factory.commands.requests import OutputOptions
-from factory.support.console import emit, say, warn
+from factory.commands.warnings import announced
+from factory.support.console import emit, say
 from factory.support.errors import Diagnostic, InputError
 
 if TYPE_CHECKING:
@@ -72,8 +73,7 @@ def import_(
     own_names(folder, files)
     write_all(files)
     pag, meshes_made = next(iter(files)), len(files) - 1
-    warnings = (*product.warnings, *_shape_warnings(pag, templates))
-    warn(warnings, out.quiet)
+    warnings = announced((*product.warnings, *_shape_warnings(pag, templates)), out)
     parts = sum(1 for _ in product.pag.parts())
     if out.as_json:
         emit(
@@ -84,7 +84,7 @@ def import_(
                 "parts": parts,
                 "meshes": meshes_made,
                 "files": [str(path) for path in files],
-                "warnings": [d.as_json() for d in warnings],
+                "warnings": warnings,
             }
         )
     elif not out.quiet:
