@@ -261,7 +261,14 @@ def test_a_product_of_an_unlikely_size_warns(edge: float, warns: bool) -> None:
     assert bool(found) == warns
     if warns:
         assert found[0].message == f"the product is {edge:g} m long"
-        assert "scale = 0.001" in found[0].hint
+        assert found[0].hint == "lengths are in metres"
+
+
+def test_only_a_mesh_is_suspected_of_millimetres(tmp_path: Path) -> None:
+    """And only one that is too large."""
+    for edge, advice in ((20.0, "write scale = 0.001"), (0.002, "lengths are in metres: check")):
+        (found,) = from_mesh(tmp_path, trimesh.creation.box((edge, edge, edge))).warnings
+        assert advice in found.hint
 
 
 def test_parts_without_geometry_are_packed_near_a_cube() -> None:
