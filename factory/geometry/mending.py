@@ -25,6 +25,8 @@ HOLLOW = 1e-5
 """A mesh of less than this share of its box bounds no volume that is meant: a sheet with two sides,
 bodies that cancel each other."""
 
+FILLED = "was open by slivers or small holes"
+
 
 def mended(vertices: Array, faces: Indices) -> tuple[Array, Indices, str]:
     """A mesh that bounds a volume, and what was wrong with the one given. This is "", and the mesh
@@ -37,13 +39,14 @@ def mended(vertices: Array, faces: Indices) -> tuple[Array, Indices, str]:
     for step, was in (
         (_weld, "was open by cracks"),
         (_drop_twins, "had triangles twice"),
-        (_fill, "was open by slivers or small holes"),
+        (_fill, FILLED),
         (_wind, "was wound to and fro"),
     ):
         step(mesh)
         turned = _outwards(mesh)
         if turned is not None:
-            return np.asarray(mesh.vertices), turned, was
+            is_filled = len(turned) > len(faces)
+            return np.asarray(mesh.vertices), turned, FILLED if is_filled else was
     return vertices, faces, ""
 
 

@@ -137,10 +137,10 @@ def _hull_mesh(name: str, vertices: Array) -> Mesh:
 def is_closed(faces: Indices) -> bool:
     """Whether triangles (m, 3) close what they bound: every edge is passed as often to as fro. So
     do bodies that share faces, edges or corners."""
-    edges = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
-    _, inverse = np.unique(np.sort(edges, axis=1), axis=0, return_inverse=True)
-    way = np.where(edges[:, 0] < edges[:, 1], 1.0, -1.0)
-    return bool((np.bincount(inverse.ravel(), way) == 0).all())
+    count = faces.max() + 1
+    start, end = faces.ravel(), np.roll(faces, -1, axis=1).ravel()
+    to, fro = np.sort(start * count + end), np.sort(end * count + start)
+    return bool((to == fro).all())
 
 
 def measured(mesh: Mesh, remark: Remark | None = None) -> MassProperties:
