@@ -15,6 +15,7 @@ import yaml
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from factory.geometry.mesh_reader import EXPECTED
 from factory.geometry.product import product_geometry
 from factory.geometry.solids import rotation
 from factory.importing import Options, import_product
@@ -428,9 +429,11 @@ def test_a_folder_with_one_tree(bring: Importer, run: Terminal) -> None:
         (
             '{"children": ["broken.stl", "empty.obj"]}',
             [
-                f"1:{at} BadMesh cannot read '{name}': it has no triangles, or vertices that are"
-                " not finite"
-                for at, name in ((15, "broken.stl"), (29, "empty.obj"))
+                f"1:{at} BadMesh cannot read '{name}': it {why}"
+                for at, name, why in (
+                    (15, "broken.stl", f"has no triangles; it should be {EXPECTED['.stl']}"),
+                    (29, "empty.obj", "is empty"),
+                )
             ],
         ),
         ('{"part": 1, "children": ["leg"]}', ["1:2 UnknownParameter a sub-assembly is no part"]),

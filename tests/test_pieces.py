@@ -21,7 +21,7 @@ from layout_values import table_pag
 import factory
 from factory.geometry import decomposition
 from factory.geometry.decomposition import in_pieces
-from factory.geometry.meshes import Array, Mesh
+from factory.geometry.meshes import Array, Mesh, is_closed
 from factory.geometry.pieces import (
     MOST_PIECES,
     ROUND,
@@ -29,7 +29,6 @@ from factory.geometry.pieces import (
     components,
     convex_bodies,
     cylinder_piece,
-    is_closed,
     sphere_piece,
 )
 from factory.geometry.product import product_geometry

@@ -26,7 +26,8 @@ from factory.commands.options import (
 from factory.commands.outputs import writable
 from factory.commands.requests import OutputOptions, ProjectOptions, RunOptions
 from factory.commands.run import carry_out
-from factory.support.console import emit, say, table, warn
+from factory.commands.warnings import announced
+from factory.support.console import emit, say, table
 from factory.support.errors import Diagnostic, InputError, did_you_mean
 
 if TYPE_CHECKING:
@@ -172,7 +173,7 @@ def _analyze_pag(
     project = read(given.file, given.folders, made.settings, given.ground())
     layout = project.layout
     proved(layout.factory.net)
-    warn(layout.product.warnings, out.quiet)
+    warnings = announced(layout.product.warnings, out)
     timing = Timing(layout, made.settings, made.world, made.seed, made.jitter)
     change = study.change(layout.factory)
     record: RunRecord | None = None
@@ -187,7 +188,7 @@ def _analyze_pag(
         write_bytes(output, picture(found, output.suffix))
     if out.as_json:
         drawn = str(output) if output else None
-        emit({**document(found), "picture": drawn, **cut_off(log)})
+        emit({**document(found), "picture": drawn, "warnings": warnings, **cut_off(log)})
     elif not out.quiet:
         _tell(found, out.verbose)
         if output is not None:

@@ -14,6 +14,7 @@ import click
 from factory.commands.options import FLOOR, MOTION, OUTPUT, PATH, RELAY, SOURCE, WIP
 from factory.commands.outputs import writable, writable_folder
 from factory.commands.requests import OutputOptions, ProjectOptions
+from factory.commands.warnings import told
 from factory.support.collector import collector_paused
 from factory.support.console import emit, say, warning
 
@@ -74,7 +75,7 @@ def build(
         build_cache.keep(name, inputs, built.files, kept)
     else:
         kept["document"]["compile_s"] = perf_counter() - begin
-    for text in [] if out.quiet else kept["warnings"]:
+    for text in [] if out.silent else kept["all warnings" if out.verbose else "warnings"]:
         print(text, file=sys.stderr)
     if out.as_json:
         emit(kept["document"])
@@ -133,8 +134,9 @@ def _printed(project: Project, built: Built, spent: float, wip: int | None) -> d
     ]
     if wip is None and model.wip is not None:
         lines.insert(1, f"parts for at most {model.wip} units inside at once: {POOL_BOUND}")
-    warnings = [warning(diagnostic) for diagnostic in layout.product.warnings]
-    return {"document": document, "lines": lines, "warnings": warnings}
+    warnings = layout.product.warnings
+    every, brief = ([*map(warning, told(warnings, all_))] for all_ in (True, False))
+    return {"document": document, "lines": lines, "all warnings": every, "warnings": brief}
 
 
 def _shipped_and_own(folders: tuple[Path, ...]) -> tuple[Path, ...]:

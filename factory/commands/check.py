@@ -11,6 +11,7 @@ import click
 from factory.commands.options import OUTPUT, PATH, RELAY, SOURCE, WIP, for_a_pag
 from factory.commands.outputs import writable, writable_folder
 from factory.commands.requests import OutputOptions, ProjectOptions
+from factory.commands.warnings import told
 from factory.support.collector import collector_paused
 from factory.support.console import emit, say, table, warn
 from factory.support.files import is_net
@@ -58,7 +59,7 @@ def check(
     with Waiting("reading the shapes and proving", out.silent):
         checked = check_net(file) if is_net(file) else check_project(project_of(given), wip)
     warnings = checked.product.warnings if checked.product else ()
-    warn(warnings, out.quiet)
+    warn(told(warnings, out.verbose), out.silent)
     if clashes is not None:
         files = _pictures(checked, clashes)
         own_names(clashes, files, [file])

@@ -12,7 +12,8 @@ from factory.commands.logs import cut_off, read_partly
 from factory.commands.options import FLOOR, MOTION, OUTPUT, PATH, RELAY, SOURCE
 from factory.commands.outputs import writable, writable_folder
 from factory.commands.requests import OutputOptions, ProjectOptions
-from factory.support.console import emit, say, warn
+from factory.commands.warnings import announced
+from factory.support.console import emit, say
 from factory.support.errors import Diagnostic, InputError, did_you_mean
 
 if TYPE_CHECKING:
@@ -57,17 +58,18 @@ def export(
     source = _source(given, chosen, out.silent)
     name = output.name if output else ""
     made = chosen.export(Subject(given.file, source, of, name, whole))
-    if isinstance(source, Project) and source.has_geometry:
-        warn(source.product.warnings, out.quiet)
+    seen = source.product if isinstance(source, Project) and source.has_geometry else None
+    warnings = announced(seen.warnings if seen else (), out)
     files = _files(made, output, whole)
     if output is not None:
         write_all(files)
     if out.as_json:
         text = {"text": made} if output is None else {}
         shown = str(output) if output else None
-        log = cut_off(source if isinstance(source, Log) else None)
         listed = [str(f) for f in files]
-        emit({"format": form, "output": shown, "files": listed, **log, **text})
+        made_of = {"format": form, "output": shown, "files": listed, "warnings": warnings}
+        log = cut_off(source if isinstance(source, Log) else None)
+        emit({**made_of, **log, **text})
     elif output is None and isinstance(made, str):
         say(made.rstrip("\n"))
     return 0

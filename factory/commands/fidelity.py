@@ -11,7 +11,8 @@ import click
 from factory.commands.options import FLOOR, MOTION, OUTPUT, PATH, RELAY, SOURCE, Number
 from factory.commands.outputs import writable, writable_folder
 from factory.commands.requests import OutputOptions, ProjectOptions
-from factory.support.console import emit, say, table, warn
+from factory.commands.warnings import announced
+from factory.support.console import emit, say, table
 
 if TYPE_CHECKING:
     from factory.study.fidelity.convergence import Study
@@ -72,7 +73,7 @@ def fidelity(
     project = given.project()
     layout, settings = project.layout, project.settings
     proved(layout.factory.net)
-    warn(layout.product.warnings, out.quiet)
+    warnings = announced(layout.product.warnings, out)
     jobs = jobs or cores()
     with RunsBar(seeds + (runs() if convergence else 0), 0, out.silent) as bar:
 
@@ -84,7 +85,7 @@ def fidelity(
         studied = study(case, 0, jobs, done) if convergence else None
     written = [] if output is None else write_report(output, found, studied)
     if out.as_json:
-        emit(document(found, studied))
+        emit({**document(found, studied), "warnings": warnings})
     elif not out.quiet:
         _tell(found, studied, out.verbose)
         for path in written:

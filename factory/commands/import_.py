@@ -11,7 +11,8 @@ import click
 from factory.commands.options import OUTPUT, PATH
 from factory.commands.outputs import writable_folder
 from factory.commands.requests import OutputOptions
-from factory.support.console import emit, say, warn
+from factory.commands.warnings import announced
+from factory.support.console import emit, say
 from factory.support.errors import Diagnostic, InputError
 from factory.support.progress import Waiting
 
@@ -75,8 +76,8 @@ def import_(
     write_all(files)
     pag, meshes_made = next(iter(files)), len(files) - 1
     with Waiting("looking at the shapes", out.silent):
-        warnings = (*product.warnings, *_shape_warnings(pag, templates))
-    warn(warnings, out.quiet)
+        shapes = _shape_warnings(pag, templates)
+    warnings = announced((*product.warnings, *shapes), out)
     parts = sum(1 for _ in product.pag.parts())
     if out.as_json:
         emit(
@@ -87,7 +88,7 @@ def import_(
                 "parts": parts,
                 "meshes": meshes_made,
                 "files": [str(path) for path in files],
-                "warnings": [d.as_json() for d in warnings],
+                "warnings": warnings,
             }
         )
     elif not out.quiet:

@@ -23,12 +23,11 @@ from factory.commands.options import (
 from factory.commands.outputs import writable
 from factory.commands.requests import OutputOptions, PictureOptions, ProjectOptions, RunOptions
 from factory.commands.run import carry_out
-from factory.support.console import emit, say, warn
+from factory.commands.warnings import announced
+from factory.support.console import emit, say
 from factory.support.errors import Diagnostic, InputError
 
 if TYPE_CHECKING:
-    from factory.simulation.simulation import Simulation
-
     Moment = float | Literal["end"]
 
 
@@ -73,11 +72,16 @@ def render(
         raise InputError(Diagnostic("Usage", message, None, "leave out --poster"))
     probe()
     log = None
+    warnings: list[dict[str, object]] = []
     if is_log(file):
         log = read_partly(file, out.silent)
         frames = render_log(log, output, picture, shown.fps, moment, shown.poster)
     else:
-        made = _simulation(given, asked, out.quiet)
+        from factory.simulation.simulation import Simulation
+
+        project = given.project()
+        warnings = announced(project.layout.product.warnings, out)
+        made = Simulation(project.layout, asked.request(project))
         taken = (
             Still(made, output, picture, moment)
             if is_still
@@ -90,18 +94,12 @@ def render(
     if out.as_json:
         width, height = size
         document = {"output": str(output), "frames": frames, "width": width, "height": height}
-        emit({**document, "fps": shown.fps, "seconds": seconds, **cut_off(log)})
+        emit(
+            {**document, "fps": shown.fps, "seconds": seconds, "warnings": warnings, **cut_off(log)}
+        )
     elif not out.quiet:
         say(f"{output}: {frames} frames of {size[0]}x{size[1]}, {seconds:.1f} s")
     return 0
-
-
-def _simulation(given: ProjectOptions, asked: RunOptions, quiet: bool) -> Simulation:
-    from factory.simulation.simulation import Simulation
-
-    project = given.project()
-    warn(project.layout.product.warnings, quiet)
-    return Simulation(project.layout, asked.request(project))
 
 
 def _moment(at: str) -> Moment:

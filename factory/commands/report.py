@@ -26,11 +26,14 @@ from factory.commands.options import (
 from factory.commands.outputs import writable
 from factory.commands.requests import OutputOptions, ProjectOptions, RunOptions
 from factory.commands.run import run_project, summarise
-from factory.support.console import emit, say, warn
+from factory.commands.warnings import announced
+from factory.support.console import emit, say
 
 if TYPE_CHECKING:
     from factory.show.report.recording import Recording
     from factory.simulation.run import Run
+
+    _Made = tuple[Recording, Run, list[dict[str, object]]]
 
 
 @click.command()
@@ -61,11 +64,12 @@ def report(given: ProjectOptions, asked: RunOptions, out: OutputOptions, output:
 
     writable(given.file, output)
     run = None
+    warnings: list[dict[str, object]] = []
     if is_log(given.file):
         for_a_pag(given.file, "a log", "output")
         recording = recording_of(given.file)
     else:
-        recording, run = _run(given, asked, out)
+        recording, run, warnings = _run(given, asked, out)
     text = page(recording)
     write_text(output, text)
     size, cut = len(text.encode()), recording.log.cut_off
@@ -76,6 +80,7 @@ def report(given: ProjectOptions, asked: RunOptions, out: OutputOptions, output:
         "sim_time_s": round(recording.end, 6),
         "cut_off": cut and cut.as_json(),
         "predicted": recording.layout is not None,
+        "warnings": warnings,
     }
     if out.as_json:
         emit(document)
@@ -90,17 +95,17 @@ def report(given: ProjectOptions, asked: RunOptions, out: OutputOptions, output:
     return 0 if not cut and (run is None or run.succeeded) else 1
 
 
-def _run(given: ProjectOptions, asked: RunOptions, out: OutputOptions) -> tuple[Recording, Run]:
+def _run(given: ProjectOptions, asked: RunOptions, out: OutputOptions) -> _Made:
     """A run in which no parts fuse, as the report follows each part by itself; its log is in a
-    folder that is removed afterwards."""
+    folder that is removed afterwards. Gives the warnings too."""
     from factory.show.report import recording_of
 
     project = given.project()
-    warn(project.layout.product.warnings, out.quiet)
+    warnings = announced(project.layout.product.warnings, out)
     with TemporaryDirectory(prefix="factory-") as folder:
         log = Path(folder) / "run.log"
         run = run_project(project, replace(asked, fuse=False), out.silent, log)
         recording = recording_of(log, project.layout)
     if run.trouble is not None:
         print(run.trouble, file=sys.stderr)
-    return recording, run
+    return recording, run, warnings

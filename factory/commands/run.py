@@ -21,6 +21,7 @@ from factory.commands.requests import (
     RunOptions,
     check_ideal,
 )
+from factory.commands.warnings import told
 from factory.support.console import POOL_BOUND, emit, say, table, warn
 from factory.support.errors import Diagnostic, InputError, StoppedError
 from factory.support.progress import Progress, Waiting
@@ -68,7 +69,7 @@ def run(
     project = given.project()
     with Waiting("reading the shapes and laying out", out.silent):
         layout = project.layout
-    warn(layout.product.warnings, out.quiet)
+    warn(told(layout.product.warnings, out.verbose), out.silent)
     shown.area()
     if asked.world == "ideal":
         check_ideal(asked.fuse, monitor)
@@ -78,7 +79,8 @@ def run(
         document = record.as_json()
         document.pop("schema")
         trouble = [record.trouble.as_json()] if record.trouble else []
-        emit({**document, **({"errors": trouble} if trouble else {})})
+        warnings = [diagnostic.as_json() for diagnostic in layout.product.warnings]
+        emit({**document, "warnings": warnings, **({"errors": trouble} if trouble else {})})
     elif not out.quiet:
         summarise(record, layout.factory, out.verbose)
     say_violations(record.monitor)

@@ -22,7 +22,8 @@ from factory.commands.options import (
 )
 from factory.commands.outputs import writable, writable_folder
 from factory.commands.requests import OutputOptions, ProjectOptions, check_ideal
-from factory.support.console import emit, say, table, warn
+from factory.commands.warnings import announced
+from factory.support.console import emit, say, table
 from factory.support.errors import Diagnostic, InputError
 
 if TYPE_CHECKING:
@@ -106,9 +107,10 @@ def sweep(
         if database is None:
             message, hint = "there is no database for the results", "for example -o results.db"
             raise InputError(Diagnostic("Usage", message, None, hint))
-        tally = _carry_out(replace(given, file=source), runs, database, vary, out.silent)
+        tally, warnings = _carry_out(replace(given, file=source), runs, database, vary, out)
         failed = tally.failed + tally.there_failed > 0
         document = {"database": str(database), "on": runs.on, **tally.as_json()}
+        document["warnings"] = warnings
         if not out.silent:
             _tell(tally, database)
     elif not is_summary:
@@ -126,9 +128,9 @@ def _carry_out(
     runs: SweepOptions,
     database: Path,
     vary: tuple[str, ...],
-    silent: bool,
-) -> Tally:
-    """Plan, prove and run. Raises InputError for what cannot be."""
+    out: OutputOptions,
+) -> tuple[Tally, list[dict[str, object]]]:
+    """Plan, prove and run. Gives the warnings too. Raises InputError for what cannot be."""
     from factory.nets.verify import proved
     from factory.study.pool import cores
     from factory.study.sweep.grid import DEFAULTS, SETTINGS, read_axes
@@ -154,11 +156,12 @@ def _carry_out(
     # a factory that does not fit its floor is refused before the first run
     factory = project.plain if varies else project.layout.factory
     proved(factory.net)
-    warn(project.product.warnings, silent)
+    warnings = announced(project.product.warnings, out)
     fixed = {name: getattr(project.settings, name) for name in SETTINGS}
     fixed |= {key: asked[key] for key in DEFAULTS if asked[key] is not None}
     recipe = Recipe(project.plain, project.product, fixed, runs.max_time, project.ground, runs.fuse)
-    return sweep(recipe, axes, database, runs.jobs or cores(), runs.on, runs.retry, silent)
+    jobs = runs.jobs or cores()
+    return sweep(recipe, axes, database, jobs, runs.on, runs.retry, out.silent), warnings
 
 
 def _tell(tally: Tally, database: Path) -> None:

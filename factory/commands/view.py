@@ -10,7 +10,8 @@ import click
 
 from factory.commands.options import DRAW, FLOOR, MOTION, OUTPUT, RELAY, RUNS, SOURCE, WIP
 from factory.commands.requests import OutputOptions, ProjectOptions, RunOptions
-from factory.support.console import emit, say, warn
+from factory.commands.warnings import announced
+from factory.support.console import emit, say
 
 if TYPE_CHECKING:
     from factory.show.live import Server
@@ -53,12 +54,13 @@ def view(
     project = given.project()
     layout = project.layout
     proved(layout.factory.net)
-    warn(layout.product.warnings, out.quiet)
+    warnings = announced(layout.product.warnings, out)
     request = replace(asked, units=FOR_EVER, fuse=False).request(project)
     session = Session(lambda: Simulation(layout, request), not paused)
     with Interruption() as stop, Server(session, page(session), host, port, expose) as server:
         if out.as_json:
-            emit({"address": server.address, "host": host, "port": server.port})
+            shown = {"address": server.address, "host": host, "port": server.port}
+            emit({**shown, "warnings": warnings})
         else:
             _tell(server, host, expose)
         sys.stdout.flush()

@@ -17,8 +17,8 @@ from pathlib import Path
 
 import numpy as np
 
-from factory.geometry.meshes import Array, Indices, Mesh
-from factory.geometry.pieces import FLATNESS, convex_bodies, is_closed
+from factory.geometry.meshes import Array, Indices, Mesh, is_closed
+from factory.geometry.pieces import FLATNESS, convex_bodies, joined
 from factory.support.files import user_cache, write_bytes
 
 FULL = 0.98
@@ -36,8 +36,8 @@ SLIVER = 1e-6
 
 
 def in_pieces(mesh: Mesh, as_written: Callable[[], tuple[Array, Indices]]) -> Mesh:
-    """The mesh with its convex bodies, where it is found to have several. `as_written` reads it
-    again with vertices that lie in the same place kept apart, as bodies that touch need."""
+    """The mesh with its convex bodies, where it is found to have several. `as_written` gives it
+    with vertices that lie in the same place kept apart, as bodies that touch need."""
     if not is_closed(mesh.faces) or _share_of_hull(mesh) >= 1 - FLATNESS:
         return mesh
     bodies = convex_bodies(mesh.vertices, mesh.faces) or convex_bodies(*as_written())
@@ -59,10 +59,7 @@ def _share_of_hull(mesh: Mesh) -> float:
 
 def _of_bodies(name: str, bodies: list[tuple[Array, Indices]]) -> Mesh:
     """One mesh of bodies that share no vertex, so that each is closed and mass adds up."""
-    starts = np.cumsum([0, *(len(vertices) for vertices, _ in bodies)])
-    faces = [faces + start for (_, faces), start in zip(bodies, starts, strict=False)]
-    pieces = tuple(vertices for vertices, _ in bodies)
-    return Mesh(name, np.concatenate(pieces), np.concatenate(faces), pieces)
+    return Mesh(name, *joined(bodies), tuple(vertices for vertices, _ in bodies))
 
 
 def _decomposed(mesh: Mesh) -> tuple[Array, ...]:

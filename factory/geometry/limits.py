@@ -58,6 +58,10 @@ def size_warnings(pag: PAG, low: Array, high: Array) -> list[Diagnostic]:
     longest = float((high - low).max())
     if SHORTEST <= longest <= LONGEST:
         return []
-    hint = "is a mesh in millimetres? then write scale = 0.001, or import with --unit mm"
+    hint = "lengths are in metres"
+    if any(node.parameter("mesh") is not None for node in pag.parts()):
+        hint += ": check scale, and --unit of `factory import`"
+        if longest > LONGEST:
+            hint = "is a mesh in millimetres? then write scale = 0.001, or import with --unit mm"
     message = f"the product is {longest:g} m long"
     return [Diagnostic("Size", message, pag[pag.root].position, hint)]

@@ -36,33 +36,70 @@ class Mesh:
 
 
 @dataclass(frozen=True, slots=True)
+class Remark:
+    """What is to be said of a mesh: "is flat; its box is used instead"; `many`: how several are
+    counted, "meshes are flat: ..."; a `hint` what would change it, "" for none."""
+
+    text: str
+    many: str
+    hint: str = ""
+
+
+@dataclass(frozen=True, slots=True)
 class MassProperties:
-    """A mesh, what was wrong with it, and its mass properties for unit density. `leak`: why they
-    are those of its hull, "" where they are its own."""
+    """A mesh, what there is to say of it, and its mass properties for unit density."""
 
     mesh: Mesh
-    trouble: str
-    leak: str
+    remark: Remark | None
     volume: float
     centre: Array
     inertia: Array
     hull: Array
 
 
-def usable(name: str, vertices: Array, faces: Indices) -> tuple[Mesh, str]:
-    """A mesh that the engine accepts, and what was wrong with the one given ("" if nothing)."""
+FLAT = Remark(
+    "is flat; its box is used instead",
+    "meshes are flat: their boxes are used",
+    "a body has three extents: give it a thickness of a thousandth of its length at least",
+)
+TINY = Remark(
+    "is tiny; its box is used instead",
+    "meshes are tiny: their boxes are used",
+    "lengths are in metres: `scale` makes a mesh larger",
+)
+OPEN = Remark(
+    "is open (not watertight); its convex hull is used instead",
+    "meshes are open: their convex hulls are used",
+    "a closed mesh has its own mass, and collides as it is drawn",
+)
+HOLLOW = Remark(
+    "bounds no volume; its convex hull is used instead",
+    "meshes bound no volume: their convex hulls are used",
+    "two sides of a sheet, or bodies inside each other, cancel: give it a thickness",
+)
+
+
+def mend_remark(was: str) -> Remark:
+    """That a mesh was mended."""
+    return Remark(f"{was}; it is mended", "meshes were mended: closed, or turned outwards")
+
+
+def usable(name: str, vertices: Array, faces: Indices) -> tuple[Mesh, Remark | None]:
+    """A mesh that the engine accepts, and why it is not the one given (None if it is)."""
     for axes in (np.eye(3), _principal_axes(vertices)):
         low, high = (vertices @ axes.T).min(axis=0), (vertices @ axes.T).max(axis=0)
         if _is_flat(high - low):
-            return _box_mesh(name, low, high, axes), "is flat; its box is used instead"
+            return _box_mesh(name, low, high, axes), FLAT
     low, high = vertices.min(axis=0), vertices.max(axis=0)
     if float(np.prod(high - low)) < LEAST_BOX:
-        return _box_mesh(name, low, high, np.eye(3)), "is tiny; its box is used instead"
+        return _box_mesh(name, low, high, np.eye(3)), TINY
     if len(faces) > MOST_FACES:
-        return _hull_mesh(name, vertices), (
-            f"has {len(faces)} triangles; its convex hull is used instead"
+        return _hull_mesh(name, vertices), Remark(
+            f"has {len(faces)} triangles; its convex hull is used instead",
+            f"meshes have more than {MOST_FACES} triangles: their convex hulls are used",
+            f"simplify it to {MOST_FACES} triangles at most",
         )
-    return Mesh(name, vertices, faces), ""
+    return Mesh(name, vertices, faces), None
 
 
 def _principal_axes(vertices: Array) -> Array:
@@ -97,25 +134,34 @@ def _hull_mesh(name: str, vertices: Array) -> Mesh:
     return Mesh(name, np.asarray(hull.vertices), np.asarray(hull.faces))
 
 
-def measured(mesh: Mesh, trouble: str = "") -> MassProperties:
-    """Volume, centre of mass, inertia for unit density, vertices of the hull. An open mesh, or one
-    that is inside out somewhere, has those of its convex hull."""
+def is_closed(faces: Indices) -> bool:
+    """Whether triangles (m, 3) close what they bound: every edge is passed as often to as fro. So
+    do bodies that share faces, edges or corners."""
+    count = faces.max() + 1
+    start, end = faces.ravel(), np.roll(faces, -1, axis=1).ravel()
+    to, fro = np.sort(start * count + end), np.sort(end * count + start)
+    return bool((to == fro).all())
+
+
+def measured(mesh: Mesh, remark: Remark | None = None) -> MassProperties:
+    """Volume, centre of mass, inertia for unit density, vertices of the hull. A mesh that is open,
+    or bounds no volume, has those of its convex hull."""
     import trimesh
 
     body = trimesh.Trimesh(mesh.vertices, mesh.faces, process=False)
-    hull = body.convex_hull
+    hull, closed = body.convex_hull, is_closed(mesh.faces)
     for solid in (body, hull, hull.bounding_box):
-        if not solid.is_watertight or not solid.volume > 0:
+        if (solid is body and not closed) or not solid.volume > 0:
             continue
         properties = solid.mass_properties
         inertia = np.asarray(properties.inertia) / float(properties.density)
         if is_inertia(inertia):
             break
-    wrong = "is inside out" if body.is_watertight else "is open (not watertight)"
-    leak = "" if solid is body else f"{wrong}; its convex hull is used instead"
+    if solid is not body and (closed or remark is None):
+        remark = HOLLOW if closed else OPEN
     centre = np.asarray(properties.center_mass)
     volume, corners = float(properties.volume), np.asarray(hull.vertices)
-    return MassProperties(mesh, trouble, leak, volume, centre, inertia, corners)
+    return MassProperties(mesh, remark, volume, centre, inertia, corners)
 
 
 def is_inertia(matrix: Array) -> bool:

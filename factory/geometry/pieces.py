@@ -9,6 +9,7 @@ and `factory.geometry.decomposition`.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import lru_cache
 from itertools import combinations
 
@@ -94,15 +95,6 @@ def _unit(vector: Array) -> Array:
     return np.asarray(vector / np.linalg.norm(vector))
 
 
-def is_closed(faces: Indices) -> bool:
-    """Whether triangles (m, 3) close what they bound: every edge is passed as often to as fro. So
-    do bodies that share faces, edges or corners."""
-    edges = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
-    _, inverse = np.unique(np.sort(edges, axis=1), axis=0, return_inverse=True)
-    way = np.where(edges[:, 0] < edges[:, 1], 1.0, -1.0)
-    return bool((np.bincount(inverse.ravel(), way) == 0).all())
-
-
 def components(count: int, faces: Indices) -> Indices:
     """The number of the connected part that each face (m, 3) of `count` vertices is of, in the
     order of their first triangle: triangles that use a vertex in common are connected."""
@@ -125,6 +117,13 @@ def _split(vertices: Array, faces: Indices, number: Indices) -> list[tuple[Array
         used, inverse = np.unique(mine, return_inverse=True)
         found.append((vertices[used], inverse.reshape(-1, 3)))
     return found
+
+
+def joined(bodies: Sequence[tuple[Array, Indices]]) -> tuple[Array, Indices]:
+    """Bodies as one mesh, that share no vertex."""
+    starts = np.cumsum([0, *(len(vertices) for vertices, _ in bodies)])
+    faces = [faces + start for (_, faces), start in zip(bodies, starts, strict=False)]
+    return np.concatenate([vertices for vertices, _ in bodies]), np.concatenate(faces)
 
 
 def convex_bodies(vertices: Array, faces: Indices) -> list[tuple[Array, Indices]]:

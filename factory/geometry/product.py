@@ -1,13 +1,13 @@
 """The geometry of a product: a solid for each part, in the frame of the finished product.
 
-Shapes written in the PAG are taken as they are; meshes are read with trimesh; parts with no
-geometry get a box in a cubic lattice of at most 0.2 m. A mesh that the engine cannot use, or that
-is open, falls back to its convex hull or its box, with a warning that names it.
+Shapes written in the PAG are taken as they are; meshes are read from their files, and mended where
+they bound no volume but nearly do; parts with no geometry get a box in a cubic lattice of at most
+0.2 m. A mesh that the engine cannot use, or that stays open, falls back to its convex hull or its
+box, with a warning that names it.
 """
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -22,7 +22,17 @@ from factory.geometry.limits import (
     too_far,
     value_position,
 )
-from factory.geometry.meshes import Array, Indices, MassProperties, measured, usable
+from factory.geometry.mending import mended
+from factory.geometry.mesh_reader import ANEW, MeshFile, UnreadableMesh, read_mesh
+from factory.geometry.meshes import (
+    Array,
+    Indices,
+    MassProperties,
+    Mesh,
+    measured,
+    mend_remark,
+    usable,
+)
 from factory.geometry.solids import Product, Solid, from_mesh, primitive
 from factory.problem.pag import PAG, Assembly
 from factory.support.errors import Diagnostic, InputError
@@ -32,9 +42,6 @@ LATTICE = 0.2
 
 CELL = 0.06
 """Largest cell of that lattice [m]."""
-
-NAMED = 3
-"""So many meshes are named that are open or inside out."""
 
 
 @np.errstate(all="ignore")
@@ -55,8 +62,7 @@ def product_geometry(pag: PAG) -> Product:
         raise InputError([*reader.errors, *(fault for fault in faults if fault)])
     low = np.min([s.low for s in solids.values()], axis=0)
     high = np.max([s.high for s in solids.values()], axis=0)
-    leaks = _first_few(list(reader.leaks.values()))
-    warnings = (*reader.warnings, *leaks, *size_warnings(pag, low, high))
+    warnings = (*reader.warnings.values(), *size_warnings(pag, low, high))
     return Product(solids, low, high, warnings)
 
 
@@ -88,14 +94,12 @@ def _box_in_lattice(node: Assembly, number: int, cells: tuple[int, float], lift:
 
 
 class _Reader:
-    """Reads shapes, collecting errors and warnings, those of meshes that are open or inside out in
-    `leaks`, by file; a mesh file is read once."""
+    """Reads shapes, collecting errors, and warnings by file; a mesh file is read once."""
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
         self.errors: list[Diagnostic] = []
-        self.warnings: list[Diagnostic] = []
-        self.leaks: dict[str, Diagnostic] = {}
+        self.warnings: dict[tuple[str, str], Diagnostic] = {}
         self._meshes: dict[tuple[str, float], MassProperties | None] = {}
 
     def solid(self, node: Assembly, number: int) -> Solid | None:
@@ -122,44 +126,36 @@ class _Reader:
         if (path, scale) in self._meshes:
             return self._meshes[path, scale]
         found = self._meshes[path, scale] = self._read(node, path, scale)
-        trouble = found and (found.trouble or found.leak)
-        if found and trouble:
-            hint = "repair the mesh to have it used as it is"
-            position = value_position(node, "mesh")
-            warning = Diagnostic("BadMesh", f"{path} {trouble}", position, hint)
-            if found.trouble:
-                self.warnings.append(warning)
-            else:
-                self.leaks.setdefault(path, warning)
+        if found and found.remark:
+            said, position = found.remark, value_position(node, "mesh")
+            warning = Diagnostic("BadMesh", f"{path} {said.text}", position, said.hint, said.many)
+            self.warnings.setdefault((path, said.text), warning)
         return found
 
     def _read(self, node: Assembly, path: str, scale: float) -> MassProperties | None:
         try:
-            vertices, faces = self._load(path, scale, process=True)
-            if len(faces) == 0 or not np.isfinite(vertices).all():
-                raise ValueError("it has no triangles, or vertices that are not finite")
-            if not np.abs(vertices).max() <= FURTHEST:
-                self.errors.append(too_far(node, "scale", "mesh"))
-                return None
-            mesh, trouble = usable(f"m{len(self._meshes)}", vertices, faces)
-            if not trouble:
-                mesh = in_pieces(mesh, lambda: self._load(path, scale, process=False))
-            return measured(mesh, trouble)
-        except Exception as error:  # trimesh's readers raise anything on a broken file
-            position = value_position(node, "mesh")
-            hint = "export it again as .obj, .stl, .ply or .glb with triangles"
-            why = "its content is no mesh" if isinstance(error, ImportError) else str(error)
-            message = f"cannot read '{path}': {why}"
-            self.errors.append(Diagnostic("BadMesh", message, position, hint))
+            file = read_mesh((self.folder / path).read_bytes(), Path(path).suffix.lower())
+        except (OSError, UnreadableMesh) as error:
+            why = error.strerror if isinstance(error, OSError) else error
+            message, position = f"cannot read '{path}': {why}", value_position(node, "mesh")
+            self.errors.append(Diagnostic("BadMesh", message, position, ANEW))
             return None
+        vertices, faces = file.merged()
+        if not np.abs(vertices).max() * scale <= FURTHEST:
+            self.errors.append(too_far(node, "scale", "mesh"))
+            return None
+        mesh, remark = usable(f"m{len(self._meshes)}", vertices * scale, faces)
+        if remark is None:
+            vertices, faces, was = mended(mesh.vertices, mesh.faces)
+            remark = mend_remark(was) if was else None
+            mesh = in_pieces(Mesh(mesh.name, vertices, faces), lambda: _apart(file, scale))
+        return measured(mesh, remark)
 
-    def _load(self, path: str, scale: float, process: bool) -> tuple[Array, Indices]:
-        """Vertices (n, 3) and faces (m, 3) of a mesh file. Vertices in the same place are one
-        with `process`, and stay apart without."""
-        import trimesh
 
-        loaded = trimesh.load(self.folder / path, force="mesh", process=process)
-        return np.asarray(loaded.vertices, float) * scale, np.asarray(loaded.faces, np.int64)
+def _apart(file: MeshFile, scale: float) -> tuple[Array, Indices]:
+    """The mesh of a file with bodies kept apart, each turned outwards."""
+    vertices, faces = file.apart()
+    return mended(vertices * scale, faces)[:2]
 
 
 def _half(kind: str, given: Array) -> Array:
@@ -167,12 +163,3 @@ def _half(kind: str, given: Array) -> Array:
     if kind == "cylinder":
         return np.array([given[0], given[1] / 2])
     return given / 2 if kind == "box" else given
-
-
-def _first_few(leaks: list[Diagnostic]) -> list[Diagnostic]:
-    """At most NAMED of these warnings, and one for all the others: most meshes of bricks are
-    open."""
-    if len(leaks) <= NAMED + 1:
-        return leaks
-    message = f"and {len(leaks) - NAMED} more meshes are open or inside out"
-    return [*leaks[:NAMED], replace(leaks[NAMED], message=message)]

@@ -46,9 +46,10 @@ class ImportFaults:
         """Note an error: what was found, where, and what would have been valid."""
         self.diagnostics.append(Diagnostic(code, message, position, hint))
 
-    def warn(self, code: str, message: str, position: Position, hint: str) -> None:
-        """Note something that does not keep the product from being made."""
-        self.warnings.append(Diagnostic(code, message, position, hint))
+    def warn(self, code: str, message: str, position: Position, hint: str, many: str) -> None:
+        """Note something that does not keep the product from being made; `many`: how several are
+        counted."""
+        self.warnings.append(Diagnostic(code, message, position, hint, many))
 
     def check_used_once(self, what: str, places: Iterable[Position]) -> None:
         """Note every place but the first that puts the same part in the same place (UsedTwice)."""

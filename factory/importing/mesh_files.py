@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import io
 from collections.abc import Iterable
 from hashlib import sha256
 from pathlib import Path, PurePosixPath
 
-import numpy as np
-
+from factory.geometry.mesh_reader import ANEW, UnreadableMesh, read_mesh
 from factory.importing.draft import ImportFaults
 from factory.importing.labels import file_stem
 from factory.lang.operations import MESHES
@@ -90,24 +88,9 @@ class MeshFolder:
             self.faults.add("UnknownMesh", message, position, hint)
             return None
         content = path.read_bytes()
-        trouble = _trouble(content, path.suffix.lower())
-        if trouble:
-            hint = "export it again as .obj, .stl, .ply or .glb with triangles"
-            self.faults.add("BadMesh", f"cannot read {quoted(name)}: {trouble}", position, hint)
+        try:
+            read_mesh(content, path.suffix.lower())
+        except UnreadableMesh as error:
+            self.faults.add("BadMesh", f"cannot read {quoted(name)}: {error}", position, ANEW)
             return None
         return self.store.add(str(inside.with_suffix("")), path.suffix.lower(), content)
-
-
-def _trouble(content: bytes, suffix: str) -> str:
-    """What keeps a file from being a mesh; "" if nothing does."""
-    import trimesh
-
-    try:
-        found = trimesh.load(io.BytesIO(content), file_type=suffix[1:], force="mesh")
-        if len(found.faces) == 0 or not np.isfinite(np.asarray(found.vertices)).all():
-            return "it has no triangles, or vertices that are not finite"
-    except ImportError:
-        return "its content is no mesh"
-    except Exception as error:  # trimesh's readers raise anything on a broken file
-        return str(error) or type(error).__name__
-    return ""

@@ -27,12 +27,14 @@ class Position:
 
 @dataclass(frozen=True, slots=True)
 class Diagnostic:
-    """One error or warning: a documented code, what was found, where, and a way out."""
+    """One error or warning: a documented code, what was found, where, and a way out. `many`: how
+    several of the same cause are counted, "meshes are open: ..."; "" where each is told."""
 
     code: str
     message: str
     position: Position | None = None
     hint: str = ""
+    many: str = ""
 
     def __str__(self) -> str:
         """`file:line:col: CODE message`, then the source line with a caret, then the hint."""

@@ -85,7 +85,8 @@ class _ModelReader:
         if model.triangles:
             message = f"{quoted(model.name)} has surfaces of its own, which are left out"
             hint = "only parts have shapes: put them in a 0 FILE of their own, ending in .dat"
-            self.faults.warn("BadMesh", message, model.position, hint)
+            many = "models have surfaces of their own, which are left out"
+            self.faults.warn("BadMesh", message, model.position, hint, many)
         found = []
         for reference in model.references:
             below = self.shelf.find(reference)
@@ -194,9 +195,9 @@ class _ModelReader:
             self.greys.add(code)
             message = f"colour {code} is not known: the part gets one of the factory's"
             hint = "a library's LDConfig.ldr defines colours, or a line 0 !COLOUR"
-            self.faults.warnings.append(
-                Diagnostic("UnknownColour", message, replace(reference.position, column=3), hint)
-            )
+            many = "colours are not known: parts get one of the factory's"
+            position = replace(reference.position, column=3)
+            self.faults.warn("UnknownColour", message, position, hint, many)
         return known
 
 

@@ -1,0 +1,118 @@
+"""Meshes that bound no volume, closed and turned outwards where little is missing."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from factory.geometry.meshes import Array, Indices, is_closed
+from factory.geometry.pieces import components
+
+if TYPE_CHECKING:
+    import trimesh
+
+GAP = 1e-5
+"""Where a mesh is open, vertices are one that are nearer than about this share of its longest
+edge."""
+
+HOLES, SLIVERS = 0.05, 0.001
+"""Holes with three or four corners are filled if that takes no more than the first share of a
+mesh's surface, others if no more than the second: the rim of a large hole says little about what
+should be in it."""
+
+HOLLOW = 1e-5
+"""A mesh of less than this share of its box bounds no volume that is meant: a sheet with two sides,
+bodies that cancel each other."""
+
+FILLED = "was open by slivers or small holes"
+
+
+def mended(vertices: Array, faces: Indices) -> tuple[Array, Indices, str]:
+    """A mesh that bounds a volume, and what was wrong with the one given. This is "", and the mesh
+    that given, where nothing was wrong, or where it takes more than a mend. The box of a mesh stays
+    as it is."""
+    mesh = _body(vertices, faces)
+    turned = _outwards(mesh)
+    if turned is not None:
+        return vertices, turned, "was inside out" if (turned != faces).any() else ""
+    for step, was in (
+        (_weld, "was open by cracks"),
+        (_drop_twins, "had triangles twice"),
+        (_fill, FILLED),
+        (_wind, "was wound to and fro"),
+    ):
+        step(mesh)
+        turned = _outwards(mesh)
+        if turned is not None:
+            is_filled = len(turned) > len(faces)
+            return np.asarray(mesh.vertices), turned, FILLED if is_filled else was
+    return vertices, faces, ""
+
+
+def _body(vertices: Array, faces: Indices) -> trimesh.Trimesh:
+    import trimesh
+
+    return trimesh.Trimesh(vertices.copy(), faces.copy(), process=False)
+
+
+def _weld(mesh: trimesh.Trimesh) -> None:
+    """Make one of vertices that are next to each other."""
+    step = GAP * float(np.ptp(mesh.vertices, axis=0).max())
+    mesh.merge_vertices(digits_vertex=int(np.ceil(-np.log10(step))))
+    faces = np.asarray(mesh.faces)
+    mesh.update_faces((faces != np.roll(faces, 1, axis=1)).all(axis=1))
+
+
+def _drop_twins(mesh: trimesh.Trimesh) -> None:
+    """Keep one of the triangles that have the same corners."""
+    mesh.update_faces(mesh.unique_faces())
+
+
+def _fill(mesh: trimesh.Trimesh) -> None:
+    """Close holes that are small. They are found in a mesh of the same triangles whose vertices are
+    anywhere: trimesh adds none that is flat, and those close a side that has a vertex more than the
+    next."""
+    from trimesh import repair
+
+    vertices, faces = np.asarray(mesh.vertices), np.asarray(mesh.faces)
+    for use_fan, most in ((False, HOLES), (True, SLIVERS)):
+        anywhere = _body(np.random.default_rng(0).random(vertices.shape), faces)
+        repair.fill_holes(anywhere, use_fan=use_fan)
+        filled = _body(vertices, np.asarray(anywhere.faces))
+        if len(filled.faces) > len(faces) and filled.area <= (1 + most) * mesh.area:
+            mesh.faces = filled.faces
+            return
+
+
+def _wind(mesh: trimesh.Trimesh) -> None:
+    """Turn triangles to agree with their neighbours."""
+    from trimesh import repair
+
+    if mesh.is_watertight:
+        repair.fix_winding(mesh)
+
+
+def _outwards(mesh: trimesh.Trimesh) -> Indices | None:
+    """The faces of a closed mesh, turned where a body is inside out; None where it is open, or
+    bounds too little. What is in the box of another body may be a cavity: it is turned with that
+    body alone."""
+    vertices, faces = np.asarray(mesh.vertices), np.asarray(mesh.faces)
+    if not is_closed(faces):
+        return None
+    number, corners = components(len(vertices), faces), vertices[faces] - vertices.mean(axis=0)
+    cones = np.einsum("ij,ij->i", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])) / 6
+    volume = np.bincount(number, cones)
+    turned = np.full(len(volume), volume.sum() < 0)
+    if (np.where(turned, -volume, volume) < 0).any():
+        low, high = np.full((len(volume), 3), np.inf), np.full((len(volume), 3), -np.inf)
+        np.minimum.at(low, number, corners.min(axis=1))
+        np.maximum.at(high, number, corners.max(axis=1))
+        for body in np.flatnonzero(np.where(turned, -volume, volume) < 0):
+            if not ((low < low[body]) & (high > high[body])).all(axis=1).any():
+                with_it = ((low >= low[body]) & (high <= high[body])).all(axis=1)
+                turned[with_it] = ~turned[with_it]
+    whole, box = np.where(turned, -volume, volume).sum(), np.prod(np.ptp(vertices, axis=0))
+    if not HOLLOW * box < whole <= (1 + 1e-9) * box:
+        return None
+    return np.where(turned[number, None], faces[:, ::-1], faces)
