@@ -65,10 +65,9 @@ class Simulation:
     run that stalls or takes too long is a Run with its trouble; `require` makes that an error.
     `compiled`: what it shares with earlier runs, made by `compiled` for the same layout and a
     request that differs in seed and jitter alone. `counts`: how often each transition has fired
-    where it starts; `before`: products that had left by then. `chosen`: the timestep was left to
-    the factory; that of `request` is a number. `bounded`: so was the bound `wip`, which that of
-    `request` has where the pool of parts is too large. `ways`: what robots that go ahead while they
-    wait take [s].
+    where it starts; `before`: products that had left by then. `asked`: the request as it was
+    given; in `request` the timestep is a number, and `wip` is one where the pool of parts is too
+    large. `ways`: what robots that go ahead while they wait take [s].
     """
 
     def __init__(
@@ -77,8 +76,7 @@ class Simulation:
         request: RunRequest = RunRequest(),  # noqa: B008 (frozen)
         compiled: Compiled | None = None,
     ) -> None:
-        self.layout, self.chosen = layout, request.settings.timestep == AUTO
-        self.bounded = request.wip is None
+        self.layout, self.asked = layout, request
         self.request = request = replace(request, settings=_timed(layout, request, compiled))
         settings, world, net = request.settings, request.world, layout.factory.net
         self.modes = compiled.modes if compiled else operation_modes(layout, settings.eps)
@@ -239,8 +237,8 @@ class Simulation:
             figures
             and replace(
                 figures,
-                timestep_chosen=self.chosen,
-                wip_chosen=request.wip if self.bounded else None,
+                timestep_chosen=self.asked.settings.timestep == AUTO,
+                wip_chosen=request.wip if self.asked.wip is None else None,
             ),
             request.seed,
             request.jitter,
