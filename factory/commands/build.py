@@ -14,6 +14,7 @@ import click
 from factory.commands.options import FLOOR, MOTION, OUTPUT, PATH, RELAY, SOURCE, WIP
 from factory.commands.outputs import writable, writable_folder
 from factory.commands.requests import OutputOptions, ProjectOptions
+from factory.commands.warnings import told
 from factory.support.collector import collector_paused
 from factory.support.console import emit, say, warning
 
@@ -71,7 +72,7 @@ def build(
         build_cache.keep(name, inputs, built.files, kept)
     else:
         kept["document"]["compile_s"] = perf_counter() - begin
-    for text in [] if out.quiet else kept["warnings"]:
+    for text in [] if out.silent else kept["all warnings" if out.verbose else "warnings"]:
         print(text, file=sys.stderr)
     if out.as_json:
         emit(kept["document"])
@@ -115,7 +116,7 @@ def _printed(project: Project, built: Built, spent: float) -> dict[str, Any]:
         "clearance": built.clearance.summary(),
         "layout": gained.as_json(),
         "files": [str(path) for path in built.files],
-        "warnings": [d.as_json() for d in layout.product.warnings],
+        "warnings": [d.as_json() for d in project.warnings],
     }
     lines = [
         f"{root}: {robots} robots, {model.bodies} bodies of parts, {model.joints} joints, "
@@ -126,8 +127,8 @@ def _printed(project: Project, built: Built, spent: float) -> dict[str, Any]:
         + (", chosen automatically (--timestep)" if settings.timestep == AUTO else ""),
         str(gained),
     ]
-    warnings = [warning(diagnostic) for diagnostic in layout.product.warnings]
-    return {"document": document, "lines": lines, "warnings": warnings}
+    every, brief = ([*map(warning, told(project.warnings, all_))] for all_ in (True, False))
+    return {"document": document, "lines": lines, "all warnings": every, "warnings": brief}
 
 
 def _shipped_and_own(folders: tuple[Path, ...]) -> tuple[Path, ...]:

@@ -23,17 +23,20 @@ from factory.compiler.mating.bodies import bodies
 from factory.compiler.mating.meetings import Ints, Meeting, Meetings, meetings
 from factory.compiler.mating.overlaps import SIGNS, TOLERANCE, Finder, Overlaps
 from factory.geometry.solids import Product
-from factory.plant.approaches import MARGIN, Approach, Kind, Pair
+from factory.plant.approaches import MARGIN, Approach, Kind, Overlap, Pair
 from factory.plant.factory import Factory
 from factory.problem.pag import PAG
 from factory.problem.template import Template
-from factory.support.errors import Position
+from factory.support.errors import Diagnostic, Position
 
 STRICT, NO_DEEPER, LEFT_OUT, BLOCKED = 3, 2, 1, 0
 """The levels, the strictest first."""
 
 LEVELS = ("none", "left_out", "no_deeper", "strict")
 """The names of the levels in documents."""
+
+NAMED = 3
+"""The most pairs that clash that a warning names."""
 
 UPRIGHT = 2
 """The axis z, along which inputs are lowered."""
@@ -85,25 +88,37 @@ class Mating:
             "stroke_m": approach.stroke,
             "level": LEVELS[self.level],
             "slides": LEVELS[self.slide],
-            "excluded": [len(pairs) for pairs in approach.excluded],
+            "excluded": [len(overlaps) for overlaps in approach.overlaps],
         }
 
-    def clashes_as_json(self) -> list[dict[str, Any]]:
-        """The pairs that clash."""
-        return [
-            {
-                "label": self.label,
-                "parts": list(clash.parts),
-                "depth_mm": round(clash.depth * 1e3, 4),
-                "finished_mm": round(clash.finished * 1e3, 4),
-                "shift_mm": round(clash.shift * 1e3, 4),
-                "side": self.approach.sides[0],
-                "file": self.position.file if self.position else None,
-                "line": self.position.line if self.position else None,
-                "col": self.position.column if self.position else None,
-            }
-            for clash in self.clashes
+    def warning(self) -> Diagnostic:
+        """What is told of a blocked operation: where, what cannot come and what it clashes with."""
+        named = [
+            f"{c.parts[0]} and {c.parts[1]} {c.depth * 1e3:.2f} mm" for c in self.clashes[:NAMED]
         ]
+        more = len(self.clashes) - len(named)
+        pairs = ", ".join(named) + (f", and {more} more" if more else "")
+        message = f"{self.inputs[-1]} cannot come to {self.label}: {pairs}"
+        return Diagnostic("Blocked", message, self.position)
+
+    def clashes_as_json(self) -> dict[str, Any]:
+        """The pairs that clash."""
+        return {
+            "label": self.label,
+            "side": self.approach.sides[0],
+            "file": self.position.file if self.position else None,
+            "line": self.position.line if self.position else None,
+            "col": self.position.column if self.position else None,
+            "pairs": [
+                {
+                    "parts": list(clash.parts),
+                    "depth_mm": round(clash.depth * 1e3, 4),
+                    "finished_mm": round(clash.finished * 1e3, 4),
+                    "shift_mm": round(clash.shift * 1e3, 4),
+                }
+                for clash in self.clashes
+            ],
+        }
 
 
 @dataclass(frozen=True)
@@ -126,6 +141,11 @@ class Matings:
     def of_kind(self, kind: Kind) -> tuple[Mating, ...]:
         """The operations whose approach is of a kind."""
         return tuple(mating for mating in self.all if mating.approach.kind == kind)
+
+    @property
+    def warnings(self) -> tuple[Diagnostic, ...]:
+        """One for each blocked operation."""
+        return tuple(mating.warning() for mating in self.of_kind("blocked"))
 
     def as_json(self) -> dict[str, Any]:
         """How many operations are of each kind and attain each level, and all approaches."""
@@ -209,9 +229,11 @@ class _Judge:
         slide, lower = max(slides), max(self.lowers[number].tolist())
         clashes: tuple[Clash, ...] = ()
         if slide == lower == BLOCKED:
-            columns = [column for column in (0, 1) if clashing[column] == min(clashing)]
-            approach = self._along(number, "blocked", columns)
-            clashes = self._clashes(number, meeting.axis, columns[0])
+            column = clashing.index(min(clashing))
+            clashes = self._clashes(number, meeting.axis, column)
+            other = self._clashes(number, meeting.axis, 1 - column)
+            same = {c.parts for c in clashes} == {c.parts for c in other}
+            approach = self._along(number, "blocked", [0, 1] if same else [column])
         elif slide >= lower:
             columns = [column for column in (0, 1) if slides[column] == slide]
             approach = self._along(number, "slide", columns, slide == STRICT)
@@ -224,8 +246,8 @@ class _Judge:
         """From some of the sides."""
         axis = self.meetings.all[number].axis
         sides = tuple(SIGNS[column] for column in columns)
-        pairs = tuple(() if clean else self._excluded(number, axis, c) for c in columns)
-        return Approach(kind, axis, sides, "", 0.0, pairs)
+        overlaps = tuple(() if clean else self._overlaps(number, axis, c) for c in columns)
+        return Approach(kind, axis, sides, "", 0.0, overlaps)
 
     def _lowering(self, number: int, level: int) -> Approach:
         """Of two that can be lowered the one with the shorter stroke, or else the last."""
@@ -233,9 +255,9 @@ class _Judge:
         stroke = self._strokes(meeting)
         columns = [c for c in (1, 0) if self.lowers[number, c] == level]
         column = min(columns, key=lambda c: stroke[c])
-        pairs = self._excluded(number, UPRIGHT, column)
+        found = self._overlaps(number, UPRIGHT, column)
         lowered = meeting.inputs[-1 if column else 0]
-        return Approach("lower", meeting.axis, SIGNS, lowered, stroke[column], (pairs, pairs))
+        return Approach("lower", meeting.axis, SIGNS, lowered, stroke[column], (found, found))
 
     def _strokes(self, meeting: Meeting) -> tuple[float, float]:
         """How high the first, or the last input is raised above its place, so that it clears the
@@ -271,10 +293,20 @@ class _Judge:
         ]
         return tuple(sorted(found, key=lambda c: (-c.depth, c.parts)))
 
-    def _excluded(self, number: int, axis: int, column: int) -> tuple[Pair, ...]:
+    def _overlaps(self, number: int, axis: int, column: int) -> tuple[Overlap, ...]:
+        """What overlaps or scrapes as the inputs of an operation come from a side."""
         overlaps = self.overlaps[axis].of(number)
-        rows = np.flatnonzero(overlaps.depths.faulty[:, column])
-        return tuple(sorted(self._pair(overlaps, row) for row in rows.tolist()))
+        rows = np.flatnonzero(overlaps.depths.faulty[:, column]).tolist()
+        found = (self._overlap(overlaps, row, column) for row in rows)
+        return tuple(sorted(found, key=lambda overlap: overlap.parts))
+
+    def _overlap(self, overlaps: Overlaps, row: int, column: int) -> Overlap:
+        parts = self._pair(overlaps, row)
+        rows = slice(*overlaps.starts[row : row + 2].tolist())
+        bodies = overlaps.bodies.receding(rows, column)
+        if self.meetings.parts[overlaps.one[row]] != parts[0]:
+            bodies = [(other, one, far) for one, other, far in bodies]
+        return Overlap(parts, float(overlaps.depths.path[row, column]), tuple(bodies))
 
     def _pair(self, overlaps: Overlaps, row: int) -> Pair:
         parts = self.meetings.parts
