@@ -10,7 +10,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from factory.compiler.compiler import compile_pag
-from factory.compiler.mating.mating import Matings, matings, shaped
+from factory.compiler.mating.findings import Matings
+from factory.compiler.mating.mating import matings, shaped
 from factory.geometry.limits import is_plain
 from factory.geometry.product import product_geometry
 from factory.geometry.solids import Product

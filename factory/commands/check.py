@@ -17,7 +17,7 @@ from factory.support.console import emit, say, table, warn
 from factory.support.files import is_net
 
 if TYPE_CHECKING:
-    from factory.compiler.mating.mating import Matings
+    from factory.compiler.mating.findings import Matings
     from factory.pipeline import Project
     from factory.study.checking import Checked
 

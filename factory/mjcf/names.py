@@ -99,6 +99,12 @@ def exclusion(one: str, other: str, number: int) -> str:
     return f"exclude/{one}/{copy(other, number)}"
 
 
+def excluded(name: str) -> tuple[str, str]:
+    """The two parts in the name of an exclusion."""
+    one, _, other = name.partition("/")[2].partition("/")
+    return one, other.rpartition("#")[0]
+
+
 def park(label: str, number: int) -> str:
     """The weld that keeps a spare copy out of sight, `park/part1#3`."""
     return f"park/{copy(label, number)}"

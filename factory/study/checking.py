@@ -18,7 +18,7 @@ from factory.support.errors import Diagnostic
 from factory.timing.pool import part_pool
 
 if TYPE_CHECKING:
-    from factory.compiler.mating.mating import Matings
+    from factory.compiler.mating.findings import Matings
     from factory.geometry.solids import Product
 
 
