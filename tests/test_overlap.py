@@ -227,9 +227,8 @@ def test_in_fused_runs_pairs_are_left_out_part_by_part() -> None:
     assert m.body_mass[m.body_parentid == u].sum() == 0.0
     assert m.body_subtreemass[u] == m.body_mass[u] == pytest.approx(0.128)
     solid = m.body_geomnum > 0
-    m.geom_contype[:] = m.geom_conaffinity[:] = m.body_contype[solid] = m.body_conaffinity[
-        solid
-    ] = 1
+    m.geom_contype[:] = m.geom_conaffinity[:] = 1
+    m.body_contype[solid] = m.body_conaffinity[solid] = 1
     m.opt.enableflags &= ~int(mujoco.mjtEnableBit.mjENBL_SLEEP)
     places = (model.carried.centre["u"], model.carried.centre["v"] - [0, 3 * MM, 0])
     for body, at in zip((u, v), places, strict=True):
