@@ -31,7 +31,7 @@ from factory.compiler.mating.findings import (
 )
 from factory.compiler.mating.mating import matings, shaped
 from factory.compiler.mating.meetings import meetings
-from factory.compiler.mating.overlaps import CHUNK, TOLERANCE
+from factory.compiler.mating.overlaps import CHUNK, CLEAR, TOLERANCE
 from factory.export.clash_picture import draw, picture_names
 from factory.geometry.product import product_geometry
 from factory.geometry.solids import Product
@@ -215,6 +215,19 @@ def test_a_press_fit_is_clean_only_with_finished_overlaps_left_out() -> None:
     assert (mating.approach.kind, mating.slide) == ("slide", NO_DEEPER)
     assert mating.approach.pairs == ((("a", "b"),), (("a", "b"),))
     assert [found.count(level) for level in (LEFT_OUT, NO_DEEPER, STRICT)] == [1, 1, 0]
+
+
+def test_what_overlaps_is_known_body_by_body() -> None:
+    """Part z has three bodies: a overlaps the second and scrapes along the third. Parts are in
+    alphabetical order, and their bodies in that of the parts."""
+    bodies = [block((90, 99), (0, 9), (0, 9)), block((0, 10), (0, 10), (0, 10))]
+    bodies.append(block((-5, 0), (9, 20), (0, 10)))
+    text = "root = r; r = mate ( z, a ); "
+    found = one(judged(text, z=bodies, a=[block((0, 10), (9.7, 20), (0, 10))]))
+    ((overlap,),) = found.approach.overlaps
+    assert (overlap.parts, overlap.deep) == (("a", "z"), pytest.approx(0.3 * MM))
+    far = [pytest.approx(0.3 * MM), pytest.approx(CLEAR)]
+    assert overlap.bodies == ((0, 1, far[0]), (0, 2, far[1]))
 
 
 def test_a_snap_fit_goes_deeper_on_its_way() -> None:

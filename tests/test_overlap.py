@@ -3,6 +3,7 @@ overlap deeper are left out, part by part, and counted."""
 
 from __future__ import annotations
 
+import io
 import xml.etree.ElementTree as ElementTree
 from dataclasses import replace
 from math import comb
@@ -165,6 +166,29 @@ def test_a_mesh_recedes_in_a_file_of_its_own(tmp_path: Path) -> None:
     assert np.ptp(m.mesh_vert[m.mesh(meshes[0]).vertadr[0] :][:9], axis=0).max() < 0.04 - depth
 
 
+def test_of_a_mesh_of_several_bodies_those_recede_that_overlap(tmp_path: Path) -> None:
+    """The second of two boxes in one mesh is 0.2 mm deep in another part."""
+    import trimesh
+
+    boxes = [
+        trimesh.creation.box((0.02, 0.02, 0.02)).apply_translation((0, y, 0)) for y in (0, 0.03)
+    ]
+    (tmp_path / "b.obj").write_text(trimesh.util.concatenate(boxes).export(file_type="obj"))
+    file = tmp_path / "m.pag"
+    file.write_text(
+        """root = r; r = mate ( p, q ); p = atomic ( mesh = "b.obj" );
+        q = atomic ( box = (0.02, 0.02, 0.02), pos = (0, 0.0498, 0) )"""
+    )
+    model = model_of(read(file).layout)
+    assert model.insets.depths == {"p": {1: 1e-4}, "q": {0: 1e-4}}
+    used = [geoms(model)[f"part/p#1/{n}"]["mesh"].rpartition("/")[2] for n in (1, 2)]
+    assert [name.partition(".")[2] for name in used] == ["1", "2-100"]
+    files = [io.BytesIO(model.files[f"{name}.stl"]) for name in used]
+    size = [np.ptp(trimesh.load(file, file_type="stl").vertices, axis=0) for file in files]
+    assert size[0] == pytest.approx([0.02] * 3) and size[1] == pytest.approx([0.0198] * 3)
+    load(model)
+
+
 # --- runs -------------------------------------------------------------------------------------
 
 
@@ -256,6 +280,26 @@ def test_a_fused_run_is_as_the_plain_one() -> None:
     assert fused.physics.handoff_gap_max_mm == pytest.approx(
         plain.physics.handoff_gap_max_mm, abs=0.01
     )
+
+
+def test_shells_are_in_the_hands_and_the_unit_of_what_they_are_of() -> None:
+    """Else they would pass through other parts and robots, or stop what they are joined with."""
+    simulation = ready(laid_out(FOUR), fuse=True)
+    world, seen = simulation.physical, set()
+    m, masks = world.m, world.parts.masks
+    shells = np.flatnonzero(masks.trunk != np.arange(m.nbody))
+    trunks = masks.trunk[shells]
+    assert len(shells) == len(m.body_parentid[shells]) and (m.body_dofnum[shells] == 0).all()
+    while world.delivered() < 2:
+        simulation.supervisor.step()
+        for figures in (masks.code, masks.unit, m.body_contype, m.body_conaffinity):
+            assert (figures[shells] == figures[trunks]).all()
+        for shell, trunk in zip(shells, trunks, strict=True):
+            (mine,) = np.flatnonzero(m.geom_bodyid == shell)
+            (other,) = np.flatnonzero(m.geom_bodyid == trunk)
+            assert m.geom_contype[mine] == m.geom_contype[other] == m.body_contype[shell]
+        seen |= set(masks.code[shells].tolist())
+    assert len(seen) > 2
 
 
 def test_the_broad_phase_knows_the_boxes_of_shells() -> None:

@@ -185,7 +185,7 @@ class _Judge:
         bodies = overlaps.bodies.receding(rows, column)
         if self.meetings.parts[overlaps.one[row]] != parts[0]:
             bodies = [(other, one, far) for one, other, far in bodies]
-        return Overlap(parts, float(overlaps.depths.path[row, column]), tuple(bodies))
+        return Overlap(parts, float(overlaps.depths.path[row, column]), tuple(sorted(bodies)))
 
     def _pair(self, overlaps: Overlaps, row: int) -> Pair:
         parts = self.meetings.parts
