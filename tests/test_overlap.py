@@ -24,9 +24,11 @@ from factory.mjcf.insets import insets_of
 from factory.mjcf.loading import load
 from factory.mjcf.model import Model
 from factory.pipeline import read
+from factory.show.live import Session
 from factory.simulation.mujoco.fast.neighbours import boxes
 from factory.simulation.mujoco.world import MujocoWorld
-from factory.simulation.simulation import physical_model
+from factory.simulation.request import RunRequest
+from factory.simulation.simulation import Simulation, physical_model
 from factory.support.engine import mujoco
 from factory.support.settings import Settings
 from tests.command_line import ROOT, Terminal
@@ -300,6 +302,20 @@ def test_shells_are_in_the_hands_and_the_unit_of_what_they_are_of() -> None:
             assert m.geom_contype[mine] == m.geom_contype[other] == m.body_contype[shell]
         seen |= set(masks.code[shells].tolist())
     assert len(seen) > 2
+
+
+def test_a_live_view_shows_shells_where_their_bodies_are() -> None:
+    """At once where these have been put somewhere."""
+    layout = laid_out(FOUR)
+    session = Session(lambda: Simulation(layout, RunRequest(units=10**9, fuse=True)), False)
+    world = session.simulation.physical
+    bodies, trunk = session.bodies, world.parts.masks.trunk
+    shells = np.flatnonzero(trunk[bodies] != bodies)
+    places = [bodies.tolist().index(b) for b in trunk[bodies[shells]]]
+    world.d.xpos[bodies[places]] += 1.0
+    session._publish()
+    poses = np.frombuffer(session.frame.poses, "<f4").reshape(-1, 7)
+    assert len(shells) and (poses[shells] == poses[places]).all()
 
 
 def test_the_broad_phase_knows_the_boxes_of_shells() -> None:
