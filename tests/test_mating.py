@@ -105,6 +105,11 @@ def one(found: Matings, label: str = "") -> Mating:
     return next(m for m in found.all if label in ("", m.label))
 
 
+def overlapping(mating: Mating) -> tuple[tuple[tuple[str, str], ...], ...]:
+    """The parts that overlap or scrape, for each side."""
+    return tuple(tuple(found.parts for found in side) for side in mating.approach.overlaps)
+
+
 # --- hand-made cases --------------------------------------------------------------------------
 
 
@@ -113,7 +118,7 @@ def test_two_boxes_side_by_side_slide_from_one_side_only() -> None:
     found = one(judged(ALONG_Y, a=[a], b=[b]))
     assert (found.approach.kind, found.approach.axis) == ("slide", 1)
     assert found.approach.sides == (+1,)
-    assert found.approach.pairs == ((),)
+    assert overlapping(found) == ((),)
     assert found.level == STRICT and found.clashes == ()
     swapped = one(judged(ALONG_Y, a=[b], b=[a]))
     assert swapped.approach.sides == (-1,)
@@ -142,7 +147,7 @@ def test_hooks_that_hold_each_other_are_lowered() -> None:
     assert found.approach.lowered == "b"
     assert found.approach.stroke == pytest.approx(0.030)
     assert found.approach.sides == (-1, +1)
-    assert found.approach.pairs == ((), ())
+    assert overlapping(found) == ((), ())
 
 
 def test_hooks_between_covers_are_blocked_and_told() -> None:
@@ -153,7 +158,7 @@ def test_hooks_between_covers_are_blocked_and_told() -> None:
     assert [clash.parts for clash in found.clashes] == [("a", "b")]
     assert found.clashes[0].depth == pytest.approx(10 * MM, abs=0.2 * MM)
     assert found.clashes[0].finished == 0.0
-    assert found.approach.pairs == ((("a", "b"),),) * len(found.approach.sides)
+    assert overlapping(found) == ((("a", "b"),),) * len(found.approach.sides)
 
 
 @pytest.mark.parametrize(
@@ -213,7 +218,7 @@ def test_a_press_fit_is_clean_only_with_finished_overlaps_left_out() -> None:
     found = judged(ALONG_Y, a=plate(8, 1), b=[block((-8.05, 8.05), (-20, 20), (-7, 7))])
     mating = one(found)
     assert (mating.approach.kind, mating.slide) == ("slide", NO_DEEPER)
-    assert mating.approach.pairs == ((("a", "b"),), (("a", "b"),))
+    assert overlapping(mating) == ((("a", "b"),), (("a", "b"),))
     assert [found.count(level) for level in (LEFT_OUT, NO_DEEPER, STRICT)] == [1, 1, 0]
 
 
@@ -256,7 +261,7 @@ def test_sides_may_differ_in_what_they_exclude() -> None:
     text = "root = r; r = mate ( a, c, b ); "
     found = one(judged(text, **{n: [v] for n, v in lugs.items()}, b=[body]), "r")
     assert found.approach.sides == (-1,)
-    assert found.approach.pairs == ((("a", "b"), ("b", "c")),)
+    assert overlapping(found) == ((("a", "b"), ("b", "c")),)
 
 
 def test_positions_are_those_of_the_input_that_comes() -> None:

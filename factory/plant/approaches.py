@@ -44,8 +44,3 @@ class Approach:
     lowered: str = ""
     stroke: float = 0.0
     overlaps: tuple[tuple[Overlap, ...], ...] = ((), ())
-
-    @property
-    def pairs(self) -> tuple[tuple[Pair, ...], ...]:
-        """The parts of `overlaps`."""
-        return tuple(tuple(overlap.parts for overlap in side) for side in self.overlaps)
