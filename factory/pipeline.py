@@ -10,7 +10,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from factory.compiler.compiler import compile_pag
-from factory.compiler.mating.mating import Matings, matings, shaped
+from factory.compiler.mating.findings import Matings
+from factory.compiler.mating.mating import matings, shaped
+from factory.geometry.limits import is_plain
 from factory.geometry.product import product_geometry
 from factory.geometry.solids import Product
 from factory.lang.pag_reader import load_pag
@@ -71,6 +73,12 @@ class Project:
     def matings(self) -> Matings | None:
         """What was found of how its inputs come together; None for a product of default boxes."""
         return matings(self.pag, self.templates, self.product) if shaped(self.pag) else None
+
+    @property
+    def warnings(self) -> tuple[Diagnostic, ...]:
+        """What is wrong with the geometry of its parts, and what is blocked."""
+        product = () if is_plain(self.pag) else self.product.warnings
+        return (*product, *(self.matings.warnings if self.matings else ()))
 
     @cached_property
     def plain(self) -> Factory:

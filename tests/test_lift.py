@@ -82,7 +82,7 @@ def test_lifts_lower_in_either_world(text: str, distributed: bool, world: str) -
     assert run.trouble is None, str(run.trouble)
     assert run.products == 4 and run.refines_net
     if world == "mujoco":
-        assert layout.excluded == ()
+        assert layout.overlaps == ()
         assert run.physics is not None
         assert run.physics.unintended_contacts == 0, run.physics.contacts
         assert run.physics.mating_force_max_n == 0.0
@@ -182,7 +182,7 @@ def test_without_a_lift_the_ball_is_blocked_and_its_pairs_left_out() -> None:
     layout = laid_out(FENCE)
     kinds = {o.label: o.approach.kind for o in layout.factory.operations if o.approach}
     assert "blocked" in kinds.values()
-    assert any("ball" in pair for pair in layout.excluded)
+    assert any("ball" in overlap.parts for overlap in layout.overlaps)
     run = Simulation(layout, RunRequest(units=2)).run()
     assert run.trouble is None and run.physics.unintended_contacts == 0
 

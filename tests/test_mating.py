@@ -18,20 +18,20 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial import ConvexHull
 
+from factory.commands.warnings import SHOWN, told
 from factory.compiler.compiler import expand
 from factory.compiler.mating.depth import deepest, exact, polytope, rough
-from factory.compiler.mating.mating import (
+from factory.compiler.mating.findings import (
     BLOCKED,
     LEFT_OUT,
     NO_DEEPER,
     STRICT,
     Mating,
     Matings,
-    matings,
-    shaped,
 )
+from factory.compiler.mating.mating import matings, shaped
 from factory.compiler.mating.meetings import meetings
-from factory.compiler.mating.overlaps import CHUNK, TOLERANCE
+from factory.compiler.mating.overlaps import CHUNK, CLEAR, TOLERANCE
 from factory.export.clash_picture import draw, picture_names
 from factory.geometry.product import product_geometry
 from factory.geometry.solids import Product
@@ -39,6 +39,7 @@ from factory.lang import read_pag
 from factory.pipeline import all_templates
 from factory.problem.pag import PAG
 from factory.problem.template import Template
+from factory.support.errors import Diagnostic
 from tests.command_line import Terminal
 from tests.strategies import pags, random_pag_text
 
@@ -104,6 +105,11 @@ def one(found: Matings, label: str = "") -> Mating:
     return next(m for m in found.all if label in ("", m.label))
 
 
+def overlapping(mating: Mating) -> tuple[tuple[tuple[str, str], ...], ...]:
+    """The parts that overlap or scrape, for each side."""
+    return tuple(tuple(found.parts for found in side) for side in mating.approach.overlaps)
+
+
 # --- hand-made cases --------------------------------------------------------------------------
 
 
@@ -112,7 +118,7 @@ def test_two_boxes_side_by_side_slide_from_one_side_only() -> None:
     found = one(judged(ALONG_Y, a=[a], b=[b]))
     assert (found.approach.kind, found.approach.axis) == ("slide", 1)
     assert found.approach.sides == (+1,)
-    assert found.approach.excluded == ((),)
+    assert overlapping(found) == ((),)
     assert found.level == STRICT and found.clashes == ()
     swapped = one(judged(ALONG_Y, a=[b], b=[a]))
     assert swapped.approach.sides == (-1,)
@@ -141,7 +147,7 @@ def test_hooks_that_hold_each_other_are_lowered() -> None:
     assert found.approach.lowered == "b"
     assert found.approach.stroke == pytest.approx(0.030)
     assert found.approach.sides == (-1, +1)
-    assert found.approach.excluded == ((), ())
+    assert overlapping(found) == ((), ())
 
 
 def test_hooks_between_covers_are_blocked_and_told() -> None:
@@ -152,7 +158,7 @@ def test_hooks_between_covers_are_blocked_and_told() -> None:
     assert [clash.parts for clash in found.clashes] == [("a", "b")]
     assert found.clashes[0].depth == pytest.approx(10 * MM, abs=0.2 * MM)
     assert found.clashes[0].finished == 0.0
-    assert found.approach.excluded == ((("a", "b"),),) * len(found.approach.sides)
+    assert overlapping(found) == ((("a", "b"),),) * len(found.approach.sides)
 
 
 @pytest.mark.parametrize(
@@ -212,8 +218,21 @@ def test_a_press_fit_is_clean_only_with_finished_overlaps_left_out() -> None:
     found = judged(ALONG_Y, a=plate(8, 1), b=[block((-8.05, 8.05), (-20, 20), (-7, 7))])
     mating = one(found)
     assert (mating.approach.kind, mating.slide) == ("slide", NO_DEEPER)
-    assert mating.approach.excluded == ((("a", "b"),), (("a", "b"),))
+    assert overlapping(mating) == ((("a", "b"),), (("a", "b"),))
     assert [found.count(level) for level in (LEFT_OUT, NO_DEEPER, STRICT)] == [1, 1, 0]
+
+
+def test_what_overlaps_is_known_body_by_body() -> None:
+    """Part z has three bodies: a overlaps the second and scrapes along the third. Parts are in
+    alphabetical order, and their bodies in that of the parts."""
+    bodies = [block((90, 99), (0, 9), (0, 9)), block((0, 10), (0, 10), (0, 10))]
+    bodies.append(block((-5, 0), (9, 20), (0, 10)))
+    text = "root = r; r = mate ( z, a ); "
+    found = one(judged(text, z=bodies, a=[block((0, 10), (9.7, 20), (0, 10))]))
+    ((overlap,),) = found.approach.overlaps
+    assert (overlap.parts, overlap.deep) == (("a", "z"), pytest.approx(0.3 * MM))
+    far = [pytest.approx(0.3 * MM), pytest.approx(CLEAR)]
+    assert overlap.bodies == ((0, 1, far[0]), (0, 2, far[1]))
 
 
 def test_a_snap_fit_goes_deeper_on_its_way() -> None:
@@ -242,7 +261,7 @@ def test_sides_may_differ_in_what_they_exclude() -> None:
     text = "root = r; r = mate ( a, c, b ); "
     found = one(judged(text, **{n: [v] for n, v in lugs.items()}, b=[body]), "r")
     assert found.approach.sides == (-1,)
-    assert found.approach.excluded == ((("a", "b"), ("b", "c")),)
+    assert overlapping(found) == ((("a", "b"), ("b", "c")),)
 
 
 def test_positions_are_those_of_the_input_that_comes() -> None:
@@ -450,8 +469,56 @@ def test_check_tells_figures_and_names_what_is_blocked(run: Terminal, closed: Pa
         "approach: 5 of 6 operations clean with finished overlaps left out, 5 with paths no deeper,"
         " 5 strictly; 5 lowered, 1 blocked" in out
     )
-    assert f"{closed}:2:15: Blocked warning: b cannot come to r: b and front 20.00 mm" in out
-    assert "--clashes DIR draws each of them" in out
+    assert "5 strictly; 5 lowered, 1 blocked (--clashes DIR draws each)" in out
+    assert done.err.splitlines() == blocked_lines(closed)
+
+
+def blocked_lines(closed: Path) -> list[str]:
+    """What is told of CLOSED."""
+    line = f"{closed}:2:15: Blocked warning: b cannot come to r: b and front 20.00 mm"
+    return [line, "    r = mate ( a, b );", f"    {' ' * 14}^"]
+
+
+def test_run_and_build_tell_what_is_blocked_as_check_does(run: Terminal, closed: Path) -> None:
+    """The same lines, and the same entry in the documents; nothing with -q."""
+    found = run("check", closed, "--json").json["warnings"]
+    assert [(w["code"], w["line"], w["col"]) for w in found] == [("Blocked", 2, 15)]
+    for words in (["run", closed], ["build", closed, "--mjcf", closed.with_suffix(".xml")]):
+        for _ in range(2):  # a second build is left out
+            assert run(*words).err.splitlines() == blocked_lines(closed), words
+        assert run(*words, "-q").err == ""
+        done = run(*words, "--json")
+        assert done.json["warnings"] == found and done.err == "", words
+
+
+def test_of_many_blocked_operations_the_first_are_told_and_how_many_more() -> None:
+    other = Diagnostic("Size", "long")
+    many = [Diagnostic("Blocked", f"b cannot come to r{i}: b and c 1.00 mm") for i in range(SHOWN)]
+    assert told([other, *many], verbose=False) == [other, *many]
+    more = [*many, *many]
+    assert told([other, *more], verbose=True) == [other, *more]
+    *first, last = told([other, *more], verbose=False)
+    assert first == [other, *many]
+    assert str(last) == f"Blocked and {SHOWN} more operations are blocked\n    list: -v"
+
+
+def test_all_pairs_that_clash_in_one_operation_are_one_entry(run: Terminal, closed: Path) -> None:
+    """Three parts in a closed box: one line, one entry, every pair in it."""
+    text = CLOSED.replace("b = atomic", "b = mate ( b1, b2, b3 ); b1 = atomic").replace(
+        "(0.03, 0.03, 0.02), pos = (0, 0, 0.022)", "(0.008, 0.03, 0.02), pos = (0, 0, 0.022)"
+    )
+    for name, x in (("b2", -0.0101), ("b3", 0.0101)):
+        text += f"; {name} = atomic ( box = (0.008, 0.03, 0.02), pos = ({x}, 0, 0.022) )"
+    closed.write_text(text)
+    document = run("check", closed, "--json").json
+    (clashes,), (warning,) = document["clashes"], document["warnings"]
+    pairs = [pair["parts"] for pair in clashes["pairs"]]
+    assert (clashes["label"], clashes["line"]) == ("r", 2)
+    assert sorted(pairs) == [["b1", "front"], ["b2", "front"], ["b3", "front"]]
+    assert warning["message"].startswith("b cannot come to r: ")
+    assert len(run("check", closed).err.splitlines()) == 3
+    tried = run("run", closed, "--json").json
+    assert {*map(tuple, tried["excluded"])} == {*map(tuple, pairs)}, "those that check names"
 
 
 def test_check_lists_approaches_and_clashes(run: Terminal, closed: Path) -> None:
@@ -471,10 +538,11 @@ def test_check_lists_approaches_and_clashes(run: Terminal, closed: Path) -> None
         "y",
         "none",
     )
-    clash = document["clashes"][0]
-    assert (clash["label"], clash["parts"]) == ("r", ["b", "front"])
-    assert clash["depth_mm"] == pytest.approx(20) and clash["line"] == 2
-    assert Path(clash["file"]) == closed
+    (clashes,) = document["clashes"]
+    (clash,) = clashes["pairs"]
+    assert (clashes["label"], clash["parts"]) == ("r", ["b", "front"])
+    assert clash["depth_mm"] == pytest.approx(20) and clashes["line"] == 2
+    assert Path(clashes["file"]) == closed
 
 
 def test_check_computes_no_geometry_where_no_part_has_a_shape(
@@ -552,8 +620,8 @@ def test_random_products_have_nested_levels_and_consistent_exclusions(seed: int)
     assert found.count(STRICT) <= found.count(NO_DEEPER) <= found.count(LEFT_OUT)
     for mating in found.all:
         approach = mating.approach
-        assert len(approach.excluded) == len(approach.sides) > 0
-        assert (mating.level == STRICT) == (not any(approach.excluded))
+        assert len(approach.overlaps) == len(approach.sides) > 0
+        assert (mating.level == STRICT) == (not any(approach.overlaps))
         assert (approach.kind == "blocked") == bool(mating.clashes) == (mating.level == BLOCKED)
 
 

@@ -229,7 +229,7 @@ def test_excluded_pairs_of_one_unit_do_not_collide() -> None:
     """In every tick the engine's list has the pairs of those that are in the factory, sorted."""
     simulation = ready(laid_out(FENCE))
     world, lengths = simulation.physical, set()
-    listed, excluded = world.m.exclude_signature.view(np.uint32), simulation.layout.excluded
+    listed, excluded = world.m.exclude_signature.view(np.uint32), world.model.excluded
     assert excluded
     while world.delivered() < 2:
         simulation.supervisor.step()

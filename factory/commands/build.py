@@ -121,7 +121,7 @@ def _printed(project: Project, built: Built, spent: float, wip: int | None) -> d
         "clearance": built.clearance.summary(),
         "layout": gained.as_json(),
         "files": [str(path) for path in built.files],
-        "warnings": [d.as_json() for d in layout.product.warnings],
+        "warnings": [d.as_json() for d in project.warnings],
     }
     lines = [
         f"{root}: {robots} robots, {model.bodies} bodies of parts, {model.joints} joints, "
@@ -134,8 +134,7 @@ def _printed(project: Project, built: Built, spent: float, wip: int | None) -> d
     ]
     if wip is None and model.wip is not None:
         lines.insert(1, f"parts for at most {model.wip} units inside at once: {POOL_BOUND}")
-    warnings = layout.product.warnings
-    every, brief = ([*map(warning, told(warnings, all_))] for all_ in (True, False))
+    every, brief = ([*map(warning, told(project.warnings, all_))] for all_ in (True, False))
     return {"document": document, "lines": lines, "all warnings": every, "warnings": brief}
 
 

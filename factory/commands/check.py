@@ -18,15 +18,12 @@ from factory.support.files import is_net
 from factory.support.progress import Waiting
 
 if TYPE_CHECKING:
-    from factory.compiler.mating.mating import Mating, Matings
+    from factory.compiler.mating.findings import Matings
     from factory.pipeline import Project
     from factory.study.checking import Checked
 
 SHOWN = 24
-"""The most robots, and blocked operations, that are printed, unless `-v` asks for all."""
-
-NAMED = 3
-"""The most pairs of parts that are named in a line."""
+"""The most robots that are printed, unless `-v` asks for all."""
 
 POOLED = 8
 """The most parts whose copies are printed."""
@@ -58,8 +55,7 @@ def check(
     writable_folder(clashes)
     with Waiting("reading the shapes and proving", out.silent):
         checked = check_net(file) if is_net(file) else check_project(project_of(given), wip)
-    warnings = checked.product.warnings if checked.product else ()
-    warn(told(warnings, out.verbose), out.silent)
+    warn(told(checked.warnings, out.verbose), out.silent)
     if clashes is not None:
         files = _pictures(checked, clashes)
         own_names(clashes, files, [file])
@@ -70,7 +66,7 @@ def check(
         proof = document(checked.net, checked.verdict)
         write_text(certificate, json.dumps(proof, ensure_ascii=False) + "\n")
     if out.as_json:
-        emit({**checked.as_json(), "warnings": [d.as_json() for d in warnings]})
+        emit(checked.as_json())
     elif not out.quiet:
         _describe(checked, out.verbose)
     return 0 if checked.verdict.holds else 1
@@ -124,32 +120,15 @@ def _describe(checked: Checked, verbose: bool) -> None:
         listed = ", ".join(f"{label} {count}" for label, count in most)
         say(f"copies inside at once: {listed}{', ...' if len(checked.pool) > POOLED else ''}")
     if checked.matings is not None:
-        _describe_approaches(checked.matings, None if verbose else SHOWN)
+        _describe_approaches(checked.matings)
 
 
-def _describe_approaches(matings: Matings, most: int | None) -> None:
-    """For people: the figures in a line, and a line for each blocked operation, at most so many."""
+def _describe_approaches(matings: Matings) -> None:
+    """For people: the figures in a line."""
     strict, no_deeper, left_out = (matings.count(level) for level in (3, 2, 1))
-    lowered, blocked = len(matings.of_kind("lower")), matings.of_kind("blocked")
+    lowered, blocked = len(matings.of_kind("lower")), len(matings.of_kind("blocked"))
     say(
         f"approach: {left_out} of {len(matings.all)} operations clean with finished overlaps left"
         f" out, {no_deeper} with paths no deeper, {strict} strictly; {lowered} lowered,"
-        f" {len(blocked)} blocked"
+        f" {blocked} blocked{' (--clashes DIR draws each)' if blocked else ''}"
     )
-    for mating in blocked[:most]:
-        say(f"  {_blocked_line(mating)}")
-    if most is not None and len(blocked) > most:
-        say(f"  ... and {len(blocked) - most} more (-v shows all)")
-    if blocked:
-        say("  --clashes DIR draws each of them")
-
-
-def _blocked_line(mating: Mating) -> str:
-    """Where, what is blocked and by what."""
-    named = [
-        f"{c.parts[0]} and {c.parts[1]} {c.depth * 1e3:.2f} mm" for c in mating.clashes[:NAMED]
-    ]
-    more = len(mating.clashes) - len(named)
-    pairs = ", ".join(named) + (f", and {more} more" if more else "")
-    where = f"{mating.position}: " if mating.position else ""
-    return f"{where}Blocked warning: {mating.inputs[-1]} cannot come to {mating.label}: {pairs}"

@@ -129,6 +129,11 @@ MOTION = options(
         help="Timesteps in a supervisor's tick (of 10 ms by default).",
     ),
     click.option(
+        "--overlap",
+        type=float,
+        help="Parts that overlap by no more are tested against each other [m]; 0.0005 by default.",
+    ),
+    click.option(
         "--stage/--no-stage",
         default=None,
         help="Robots that wait empty-handed go ahead to where they are needed next.",

@@ -46,6 +46,7 @@ class ProjectOptions:
     substeps: int | None = None
     stage: bool | None = None
     clearance: float | None = None
+    overlap: float | None = None
     floor: str | None = None
     relay: bool = False
     cycle: float | None = None
@@ -56,7 +57,7 @@ class ProjectOptions:
         from factory.support.settings import environment
         from factory.support.user_defaults import defaults_for
 
-        names = ("speed", "acceleration", "force", "timestep", "substeps", "clearance")
+        names = ("speed", "acceleration", "force", "timestep", "substeps", "clearance", "overlap")
         given = {name: getattr(self, name) for name in names}
         given["stage"] = None if self.stage is None else int(self.stage)
         settings = defaults_for(self.file).settings().with_options(environment())

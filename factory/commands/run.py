@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from factory.plant.factory import Factory
     from factory.record.observed import Recorder
     from factory.render import Film
-    from factory.simulation.run import Run
+    from factory.simulation.run import PhysicsFigures, Run
     from factory.simulation.simulation import Observer, Simulation
 
     Filming = Callable[[Simulation], Film]
@@ -69,7 +69,7 @@ def run(
     project = given.project()
     with Waiting("reading the shapes and laying out", out.silent):
         layout = project.layout
-    warn(told(layout.product.warnings, out.verbose), out.silent)
+    warn(told(project.warnings, out.verbose), out.silent)
     shown.area()
     if asked.world == "ideal":
         check_ideal(asked.fuse, monitor)
@@ -79,7 +79,7 @@ def run(
         document = record.as_json()
         document.pop("schema")
         trouble = [record.trouble.as_json()] if record.trouble else []
-        warnings = [diagnostic.as_json() for diagnostic in layout.product.warnings]
+        warnings = [diagnostic.as_json() for diagnostic in project.warnings]
         emit({**document, "warnings": warnings, **({"errors": trouble} if trouble else {})})
     elif not out.quiet:
         summarise(record, layout.factory, out.verbose)
@@ -170,6 +170,11 @@ def carry_out(
         raise StoppedError(Diagnostic("Interrupted", f"stopped by the user, {came}")) from error
 
 
+def not_tested(physics: PhysicsFigures) -> str:
+    """How many pairs of parts had no contact, of how many."""
+    return f"{physics.pairs_excluded} of {physics.pairs} pairs were not tested against each other"
+
+
 def summarise(record: Run, factory: Factory, verbose: bool) -> None:
     """A run in a few lines for people."""
     cycle = f"{record.cycle_time_s:.3f} s" if record.cycle_time_s is not None else "not yet steady"
@@ -193,21 +198,22 @@ def summarise(record: Run, factory: Factory, verbose: bool) -> None:
         if physics.wip_chosen:
             say(f"at most {physics.wip_chosen} units inside at once: {POOL_BOUND}")
         error = physics.product_error_max_mm
+        contacts = f"{physics.unintended_contacts} unintended contacts"
+        warnings = f"{physics.engine_warnings} engine warnings"
         say(
             f"{physics.handoffs} hand-offs, gap at most {physics.handoff_gap_max_mm:.3f} mm; "
             f"product error {'none measured' if error is None else f'{error:.3f} mm'}; "
-            f"{physics.unintended_contacts} unintended contacts, "
-            f"{physics.engine_warnings} engine warnings"
+            + (warnings if physics.excluded else f"{contacts}, {warnings}")
         )
+        if physics.excluded:
+            say(f"{contacts}; {not_tested(physics)}{'' if verbose else ' (list: -v)'}")
+        for one, other in physics.excluded if verbose else ():
+            say(f"  not tested: {one} - {other}")
         for pair in physics.contacts[:8]:
             say(f"  touched: {pair}")
         if physics.mating_forces:
             most = max(physics.mating_forces, key=physics.mating_forces.__getitem__)
             say(f"inputs pressed on each other with {physics.mating_force_max_n:.3f} N in {most}")
-        if physics.excluded:
-            say(f"{len(physics.excluded)} pairs that clash when joined pass through each other")
-        for one, other in physics.excluded if verbose else ():
-            say(f"  left out: {one} - {other}")
         if physics.fused:
             say("parts joined for good are one rigid body (--no-fuse keeps them apart)")
     if record.monitor is not None:

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from factory.compiler.mating.mating import Mating, Matings
+from factory.compiler.mating.findings import Mating, Matings
 from factory.geometry.meshes import Array
 from factory.geometry.solids import Product, Solid
 from factory.support.canvas import Box, Canvas, Point, shortened

@@ -11,7 +11,7 @@ from factory.geometry.solids import Product
 from factory.layout.certificate import Certificate
 from factory.layout.dimensions import BOOM, PAYLOAD, POST, Clearance
 from factory.layout.guidepath import Box, Extent, Feeder, Guidepath, Point2
-from factory.plant.approaches import Pair
+from factory.plant.approaches import Overlap
 from factory.plant.factory import Factory, Operation
 from factory.problem.pag import NOPART
 
@@ -129,15 +129,14 @@ class Layout:
         return -side if last == carrier else side
 
     @cached_property
-    def excluded(self) -> tuple[Pair, ...]:
-        """The pairs of parts that pass through each other as their operations join them, or overlap
-        in the finished product; contact between them is off."""
-        found: dict[Pair, None] = {}
+    def overlaps(self) -> tuple[Overlap, ...]:
+        """The parts that overlap or scrape as their operations join them from the sides chosen, or
+        overlap in the finished product."""
+        found: list[Overlap] = []
         for operation in self.factory.operations[:-1]:
             approach = operation.approach
-            if approach is not None and any(approach.excluded):
-                which = approach.sides.index(self.side(operation))
-                found.update(dict.fromkeys(approach.excluded[which]))
+            if approach is not None and any(approach.overlaps):
+                found += approach.overlaps[approach.sides.index(self.side(operation))]
         return tuple(found)
 
     def home(self, robot: int, operation: int) -> float:

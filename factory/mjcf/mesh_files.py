@@ -13,6 +13,7 @@ import struct
 
 import numpy as np
 
+from factory.geometry.insets import inset
 from factory.geometry.meshes import Array, Indices, Mesh
 
 CREASE = 31.0
@@ -36,15 +37,31 @@ def mesh_file(mesh: Mesh) -> tuple[str, bytes]:
 def piece_files(mesh: Mesh) -> list[tuple[str, bytes]]:
     """The files of the convex bodies that collide in a mesh's place: names, counted from 1, and
     contents."""
-    import trimesh
-
     found = []
     for number, vertices in enumerate(mesh.pieces, 1):
-        hull = trimesh.convex.convex_hull(vertices)
         name = f"{mesh.name}.{number}"
-        piece = Mesh(name, np.asarray(hull.vertices), np.asarray(hull.faces))
-        found.append((f"{name}.stl", stl(piece)))
+        found.append((f"{name}.stl", stl(_hull(name, vertices))))
     return found
+
+
+def inset_name(mesh: Mesh, number: int, depth: float) -> str:
+    """The name of a mesh's convex body, counted from 0, whose faces recede by `depth` [m]."""
+    receded = f"-{round(depth * 1e6)}" if depth else ""
+    return f"{mesh.name}.{number + 1}{receded}"
+
+
+def inset_file(mesh: Mesh, number: int, depth: float) -> tuple[str, bytes]:
+    """The file of that body: name and content. A mesh without pieces has one, its hull."""
+    name = inset_name(mesh, number, depth)
+    whole = mesh.pieces[number] if mesh.pieces else mesh.vertices
+    return f"{name}.stl", stl(_hull(name, inset(whole, depth)))
+
+
+def _hull(name: str, vertices: Array) -> Mesh:
+    import trimesh
+
+    hull = trimesh.convex.convex_hull(vertices)
+    return Mesh(name, np.asarray(hull.vertices), np.asarray(hull.faces))
 
 
 def stl(mesh: Mesh) -> bytes:

@@ -19,14 +19,16 @@ from xml.sax.saxutils import quoteattr
 from factory.layout.layout import Layout
 from factory.mjcf import names
 from factory.mjcf.elements import add, fill
+from factory.mjcf.insets import Insets, insets_of
 from factory.mjcf.outfeed import TRAY_MASS, add_tray
 from factory.mjcf.parts import add_meshes, add_parts, add_wholes
 from factory.mjcf.robots import Drive, Hoist, add_paints, instantiate, load_robot_model
 from factory.mjcf.scene import add_follower, add_scene
 from factory.mjcf.unseen import leave_out_what_is_shown
 from factory.mjcf.welds import add_exclusions, add_welds, held_at
+from factory.plant.approaches import Pair
 from factory.plant.factory import Factory, Robot
-from factory.plant.fused_bodies import FusedBodies, bodies_of
+from factory.plant.fused_bodies import FusedBodies, Inside, bodies_of
 from factory.problem.robot_types import Catalogue
 from factory.support.settings import Settings
 
@@ -75,8 +77,8 @@ class Model:
     """A factory as MJCF: the XML, its mesh files by name, and the numbers the run needs.
 
     `carried`: what bodies there are, `copies`: how many of each; `masses`: of each label carried
-    [kg]; `drives`: of each robot; `wip`: the most units inside at once that they are enough for,
-    None where more never are.
+    [kg]; `drives`: of each robot; `insets`: what is taken from the shapes that collide; `wip`: the
+    most units inside at once that they are enough for, None where more never are.
     """
 
     layout: Layout
@@ -85,6 +87,7 @@ class Model:
     copies: Mapping[str, int]
     masses: Mapping[str, float]
     drives: tuple[Drive, ...]
+    insets: Insets = field(repr=False)
     xml: str = field(repr=False)
     files: Mapping[str, bytes] = field(repr=False)
     joints: int = 0
@@ -100,10 +103,15 @@ class Model:
         """The factory the model is of."""
         return self.layout.factory
 
+    @property
+    def excluded(self) -> tuple[Pair, ...]:
+        """The pairs of parts between which there is no contact."""
+        return self.insets.excluded
+
     @cached_property
-    def excluded(self) -> tuple[tuple[str, str], ...]:
-        """The pairs of bodies that pass through each other when they are joined."""
-        return self.carried.lifted(self.factory, self.layout.excluded)
+    def apart(self) -> tuple[tuple[Inside, Inside], ...]:
+        """The same, each part with the body that brings it to the other."""
+        return tuple(self.carried.meeting(self.factory, pair) for pair in self.excluded)
 
     @cached_property
     def bodies(self) -> int:
@@ -167,17 +175,19 @@ def build_model(
     world, equality, actuator = (section[tag] for tag in ("worldbody", "equality", "actuator"))
     fill(section["option"], timestep=settings.step)
     add_paints(section["asset"])
-    files = add_meshes(section["asset"], product)
+    insets = insets_of(layout, settings.overlap)
+    apart = [bodies.meeting(factory, pair) for pair in insets.excluded]
+    files = add_meshes(section["asset"], product, insets)
     add_scene(world, section["statistic"], layout)
     hoists = _hoists(factory, masses, settings)
     _robots(layout, catalogue, drives, hoists, section)
     load = masses[factory.pag.root]
     drive = drive_for(TRAY_MASS, load, settings.outfeed_acceleration, settings)
     add_tray(world, actuator, layout, drive)
-    add_parts(world, layout, copies)
-    add_wholes(world, layout, bodies, copies)
+    add_parts(world, layout, copies, insets)
+    add_wholes(world, layout, bodies, copies, insets, {inside for both in apart for inside in both})
     add_welds(equality, layout, bodies, copies)
-    add_exclusions(section["contact"], layout, bodies, copies)
+    add_exclusions(section["contact"], apart, copies)
     if not len(section["contact"]):
         root.remove(section["contact"])
     _home(section["keyframe"], layout, actuator)
@@ -188,7 +198,8 @@ def build_model(
     xml = ElementTree.tostring(root, encoding="unicode") + "\n"
     joints = len(factory.robots) + len(hoists) + 1 + sum(copies.values())
     return Model(
-        layout, settings, bodies, copies, masses, drives, xml, files, joints, len(equality), wip
+        *(layout, settings, bodies, copies, masses, drives, insets, xml, files, joints),
+        *(len(equality), wip),
     )
 
 

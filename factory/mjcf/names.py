@@ -48,6 +48,18 @@ def piece(body: str, number: int) -> str:
     return f"{body}/{number}"
 
 
+SHELL = "shell"
+"""What the names of bodies begin with that hold one part's geoms in a fused body."""
+
+
+def solid(label: str, number: int, part_inside: str) -> str:
+    """The body that has the geoms of a part in a body's copy: that copy, or where the body is a
+    fused one the part's shell, `shell/sub1#2/part1`."""
+    if label == part_inside:
+        return part(label, number)
+    return f"{SHELL}/{copy(label, number)}/{part_inside}"
+
+
 def grip(robot: str, label: str) -> str:
     """The weld by which a robot holds a part, `grip/r3/part1`; it is aimed at the copy it holds."""
     return f"grip/{robot}/{label}"
@@ -85,6 +97,12 @@ OUTFEED_DRIVE = "outfeed/drive"
 def exclusion(one: str, other: str, number: int) -> str:
     """The exclusion of contact between two parts of one unit, `exclude/part1/part2#1`."""
     return f"exclude/{one}/{copy(other, number)}"
+
+
+def excluded(name: str) -> tuple[str, str]:
+    """The two parts in the name of an exclusion."""
+    one, _, other = name.partition("/")[2].partition("/")
+    return one, other.rpartition("#")[0]
 
 
 def park(label: str, number: int) -> str:

@@ -3,7 +3,7 @@ mass."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from xml.etree.ElementTree import Element
 
 from factory.geometry.meshes import Array, Mesh
@@ -11,9 +11,11 @@ from factory.geometry.solids import Product, Solid
 from factory.layout.dimensions import PAYLOAD
 from factory.layout.layout import Layout, Point2
 from factory.mjcf.elements import add, exact, numbers
-from factory.mjcf.mesh_files import mesh_file, piece_files
+from factory.mjcf.insets import Insets
+from factory.mjcf.mesh_files import inset_file, inset_name, mesh_file, piece_files
 from factory.mjcf.names import part, piece
-from factory.plant.fused_bodies import FusedBodies
+from factory.mjcf.names import solid as solid_name
+from factory.plant.fused_bodies import FusedBodies, Inside
 
 PARKED = -0.6
 """Height at which the first spare copy of a part is kept, under the floor [m]."""
@@ -48,7 +50,7 @@ def parked_at(layout: Layout, label: str, number: int) -> tuple[float, float, fl
     return x, y, PARKED - 0.4 * (number - 1)
 
 
-def add_parts(world: Element, layout: Layout, copies: Mapping[str, int]) -> None:
+def add_parts(world: Element, layout: Layout, copies: Mapping[str, int], insets: Insets) -> None:
     """All copies of all parts; the first of each in its feeder, the others parked."""
     for operation in layout.factory.leaves:
         label = operation.label
@@ -56,13 +58,21 @@ def add_parts(world: Element, layout: Layout, copies: Mapping[str, int]) -> None
         home = presented_at(layout, label)
         for number in range(1, copies[label] + 1):
             at = home if number == 1 else parked_at(layout, label, number)
-            _add_part(world, solid, number, at)
+            name = part(label, number)
+            body = _add_body(world, name, at, solid.mass, solid.inertia)
+            _add_geoms(body, name, solid, solid.centre, insets.of(label), number == 1)
 
 
 def add_wholes(
-    world: Element, layout: Layout, bodies: FusedBodies, copies: Mapping[str, int]
+    world: Element,
+    layout: Layout,
+    bodies: FusedBodies,
+    copies: Mapping[str, int],
+    insets: Insets,
+    shells: Collection[Inside],
 ) -> None:
-    """The bodies that sub-assemblies become, parked: each has the geoms of all its parts."""
+    """The bodies that sub-assemblies become, parked: each has the geoms of all its parts; those of
+    a part that is among the `shells` are in a body of their own."""
     solids = layout.product.solids
     for label, whole in bodies.wholes.items():
         for number in range(1, copies[label] + 1):
@@ -70,13 +80,12 @@ def add_wholes(
             at = parked_at(layout, label, number)
             body = _add_body(world, name, at, whole.mass, whole.inertia)
             for inside in whole.parts:
-                _add_geoms(body, f"{name}/{inside}", solids[inside], whole.centre, False)
-
-
-def _add_part(world: Element, solid: Solid, number: int, at: tuple[float, float, float]) -> None:
-    name = part(solid.label, number)
-    body = _add_body(world, name, at, solid.mass, solid.inertia)
-    _add_geoms(body, name, solid, solid.centre, number == 1)
+                own = body
+                if (label, inside) in shells:
+                    own = add(body, "body", name=solid_name(label, number, inside))
+                    add(own, "inertial", pos="0 0 0", mass=0, diaginertia="0 0 0")
+                solid, faces = solids[inside], insets.of(inside)
+                _add_geoms(own, f"{name}/{inside}", solid, whole.centre, faces, False)
 
 
 def _add_body(
@@ -96,13 +105,22 @@ def _add_body(
     return body
 
 
-def _add_geoms(body: Element, name: str, solid: Solid, centre: Array, collides: bool) -> None:
-    """A part's geoms in a body with that centre of mass. What is drawn of a part of several pieces
-    has class `shown`, thus no contacts; its pieces, group 3, are not drawn. A part collides with
-    all its geoms but those: contact masks are written to these."""
+def _add_geoms(
+    body: Element,
+    name: str,
+    solid: Solid,
+    centre: Array,
+    faces: Mapping[int, float],
+    collides: bool,
+) -> None:
+    """A part's geoms in a body with that centre of mass. What is drawn of a part of several pieces,
+    or of one whose faces recede by `faces` [m], has class `shown`, thus no contacts; its pieces,
+    group 3, are not drawn. A part collides with all its geoms but those: contact masks are written
+    to these."""
     masks = {} if collides else {"contype": 0, "conaffinity": 0}
     place = {"pos": numbers(solid.position - centre), "quat": numbers(solid.quaternion)}
-    pieces = solid.mesh.pieces if solid.mesh else ()
+    pieces = len(solid.mesh.pieces) if solid.mesh else 0
+    pieces = pieces or bool(faces)
     add(
         body,
         "geom",
@@ -115,25 +133,33 @@ def _add_geoms(body: Element, name: str, solid: Solid, centre: Array, collides: 
         rgba=solid.rgba,
         **({} if pieces else masks),
     )
-    for n in range(1, len(pieces) + 1):
+    for n in range(pieces):
+        depth = faces.get(n, 0.0)
         add(
             body,
             "geom",
-            name=piece(name, n),
+            name=piece(name, n + 1),
             class_="part",
-            type="mesh",
-            mesh=f"mesh/{solid.mesh.name}.{n}" if solid.mesh else None,
+            type=solid.kind,
+            mesh=f"mesh/{inset_name(solid.mesh, n, depth)}" if solid.mesh else None,
+            size=None if solid.mesh else tuple(half - depth for half in solid.size),
             group=3,
             **place,
             **masks,
         )
 
 
-def add_meshes(asset: Element, product: Product) -> dict[str, bytes]:
+def add_meshes(asset: Element, product: Product, insets: Insets) -> dict[str, bytes]:
     """The meshes and their pieces as assets, and the content of their files by name."""
     files: dict[str, bytes] = {}
+    receded: dict[str, set[tuple[int, float]]] = {}
+    for label, solid in product.solids.items():
+        if solid.mesh is not None:
+            receded.setdefault(solid.mesh.name, set()).update(insets.of(label).items())
     for mesh in used_meshes(product):
-        for file, content in (mesh_file(mesh), *piece_files(mesh)):
+        found = [mesh_file(mesh), *piece_files(mesh)]
+        found += (inset_file(mesh, *at) for at in sorted(receded[mesh.name]))
+        for file, content in found:
             name = file.rpartition(".")[0]
             add(asset, "mesh", name=f"mesh/{name}", file=file, inertia="convex")
             files[file] = content

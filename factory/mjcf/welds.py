@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from xml.etree.ElementTree import Element
 
 from factory.layout.layout import Layout
@@ -10,7 +10,7 @@ from factory.mjcf import names
 from factory.mjcf.elements import add, numbers
 from factory.mjcf.parts import parked_at, place_in
 from factory.mjcf.robots import heading_quaternion
-from factory.plant.fused_bodies import FusedBodies
+from factory.plant.fused_bodies import FusedBodies, Inside
 
 
 def add_welds(
@@ -49,13 +49,14 @@ def _park(equality: Element, layout: Layout, label: str, copies: int, used: int)
 
 
 def add_exclusions(
-    contact: Element, layout: Layout, bodies: FusedBodies, copies: Mapping[str, int]
+    contact: Element, apart: Iterable[tuple[Inside, Inside]], copies: Mapping[str, int]
 ) -> None:
-    """The pairs of bodies that pass through each other when they are joined, a slot for each unit
-    that can be inside: a run aims them at the copies of one unit."""
-    for one, other in bodies.lifted(layout.factory, layout.excluded):
+    """The pairs of parts between which there is no contact, each with the body that brings it, a
+    slot for each unit that can be inside: a run aims them at the copies of one unit."""
+    for (one, part), (other, partner) in apart:
         for n in range(1, min(copies[one], copies[other]) + 1):
-            name, pair = names.exclusion(one, other, n), (names.part(one, n), names.part(other, n))
+            pair = names.solid(one, n, part), names.solid(other, n, partner)
+            name = names.exclusion(part, partner, n)
             add(contact, "exclude", name=name, body1=pair[0], body2=pair[1])
 
 

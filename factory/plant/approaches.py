@@ -16,15 +16,26 @@ MARGIN = 0.02
 
 
 @dataclass(frozen=True, slots=True)
+class Overlap:
+    """Two parts that overlap on the way of one to its place, or in it, or scrape along each other:
+    how `deep` they get into each other [m], negative where they only scrape; `bodies`, of each two
+    convex bodies of theirs that do, their numbers and how far [m] those must recede from each other
+    so that they do not."""
+
+    parts: Pair
+    deep: float
+    bodies: tuple[tuple[int, int, float], ...]
+
+
+@dataclass(frozen=True, slots=True)
 class Approach:
     """The admissible approaches of one operation with two inputs (or a pile and one more).
 
     `axis`: 0 for x or 1 for y of the product, along which its inputs come in the layout. `sides`:
     the sides of that axis, +1 or -1, from which the *last* input may come (moving against it); the
     other comes from, or stands on, the opposite side. `lowered`: the label of the input that comes
-    `stroke` [m] above its place and is lowered when all others stand, "" where none is. `excluded`:
-    for each of `sides` the pairs of parts that cannot come so without passing through each other,
-    whose contact is switched off.
+    `stroke` [m] above its place and is lowered when all others stand, "" where none is. `overlaps`:
+    for each of `sides` the parts that cannot come so without overlapping or scraping.
     """
 
     kind: Kind
@@ -32,4 +43,4 @@ class Approach:
     sides: tuple[int, ...] = (-1, +1)
     lowered: str = ""
     stroke: float = 0.0
-    excluded: tuple[tuple[Pair, ...], ...] = ((), ())
+    overlaps: tuple[tuple[Overlap, ...], ...] = ((), ())

@@ -21,6 +21,10 @@ GEOMS = 40
 those of all that it is made of, so that a chain of n parts has n / 2 for each."""
 
 
+Inside = tuple[str, str]
+"""Labels of a body and of a part that it has."""
+
+
 @dataclass(frozen=True, slots=True)
 class Whole:
     """A sub-assembly as one rigid body, in the frame of the finished product: the labels of its
@@ -70,16 +74,12 @@ class FusedBodies:
                     found.update(dict.fromkeys(self.carried[label]))
         return tuple(found)
 
-    def lifted(
-        self, factory: Factory, pairs: tuple[tuple[str, str], ...]
-    ) -> tuple[tuple[str, str], ...]:
-        """Pairs of parts as the pairs of bodies that bring them together, each once."""
-        if not self.wholes:
-            return pairs
-        found: dict[tuple[str, str], None] = {}
-        for one, other in pairs:
-            found[_meeting(factory, self.carried, one, other)] = None
-        return tuple(found)
+    def meeting(self, factory: Factory, pair: tuple[str, str]) -> tuple[Inside, Inside]:
+        """Two parts, each with the body that it belongs to just before the operation that joins
+        them."""
+        one, other = pair
+        bodies = _meeting(factory, self.carried, one, other) if self.wholes else pair
+        return (bodies[0], one), (bodies[1], other)
 
 
 def bodies_of(factory: Factory, product: Product, fuse: bool = False) -> FusedBodies:

@@ -56,9 +56,9 @@ class PhysicsFigures:
     """What only the engine can tell; see the specification of `run` for each.
 
     `mating_forces`: by operation, the largest force of a contact between inputs that it was
-    joining [N]; `excluded`: pairs of parts whose contact was off; `timestep_chosen`: by the
-    factory, not by the user; `wip_chosen`: the bound on units inside at once where the factory
-    chose one.
+    joining [N]; `pairs`: how many pairs of parts there are; `excluded`: those whose contact was
+    off; `timestep_chosen`: by the factory, not by the user; `wip_chosen`: the bound on units inside
+    at once where the factory chose one.
     """
 
     handoffs: int = 0
@@ -69,11 +69,22 @@ class PhysicsFigures:
     engine_warnings: int = 0
     contacts: tuple[str, ...] = ()
     mating_forces: Mapping[str, float] = field(default_factory=dict)
+    pairs: int = 0
     excluded: tuple[Pair, ...] = ()
     fused: bool = False
     timestep_s: float = 0.0
     timestep_chosen: bool = False
     wip_chosen: int | None = None
+
+    @property
+    def pairs_excluded(self) -> int:
+        """How many pairs of parts were not tested against each other."""
+        return len(self.excluded)
+
+    @property
+    def pairs_tested(self) -> int:
+        """How many pairs of parts were tested against each other."""
+        return self.pairs - len(self.excluded)
 
     @property
     def mating_force_max_n(self) -> float:
@@ -148,6 +159,8 @@ class Run:
             "weld_residual_max_mm",
             "product_error_max_mm",
             "unintended_contacts",
+            "pairs_tested",
+            "pairs_excluded",
             "engine_warnings",
             "mating_force_max_n",
             "timestep_s",

@@ -14,10 +14,11 @@ from factory.nets.petri import Place
 from factory.nets.verdict import Verdict
 from factory.nets.verify import verify
 from factory.pipeline import Project
+from factory.support.errors import Diagnostic
 from factory.timing.pool import part_pool
 
 if TYPE_CHECKING:
-    from factory.compiler.mating.mating import Matings
+    from factory.compiler.mating.findings import Matings
     from factory.geometry.solids import Product
 
 
@@ -34,6 +35,7 @@ class Checked:
     pool: Mapping[str, int] = field(default_factory=dict)
     matings: Matings | None = None
     product: Product | None = None
+    warnings: tuple[Diagnostic, ...] = ()
 
     def as_json(self) -> dict[str, Any]:
         """The keys of `check --json`."""
@@ -52,7 +54,8 @@ class Checked:
             "gears": [_gear_json(gear, places) for gear in self.verdict.gears],
             "part_pool": dict(self.pool),
             "approaches": self.matings.as_json() if self.matings else None,
-            "clashes": [clash for mating in blocked for clash in mating.clashes_as_json()],
+            "clashes": [mating.clashes_as_json() for mating in blocked],
+            "warnings": [warning.as_json() for warning in self.warnings],
         }
 
 
@@ -80,6 +83,7 @@ def check_project(project: Project, wip: int | None = None) -> Checked:
         part_pool(factory, wip),
         project.matings,
         None if is_plain(project.pag) else project.product,
+        project.warnings,
     )
 
 

@@ -17,6 +17,7 @@ RANGES = {
     "timestep": (1e-5, 0.02),
     "substeps": (1, 100),
     "clearance": (1e-4, 10.0),
+    "overlap": (0.0, 0.005),
     "force": (1e-3, 1e6),
     "settle": (0.0, 10.0),
     "outfeed": (1e-3, 10.0),
@@ -49,7 +50,9 @@ EXAMPLES: Mapping[str, str] = MappingProxyType({"timestep": '0.002, or "auto"', 
 class Settings:
     """Speed [m/s] and acceleration [m/s²] of a robot; `eps`, radius of a goal ball [m]; `timestep`
     of the engine [s], or AUTO, and `substeps` of it in one tick of the supervisor (None: as many as
-    TICK has room for; with AUTO at least so many); least `clearance` [m]; `force`: the actuators'
+    TICK has room for; with AUTO at least so many); least `clearance` [m]; `overlap`:
+    the most [m] by which parts may overlap and are still tested against each other, by shapes that
+    are smaller where they collide; `force`: the actuators'
     limit as a multiple of what the payload needs; `settle`: time to come to rest within eps [s],
     used only to predict; `outfeed` speed [m/s]; `stage`: 1 where robots that wait empty-handed go
     ahead to where their next operation needs them.
@@ -64,6 +67,7 @@ class Settings:
     timestep: float | Literal["auto"] = AUTO
     substeps: int | None = None
     clearance: float = 0.02
+    overlap: float = 0.0005
     force: float = 3.0
     settle: float = 0.0
     outfeed: float = 1.0

@@ -5,7 +5,7 @@ from __future__ import annotations
 from time import perf_counter
 from typing import Any
 
-from factory.compiler.mating.mating import LEFT_OUT, NO_DEEPER, STRICT
+from factory.compiler.mating.findings import LEFT_OUT, NO_DEEPER, STRICT
 from factory.compiler.mating.overlaps import CLEAR, TOLERANCE
 from factory.pipeline import read
 from factory.simulation.request import RunRequest

@@ -14,7 +14,9 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 from typing import Any
 
+from factory.mjcf.insets import insets_of
 from factory.study.fidelity import measure as compared
+from factory.support.settings import Settings
 from tests.tables import table
 
 from .products import PAPER, REAL, is_here, layout
@@ -85,7 +87,7 @@ def measured(plan: Plan) -> dict[str, Any]:
         "units": found.units,
         "passed": sum(record.passed for record in found.seeds),
         "worst": worst,
-        "excluded": len(layout(plan.product).excluded),
+        "excluded": len(insets_of(layout(plan.product), Settings().overlap).excluded),
         "troubles": [str(t) for record in found.seeds for t in record.trouble][:5],
         "contacts": sorted({c for record in found.seeds for c in record.contacts})[:5],
         "missed": [key for key, most in LIMITS.items() if abs(worst[key] or 0.0) > most],

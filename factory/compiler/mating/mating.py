@@ -1,141 +1,40 @@
-"""How the inputs of each operation of a product can come together: they slide, one is lowered, or
-they are blocked.
-
-Three levels say how strictly. At a *strict* one no two parts ever overlap, nor scrape along each
-other; at one that goes *no deeper* they overlap on the way by no more than in the finished product;
-at the third, pairs that overlap in the finished product are *left out*. All of it up to TOLERANCE.
-"""
+"""Judges how the inputs of each operation of a product can come together: they slide, one is
+lowered, or they are blocked."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
-from functools import cached_property
+from dataclasses import replace
 from math import ceil
-from types import MappingProxyType
-from typing import Any, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
 from factory.compiler.compiler import expand
 from factory.compiler.mating.bodies import bodies
+from factory.compiler.mating.findings import (
+    BLOCKED,
+    LEFT_OUT,
+    NO_DEEPER,
+    STRICT,
+    Clash,
+    Mating,
+    Matings,
+)
 from factory.compiler.mating.meetings import Ints, Meeting, Meetings, meetings
 from factory.compiler.mating.overlaps import SIGNS, TOLERANCE, Finder, Overlaps
 from factory.geometry.solids import Product
-from factory.plant.approaches import MARGIN, Approach, Kind, Pair
+from factory.plant.approaches import MARGIN, Approach, Kind, Overlap, Pair
 from factory.plant.factory import Factory
 from factory.problem.pag import PAG
 from factory.problem.template import Template
 from factory.support.errors import Position
-
-STRICT, NO_DEEPER, LEFT_OUT, BLOCKED = 3, 2, 1, 0
-"""The levels, the strictest first."""
-
-LEVELS = ("none", "left_out", "no_deeper", "strict")
-"""The names of the levels in documents."""
 
 UPRIGHT = 2
 """The axis z, along which inputs are lowered."""
 
 SHAPES = frozenset({"mesh", "box", "cylinder", "sphere", "pos"})
 """Parameters that give a part a shape or a place of its own."""
-
-
-@dataclass(frozen=True, slots=True)
-class Clash:
-    """Two parts that pass through each other: how deep [m] on the way and in the finished product,
-    and how far [m] from its place the last input is where they are deepest."""
-
-    parts: Pair
-    depth: float
-    finished: float
-    shift: float
-
-
-@dataclass(frozen=True, slots=True)
-class Mating:
-    """What was found of one operation: the approach chosen, the best levels at which its inputs
-    slide or one is lowered, and, where it is blocked, the pairs that clash if the last input comes
-    from the first of its sides, the deepest first."""
-
-    label: str
-    inputs: tuple[str, ...]
-    approach: Approach
-    slide: int
-    lower: int
-    clashes: tuple[Clash, ...] = ()
-    position: Position | None = field(default=None, compare=False)
-
-    @property
-    def level(self) -> int:
-        """The best level of all."""
-        return max(self.slide, self.lower)
-
-    def as_json(self) -> dict[str, Any]:
-        """The approach and its levels."""
-        approach = self.approach
-        return {
-            "label": self.label,
-            "inputs": list(self.inputs),
-            "kind": approach.kind,
-            "axis": "xy"[approach.axis],
-            "sides": list(approach.sides),
-            "lowered": approach.lowered or None,
-            "stroke_m": approach.stroke,
-            "level": LEVELS[self.level],
-            "slides": LEVELS[self.slide],
-            "excluded": [len(pairs) for pairs in approach.excluded],
-        }
-
-    def clashes_as_json(self) -> list[dict[str, Any]]:
-        """The pairs that clash."""
-        return [
-            {
-                "label": self.label,
-                "parts": list(clash.parts),
-                "depth_mm": round(clash.depth * 1e3, 4),
-                "finished_mm": round(clash.finished * 1e3, 4),
-                "shift_mm": round(clash.shift * 1e3, 4),
-                "side": self.approach.sides[0],
-                "file": self.position.file if self.position else None,
-                "line": self.position.line if self.position else None,
-                "col": self.position.column if self.position else None,
-            }
-            for clash in self.clashes
-        ]
-
-
-@dataclass(frozen=True)
-class Matings:
-    """All that a product's operations were judged to be, inputs before what is made of them."""
-
-    all: tuple[Mating, ...]
-    parts: Mapping[str, tuple[str, ...]] = field(repr=False)
-    """The parts of each input of a blocked operation."""
-
-    @cached_property
-    def approaches(self) -> Mapping[str, Approach]:
-        """The approach of each operation, by its label."""
-        return MappingProxyType({mating.label: mating.approach for mating in self.all})
-
-    def count(self, level: int) -> int:
-        """How many operations attain a level, by sliding or lowering."""
-        return sum(mating.level >= level for mating in self.all)
-
-    def of_kind(self, kind: Kind) -> tuple[Mating, ...]:
-        """The operations whose approach is of a kind."""
-        return tuple(mating for mating in self.all if mating.approach.kind == kind)
-
-    def as_json(self) -> dict[str, Any]:
-        """How many operations are of each kind and attain each level, and all approaches."""
-        return {
-            "operations": len(self.all),
-            **{kind: len(self.of_kind(kind)) for kind in get_args(Kind)},
-            **{name: self.count(level) for level, name in enumerate(LEVELS) if level},
-            "tolerance_mm": TOLERANCE * 1e3,
-            "list": [mating.as_json() for mating in self.all],
-        }
 
 
 def shaped(pag: PAG) -> bool:
@@ -209,9 +108,11 @@ class _Judge:
         slide, lower = max(slides), max(self.lowers[number].tolist())
         clashes: tuple[Clash, ...] = ()
         if slide == lower == BLOCKED:
-            columns = [column for column in (0, 1) if clashing[column] == min(clashing)]
-            approach = self._along(number, "blocked", columns)
-            clashes = self._clashes(number, meeting.axis, columns[0])
+            column = clashing.index(min(clashing))
+            clashes = self._clashes(number, meeting.axis, column)
+            other = self._clashes(number, meeting.axis, 1 - column)
+            same = {c.parts for c in clashes} == {c.parts for c in other}
+            approach = self._along(number, "blocked", [0, 1] if same else [column])
         elif slide >= lower:
             columns = [column for column in (0, 1) if slides[column] == slide]
             approach = self._along(number, "slide", columns, slide == STRICT)
@@ -224,8 +125,8 @@ class _Judge:
         """From some of the sides."""
         axis = self.meetings.all[number].axis
         sides = tuple(SIGNS[column] for column in columns)
-        pairs = tuple(() if clean else self._excluded(number, axis, c) for c in columns)
-        return Approach(kind, axis, sides, "", 0.0, pairs)
+        overlaps = tuple(() if clean else self._overlaps(number, axis, c) for c in columns)
+        return Approach(kind, axis, sides, "", 0.0, overlaps)
 
     def _lowering(self, number: int, level: int) -> Approach:
         """Of two that can be lowered the one with the shorter stroke, or else the last."""
@@ -233,9 +134,9 @@ class _Judge:
         stroke = self._strokes(meeting)
         columns = [c for c in (1, 0) if self.lowers[number, c] == level]
         column = min(columns, key=lambda c: stroke[c])
-        pairs = self._excluded(number, UPRIGHT, column)
+        found = self._overlaps(number, UPRIGHT, column)
         lowered = meeting.inputs[-1 if column else 0]
-        return Approach("lower", meeting.axis, SIGNS, lowered, stroke[column], (pairs, pairs))
+        return Approach("lower", meeting.axis, SIGNS, lowered, stroke[column], (found, found))
 
     def _strokes(self, meeting: Meeting) -> tuple[float, float]:
         """How high the first, or the last input is raised above its place, so that it clears the
@@ -271,10 +172,20 @@ class _Judge:
         ]
         return tuple(sorted(found, key=lambda c: (-c.depth, c.parts)))
 
-    def _excluded(self, number: int, axis: int, column: int) -> tuple[Pair, ...]:
+    def _overlaps(self, number: int, axis: int, column: int) -> tuple[Overlap, ...]:
+        """What overlaps or scrapes as the inputs of an operation come from a side."""
         overlaps = self.overlaps[axis].of(number)
-        rows = np.flatnonzero(overlaps.depths.faulty[:, column])
-        return tuple(sorted(self._pair(overlaps, row) for row in rows.tolist()))
+        rows = np.flatnonzero(overlaps.depths.faulty[:, column]).tolist()
+        found = (self._overlap(overlaps, row, column) for row in rows)
+        return tuple(sorted(found, key=lambda overlap: overlap.parts))
+
+    def _overlap(self, overlaps: Overlaps, row: int, column: int) -> Overlap:
+        parts = self._pair(overlaps, row)
+        rows = slice(*overlaps.starts[row : row + 2].tolist())
+        bodies = overlaps.bodies.receding(rows, column)
+        if self.meetings.parts[overlaps.one[row]] != parts[0]:
+            bodies = [(other, one, far) for one, other, far in bodies]
+        return Overlap(parts, float(overlaps.depths.path[row, column]), tuple(sorted(bodies)))
 
     def _pair(self, overlaps: Overlaps, row: int) -> Pair:
         parts = self.meetings.parts

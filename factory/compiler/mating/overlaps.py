@@ -53,26 +53,53 @@ class Depths:
         """Which pairs (n, 2) overlap or scrape on the way from either side."""
         return np.asarray((self.path > TOLERANCE) | (self.graze > -CLEAR))
 
+    @property
+    def receding(self) -> Array:
+        """How far (n, 2) the two must recede from each other [m], or be made smaller together, so
+        that they neither overlap nor scrape on the way from either side."""
+        return np.asarray(np.maximum(self.path, self.graze + CLEAR))
+
     def at(self, rows: Ints | slice) -> Depths:
         """Those of some of the pairs."""
         return Depths(self.finished[rows], self.path[rows], self.shift[rows], self.graze[rows])
 
 
 @dataclass(frozen=True)
+class BodyPairs:
+    """Pairs of convex bodies: their numbers among those of their parts, and their depths (m,)."""
+
+    one: Ints
+    other: Ints
+    depths: Depths = field(repr=False)
+
+    def receding(self, rows: slice, side: int) -> list[tuple[int, int, float]]:
+        """Those of `rows` that overlap or scrape on the way from a side, and how far [m] they must
+        recede from each other so that they do not."""
+        depths = self.depths.at(rows)
+        chosen = np.flatnonzero(depths.faulty[:, side])
+        pairs = self.one[rows][chosen].tolist(), self.other[rows][chosen].tolist()
+        return list(zip(*pairs, depths.receding[chosen, side].tolist(), strict=True))
+
+
+@dataclass(frozen=True)
 class Overlaps:
     """Pairs of parts that overlap by more than the tolerance in some place of a path, or scrape, by
-    meeting. `meeting`, `one` < `other` (n,): numbers of the meeting and the parts."""
+    meeting. `meeting`, `one` < `other` (n,): numbers of the meeting and the parts; `bodies`: what
+    overlaps of them, those of row i from `starts[i]` to `starts[i + 1]` (n + 1,)."""
 
     meeting: Ints
     one: Ints
     other: Ints
     depths: Depths = field(repr=False)
+    bodies: BodyPairs = field(repr=False)
+    starts: Ints = field(repr=False)
 
     def of(self, meeting: int) -> Overlaps:
         """Those of one meeting."""
-        rows = slice(*np.searchsorted(self.meeting, [meeting, meeting + 1]).tolist())
+        first, end = np.searchsorted(self.meeting, [meeting, meeting + 1]).tolist()
+        rows = slice(first, end)
         at = self.meeting[rows], self.one[rows], self.other[rows]
-        return Overlaps(*at, self.depths.at(rows))
+        return Overlaps(*at, self.depths.at(rows), self.bodies, self.starts[first : end + 1])
 
 
 class Finder:
@@ -164,12 +191,15 @@ class Finder:
         kept = np.flatnonzero(depths.faulty.any(axis=1))
         order = kept[np.lexsort((part[moving[kept]], part[standing[kept]], meeting[kept]))]
         meeting, one, other = meeting[order], part[standing[order]], part[moving[order]]
-        depths = depths.at(order)
+        depths, first = depths.at(order), np.searchsorted(part, part)
+        standing, moving = standing[order], moving[order]
+        bodies = BodyPairs(standing - first[standing], moving - first[moving], depths)
         new = np.ones(len(order), bool)
         new[1:] = (np.diff(one) != 0) | (np.diff(other) != 0)
         starts = np.flatnonzero(new)
+        ends = np.append(starts, len(order))
         if not len(starts):
-            return Overlaps(meeting, one, other, depths)
+            return Overlaps(meeting, one, other, depths, bodies, ends)
         path = np.maximum.reduceat(depths.path, starts)
         at = np.where(depths.path >= path[np.cumsum(new) - 1], depths.shift, np.inf)
         by_parts = Depths(
@@ -178,7 +208,8 @@ class Finder:
             np.minimum.reduceat(at, starts),
             np.maximum.reduceat(depths.graze, starts),
         )
-        return Overlaps(meeting[starts], one[starts], other[starts], by_parts)
+        at_parts = meeting[starts], one[starts], other[starts]
+        return Overlaps(*at_parts, by_parts, bodies, ends)
 
 
 def _box_depths(bodies: ConvexBodies, moving: Ints, standing: Ints, axis: int) -> Depths:

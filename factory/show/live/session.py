@@ -202,7 +202,9 @@ class Session:
             self.simulation.supervisor,
             self.bodies,
         )
-        poses = np.hstack([world.d.xpos[bodies], world.d.xquat[bodies]])
+        # shells follow one step after the body that has been put somewhere
+        whole = world.parts.masks.trunk[bodies]
+        poses = np.hstack([world.d.xpos[whole], world.d.xquat[whole]])
         left = world.dropoffs
         self._number += 1
         frame = LiveFrame(

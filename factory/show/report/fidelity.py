@@ -5,13 +5,16 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from math import comb
 
 import numpy as np
 
+from factory.mjcf import names
 from factory.mjcf.parts import HIDDEN
 from factory.mjcf.replica import Replica
 from factory.mjcf.weld_frames import GRIP, HOLD, gaps
 from factory.nets.replay import replay
+from factory.plant.approaches import Pair
 from factory.record.monitor.record import watch_log
 from factory.record.monitor.report import Report
 from factory.show.report.recording import Recording
@@ -30,11 +33,14 @@ EVERY = 5
 @dataclass(frozen=True)
 class RecordedFidelity:
     """The figures by the keys of their definitions, whether the record refines the net, and the
-    verdict of the monitor, None where the log is not one to be judged."""
+    verdict of the monitor, None where the log is not one to be judged; of how many `pairs` of parts
+    there are those whose contact was off."""
 
     figures: Mapping[str, float | None]
     refines: bool
     monitor: Report | None
+    pairs: int
+    excluded: tuple[Pair, ...]
 
 
 def fidelity(recording: Recording) -> RecordedFidelity:
@@ -53,7 +59,15 @@ def fidelity(recording: Recording) -> RecordedFidelity:
         "tracking_error_max_mm": _tracking(recording),
         **_ideal(recording),
     }
-    return RecordedFidelity(found, record.refines, monitor)
+    pairs = comb(len(recording.factory.leaves), 2)
+    return RecordedFidelity(found, record.refines, monitor, pairs, _excluded(recording))
+
+
+def _excluded(recording: Recording) -> tuple[Pair, ...]:
+    """The pairs of parts that the recorded model leaves out of contact."""
+    m = recording.motion.m
+    found = (names.excluded(m.exclude(i).name) for i in range(m.nexclude))
+    return tuple(dict.fromkeys(found))
 
 
 def _tracking(recording: Recording) -> float | None:

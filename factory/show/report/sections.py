@@ -213,7 +213,17 @@ def fidelity_words(found: RecordedFidelity, cut: CutOff | None) -> str:
         for key, value in found.figures.items()
     )
     table = _table(("", "found", "limit", ""), rows)
-    return "".join(_judged(found, cut)) + table
+    return "".join(_judged(found, cut)) + _untested(found) + table
+
+
+def _untested(found: RecordedFidelity) -> str:
+    """How many pairs of parts had no contact, and which."""
+    if not found.excluded:
+        return ""
+    count = f"{len(found.excluded)} of {found.pairs} pairs of parts"
+    listed = "".join(f"<li>{escape(f'{one} - {other}')}</li>" for one, other in found.excluded)
+    summary = f"<summary>{count} were not tested against each other.</summary>"
+    return f"<details>{summary}<ul>{listed}</ul></details>"
 
 
 def _judged(found: RecordedFidelity, cut: CutOff | None) -> Iterator[str]:

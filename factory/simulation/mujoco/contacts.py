@@ -14,7 +14,9 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from factory.control.mode import Index, Truth
-from factory.plant.approaches import Pair
+from factory.mjcf import names
+from factory.mjcf.shells import trunks
+from factory.plant.fused_bodies import Inside
 from factory.support.engine import mujoco
 
 NOBODY = 0
@@ -31,36 +33,51 @@ class ContactMasks:
     """The masks and exclusions of a model, for parts whose bodies are given by label and copy.
 
     `code` and `unit` (nbody,): the holder of each part's body, or the code of a holder itself
-    (`own`), and the unit that a part belongs to, -1 for none. `solid`: the geoms of each part's
-    body that collide. `fresh`: holders that have been given something. `excluded`: pairs of labels
-    whose parts of one unit do not collide.
+    (`own`), and the unit that a part belongs to, -1 for none. `trunk` (nbody,): what a shell is of.
+    `solid`: the geoms of each part's body, and of its shells, that collide. `fresh`: holders that
+    have been given something. `apart`: pairs of parts, each with the body that it is of, that do
+    not collide where they are of one unit.
     """
 
     def __init__(
-        self, m: mujoco.MjModel, bodies: Mapping[str, Index], excluded: Sequence[Pair]
+        self,
+        m: mujoco.MjModel,
+        bodies: Mapping[str, Index],
+        apart: Sequence[tuple[Inside, Inside]],
     ) -> None:
         self.code, self.unit = np.zeros(m.nbody, np.int64), np.full(m.nbody, -1)
+        self.trunk = trunks(m)
         self._m, self._masks = m, np.array([m.body_contype, m.body_conaffinity])
-        self.solid = {int(b): self._solid_geoms(int(b)) for ids in bodies.values() for b in ids}
-        self._partners: dict[str, list[str]] = {}
-        for one, other in excluded:
-            self._partners.setdefault(one, []).append(other)
-            self._partners.setdefault(other, []).append(one)
+        self._own = {int(b): np.array([b]) for ids in bodies.values() for b in ids}
+        for shell in np.flatnonzero(self.trunk != np.arange(m.nbody)).tolist():
+            trunk = int(self.trunk[shell])
+            self._own[trunk] = np.append(self._own[trunk], shell)
+        self.solid = {body: self._solid_geoms(own) for body, own in self._own.items()}
+        self._partners: dict[str, list[tuple[str, Inside]]] = {}
+        for one, other in apart:
+            self._partners.setdefault(one[0], []).append((one[1], other))
+            self._partners.setdefault(other[0], []).append((other[1], one))
+        self._of_part = {
+            (int(body), part): m.body(names.solid(label, number, part)).id
+            for label, part in {inside for both in apart for inside in both}
+            for number, body in enumerate(bodies[label], 1)
+        }
         self.fresh: set[int] = set()
         self._present: dict[tuple[str, int], int] = {}
         self._signatures: set[int] = set()
 
-    def _solid_geoms(self, body: int) -> Index:
-        """The geoms of a body that collide: all but those of group 1, which are shown in place of
+    def _solid_geoms(self, bodies: Index) -> Index:
+        """The geoms of bodies that collide: all but those of group 1, which are shown in place of
         convex pieces."""
-        geoms = self._m.body_geomadr[body] + np.arange(self._m.body_geomnum[body])
+        first, count = self._m.body_geomadr[bodies], self._m.body_geomnum[bodies]
+        geoms = np.concatenate([at + np.arange(n) for at, n in zip(first, count, strict=True)])
         return np.asarray(geoms[self._m.geom_group[geoms] != 1])
 
     def own(self, trees: Mapping[int, int], last: int) -> int:
         """Give what collides and is no part a code: that of its kinematic tree, or one of its own
         after the `last` where it is fixed to the floor. Gives the greatest code."""
         for body in np.flatnonzero(self._masks.any(axis=0)).tolist():
-            if body not in self.solid:
+            if self.trunk[body] not in self.solid:
                 tree = int(self._m.body_treeid[body])
                 last += tree not in trees
                 self.code[body] = trees.get(tree, last)
@@ -80,15 +97,17 @@ class ContactMasks:
             geoms = self.solid[body]
             contype = holder << 1
             conaffinity = 0 if holder == NOBODY else ((~holder & ALL) << 1) | 1
-            self.code[body] = holder
+            own = self._own[body]
+            self.code[own] = holder
             self.fresh.add(holder)
-            self._masks[:, body] = contype, conaffinity
-            m.body_contype[body], m.body_conaffinity[body] = contype, conaffinity
+            with_geoms = own[m.body_geomnum[own] > 0]
+            self._masks[:, with_geoms] = [[contype], [conaffinity]]
+            m.body_contype[with_geoms], m.body_conaffinity[with_geoms] = contype, conaffinity
             m.geom_contype[geoms], m.geom_conaffinity[geoms] = contype, conaffinity
 
     def enter(self, label: str, unit: int, body: int) -> None:
         """A part's body comes into the factory, for a unit."""
-        self.unit[body] = unit
+        self.unit[self._own[body]] = unit
         self._present[label, unit] = body
         self._exclude(label, unit, body, True)
 
@@ -96,14 +115,21 @@ class ContactMasks:
         """A part's body leaves the factory with its unit."""
         body = self._present.pop((label, unit))
         self._exclude(label, unit, body, False)
-        self.unit[body] = -1
+        self.unit[self._own[body]] = -1
 
     def _exclude(self, label: str, unit: int, body: int, now: bool) -> None:
         """Leave out, or no longer, the pairs of a part with those of its unit that are there. The
         engine merges the exclusions, a sorted list of unsigned numbers, with its sorted pairs; free
         slots are behind."""
-        present = [self._present.get((partner, unit)) for partner in self._partners.get(label, ())]
-        pairs = [sorted((body, other)) for other in present if other is not None]
+        found = (
+            (part, self._present.get((partner, unit)), theirs)
+            for part, (partner, theirs) in self._partners.get(label, ())
+        )
+        pairs = [
+            sorted((self._of_part[body, part], self._of_part[other, theirs]))
+            for part, other, theirs in found
+            if other is not None
+        ]
         for low, high in pairs:
             (self._signatures.add if now else self._signatures.discard)((low << 16) + high)
         if pairs:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from math import comb
+
 import numpy as np
 
 from factory.mjcf.model import Model
@@ -95,6 +97,7 @@ class Inspection:
             int(sum(w.number for w in self._d.warning)),
             tuple(pairs),
             dict(self.force),
+            comb(len(self._model.factory.leaves), 2),
             self._model.excluded,
             bool(self._model.carried.wholes),
             float(self._m.opt.timestep),

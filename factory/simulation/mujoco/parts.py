@@ -42,7 +42,7 @@ class Parts:
         self.model, self._d = model, d
         self.labels = model.carried.carried[factory.pag.root]
         self.on_tray: int | None = None
-        self.masks = ContactMasks(m, body, model.excluded)
+        self.masks = ContactMasks(m, body, model.apart)
         self.welds = Welds(m, d, self.masks, sleep)
         self.hold = {label: m.equality(names.hold(label)).id for label in self.labels}
         self.copies = Copies(m, model, body, self.welds)

@@ -14,6 +14,7 @@ from factory.control.mode import Array, Index, Truth
 from factory.layout.clearance import certify
 from factory.layout.layout import Layout
 from factory.mjcf import names
+from factory.mjcf.shells import trunks
 from factory.study.fidelity.readings import ActiveWelds, Shadow
 from factory.study.fidelity.record import ClosestApproach
 
@@ -42,7 +43,7 @@ class Approaches:
     def __init__(self, world: Any, layout: Layout, welds: ActiveWelds, shadow: Shadow) -> None:
         m = world.m
         self.m, self.welds, self.shadow = m, welds, shadow
-        self.certified = certified(layout)
+        self.certified, self.trunk = certified(layout), trunks(m)
         words = [m.body(i).name for i in range(m.nbody)]
         kinds = [names.kind(word) for word in words]
         self.kind = np.array([KINDS.index(k) if k in KINDS else NONE for k in kinds])
@@ -60,7 +61,7 @@ class Approaches:
         d = self.shadow.d
         if not d.ncon:
             return
-        pairs, dist = self.m.geom_bodyid[d.contact.geom], d.contact.dist
+        pairs, dist = self.trunk[self.m.geom_bodyid[d.contact.geom]], d.contact.dist
         kinds = self.kind[pairs]
         nearer = np.flatnonzero(dist < self.least[kinds[:, 0], kinds[:, 1]])
         if not len(nearer):

@@ -155,8 +155,8 @@ def _swept(
 
 def boxes(m: mujoco.MjModel, d: mujoco.MjData, masks: ContactMasks) -> tuple[Array, Array]:
     """The corners of each body's box from its origin, seen from above (nbody, 2) [m]: of what can
-    collide of it, as it is turned now."""
-    turn, body = d.geom_xmat.reshape(-1, 3, 3), m.geom_bodyid
+    collide of it and its shells, as it is turned now."""
+    turn, body = d.geom_xmat.reshape(-1, 3, 3), masks.trunk[m.geom_bodyid]
     middle = d.geom_xpos + (turn @ m.geom_aabb[:, :3, None])[:, :, 0] - d.xpos[body]
     half = (np.abs(turn) @ m.geom_aabb[:, 3:, None])[:, :, 0]
     low, high = np.full((m.nbody, 2), np.inf), np.full((m.nbody, 2), -np.inf)

@@ -1,0 +1,140 @@
+"""What is found of how the inputs of a product's operations can come together.
+
+Three levels say how strictly. At a *strict* one no two parts ever overlap, nor scrape along each
+other; at one that goes *no deeper* they overlap on the way by no more than in the finished product;
+at the third, pairs that overlap in the finished product are *left out*. All of it up to TOLERANCE.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from types import MappingProxyType
+from typing import Any, get_args
+
+from factory.compiler.mating.overlaps import TOLERANCE
+from factory.plant.approaches import Approach, Kind, Pair
+from factory.support.errors import Diagnostic, Position
+
+STRICT, NO_DEEPER, LEFT_OUT, BLOCKED = 3, 2, 1, 0
+"""The levels, the strictest first."""
+
+LEVELS = ("none", "left_out", "no_deeper", "strict")
+"""The names of the levels in documents."""
+
+NAMED = 3
+"""The most pairs that clash that a warning names."""
+
+
+@dataclass(frozen=True, slots=True)
+class Clash:
+    """Two parts that pass through each other: how deep [m] on the way and in the finished product,
+    and how far [m] from its place the last input is where they are deepest."""
+
+    parts: Pair
+    depth: float
+    finished: float
+    shift: float
+
+
+@dataclass(frozen=True, slots=True)
+class Mating:
+    """What was found of one operation: the approach chosen, the best levels at which its inputs
+    slide or one is lowered, and, where it is blocked, the pairs that clash if the last input comes
+    from the first of its sides, the deepest first."""
+
+    label: str
+    inputs: tuple[str, ...]
+    approach: Approach
+    slide: int
+    lower: int
+    clashes: tuple[Clash, ...] = ()
+    position: Position | None = field(default=None, compare=False)
+
+    @property
+    def level(self) -> int:
+        """The best level of all."""
+        return max(self.slide, self.lower)
+
+    def as_json(self) -> dict[str, Any]:
+        """The approach and its levels."""
+        approach = self.approach
+        return {
+            "label": self.label,
+            "inputs": list(self.inputs),
+            "kind": approach.kind,
+            "axis": "xy"[approach.axis],
+            "sides": list(approach.sides),
+            "lowered": approach.lowered or None,
+            "stroke_m": approach.stroke,
+            "level": LEVELS[self.level],
+            "slides": LEVELS[self.slide],
+            "excluded": [len(overlaps) for overlaps in approach.overlaps],
+        }
+
+    def warning(self) -> Diagnostic:
+        """What is told of a blocked operation: where, what cannot come and what it clashes with."""
+        named = [
+            f"{c.parts[0]} and {c.parts[1]} {c.depth * 1e3:.2f} mm" for c in self.clashes[:NAMED]
+        ]
+        more = len(self.clashes) - len(named)
+        pairs = ", ".join(named) + (f", and {more} more" if more else "")
+        message = f"{self.inputs[-1]} cannot come to {self.label}: {pairs}"
+        return Diagnostic("Blocked", message, self.position)
+
+    def clashes_as_json(self) -> dict[str, Any]:
+        """The pairs that clash."""
+        return {
+            "label": self.label,
+            "side": self.approach.sides[0],
+            "file": self.position.file if self.position else None,
+            "line": self.position.line if self.position else None,
+            "col": self.position.column if self.position else None,
+            "pairs": [
+                {
+                    "parts": list(clash.parts),
+                    "depth_mm": round(clash.depth * 1e3, 4),
+                    "finished_mm": round(clash.finished * 1e3, 4),
+                    "shift_mm": round(clash.shift * 1e3, 4),
+                }
+                for clash in self.clashes
+            ],
+        }
+
+
+@dataclass(frozen=True)
+class Matings:
+    """All that a product's operations were judged to be, inputs before what is made of them."""
+
+    all: tuple[Mating, ...]
+    parts: Mapping[str, tuple[str, ...]] = field(repr=False)
+    """The parts of each input of a blocked operation."""
+
+    @cached_property
+    def approaches(self) -> Mapping[str, Approach]:
+        """The approach of each operation, by its label."""
+        return MappingProxyType({mating.label: mating.approach for mating in self.all})
+
+    def count(self, level: int) -> int:
+        """How many operations attain a level, by sliding or lowering."""
+        return sum(mating.level >= level for mating in self.all)
+
+    def of_kind(self, kind: Kind) -> tuple[Mating, ...]:
+        """The operations whose approach is of a kind."""
+        return tuple(mating for mating in self.all if mating.approach.kind == kind)
+
+    @property
+    def warnings(self) -> tuple[Diagnostic, ...]:
+        """One for each blocked operation."""
+        return tuple(mating.warning() for mating in self.of_kind("blocked"))
+
+    def as_json(self) -> dict[str, Any]:
+        """How many operations are of each kind and attain each level, and all approaches."""
+        return {
+            "operations": len(self.all),
+            **{kind: len(self.of_kind(kind)) for kind in get_args(Kind)},
+            **{name: self.count(level) for level, name in enumerate(LEVELS) if level},
+            "tolerance_mm": TOLERANCE * 1e3,
+            "list": [mating.as_json() for mating in self.all],
+        }

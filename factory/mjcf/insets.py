@@ -1,0 +1,83 @@
+"""Overlaps of parts that are taken from the shapes, and pairs that are left out of contact.
+
+Parts overlap a little where a model has no fits: pegs as wide as their holes, panels that reach
+into each other. So that they are tested against each other all the same, the convex bodies that
+collide are made smaller where they overlap, by half of it each, and no more. What is drawn, the
+masses and the clearance are those of the whole shapes. Parts that overlap deeper, or are too thin
+to become smaller, are left out.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from math import ceil
+from types import MappingProxyType
+
+from factory.compiler.mating.overlaps import TOLERANCE
+from factory.geometry.insets import breadth
+from factory.geometry.solids import Product
+from factory.layout.layout import Layout
+from factory.plant.approaches import Overlap, Pair
+
+LEFT = 0.5
+"""A body keeps at least this share of its thickness."""
+
+NONE: Mapping[int, float] = MappingProxyType({})
+
+
+@dataclass(frozen=True)
+class Insets:
+    """How far [m] the faces of convex bodies recede, by part and number, in whole micrometres;
+    `excluded`: pairs of parts between which there is no contact."""
+
+    depths: Mapping[str, Mapping[int, float]] = field(default_factory=dict, repr=False)
+    excluded: tuple[Pair, ...] = ()
+
+    def of(self, part: str) -> Mapping[int, float]:
+        """Those of a part."""
+        return self.depths.get(part, NONE)
+
+
+def insets_of(layout: Layout, overlap: float) -> Insets:
+    """What is taken from the shapes of a layout's parts where they overlap by no more than
+    `overlap` [m]; nothing where that is 0."""
+    thickness = _Thickness(layout.product)
+    depths: dict[str, dict[int, float]] = {}
+    excluded: list[Pair] = []
+    for found in layout.overlaps:
+        if not overlap or found.deep > overlap + TOLERANCE or not thickness.allows(found):
+            excluded.append(found.parts)
+            continue
+        for one, other, far in found.bodies:
+            for part, number in zip(found.parts, (one, other), strict=True):
+                mine = depths.setdefault(part, {})
+                mine[number] = max(mine.get(number, 0.0), _half(far))
+    return Insets(depths, tuple(excluded))
+
+
+def _half(far: float) -> float:
+    return ceil(far / 2 * 1e6 - 1e-3) / 1e6
+
+
+class _Thickness:
+    """The radii of the largest balls in a product's convex bodies, each found once."""
+
+    def __init__(self, product: Product) -> None:
+        self._product = product
+        self._radius: dict[tuple[str, int], float] = {}
+
+    def allows(self, overlap: Overlap) -> bool:
+        """Whether all bodies that overlap can recede from each other."""
+        return all(
+            _half(far) <= (1 - LEFT) * self._of(part, number)
+            for one, other, far in overlap.bodies
+            for part, number in zip(overlap.parts, (one, other), strict=True)
+        )
+
+    def _of(self, part: str, number: int) -> float:
+        solid = self._product.solids[part]
+        key = (solid.mesh.name if solid.mesh else part, number)
+        if key not in self._radius:
+            self._radius[key] = breadth(solid, number)
+        return self._radius[key]
