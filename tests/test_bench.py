@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.bench import floors, production, replaying
+from tests.bench import floors, large, production, replaying
 from tests.bench.__main__ import REPORT
 from tests.bench.factories import laid_out, robots_at_least
 
@@ -60,3 +60,9 @@ def test_a_replay_that_leaves_something_out_is_noticed(monkeypatch: pytest.Monke
     monkeypatch.setattr(replaying, "replay", forgetful)
     with pytest.raises(AssertionError, match="another state"):
         floors.work(4, None, units=1)
+
+
+@pytest.mark.skipif(not large.BRICKS.is_dir(), reason="the LDraw products are not here")
+def test_the_import_of_a_large_product_is_measured() -> None:
+    (row,) = large.measure(quick=True)["rows"]
+    assert row["command"] == "import" and row["said"]["parts"] == 1253

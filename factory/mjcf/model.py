@@ -8,7 +8,7 @@ same bytes.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from types import MappingProxyType
@@ -197,10 +197,8 @@ def build_model(
     ElementTree.indent(root)
     xml = ElementTree.tostring(root, encoding="unicode") + "\n"
     joints = len(factory.robots) + len(hoists) + 1 + sum(copies.values())
-    return Model(
-        *(layout, settings, bodies, copies, masses, drives, insets, xml, files, joints),
-        *(len(equality), wip),
-    )
+    made = Model(layout, settings, bodies, copies, masses, drives, insets, xml, files)
+    return replace(made, joints=joints, welds=len(equality), wip=wip)
 
 
 def _pairs(root: Element) -> int:

@@ -25,6 +25,7 @@ REPORT = Report(
         "sweeping",
         "rendering",
         "products",
+        "large",
     ),
     DOCS / "benchmarks.md",
     ("mujoco", "numpy", "scipy", "lark", "shapely"),
