@@ -123,35 +123,66 @@ def _tangents(framing: Framing) -> tuple[float, float, float, float]:
 
 
 def overview(points: Array, framing: Framing) -> View:
-    """From the south, aslant, or from where the factory fills the picture better by a tenth; an
-    upright picture may see a long factory lengthwise, and from higher up."""
-    wide = framing.aspect >= 1
-    azimuths = (-62.0, -118.0, -28.0, -152.0) if wide else (-62.0, -118.0, -8.0, -172.0)
-    best, *others = (fit(points, towards(a, 40.0 if wide else 52.0), framing) for a in azimuths)
-    for view in others:
-        if view.distance < 0.9 * best.distance:
-            best = view
-    return best
+    """From the south, aslant, or from where the points are larger on average by a twentieth; the
+    narrower the picture, the higher up."""
+    elevation = 40.0 if framing.aspect > 1.2 else 46.0 if framing.aspect > 0.8 else 52.0
+
+    def size(view: View) -> float:
+        return float((1 / ((points - view.position) @ view.axes[2])).mean())
+
+    usual = fit(points, towards(-62.0, elevation), framing)
+    others = [fit(points, towards(a, elevation), framing) for a in range(-165, 0, 15)]
+    best = max(others, key=size)
+    return best if size(best) > 1.05 * size(usual) else usual
 
 
 def orbit(points: Array, framing: Framing) -> Callable[[float], View]:
-    """The view at each time [s] from a camera that goes round at an even height and distance, the
-    nearest from which everything is in the frame all the way."""
+    """The view at each time [s] from a camera that goes round at an even height. It comes nearer
+    and goes away calmly, and has everything in the frame all the way."""
     elevation = 36.0 if framing.aspect >= 1 else 50.0
+    azimuths = np.arange(0.0, 360.0, 3.0)
     middle = (points.min(axis=0) + points.max(axis=0)) / 2
-    tall, side, low, high = _tangents(framing)
-    away = 0.0
-    for azimuth in range(0, 360, 5):
-        r, u, f = towards(azimuth, elevation) @ (points - middle).T
-        nearest = np.maximum(np.abs(r) / side, np.maximum(u / high, -u / low)) - f
-        away = max(away, float(nearest.max()))
-    depth = float(np.linalg.norm(points - middle, axis=1).max())
+    about, tall = points - middle, _tangents(framing)[0]
+    best = [fit(about, towards(a, elevation), framing) for a in azimuths]
+    aside = _calm(np.array([(v.axes @ v.position)[:2] for v in best]))
+    needed = [_away(about, v.axes, at, framing) for v, at in zip(best, aside, strict=True)]
+    away = _calm(_most(np.array(needed)))
+    depth = float(np.linalg.norm(about, axis=1).max())
 
     def view(time: float) -> View:
-        axes = towards(-62.0 + TURN * time, elevation)
-        return View(middle - away * axes[2], axes, tall * framing.aspect, tall, away, depth)
+        azimuth = -62.0 + TURN * time
+        axes = towards(azimuth, elevation)
+        right, up, back = (
+            np.interp(azimuth, azimuths, values, period=360.0) for values in (*aside.T, away)
+        )
+        position = middle + right * axes[0] + up * axes[1] - back * axes[2]
+        return View(position, axes, tall * framing.aspect, tall, float(back), depth)
 
     return view
+
+
+def _away(points: Array, axes: Array, at: Array, framing: Framing) -> float:
+    """How far a camera has to go back along `axes` from the plane through the origin, `at` (2,) to
+    the right and up in it, to have all points in the frame."""
+    _, side, low, high = _tangents(framing)
+    r, u, f = axes @ points.T - np.array([[at[0]], [at[1]], [0.0]])
+    return float((np.maximum(np.abs(r) / side, np.maximum(u / high, -u / low)) - f).max())
+
+
+CALM = 8
+"""Half the steps of an orbit over which a camera's way is evened out."""
+
+
+def _calm(values: Array) -> Array:
+    """A closed row of values, each the mean of those about it, the nearer the heavier."""
+    weights = np.hanning(2 * CALM + 3)[1:-1]
+    shifted = (w * np.roll(values, n - CALM, axis=0) for n, w in enumerate(weights))
+    return np.asarray(sum(shifted) / weights.sum())
+
+
+def _most(values: Array) -> Array:
+    """A closed row of values, each the greatest of those about it."""
+    return np.max([np.roll(values, n, axis=0) for n in range(-CALM, CALM + 1)], axis=0)
 
 
 def from_above(points: Array, framing: Framing) -> View:

@@ -9,6 +9,7 @@ import numpy as np
 from factory.mjcf.replica import Replica
 from factory.record.monitor.subject import MonitorSubject
 from factory.render.camera import Array, Camera, Framing, View
+from factory.render.fading import Fading
 from factory.render.following import Viewpoint
 from factory.render.ink import Pixels
 from factory.render.picture import Size
@@ -53,6 +54,7 @@ class Painter(Closing):
             quality.quality.offsamples = 1
         framing = Framing(size[0] / size[1], below=0.03 + caption)
         self.viewpoint = Viewpoint(self.replica, camera, framing, subject)
+        self.fading = Fading(self.replica)
         self.shadows = int((m.jnt_type == mujoco.mjtJoint.mjJNT_SLIDE).sum()) <= MANY
         self.renderer = _Renderer(self.replica, size)
 
@@ -66,6 +68,7 @@ class Painter(Closing):
         self.replica.place(shown.qpos)
         mujoco.mj_camlight(self.replica.m, self.replica.d)
         view = self.viewpoint.view(shown, elapsed, time)
+        self.fading.fade(view, self.viewpoint.watched)
         if self.samples == 1:
             return np.ascontiguousarray(self.renderer.draw(view, self.shadows)[::-1])
         total = np.zeros(self.renderer.pixels.shape, np.float32)
