@@ -65,25 +65,43 @@ class View:
         """From where to where something is drawn [m]: tightly, or shadows get speckles. Twice as
         far as the floor at the upper edge of the picture, since the sky is drawn nearer than the
         far end."""
-        up, ahead = self.axes[1][2], self.axes[2][2]
-        far = float(self.position[2]) / max(-ahead - self.tall * up, 0.06)
+        far = float(self.position[2]) / max(self.dip, 0.06)
         near = max(0.1 * self.distance, 0.7 * (self.distance - self.depth))
         return near, 2 * max(far, self.distance + self.depth)
+
+    @property
+    def dip(self) -> float:
+        """How steeply the upper edge of the picture looks down: its descent on a way of 1 ahead."""
+        return float(-self.axes[2][2] - self.tall * self.axes[1][2])
+
+    @property
+    def has_sky(self) -> bool:
+        """Whether the end of the floor may be seen, which is 20 times as large as the factory."""
+        return self.dip < 0.3
+
+
+def camera_names(parts: Sequence[str]) -> tuple[Camera, ...]:
+    """The names of all cameras of a factory with these parts."""
+    return (*CAMERAS, *(PART + part for part in parts))
 
 
 def camera_named(name: str, parts: Sequence[str] | None = None) -> Camera:
     """Raises InputError (BadValue) for a name that no camera has, and for a part that is none of
-    `parts`, if these are known."""
+    `parts`, if these are known. Both list what there is."""
     head, colon, label = name.partition(":")
-    if not colon and name in CAMERAS:
+    if head + colon == PART:
+        if parts is None or label in parts:
+            return name
+        raise _none_of("part", label, parts)
+    if name in CAMERAS:
         return name
-    if head + colon == PART and (parts is None or label in parts):
-        return name
-    if head + colon == PART and parts is not None:
-        hint = did_you_mean(label, parts, "parts")
-        raise InputError(Diagnostic("BadValue", f"there is no part '{label}'", None, hint))
-    hint = did_you_mean(name, (*CAMERAS, "part:LABEL"), "cameras")
-    raise InputError(Diagnostic("BadValue", f"there is no camera '{name}'", None, hint))
+    raise _none_of("camera", name, (*CAMERAS, "part:LABEL"))
+
+
+def _none_of(noun: str, found: str, valid: Sequence[str]) -> InputError:
+    near, every = (did_you_mean(word, valid, f"{noun}s") for word in (found, ""))
+    hint = every if near == every else f"{near} {every}"
+    return InputError(Diagnostic("BadValue", f"there is no {noun} '{found}'", None, hint))
 
 
 def towards(azimuth: float, elevation: float) -> Array:

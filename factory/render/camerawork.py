@@ -4,6 +4,7 @@ logs have in common."""
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from math import floor
 from typing import Literal
 
 import numpy as np
@@ -139,3 +140,10 @@ def pictureless() -> InputError:
     """Why there is nothing to see."""
     message = "the ideal world has no bodies to picture"
     return InputError(Diagnostic("BadValue", message, None, "leave out --world ideal"))
+
+
+def past_the_end(at: float, what: str, end: float) -> InputError:
+    """Why there is no still of a time: the run, or the log, ended before."""
+    message = f"--at {at:g} is past the end: the {what} ends at {floor(100 * end) / 100:.2f} s"
+    hint = "give a time up to then, or `end`; a run of more --units takes longer"
+    return InputError(Diagnostic("BadValue", message, None, hint))
