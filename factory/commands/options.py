@@ -66,10 +66,10 @@ class CameraName(click.ParamType[str]):
 
 def _parts(file: Path | None, folders: Sequence[Path]) -> list[str]:
     """The labels of the parts in a PAG or a log; none where it cannot be read."""
+    from factory.lang import load_pag
     from factory.pipeline import all_templates
     from factory.record.log import is_log, read_log
     from factory.record.log.recompiled import factory_of
-    from factory.lang import load_pag
 
     try:
         if file is None:

@@ -41,7 +41,8 @@ def action_of(m: mujoco.MjModel, d: mujoco.MjData) -> Action:
     for own, found in (*_bodies(m, d), *_loads(m, d)):
         points[own].append(found)
     boxes = {own: _box(np.concatenate(found)) for own, found in points.items()}
-    robots, beside = [], [placed(m, d, g) for g in range(m.ngeom) if _feeds(m, g)]
+    beside = [placed(m, d, g) for g in range(m.ngeom) if _feeds(m, g)]
+    robots: list[Array] = []
     for (body, _), box in boxes.items():
         way = _way(m, d, body, boxes.get((body, "load"), box))
         is_tray = m.body(body).name == names.OUTFEED_TRAY

@@ -200,7 +200,7 @@ def _calm(values: Array) -> Array:
 
 def _most(values: Array) -> Array:
     """A closed row of values, each the greatest of those about it."""
-    return np.max([np.roll(values, n, axis=0) for n in range(-CALM, CALM + 1)], axis=0)
+    return np.asarray(np.max([np.roll(values, n, axis=0) for n in range(-CALM, CALM + 1)], axis=0))
 
 
 def from_above(points: Array, framing: Framing) -> View:

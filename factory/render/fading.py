@@ -19,6 +19,9 @@ FAINT = 0.16
 SEEN, HIDDEN = 0.08, 0.25
 """Shares of a box that may be hidden: below the one nothing fades, above the other all does."""
 
+ROUND = 0.03
+"""How far about a box counts as that box [m]: what is thin is not hidden all of a sudden."""
+
 STANDS = ("wall", "roof", "back")
 """What of the outfeed stands up: its shed."""
 
@@ -50,6 +53,7 @@ class Fading:
 
     def hidden(self, view: View, watched: Array) -> Array:
         """For each group of geoms the greatest share of a watched box that it hides in a view."""
+        watched = watched + ROUND * np.sign(watched - watched.mean(axis=1, keepdims=True))
         (front, before), (back, behind) = _outlines(view, self.boxes), _outlines(view, watched)
         one, other = shapely.STRtree(back).query(front, predicate="intersects")
         shared = shapely.area(shapely.intersection(front[one], back[other]))
