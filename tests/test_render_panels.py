@@ -15,7 +15,7 @@ from factory.pipeline import all_templates
 from factory.record.log import Log, LogWriter, read_log
 from factory.record.monitor.record import recorded_subject
 from factory.record.monitor.subject import subject_of_run
-from factory.render import Film, Picture, camera_named, panels_named, render_log
+from factory.render import Film, Picture, Still, camera_named, panels_named, render_log
 from factory.render.camerawork import Moment
 from factory.render.caption import FADES, SHOWN, draw_title, strength
 from factory.render.colours import GROUND, operation_colours, robot_colours
@@ -446,3 +446,60 @@ def test_a_still_with_panels_on_the_command_line(run: Terminal, out: Path) -> No
     words = ["--with", "net,gantt", "--size", "560x480", "--title", "A title", "--at", "0.5"]
     assert run("render", PAPER, "-o", picture, *words, "--json").status == 0
     assert iio.imread(picture).shape == (480, 560, 3) and list(files_in(out)) == ["still.png"]
+
+
+@needs_gl
+def test_a_run_says_where_its_film_is(run: Terminal, tmp_path: Path) -> None:
+    film, poster, log = (tmp_path / name for name in ("a.mp4", "a.png", "a.log"))
+    words = ["--video", film, "--poster", poster, "--log", log, "--size", "64x48", "--fps", 2]
+    out = run("run", PAPER, *words).out
+    assert out.endswith(f"film: {film}\nposter: {poster}\nlog: {log}\n")
+    assert run("run", PAPER, *words, "-q").out == ""
+
+
+@needs_gl
+def test_a_still_is_called_a_still(run: Terminal, out: Path) -> None:
+    still = out / "a.png"
+    words = ["render", PAPER, "-o", still, "--size", "64x48", "--at"]
+    assert run(*words, "0.5").out == f"{still}: a still of 64x48 at 0.5 s\n"
+    assert run(*words, "end").out == f"{still}: a still of 64x48 at the end\n"
+    found = run(*words, "0.5", "--json").json
+    assert (found["frames"], found["seconds"]) == (1, 0.0)
+
+
+@needs_gl
+def test_a_time_past_the_end_is_an_error_that_names_the_end(run: Terminal, out: Path) -> None:
+    log, still = out / "run.log", out / "a.png"
+    end = run("run", PAPER, "--log", log, "--json").json["sim_time_s"]
+    assert run("render", PAPER, "-o", still, "--size", "64x48", "--at", end).status == 0
+    still.unlink()
+    for file, what in ((PAPER, "run"), (log, "log")):
+        done = run("render", file, "-o", still, "--size", "64x48", "--at", "100", "--json")
+        assert (done.status, done.codes) == (2, ["BadValue"])
+        message = done.json["errors"][0]["message"]
+        assert message == f"--at 100 is past the end: the {what} ends at {end:.2f} s"
+    assert list(files_in(out)) == ["run.log"]
+
+
+@needs_gl
+def test_a_still_of_a_time_that_does_not_come_is_not_written(tmp_path: Path) -> None:
+    """What went wrong is told, not that the time did not come."""
+    simulation = Simulation(laid_out("paper"), RunRequest("mujoco", units=1))
+
+    def fail(world, supervisor) -> None:
+        raise RuntimeError
+
+    with pytest.raises(RuntimeError), Still(simulation, tmp_path / "a.png", at=1.0) as still:
+        simulation.run([still.observe, fail])
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_wrong_camera_lists_the_right_ones() -> None:
+    every = "valid cameras: overview, orbit, top, product, part:LABEL"
+    for name, hint in (("orbt", f"did you mean 'orbit'? {every}"), ("zzz", every)):
+        with pytest.raises(InputError) as caught:
+            camera_named(name)
+        assert caught.value.diagnostics[0].hint == hint
+    with pytest.raises(InputError) as caught:
+        camera_named("part:lod", ["lid", "box"])
+    assert caught.value.diagnostics[0].hint == "did you mean 'lid'? valid parts: lid, box"

@@ -63,7 +63,7 @@ def _row(log: Log, at: str) -> int:
     except ValueError:
         row = len(log)
     if row >= len(log):
-        hint = f"give a time from 0 to {int(100 * log.time[-1]) / 100:.2f} s"
+        hint = f"give a time from 0 to {int(100 * log.time[-1] + 1e-6) / 100:.2f} s"
         raise InputError(Diagnostic("Usage", f"--of '{at}' is no time of the log", None, hint))
     return row
 
