@@ -213,9 +213,9 @@ def test_a_table_says_that_it_is_cut(run: Terminal) -> None:
     robots = run(*words, "--json").json["robots"]
     out = run(*words).out
     assert out.endswith(f"... and {robots - 6} more robots (-v shows all)\n")
-    assert len(re.findall(r"^r\d+ ", out, re.M)) == 6
+    assert len(re.findall(r"^ r\d+ ", out, re.M)) == 6
     out = run(*words, "-v").out
-    assert "more robot" not in out and len(re.findall(r"^r\d+ ", out, re.M)) == robots
+    assert "more robot" not in out and len(re.findall(r"^ r\d+ ", out, re.M)) == robots
 
 
 def test_more_is_said_of_what_was_written(run: Terminal, tmp_path: Path) -> None:

@@ -409,7 +409,10 @@ def test_gltf_shares_meshes(ending: str) -> None:
     assert len(set(legs)) == 1
 
 
-def test_a_factory_is_exported_at_a_time_of_its_log(run: Terminal, log: Path, out: Path) -> None:
+def test_a_factory_is_exported_at_a_time_of_its_log(
+    run: Terminal, out: Path, tmp_path_factory: pytest.TempPathFactory
+) -> None:
+    log = kept_log(project().layout, tmp_path_factory.mktemp("log") / "paper.log")
     words = ["--format", "gltf-factory", "-o", out / "x.gltf"]
     for of in ("nan", "-1", "soon", "1e9"):
         done = run("export", log, *words, "--of", of, "--json")

@@ -230,7 +230,7 @@ def test_commands_options_codes_and_products_are_completed(tmp_path: Path) -> No
 
 def test_cameras_are_completed_with_the_parts_of_the_file(tmp_path: Path) -> None:
     cameras = ["overview", "orbit", "top", "product"]
-    parts = ["part:part3", "part:part1", "part:part2"]
+    parts = ["part:part1", "part:part2", "part:part3"]
     log = tmp_path / "run.log"
     assert spawn("run", PAPER, "--log", log, "--max-time", "0.1", "-q").status in (0, 1)
     for file in (PAPER, log):

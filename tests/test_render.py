@@ -282,7 +282,7 @@ def test_a_long_factory_is_not_looked_at_from_further_than_a_short_side_asks(loo
 
 @needs_gl
 def test_no_more_facets_are_drawn_than_are_seen(layout, tmp_path: Path) -> None:
-    """Faces are whole, cylinders have two rings, and the sky behind the floor is left out; a picture
+    """Faces are whole, cylinders have two rings, the sky behind the floor is left out; a picture
     with all of that shows the same."""
     simulation = Simulation(layout, RunRequest("mujoco", units=1))
     subject = subject_of_run(simulation)

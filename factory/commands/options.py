@@ -60,7 +60,8 @@ class CameraName(click.ParamType[str]):
 
         # Of a line that is not complete click keeps the arguments apart, and sets no parameter.
         files = [ctx.params.get("file"), *map(Path, ctx.args)]
-        names = camera_names(_parts(next(filter(None, files), None), ctx.params["folders"]))
+        parts = _parts(next(filter(None, files), None), ctx.params["folders"])
+        names = camera_names(sorted(parts))
         return [CompletionItem(name) for name in names if name.startswith(incomplete)]
 
 

@@ -144,6 +144,8 @@ def pictureless() -> InputError:
 
 def past_the_end(at: float, what: str, end: float) -> InputError:
     """Why there is no still of a time: the run, or the log, ended before."""
-    message = f"--at {at:g} is past the end: the {what} ends at {floor(100 * end + 1e-6) / 100:.2f} s"
+    message = (
+        f"--at {at:g} is past the end: the {what} ends at {floor(100 * end + 1e-6) / 100:.2f} s"
+    )
     hint = "give a time up to then, or `end`; a run of more --units takes longer"
     return InputError(Diagnostic("BadValue", message, None, hint))
