@@ -205,7 +205,7 @@ def many(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactor
     return kept(laid_out(request.param), tmp_path_factory.mktemp("many") / "log", "ideal", 1)
 
 
-@pytest.mark.parametrize("tall", [150.0, ROOM, 652.0])
+@pytest.mark.parametrize("tall", [150.0, 250.0, ROOM, 652.0])
 def test_no_row_is_empty_and_rows_fill_the_panel(many: Log, tall: float) -> None:
     """Every robot that has a row has an operation in sight."""
     history = told(many)

@@ -16,7 +16,7 @@ from factory.render.subject import placed
 FAINT = 0.16
 """How opaque something is that hides what it may not."""
 
-SEEN, HIDDEN = 0.08, 0.25
+SEEN, HIDDEN = 0.05, 0.20
 """Shares of a box that may be hidden: below the one nothing fades, above the other all does."""
 
 ROUND = 0.03
