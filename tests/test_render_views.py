@@ -122,6 +122,19 @@ def test_an_orbit_is_as_near_as_it_can_be_and_calm() -> None:
     assert steps.max() < 0.02 and np.abs(np.diff(away, 2)).max() < 0.01 * away.mean()
 
 
+@pytest.mark.parametrize("camera", ["product", "part:{}"])
+def test_what_is_followed_is_watched_in_all_its_eighths(log, take, replica, camera) -> None:
+    """A post that hides an eighth of a product stands in front of it."""
+    label = take.subject.factory.leaves[0].label
+    viewpoint = Viewpoint(Replica(take.m), camera.format(label), WIDE, take.subject)
+    moment = moment_of(log, len(log) // 2)
+    view = viewpoint.view(moment.shown, 0.0, moment.time)
+    eighths = viewpoint.watched
+    assert eighths.shape == (8, 8, 3) and np.abs(seen(view, eighths.reshape(-1, 3))).max() < 1
+    sizes = np.ptp(eighths, axis=1)
+    assert np.allclose(2 * sizes, np.ptp(eighths.reshape(-1, 3), axis=0))
+
+
 # --- fading ---------------------------------------------------------------------------------------
 
 

@@ -78,7 +78,8 @@ class Viewpoint:
         self.wanted, self.body = wanted, body
         middle = followed.box.mean(axis=0)
         about = middle + 1.45 * (followed.box - middle)
-        self.watched = (wanted + self.away + followed.box)[None]
+        box = wanted + self.away + followed.box
+        self.watched = (box[:, None] + box) / 2  # each eighth: the least of it is to be seen
         return fit(wanted + self.away + about, towards(-122.0, 44.0), self.framing)
 
     def _wanted(self, followed: Followed, shown: Snapshot) -> tuple[Array, int]:
