@@ -200,11 +200,22 @@ def test_people_get_a_summary(run: Terminal) -> None:
     out = run("run", PAPER, "--units", 4).out
     for word in ("4 of 4 products", "cycle time", "bottleneck r3", "Utilisation", "refines"):
         assert word in out
+    assert "more robot" not in out  # six are all that there are
     assert "live: yes" in run("check", PAPER).out
     assert run("check", PAPER, "-q").out == ""
     assert run("run", PAPER, "-q").out == ""
     assert run("build", PAPER, "-q").out == ""
     assert len(run("templates", "-v").out) > len(run("templates").out)
+
+
+def test_a_table_says_that_it_is_cut(run: Terminal) -> None:
+    words = "run", PAPER.parent / "lamp.pag", "--world", "ideal"
+    robots = run(*words, "--json").json["robots"]
+    out = run(*words).out
+    assert out.endswith(f"... and {robots - 6} more robots (-v shows all)\n")
+    assert len(re.findall(r"^ r\d+ ", out, re.M)) == 6
+    out = run(*words, "-v").out
+    assert "more robot" not in out and len(re.findall(r"^ r\d+ ", out, re.M)) == robots
 
 
 def test_more_is_said_of_what_was_written(run: Terminal, tmp_path: Path) -> None:

@@ -129,7 +129,7 @@ def test_the_reference_has_everything_there_is(reference: dict[str, str]) -> Non
     assert headings(reference["operations"]) == sorted(all_templates())
     assert headings(reference["robots"]) == [*load_catalogue().types, "The catalogue"]
     for page, names in (("settings", RANGES), ("language", GEOMETRY), ("formats", exporters())):
-        rows = re.findall(r"^\| `(\w+)` \|", reference[page], re.M)
+        rows = re.findall(r"^\| `([\w-]+)` \|", reference[page], re.M)
         assert set(names) <= set(rows), page
 
 

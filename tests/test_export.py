@@ -41,6 +41,7 @@ from factory.modes.modes import operation_modes
 from factory.nets.marked import MarkedNet, marked
 from factory.nets.petri import PetriNet, Place, Transition
 from factory.plant.factory import Factory
+from factory.record.log import read_log
 from tests.command_line import PAPER, ROOT, Terminal, files_in
 from tests.export_values import LAMP, MESHES, kept_log, made, project, subject
 from tests.net_values import net_from, planted
@@ -66,7 +67,7 @@ def test_they_are_found_by_directory() -> None:
     assert list(found) == sorted(found)
     for exporter in found.values():
         assert exporter.summary.endswith(".")
-        assert exporter.takes in ("net", "pag", "log")
+        assert exporter.takes in ("net", "pag", "log", "factory")
 
 
 def test_help_says_what_each_is(run: Terminal) -> None:
@@ -116,7 +117,8 @@ def test_what_is_binary_needs_a_file(run: Terminal, form: str, log: Path) -> Non
     done = run("export", file, "--format", form)
     assert done.status == 2
     assert done.err == (
-        f"Usage {form} is binary and is not written to a terminal\n    give -o OUT.{form}\n"
+        f"Usage {form} is binary and is not written to a terminal\n"
+        f"    give -o OUT.{exporters()[form].ending or form}\n"
     )
 
 
@@ -405,6 +407,22 @@ def test_gltf_shares_meshes(ending: str) -> None:
     ]
     assert len(legs) == 3
     assert len(set(legs)) == 1
+
+
+def test_a_factory_is_exported_at_a_time_of_its_log(
+    run: Terminal, out: Path, tmp_path_factory: pytest.TempPathFactory
+) -> None:
+    log = kept_log(project().layout, tmp_path_factory.mktemp("log") / "paper.log")
+    words = ["--format", "gltf-factory", "-o", out / "x.gltf"]
+    for of in ("nan", "-1", "soon", "1e9"):
+        done = run("export", log, *words, "--of", of, "--json")
+        assert (done.status, done.codes) == (2, ["Usage"]) and files_in(out) == {}
+        end = int(100 * read_log(log).time[-1] + 1e-6) / 100
+        assert done.json["errors"][0]["hint"] == f"give a time from 0 to {end:.2f} s"
+    assert "give a log" in run("export", PAPER, *words, "--of", "1").err
+    assert run("export", log, *words, "--of", "0.5").status == 0
+    names = {node.get("name") for node in json.loads((out / "x.gltf").read_bytes())["nodes"]}
+    assert {"floor", "r1/carriage", "outfeed/tray"} <= names
 
 
 def test_stl_counts_its_triangles() -> None:

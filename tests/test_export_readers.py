@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 from collections import Counter
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +20,8 @@ from factory.mjcf.loading import load
 from factory.mjcf.names import COMPASS
 from factory.nets.marked import MarkedNet, marked
 from factory.nets.replay import replay
+from factory.record.log import read_log
+from factory.record.log.model import model_of
 from factory.simulation.simulation import physical_model
 from tests.command_line import PAPER, ROOT
 from tests.export_values import (
@@ -338,6 +341,75 @@ def gltf_by_pygltflib(folder: Path) -> None:
         assert np.allclose(size, solid.high - solid.low, atol=2e-4), part
 
 
+# the factory
+
+
+def states(log: Path) -> Iterator[tuple[Any, Any, bytes]]:
+    """A factory at its start, during a run and at its end: the engine's model and state of it, and
+    the export."""
+    import mujoco
+
+    kept = read_log(log)
+    m = model_of(kept)
+    row = len(kept) // 2
+    start = load(physical_model(project(LAMP).layout, 1, project(LAMP).settings))
+    for model, qpos, file, of in (
+        (start, start.qpos0, LAMP, ""),
+        (m, kept.qpos[row], log, str(kept.time[row])),
+        (m, kept.qpos[-1], log, ""),
+    ):
+        d = mujoco.MjData(model)
+        d.qpos[:] = qpos
+        mujoco.mj_kinematics(model, d)
+        yield model, d, made("gltf-factory", file, of, "x.glb")
+
+
+def upright(points: Any) -> Any:
+    """From z upwards to y upwards."""
+    return np.asarray(points) @ np.array([[1, 0, 0], [0, 0, -1], [0, 1, 0]])
+
+
+@reads("gltf-factory", "trimesh", "MIT")
+def factory_by_trimesh(log: Path) -> None:
+    """each body where the engine has it, at the start and at two times of a log, spare parts left
+    out; all on a floor (the library that writes it)"""
+    import trimesh
+
+    for m, d, content in states(log):
+        scene = trimesh.load_scene(written(content, log.with_name("x.glb")))
+        shown = {m.body(b).name: b for b in range(1, m.nbody) if d.xpos[b, 2] > -0.1}
+        del shown[COMPASS]
+        bodies = [name for name in scene.graph.nodes if name in shown]
+        assert len(bodies) == len(shown) > 10
+        for name in bodies:
+            place = scene.graph[name][0][:3, 3]
+            assert np.allclose(place, upright(d.xpos[shown[name]]), atol=1e-6), name
+        low, high = scene.bounds
+        floor = scene.geometry[scene.graph["floor"][1]]
+        turned = scene.graph["floor"][0]
+        reach = trimesh.transform_points(floor.bounds, turned)
+        assert low[1] == pytest.approx(-0.002) and high[1] > 0.2
+        assert np.allclose(np.sort(reach, axis=0)[:, [0, 2]], [low[[0, 2]], high[[0, 2]]])
+
+
+@reads("gltf-factory", "pygltflib", "MIT")
+def factory_by_pygltflib(log: Path) -> None:
+    """valid references; the parts' colours, and robots that share their meshes"""
+    from pygltflib import GLTF2
+    from pygltflib.validator import validate
+
+    content = made("gltf-factory", log, "0", "x.glb")
+    document = GLTF2().load(str(written(content, log.with_name("y.glb"))))
+    validate(document)
+    nodes = {node.name: node for node in document.nodes}
+    for label, solid in project(LAMP).product.solids.items():
+        primitive = document.meshes[nodes[f"part/{label}#1/shape"].mesh].primitives[0]
+        colour = document.materials[primitive.material].pbrMetallicRoughness.baseColorFactor
+        assert np.allclose(colour, solid.rgba, atol=0.01)
+    masts = {nodes[f"{robot.name}/mast"].mesh for robot in project(LAMP).factory.robots}
+    assert len(masts) == 1
+
+
 # robots
 
 
@@ -516,7 +588,7 @@ def usd_by_usd_core(log: Path) -> None:
 @pytest.mark.parametrize("which", READERS)
 def test_read_back(which: str, tmp_path: Path, request: pytest.FixtureRequest) -> None:
     reader = READERS[which]
-    takes_log = exporters()[reader.form].takes == "log"
+    takes_log = exporters()[reader.form].takes in ("log", "factory")
     reader.check(request.getfixturevalue("log") if takes_log else tmp_path)
 
 

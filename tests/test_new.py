@@ -40,6 +40,14 @@ def test_a_new_product_runs_at_once(run: Terminal, tmp_path: Path) -> None:
         assert solid.is_watertight and solid.volume > 0
 
 
+def test_the_new_product_is_told_as_it_is_made(run: Terminal, tmp_path: Path) -> None:
+    """Its first line speaks of its own parts, by their labels, and of no others."""
+    run("new", tmp_path / "bell-3")
+    first = (tmp_path / "bell-3" / "bell-3.pag").read_text().splitlines()[0]
+    parts = {"bell", "neck", "grip", "knob"}
+    assert parts <= set(re.findall(r"[a-z]+", first.lower())) and "clapper" not in first
+
+
 def test_the_commands_that_its_readme_tells_are_right(
     run: Terminal, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -218,6 +226,20 @@ def test_commands_options_codes_and_products_are_completed(tmp_path: Path) -> No
     assert completions("factory run lamp.pag --wo", tmp_path) == ["--world"]
     assert completions("factory run --world ", tmp_path) == ["mujoco", "ideal"]
     assert completions("factory --explain undef", tmp_path) == ["UndefinedLabel"]
+
+
+def test_cameras_are_completed_with_the_parts_of_the_file(tmp_path: Path) -> None:
+    cameras = ["overview", "orbit", "top", "product"]
+    parts = ["part:part1", "part:part2", "part:part3"]
+    log = tmp_path / "run.log"
+    assert spawn("run", PAPER, "--log", log, "--max-time", "0.1", "-q").status in (0, 1)
+    for file in (PAPER, log):
+        assert completions(f"factory render {file} --camera ", tmp_path) == cameras + parts
+    assert completions(f"factory run {PAPER} --units 2 --camera part:", tmp_path) == parts
+    assert completions("factory render --camera o", tmp_path) == ["overview", "orbit"]
+    (tmp_path / "broken.pag").write_text("root = ")
+    for file in ("broken.pag", "missing.pag"):
+        assert completions(f"factory run {file} --camera ", tmp_path) == cameras
 
 
 @pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])

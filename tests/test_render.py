@@ -24,12 +24,16 @@ import factory
 from factory.geometry.meshes import Mesh
 from factory.mjcf.mesh_files import corner_normals, face_normals, mesh_file
 from factory.record.log import LogWriter, read_log
+from factory.record.monitor.subject import subject_of_run
 from factory.render import Film, Picture, Still, camera_named, check_output, render_log
 from factory.render.camera import Framing, fit, from_above, overview, towards
+from factory.render.painter import Painter, _Renderer
+from factory.render.subject import Snapshot
 from factory.render.video import VideoFile
 from factory.simulation.request import RunRequest
 from factory.simulation.simulation import Simulation
 from factory.support import gl
+from factory.support.engine import mujoco
 from factory.support.errors import InputError, MissingError
 from tests.opengl import needs_gl
 
@@ -274,6 +278,31 @@ def test_a_long_factory_is_not_looked_at_from_further_than_a_short_side_asks(loo
     upright = look(long, Framing(9 / 16))
     turned = look(long[:, [1, 0, 2]], Framing(9 / 16))
     assert upright.distance < 1.5 * turned.distance
+
+
+@needs_gl
+def test_no_more_facets_are_drawn_than_are_seen(layout, tmp_path: Path) -> None:
+    """Faces are whole, cylinders have two rings, the sky behind the floor is left out; a picture
+    with all of that shows the same."""
+    simulation = Simulation(layout, RunRequest("mujoco", units=1))
+    subject = subject_of_run(simulation)
+    shown = Snapshot.of(simulation.world.m, simulation.world.d)
+    with Painter(simulation.world.m, (320, 180), "overview", subject) as painter:
+        few, quality = painter.paint(shown), painter.replica.m.vis.quality
+        assert (quality.numquads, quality.numstacks) == (1, 2)
+        assert not painter.renderer.scene.flags[mujoco.mjtRndFlag.mjRND_SKYBOX]
+        painter.renderer.close()
+        quality.numquads, quality.numstacks = 4, 16
+        painter.renderer = _Renderer(painter.replica, (320, 180))
+        many = painter.paint(shown)
+    change = np.abs(few.astype(int) - many).max(axis=-1)
+    assert change.mean() < 0.1 and (change > 12).mean() < 1e-3 and few.std() > 10
+
+
+def test_a_sky_is_drawn_where_the_floor_may_end() -> None:
+    floor = np.array([(x, y, 0) for x in (-1, 1) for y in (-1, 1)], float)
+    assert not fit(floor, towards(-62, 40), Framing(16 / 9)).has_sky
+    assert fit(floor, towards(-62, 15), Framing(16 / 9)).has_sky
 
 
 # --- meshes -----------------------------------------------------------------------------------

@@ -15,8 +15,7 @@ from factory.pipeline import all_templates
 from factory.record.log import Log, LogWriter, read_log
 from factory.record.monitor.record import recorded_subject
 from factory.record.monitor.subject import subject_of_run
-from factory.render import Film, Picture, camera_named, panels_named, render_log
-from factory.render.camera import Framing, orbit
+from factory.render import Film, Picture, Still, camera_named, panels_named, render_log
 from factory.render.camerawork import Moment
 from factory.render.caption import FADES, SHOWN, draw_title, strength
 from factory.render.colours import GROUND, operation_colours, robot_colours
@@ -28,7 +27,8 @@ from factory.render.ink import Ink, fitted, width
 from factory.render.net_panel import NetPanel
 from factory.render.picture import PANELS, shared
 from factory.render.reel import Poster
-from factory.render.rows import NEIGHBOURS, Rows, neighbourhood
+from factory.render.rows import CLOSE, EASY, ROOM, Rows, neighbourhood
+from factory.render.sheet import BOTTOM, FOOT, OUTSIDE, TALLEST
 from factory.render.subject import Snapshot
 from factory.simulation.request import RunRequest
 from factory.simulation.simulation import Simulation
@@ -174,17 +174,51 @@ def test_the_modes_of_the_last_seconds_end_at_the_right(paper: Log) -> None:
 # Many robots.
 
 
-def test_beyond_twenty_robots_the_neighbourhood_of_the_product_is_shown(balanced: Log) -> None:
+def test_without_room_for_all_robots_the_neighbourhood_of_the_product_is_shown(
+    balanced: Log,
+) -> None:
     history = told(balanced)
     rows = Rows(history)
     assert rows.reduced
     for time in np.arange(0.0, balanced.time[-1], 0.5):
         rows.advance(float(time), 0.0)
         shown = [row.robot for row in rows.shown]
-        assert rows.focus is not None and shown == sorted(shown) and len(shown) <= NEIGHBOURS
+        assert rows.focus is not None and shown == sorted(shown)
+        assert len(shown) == rows.named == rows.count <= ROOM / EASY
         assert set(rows.focus.robots) <= set(shown)
         after = history.factory.parents[rows.focus.index]
         assert after < 0 or set(history.factory.operations[after].robots) <= set(shown)
+
+
+def test_all_robots_are_shown_where_there_is_room(balanced: Log) -> None:
+    history = told(balanced)
+    robots = len(history.factory.robots)
+    rows = Rows(history, CLOSE * robots)
+    rows.advance(1.0, 0.0)
+    assert not rows.reduced and [row.robot for row in rows.shown] == list(range(robots))
+    assert Rows(history, CLOSE * robots - 1).reduced
+
+
+@pytest.fixture(scope="module", params=["balanced", "truck"])
+def many(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Log:
+    """The log of a factory of 31 robots, or 23."""
+    return kept(laid_out(request.param), tmp_path_factory.mktemp("many") / "log", "ideal", 1)
+
+
+@pytest.mark.parametrize("tall", [150.0, 250.0, ROOM, 652.0])
+def test_no_row_is_empty_and_rows_fill_the_panel(many: Log, tall: float) -> None:
+    """Every robot that has a row has an operation in sight."""
+    history = told(many)
+    rows = Rows(history, tall)
+    panel = NetPanel((564, int(tall + OUTSIDE)), 1.0, history, rows)
+    assert tall < 600 or not rows.reduced
+    for time in np.arange(0.0, many.time[-1], 1.0):
+        rows.advance(float(time), 0.0)
+        for row in rows.shown:
+            spans = map(panel.rings.span, history.factory.robots[row.robot].operations)
+            assert any(left >= panel.sheet.gutter - 1 and right <= 564 for left, right in spans)
+        last = panel.sheet.height(rows.shown[-1]) + panel.sheet.pitch / 2
+        assert panel.sheet.pitch == TALLEST or last > panel.sheet.size[1] - FOOT - 2 * BOTTOM
 
 
 def test_rows_come_and_go_calmly(balanced: Log) -> None:
@@ -207,7 +241,7 @@ def test_a_neighbourhood_is_never_too_large(seed: int) -> None:
     pag = read_pag(random_pag_text(20 + 9 * seed, seed), all_templates())
     made = factory.compile(pag)
     for operation in made.operations:
-        found = neighbourhood(made, operation, 5)
+        found = neighbourhood(made, operation, 5, range(len(made.operations)))
         assert 0 < len(found) <= max(5, len(operation.robots)) and found == sorted(set(found))
         assert set(operation.robots[:5]) <= set(found)
     depth = depths(made)
@@ -262,20 +296,6 @@ def test_a_part_is_followed_from_its_feeder_to_the_dropoff(fuse: bool) -> None:
 # Cameras, areas, words.
 
 
-def test_orbit_has_everything_in_the_frame_all_the_way_round() -> None:
-    points = np.random.default_rng(3).uniform((-3, -1, 0), (3, 1, 0.4), (60, 3))
-    look = orbit(points, Framing(16 / 9, below=0.08))
-    distances, edges = [], []
-    for time in range(0, 46, 5):
-        view = look(float(time))
-        right, up, ahead = view.axes @ (points - view.position).T
-        assert (ahead > 0).all()
-        x, y = right / ahead / view.tall, up / ahead / view.tall
-        edges.append(min(16 / 9 - np.abs(x).max(), 1 - y.max(), y.min() + 1))
-        distances.append(view.distance)
-    assert min(edges) > 0 and np.ptp(distances) < 1e-9
-
-
 def test_cameras_may_follow_a_part() -> None:
     assert camera_named("part:lid", ["lid", "box"]) == "part:lid"
     assert camera_named("part:anything") == "part:anything"
@@ -321,8 +341,14 @@ def test_a_title_fades_and_then_leaves_the_picture_alone() -> None:
 
 def test_words_are_cut_to_fit() -> None:
     assert fitted("gearbox", 12, 1000) == "gearbox"
-    assert fitted("gearbox/12", 12, 0.7 * width("gearbox/12", 12)).endswith("…/12")
+    assert fitted("gearbox/12", 12, 0.8 * width("gearbox/12", 12)).endswith("…/12")
     assert fitted("gearbox", 12, 5) == ""
+    assert fitted("mount/2", 12, 0.65 * width("mount/2", 12)) == ""
+    for label in ("mount", "mount/2", "front_axle", "cab"):
+        name = label.partition("/")[0]
+        for room in range(90):
+            found = fitted(label, 12, room)
+            assert not found or len(found.partition("…")[0].partition("/")[0]) >= 0.4 * len(name)
     assert all(width(fitted("subassembly", 12, room), 12) <= room for room in range(0, 90, 7))
 
 
@@ -420,3 +446,60 @@ def test_a_still_with_panels_on_the_command_line(run: Terminal, out: Path) -> No
     words = ["--with", "net,gantt", "--size", "560x480", "--title", "A title", "--at", "0.5"]
     assert run("render", PAPER, "-o", picture, *words, "--json").status == 0
     assert iio.imread(picture).shape == (480, 560, 3) and list(files_in(out)) == ["still.png"]
+
+
+@needs_gl
+def test_a_run_says_where_its_film_is(run: Terminal, tmp_path: Path) -> None:
+    film, poster, log = (tmp_path / name for name in ("a.mp4", "a.png", "a.log"))
+    words = ["--video", film, "--poster", poster, "--log", log, "--size", "64x48", "--fps", 2]
+    out = run("run", PAPER, *words).out
+    assert out.endswith(f"film: {film}\nposter: {poster}\nlog: {log}\n")
+    assert run("run", PAPER, *words, "-q").out == ""
+
+
+@needs_gl
+def test_a_still_is_called_a_still(run: Terminal, out: Path) -> None:
+    still = out / "a.png"
+    words = ["render", PAPER, "-o", still, "--size", "64x48", "--at"]
+    assert run(*words, "0.5").out == f"{still}: a still of 64x48 at 0.5 s\n"
+    assert run(*words, "end").out == f"{still}: a still of 64x48 at the end\n"
+    found = run(*words, "0.5", "--json").json
+    assert (found["frames"], found["seconds"]) == (1, 0.0)
+
+
+@needs_gl
+def test_a_time_past_the_end_is_an_error_that_names_the_end(run: Terminal, out: Path) -> None:
+    log, still = out / "run.log", out / "a.png"
+    end = run("run", PAPER, "--log", log, "--json").json["sim_time_s"]
+    assert run("render", PAPER, "-o", still, "--size", "64x48", "--at", end).status == 0
+    still.unlink()
+    for file, what in ((PAPER, "run"), (log, "log")):
+        done = run("render", file, "-o", still, "--size", "64x48", "--at", "100", "--json")
+        assert (done.status, done.codes) == (2, ["BadValue"])
+        message = done.json["errors"][0]["message"]
+        assert message == f"--at 100 is past the end: the {what} ends at {end:.2f} s"
+    assert list(files_in(out)) == ["run.log"]
+
+
+@needs_gl
+def test_a_still_of_a_time_that_does_not_come_is_not_written(tmp_path: Path) -> None:
+    """What went wrong is told, not that the time did not come."""
+    simulation = Simulation(laid_out("paper"), RunRequest("mujoco", units=1))
+
+    def fail(world, supervisor) -> None:
+        raise RuntimeError
+
+    with pytest.raises(RuntimeError), Still(simulation, tmp_path / "a.png", at=1.0) as still:
+        simulation.run([still.observe, fail])
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_wrong_camera_lists_the_right_ones() -> None:
+    every = "valid cameras: overview, orbit, top, product, part:LABEL"
+    for name, hint in (("orbt", f"did you mean 'orbit'? {every}"), ("zzz", every)):
+        with pytest.raises(InputError) as caught:
+            camera_named(name)
+        assert caught.value.diagnostics[0].hint == hint
+    with pytest.raises(InputError) as caught:
+        camera_named("part:lod", ["lid", "box"])
+    assert caught.value.diagnostics[0].hint == "did you mean 'lid'? valid parts: lid, box"

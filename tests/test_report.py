@@ -20,7 +20,7 @@ from factory.record.log import LogWriter, read_log
 from factory.show.report import page, recording_of
 from factory.show.report.drawings import floor_plan
 from factory.show.report.fidelity import fidelity
-from factory.show.report.links import labels_of, links
+from factory.show.report.links import data, labels_of, links
 from factory.show.report.pace import measured
 from factory.show.report.packing import json_inside
 from factory.show.report.page import SCRIPTS
@@ -162,6 +162,19 @@ def test_a_stage_of_a_sub_assembly_is_about_that() -> None:
         whole = labels[operation.label.partition("/")[0]]
         assert found["transition"][operation.start]["labels"] == [whole]
         assert operation.index in found["label"][whole]["operations"]
+
+
+def test_bars_say_what_they_make_whole_or_not_at_all(recording) -> None:
+    """Not `mate ...`, which all begin with: what is too long goes to a line out of sight."""
+    factory = recording.factory
+    assert [o["label"] for o in data(factory)["operations"]] == [
+        o.label for o in factory.operations
+    ]
+    text = page(recording)
+    (bar,) = re.findall(r"^\.op \{[^}]*\}", text, re.M)
+    assert "overflow: hidden" in bar and "ellipsis" not in bar and "nowrap" not in bar
+    assert ".op span { display: inline-block; white-space: nowrap; }" in text
+    assert text.count("inside(bar, span.operation)") == 1
 
 
 def test_what_is_measured_is_what_analyze_says(recording) -> None:

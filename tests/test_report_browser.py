@@ -118,6 +118,15 @@ def test_it_plays_and_pauses_by_keyboard(tab: Tab) -> None:
     assert tab.ask("time") > stopped
 
 
+def test_words_in_bars_are_whole_or_out_of_sight(tab: Tab) -> None:
+    script = """spans => spans.map(s => {
+        const [bar, words] = [s.parentNode, s].map(e => e.getBoundingClientRect());
+        return words.top >= bar.bottom - 1 ? 'out' : words.right <= bar.right ? 'whole' : 'cut';
+    })"""
+    found = tab.page.locator(".op span").evaluate_all(script)
+    assert "whole" in found and "cut" not in found
+
+
 CLICKS = {
     "tree": (".node[data-label='3']", "label"),
     "gantt": ("#gantt button[data-robot='2']", "robot"),

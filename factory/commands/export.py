@@ -20,7 +20,12 @@ if TYPE_CHECKING:
     from factory.export import Exporter, Made
     from factory.export.subject import Source
 
-TAKEN = {"net": ("a PAG", "a net in PNML"), "pag": ("a PAG",), "log": ("a log",)}
+TAKEN = {
+    "net": ("a PAG", "a net in PNML"),
+    "pag": ("a PAG",),
+    "log": ("a log",),
+    "factory": ("a PAG", "a log"),
+}
 """The kinds of file that an exporter can take."""
 
 
@@ -122,7 +127,9 @@ def _is_folder(output: Path) -> bool:
 def _writable(file: Path, output: Path | None, whole: bool, chosen: Exporter) -> None:
     if output is None and chosen.binary:
         message = f"{chosen.format} is binary and is not written to a terminal"
-        raise InputError(Diagnostic("Usage", message, None, f"give -o OUT.{chosen.format}"))
+        raise InputError(
+            Diagnostic("Usage", message, None, f"give -o OUT.{chosen.ending or chosen.format}")
+        )
     if whole:
         writable_folder(output)
     else:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import fields
 from functools import wraps
 from math import isfinite
@@ -15,7 +15,7 @@ from click.core import ParameterSource
 from click.shell_completion import CompletionItem
 
 from factory.commands.requests import OutputOptions, PictureOptions, ProjectOptions, RunOptions
-from factory.support.errors import Diagnostic, InputError
+from factory.support.errors import Diagnostic, FactoryError, InputError
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -45,6 +45,41 @@ class PagPath(click.Path):
 
 
 PAG_PATH = PagPath(path_type=Path, readable=False)
+
+
+class CameraName(click.ParamType[str]):
+    """The name of a camera; its completions in the shell are those that FILE has, as far as FILE is
+    given before and can be read."""
+
+    name = "camera"
+
+    def shell_complete(
+        self, ctx: click.Context, param: click.Parameter, incomplete: str
+    ) -> list[CompletionItem]:
+        from factory.render.camera import camera_names
+
+        # Of a line that is not complete click keeps the arguments apart, and sets no parameter.
+        files = [ctx.params.get("file"), *map(Path, ctx.args)]
+        parts = _parts(next(filter(None, files), None), ctx.params["folders"])
+        names = camera_names(sorted(parts))
+        return [CompletionItem(name) for name in names if name.startswith(incomplete)]
+
+
+def _parts(file: Path | None, folders: Sequence[Path]) -> list[str]:
+    """The labels of the parts in a PAG or a log; none where it cannot be read."""
+    from factory.lang import load_pag
+    from factory.pipeline import all_templates
+    from factory.record.log import is_log, read_log
+    from factory.record.log.recompiled import factory_of
+
+    try:
+        if file is None:
+            return []
+        if is_log(file):
+            return [part.label for part in factory_of(read_log(file).header).leaves]
+        return [part.label for part in load_pag(file, all_templates(folders)).parts()]
+    except FactoryError:
+        return []
 
 
 def options(*decorators: Callable[[F], F]) -> Callable[[F], F]:
@@ -194,6 +229,7 @@ PICTURE = options(
     click.option("--fps", type=click.IntRange(1, 120), default=30, help="Pictures a second."),
     click.option(
         "--camera",
+        type=CameraName(),
         default="overview",
         help="overview, orbit, top, product, or part:LABEL to follow a part.",
     ),

@@ -98,7 +98,10 @@ def render(
             {**document, "fps": shown.fps, "seconds": seconds, "warnings": warnings, **cut_off(log)}
         )
     elif not out.quiet:
-        say(f"{output}: {frames} frames of {size[0]}x{size[1]}, {seconds:.1f} s")
+        shape = f"{size[0]}x{size[1]}"
+        when = "at the end" if moment == "end" else f"at {moment:g} s"
+        filmed = f"{frames} frames of {shape}, {seconds:.1f} s"
+        say(f"{output}: {f'a still of {shape} {when}' if is_still else filmed}")
     return 0
 
 

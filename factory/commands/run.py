@@ -83,6 +83,7 @@ def run(
         emit({**document, "warnings": warnings, **({"errors": trouble} if trouble else {})})
     elif not out.quiet:
         summarise(record, layout.factory, out.verbose)
+        say_files(film=video, poster=shown.poster, log=log)
     say_violations(record.monitor)
     if record.trouble is not None:
         print(record.trouble, file=sys.stderr)
@@ -221,3 +222,12 @@ def summarise(record: Run, factory: Factory, verbose: bool) -> None:
     busy = sorted(zip(factory.robots, record.utilisation, strict=True), key=lambda p: -p[1])
     rows = [(r.name, r.type, f"{100 * u:.0f} %") for r, u in (busy if verbose else busy[:6])]
     table("Utilisation", ("robot", "type", "busy"), rows)
+    if more := len(busy) - len(rows):
+        say(f"... and {more} more robot{'s' if more > 1 else ''} (-v shows all)")
+
+
+def say_files(**files: Path | None) -> None:
+    """Where the files are that a run has left, by what they are."""
+    for kind, path in files.items():
+        if path is not None:
+            say(f"{kind}: {path}")

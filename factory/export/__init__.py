@@ -1,7 +1,8 @@
 """Exporters, found by directory: every module here that defines `FORMAT`, `TAKES` and `export`.
 
-`FORMAT` is the name of the format and the ending of its files; `TAKES` what it is made from: "net"
-(a PAG, or a net in PNML), "pag" or "log". `export(subject)` gives a text, bytes where `BINARY` is
+`FORMAT` is the name of the format and, where there is no `ENDING`, the ending of its files; `TAKES`
+what it is made from: "net" (a PAG, or a net in PNML), "pag", "log" or "factory" (a PAG or a log).
+`export(subject)` gives a text, bytes where `BINARY` is
 set, or several files by name beside the file asked for, that itself under ""; where the subject is
 `whole`, files in a folder. `OF`, where there is a choice, says what `--of` means. The module's
 docstring is its line in `factory export --help`.
@@ -24,7 +25,8 @@ Made = str | bytes | Mapping[str, bytes]
 @dataclass(frozen=True, slots=True)
 class Exporter:
     """A format, what it takes, and what writes it; `of`: what `--of` means, "" for nothing;
-    `folder`: whether it writes a whole folder if asked to."""
+    `folder`: whether it writes a whole folder if asked to; `ending`: of its files, "" where that is
+    the format's name."""
 
     format: str
     takes: str
@@ -33,6 +35,7 @@ class Exporter:
     binary: bool = False
     of: str = ""
     folder: bool = False
+    ending: str = ""
 
 
 def exporters() -> Mapping[str, Exporter]:
@@ -44,9 +47,8 @@ def exporters() -> Mapping[str, Exporter]:
 
 def _exporter(module: ModuleType) -> Exporter:
     summary = " ".join((module.__doc__ or "").strip().partition("\n\n")[0].split())
-    names = [
-        name for name in ("FORMAT", "TAKES", "BINARY", "OF", "FOLDER") if hasattr(module, name)
-    ]
+    words = ("FORMAT", "TAKES", "BINARY", "OF", "FOLDER", "ENDING")
+    names = [name for name in words if hasattr(module, name)]
     given = {name.lower(): getattr(module, name) for name in names}
     return Exporter(**given, summary=summary, export=module.export)
 

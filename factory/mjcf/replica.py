@@ -16,6 +16,9 @@ Floats = NDArray[np.float64]
 SHOWN = 3
 """Geoms of groups below this one are drawn."""
 
+ROUND = 28
+"""Sides of a cylinder."""
+
 
 class Replica:
     """A model `m` and data `d` of its own, in which nothing sleeps, at the model's start."""
@@ -73,3 +76,19 @@ def mesh_of(m: mujoco.MjModel, geom: int) -> tuple[Floats, NDArray[np.int64]]:
     vertices = np.asarray(m.mesh_vert[first : first + count], float)
     first, count = int(mesh.faceadr[0]), int(mesh.facenum[0])
     return vertices, np.asarray(m.mesh_face[first : first + count], np.int64)
+
+
+def triangles(m: mujoco.MjModel, geom: int) -> tuple[Floats, NDArray[np.int64]]:
+    """A geom's vertices (n, 3), in its own frame [m], and faces (k, 3)."""
+    from trimesh import creation
+
+    kind, size = mujoco.mjtGeom(m.geom_type[geom]), m.geom_size[geom]
+    if kind == mujoco.mjtGeom.mjGEOM_MESH:
+        return mesh_of(m, geom)
+    if kind == mujoco.mjtGeom.mjGEOM_SPHERE:
+        made = creation.icosphere(subdivisions=2, radius=size[0])
+    elif kind == mujoco.mjtGeom.mjGEOM_CYLINDER:
+        made = creation.cylinder(size[0], 2 * size[1], sections=ROUND)
+    else:
+        made = creation.box(extents=2 * half_sizes(m, geom))
+    return np.asarray(made.vertices, float), np.asarray(made.faces, np.int64)

@@ -65,25 +65,43 @@ class View:
         """From where to where something is drawn [m]: tightly, or shadows get speckles. Twice as
         far as the floor at the upper edge of the picture, since the sky is drawn nearer than the
         far end."""
-        up, ahead = self.axes[1][2], self.axes[2][2]
-        far = float(self.position[2]) / max(-ahead - self.tall * up, 0.06)
+        far = float(self.position[2]) / max(self.dip, 0.06)
         near = max(0.1 * self.distance, 0.7 * (self.distance - self.depth))
         return near, 2 * max(far, self.distance + self.depth)
+
+    @property
+    def dip(self) -> float:
+        """How steeply the upper edge of the picture looks down: its descent on a way of 1 ahead."""
+        return float(-self.axes[2][2] - self.tall * self.axes[1][2])
+
+    @property
+    def has_sky(self) -> bool:
+        """Whether the end of the floor may be seen, which is 20 times as large as the factory."""
+        return self.dip < 0.3
+
+
+def camera_names(parts: Sequence[str]) -> tuple[Camera, ...]:
+    """The names of all cameras of a factory with these parts."""
+    return (*CAMERAS, *(PART + part for part in parts))
 
 
 def camera_named(name: str, parts: Sequence[str] | None = None) -> Camera:
     """Raises InputError (BadValue) for a name that no camera has, and for a part that is none of
-    `parts`, if these are known."""
+    `parts`, if these are known. Both list what there is."""
     head, colon, label = name.partition(":")
-    if not colon and name in CAMERAS:
+    if head + colon == PART:
+        if parts is None or label in parts:
+            return name
+        raise _none_of("part", label, parts)
+    if name in CAMERAS:
         return name
-    if head + colon == PART and (parts is None or label in parts):
-        return name
-    if head + colon == PART and parts is not None:
-        hint = did_you_mean(label, parts, "parts")
-        raise InputError(Diagnostic("BadValue", f"there is no part '{label}'", None, hint))
-    hint = did_you_mean(name, (*CAMERAS, "part:LABEL"), "cameras")
-    raise InputError(Diagnostic("BadValue", f"there is no camera '{name}'", None, hint))
+    raise _none_of("camera", name, (*CAMERAS, "part:LABEL"))
+
+
+def _none_of(noun: str, found: str, valid: Sequence[str]) -> InputError:
+    near, every = (did_you_mean(word, valid, f"{noun}s") for word in (found, ""))
+    hint = every if near == every else f"{near} {every}"
+    return InputError(Diagnostic("BadValue", f"there is no {noun} '{found}'", None, hint))
 
 
 def towards(azimuth: float, elevation: float) -> Array:
@@ -123,35 +141,66 @@ def _tangents(framing: Framing) -> tuple[float, float, float, float]:
 
 
 def overview(points: Array, framing: Framing) -> View:
-    """From the south, aslant, or from where the factory fills the picture better by a tenth; an
-    upright picture may see a long factory lengthwise, and from higher up."""
-    wide = framing.aspect >= 1
-    azimuths = (-62.0, -118.0, -28.0, -152.0) if wide else (-62.0, -118.0, -8.0, -172.0)
-    best, *others = (fit(points, towards(a, 40.0 if wide else 52.0), framing) for a in azimuths)
-    for view in others:
-        if view.distance < 0.9 * best.distance:
-            best = view
-    return best
+    """From the south, aslant, or from where the points are larger on average by a twentieth; the
+    narrower the picture, the higher up."""
+    elevation = 40.0 if framing.aspect > 1.2 else 46.0 if framing.aspect > 0.8 else 52.0
+
+    def size(view: View) -> float:
+        return float((1 / ((points - view.position) @ view.axes[2])).mean())
+
+    usual = fit(points, towards(-62.0, elevation), framing)
+    others = [fit(points, towards(a, elevation), framing) for a in range(-165, 0, 15)]
+    best = max(others, key=size)
+    return best if size(best) > 1.05 * size(usual) else usual
 
 
 def orbit(points: Array, framing: Framing) -> Callable[[float], View]:
-    """The view at each time [s] from a camera that goes round at an even height and distance, the
-    nearest from which everything is in the frame all the way."""
+    """The view at each time [s] from a camera that goes round at an even height. It comes nearer
+    and goes away calmly, and has everything in the frame all the way."""
     elevation = 36.0 if framing.aspect >= 1 else 50.0
+    azimuths = np.arange(0.0, 360.0, 3.0)
     middle = (points.min(axis=0) + points.max(axis=0)) / 2
-    tall, side, low, high = _tangents(framing)
-    away = 0.0
-    for azimuth in range(0, 360, 5):
-        r, u, f = towards(azimuth, elevation) @ (points - middle).T
-        nearest = np.maximum(np.abs(r) / side, np.maximum(u / high, -u / low)) - f
-        away = max(away, float(nearest.max()))
-    depth = float(np.linalg.norm(points - middle, axis=1).max())
+    about, tall = points - middle, _tangents(framing)[0]
+    best = [fit(about, towards(a, elevation), framing) for a in azimuths]
+    aside = _calm(np.array([(v.axes @ v.position)[:2] for v in best]))
+    needed = [_away(about, v.axes, at, framing) for v, at in zip(best, aside, strict=True)]
+    away = _calm(_most(np.array(needed)))
+    depth = float(np.linalg.norm(about, axis=1).max())
 
     def view(time: float) -> View:
-        axes = towards(-62.0 + TURN * time, elevation)
-        return View(middle - away * axes[2], axes, tall * framing.aspect, tall, away, depth)
+        azimuth = -62.0 + TURN * time
+        axes = towards(azimuth, elevation)
+        right, up, back = (
+            np.interp(azimuth, azimuths, values, period=360.0) for values in (*aside.T, away)
+        )
+        position = middle + right * axes[0] + up * axes[1] - back * axes[2]
+        return View(position, axes, tall * framing.aspect, tall, float(back), depth)
 
     return view
+
+
+def _away(points: Array, axes: Array, at: Array, framing: Framing) -> float:
+    """How far a camera has to go back along `axes` from the plane through the origin, `at` (2,) to
+    the right and up in it, to have all points in the frame."""
+    _, side, low, high = _tangents(framing)
+    r, u, f = axes @ points.T - np.array([[at[0]], [at[1]], [0.0]])
+    return float((np.maximum(np.abs(r) / side, np.maximum(u / high, -u / low)) - f).max())
+
+
+CALM = 8
+"""Half the steps of an orbit over which a camera's way is evened out."""
+
+
+def _calm(values: Array) -> Array:
+    """A closed row of values, each the mean of those about it, the nearer the heavier."""
+    weights = np.hanning(2 * CALM + 3)[1:-1]
+    shifted = (w * np.roll(values, n - CALM, axis=0) for n, w in enumerate(weights))
+    return np.asarray(sum(shifted) / weights.sum())
+
+
+def _most(values: Array) -> Array:
+    """A closed row of values, each the greatest of those about it."""
+    return np.asarray(np.max([np.roll(values, n, axis=0) for n in range(-CALM, CALM + 1)], axis=0))
 
 
 def from_above(points: Array, framing: Framing) -> View:

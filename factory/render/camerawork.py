@@ -4,6 +4,7 @@ logs have in common."""
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from math import floor
 from typing import Literal
 
 import numpy as np
@@ -19,6 +20,7 @@ from factory.render.net_panel import NetPanel
 from factory.render.painter import Painter
 from factory.render.picture import Area, PanelName, Picture, Size, shared
 from factory.render.rows import Rows
+from factory.render.sheet import OUTSIDE
 from factory.render.subject import Snapshot
 from factory.support.engine import mujoco
 from factory.support.errors import Diagnostic, InputError
@@ -99,14 +101,19 @@ class Camerawork(Closing):
 KINDS: dict[PanelName, type[NetPanel] | type[GanttPanel]] = {"net": NetPanel, "gantt": GanttPanel}
 
 
+SMALLEST = 0.75
+"""Of the scale, when rows are counted: words in them do not get smaller than that."""
+
+
 class Panels:
     """Puts panels into their areas of a picture of a size, beside one of the 3-D."""
 
     def __init__(
         self, m: mujoco.MjModel, size: Size, areas: dict[PanelName, Area], history: History
     ) -> None:
-        self.size, self.rows = size, Rows(history)
         scale = min(max(size) / 1280, min(size) / 720)
+        room = min(area.height for area in areas.values()) / max(scale, SMALLEST) - OUTSIDE
+        self.size, self.rows = size, Rows(history, room)
         self.shown = [
             (area, KINDS[name]((area.width, area.height), scale, history, self.rows))
             for name, area in areas.items()
@@ -133,3 +140,12 @@ def pictureless() -> InputError:
     """Why there is nothing to see."""
     message = "the ideal world has no bodies to picture"
     return InputError(Diagnostic("BadValue", message, None, "leave out --world ideal"))
+
+
+def past_the_end(at: float, what: str, end: float) -> InputError:
+    """Why there is no still of a time: the run, or the log, ended before."""
+    message = (
+        f"--at {at:g} is past the end: the {what} ends at {floor(100 * end + 1e-6) / 100:.2f} s"
+    )
+    hint = "give a time up to then, or `end`; a run of more --units takes longer"
+    return InputError(Diagnostic("BadValue", message, None, hint))

@@ -14,8 +14,8 @@ from factory.record.log.model import model_of
 from factory.record.monitor.record import recorded_subject
 from factory.record.monitor.subject import subject_of_run
 from factory.record.observed import Recorder
-from factory.render.camerawork import Moment, Take, When, pictureless
-from factory.render.history import History
+from factory.render.camerawork import Moment, Take, When, past_the_end, pictureless
+from factory.render.history import TIE, History
 from factory.render.picture import USUAL, Picture
 from factory.render.reel import Reel, save
 from factory.render.subject import Snapshot, held
@@ -83,7 +83,8 @@ class Film(_Observer):
 
 
 class Still(_Observer):
-    """A still (PNG) of a run at a time [s], or at its end; written when it is closed.
+    """A still (PNG) of a run at a time [s], or at its end; written when it is closed, except after
+    an exception before that time.
 
     For the camera `product` the end is when the output robot last holds a product.
     """
@@ -101,7 +102,7 @@ class Still(_Observer):
 
     def observe(self, world: Any, supervisor: Any) -> None:
         """Keep the state if it may be the one."""
-        if self.at != "end" and self.last.time >= self.at:
+        if self.at != "end" and self._has_come:
             return
         now = self._moment()
         holds = held(world.m, now.shown)
@@ -109,9 +110,20 @@ class Still(_Observer):
         if self.at != "end" or not follows or holds or not self.held:
             self.last, self.held = now, self.held or holds
 
+    @property
+    def _has_come(self) -> bool:
+        """Whether the time of the picture has come, as far as is known."""
+        return self.at == "end" or self.last.time >= self.at - TIE
+
     def close(self) -> None:
-        """Take the picture."""
+        """Take the picture. Raises InputError (BadValue) where the run ended before its time."""
+        if self.at != "end" and not self._has_come:
+            raise past_the_end(self.at, "run", self.last.time)
         save(self.take, self.last, self.path)
+
+    def __exit__(self, *raised: object) -> None:
+        if self._has_come or raised[0] is None:
+            self.close()
 
 
 def render_log(
@@ -126,7 +138,7 @@ def render_log(
     `poster` is that of `Film`.
 
     Nothing is simulated again. Raises InputError for a log of the ideal world, one without a tick,
-    or one that is not of the factory in its header."""
+    or one that is not of the factory in its header, and for a time after its end."""
     is_still = check_output(path, picture.size, fps, still=None)
     take = take_of(log, picture)
     firings = list(zip(log.fired_t.tolist(), log.fired.tolist(), strict=True))
@@ -163,6 +175,9 @@ def _row(log: Log, take: Take, at: When) -> int:
     """The row of a log that a still at that time shows."""
     last = len(log) - 1
     if at != "end":
-        return min(int(np.searchsorted(log.time, at - 1e-9)), last)
+        row = int(np.searchsorted(log.time, at - TIE))
+        if row > last:
+            raise past_the_end(at, "log", float(log.time[-1]))
+        return row
     rows = range(last, -1, -1) if take.picture.camera == "product" else ()
     return next((row for row in rows if held(take.m, moment_of(log, row).shown)), last)

@@ -7,11 +7,14 @@ joined for good become one body.
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from factory.mjcf import names
 from factory.mjcf.replica import Replica
 from factory.record.monitor.subject import MonitorSubject
+from factory.render.action import action_of
 from factory.render.camera import (
     PART,
     Array,
@@ -24,7 +27,7 @@ from factory.render.camera import (
     overview,
     towards,
 )
-from factory.render.subject import SIGNS, Snapshot, corners, extent
+from factory.render.subject import SIGNS, Snapshot, corners
 from factory.support.engine import mujoco
 
 LAG = 0.25
@@ -36,14 +39,16 @@ NEAR = 0.02
 
 class Viewpoint:
     """Where the camera is in pictures of a replica, in their order. Cameras that follow a product
-    need to know the factory."""
+    need to know the factory. `watched` (n, 8, 3): boxes round what is to be seen in the last view,
+    by their corners [m]."""
 
     def __init__(
         self, replica: Replica, camera: Camera, framing: Framing, subject: MonitorSubject
     ) -> None:
-        self.d, self.camera, self.framing = replica.d, camera, framing
-        self.points = extent(replica.m, replica.d)
-        self.orbit = orbit(self.points, framing)
+        self.d, self.framing = replica.d, framing
+        found = action_of(replica.m, replica.d)
+        self.watched, self.points = found.robots, found.points
+        self.goes = _standing(camera, self.points, framing)
         self.followed: Followed | None = None
         if camera == "product" or camera.startswith(PART):
             part = camera.removeprefix(PART) if ":" in camera else ""
@@ -56,11 +61,7 @@ class Viewpoint:
         """The view at a time, `elapsed` [s] after the last, of the replica's state."""
         if self.followed is not None:
             return self._following(self.followed, shown, elapsed)
-        if self.camera == "top":
-            return from_above(self.points, self.framing)
-        if self.camera == "orbit":
-            return self.orbit(time)
-        return overview(self.points, self.framing)
+        return self.goes(time)
 
     def _following(self, followed: Followed, shown: Snapshot, elapsed: float) -> View:
         """From an even distance; after a change of body the way still to go glides to 0, by a
@@ -77,6 +78,8 @@ class Viewpoint:
         self.wanted, self.body = wanted, body
         middle = followed.box.mean(axis=0)
         about = middle + 1.45 * (followed.box - middle)
+        box = wanted + self.away + followed.box
+        self.watched = (box[:, None] + box) / 2  # each eighth: the least of it is to be seen
         return fit(wanted + self.away + about, towards(-122.0, 44.0), self.framing)
 
     def _wanted(self, followed: Followed, shown: Snapshot) -> tuple[Array, int]:
@@ -89,6 +92,14 @@ class Viewpoint:
         if rank == np.inf and body == self.body and self.wanted is not None:
             return self.wanted, body
         return followed.origin(self.d, body), body
+
+
+def _standing(camera: Camera, points: Array, framing: Framing) -> Callable[[float], View]:
+    """The view at each time [s] of a camera that follows nothing."""
+    if camera == "orbit":
+        return orbit(points, framing)
+    view = (from_above if camera == "top" else overview)(points, framing)
+    return lambda time: view
 
 
 class Followed:

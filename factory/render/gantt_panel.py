@@ -17,7 +17,7 @@ from factory.render.colours import (
 from factory.render.history import History, OperationProgress, Spell
 from factory.render.ink import Ink, Pixels, fitted, width
 from factory.render.rows import PanelRow, Rows
-from factory.render.sheet import PanelSheet
+from factory.render.sheet import FOOT, PanelSheet
 
 CYCLES = 2.2
 """How many rounds of the busiest robot are shown."""
@@ -42,7 +42,7 @@ class GanttPanel:
 
     def __init__(self, size: tuple[int, int], scale: float, history: History, rows: Rows) -> None:
         self.history, self.factory, self.rows = history, history.factory, rows
-        self.sheet = PanelSheet(size, scale, rows, 22 * scale)
+        self.sheet = PanelSheet(size, scale, rows, FOOT * scale)
         self.colours = operation_colours(self.factory)
         self.window = _window(history)
         self.step = next((s for s in STEPS if self.window / s <= 8), STEPS[-1])

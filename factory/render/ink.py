@@ -90,13 +90,13 @@ def width(text: str, points: int) -> int:
 
 
 def fitted(text: str, points: int, room: float) -> str:
-    """A text, or its beginning, as far as it fits; nothing where not even three letters do. The end
-    of a label that is numbered, as in `box/3`, stays."""
+    """A text, or its beginning, as far as it fits; nothing where not even three letters, nor two
+    fifths of it, do. The end of a label that is numbered, as in `box/3`, stays."""
     if width(text, points) <= room:
         return text
     head, slash, number = text.rpartition("/")
     head, tail = (head, slash + number) if slash else (text, "")
-    for length in range(len(head) - 1, -1 if tail else 2, -1):
+    for length in range(len(head) - 1, max(2, int(0.4 * len(head))), -1):
         shorter = f"{head[:length].rstrip()}…{tail}"
         if width(shorter, points) <= room:
             return shorter

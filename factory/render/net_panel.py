@@ -92,7 +92,8 @@ class NetPanel:
                 yield operation.index, (self.progress.of(operation, x, age), age)
 
     def _ground(self) -> Pixels:
-        key = (tuple(self.rows.shown), round(self.rows.first, 3), self.rows.focus)
+        rows = self.rows
+        key = (tuple(rows.shown), round(rows.count, 3), round(rows.first, 3), rows.focus)
         if self.ground is None or self.ground[0] != key:
             self.ground = key, self._drawn()
         return self.ground[1]

@@ -6,9 +6,10 @@ from functools import cache
 
 import numpy as np
 
-from factory.mjcf.replica import Replica
+from factory.mjcf.replica import SHOWN, Replica
 from factory.record.monitor.subject import MonitorSubject
 from factory.render.camera import Array, Camera, Framing, View
+from factory.render.fading import Fading
 from factory.render.following import Viewpoint
 from factory.render.ink import Pixels
 from factory.render.picture import Size
@@ -47,12 +48,14 @@ class Painter(Closing):
     ) -> None:
         gl.probe()
         self.replica, self.samples = Replica(m), samples
+        _facet(self.replica.m)
         quality = self.replica.m.vis
         quality.global_.offwidth, quality.global_.offheight = size
         if samples > 1:
             quality.quality.offsamples = 1
         framing = Framing(size[0] / size[1], below=0.03 + caption)
         self.viewpoint = Viewpoint(self.replica, camera, framing, subject)
+        self.fading = Fading(self.replica)
         self.shadows = int((m.jnt_type == mujoco.mjtJoint.mjJNT_SLIDE).sum()) <= MANY
         self.renderer = _Renderer(self.replica, size)
 
@@ -66,6 +69,7 @@ class Painter(Closing):
         self.replica.place(shown.qpos)
         mujoco.mj_camlight(self.replica.m, self.replica.d)
         view = self.viewpoint.view(shown, elapsed, time)
+        self.fading.fade(view, self.viewpoint.watched)
         if self.samples == 1:
             return np.ascontiguousarray(self.renderer.draw(view, self.shadows)[::-1])
         total = np.zeros(self.renderer.pixels.shape, np.float32)
@@ -101,9 +105,10 @@ class _Renderer(Closing):
         scene, everything = self.scene, mujoco.mjtCatBit.mjCAT_ALL.value
         m, d, nothing = self.replica.m, self.replica.d, None
         mujoco.mjv_updateScene(m, d, self.options, nothing, self.free, everything, scene)
-        scene.flags[mujoco.mjtRndFlag.mjRND_SHADOW] = shadows
-        scene.flags[mujoco.mjtRndFlag.mjRND_REFLECTION] = False
-        scene.flags[mujoco.mjtRndFlag.mjRND_HAZE] = False
+        flags = mujoco.mjtRndFlag
+        scene.flags[flags.mjRND_SHADOW], scene.flags[flags.mjRND_SKYBOX] = shadows, view.has_sky
+        for unused in (flags.mjRND_REFLECTION, flags.mjRND_HAZE, flags.mjRND_POST_PROCESSING):
+            scene.flags[unused] = False
         self._aim(view, _spread(sample[1])[sample[0]] - 0.5 if sample else np.zeros(2))
         self._light(view, sample)
         self.held.make_current()
@@ -136,6 +141,22 @@ class _Renderer(Closing):
                 if sample is not None:
                     light.dir = _moved(np.asarray(light.dir, float), sample)
                 light.pos = middle - sum(view.range) / 2 * np.asarray(light.dir, float)
+
+
+ROUND = (
+    mujoco.mjtGeom.mjGEOM_SPHERE,
+    mujoco.mjtGeom.mjGEOM_CAPSULE,
+    mujoco.mjtGeom.mjGEOM_ELLIPSOID,
+)
+"""Shapes that are curved in both directions."""
+
+
+def _facet(m: mujoco.MjModel) -> None:
+    """Let the engine draw no more facets than are seen: flat faces whole, cylinders of two rings.
+    By itself it cuts a face into 16, and a cylinder into 16 rings."""
+    m.vis.quality.numquads = 1
+    if not np.isin(m.geom_type[m.geom_group < SHOWN], ROUND).any():
+        m.vis.quality.numstacks = 2
 
 
 def _moved(direction: Array, sample: Sample) -> Array:

@@ -12,7 +12,7 @@ from factory.support.errors import Diagnostic, InputError
 from factory.support.files import write_bytes
 from factory.support.resource import Closing
 
-SAMPLES = 32
+SAMPLES = 24
 """Pictures that a still is the mean of."""
 
 
@@ -93,7 +93,7 @@ def save(take: Take, moment: Moment, path: Path) -> None:
     """A still of a moment as PNG."""
     with Camerawork(take, SAMPLES) as work:
         pixels = work.picture(moment)
-    content = iio.imwrite("<bytes>", pixels, extension=".png", plugin="pillow", optimize=True)
+    content = iio.imwrite("<bytes>", pixels, extension=".png", plugin="pillow")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         write_bytes(path, content)

@@ -1,13 +1,13 @@
 """Which robots the panels show, each in a row of its own, and where the rows are.
 
-Up to LIMIT robots all are shown, in the order of their numbers. Beyond, those in the neighbourhood
-of the product that is furthest on its way: the robots that have it now and those it meets next.
-Their rows fade in and out, and glide to their places.
+Where there is room for all robots all are shown, in the order of their numbers. Else those in the
+neighbourhood of the product that is furthest on its way: the robots that have it now and those it
+meets next. Their rows fade in and out, and glide to their places.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Container, Iterator
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -16,11 +16,11 @@ import numpy as np
 from factory.plant.factory import Factory, Operation
 from factory.render.history import History, depths, followed
 
-LIMIT = 20
-"""Robots up to which all are shown."""
+CLOSE, EASY = 12.0, 26.0
+"""Least distances of rows at 1280x720 where all robots are shown, and where not [px]."""
 
-NEIGHBOURS = 12
-"""Rows where not all robots are shown."""
+ROOM = 292.0
+"""For rows, in one of two panels at 1280x720 [px]."""
 
 COLUMNS = 6.0
 """Operations side by side where not all robots are shown."""
@@ -40,15 +40,17 @@ class PanelRow:
 
 
 class Rows:
-    """The rows at present. `reduced`: whether not all robots have one; `named`: how many have,
-    without those that fade out; `first`: the leftmost column of operations to be seen, and
-    `columns` how many are."""
+    """The rows at present, in so much `room` [px at 1280x720]. `reduced`: whether not all robots
+    have one; `named`: how many have, without those that fade out; `count`: for how many there are
+    places, `most` at the most; `first`: the leftmost column of operations to be seen, and `columns`
+    how many are."""
 
-    def __init__(self, history: History) -> None:
+    def __init__(self, history: History, room: float = ROOM) -> None:
         self.history, self.factory = history, history.factory
         robots = len(self.factory.robots)
-        self.reduced = robots > LIMIT
-        self.count = NEIGHBOURS if self.reduced else robots
+        self.reduced = CLOSE * robots > room
+        self.most = int(room / EASY)
+        self.count = float(self.most if self.reduced else robots)
         self.shown = [] if self.reduced else [PanelRow(r, float(r)) for r in range(robots)]
         self.columns = min(COLUMNS, self.width) if self.reduced else self.width
         self.named = robots
@@ -75,13 +77,19 @@ class Rows:
         wanted = self.column[self.focus.index] + 1.5 - self.columns / 2
         wanted = min(max(wanted, 0.0), self.width - self.columns)
         self.first += share * (wanted - self.first)
-        near = neighbourhood(self.factory, self.focus)
+        near = neighbourhood(self.factory, self.focus, self.most, self._in_sight(wanted))
         place = {robot: float(number) for number, robot in enumerate(near)}
         self.named = len(near)
+        self.count += share * (self.named - self.count)
         old = {row.robot: row for row in self.shown}
         fresh = [PanelRow(r, at, 0.0) for r, at in place.items() if r not in old]
         moved = (_moved(row, place, share) for row in (*self.shown, *fresh))
         self.shown = sorted((row for row in moved if row), key=lambda row: row.robot)
+
+    def _in_sight(self, first: float) -> frozenset[int]:
+        """The operations that are in sight where that is the leftmost column."""
+        last = first + self.columns - 0.5
+        return frozenset(o for o, c in enumerate(self.column) if first - 0.4 < c < last)
 
 
 def _moved(row: PanelRow, place: dict[int, float], share: float) -> PanelRow | None:
@@ -91,13 +99,17 @@ def _moved(row: PanelRow, place: dict[int, float], share: float) -> PanelRow | N
     return PanelRow(row.robot, row.at + share * (at - row.at), alpha) if alpha > 0.02 else None
 
 
-def neighbourhood(factory: Factory, focus: Operation, most: int = NEIGHBOURS) -> list[int]:
-    """At most so many robots: those of an operation, of the operations that its result goes to, the
-    nearest first, and of those that make what joins it there; then of those that make what these
-    need, and so on. In the order of their numbers."""
+def neighbourhood(
+    factory: Factory, focus: Operation, most: int, sight: Container[int]
+) -> list[int]:
+    """At most so many robots of operations in sight: those of one, of the operations that its
+    result goes to, the nearest first, and of those that make what joins it there; then of those
+    that make what these need, and so on. In the order of their numbers."""
     chosen = list(_ahead(factory, focus))
     found = set(focus.robots[:most])
     for operation in chosen:
+        if operation.index not in sight:
+            continue
         more = found | set(operation.robots)
         if len(more) > most:
             break

@@ -13,6 +13,12 @@ from factory.render.rows import PanelRow, Rows
 TALLEST = 62.0
 """Distance of rows at 1280x720, at the most [px]."""
 
+TOP, FOOT, BOTTOM = 40.0, 22.0, 6.0
+"""Above the rows at 1280x720, and below them with a scale of time and without [px]."""
+
+OUTSIDE = TOP + FOOT + BOTTOM
+"""What of a panel's height no row has [px]."""
+
 
 @dataclass(frozen=True)
 class PanelSheet:
@@ -43,13 +49,13 @@ class PanelSheet:
     @property
     def top(self) -> float:
         """Where the rows begin."""
-        return 40 * self.scale
+        return TOP * self.scale
 
     @property
     def pitch(self) -> float:
         """Distance of rows."""
-        room = self.size[1] - self.top - self.below - 6 * self.scale
-        return min(room / max(self.rows.count, 1), TALLEST * self.scale)
+        room = self.size[1] - self.top - self.below - BOTTOM * self.scale
+        return min(room / max(self.rows.count, 1.0), TALLEST * self.scale)
 
     @property
     def gutter(self) -> float:

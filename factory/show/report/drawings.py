@@ -15,7 +15,7 @@ from factory.mjcf.replica import Floats, paint, shown
 from factory.nets.marked import marked
 from factory.plant.factory import Factory
 from factory.show.report.links import about
-from factory.show.report.scene import DrawnFactory, owner, stands_for, triangles
+from factory.show.report.scene import DrawnFactory, owner, placed, stands_for
 from factory.support.canvas import Canvas, Point, hexadecimal, hull, millimetres
 
 MARGIN = 80.0
@@ -104,7 +104,7 @@ class _Plan:
         for own in np.flatnonzero(self.m.body_weldid == body).tolist():
             place, turn = self.m.body_pos[own], rotation(self.m.body_quat[own])
             for geom in shown(self.m, own):
-                points = triangles(self.m, geom)[0]
+                points = placed(self.m, geom)[0]
                 yield geom, points if own == body else points @ turn.T + place
 
     def _meant(self, name: str) -> dict[str, Any]:
@@ -140,7 +140,7 @@ class _Plan:
     def _part(self, body: int) -> None:
         """The outline of a part; a spare one, under the floor, is hidden."""
         name, geoms = self.m.body(body).name, list(shown(self.m, body))
-        points = np.concatenate([triangles(self.m, geom)[0] for geom in geoms])
+        points = np.concatenate([placed(self.m, geom)[0] for geom in geoms])
         spare = "hidden" if self.stage.position[body, 2] < 0 else None
         fill = hexadecimal(paint(self.m, geoms[0]))
         with self.canvas.group(**self._meant(name), data_body=body, hidden=spare):

@@ -116,7 +116,10 @@ def data(factory: Factory) -> dict[str, Any]:
         "labels": list(labels),
         "transitions": [t.name for t in net.transitions],
         "places": [f"{p.mode} {p.label}".strip() or p.name for p in net.places],
-        "operations": [{"name": words_of(o), "robots": list(o.robots)} for o in factory.operations],
+        "operations": [
+            {"name": words_of(o), "label": o.label, "robots": list(o.robots)}
+            for o in factory.operations
+        ],
         "left": [list(p.left) for p in net.places],
         "right": [list(p.right) for p in net.places],
         "links": links(factory),

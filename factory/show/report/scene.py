@@ -14,14 +14,11 @@ from numpy.typing import NDArray
 
 from factory.geometry.solids import rotation
 from factory.mjcf import names
-from factory.mjcf.replica import Floats, Replica, half_sizes, mesh_of, paint, shown
+from factory.mjcf.replica import Floats, Replica, paint, shown, triangles
 from factory.mjcf.robots import ROLES
 from factory.plant.factory import Factory, Operation
 from factory.show.report.packing import Pack
 from factory.support.engine import mujoco
-
-ROUND = 28
-"""Sides of a cylinder."""
 
 
 @dataclass(frozen=True)
@@ -76,28 +73,16 @@ def _has_site(m: mujoco.MjModel, name: str) -> bool:
     return int(mujoco.mj_name2id(m, mujoco.mjtObj.mjOBJ_SITE.value, name)) >= 0
 
 
-def triangles(m: mujoco.MjModel, geom: int) -> tuple[Floats, NDArray[np.int64]]:
+def placed(m: mujoco.MjModel, geom: int) -> tuple[Floats, NDArray[np.int64]]:
     """A geom's vertices, in the frame of its body [m], and faces."""
-    from trimesh import creation
-
-    kind, size = mujoco.mjtGeom(m.geom_type[geom]), m.geom_size[geom]
-    if kind == mujoco.mjtGeom.mjGEOM_MESH:
-        points, corners = mesh_of(m, geom)
-    else:
-        if kind == mujoco.mjtGeom.mjGEOM_SPHERE:
-            made = creation.icosphere(subdivisions=2, radius=size[0])
-        elif kind == mujoco.mjtGeom.mjGEOM_CYLINDER:
-            made = creation.cylinder(size[0], 2 * size[1], sections=ROUND)
-        else:
-            made = creation.box(extents=2 * half_sizes(m, geom))
-        points, corners = np.asarray(made.vertices, float), np.asarray(made.faces, np.int64)
-    return points @ rotation(m.geom_quat[geom]).T + m.geom_pos[geom], corners
+    points, faces = triangles(m, geom)
+    return points @ rotation(m.geom_quat[geom]).T + m.geom_pos[geom], faces
 
 
 def _look(m: mujoco.MjModel, geoms: Sequence[int]) -> tuple[list[NDArray[Any]], float]:
     """Several geoms of a body as one: vertices (n, 3) [m] in its frame, faces (k, 3), colours
     (n, 3) from 0 to 255; and how opaque it is."""
-    found = [triangles(m, geom) for geom in geoms]
+    found = [placed(m, geom) for geom in geoms]
     paints = np.array([paint(m, geom) for geom in geoms])
     counts = [len(points) for points, _ in found]
     starts = np.cumsum([0, *counts])

@@ -70,7 +70,7 @@ class Rolling {
       element.className = `op ${DATA.roles[robot]}${odd}`;
       element.dataset.operation = operation;
       element.title = name;
-      element.textContent = name;
+      inside(element, operation);
       this.tracks[robot].append(element);
       return element;
     });

@@ -115,3 +115,11 @@ class Game {
     return this.marked;
   }
 }
+
+// What a bar of an operation says: what it makes, or nothing where that does not fit. It follows a
+// space of no width, after which a line may end: what is too long goes to the next line, out of sight.
+function inside(bar, operation) {
+  const words = document.createElement('span');
+  words.textContent = DATA.operations[operation].label;
+  bar.append('\u200b', words);
+}

@@ -97,7 +97,7 @@ class Gantt {
         bar.style.left = percent(left);
         bar.style.width = `${((100 * (right - left)) / this.width).toFixed(3)}%`;
         bar.title = `${name}, unit ${span.unit + 1}: ${span.from.toFixed(2)} to ${span.to.toFixed(2)} s`;
-        bar.textContent = (right - left) / this.width > 0.02 ? name : '';
+        if ((right - left) / this.width > 0.02) inside(bar, span.operation);
         this.tracks[robot].append(bar);
       }
     }

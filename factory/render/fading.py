@@ -1,0 +1,86 @@
+"""What stands in front of the action fades: feeders, and the shed that products end in.
+
+How much follows from the view alone, so a still, a film of a run and one of its log show the same.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import shapely
+
+from factory.mjcf import names
+from factory.mjcf.replica import Replica, paint, shown
+from factory.render.camera import Array, View
+from factory.render.subject import placed
+
+FAINT = 0.16
+"""How opaque something is that hides what it may not."""
+
+SEEN, HIDDEN = 0.05, 0.20
+"""Shares of a box that may be hidden: below the one nothing fades, above the other all does."""
+
+ROUND = 0.03
+"""How far about a box counts as that box [m]: what is thin is not hidden all of a sudden."""
+
+STANDS = ("wall", "roof", "back")
+"""What of the outfeed stands up: its shed."""
+
+
+class Fading:
+    """Fades geoms of a replica, which is not any run's."""
+
+    def __init__(self, replica: Replica) -> None:
+        self.m, d = replica.m, replica.d
+        self.last: View | None = None
+        found = [(g, group) for g in shown(self.m, 0) if (group := _group(self.m.geom(g).name))]
+        for body in range(1, self.m.nbody):
+            if names.kind(name := self.m.body(body).name) == "feeder":
+                found += [(g, name) for g in shown(self.m, body)]
+        self.geoms = np.array([g for g, _ in found], np.intp)
+        self.groups = np.unique([group for _, group in found], return_inverse=True)[1]
+        self.paint = np.array([paint(self.m, g) for g in self.geoms]).reshape(-1, 4)
+        self.boxes = np.array([placed(self.m, d, g) for g in self.geoms]).reshape(-1, 8, 3)
+
+    def fade(self, view: View, watched: Array) -> None:
+        """Fade what hides much of any of the boxes `watched` (n, 8, 3) in a view."""
+        if view is self.last or not len(self.geoms):
+            return
+        self.last = view
+        share = (self.hidden(view, watched) - SEEN) / (HIDDEN - SEEN)
+        share = np.clip(share, 0.0, 1.0)[self.groups]
+        self.m.geom_rgba[self.geoms] = self.paint
+        self.m.geom_rgba[self.geoms, 3] *= 1.0 - (1.0 - FAINT) * share * share * (3 - 2 * share)
+
+    def hidden(self, view: View, watched: Array) -> Array:
+        """For each group of geoms the greatest share of a watched box that it hides in a view."""
+        watched = watched + ROUND * np.sign(watched - watched.mean(axis=1, keepdims=True))
+        (front, before), (back, behind) = _outlines(view, self.boxes), _outlines(view, watched)
+        one, other = shapely.STRtree(back).query(front, predicate="intersects")
+        shared = shapely.area(shapely.intersection(front[one], back[other]))
+        shared /= np.maximum(shapely.area(back[other]), 1e-12)
+        ahead = behind[other].mean(axis=1) - before[one].mean(axis=1)
+        deep = (np.ptp(behind[other], axis=1) + np.ptp(before[one], axis=1)) / 2
+        shared *= np.clip(2 * ahead / deep - 1, 0.0, 1.0)
+        count = len(watched)
+        pairs, number = np.unique(self.groups[one] * count + other, return_inverse=True)
+        together = np.bincount(number, shared, len(pairs))
+        found = np.zeros(int(self.groups.max()) + 1)
+        np.maximum.at(found, pairs // count, together)
+        return found
+
+
+def _group(geom: str) -> str:
+    """What a geom of the world fades with, "" for what stays."""
+    head, _, rest = geom.partition("/")
+    if head == "outfeed":
+        return head if rest.startswith(STANDS) else ""
+    return geom.rpartition("/")[0] if head == "feeder" else ""
+
+
+def _outlines(view: View, boxes: Array) -> tuple[Array, Array]:
+    """The outlines (n,) of boxes (n, 8, 3) in a view, as polygons, and how far ahead (n, 8) their
+    corners are."""
+    seen = (boxes - view.position) @ view.axes.T
+    ahead = np.maximum(seen[:, :, 2], 1e-3)
+    points = shapely.multipoints(shapely.points(seen[:, :, :2] / ahead[:, :, None]))
+    return shapely.convex_hull(points), seen[:, :, 2]

@@ -1,0 +1,200 @@
+"""What cameras show: all that moves, large, with nothing in front of it; found without drawing."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import factory
+from factory.mjcf import names
+from factory.mjcf.replica import Replica
+from factory.record.log import Log, LogWriter, read_log
+from factory.render.action import Action, action_of
+from factory.render.camera import Framing, View, fit, orbit, overview, towards
+from factory.render.camerawork import Take
+from factory.render.fading import FAINT, Fading
+from factory.render.film import moment_of, take_of
+from factory.render.following import Viewpoint
+from factory.render.picture import Picture
+from factory.render.subject import placed
+from factory.simulation.request import RunRequest
+from factory.simulation.simulation import Simulation
+from factory.support.engine import mujoco
+
+EXAMPLES = Path(__file__).parent.parent / "examples"
+
+WIDE, BESIDE_PANELS = Framing(16 / 9, below=0.1), Framing(716 / 720, below=0.1)
+
+
+@pytest.fixture(scope="module", params=["paper", "lamp"])
+def log(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Log:
+    """The log of a factory without lifts, and of one with."""
+    path = tmp_path_factory.mktemp("log") / "run.log"
+    layout = factory.lay_out(factory.compile(factory.load_pag(EXAMPLES / f"{request.param}.pag")))
+    simulation = Simulation(layout, RunRequest("mujoco", units=2))
+    with LogWriter(path, simulation) as writer:
+        simulation.run([writer.observe])
+    return read_log(path)
+
+
+@pytest.fixture(scope="module")
+def take(log: Log) -> Take:
+    return take_of(log, Picture())
+
+
+@pytest.fixture(scope="module")
+def replica(take: Take) -> Replica:
+    return Replica(take.m)
+
+
+@pytest.fixture(scope="module")
+def action(replica: Replica) -> Action:
+    return action_of(replica.m, Replica(replica.m).d)
+
+
+def seen(view: View, points: np.ndarray) -> np.ndarray:
+    """Where points are in a view (n, 2): from -1 to 1 within the frame, either way."""
+    right, up, ahead = view.axes @ (points - view.position).T
+    assert (ahead > 0).all()
+    return np.stack([right / ahead / view.wide, up / ahead / view.tall], axis=1)
+
+
+def moving(replica: Replica, row: np.ndarray) -> np.ndarray:
+    """Corners of what moves in a state: robots, and parts that are in sight and not in the shed."""
+    m, d = replica.m, replica.d
+    replica.place(row)
+    wall = m.geom("outfeed/wall1")
+    mouth = float(wall.pos[0] - wall.size[0])
+    found = []
+    for g in range(m.ngeom):
+        body = m.body(int(m.body_rootid[m.geom_bodyid[g]]))
+        inside = body.name.startswith("part/") and d.xpos[body.id, 2] > 0
+        if (inside and d.xpos[body.id, 0] < mouth) or names.kind(body.name) == "robot":
+            found.append(placed(m, d, g))
+    return np.concatenate(found)
+
+
+# --- framing --------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("camera", ["overview", "orbit", "top"])
+@pytest.mark.parametrize("framing", [WIDE, BESIDE_PANELS, Framing(9 / 16, below=0.1)])
+def test_all_that_moves_is_in_the_frame_all_the_time(log, take, replica, camera, framing) -> None:
+    viewpoint = Viewpoint(Replica(take.m), camera, framing, take.subject)
+    for row in range(0, len(log), max(1, len(log) // 60)):
+        moment = moment_of(log, row)
+        view = viewpoint.view(moment.shown, 1 / 30, 7 * moment.time)
+        assert np.abs(seen(view, moving(replica, moment.shown.qpos))).max() < 1
+
+
+@pytest.mark.parametrize("framing", [WIDE, BESIDE_PANELS])
+def test_the_frame_is_filled_one_way_and_not_by_the_shed(replica, action, framing) -> None:
+    view = overview(action.points, framing)
+    filled = np.ptp(seen(view, action.points), axis=0) / 2
+    assert filled.max() > 0.85
+    m, d = replica.m, Replica(replica.m).d
+    shed = np.concatenate([placed(m, d, m.geom(f"outfeed/{n}").id) for n in ("roof", "back")])
+    assert np.abs(seen(view, shed)).max() > 1
+
+
+def test_lifts_are_seen_up_and_down(replica, action) -> None:
+    m = replica.m
+    strokes = [2 * m.geom(g).size[1] for g in range(m.ngeom) if m.geom(g).name.endswith("/column")]
+    if not strokes:
+        pytest.skip("this factory has no lift")
+    loads = action.robots[:, :, 2]
+    assert np.ptp(loads, axis=1).max() > max(strokes)
+
+
+def test_an_orbit_is_as_near_as_it_can_be_and_calm() -> None:
+    """A camera at an even distance is as far away everywhere as the widest side asks."""
+    points = np.random.default_rng(3).uniform((-3, -1, 0), (3, 1, 0.4), (60, 3))
+    tight = Framing(16 / 9, 0.0, 0.0, 0.0)
+    look = orbit(points, tight)
+    views = [look(time) for time in np.arange(0.0, 45.0, 0.25)]
+    assert max(np.abs(seen(view, points)).max() for view in views) < 1.002
+    away = np.array([view.distance for view in views])
+    widest = max(fit(points, view.axes, tight).distance for view in views)
+    assert away.max() < 1.05 * widest and away.min() < 0.93 * away.max()
+    steps = np.abs(np.diff(away)) / away[1:]
+    assert steps.max() < 0.02 and np.abs(np.diff(away, 2)).max() < 0.01 * away.mean()
+
+
+@pytest.mark.parametrize("camera", ["product", "part:{}"])
+def test_what_is_followed_is_watched_in_all_its_eighths(log, take, replica, camera) -> None:
+    """A post that hides an eighth of a product stands in front of it."""
+    label = take.subject.factory.leaves[0].label
+    viewpoint = Viewpoint(Replica(take.m), camera.format(label), WIDE, take.subject)
+    moment = moment_of(log, len(log) // 2)
+    view = viewpoint.view(moment.shown, 0.0, moment.time)
+    eighths = viewpoint.watched
+    assert eighths.shape == (8, 8, 3) and np.abs(seen(view, eighths.reshape(-1, 3))).max() < 1
+    sizes = np.ptp(eighths, axis=1)
+    assert np.allclose(2 * sizes, np.ptp(eighths.reshape(-1, 3), axis=0))
+
+
+# --- fading ---------------------------------------------------------------------------------------
+
+
+def opacity(replica: Replica, feeder: str) -> float:
+    """How opaque a feeder's post is."""
+    return float(replica.m.geom(f"{feeder}/post").rgba[3])
+
+
+def first_feeder(m: mujoco.MjModel) -> str:
+    posts = (m.geom(g).name for g in range(m.ngeom))
+    return next(name for name in posts if name.endswith("/post")).removesuffix("/post")
+
+
+def test_a_post_in_front_fades_and_one_behind_does_not(take) -> None:
+    replica = Replica(take.m)
+    fading, feeder = Fading(replica), first_feeder(take.m)
+    post = placed(replica.m, replica.d, replica.m.geom(f"{feeder}/post").id)
+    for azimuth in (-90.0, 0.0, 90.0, 180.0):
+        axes = towards(azimuth, 10.0)
+        ahead = np.array([axes[2][0], axes[2][1], 0.0])
+        view = fit(post, axes, WIDE)
+        fading.fade(view, (post + 0.3 * ahead)[None])
+        assert opacity(replica, feeder) < FAINT + 0.05
+        fading.fade(fit(post, axes, WIDE), (post - 0.3 * ahead)[None])
+        assert opacity(replica, feeder) == 1.0
+
+
+def test_what_fades_keeps_its_colour_and_robots_never_fade(take, action) -> None:
+    replica = Replica(take.m)
+    before = replica.m.geom_rgba.copy()
+    fading = Fading(replica)
+    fading.fade(overview(action.points, WIDE), action.robots)
+    changed = np.flatnonzero((replica.m.geom_rgba != before).any(axis=1))
+    faded = [g for g in changed if replica.m.geom_rgba[g, 3] < 1]
+    assert faded
+    m, material = replica.m, take.m.geom_matid
+    for g in changed:
+        assert names.kind(m.geom(g).name) in ("feeder", "outfeed")
+        worn = m.mat_rgba[material[g]] if material[g] >= 0 else before[g]
+        assert np.allclose(m.geom_rgba[g, :3], worn[:3])
+
+
+def test_fading_is_of_the_view_alone(take, action) -> None:
+    """Films and stills, runs and logs show the same: what was seen before plays no part."""
+    one, other = Replica(take.m), Replica(take.m)
+    look = orbit(action.points, WIDE)
+    first, second = Fading(one), Fading(other)
+    for time in (0.0, 9.0, 20.0, 31.0):
+        first.fade(look(time), action.robots)
+    second.fade(look(31.0), action.robots)
+    assert (one.m.geom_rgba == other.m.geom_rgba).all()
+
+
+def test_what_fades_in_an_orbit_takes_a_quarter_of_a_second_at_least(take, action) -> None:
+    replica = Replica(take.m)
+    fading, look = Fading(replica), orbit(action.points, WIDE)
+    last, steps = None, []
+    for time in np.arange(0.0, 45.0, 1 / 15):
+        fading.fade(look(float(time)), action.robots)
+        alpha = replica.m.geom_rgba[fading.geoms, 3].copy()
+        steps += [] if last is None else [np.abs(alpha - last).max()]
+        last = alpha
+    assert 0.01 < max(steps) < 0.3
