@@ -31,7 +31,8 @@ from factory.compiler.mating.mating import (
     shaped,
 )
 from factory.compiler.mating.meetings import meetings
-from factory.compiler.mating.overlaps import CHUNK, TOLERANCE
+from factory.compiler.mating.overlaps import CHUNK
+from factory.compiler.mating.paths import TOLERANCE
 from factory.export.clash_picture import draw, picture_names
 from factory.geometry.product import product_geometry
 from factory.geometry.solids import Product

@@ -21,10 +21,6 @@ from numpy.typing import NDArray
 
 from factory.geometry.meshes import Array
 
-MOST_CROSSINGS = 8_000_000
-"""Of bodies with more pairs of edges only faces count: depths are then found too large, never too
-small; such bodies have faces so small that it hardly shows."""
-
 CHUNK = 2_000_000
 """So many numbers are computed at a time."""
 
@@ -108,7 +104,7 @@ def exact(p: Polytope, q: Polytope) -> Difference:
 def _spanned(p: Array, q: Array) -> Array:
     """Unit normals (k, 3) of the facets spanned by an edge of P and one of Q: those whose arcs
     cross, the arc of Q's edge being turned about (Gregorius, The Separating Axis Test, 2013)."""
-    if len(p) * len(q) == 0 or len(p) * len(q) > MOST_CROSSINGS:
+    if len(p) * len(q) == 0:
         return np.zeros((0, 3))
     a, b, c, d = p[:, 1], p[:, 2], -q[:, 1], -q[:, 2]
     ba, dc = np.cross(b, a), np.cross(d, c)
@@ -124,10 +120,10 @@ def _spanned(p: Array, q: Array) -> Array:
     outward = np.einsum("ij,ij->i", normals, (a + b)[one[~parallel]] + (c + d)[other[~parallel]])
     doubtful = np.abs(outward) < 1e-6
     normals = np.concatenate([normals * np.where(outward < 0, -1, 1)[:, None], -normals[doubtful]])
-    return np.asarray(normals[_distinct(normals)])
+    return np.asarray(normals[distinct(normals)])
 
 
-def _distinct(normals: Array) -> NDArray[np.int64]:
+def distinct(normals: Array) -> NDArray[np.int64]:
     """Which normals to keep of those that are the same up to rounding, told by their place along a
     line in no special direction."""
     key = np.round(normals @ (np.sqrt([2.0, 3.0, 5.0]) * 1e9)).astype(np.int64)
@@ -136,13 +132,14 @@ def _distinct(normals: Array) -> NDArray[np.int64]:
 
 def deepest(difference: Difference, apart: Array, direction: Array) -> tuple[Array, Array]:
     """The greatest depth (m,) over λ >= 0 of P, at first `apart` (m, 3) from Q, on its way along
-    `direction` (3,), and the λ at which it is [m]."""
-    slopes = difference.normals @ direction
-    slopes[np.abs(slopes) < SMALL] = 0.0
+    `direction`, the same (3,) for all or one for each (m, 3), and the λ at which it is [m]."""
+    directions = np.broadcast_to(direction, apart.shape)
     depth, shift = np.empty(len(apart)), np.empty(len(apart))
-    step = max(1, CHUNK // len(slopes))
+    step = max(1, CHUNK // len(difference.normals))
     for start in range(0, len(apart), step):
         part = slice(start, start + step)
+        slopes = directions[part] @ difference.normals.T
+        slopes[np.abs(slopes) < SMALL] = 0.0
         depth[part], shift[part] = _summit(difference.heights(apart[part]), slopes)
     return depth, shift
 
@@ -155,20 +152,20 @@ def _summit(heights: Array, slopes: Array) -> tuple[Array, Array]:
     """
     rows = np.arange(len(heights))
     rising = heights.argmin(axis=1)
-    steepest = np.flatnonzero(slopes == slopes.min())
-    falling = steepest[heights[:, steepest].argmin(axis=1)]
+    steepest = slopes == slopes.min(axis=1, keepdims=True)
+    falling = np.where(steepest, heights, np.inf).argmin(axis=1)
     depth, shift = heights[rows, rising], np.zeros(len(heights))
-    left: NDArray[np.int64] = np.flatnonzero(slopes[rising] > 0)
+    left: NDArray[np.int64] = np.flatnonzero(slopes[rows, rising] > 0)
     while len(left):
         up, down = rising[left], falling[left]
         drop = heights[left, down] - heights[left, up]
-        at = np.maximum(drop / (slopes[up] - slopes[down]), 0.0)
-        value = heights[left] + at[:, None] * slopes
+        at = np.maximum(drop / (slopes[left, up] - slopes[left, down]), 0.0)
+        value = heights[left] + at[:, None] * slopes[left]
         lowest = value.argmin(axis=1)
         found = value[np.arange(len(left)), lowest]
         depth[left], shift[left] = found, at
-        gain = heights[left, up] + at * slopes[up] - found
-        climbs = slopes[lowest] > 0
+        gain = heights[left, up] + at * slopes[left, up] - found
+        climbs = slopes[left, lowest] > 0
         new = (gain > 1e-13) & (lowest != up) & (lowest != down)
         rising[left[climbs & new]] = lowest[climbs & new]
         falling[left[~climbs & new]] = lowest[~climbs & new]

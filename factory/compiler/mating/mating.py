@@ -21,7 +21,8 @@ from numpy.typing import NDArray
 from factory.compiler.compiler import expand
 from factory.compiler.mating.bodies import bodies
 from factory.compiler.mating.meetings import Ints, Meeting, Meetings, meetings
-from factory.compiler.mating.overlaps import SIGNS, TOLERANCE, Finder, Overlaps
+from factory.compiler.mating.overlaps import Finder, Overlaps
+from factory.compiler.mating.paths import SIGNS, TOLERANCE
 from factory.geometry.solids import Product
 from factory.plant.approaches import MARGIN, Approach, Kind, Pair
 from factory.plant.factory import Factory

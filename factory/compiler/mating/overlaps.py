@@ -14,48 +14,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from factory.compiler.mating.bodies import ConvexBodies
-from factory.compiler.mating.depth import Difference, Polytope, deepest, exact, polytope, rough
+from factory.compiler.mating.depth import Difference, Polytope, exact, polytope, rough
 from factory.compiler.mating.meetings import Ints, Meetings
+from factory.compiler.mating.paths import CLEAR, LAST, SIGNS, Depths, depths_along
+from factory.compiler.mating.seeking import MANY, sought
 from factory.geometry.meshes import Array
-
-TOLERANCE = 2e-5
-"""Overlaps of no more than this [m] do not count: what welds in the engine give way, and far above
-what numbers written with five digits are rounded by."""
-
-CLEAR = 5e-5
-"""On their way bodies that do not overlap still need so much room between them [m], or they scrape:
-faces that are flush catch at their edges when a weld gives way by its 0.03 mm."""
-
-LAST = 1e-3
-"""But for the last bit of the way [m]: finished parts may touch."""
-
-SIGNS = (-1, +1)
-"""The sides from which the last input comes: its path is shifted to this side of the axis."""
 
 CHUNK = 4096
 """Bodies whose candidates are sought at a time."""
-
-
-@dataclass(frozen=True)
-class Depths:
-    """How deep the two of each pair get into each other [m], less than 0 where apart: `finished`
-    (n,) in the finished product; `path` (n, 2) the most if the last input comes from the lower or
-    the upper side, and `shift` (n, 2) how far from its place that is; `graze` (n, 2) the most but
-    for the last bit of the way."""
-
-    finished: Array
-    path: Array
-    shift: Array
-    graze: Array
-
-    @property
-    def faulty(self) -> NDArray[np.bool_]:
-        """Which pairs (n, 2) overlap or scrape on the way from either side."""
-        return np.asarray((self.path > TOLERANCE) | (self.graze > -CLEAR))
-
-    def at(self, rows: Ints | slice) -> Depths:
-        """Those of some of the pairs."""
-        return Depths(self.finished[rows], self.path[rows], self.shift[rows], self.graze[rows])
 
 
 @dataclass(frozen=True)
@@ -80,6 +46,8 @@ class Finder:
 
     def __init__(self, found: ConvexBodies, where: Meetings) -> None:
         self.bodies, self.meetings = found, where
+        self._keys: dict[int, bytes] = {}
+        self._shapes: dict[bytes, Array] = {}
         self._polytopes: dict[bytes, Polytope] = {}
         self._differences: dict[tuple[bytes, bytes], Difference] = {}
 
@@ -121,42 +89,45 @@ class Finder:
     def _refine(self, moving: Ints, standing: Ints, axis: int, depths: Depths) -> None:
         """Replaces the depths of boxes by those of the bodies where these are no boxes."""
         groups: dict[tuple[bytes, bytes], list[int]] = {}
-        keys: dict[int, bytes] = {}
         both = self.bodies.boxes[moving] & self.bodies.boxes[standing]
         for row in np.flatnonzero(~both).tolist():
-            pair = self._key(int(moving[row]), keys), self._key(int(standing[row]), keys)
+            pair = self._key(int(moving[row])), self._key(int(standing[row]))
             groups.setdefault(pair, []).append(row)
         low = self.bodies.low
         for pair, members in groups.items():
             rows = np.array(members)
-            for differ in (self._rough, self._exact):
-                difference, apart = differ(pair), low[moving[rows]] - low[standing[rows]]
-                depths.finished[rows] = difference.heights(apart).min(axis=1)
-                for side, sign in enumerate(SIGNS):
-                    direction = sign * np.eye(3)[axis]
-                    found = deepest(difference, apart, direction)
-                    depths.path[rows, side], depths.shift[rows, side] = found
-                    further = apart + LAST * direction
-                    depths.graze[rows, side] = deepest(difference, further, direction)[0]
-                rows = rows[depths.at(rows).faulty.any(axis=1)]
-                if not len(rows):
-                    break
+            apart = low[moving[rows]] - low[standing[rows]]
+            one, other = (self._shapes[key] for key in pair)
+            if len(one) * len(other) > MANY:
+                depths.put(rows, sought(one, other, apart, axis))
+                continue
+            found, _ = depths_along(self._rough(pair), apart, axis)
+            depths.put(rows, found)
+            left = found.faulty.any(axis=1)
+            if left.any():
+                found, _ = depths_along(self._exact(pair), apart[left], axis)
+                depths.put(rows[left], found)
 
     def _rough(self, pair: tuple[bytes, bytes]) -> Difference:
         """What is known of two shapes: all, if it was needed along another axis."""
-        return self._differences.get(pair) or rough(*(self._polytopes[key] for key in pair))
+        return self._differences.get(pair) or rough(*map(self._polytope, pair))
 
     def _exact(self, pair: tuple[bytes, bytes]) -> Difference:
         if pair not in self._differences:
-            self._differences[pair] = exact(*(self._polytopes[key] for key in pair))
+            self._differences[pair] = exact(*map(self._polytope, pair))
         return self._differences[pair]
 
-    def _key(self, body: int, keys: dict[int, bytes]) -> bytes:
-        if body not in keys:
-            vertices, keys[body] = self.bodies.shape(body)
-            if keys[body] not in self._polytopes:
-                self._polytopes[keys[body]] = polytope(vertices)
-        return keys[body]
+    def _polytope(self, key: bytes) -> Polytope:
+        if key not in self._polytopes:
+            self._polytopes[key] = polytope(self._shapes[key])
+        return self._polytopes[key]
+
+    def _key(self, body: int) -> bytes:
+        if body not in self._keys:
+            vertices, key = self.bodies.shape(body)
+            self._keys[body] = key
+            self._shapes.setdefault(key, vertices)
+        return self._keys[body]
 
     def _by_parts(self, meeting: Ints, moving: Ints, standing: Ints, depths: Depths) -> Overlaps:
         """Of all bodies of two parts the deepest."""
