@@ -12,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
+from factory.geometry import kept_meshes
 from factory.geometry.decomposition import in_pieces
 from factory.geometry.limits import (
     FURTHEST,
@@ -134,17 +135,23 @@ class _Reader:
         return found
 
     def _read(self, node: Assembly, path: str, scale: float) -> MassProperties | None:
+        name = f"m{len(self._meshes)}"
         try:
+            content = (self.folder / path).read_bytes()
+            key = kept_meshes.key_of(content, Path(path).suffix.lower(), scale)
+            kept = kept_meshes.find(key, name)
+            if kept is not None:
+                return kept
             vertices, faces = self._load(path, scale, process=True)
             if len(faces) == 0 or not np.isfinite(vertices).all():
                 raise ValueError("it has no triangles, or vertices that are not finite")
             if not np.abs(vertices).max() <= FURTHEST:
                 self.errors.append(too_far(node, "scale", "mesh"))
                 return None
-            mesh, trouble = usable(f"m{len(self._meshes)}", vertices, faces)
+            mesh, trouble = usable(name, vertices, faces)
             if not trouble:
                 mesh = in_pieces(mesh, lambda: self._load(path, scale, process=False))
-            return measured(mesh, trouble)
+            return kept_meshes.keep(key, measured(mesh, trouble))
         except Exception as error:  # trimesh's readers raise anything on a broken file
             position = value_position(node, "mesh")
             hint = "export it again as .obj, .stl, .ply or .glb with triangles"

@@ -8,7 +8,9 @@ shapes are computed together, wherever they are.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import astuple, dataclass, field
+from functools import cached_property
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +21,14 @@ from factory.compiler.mating.meetings import Ints, Meetings
 from factory.compiler.mating.paths import CLEAR, LAST, SIGNS, Depths, depths_along
 from factory.compiler.mating.seeking import MANY, sought
 from factory.geometry.meshes import Array
+from factory.support import array_cache
+from factory.support.array_cache import digest, program
+
+FOLDER = "overlaps"
+"""Where overlaps are kept, in the user's cache."""
+
+KEYS = ("meeting", "one", "other", "finished", "path", "shift", "graze")
+"""The arrays of an entry."""
 
 CHUNK = 4096
 """Bodies whose candidates are sought at a time."""
@@ -42,7 +52,8 @@ class Overlaps:
 
 
 class Finder:
-    """Finds overlaps in one product; shapes are kept from one axis to the next."""
+    """Finds overlaps in one product; shapes are kept from one axis to the next, what is found in
+    the user's cache."""
 
     def __init__(self, found: ConvexBodies, where: Meetings) -> None:
         self.bodies, self.meetings = found, where
@@ -53,6 +64,26 @@ class Finder:
 
     def along(self, axis: int, wanted: NDArray[np.bool_]) -> Overlaps:
         """The overlaps of the wanted meetings when their inputs come along an axis: x, y or z."""
+        if self.bodies.boxes.all():
+            return self._along(axis, wanted)
+        name = digest(self._product, axis, wanted)
+        kept = array_cache.find(FOLDER, name, KEYS)
+        if kept is not None:
+            meeting, one, other, *depths = (kept[key] for key in KEYS)
+            return Overlaps(meeting, one, other, Depths(*depths))
+        found = self._along(axis, wanted)
+        arrays = found.meeting, found.one, found.other, *astuple(found.depths)
+        array_cache.keep(FOLDER, name, dict(zip(KEYS, arrays, strict=True)))
+        return found
+
+    @cached_property
+    def _product(self) -> str:
+        """A digest of what overlaps depend on."""
+        where = self.meetings.borders, self.meetings.levels, self.meetings.splits
+        own = program(Path(__file__).parent, "numpy", "scipy", "shapely")
+        return digest(own, self.bodies.part, *where, *self.bodies.vertices)
+
+    def _along(self, axis: int, wanted: NDArray[np.bool_]) -> Overlaps:
         parts = [self._near(axis, wanted, *pairs) for pairs in self._chunks(axis)]
         moving, standing, meeting = np.concatenate([np.zeros((3, 0), np.int64), *parts], axis=1)
         depths = _box_depths(self.bodies, moving, standing, axis)
