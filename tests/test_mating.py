@@ -28,7 +28,6 @@ from factory.compiler.mating.mating import (
     Mating,
     Matings,
     matings,
-    shaped,
 )
 from factory.compiler.mating.meetings import meetings
 from factory.compiler.mating.overlaps import CHUNK
@@ -39,6 +38,7 @@ from factory.geometry.solids import Product
 from factory.lang import read_pag
 from factory.pipeline import all_templates
 from factory.problem.pag import PAG
+from factory.problem.shapes import is_shaped
 from factory.problem.template import Template
 from tests.command_line import Terminal
 from tests.strategies import pags, random_pag_text
@@ -296,7 +296,7 @@ def test_default_boxes_always_slide(pag: PAG) -> None:
     """Theorem: neighbouring intervals of the path to and fro go ahead of each other."""
     plain = tuple(n if n.inputs else replace(n, parameters=()) for n in pag.nodes)
     bare = replace(pag, nodes=plain)
-    assert not shaped(bare)
+    assert not is_shaped(bare)
     found = matings(bare, TEMPLATES, product_geometry(bare))
     assert all(m.approach.kind == "slide" and m.level == STRICT for m in found.all)
 

@@ -215,7 +215,7 @@ def library(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[int]]:
         Mesh=lambda *arrays: arrays, run_coacd=run_coacd, set_log_level=lambda level: None
     )
     monkeypatch.setitem(sys.modules, "coacd", fake)
-    monkeypatch.setattr(decomposition, "version", lambda name: "1.0.0")
+    monkeypatch.setattr(decomposition, "release", lambda name: "1.0.0")
     yield calls
 
 

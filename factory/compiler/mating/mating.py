@@ -39,9 +39,6 @@ LEVELS = ("none", "left_out", "no_deeper", "strict")
 UPRIGHT = 2
 """The axis z, along which inputs are lowered."""
 
-SHAPES = frozenset({"mesh", "box", "cylinder", "sphere", "pos"})
-"""Parameters that give a part a shape or a place of its own."""
-
 
 @dataclass(frozen=True, slots=True)
 class Clash:
@@ -137,13 +134,6 @@ class Matings:
             "tolerance_mm": TOLERANCE * 1e3,
             "list": [mating.as_json() for mating in self.all],
         }
-
-
-def shaped(pag: PAG) -> bool:
-    """Whether some part has a shape or a place of its own. The default boxes of a product in which
-    none has can always slide: each sub-assembly is an interval of a path to and fro in a lattice,
-    so the next interval goes on ahead of it along x and along y."""
-    return any(p.name in SHAPES for node in pag.parts() for p in node.parameters)
 
 
 def matings(
