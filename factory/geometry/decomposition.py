@@ -9,10 +9,11 @@ has its hull. Its results are kept in the user's cache.
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 
-from factory.geometry.meshes import Array, Indices, Mesh
+from factory.geometry.meshes import Array, Indices, Mesh, volume_of
 from factory.geometry.pieces import FLATNESS, convex_bodies, is_closed
 from factory.support.array_cache import PACKED, digest, find, keep, packed, release, unpacked
 
@@ -43,16 +44,14 @@ def in_pieces(mesh: Mesh, as_written: Callable[[], tuple[Array, Indices]]) -> Me
         return _of_bodies(mesh.name, bodies)
     if _share_of_hull(mesh) >= FULL:
         return mesh
-    return Mesh(mesh.name, mesh.vertices, mesh.faces, _decomposed(mesh))
+    pieces = _decomposed(mesh)
+    return replace(mesh, pieces=pieces) if pieces else mesh
 
 
 def _share_of_hull(mesh: Mesh) -> float:
     """The volume of a mesh in that of its hull; 1 where it has none."""
-    import trimesh
-
-    body = trimesh.Trimesh(mesh.vertices, mesh.faces, process=False)
-    volume = float(body.volume)
-    return volume / float(body.convex_hull.volume) if volume > 0 else 1.0
+    volume = volume_of(mesh.vertices, mesh.faces)
+    return volume / mesh.hull.volume if volume > 0 else 1.0
 
 
 def _of_bodies(name: str, bodies: list[tuple[Array, Indices]]) -> Mesh:

@@ -14,7 +14,7 @@ from itertools import combinations
 
 import numpy as np
 
-from factory.geometry.meshes import Array, Indices
+from factory.geometry.meshes import Array, Indices, hull_of
 
 ROUND = 5e-6
 """How far the polytope round a round body may reach outside it [m]."""
@@ -97,10 +97,10 @@ def _unit(vector: Array) -> Array:
 def is_closed(faces: Indices) -> bool:
     """Whether triangles (m, 3) close what they bound: every edge is passed as often to as fro. So
     do bodies that share faces, edges or corners."""
-    edges = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
-    _, inverse = np.unique(np.sort(edges, axis=1), axis=0, return_inverse=True)
-    way = np.where(edges[:, 0] < edges[:, 1], 1.0, -1.0)
-    return bool((np.bincount(inverse.ravel(), way) == 0).all())
+    start, end = faces.ravel(), np.roll(faces, -1, axis=1).ravel()
+    edge = np.minimum(start, end) * (faces.max(initial=0) + 1) + np.maximum(start, end)
+    _, inverse = np.unique(edge, return_inverse=True)
+    return bool((np.bincount(inverse, np.where(start < end, 1.0, -1.0)) == 0).all())
 
 
 def components(count: int, faces: Indices) -> Indices:
@@ -144,4 +144,4 @@ def is_convex(vertices: Array, faces: Indices) -> bool:
     body = trimesh.Trimesh(vertices, faces, process=False)
     if not (body.is_watertight and body.is_winding_consistent and body.volume > 0):
         return False
-    return bool(body.volume >= (1 - FLATNESS) * body.convex_hull.volume)
+    return bool(body.volume >= (1 - FLATNESS) * hull_of(vertices).volume)
