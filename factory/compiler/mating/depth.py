@@ -15,16 +15,19 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from functools import cached_property
+from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
 
 from factory.geometry.meshes import Array
 
-CHUNK = 2_000_000
-"""So many numbers are computed at a time."""
-
 SMALL = 1e-12
+
+_GRID = np.array([way for way in product((-1, 0, 1), repeat=3) if any(way)], float)
+WAYS = _GRID / np.linalg.norm(_GRID, axis=1, keepdims=True)
+"""The directions along the axes and between them (26, 3); the reverse of each is as far from the
+other end."""
 
 
 @dataclass(frozen=True)
@@ -82,23 +85,23 @@ class Difference:
         """h(n) (m, k) where P lies `apart` (m, 3) from Q."""
         return np.asarray(self.bounds + apart @ self.normals.T)
 
+    def and_those_of(self, other: Difference) -> Difference:
+        """These half-spaces and others."""
+        normals = np.concatenate([self.normals, other.normals])
+        return Difference(normals, np.concatenate([self.bounds, other.bounds]))
+
 
 def rough(p: Polytope, q: Polytope) -> Difference:
     """The half-spaces of the faces of both: never too small."""
-    normals = np.concatenate([p.normals, -q.normals])
-    mine = p.reach + _support(-p.normals, q.vertices)
-    theirs = _support(-q.normals, p.vertices) + q.reach
-    return Difference(normals, np.concatenate([mine, theirs]))
+    mine = Difference(p.normals, p.reach + _support(-p.normals, q.vertices))
+    return mine.and_those_of(Difference(-q.normals, _support(-q.normals, p.vertices) + q.reach))
 
 
 def exact(p: Polytope, q: Polytope) -> Difference:
     """All half-spaces: those of the faces and those that an edge of each spans."""
-    faces = rough(p, q)
     spanned = _spanned(p.edges, q.edges)
     bounds = _support(spanned, p.vertices) + _support(-spanned, q.vertices)
-    return Difference(
-        np.concatenate([faces.normals, spanned]), np.concatenate([faces.bounds, bounds])
-    )
+    return rough(p, q).and_those_of(Difference(spanned, bounds))
 
 
 def _spanned(p: Array, q: Array) -> Array:
@@ -130,26 +133,14 @@ def distinct(normals: Array) -> NDArray[np.int64]:
     return np.asarray(np.unique(key, return_index=True)[1])
 
 
-def deepest(difference: Difference, apart: Array, direction: Array) -> tuple[Array, Array]:
-    """The greatest depth (m,) over λ >= 0 of P, at first `apart` (m, 3) from Q, on its way along
-    `direction`, the same (3,) for all or one for each (m, 3), and the λ at which it is [m]."""
-    directions = np.broadcast_to(direction, apart.shape)
-    depth, shift = np.empty(len(apart)), np.empty(len(apart))
-    step = max(1, CHUNK // len(difference.normals))
-    for start in range(0, len(apart), step):
-        part = slice(start, start + step)
-        slopes = directions[part] @ difference.normals.T
-        slopes[np.abs(slopes) < SMALL] = 0.0
-        depth[part], shift[part] = _summit(difference.heights(apart[part]), slopes)
-    return depth, shift
-
-
-def _summit(heights: Array, slopes: Array) -> tuple[Array, Array]:
-    """For each row the greatest value over λ >= 0 of the lowest of its lines h + λ s, and λ.
+def summits(heights: Array, slopes: Array) -> tuple[Array, Array]:
+    """For each row (m, k) the greatest value over λ >= 0 of the lowest of its lines h + λ s, and λ:
+    the greatest depth of a body on its way, and how far it has come [m].
 
     The summit lies between a rising and a falling line; where they cross, a lower line replaces
     that of its own kind, until there is none.
     """
+    slopes = np.where(np.abs(slopes) < SMALL, 0.0, slopes)
     rows = np.arange(len(heights))
     rising = heights.argmin(axis=1)
     steepest = slopes == slopes.min(axis=1, keepdims=True)

@@ -260,7 +260,7 @@ class _Judge:
             )
             for row in rows.tolist()
         ]
-        return tuple(sorted(found, key=lambda c: (-c.depth, c.parts)))
+        return tuple(sorted(found, key=lambda c: (-round(c.depth, 9), c.parts)))
 
     def _excluded(self, number: int, axis: int, column: int) -> tuple[Pair, ...]:
         overlaps = self.overlaps[axis].of(number)

@@ -16,9 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from factory.compiler.mating.bodies import ConvexBodies
-from factory.compiler.mating.depth import Difference, Polytope, exact, polytope, rough
+from factory.compiler.mating.depth import WAYS, Difference, Polytope, exact, polytope, rough
 from factory.compiler.mating.meetings import Ints, Meetings
-from factory.compiler.mating.paths import CLEAR, LAST, SIGNS, Depths, depths_along
+from factory.compiler.mating.paths import CLEAR, LAST, SIGNS, Depths, depths_of
 from factory.compiler.mating.seeking import MANY, sought
 from factory.geometry.meshes import Array
 from factory.support import array_cache
@@ -118,10 +118,34 @@ class Finder:
         return np.asarray(found[:, depths.faulty.any(axis=1)])
 
     def _refine(self, moving: Ints, standing: Ints, axis: int, depths: Depths) -> None:
-        """Replaces the depths of boxes by those of the bodies where these are no boxes."""
-        groups: dict[tuple[bytes, bytes], list[int]] = {}
+        """Replaces the depths of boxes by those of the bodies where these are no boxes, and matter:
+        of all bodies of two parts the deepest count. Bounds tell which may be those; the most
+        promising come first, one of each two parts, then two, four and so on."""
         both = self.bodies.boxes[moving] & self.bodies.boxes[standing]
-        for row in np.flatnonzero(~both).tolist():
+        left = np.flatnonzero(~both)
+        bounds = self.bodies.reach[moving[left]] + self.bodies.reach[standing[left], ::-1]
+        depths.put(left, depths_of(bounds, WAYS[:, axis])[0])
+        parts = self.bodies.part[[moving, standing]]
+        pair = np.unique(parts, axis=1, return_inverse=True)[1].ravel()
+        best = np.full((pair.max(initial=-1) + 1, 5), -np.inf)
+        done, count = np.flatnonzero(both), 1
+        while True:
+            np.maximum.at(best, pair[done], depths.table(done))
+            table = depths.table(left)
+            left = left[(table > best[pair[left]]).any(axis=1) & depths.at(left).faulty.any(axis=1)]
+            if not len(left):
+                return
+            left = left[np.lexsort((-depths.path[left].max(axis=1), pair[left]))]
+            rank = np.arange(len(left)) - np.searchsorted(pair[left], pair[left])
+            done, left, count = left[rank < count], left[rank >= count], 2 * count
+            self._compute(moving, standing, axis, depths, done)
+
+    def _compute(
+        self, moving: Ints, standing: Ints, axis: int, depths: Depths, wanted: Ints
+    ) -> None:
+        """Replaces depths by those of the bodies."""
+        groups: dict[tuple[bytes, bytes], list[int]] = {}
+        for row in wanted.tolist():
             pair = self._key(int(moving[row])), self._key(int(standing[row]))
             groups.setdefault(pair, []).append(row)
         low = self.bodies.low
@@ -132,12 +156,14 @@ class Finder:
             if len(one) * len(other) > MANY:
                 depths.put(rows, sought(one, other, apart, axis))
                 continue
-            found, _ = depths_along(self._rough(pair), apart, axis)
-            depths.put(rows, found)
-            left = found.faulty.any(axis=1)
-            if left.any():
-                found, _ = depths_along(self._exact(pair), apart[left], axis)
-                depths.put(rows[left], found)
+            for differ in (self._rough, self._exact):
+                difference = differ(pair)
+                found, _ = depths_of(difference.heights(apart), difference.normals[:, axis])
+                depths.put(rows, found)
+                left = found.faulty.any(axis=1)
+                rows, apart = rows[left], apart[left]
+                if not len(rows):
+                    break
 
     def _rough(self, pair: tuple[bytes, bytes]) -> Difference:
         """What is known of two shapes: all, if it was needed along another axis."""

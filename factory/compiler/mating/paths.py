@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from factory.compiler.mating.depth import Difference, deepest
+from factory.compiler.mating.depth import summits
 from factory.compiler.mating.meetings import Ints
 from factory.geometry.meshes import Array
 
@@ -21,6 +21,9 @@ faces that are flush catch at their edges when a weld gives way by its 0.03 mm."
 
 LAST = 1e-3
 """But for the last bit of the way [m]: finished parts may touch."""
+
+CHUNK = 500_000
+"""So many numbers are computed at a time."""
 
 SIGNS = (-1, +1)
 """The sides from which the last input comes: its path is shifted to this side of the axis."""
@@ -47,21 +50,31 @@ class Depths:
         """Those of some of the pairs."""
         return Depths(self.finished[rows], self.path[rows], self.shift[rows], self.graze[rows])
 
-    def put(self, rows: Ints, found: Depths) -> None:
+    def table(self, rows: Ints) -> Array:
+        """Those of some of the pairs that count where parts have several bodies (n, 5)."""
+        found = self.finished[rows, None], self.path[rows], self.graze[rows]
+        return np.concatenate(found, axis=1)
+
+    def put(self, rows: Ints | slice, found: Depths) -> None:
         """Replaces those of some of the pairs."""
         self.finished[rows], self.path[rows] = found.finished, found.path
         self.shift[rows], self.graze[rows] = found.shift, found.graze
 
 
-def depths_along(difference: Difference, apart: Array, axis: int) -> tuple[Depths, Array]:
-    """The depths where the moving body, in its place `apart` (m, 3) from the other, comes along an
-    axis; and where it is (5 m, 3) at each of these depths."""
-    ways = np.multiply.outer(SIGNS, np.eye(3)[axis])
-    starts = np.stack([apart, apart, apart + LAST * ways[0], apart + LAST * ways[1]])
-    along = np.broadcast_to(np.concatenate([ways, ways])[:, None], starts.shape).reshape(-1, 3)
-    depth, shift = deepest(difference, starts.reshape(-1, 3), along)
-    places = starts.reshape(-1, 3) + shift[:, None] * along
-    depth, shift = depth.reshape(4, -1).T, shift.reshape(4, -1).T
-    finished = difference.heights(apart).min(axis=1)
-    found = Depths(finished, depth[:, :2], shift[:, :2], depth[:, 2:])
-    return found, np.concatenate([apart, places])
+def depths_of(heights: Array, slopes: Array) -> tuple[Depths, Array]:
+    """The depths of pairs on their ways along an axis, from the bounds that half-spaces set (m, k):
+    their `heights` in the finished product, and how much more a metre along the axis (k,). And the
+    places (4, m) on the axis, from there, where those of `path` and `graze` are."""
+    ways, begin = np.array([*SIGNS, *SIGNS], float), np.array([0.0, 0.0, LAST, LAST])
+    depth, shift = np.empty((4, len(heights))), np.empty((4, len(heights)))
+    step = max(1, CHUNK // max(1, len(slopes)))
+    for start in range(0, len(heights), step):
+        mine = heights[start : start + step]
+        along = np.multiply.outer(ways, slopes)[:, None]
+        lines = mine + begin[:, None, None] * along
+        rows = np.broadcast_to(along, lines.shape).reshape(-1, len(slopes))
+        most, at = summits(lines.reshape(-1, len(slopes)), rows)
+        depth[:, start : start + step] = most.reshape(4, -1)
+        shift[:, start : start + step] = at.reshape(4, -1)
+    found = Depths(heights.min(axis=1), depth[:2].T, shift[:2].T, depth[2:].T)
+    return found, (begin[:, None] + shift) * ways[:, None]

@@ -8,12 +8,10 @@ next directions, until the hull reaches as far there as the difference does.
 
 from __future__ import annotations
 
-from itertools import product
-
 import numpy as np
 
-from factory.compiler.mating.depth import Difference, distinct
-from factory.compiler.mating.paths import Depths, depths_along
+from factory.compiler.mating.depth import WAYS, Difference, distinct
+from factory.compiler.mating.paths import Depths, depths_of
 from factory.geometry.meshes import Array
 
 MANY = 60_000
@@ -28,38 +26,35 @@ SAME = 1e-10
 MOST = 200
 """So many times, at most, the hull grows; a depth is then found too large, never too small."""
 
-_WAYS = np.array([way for way in product((-1, 0, 1), repeat=3) if any(way)], float)
-START = _WAYS / np.linalg.norm(_WAYS, axis=1, keepdims=True)
-"""The first directions (26, 3): along the axes and between them."""
-
 
 def sought(p: Array, q: Array, apart: Array, axis: int) -> Depths:
     """The depths of a body P (n, 3) on its way along an axis through Q (k, 3), its place being
     `apart` (m, 3) from that of Q. Those of pairs that are not faulty may be too large."""
-    found = depths_along(_touching(START, p, q)[0], apart, axis)[0]
-    for row in np.flatnonzero(found.faulty.any(axis=1)):
-        rows = np.array([row])
-        found.put(rows, _sought(p, q, apart[rows], axis))
+    outside, tips = _touching(WAYS, p, q)
+    found, _ = depths_of(outside.heights(apart), outside.normals[:, axis])
+    for row in np.flatnonzero(found.faulty.any(axis=1)).tolist():
+        here = slice(row, row + 1)
+        found.put(here, _closed_in(p, q, apart[here], axis, outside, tips))
     return found
 
 
-def _sought(p: Array, q: Array, apart: Array, axis: int) -> Depths:
-    """The depths in one place, `apart` (1, 3)."""
+def _closed_in(
+    p: Array, q: Array, apart: Array, axis: int, outside: Difference, tips: Array
+) -> Depths:
+    """The depths in one place, `apart` (1, 3), from half-spaces that contain the difference, and
+    the points at which they touch it."""
     from scipy.spatial import ConvexHull, QhullError
 
-    outside, tips = _touching(START, p, q)
-    found = depths_along(outside, apart, axis)[0]
+    found, _ = depths_of(outside.heights(apart), outside.normals[:, axis])
     try:
         hull = ConvexHull(tips, incremental=True)
         for _ in range(MOST):
-            inside = Difference(hull.equations[:, :3], -hull.equations[:, 3])
-            binding = _binding(inside, apart, axis)
-            touching, tips = _touching(binding.normals, p, q)
-            outside = Difference(
-                np.concatenate([outside.normals, touching.normals]),
-                np.concatenate([outside.bounds, touching.bounds]),
+            binding = _binding(
+                Difference(hull.equations[:, :3], -hull.equations[:, 3]), apart, axis
             )
-            found = depths_along(outside, apart, axis)[0]
+            touching, tips = _touching(binding.normals, p, q)
+            outside = outside.and_those_of(touching)
+            found, _ = depths_of(outside.heights(apart), outside.normals[:, axis])
             further = touching.bounds > binding.bounds + NEAR
             if not (further.any() and found.faulty.any()):
                 break
@@ -77,9 +72,11 @@ def _touching(normals: Array, p: Array, q: Array) -> tuple[Difference, Array]:
 
 
 def _binding(inside: Difference, apart: Array, axis: int) -> Difference:
-    """The facets of a difference at which its depths are attained."""
-    heights = inside.heights(depths_along(inside, apart, axis)[1])
-    binds = (heights <= heights.min(axis=1, keepdims=True) + SAME).any(axis=0)
+    """The facets of a difference at which its depths in one place are attained."""
+    heights, slopes = inside.heights(apart), inside.normals[:, axis]
+    places = depths_of(heights, slopes)[1]
+    lines = heights + np.concatenate([np.zeros((1, 1)), places]) * slopes
+    binds = (lines <= lines.min(axis=1, keepdims=True) + SAME).any(axis=0)
     normals, bounds = inside.normals[binds], inside.bounds[binds]
     kept = distinct(normals)
     return Difference(normals[kept], bounds[kept])
