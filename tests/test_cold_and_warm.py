@@ -66,7 +66,7 @@ def work(monkeypatch: pytest.MonkeyPatch) -> dict[str, int]:
 
     measured = counted("measured", meshes.measured)
     monkeypatch.setattr("factory.geometry.product.measured", measured)
-    monkeypatch.setattr(Finder, "_along", counted("searched", Finder._along))
+    monkeypatch.setattr(Finder, "_search", counted("searched", Finder._search))
     return found
 
 

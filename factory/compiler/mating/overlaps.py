@@ -27,7 +27,7 @@ from factory.support.array_cache import digest, program
 FOLDER = "overlaps"
 """Where overlaps are kept, in the user's cache."""
 
-KEYS = ("meeting", "one", "other", "finished", "path", "shift", "graze")
+KEYS = ("meeting", "moving", "standing", "finished", "path", "shift", "graze")
 """The arrays of an entry."""
 
 CHUNK = 4096
@@ -64,26 +64,28 @@ class Finder:
 
     def along(self, axis: int, wanted: NDArray[np.bool_]) -> Overlaps:
         """The overlaps of the wanted meetings when their inputs come along an axis: x, y or z."""
-        if self.bodies.boxes.all():
-            return self._along(axis, wanted)
+        if self.bodies.boxes.all():  # found at once
+            return self._by_parts(*self._search(axis, wanted))
         name = digest(self._product, axis, wanted)
         kept = array_cache.find(FOLDER, name, KEYS)
-        if kept is not None:
-            meeting, one, other, *depths = (kept[key] for key in KEYS)
-            return Overlaps(meeting, one, other, Depths(*depths))
-        found = self._along(axis, wanted)
-        arrays = found.meeting, found.one, found.other, *astuple(found.depths)
-        array_cache.keep(FOLDER, name, dict(zip(KEYS, arrays, strict=True)))
-        return found
+        if kept is None:
+            meeting, moving, standing, depths = self._search(axis, wanted)
+            arrays = (meeting, moving, standing, *astuple(depths))
+            kept = dict(zip(KEYS, arrays, strict=True))
+            array_cache.keep(FOLDER, name, kept)
+        meeting, moving, standing, *rest = (kept[key] for key in KEYS)
+        return self._by_parts(meeting, moving, standing, Depths(*rest))
 
     @cached_property
     def _product(self) -> str:
-        """A digest of what overlaps depend on."""
+        """A digest of all that overlaps depend on."""
         where = self.meetings.borders, self.meetings.levels, self.meetings.splits
         own = program(Path(__file__).parent, "numpy", "scipy", "shapely")
         return digest(own, self.bodies.part, *where, *self.bodies.vertices)
 
-    def _along(self, axis: int, wanted: NDArray[np.bool_]) -> Overlaps:
+    def _search(self, axis: int, wanted: NDArray[np.bool_]) -> tuple[Ints, Ints, Ints, Depths]:
+        """The bodies, moving and standing, that overlap or scrape, and the meetings at which they
+        do."""
         parts = [self._near(axis, wanted, *pairs) for pairs in self._chunks(axis)]
         moving, standing, meeting = np.concatenate([np.zeros((3, 0), np.int64), *parts], axis=1)
         depths = _box_depths(self.bodies, moving, standing, axis)
@@ -91,7 +93,8 @@ class Finder:
         idle = self.bodies.part[moving] < self.meetings.splits[meeting]
         depths.path[idle], depths.shift[idle] = depths.finished[idle, None], 0.0
         depths.graze[idle] = -np.inf
-        return self._by_parts(meeting, moving, standing, depths)
+        kept = np.flatnonzero(depths.faulty.any(axis=1))
+        return meeting[kept], moving[kept], standing[kept], depths.at(kept)
 
     def _chunks(self, axis: int) -> Iterator[tuple[Ints, Ints]]:
         """Pairs (moving, standing) of bodies whose boxes overlap or are near across the axis, the
@@ -118,34 +121,15 @@ class Finder:
         return np.asarray(found[:, depths.faulty.any(axis=1)])
 
     def _refine(self, moving: Ints, standing: Ints, axis: int, depths: Depths) -> None:
-        """Replaces the depths of boxes by those of the bodies where these are no boxes, and matter:
-        of all bodies of two parts the deepest count. Bounds tell which may be those; the most
-        promising come first, one of each two parts, then two, four and so on."""
-        both = self.bodies.boxes[moving] & self.bodies.boxes[standing]
-        left = np.flatnonzero(~both)
-        bounds = self.bodies.reach[moving[left]] + self.bodies.reach[standing[left], ::-1]
-        depths.put(left, depths_of(bounds, WAYS[:, axis])[0])
-        parts = self.bodies.part[[moving, standing]]
-        pair = np.unique(parts, axis=1, return_inverse=True)[1].ravel()
-        best = np.full((pair.max(initial=-1) + 1, 5), -np.inf)
-        done, count = np.flatnonzero(both), 1
-        while True:
-            np.maximum.at(best, pair[done], depths.table(done))
-            table = depths.table(left)
-            left = left[(table > best[pair[left]]).any(axis=1) & depths.at(left).faulty.any(axis=1)]
-            if not len(left):
-                return
-            left = left[np.lexsort((-depths.path[left].max(axis=1), pair[left]))]
-            rank = np.arange(len(left)) - np.searchsorted(pair[left], pair[left])
-            done, left, count = left[rank < count], left[rank >= count], 2 * count
-            self._compute(moving, standing, axis, depths, done)
-
-    def _compute(
-        self, moving: Ints, standing: Ints, axis: int, depths: Depths, wanted: Ints
-    ) -> None:
-        """Replaces depths by those of the bodies."""
+        """Replaces the depths of boxes by those of the bodies where these are no boxes: first by
+        what their reach in a few directions tells of all pairs at once, then, of those that may be
+        faulty, by what their faces tell, then by all facets, or those that matter of very many."""
+        rows = np.flatnonzero(~(self.bodies.boxes[moving] & self.bodies.boxes[standing]))
+        bounds = self.bodies.reach[moving[rows]] + self.bodies.reach[standing[rows], ::-1]
+        found, _ = depths_of(bounds, WAYS[:, axis])
+        depths.put(rows, found)
         groups: dict[tuple[bytes, bytes], list[int]] = {}
-        for row in wanted.tolist():
+        for row in rows[found.faulty.any(axis=1)].tolist():
             pair = self._key(int(moving[row])), self._key(int(standing[row]))
             groups.setdefault(pair, []).append(row)
         low = self.bodies.low
@@ -189,8 +173,7 @@ class Finder:
     def _by_parts(self, meeting: Ints, moving: Ints, standing: Ints, depths: Depths) -> Overlaps:
         """Of all bodies of two parts the deepest."""
         part = self.bodies.part
-        kept = np.flatnonzero(depths.faulty.any(axis=1))
-        order = kept[np.lexsort((part[moving[kept]], part[standing[kept]], meeting[kept]))]
+        order = np.lexsort((part[moving], part[standing], meeting))
         meeting, one, other = meeting[order], part[standing[order]], part[moving[order]]
         depths = depths.at(order)
         new = np.ones(len(order), bool)

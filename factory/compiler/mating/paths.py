@@ -50,11 +50,6 @@ class Depths:
         """Those of some of the pairs."""
         return Depths(self.finished[rows], self.path[rows], self.shift[rows], self.graze[rows])
 
-    def table(self, rows: Ints) -> Array:
-        """Those of some of the pairs that count where parts have several bodies (n, 5)."""
-        found = self.finished[rows, None], self.path[rows], self.graze[rows]
-        return np.concatenate(found, axis=1)
-
     def put(self, rows: Ints | slice, found: Depths) -> None:
         """Replaces those of some of the pairs."""
         self.finished[rows], self.path[rows] = found.finished, found.path
