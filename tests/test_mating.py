@@ -8,7 +8,6 @@ import time
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from itertools import pairwise
 from itertools import product as every
 from pathlib import Path
 
@@ -21,7 +20,6 @@ from scipy.spatial import ConvexHull
 
 from factory.compiler.compiler import expand
 from factory.compiler.mating import overlaps, seeking
-from factory.compiler.mating.bodies import bodies
 from factory.compiler.mating.depth import Difference, exact, polytope, rough, summits
 from factory.compiler.mating.mating import (
     BLOCKED,
@@ -33,7 +31,7 @@ from factory.compiler.mating.mating import (
     matings,
 )
 from factory.compiler.mating.meetings import meetings
-from factory.compiler.mating.overlaps import CHUNK, Finder
+from factory.compiler.mating.overlaps import CHUNK
 from factory.compiler.mating.paths import TOLERANCE, depths_of
 from factory.compiler.mating.seeking import NEAR, sought
 from factory.export.clash_picture import draw, picture_names
@@ -448,29 +446,6 @@ def test_few_facets_of_fine_bodies_are_looked_at(monkeypatch: pytest.MonkeyPatch
     depth = sought(q, p, np.array([[0.03, 0.0, 0.0]]), 1).finished[0]
     assert depth == pytest.approx(0.01, abs=1e-4)  # the radii along x are 0.04 together
     assert sum(looked) < 500
-
-
-def test_bodies_far_from_each_other_are_told_apart_by_a_few_directions(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    """A ring of wedges goes into a wider one: boxes overlap, and of 32 times 32 pairs few come so
-    near that their faces are looked at."""
-    looked: list[int] = []
-    monkeypatch.setattr(overlaps, "rough", lambda p, q: looked.append(1) or rough(p, q))
-    pag, product = made_of(ALONG_Y, a=wedges(10, 12), b=wedges(8, 9.9))
-    where = meetings(expand(pag, TEMPLATES), pag.root)
-    Finder(bodies(product, where.parts), where).along(2, np.array([True]))
-    assert len(looked) < 150
-
-
-def wedges(inner: float, outer: float, count: int = 32) -> list[np.ndarray]:
-    """A ring about z as wedges, no two alike [mm]."""
-    turns = np.linspace(0, 2 * np.pi, count + 1)
-    found = []
-    for number, ends in enumerate(pairwise(turns)):
-        flat = [(r * np.cos(t), r * np.sin(t)) for t in ends for r in (inner, outer)]
-        found.append(np.array([(*p, z) for p in flat for z in (0, 5 + number / 100)]) * MM)
-    return found
 
 
 class Engine:

@@ -8,7 +8,6 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from factory.compiler.mating.depth import WAYS
 from factory.geometry.meshes import Array
 from factory.geometry.solids import Product
 
@@ -19,15 +18,13 @@ ROUNDING = 1e-9
 @dataclass(frozen=True, slots=True)
 class ConvexBodies:
     """All convex bodies: `vertices` (n, 3) of each, `low`, `high` (bodies, 3) its bounding box,
-    `part` the number of the part it belongs to, `boxes` whether it is its bounding box, `reach`
-    (bodies, 26) how far it reaches in the directions WAYS [m]."""
+    `part` the number of the part it belongs to, `boxes` whether it is its bounding box [m]."""
 
     vertices: tuple[Array, ...] = field(repr=False)
     part: NDArray[np.int64]
     low: Array
     high: Array
     boxes: NDArray[np.bool_]
-    reach: Array = field(repr=False)
 
     def shape(self, body: int) -> tuple[Array, bytes]:
         """A body's vertices from the low corner of its box, and a key that is the same for bodies
@@ -51,8 +48,7 @@ def bodies(product: Product, parts: Sequence[str]) -> ConvexBodies:
     points = np.concatenate(found)
     low, high = np.minimum.reduceat(points, starts), np.maximum.reduceat(points, starts)
     boxes = _boxes(points, starts, counts, low, high)
-    reach = np.stack([np.maximum.reduceat(points @ way, starts) for way in WAYS], axis=1)
-    return ConvexBodies(tuple(found), np.array(part, np.int64), low, high, boxes, reach)
+    return ConvexBodies(tuple(found), np.array(part, np.int64), low, high, boxes)
 
 
 def _boxes(

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from factory.compiler.mating.bodies import ConvexBodies
-from factory.compiler.mating.depth import WAYS, Difference, Polytope, exact, polytope, rough
+from factory.compiler.mating.depth import Difference, Polytope, exact, polytope
 from factory.compiler.mating.meetings import Ints, Meetings
 from factory.compiler.mating.paths import CLEAR, LAST, SIGNS, Depths, depths_of
 from factory.compiler.mating.seeking import MANY, sought
@@ -121,15 +121,10 @@ class Finder:
         return np.asarray(found[:, depths.faulty.any(axis=1)])
 
     def _refine(self, moving: Ints, standing: Ints, axis: int, depths: Depths) -> None:
-        """Replaces the depths of boxes by those of the bodies where these are no boxes: first by
-        what their reach in a few directions tells of all pairs at once, then, of those that may be
-        faulty, by what their faces tell, then by all facets, or those that matter of very many."""
-        rows = np.flatnonzero(~(self.bodies.boxes[moving] & self.bodies.boxes[standing]))
-        bounds = self.bodies.reach[moving[rows]] + self.bodies.reach[standing[rows], ::-1]
-        found, _ = depths_of(bounds, WAYS[:, axis])
-        depths.put(rows, found)
+        """Replaces the depths of boxes by those of the bodies where these are no boxes."""
         groups: dict[tuple[bytes, bytes], list[int]] = {}
-        for row in rows[found.faulty.any(axis=1)].tolist():
+        both = self.bodies.boxes[moving] & self.bodies.boxes[standing]
+        for row in np.flatnonzero(~both).tolist():
             pair = self._key(int(moving[row])), self._key(int(standing[row]))
             groups.setdefault(pair, []).append(row)
         low = self.bodies.low
@@ -139,19 +134,10 @@ class Finder:
             one, other = (self._shapes[key] for key in pair)
             if len(one) * len(other) > MANY:
                 depths.put(rows, sought(one, other, apart, axis))
-                continue
-            for differ in (self._rough, self._exact):
-                difference = differ(pair)
-                found, _ = depths_of(difference.heights(apart), difference.normals[:, axis])
-                depths.put(rows, found)
-                left = found.faulty.any(axis=1)
-                rows, apart = rows[left], apart[left]
-                if not len(rows):
-                    break
-
-    def _rough(self, pair: tuple[bytes, bytes]) -> Difference:
-        """What is known of two shapes: all, if it was needed along another axis."""
-        return self._differences.get(pair) or rough(*map(self._polytope, pair))
+            else:
+                difference = self._exact(pair)
+                heights, slopes = difference.heights(apart), difference.normals[:, axis]
+                depths.put(rows, depths_of(heights, slopes)[0])
 
     def _exact(self, pair: tuple[bytes, bytes]) -> Difference:
         if pair not in self._differences:

@@ -8,9 +8,11 @@ next directions, until the hull reaches as far there as the difference does.
 
 from __future__ import annotations
 
+from itertools import product
+
 import numpy as np
 
-from factory.compiler.mating.depth import WAYS, Difference, distinct
+from factory.compiler.mating.depth import Difference, distinct
 from factory.compiler.mating.paths import Depths, depths_of
 from factory.geometry.meshes import Array
 
@@ -25,6 +27,10 @@ SAME = 1e-10
 
 MOST = 200
 """So many times, at most, the hull grows; a depth is then found too large, never too small."""
+
+_GRID = np.array([way for way in product((-1, 0, 1), repeat=3) if any(way)], float)
+WAYS = _GRID / np.linalg.norm(_GRID, axis=1, keepdims=True)
+"""The first directions (26, 3): along the axes and between them."""
 
 
 def sought(p: Array, q: Array, apart: Array, axis: int) -> Depths:
