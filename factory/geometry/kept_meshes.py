@@ -17,7 +17,6 @@ FOLDER = "meshes"
 PACKAGES = ("trimesh", "numpy", "scipy", "coacd")
 """What reads, measures and decomposes meshes."""
 
-
 KEYS = ("vertices", "faces", "texts", "volume", "centre", "inertia", "hull", *PACKED)
 """The arrays of an entry."""
 

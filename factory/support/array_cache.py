@@ -35,7 +35,8 @@ def digest(*parts: object) -> str:
         shape = (part.dtype, part.shape) if isinstance(part, np.ndarray) else ()
         content = part.tobytes() if isinstance(part, np.ndarray) else part
         content = content if isinstance(content, bytes) else repr(content).encode()
-        found.update(f" {shape} {len(content)} ".encode() + content)
+        found.update(f" {shape} {len(content)} ".encode())
+        found.update(content)
     return found.hexdigest()
 
 

@@ -1,8 +1,8 @@
 """The pairs of parts that come to overlap when the inputs of operations come along an axis.
 
 Candidates are the bodies whose boxes overlap across the axis. Boxes bound the depth, and for boxes
-they give it; for the others the faces bound it better, and what is left is computed. Bodies of two
-shapes are computed together, wherever they are.
+they give it; for the others it is computed from the facets of the Minkowski difference. Bodies of
+two shapes are computed together, wherever they are.
 """
 
 from __future__ import annotations
