@@ -1,4 +1,8 @@
-"""The stages from a PAG to a laid-out factory, for the command line and the Python API."""
+"""The stages from a PAG to a laid-out factory, for the command line and the Python API.
+
+Stages that need numpy are imported where they begin: a product without shapes needs none to be
+checked.
+"""
 
 from __future__ import annotations
 
@@ -10,11 +14,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from factory.compiler.compiler import compile_pag
-from factory.compiler.mating.findings import Matings
-from factory.compiler.mating.mating import matings, shaped
-from factory.geometry.limits import is_plain
-from factory.geometry.product import product_geometry
-from factory.geometry.solids import Product
 from factory.lang.pag_reader import load_pag
 from factory.lang.template_reader import load_templates
 from factory.layout.request import Ground
@@ -22,12 +21,15 @@ from factory.plant.approaches import Approach
 from factory.plant.factory import Factory
 from factory.problem.pag import PAG
 from factory.problem.robot_types import Catalogue, load_catalogue
+from factory.problem.shapes import is_plain, is_shaped
 from factory.problem.template import Template
 from factory.support.errors import Diagnostic, InputError
 from factory.support.resources import templates_folder
 from factory.support.settings import Settings
 
 if TYPE_CHECKING:
+    from factory.compiler.mating.findings import Matings
+    from factory.geometry.solids import Product
     from factory.layout.layout import Layout
 
 
@@ -56,6 +58,8 @@ class Project:
     @cached_property
     def product(self) -> Product:
         """The solids of its parts. Raises InputError where a mesh cannot be read."""
+        from factory.geometry.product import product_geometry
+
         return product_geometry(self.pag)
 
     @property
@@ -72,7 +76,11 @@ class Project:
     @cached_property
     def matings(self) -> Matings | None:
         """What was found of how its inputs come together; None for a product of default boxes."""
-        return matings(self.pag, self.templates, self.product) if shaped(self.pag) else None
+        if not is_shaped(self.pag):
+            return None
+        from factory.compiler.mating.mating import matings
+
+        return matings(self.pag, self.templates, self.product)
 
     @property
     def warnings(self) -> tuple[Diagnostic, ...]:

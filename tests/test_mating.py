@@ -6,7 +6,7 @@ from __future__ import annotations
 import re
 import time
 import xml.etree.ElementTree as ElementTree
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from itertools import product as every
 from pathlib import Path
@@ -20,7 +20,8 @@ from scipy.spatial import ConvexHull
 
 from factory.commands.warnings import SHOWN, told
 from factory.compiler.compiler import expand
-from factory.compiler.mating.depth import deepest, exact, polytope, rough
+from factory.compiler.mating import overlaps, seeking
+from factory.compiler.mating.depth import Difference, exact, polytope, rough, summits
 from factory.compiler.mating.findings import (
     BLOCKED,
     LEFT_OUT,
@@ -29,15 +30,18 @@ from factory.compiler.mating.findings import (
     Mating,
     Matings,
 )
-from factory.compiler.mating.mating import matings, shaped
+from factory.compiler.mating.mating import matings
 from factory.compiler.mating.meetings import meetings
-from factory.compiler.mating.overlaps import CHUNK, CLEAR, TOLERANCE
+from factory.compiler.mating.overlaps import CHUNK
+from factory.compiler.mating.paths import CLEAR, TOLERANCE, depths_of
+from factory.compiler.mating.seeking import NEAR, sought
 from factory.export.clash_picture import draw, picture_names
 from factory.geometry.product import product_geometry
 from factory.geometry.solids import Product
 from factory.lang import read_pag
 from factory.pipeline import all_templates
 from factory.problem.pag import PAG
+from factory.problem.shapes import is_shaped
 from factory.problem.template import Template
 from factory.support.errors import Diagnostic
 from tests.command_line import Terminal
@@ -84,16 +88,22 @@ def plate(hole: float, axis: int, size: float = 30, thick: float = 5) -> list[np
 
 def judged(text: str, **pieces: list[np.ndarray]) -> Matings:
     """The matings of a PAG whose parts `pieces` are made of these convex bodies."""
+    pag, product = made_of(text, **pieces)
+    return matings(pag, TEMPLATES, product)
+
+
+def made_of(text: str, **pieces: list[np.ndarray]) -> tuple[PAG, Product]:
+    """A PAG whose parts `pieces` are made of these convex bodies."""
     atoms = "; ".join(f"{name} = atomic ( box = (1, 1, 1) )" for name in pieces)
     pag = read_pag(text + atoms, TEMPLATES)
     product = product_geometry(pag)
     solids = dict(product.solids)
-    for name, bodies in pieces.items():
-        corners = np.concatenate(bodies)
+    for name, mine in pieces.items():
+        corners = np.concatenate(mine)
         low, high = corners.min(axis=0), corners.max(axis=0)
-        solid = replace(solids[name], pieces=tuple(bodies), corners=corners, low=low, high=high)
+        solid = replace(solids[name], pieces=tuple(mine), corners=corners, low=low, high=high)
         solids[name] = solid
-    return matings(pag, TEMPLATES, replace_solids(product, solids))
+    return pag, replace_solids(product, solids)
 
 
 def replace_solids(product: Product, solids: Mapping[str, object]) -> Product:
@@ -314,7 +324,7 @@ def test_default_boxes_always_slide(pag: PAG) -> None:
     """Theorem: neighbouring intervals of the path to and fro go ahead of each other."""
     plain = tuple(n if n.inputs else replace(n, parameters=()) for n in pag.nodes)
     bare = replace(pag, nodes=plain)
-    assert not shaped(bare)
+    assert not is_shaped(bare)
     found = matings(bare, TEMPLATES, product_geometry(bare))
     assert all(m.approach.kind == "slide" and m.level == STRICT for m in found.all)
 
@@ -351,6 +361,14 @@ def convex_pair(seed: int) -> tuple[np.ndarray, np.ndarray]:
     if seed % 5 == 0:
         found[1] = found[0].copy()
     return found[0], found[1] + rng.normal(size=3) * 0.04
+
+
+def deepest(
+    difference: Difference, apart: np.ndarray, direction: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """The greatest depth on the way along a direction, and how far that is, for each place."""
+    heights = difference.heights(apart)
+    return summits(heights, np.broadcast_to(difference.normals @ direction, heights.shape))
 
 
 def brute(p: np.ndarray, q: np.ndarray, direction: np.ndarray, shifts: np.ndarray) -> np.ndarray:
@@ -401,6 +419,53 @@ def test_planted_fault_without_the_edges_depths_are_too_large() -> None:
         depths = [d(p, q).heights(np.zeros((1, 3))).min() for d in (rough, exact)]
         worst = max(worst, float(depths[0] - depths[1]))
     assert worst > 1 * MM
+
+
+@pytest.mark.parametrize("seed", range(60))
+def test_depths_that_are_sought_are_those_of_all_facets(seed: int) -> None:
+    p, q = convex_pair(seed)
+    apart = np.random.default_rng(seed).normal(size=(6, 3)) * 0.04
+    for axis in range(3):
+        difference = exact(polytope(p), polytope(q))
+        all_, _ = depths_of(difference.heights(apart), difference.normals[:, axis])
+        found = sought(p, q, apart, axis)
+        assert (found.faulty == all_.faulty).all()
+        faulty = all_.faulty.any(axis=1)
+        for one, other in ((found.path, all_.path), (found.finished, all_.finished)):
+            assert np.maximum(one, 0)[faulty] == pytest.approx(
+                np.maximum(other, 0)[faulty], abs=NEAR
+            )
+            assert (np.maximum(one, 0) >= np.maximum(other, 0) - 1e-8).all()
+
+
+def egg(count: int, size: Sequence[float]) -> np.ndarray:
+    """Points spread over an ellipsoid."""
+    z = 1 - (2 * np.arange(count) + 1) / count
+    turns = np.pi * (1 + 5**0.5) * np.arange(count)
+    ring = np.sqrt(1 - z**2)
+    return np.column_stack([ring * np.cos(turns), ring * np.sin(turns), z]) * size
+
+
+def test_few_facets_of_fine_bodies_are_looked_at(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Two balls of 3,000 vertices: their difference has about 20,000 facets, and pairs of edges
+    that may span one are 80 million."""
+    looked: list[int] = []
+
+    def touching(normals: np.ndarray, *bodies: np.ndarray) -> object:
+        looked.append(len(normals))
+        return seeking_touching(normals, *bodies)
+
+    seeking_touching = seeking._touching
+    monkeypatch.setattr(seeking, "_touching", touching)
+    monkeypatch.setattr(overlaps, "exact", pytest.fail)
+    p, q = egg(3000, (0.02, 0.03, 0.02)), egg(3000, (0.02, 0.02, 0.04))
+    beside, above = (
+        one(judged(ALONG_Y, a=[p], b=[q + by])) for by in ([0.041, 0, 0], [0, 0.06, 0])
+    )
+    assert beside.approach.sides == (-1, +1) and above.approach.sides == (+1,)
+    depth = sought(q, p, np.array([[0.03, 0.0, 0.0]]), 1).finished[0]
+    assert depth == pytest.approx(0.01, abs=1e-4)  # the radii along x are 0.04 together
+    assert sum(looked) < 500
 
 
 class Engine:
@@ -550,7 +615,7 @@ def test_check_computes_no_geometry_where_no_part_has_a_shape(
 ) -> None:
     file = tmp_path / "plain.pag"
     file.write_text("root = r; r = mate ( a, b ); a = atomic(); b = atomic()")
-    monkeypatch.setattr("factory.pipeline.product_geometry", pytest.fail)
+    monkeypatch.setattr("factory.geometry.product.product_geometry", pytest.fail)
     document = run("check", file, "--clashes", tmp_path / "none", "--json").json
     assert document["approaches"] is None and document["clashes"] == []
     assert not (tmp_path / "none").exists()

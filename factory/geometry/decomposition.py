@@ -8,18 +8,17 @@ has its hull. Its results are kept in the user's cache.
 
 from __future__ import annotations
 
-import contextlib
-import hashlib
-import io
 from collections.abc import Callable
-from importlib.metadata import PackageNotFoundError, version
-from pathlib import Path
+from dataclasses import replace
 
 import numpy as np
 
-from factory.geometry.meshes import Array, Indices, Mesh, is_closed
+from factory.geometry.meshes import Array, Indices, Mesh, is_closed, volume_of
 from factory.geometry.pieces import FLATNESS, convex_bodies, joined
-from factory.support.files import user_cache, write_bytes
+from factory.support.array_cache import PACKED, digest, find, keep, packed, release, unpacked
+
+FOLDER = "pieces"
+"""Where decompositions are kept, in the user's cache."""
 
 FULL = 0.98
 """A closed mesh that fills more than this share of its hull collides as its hull."""
@@ -45,16 +44,14 @@ def in_pieces(mesh: Mesh, as_written: Callable[[], tuple[Array, Indices]]) -> Me
         return _of_bodies(mesh.name, bodies)
     if _share_of_hull(mesh) >= FULL:
         return mesh
-    return Mesh(mesh.name, mesh.vertices, mesh.faces, _decomposed(mesh))
+    pieces = _decomposed(mesh)
+    return replace(mesh, pieces=pieces) if pieces else mesh
 
 
 def _share_of_hull(mesh: Mesh) -> float:
     """The volume of a mesh in that of its hull; 1 where it has none."""
-    import trimesh
-
-    body = trimesh.Trimesh(mesh.vertices, mesh.faces, process=False)
-    volume = float(body.volume)
-    return volume / float(body.convex_hull.volume) if volume > 0 else 1.0
+    volume = volume_of(mesh.vertices, mesh.faces)
+    return volume / mesh.hull.volume if volume > 0 else 1.0
 
 
 def _of_bodies(name: str, bodies: list[tuple[Array, Indices]]) -> Mesh:
@@ -65,31 +62,15 @@ def _of_bodies(name: str, bodies: list[tuple[Array, Indices]]) -> Mesh:
 def _decomposed(mesh: Mesh) -> tuple[Array, ...]:
     """The bodies that CoACD makes of a mesh, from the cache if it did so before; none where it is
     not installed or fails, or finds that one will do."""
-    try:
-        release = version("coacd")
-    except PackageNotFoundError:
+    if not release("coacd"):
         return ()
-    kept = cache_folder() / f"{_key(mesh, release)}.npz"
-    found = _read(kept)
-    if found is None:
-        found = _run_coacd(mesh)
-        with contextlib.suppress(OSError):
-            write_bytes(kept, _packed(found))
+    parameters = sorted(PARAMETERS.items())
+    name = digest(release("coacd"), parameters, SLIVER, mesh.vertices, mesh.faces)
+    kept = find(FOLDER, name, PACKED)
+    found = _run_coacd(mesh) if kept is None else unpacked(kept)
+    if kept is None:
+        keep(FOLDER, name, packed(found))
     return found if len(found) > 1 else ()
-
-
-def cache_folder() -> Path:
-    """Where decompositions are kept."""
-    return user_cache() / "pieces"
-
-
-def _key(mesh: Mesh, release: str) -> str:
-    """A digest of what a decomposition depends on."""
-    digest = hashlib.sha256(f"{release} {sorted(PARAMETERS.items())} {SLIVER}".encode())
-    for array in (mesh.vertices, mesh.faces):
-        digest.update(f" {array.shape} ".encode())
-        digest.update(np.ascontiguousarray(array).tobytes())
-    return digest.hexdigest()
 
 
 def _run_coacd(mesh: Mesh) -> tuple[Array, ...]:
@@ -106,20 +87,3 @@ def _run_coacd(mesh: Mesh) -> tuple[Array, ...]:
         return ()
     least = SLIVER * sum(float(hull.volume) for hull in hulls)
     return tuple(np.asarray(hull.vertices) for hull in hulls if hull.volume > least)
-
-
-def _packed(pieces: tuple[Array, ...]) -> bytes:
-    content = io.BytesIO()
-    np.savez(content, *pieces)
-    return content.getvalue()
-
-
-def _read(path: Path) -> tuple[Array, ...] | None:
-    """What `_packed` wrote; None where there is none, or it is damaged."""
-    try:
-        with np.load(path, allow_pickle=False) as content:
-            found = tuple(content[name] for name in content.files)
-        sound = all(p.shape[1:] == (3,) and len(p) > 3 and np.isfinite(p).all() for p in found)
-        return found if sound else None
-    except Exception:  # numpy and zipfile raise anything on a broken file
-        return None

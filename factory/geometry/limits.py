@@ -42,11 +42,6 @@ def too_far(node: Assembly, *names: str) -> Diagnostic:
     return Diagnostic("BadValue", message, value_position(node, *names), hint)
 
 
-def is_plain(pag: PAG) -> bool:
-    """Whether no part says more of its geometry than its colour: nothing can be wrong with it."""
-    return all(p.name == "rgba" for node in pag.parts() for p in node.parameters)
-
-
 def value_position(node: Assembly, *names: str) -> Position | None:
     """Where the value of the first of these parameters is that the part has; else its label."""
     found = {p.name: p.position for p in node.parameters}

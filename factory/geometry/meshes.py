@@ -2,10 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, field
+from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    import trimesh
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -24,7 +30,7 @@ MARGIN = 1e-8
 may turn a sheet or a rod into what cannot be a body."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Mesh:
     """A triangle mesh in metres, in its own frame: vertices (n, 3), faces (m, 3). `pieces` are the
     vertices (k, 3) of the convex bodies that collide in its place; none where its hull does."""
@@ -33,6 +39,34 @@ class Mesh:
     vertices: Array = field(repr=False)
     faces: Indices = field(repr=False)
     pieces: tuple[Array, ...] = field(default=(), repr=False)
+
+    @cached_property
+    def hull(self) -> Hull:
+        """Its convex hull, computed once: that of a fine mesh takes as long as all the rest."""
+        return hull_of(self.vertices)
+
+
+@dataclass(frozen=True, slots=True)
+class Hull:
+    """A convex hull: its vertices (k, 3) and volume."""
+
+    corners: Array
+    volume: float
+
+
+def hull_of(points: Array) -> Hull:
+    """The convex hull of points (n, 3). Raises QhullError where they lie in a plane."""
+    from scipy.spatial import ConvexHull
+
+    found, box = ConvexHull(points, qhull_options="QbB Pp Qt"), np.ptp(points, axis=0)
+    volume = float(found.volume * box.prod())  # Qhull has scaled the points to a unit cube
+    return Hull(points[np.sort(found.vertices)], volume)
+
+
+def volume_of(vertices: Array, faces: Indices) -> float:
+    """The volume inside a closed mesh, negative where it is inside out."""
+    a, b, c = (vertices[faces[:, corner]] - vertices.mean(axis=0) for corner in range(3))
+    return float(np.einsum("ij,ij->", a, np.cross(b, c))) / 6
 
 
 @dataclass(frozen=True, slots=True)
@@ -137,10 +171,10 @@ def _hull_mesh(name: str, vertices: Array) -> Mesh:
 def is_closed(faces: Indices) -> bool:
     """Whether triangles (m, 3) close what they bound: every edge is passed as often to as fro. So
     do bodies that share faces, edges or corners."""
-    count = faces.max() + 1
     start, end = faces.ravel(), np.roll(faces, -1, axis=1).ravel()
-    to, fro = np.sort(start * count + end), np.sort(end * count + start)
-    return bool((to == fro).all())
+    edge = np.minimum(start, end) * (faces.max(initial=0) + 1) + np.maximum(start, end)
+    _, inverse = np.unique(edge, return_inverse=True)
+    return bool((np.bincount(inverse, np.where(start < end, 1.0, -1.0)) == 0).all())
 
 
 def measured(mesh: Mesh, remark: Remark | None = None) -> MassProperties:
@@ -149,8 +183,8 @@ def measured(mesh: Mesh, remark: Remark | None = None) -> MassProperties:
     import trimesh
 
     body = trimesh.Trimesh(mesh.vertices, mesh.faces, process=False)
-    hull, closed = body.convex_hull, is_closed(mesh.faces)
-    for solid in (body, hull, hull.bounding_box):
+    closed = is_closed(mesh.faces)
+    for solid in _body_or_hull(body):
         if (solid is body and not closed) or not solid.volume > 0:
             continue
         properties = solid.mass_properties
@@ -159,9 +193,15 @@ def measured(mesh: Mesh, remark: Remark | None = None) -> MassProperties:
             break
     if solid is not body and (closed or remark is None):
         remark = HOLLOW if closed else OPEN
-    centre = np.asarray(properties.center_mass)
-    volume, corners = float(properties.volume), np.asarray(hull.vertices)
-    return MassProperties(mesh, remark, volume, centre, inertia, corners)
+    centre, volume = np.asarray(properties.center_mass), float(properties.volume)
+    return MassProperties(mesh, remark, volume, centre, inertia, mesh.hull.corners)
+
+
+def _body_or_hull(body: trimesh.Trimesh) -> Iterator[trimesh.Trimesh]:
+    """A body, its hull and the box of that, each computed when it is asked for."""
+    yield body
+    yield body.convex_hull
+    yield body.convex_hull.bounding_box
 
 
 def is_inertia(matrix: Array) -> bool:

@@ -15,7 +15,7 @@ from itertools import combinations
 
 import numpy as np
 
-from factory.geometry.meshes import Array, Indices
+from factory.geometry.meshes import Array, Indices, hull_of
 
 ROUND = 5e-6
 """How far the polytope round a round body may reach outside it [m]."""
@@ -143,4 +143,4 @@ def is_convex(vertices: Array, faces: Indices) -> bool:
     body = trimesh.Trimesh(vertices, faces, process=False)
     if not (body.is_watertight and body.is_winding_consistent and body.volume > 0):
         return False
-    return bool(body.volume >= (1 - FLATNESS) * body.convex_hull.volume)
+    return bool(body.volume >= (1 - FLATNESS) * hull_of(vertices).volume)

@@ -12,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
+from factory.geometry import kept_meshes
 from factory.geometry.decomposition import in_pieces
 from factory.geometry.limits import (
     FURTHEST,
@@ -133,8 +134,14 @@ class _Reader:
         return found
 
     def _read(self, node: Assembly, path: str, scale: float) -> MassProperties | None:
+        name = f"m{len(self._meshes)}"
         try:
-            file = read_mesh((self.folder / path).read_bytes(), Path(path).suffix.lower())
+            content, suffix = (self.folder / path).read_bytes(), Path(path).suffix.lower()
+            key = kept_meshes.key_of(content, suffix, scale)
+            kept = kept_meshes.find(key, name)
+            if kept is not None:
+                return kept
+            file = read_mesh(content, suffix)
         except (OSError, UnreadableMesh) as error:
             why = error.strerror if isinstance(error, OSError) else error
             message, position = f"cannot read '{path}': {why}", value_position(node, "mesh")
@@ -144,12 +151,12 @@ class _Reader:
         if not np.abs(vertices).max() * scale <= FURTHEST:
             self.errors.append(too_far(node, "scale", "mesh"))
             return None
-        mesh, remark = usable(f"m{len(self._meshes)}", vertices * scale, faces)
+        mesh, remark = usable(name, vertices * scale, faces)
         if remark is None:
             vertices, faces, was = mended(mesh.vertices, mesh.faces)
             remark = mend_remark(was) if was else None
             mesh = in_pieces(Mesh(mesh.name, vertices, faces), lambda: _apart(file, scale))
-        return measured(mesh, remark)
+        return kept_meshes.keep(key, measured(mesh, remark))
 
 
 def _apart(file: MeshFile, scale: float) -> tuple[Array, Indices]:

@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 from math import ceil
 from types import MappingProxyType
 
-from factory.compiler.mating.overlaps import TOLERANCE
+from factory.compiler.mating.paths import TOLERANCE
 from factory.geometry.insets import breadth
 from factory.geometry.solids import Product
 from factory.layout.layout import Layout

@@ -7,13 +7,13 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from factory.geometry.limits import is_plain
 from factory.nets.gears import Gear, GearNet
 from factory.nets.marked import MarkedNet, marked
 from factory.nets.petri import Place
 from factory.nets.verdict import Verdict
 from factory.nets.verify import verify
 from factory.pipeline import Project
+from factory.problem.shapes import is_plain
 from factory.support.errors import Diagnostic
 from factory.timing.pool import part_pool
 

@@ -6,7 +6,7 @@ from time import perf_counter
 from typing import Any
 
 from factory.compiler.mating.findings import LEFT_OUT, NO_DEEPER, STRICT
-from factory.compiler.mating.overlaps import CLEAR, TOLERANCE
+from factory.compiler.mating.paths import CLEAR, TOLERANCE
 from factory.pipeline import read
 from factory.simulation.request import RunRequest
 from factory.simulation.simulation import Simulation

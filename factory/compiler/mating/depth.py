@@ -21,13 +21,6 @@ from numpy.typing import NDArray
 
 from factory.geometry.meshes import Array
 
-MOST_CROSSINGS = 8_000_000
-"""Of bodies with more pairs of edges only faces count: depths are then found too large, never too
-small; such bodies have faces so small that it hardly shows."""
-
-CHUNK = 2_000_000
-"""So many numbers are computed at a time."""
-
 SMALL = 1e-12
 
 
@@ -86,37 +79,37 @@ class Difference:
         """h(n) (m, k) where P lies `apart` (m, 3) from Q."""
         return np.asarray(self.bounds + apart @ self.normals.T)
 
+    def and_those_of(self, other: Difference) -> Difference:
+        """These half-spaces and others."""
+        normals = np.concatenate([self.normals, other.normals])
+        return Difference(normals, np.concatenate([self.bounds, other.bounds]))
+
 
 def rough(p: Polytope, q: Polytope) -> Difference:
     """The half-spaces of the faces of both: never too small."""
-    normals = np.concatenate([p.normals, -q.normals])
-    mine = p.reach + _support(-p.normals, q.vertices)
-    theirs = _support(-q.normals, p.vertices) + q.reach
-    return Difference(normals, np.concatenate([mine, theirs]))
+    mine = Difference(p.normals, p.reach + _support(-p.normals, q.vertices))
+    return mine.and_those_of(Difference(-q.normals, _support(-q.normals, p.vertices) + q.reach))
 
 
 def exact(p: Polytope, q: Polytope) -> Difference:
     """All half-spaces: those of the faces and those that an edge of each spans."""
-    faces = rough(p, q)
     spanned = _spanned(p.edges, q.edges)
     bounds = _support(spanned, p.vertices) + _support(-spanned, q.vertices)
-    return Difference(
-        np.concatenate([faces.normals, spanned]), np.concatenate([faces.bounds, bounds])
-    )
+    return rough(p, q).and_those_of(Difference(spanned, bounds))
 
 
 def _spanned(p: Array, q: Array) -> Array:
     """Unit normals (k, 3) of the facets spanned by an edge of P and one of Q: those whose arcs
     cross, the arc of Q's edge being turned about (Gregorius, The Separating Axis Test, 2013)."""
-    if len(p) * len(q) == 0 or len(p) * len(q) > MOST_CROSSINGS:
+    if len(p) * len(q) == 0:
         return np.zeros((0, 3))
     a, b, c, d = p[:, 1], p[:, 2], -q[:, 1], -q[:, 2]
-    ba, dc = np.cross(b, a), np.cross(d, c)
+    ba, dc = _cross(b, a), _cross(d, c)
     cba, dba = ba @ c.T, ba @ d.T
     adc, bdc = a @ dc.T, b @ dc.T
     crossing = (cba * dba <= SMALL) & (adc * bdc <= SMALL) & (cba * bdc >= -SMALL)
     one, other = np.nonzero(crossing)
-    normals = np.cross(p[one, 0], q[other, 0])
+    normals = _cross(p[one, 0], q[other, 0])
     length = np.linalg.norm(normals, axis=1)
     scale = np.linalg.norm(p[one, 0], axis=1) * np.linalg.norm(q[other, 0], axis=1)
     parallel = length <= 1e-7 * scale
@@ -124,51 +117,47 @@ def _spanned(p: Array, q: Array) -> Array:
     outward = np.einsum("ij,ij->i", normals, (a + b)[one[~parallel]] + (c + d)[other[~parallel]])
     doubtful = np.abs(outward) < 1e-6
     normals = np.concatenate([normals * np.where(outward < 0, -1, 1)[:, None], -normals[doubtful]])
-    return np.asarray(normals[_distinct(normals)])
+    return np.asarray(normals[distinct(normals)])
 
 
-def _distinct(normals: Array) -> NDArray[np.int64]:
+def _cross(a: Array, b: Array) -> Array:
+    """The products of vectors (n, 3): numpy's own takes longer to begin than to compute few."""
+    x, y, z = a.T
+    u, v, w = b.T
+    return np.stack([y * w - z * v, z * u - x * w, x * v - y * u], axis=1)
+
+
+def distinct(normals: Array) -> NDArray[np.int64]:
     """Which normals to keep of those that are the same up to rounding, told by their place along a
     line in no special direction."""
     key = np.round(normals @ (np.sqrt([2.0, 3.0, 5.0]) * 1e9)).astype(np.int64)
     return np.asarray(np.unique(key, return_index=True)[1])
 
 
-def deepest(difference: Difference, apart: Array, direction: Array) -> tuple[Array, Array]:
-    """The greatest depth (m,) over λ >= 0 of P, at first `apart` (m, 3) from Q, on its way along
-    `direction` (3,), and the λ at which it is [m]."""
-    slopes = difference.normals @ direction
-    slopes[np.abs(slopes) < SMALL] = 0.0
-    depth, shift = np.empty(len(apart)), np.empty(len(apart))
-    step = max(1, CHUNK // len(slopes))
-    for start in range(0, len(apart), step):
-        part = slice(start, start + step)
-        depth[part], shift[part] = _summit(difference.heights(apart[part]), slopes)
-    return depth, shift
-
-
-def _summit(heights: Array, slopes: Array) -> tuple[Array, Array]:
-    """For each row the greatest value over λ >= 0 of the lowest of its lines h + λ s, and λ.
+def summits(heights: Array, slopes: Array) -> tuple[Array, Array]:
+    """For each row (m, k) the greatest value over λ >= 0 of the lowest of its lines h + λ s, and λ:
+    the greatest depth of a body on its way, and how far it has come [m].
 
     The summit lies between a rising and a falling line; where they cross, a lower line replaces
     that of its own kind, until there is none.
     """
+    slopes = np.where(np.abs(slopes) < SMALL, 0.0, slopes)
     rows = np.arange(len(heights))
     rising = heights.argmin(axis=1)
-    steepest = np.flatnonzero(slopes == slopes.min())
-    falling = steepest[heights[:, steepest].argmin(axis=1)]
+    steepest = slopes == slopes.min(axis=1, keepdims=True)
+    falling = np.where(steepest, heights, np.inf).argmin(axis=1)
     depth, shift = heights[rows, rising], np.zeros(len(heights))
-    left: NDArray[np.int64] = np.flatnonzero(slopes[rising] > 0)
+    left: NDArray[np.int64] = np.flatnonzero(slopes[rows, rising] > 0)
     while len(left):
         up, down = rising[left], falling[left]
         drop = heights[left, down] - heights[left, up]
-        at = np.maximum(drop / (slopes[up] - slopes[down]), 0.0)
-        value = heights[left] + at[:, None] * slopes
+        at = np.maximum(drop / (slopes[left, up] - slopes[left, down]), 0.0)
+        value = heights[left] + at[:, None] * slopes[left]
         lowest = value.argmin(axis=1)
         found = value[np.arange(len(left)), lowest]
         depth[left], shift[left] = found, at
-        gain = heights[left, up] + at * slopes[up] - found
-        climbs = slopes[lowest] > 0
+        gain = heights[left, up] + at * slopes[left, up] - found
+        climbs = slopes[left, lowest] > 0
         new = (gain > 1e-13) & (lowest != up) & (lowest != down)
         rising[left[climbs & new]] = lowest[climbs & new]
         falling[left[~climbs & new]] = lowest[~climbs & new]

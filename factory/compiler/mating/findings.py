@@ -13,7 +13,7 @@ from functools import cached_property
 from types import MappingProxyType
 from typing import Any, get_args
 
-from factory.compiler.mating.overlaps import TOLERANCE
+from factory.compiler.mating.paths import TOLERANCE
 from factory.plant.approaches import Approach, Kind, Pair
 from factory.support.errors import Diagnostic, Position
 

@@ -22,7 +22,8 @@ from factory.compiler.mating.findings import (
     Matings,
 )
 from factory.compiler.mating.meetings import Ints, Meeting, Meetings, meetings
-from factory.compiler.mating.overlaps import SIGNS, TOLERANCE, Finder, Overlaps
+from factory.compiler.mating.overlaps import Finder, Overlaps
+from factory.compiler.mating.paths import SIGNS, TOLERANCE
 from factory.geometry.solids import Product
 from factory.plant.approaches import MARGIN, Approach, Kind, Overlap, Pair
 from factory.plant.factory import Factory
@@ -32,16 +33,6 @@ from factory.support.errors import Position
 
 UPRIGHT = 2
 """The axis z, along which inputs are lowered."""
-
-SHAPES = frozenset({"mesh", "box", "cylinder", "sphere", "pos"})
-"""Parameters that give a part a shape or a place of its own."""
-
-
-def shaped(pag: PAG) -> bool:
-    """Whether some part has a shape or a place of its own. The default boxes of a product in which
-    none has can always slide: each sub-assembly is an interval of a path to and fro in a lattice,
-    so the next interval goes on ahead of it along x and along y."""
-    return any(p.name in SHAPES for node in pag.parts() for p in node.parameters)
 
 
 def matings(
@@ -170,7 +161,7 @@ class _Judge:
             )
             for row in rows.tolist()
         ]
-        return tuple(sorted(found, key=lambda c: (-c.depth, c.parts)))
+        return tuple(sorted(found, key=lambda c: (-round(c.depth, 9), c.parts)))
 
     def _overlaps(self, number: int, axis: int, column: int) -> tuple[Overlap, ...]:
         """What overlaps or scrapes as the inputs of an operation come from a side."""

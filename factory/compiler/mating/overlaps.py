@@ -1,67 +1,37 @@
 """The pairs of parts that come to overlap when the inputs of operations come along an axis.
 
 Candidates are the bodies whose boxes overlap across the axis. Boxes bound the depth, and for boxes
-they give it; for the others the faces bound it better, and what is left is computed. Bodies of two
-shapes are computed together, wherever they are.
+they give it; for the others it is computed from the facets of the Minkowski difference. Bodies of
+two shapes are computed together, wherever they are.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import astuple, dataclass, field
+from functools import cached_property
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from factory.compiler.mating.bodies import ConvexBodies
-from factory.compiler.mating.depth import Difference, Polytope, deepest, exact, polytope, rough
+from factory.compiler.mating.depth import Difference, Polytope, exact, polytope
 from factory.compiler.mating.meetings import Ints, Meetings
+from factory.compiler.mating.paths import CLEAR, LAST, SIGNS, Depths, depths_of
+from factory.compiler.mating.seeking import MANY, sought
 from factory.geometry.meshes import Array
+from factory.support import array_cache
+from factory.support.array_cache import digest, program
 
-TOLERANCE = 2e-5
-"""Overlaps of no more than this [m] do not count: what welds in the engine give way, and far above
-what numbers written with five digits are rounded by."""
+FOLDER = "overlaps"
+"""Where overlaps are kept, in the user's cache."""
 
-CLEAR = 5e-5
-"""On their way bodies that do not overlap still need so much room between them [m], or they scrape:
-faces that are flush catch at their edges when a weld gives way by its 0.03 mm."""
-
-LAST = 1e-3
-"""But for the last bit of the way [m]: finished parts may touch."""
-
-SIGNS = (-1, +1)
-"""The sides from which the last input comes: its path is shifted to this side of the axis."""
+KEYS = ("meeting", "moving", "standing", "finished", "path", "shift", "graze")
+"""The arrays of an entry."""
 
 CHUNK = 4096
 """Bodies whose candidates are sought at a time."""
-
-
-@dataclass(frozen=True)
-class Depths:
-    """How deep the two of each pair get into each other [m], less than 0 where apart: `finished`
-    (n,) in the finished product; `path` (n, 2) the most if the last input comes from the lower or
-    the upper side, and `shift` (n, 2) how far from its place that is; `graze` (n, 2) the most but
-    for the last bit of the way."""
-
-    finished: Array
-    path: Array
-    shift: Array
-    graze: Array
-
-    @property
-    def faulty(self) -> NDArray[np.bool_]:
-        """Which pairs (n, 2) overlap or scrape on the way from either side."""
-        return np.asarray((self.path > TOLERANCE) | (self.graze > -CLEAR))
-
-    @property
-    def receding(self) -> Array:
-        """How far (n, 2) the two must recede from each other [m], or be made smaller together, so
-        that they neither overlap nor scrape on the way from either side."""
-        return np.asarray(np.maximum(self.path, self.graze + CLEAR))
-
-    def at(self, rows: Ints | slice) -> Depths:
-        """Those of some of the pairs."""
-        return Depths(self.finished[rows], self.path[rows], self.shift[rows], self.graze[rows])
 
 
 @dataclass(frozen=True)
@@ -103,15 +73,40 @@ class Overlaps:
 
 
 class Finder:
-    """Finds overlaps in one product; shapes are kept from one axis to the next."""
+    """Finds overlaps in one product; shapes are kept from one axis to the next, what is found in
+    the user's cache."""
 
     def __init__(self, found: ConvexBodies, where: Meetings) -> None:
         self.bodies, self.meetings = found, where
+        self._keys: dict[int, bytes] = {}
+        self._shapes: dict[bytes, Array] = {}
         self._polytopes: dict[bytes, Polytope] = {}
         self._differences: dict[tuple[bytes, bytes], Difference] = {}
 
     def along(self, axis: int, wanted: NDArray[np.bool_]) -> Overlaps:
         """The overlaps of the wanted meetings when their inputs come along an axis: x, y or z."""
+        if self.bodies.boxes.all():  # found at once
+            return self._by_parts(*self._search(axis, wanted))
+        name = digest(self._product, axis, wanted)
+        kept = array_cache.find(FOLDER, name, KEYS)
+        if kept is None:
+            meeting, moving, standing, depths = self._search(axis, wanted)
+            arrays = (meeting, moving, standing, *astuple(depths))
+            kept = dict(zip(KEYS, arrays, strict=True))
+            array_cache.keep(FOLDER, name, kept)
+        meeting, moving, standing, *rest = (kept[key] for key in KEYS)
+        return self._by_parts(meeting, moving, standing, Depths(*rest))
+
+    @cached_property
+    def _product(self) -> str:
+        """A digest of all that overlaps depend on."""
+        where = self.meetings.borders, self.meetings.levels, self.meetings.splits
+        own = program(Path(__file__).parent, "numpy", "scipy", "shapely")
+        return digest(own, self.bodies.part, *where, *self.bodies.vertices)
+
+    def _search(self, axis: int, wanted: NDArray[np.bool_]) -> tuple[Ints, Ints, Ints, Depths]:
+        """The bodies, moving and standing, that overlap or scrape, and the meetings at which they
+        do."""
         parts = [self._near(axis, wanted, *pairs) for pairs in self._chunks(axis)]
         moving, standing, meeting = np.concatenate([np.zeros((3, 0), np.int64), *parts], axis=1)
         depths = _box_depths(self.bodies, moving, standing, axis)
@@ -119,7 +114,8 @@ class Finder:
         idle = self.bodies.part[moving] < self.meetings.splits[meeting]
         depths.path[idle], depths.shift[idle] = depths.finished[idle, None], 0.0
         depths.graze[idle] = -np.inf
-        return self._by_parts(meeting, moving, standing, depths)
+        kept = np.flatnonzero(depths.faulty.any(axis=1))
+        return meeting[kept], moving[kept], standing[kept], depths.at(kept)
 
     def _chunks(self, axis: int) -> Iterator[tuple[Ints, Ints]]:
         """Pairs (moving, standing) of bodies whose boxes overlap or are near across the axis, the
@@ -148,48 +144,43 @@ class Finder:
     def _refine(self, moving: Ints, standing: Ints, axis: int, depths: Depths) -> None:
         """Replaces the depths of boxes by those of the bodies where these are no boxes."""
         groups: dict[tuple[bytes, bytes], list[int]] = {}
-        keys: dict[int, bytes] = {}
         both = self.bodies.boxes[moving] & self.bodies.boxes[standing]
         for row in np.flatnonzero(~both).tolist():
-            pair = self._key(int(moving[row]), keys), self._key(int(standing[row]), keys)
+            pair = self._key(int(moving[row])), self._key(int(standing[row]))
             groups.setdefault(pair, []).append(row)
         low = self.bodies.low
         for pair, members in groups.items():
             rows = np.array(members)
-            for differ in (self._rough, self._exact):
-                difference, apart = differ(pair), low[moving[rows]] - low[standing[rows]]
-                depths.finished[rows] = difference.heights(apart).min(axis=1)
-                for side, sign in enumerate(SIGNS):
-                    direction = sign * np.eye(3)[axis]
-                    found = deepest(difference, apart, direction)
-                    depths.path[rows, side], depths.shift[rows, side] = found
-                    further = apart + LAST * direction
-                    depths.graze[rows, side] = deepest(difference, further, direction)[0]
-                rows = rows[depths.at(rows).faulty.any(axis=1)]
-                if not len(rows):
-                    break
-
-    def _rough(self, pair: tuple[bytes, bytes]) -> Difference:
-        """What is known of two shapes: all, if it was needed along another axis."""
-        return self._differences.get(pair) or rough(*(self._polytopes[key] for key in pair))
+            apart = low[moving[rows]] - low[standing[rows]]
+            one, other = (self._shapes[key] for key in pair)
+            if len(one) * len(other) > MANY:
+                depths.put(rows, sought(one, other, apart, axis))
+            else:
+                difference = self._exact(pair)
+                heights, slopes = difference.heights(apart), difference.normals[:, axis]
+                depths.put(rows, depths_of(heights, slopes)[0])
 
     def _exact(self, pair: tuple[bytes, bytes]) -> Difference:
         if pair not in self._differences:
-            self._differences[pair] = exact(*(self._polytopes[key] for key in pair))
+            self._differences[pair] = exact(*map(self._polytope, pair))
         return self._differences[pair]
 
-    def _key(self, body: int, keys: dict[int, bytes]) -> bytes:
-        if body not in keys:
-            vertices, keys[body] = self.bodies.shape(body)
-            if keys[body] not in self._polytopes:
-                self._polytopes[keys[body]] = polytope(vertices)
-        return keys[body]
+    def _polytope(self, key: bytes) -> Polytope:
+        if key not in self._polytopes:
+            self._polytopes[key] = polytope(self._shapes[key])
+        return self._polytopes[key]
+
+    def _key(self, body: int) -> bytes:
+        if body not in self._keys:
+            vertices, key = self.bodies.shape(body)
+            self._keys[body] = key
+            self._shapes.setdefault(key, vertices)
+        return self._keys[body]
 
     def _by_parts(self, meeting: Ints, moving: Ints, standing: Ints, depths: Depths) -> Overlaps:
         """Of all bodies of two parts the deepest."""
         part = self.bodies.part
-        kept = np.flatnonzero(depths.faulty.any(axis=1))
-        order = kept[np.lexsort((part[moving[kept]], part[standing[kept]], meeting[kept]))]
+        order = np.lexsort((part[moving], part[standing], meeting))
         meeting, one, other = meeting[order], part[standing[order]], part[moving[order]]
         depths, first = depths.at(order), np.searchsorted(part, part)
         standing, moving = standing[order], moving[order]
