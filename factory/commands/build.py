@@ -16,6 +16,7 @@ from factory.commands.outputs import writable, writable_folder
 from factory.commands.requests import OutputOptions, ProjectOptions
 from factory.support.collector import collector_paused
 from factory.support.console import emit, say, warning
+from factory.support.errors import printed
 
 if TYPE_CHECKING:
     from factory.export.build import Built
@@ -126,7 +127,7 @@ def _printed(project: Project, built: Built, spent: float) -> dict[str, Any]:
         + (", chosen automatically (--timestep)" if settings.timestep == AUTO else ""),
         str(gained),
     ]
-    warnings = [warning(diagnostic) for diagnostic in layout.product.warnings]
+    warnings = printed([*map(warning, layout.product.warnings)], "warnings")
     return {"document": document, "lines": lines, "warnings": warnings}
 
 

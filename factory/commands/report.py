@@ -18,9 +18,9 @@ from factory.commands.options import (
     PATH,
     RELAY,
     RUNS,
+    SECONDS,
     SOURCE,
     WIP,
-    Number,
     for_a_pag,
 )
 from factory.commands.outputs import writable
@@ -39,7 +39,7 @@ if TYPE_CHECKING:
 @click.option("--units", type=click.IntRange(1, 10_000), default=3, help="Products of the run.")
 @DRAW
 @WIP
-@click.option("--max-time", type=Number(0, min_open=True), help="Stop after this time [s].")
+@click.option("--max-time", type=SECONDS, help="Stop after this time [s].")
 @RUNS
 @FLOOR
 @RELAY

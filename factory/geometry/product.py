@@ -8,6 +8,7 @@ is open, falls back to its convex hull or its box, with a warning that names it.
 from __future__ import annotations
 
 from dataclasses import replace
+from io import BytesIO
 from pathlib import Path
 
 import numpy as np
@@ -26,6 +27,7 @@ from factory.geometry.meshes import Array, Indices, MassProperties, measured, us
 from factory.geometry.solids import Product, Solid, from_mesh, primitive
 from factory.problem.pag import PAG, Assembly
 from factory.support.errors import Diagnostic, InputError
+from factory.support.files import MESH, read_bytes
 
 LATTICE = 0.2
 """Longest edge of the lattice of parts with no geometry [m]."""
@@ -149,6 +151,7 @@ class _Reader:
             position = value_position(node, "mesh")
             hint = "export it again as .obj, .stl, .ply or .glb with triangles"
             why = "its content is no mesh" if isinstance(error, ImportError) else str(error)
+            why = getattr(error, "strerror", None) or why
             message = f"cannot read '{path}': {why}"
             self.errors.append(Diagnostic("BadMesh", message, position, hint))
             return None
@@ -158,7 +161,9 @@ class _Reader:
         with `process`, and stay apart without."""
         import trimesh
 
-        loaded = trimesh.load(self.folder / path, force="mesh", process=process)
+        content = BytesIO(read_bytes(self.folder / path, MESH))
+        kind = Path(path).suffix[1:].lower()
+        loaded = trimesh.load(content, file_type=kind, force="mesh", process=process)
         return np.asarray(loaded.vertices, float) * scale, np.asarray(loaded.faces, np.int64)
 
 

@@ -14,6 +14,7 @@ from factory.importing.labels import file_stem
 from factory.lang.operations import MESHES
 from factory.lang.source import near_file, quoted
 from factory.support.errors import Position
+from factory.support.files import MESH, read_bytes
 
 
 def path_inside(name: str) -> PurePosixPath | None:
@@ -89,7 +90,7 @@ class MeshFolder:
             hint = near_file(str(self.folder), wanted) or "--meshes DIR names another folder"
             self.faults.add("UnknownMesh", message, position, hint)
             return None
-        content = path.read_bytes()
+        content = read_bytes(path, MESH)
         trouble = _trouble(content, path.suffix.lower())
         if trouble:
             hint = "export it again as .obj, .stl, .ply or .glb with triangles"

@@ -11,6 +11,9 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from difflib import get_close_matches
 
+SHOWN = 100
+"""The most diagnostics that are printed at once; the others are counted."""
+
 
 @dataclass(frozen=True, slots=True)
 class Position:
@@ -70,14 +73,18 @@ def _window(source: str, caret: int, width: int = 100) -> tuple[str, int]:
 
 
 class FactoryError(Exception):
-    """What a stage of the factory refuses, as one or more diagnostics. Exit status 2."""
+    """What a stage of the factory refuses, as one or more diagnostics, of which the first SHOWN are
+    printed. Exit status 2."""
 
     exit_status = 2
 
     def __init__(self, diagnostics: Diagnostic | Iterable[Diagnostic]) -> None:
-        many = [diagnostics] if isinstance(diagnostics, Diagnostic) else list(diagnostics)
+        many = [diagnostics] if isinstance(diagnostics, Diagnostic) else diagnostics
         self.diagnostics: tuple[Diagnostic, ...] = tuple(many)
-        super().__init__("\n".join(str(d) for d in self.diagnostics))
+        super().__init__()
+
+    def __str__(self) -> str:
+        return "\n".join(printed(self.diagnostics, "errors"))
 
     def __reduce__(self) -> tuple[type[FactoryError], tuple[tuple[Diagnostic, ...]]]:
         return type(self), (self.diagnostics,)
@@ -97,6 +104,13 @@ class MissingError(FactoryError):
     """Something is missing on this machine; the message says what to install. Exit status 3."""
 
     exit_status = 3
+
+
+def printed(diagnostics: Sequence[Diagnostic], noun: str) -> list[str]:
+    """The texts of the first SHOWN diagnostics, and a line with the number of the others."""
+    more = len(diagnostics) - SHOWN
+    last = [f"... and {more} more {noun}"] if more > 0 else []
+    return [*map(str, diagnostics[:SHOWN]), *last]
 
 
 def did_you_mean(found: str, valid: Sequence[str], noun: str = "") -> str:

@@ -17,6 +17,7 @@ from factory.record.log.blocks import LENGTH, MAGIC, Arrays, bad_log, blocks, un
 from factory.record.log.header import check_header
 from factory.record.log.ticks import check_block, check_course, state_bytes
 from factory.support.errors import InputError
+from factory.support.files import RECORD, head_of, read_bytes
 
 Index = NDArray[np.int32]
 
@@ -76,7 +77,7 @@ def read_log(path: Path | str) -> Log:
     """The log in a file, whole or cut off. Raises InputError (BadLog) where it is not one."""
     path = Path(path)
     try:
-        data = path.read_bytes()
+        data = read_bytes(path, RECORD)
     except OSError as error:
         raise InputError(bad_log(path, f"cannot be read: {error.strerror}")) from error
     if not data.startswith(MAGIC):
@@ -91,11 +92,7 @@ def read_log(path: Path | str) -> Log:
 
 def is_log(path: Path | str) -> bool:
     """Whether a file begins as a log does."""
-    try:
-        with Path(path).open("rb") as file:
-            return file.read(len(MAGIC)) == MAGIC
-    except OSError:
-        return False
+    return head_of(Path(path), len(MAGIC)) == MAGIC
 
 
 def _read(data: memoryview) -> Log:
