@@ -12,7 +12,7 @@ import pytest
 from factory.foreign_nets import pnml_reader, xml_tree
 from factory.lang import load_templates, read_pag
 from factory.support import files
-from factory.support.errors import SHOWN, InputError
+from factory.support.errors import SHOWN, InputError, did_you_mean
 from factory.support.files import MESH, MIB, NET, RECORD, TABLE, TEXT, read_bytes
 from tests.command_line import PAPER, ROOT, Terminal
 
@@ -237,3 +237,70 @@ def test_delays_have_bounds(run: Terminal, here: Path) -> None:
         assert error["message"] == f"p = {value[:20]} is no time from 0 to 1e+09 s".replace(
             "1e300 is", "1e+300 is"
         )
+
+
+def test_messages_and_hints_are_cut(run: Terminal, here: Path) -> None:
+    (here / "n.pnml").write_text(
+        NET_OF.format(
+            f'<place id="p"><initialMarking><text>{"1" * 10**6}</text></initialMarking></place>'
+        )
+    )
+    (here / "p.pag").write_text(f"root = a; a = mate(b, c{'c' * 10**6}); b = atomic();")
+    for file in ("n.pnml", "p.pag"):
+        done = run("check", file, "--json")
+        assert done.status == 2
+        assert len(done.out) < 5_000 and len(done.err) < 5_000
+
+
+def test_very_long_words_are_not_compared() -> None:
+    assert did_you_mean("inspekt", ["inspect"]) == "did you mean 'inspect'?"
+    assert did_you_mean("inspect" * 10**6, ["inspect"]) == "valid names: inspect"
+
+
+def test_references_lead_to_their_node_in_a_step(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A chain of references is walked once, not once from each of its links."""
+    count = 300
+    chain = "".join(f'<referencePlace id="r{i}" ref="r{i + 1}"/>' for i in range(count))
+    net = NET_OF.format(f'{chain}<place id="r{count}"/>')
+    reader = pnml_reader._Reader(xml_tree.XmlDocument("<text>", net.split("\n")))
+    looked_up: list[str] = []
+
+    class Nodes(dict[str, xml_tree.Element]):
+        def __getitem__(self, name: str) -> xml_tree.Element:
+            looked_up.append(name)
+            return super().__getitem__(name)
+
+    reader.nodes = Nodes()
+    reader.net(reader.document.read(net, frozenset()))
+    assert len(looked_up) < 4 * count
+
+
+def test_yaml_is_not_nested_without_end(run: Terminal, here: Path) -> None:
+    (here / "t.yaml").write_text("[" * 20_000)
+    (error,) = run("import", "t.yaml", "-o", "out", "--json").json["errors"]
+    assert error["message"] == "more than 10000 values are nested here"
+
+
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [
+        (b"speed = " + b"9" * 5000, "a number has too many digits"),
+        (b"speed = 1 # \xff", "byte 0xff is not UTF-8 text"),
+        (b"speed = " + b"[" * 5000, "the file is nested too deeply"),
+    ],
+)
+def test_settings_are_refused_in_plain_words(
+    run: Terminal, here: Path, content: bytes, words: str
+) -> None:
+    (here / "p.pag").write_text("root = p; p = atomic();")
+    (here / "factory.toml").write_bytes(content)
+    (error,) = run("check", "p.pag", "--json").json["errors"]
+    assert (error["code"], error["message"]) == ("Syntax", words)
+
+
+def test_a_long_text_in_quotes_takes_little_memory(here: Path) -> None:
+    (here / "p.pag").write_text(f'root = a; a = atomic(mesh = "{"x" * 15_000_000}.obj");')
+    words = f"ulimit -v 2000000; {sys.executable} -m factory check p.pag --json"
+    done = subprocess.run(["bash", "-c", words], capture_output=True, text=True, check=False)
+    assert done.returncode == 2, done.stderr[:1000]
+    assert "there is no mesh file" in done.stdout

@@ -137,8 +137,9 @@ class _Reader:
             ids[name] = element
 
     def _resolve(self, element: Element) -> str:
-        """The id of the node that a reference stands for in the end; of a node, its own."""
-        start, seen = element, set[str]()
+        """The id of the node that a reference stands for in the end; of a node, its own. What it
+        passes on the way then stands for that node at once."""
+        start, seen = element, dict[str, Element]()
         while element.name.startswith("reference"):
             name = element.attributes.get("ref", "")
             kind = start.name.removeprefix("reference").lower()
@@ -146,11 +147,13 @@ class _Reader:
                 what = "stands for itself" if name in seen else f"refers to unknown '{name}'"
                 self.fault(start, f"a <{start.name}> {what}", self._known(name))
                 return ""
-            seen.add(name)
-            element = self.nodes[name]
+            element = seen[name] = self.nodes[name]
             if kind not in element.name.lower():
                 self.fault(start, f"a <{start.name}> refers to a {element.name}", f"name a {kind}")
                 return ""
+        for passed in seen.values():
+            if passed is not element:
+                passed.attributes["ref"] = element.attributes["id"]
         return element.attributes["id"]
 
     def _known(self, name: str) -> str:

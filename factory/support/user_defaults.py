@@ -133,11 +133,14 @@ def read_toml(path: Path, hint: str) -> tuple[str, dict[str, Any]]:
     except UnicodeDecodeError as error:
         words = f"byte 0x{content[error.start]:02x} is not UTF-8 text"
         raise InputError(Diagnostic("Syntax", words, start, hint)) from None
+    except tomllib.TOMLDecodeError as error:
+        raise InputError(_broken(path, text, str(error), hint)) from None
     except RecursionError:
         words = "the file is nested too deeply"
         raise InputError(Diagnostic("Syntax", words, start, hint)) from None
-    except ValueError as error:
-        raise InputError(_broken(path, text, str(error), hint)) from None
+    except ValueError:
+        words = "a number has too many digits"
+        raise InputError(Diagnostic("Syntax", words, start, hint)) from None
 
 
 def _broken(path: Path, text: str, words: str, hint: str) -> Diagnostic:

@@ -86,6 +86,8 @@ def read_log(path: Path | str) -> Log:
         return _read(memoryview(data)[len(MAGIC) :])
     except MemoryError as error:
         raise InputError(bad_log(path, f"takes more memory than there is: {error}")) from error
+    except UnicodeDecodeError as error:
+        raise InputError(bad_log(path, "is damaged: a text in it is not UTF-8")) from error
     except (ValueError, KeyError, IndexError, TypeError, OverflowError, RecursionError) as error:
         raise InputError(bad_log(path, f"is damaged: {error}")) from error
 
