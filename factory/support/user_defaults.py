@@ -126,7 +126,7 @@ def read_toml(path: Path, hint: str) -> tuple[str, dict[str, Any]]:
         content = read_bytes(path, TABLE)
     except OSError as error:
         message = f"'{path}' cannot be read: {error.strerror}"
-        raise InputError(Diagnostic("BadFile", message, start, hint)) from error
+        raise InputError(Diagnostic("BadFile", message, None, hint)) from error
     try:
         text = content.decode("utf-8-sig")
         return text, tomllib.loads(text)
