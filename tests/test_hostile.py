@@ -304,3 +304,11 @@ def test_a_long_text_in_quotes_takes_little_memory(here: Path) -> None:
     done = subprocess.run(["bash", "-c", words], capture_output=True, text=True, check=False)
     assert done.returncode == 2, done.stderr[:1000]
     assert "there is no mesh file" in done.stdout
+
+
+def test_a_named_pipe_is_opened_once(here: Path) -> None:
+    """Its content cannot be had a second time, for the receipt of a build."""
+    os.mkfifo("pipe")
+    words = f"cat {PAPER} > pipe & {sys.executable} -m factory build pipe --mjcf m.xml -q"
+    done = subprocess.run(["bash", "-c", words], timeout=60, capture_output=True, check=False)
+    assert (done.returncode, done.stderr) == (0, b"")
