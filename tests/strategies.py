@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 from factory.problem.pag import PAG, RESERVED, Assembly, Parameter, Value
 from factory.problem.template import Law, Point, Template
+from factory.support.settings import DWELL
 
 LABEL_LETTERS = "abzAZ0189_-.äßλД中é"
 UNARY = ("weld", "inspect", "press", "glue")
@@ -172,7 +173,7 @@ def templates(draw: st.DrawFn) -> Template:
 
 
 def _is_time(name: str, value: Value) -> bool:
-    return isinstance(value, float) and value >= 0 and not name[-1].isdigit()
+    return isinstance(value, float) and 0 <= value <= DWELL and not name[-1].isdigit()
 
 
 @st.composite

@@ -17,6 +17,7 @@ from factory.commands.requests import OutputOptions, ProjectOptions
 from factory.commands.warnings import told
 from factory.support.collector import collector_paused
 from factory.support.console import emit, say, warning
+from factory.support.errors import printed
 
 if TYPE_CHECKING:
     from factory.export.build import Built
@@ -134,7 +135,9 @@ def _printed(project: Project, built: Built, spent: float, wip: int | None) -> d
     ]
     if wip is None and model.wip is not None:
         lines.insert(1, f"parts for at most {model.wip} units inside at once: {POOL_BOUND}")
-    every, brief = ([*map(warning, told(project.warnings, all_))] for all_ in (True, False))
+    every, brief = (
+        printed([*map(warning, told(project.warnings, all_))], "warnings") for all_ in (True, False)
+    )
     return {"document": document, "lines": lines, "all warnings": every, "warnings": brief}
 
 

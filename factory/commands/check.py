@@ -32,6 +32,7 @@ POOLED = 8
 @click.command()
 @SOURCE
 @click.option("--certificate", type=PATH, help="Write the proof here.")
+@click.option("--against", type=PATH, help="Check a proof that --certificate has written.")
 @WIP
 @click.option("--clashes", type=PATH, help="Write a picture of each blocked operation in a folder.")
 @RELAY
@@ -41,21 +42,23 @@ def check(
     given: ProjectOptions,
     out: OutputOptions,
     certificate: Path | None,
+    against: Path | None,
     wip: int | None,
     clashes: Path | None,
 ) -> int:
-    """Parse, compile and prove FILE.pag (or a net in FILE.pnml)."""
+    """Parse, compile and prove FILE.pag (or a net in FILE.pnml); or check its certificate."""
     from factory.study.checking import check_net, check_project
     from factory.support.files import own_names, write_all, write_text
 
     file = given.file
     if is_net(file):
-        for_a_pag(file, "a net in PNML", "certificate")
+        for_a_pag(file, "a net in PNML", "certificate", "against")
     writable(file, certificate)
     writable_folder(clashes)
     with Waiting("reading the shapes and proving", out.silent):
         checked = check_net(file) if is_net(file) else check_project(project_of(given), wip)
     warn(told(checked.warnings, out.verbose), out.silent)
+    proved = None if against is None else _proved(against, checked)
     if clashes is not None:
         files = _pictures(checked, clashes)
         own_names(clashes, files, [file])
@@ -66,10 +69,32 @@ def check(
         proof = document(checked.net, checked.verdict)
         write_text(certificate, json.dumps(proof, ensure_ascii=False) + "\n")
     if out.as_json:
-        emit(checked.as_json())
+        found = {"certificate": {"file": str(against), **proved}} if proved else {}
+        emit({**checked.as_json(), **found})
     elif not out.quiet:
         _describe(checked, out.verbose)
+        if proved:
+            say(f"{against} is a certificate of this net: {_claims(proved)}")
     return 0 if checked.verdict.holds else 1
+
+
+def _proved(certificate: Path, checked: Checked) -> dict[str, bool | None]:
+    """What a certificate of the net that was checked proves (True), or refutes, by property. Raises
+    InputError, and RunError where it is refuted itself."""
+    from factory.export.certificate.listing import CLAIMS
+    from factory.export.proof_file import check_against
+
+    document = check_against(certificate, checked.net, checked.verdict)
+    return {claim: document[claim]["holds"] for claim in CLAIMS}
+
+
+def _claims(proved: dict[str, bool | None]) -> str:
+    """For people: what a certificate shows."""
+    words = {True: "proves", False: "refutes", None: "leaves open"}
+    said = {how: [c.replace("_", " ") for c, v in proved.items() if v is how] for how in words}
+    return "; ".join(
+        f"it {words[how]} {', '.join(claims)}" for how, claims in said.items() if claims
+    )
 
 
 def _pictures(checked: Checked, folder: Path) -> dict[Path, bytes]:

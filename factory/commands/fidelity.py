@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from factory.commands.options import FLOOR, MOTION, OUTPUT, PATH, RELAY, SOURCE, Number
+from factory.commands.options import FLOOR, MOTION, OUTPUT, PATH, RELAY, SECONDS, SOURCE, Number
 from factory.commands.outputs import writable, writable_folder
 from factory.commands.requests import OutputOptions, ProjectOptions
 from factory.commands.warnings import announced
@@ -41,7 +41,7 @@ if TYPE_CHECKING:
     help="Study seed 0 with other timesteps and weld stiffnesses too.",
 )
 @click.option("-o", "--output", type=PATH, help="A folder for a report, or a .json file.")
-@click.option("--max-time", type=Number(0, min_open=True), help="Stop a run after this time [s].")
+@click.option("--max-time", type=SECONDS, help="Stop a run after this time [s].")
 @FLOOR
 @RELAY
 @MOTION

@@ -16,6 +16,7 @@ from click.shell_completion import CompletionItem
 
 from factory.commands.requests import OutputOptions, PictureOptions, ProjectOptions, RunOptions
 from factory.support.errors import Diagnostic, FactoryError, InputError
+from factory.support.settings import LONGEST
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -138,6 +139,10 @@ class Number(click.FloatRange):
         return number
 
 
+SECONDS = Number(0, LONGEST, min_open=True)
+SEEDS = click.IntRange(0, 2**63 - 1)
+
+
 class Timestep(click.ParamType[float | str]):
     """A number, or AUTO."""
 
@@ -184,7 +189,7 @@ RELAY = options(
     ),
     click.option(
         "--cycle",
-        type=Number(0, min_open=True),
+        type=SECONDS,
         help="The cycle time that relays are to reach [s]; as short as they can by default.",
     ),
 )
@@ -193,7 +198,7 @@ WIP = click.option(
 )
 RUNS = gathered(RunOptions, "asked")
 DRAW = options(
-    click.option("--seed", type=click.IntRange(0), default=0, help="Of what jitter draws."),
+    click.option("--seed", type=SEEDS, default=0, help="Of what jitter draws."),
     click.option(
         "--jitter",
         type=Number(0, 0.9),
@@ -219,9 +224,7 @@ RUN = options(
         default=None,
         help="Parts joined for good become one rigid body; by itself for large factories.",
     ),
-    click.option(
-        "--max-time", type=Number(0, min_open=True), help="Stop after this simulated time [s]."
-    ),
+    click.option("--max-time", type=SECONDS, help="Stop after this simulated time [s]."),
     RUNS,
 )
 PICTURE = options(

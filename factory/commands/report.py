@@ -18,9 +18,9 @@ from factory.commands.options import (
     PATH,
     RELAY,
     RUNS,
+    SECONDS,
     SOURCE,
     WIP,
-    Number,
     for_a_pag,
 )
 from factory.commands.outputs import writable
@@ -47,7 +47,7 @@ if TYPE_CHECKING:
 )
 @DRAW
 @WIP
-@click.option("--max-time", type=Number(0, min_open=True), help="Stop after this time [s].")
+@click.option("--max-time", type=SECONDS, help="Stop after this time [s].")
 @RUNS
 @FLOOR
 @RELAY

@@ -67,7 +67,7 @@ class ProjectOptions:
         """What FLOOR and RELAY ask for. Raises InputError (BadValue)."""
         from factory.layout.request import Ground
 
-        floor = None if self.floor is None else pair(self.floor, "--floor", "4x3", float)
+        floor = None if self.floor is None else pair(self.floor, "--floor", "4x3", float, WIDEST)
         return Ground(floor, self.relay, self.cycle)
 
     def project(self) -> Project:
@@ -127,7 +127,7 @@ class PictureOptions:
 
     def area(self) -> tuple[int, int]:
         """Width and height [px]. Raises InputError (BadValue)."""
-        return pair(self.size, "--size", "1280x720", int)
+        return pair(self.size, "--size", "1280x720", int, LARGEST)
 
     def picture(self, parts: Sequence[str] | None = None) -> Picture:
         """The picture that is asked for, whose camera may follow one of the `parts`, or any where
@@ -144,14 +144,18 @@ class PictureOptions:
         return Picture(size, camera, panels=panels, title=self.title)
 
 
-def pair(text: str, option: str, example: str, number: type) -> tuple[Any, Any]:
-    """`4x3` as two positive numbers. Raises InputError (BadValue)."""
+WIDEST, LARGEST = 10**5, 10**5
+"""Upper bounds on the width and depth of a floor [m], and on those of a picture [px]."""
+
+
+def pair(text: str, option: str, example: str, number: type, most: int) -> tuple[Any, Any]:
+    """`4x3` as two positive numbers of at most so much. Raises InputError (BadValue)."""
     try:
         width, depth = (number(word) for word in text.lower().split("x"))
-        if "_" in text or not (0 < width < float("inf") and 0 < depth < float("inf")):
+        if "_" in text or not (0 < width <= most and 0 < depth <= most):
             raise ValueError
     except ValueError:
-        message = f"{option} takes two positive numbers, not '{text}'"
+        message = f"{option} takes two positive numbers up to {most}, not '{text}'"
         raise InputError(
             Diagnostic("BadValue", message, None, f"for example {option} {example}")
         ) from None

@@ -16,6 +16,8 @@ from factory.commands.options import (
     PATH,
     PROJECT,
     RELAY,
+    SECONDS,
+    SEEDS,
     WIP,
     Number,
     gathered,
@@ -67,10 +69,10 @@ class SweepOptions:
 @click.option("--plots", type=PATH, help="Draw the summary into a folder.")
 @click.option("--world", type=click.Choice(["mujoco", "ideal"]), help="As of `run`.")
 @click.option("--units", type=click.IntRange(1, 10**9), help="Products of each run; default: 4.")
-@click.option("--seed", type=click.IntRange(0), help="As of `run`.")
+@click.option("--seed", type=SEEDS, help="As of `run`.")
 @click.option("--jitter", type=Number(0, 0.9), help="As of `run`; default: 0.")
 @WIP
-@click.option("--max-time", type=Number(0, min_open=True), help="Stop a run after this time [s].")
+@click.option("--max-time", type=SECONDS, help="Stop a run after this time [s].")
 @click.option("--fuse/--no-fuse", default=None, help="As of `run`.")
 @gathered(SweepOptions, "runs")
 @PROJECT

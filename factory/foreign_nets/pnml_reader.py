@@ -15,6 +15,7 @@ from factory.nets.marked import MarkedNet
 from factory.nets.petri import PetriNet, Place, Transition
 from factory.support.collector import collector_paused
 from factory.support.errors import Position, did_you_mean
+from factory.support.files import NET
 
 DRAWN = frozenset({"graphics"})
 """Elements that say how a net looks, and are not read."""
@@ -24,6 +25,9 @@ FORM = (
     '<net id="n" type="http://www.pnml.org/version-2009/grammar/ptnet"><page id="p">'
 )
 WEIGHT = "the paper's nets have arcs of weight 1"
+
+SUGGESTIONS = 20
+"""The most unknown nodes that get a suggestion, which takes time."""
 
 _NODES = ("place", "transition", "referencePlace", "referenceTransition")
 _NUMBER = re.compile(r"[0-9]{1,9}")
@@ -44,7 +48,7 @@ def read_pnml(text: str, file: str = "<text>") -> GearNet | MarkedNet:
 def load_net(file: Path) -> GearNet | MarkedNet:
     """The net in a PNML file. Raises InputError as `read_pnml` does, and where the file cannot be
     read."""
-    return read_pnml(read_text(file), str(file))
+    return read_pnml(read_text(file, NET), str(file))
 
 
 class _Reader:
@@ -133,8 +137,9 @@ class _Reader:
             ids[name] = element
 
     def _resolve(self, element: Element) -> str:
-        """The id of the node that a reference stands for in the end; of a node, its own."""
-        start, seen = element, set[str]()
+        """The id of the node that a reference stands for in the end; of a node, its own. What it
+        passes on the way then stands for that node at once."""
+        start, seen = element, dict[str, Element]()
         while element.name.startswith("reference"):
             name = element.attributes.get("ref", "")
             kind = start.name.removeprefix("reference").lower()
@@ -142,14 +147,18 @@ class _Reader:
                 what = "stands for itself" if name in seen else f"refers to unknown '{name}'"
                 self.fault(start, f"a <{start.name}> {what}", self._known(name))
                 return ""
-            seen.add(name)
-            element = self.nodes[name]
+            element = seen[name] = self.nodes[name]
             if kind not in element.name.lower():
                 self.fault(start, f"a <{start.name}> refers to a {element.name}", f"name a {kind}")
                 return ""
+        for passed in seen.values():
+            if passed is not element:
+                passed.attributes["ref"] = element.attributes["id"]
         return element.attributes["id"]
 
     def _known(self, name: str) -> str:
+        if len(self.document.faults) >= SUGGESTIONS:
+            return "name a node of the net"
         return did_you_mean(name, list(self.nodes)[:1000], "nodes")
 
     def _connect(

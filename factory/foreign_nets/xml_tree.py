@@ -8,8 +8,8 @@ from xml.parsers import expat
 
 from factory.support.errors import Diagnostic, InputError, Position
 
-MOST = 20
-"""How many faults are listed."""
+MOST = 8_000_000
+"""The most elements of a document: they take 4 GB."""
 
 
 @dataclass(slots=True)
@@ -63,7 +63,7 @@ class XmlDocument:
     def stop(self) -> None:
         """Raise InputError (BadNet) with the faults noted, if any."""
         if self.faults:
-            raise InputError(self.faults[:MOST])
+            raise InputError(self.faults)
 
     def read(self, text: str, ignored: frozenset[str]) -> Element:
         """The root element of the text, without the elements that are `ignored`.
@@ -91,6 +91,8 @@ class _Builder:
         self.depth = 0  # within elements that are ignored
         self.top = Element("", {}, 0, 0)
         self.stack = [self.top]
+        self.elements = 0
+        self.text: list[str] = []  # of the innermost element, so far
         self.parser = expat.ParserCreate("utf-8", namespace_separator=" ")
         self.parser.buffer_text = True
         self.parser.StartElementHandler = self.start
@@ -103,8 +105,13 @@ class _Builder:
         if self.depth or (len(self.stack) > 1 and local in self.ignored):
             self.depth += 1
             return
+        self.end_text()
         line, column = self.parser.CurrentLineNumber, self.parser.CurrentColumnNumber + 1
         element = Element(local, attributes, line, column)
+        self.elements += 1
+        if self.elements > MOST:
+            self.document.fault(element, f"the net has more than {MOST} elements", "take it apart")
+            self.document.stop()
         self.stack[-1].children.append(element)
         self.stack.append(element)
 
@@ -112,11 +119,18 @@ class _Builder:
         if self.depth:
             self.depth -= 1
         else:
+            self.end_text()
             self.stack.pop()
 
     def data(self, text: str) -> None:
         if not self.depth and not self.stack[-1].children:
-            self.stack[-1].text += text
+            self.text.append(text)
+
+    def end_text(self) -> None:
+        """The text that has come belongs to the innermost element."""
+        if self.text:
+            self.stack[-1].text = "".join(self.text)
+            self.text.clear()
 
     def doctype(self, *_: object) -> None:
         line, column = self.parser.CurrentLineNumber, self.parser.CurrentColumnNumber + 1

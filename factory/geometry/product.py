@@ -37,6 +37,7 @@ from factory.geometry.meshes import (
 from factory.geometry.solids import Product, Solid, from_mesh, primitive
 from factory.problem.pag import PAG, Assembly
 from factory.support.errors import Diagnostic, InputError
+from factory.support.files import MESH, read_bytes
 
 LATTICE = 0.2
 """Longest edge of the lattice of parts with no geometry [m]."""
@@ -136,7 +137,7 @@ class _Reader:
     def _read(self, node: Assembly, path: str, scale: float) -> MassProperties | None:
         name = f"m{len(self._meshes)}"
         try:
-            content, suffix = (self.folder / path).read_bytes(), Path(path).suffix.lower()
+            content, suffix = read_bytes(self.folder / path, MESH), Path(path).suffix.lower()
             key = kept_meshes.key_of(content, suffix, scale)
             kept = kept_meshes.find(key, name)
             if kept is not None:

@@ -30,7 +30,7 @@ array: BRACKET (value ("," value)*)? "]"
 pair: TEXT ":" value
 OPEN: "{"
 BRACKET: "["
-TEXT: /"(?:[^"\\\x00-\x1f]|\\["\\\/bfnrt]|\\u[0-9A-Fa-f]{4})*"/
+TEXT: /"(?:[^"\\\x00-\x1f]++|\\["\\\/bfnrt]|\\u[0-9A-Fa-f]{4})*+"/
 NUMBER: /-?(?:0|[1-9][0-9]*)(?:\.[0-9]+)?(?:[eE][+-]?[0-9]+)?(?![\w.])/
 WORD: /(?:true|false|null)\b/
 %ignore /[ \t\r\n]+/
@@ -39,6 +39,9 @@ WORD: /(?:true|false|null)\b/
 
 JSON_HINT = "JSON has objects { }, lists [ ], texts in double quotes, numbers, true, false and null"
 YAML_HINT = "one YAML document of mappings, sequences and scalars"
+
+DEEPEST = 10_000
+"""The most values of YAML within one another: libyaml takes quadratic time in their number."""
 
 YAML_WORDS = {"true": True, "false": False, "null": None, "~": None, "": None}
 """Plain scalars of YAML that are neither a number, as the PAG language writes it, nor a text."""
@@ -148,6 +151,8 @@ class _YamlNodes:
         """Go on by one event."""
         if kind in ("MappingStartEvent", "SequenceStartEvent"):
             self._check_tag(event)
+            if len(self.open) == DEEPEST:
+                raise self._error(event, f"more than {DEEPEST} values are nested here")
             self.open.append((event, []))
         elif kind == "SequenceEndEvent":
             start, values = self.open.pop()

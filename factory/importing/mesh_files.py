@@ -12,6 +12,7 @@ from factory.importing.labels import file_stem
 from factory.lang.operations import MESHES
 from factory.lang.source import near_file, quoted
 from factory.support.errors import Position
+from factory.support.files import MESH, read_bytes
 
 
 def path_inside(name: str) -> PurePosixPath | None:
@@ -87,7 +88,7 @@ class MeshFolder:
             hint = near_file(str(self.folder), wanted) or "--meshes DIR names another folder"
             self.faults.add("UnknownMesh", message, position, hint)
             return None
-        content = path.read_bytes()
+        content = read_bytes(path, MESH)
         try:
             read_mesh(content, path.suffix.lower())
         except UnreadableMesh as error:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -16,6 +17,7 @@ from factory.lang.words import LABEL_HINT, is_label, is_number
 from factory.problem.pag import RESERVED, Assembly, Parameter
 from factory.problem.template import Template
 from factory.support.errors import Position, did_you_mean
+from factory.support.settings import DWELL
 
 MESHES = (".obj", ".stl", ".ply", ".glb")
 
@@ -42,7 +44,8 @@ class Signature:
 def signature(template: Template) -> Signature:
     """The signature of a template."""
     kinds = dict(GEOMETRY) if template.geometry else {}
-    kinds.update({name: kind_of(default) for name, default in template.parameters})
+    for name, default in template.parameters:
+        kinds[name] = kind_of(default, DWELL if name == template.law.dwell else math.inf)
     return Signature(template.name, len(template.inputs), bool(template.further), kinds)
 
 

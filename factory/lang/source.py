@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -9,7 +10,7 @@ from pathlib import Path
 from lark import Token
 
 from factory.support.errors import Diagnostic, InputError, Position, did_you_mean
-from factory.support.files import LOG
+from factory.support.files import LOG, TEXT, head_of, read_bytes
 
 FILES = 1000
 """The most names of a folder that are compared with a missing one."""
@@ -72,12 +73,14 @@ def where(first: Position, second: Position) -> str:
     return f"in line {first.line}" if first.line != second.line else f"at column {first.column}"
 
 
-def read_text(path: str | os.PathLike[str]) -> str:
-    """The text of a UTF-8 file. Raises InputError (BadFile, Syntax where it is not UTF-8, or Usage
-    for a log)."""
+def read_text(path: str | os.PathLike[str], most: int = TEXT) -> str:
+    """The text of a UTF-8 file of at most so many bytes. Raises InputError (BadFile, Syntax where
+    it is not UTF-8, or Usage for a log)."""
     name = os.fspath(path)
     try:
-        data = Path(name).read_bytes()
+        data = head_of(Path(name), len(LOG))
+        if data != LOG:
+            data = read_bytes(Path(name), most)
         if not data.startswith(LOG):
             return data.decode("utf-8")
     except UnicodeDecodeError as error:
@@ -97,6 +100,8 @@ def _unreadable(name: str, error: Exception) -> Diagnostic:
         message, hint = f"there is no file {quoted(name)}", near_file("", name) or hint
     elif isinstance(error, IsADirectoryError):
         message, hint = f"{quoted(name)} is a folder, not a file", "name a file in it"
+    elif getattr(error, "errno", None) == errno.EFBIG:
+        hint = "take it apart, or check that it is the file that is meant"
     return Diagnostic("BadFile", message, Position(name, 1, 1), hint)
 
 

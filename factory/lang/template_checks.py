@@ -14,6 +14,7 @@ from factory.lang.words import LABEL_HINT, is_label, is_number, number
 from factory.problem.pag import NOPART, RESERVED, Value
 from factory.problem.template import Law, Point, Template
 from factory.support.errors import did_you_mean
+from factory.support.settings import DWELL
 
 _POINT = re.compile(r"([ABS])([0-9]+)(?:([+-])([0-9.]*(?:[eE][+-]?[0-9]+)?)r)?")
 _VARIABLE = re.compile(r"LAB([1-9][0-9]{0,8})")
@@ -151,20 +152,20 @@ class TemplateMaker:
         """A number of seconds, or the name of a parameter that is one."""
         if is_number(found):
             value = number(found)
-            if value is None or value < 0:
-                hint = "write a number of seconds, not negative, or the name of a parameter"
+            if value is None or not 0 <= value <= DWELL:
+                hint = f"write seconds, from 0 to {DWELL:g}, or the name of a parameter"
                 self._bad(f"{quoted(found)} is no time to dwell", found, hint)
             return value
         default = parameters.get(found)
         if "parameters" in self.draft.broken:
             return str(found)
-        if not isinstance(default, float) or default < 0:
+        if not isinstance(default, float) or not 0 <= default <= DWELL:
             what = "is no parameter" if default is None else "is no time to dwell"
             hint = did_you_mean(found, list(parameters))
             if not hint.startswith("did"):
                 hint = f"add the clause: parameters = ( {found} = 1.0 );"
             if default is not None:
-                hint = f"its default is a number of seconds, not negative: {found} = 1.0"
+                hint = f"its default is seconds, from 0 to {DWELL:g}: {found} = 1.0"
             self._bad(f"{quoted(found)} {what}", found, hint)
         return str(found)
 

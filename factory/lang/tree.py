@@ -61,11 +61,12 @@ class TreeCheck:
 
     def _use(self) -> None:
         for node in self.nodes:
+            if node.label in node.inputs:
+                self._report_cycle([node.label])
             for index, label in enumerate(node.inputs):
                 if label == node.label:
-                    if node.inputs.index(label) == index:
-                        self._report_cycle([label])
-                elif label not in self.defined:
+                    continue
+                if label not in self.defined:
                     self._use_undefined(label, node.input_positions[index])
                 elif label in self.users:
                     self._report_second_use(label, node.input_positions[index])

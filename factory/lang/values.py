@@ -72,13 +72,13 @@ GEOMETRY: Mapping[str, Kind] = MappingProxyType(
 SHAPES = ("mesh", "box", "cylinder", "sphere")
 
 
-def kind_of(default: Value) -> Kind:
+def kind_of(default: Value, high: float = math.inf) -> Kind:
     """The kind of a template's parameter, from its default: one >= 0 has no negative values."""
     if isinstance(default, str):
         return Kind(0, f'"{default}"')
     if isinstance(default, tuple):
         return Kind(len(default), "( " + ", ".join(map(repr, default)) + " )")
-    return Kind(1, repr(default), low=0.0 if default >= 0 else -math.inf)
+    return Kind(1, repr(default), low=0.0 if default >= 0 else -math.inf, high=high)
 
 
 def text_of(token: Token) -> str:

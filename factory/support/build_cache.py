@@ -64,12 +64,14 @@ def find(name: str) -> dict[str, Any] | None:
 def keep(
     name: str, inputs: Iterable[Path], outputs: Iterable[Path], document: Mapping[str, Any]
 ) -> None:
-    """Keep the receipt of a build if it can be written and all outputs are plain files."""
-    written = list(outputs)
-    if not written or not all(path.is_file() for path in written):
+    """Keep the receipt of a build if it can be written, and no input or output is a pipe or a
+    device, which could not be read again."""
+    read, written = list(inputs), list(outputs)
+    plain = all(path.is_file() for path in written)
+    if not written or not plain or not all(path.is_file() or path.is_dir() for path in read):
         return
     receipt = {
-        "inputs": {os.path.abspath(path): _digest(path) for path in inputs},
+        "inputs": {os.path.abspath(path): _digest(path) for path in read},
         "outputs": {os.path.abspath(path): _digest(path) for path in written},
         "document": dict(document),
     }

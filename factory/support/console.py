@@ -13,7 +13,7 @@ from dataclasses import replace
 from math import isfinite
 from typing import Any
 
-from factory.support.errors import Diagnostic, FactoryError
+from factory.support.errors import SHOWN, Diagnostic, FactoryError, printed
 
 SCHEMA = 1
 
@@ -62,13 +62,13 @@ def _named() -> Iterator[None]:
 def warn(diagnostics: Iterable[Diagnostic], quiet: bool = False) -> None:
     """Print warnings to stderr: `file:line:col: CODE warning: message`."""
     if not quiet:
-        for diagnostic in diagnostics:
-            print(warning(diagnostic), file=sys.stderr)
+        for text in printed([*map(warning, diagnostics)], "warnings"):
+            print(text, file=sys.stderr)
 
 
-def warning(diagnostic: Diagnostic) -> str:
-    """The text of a diagnostic that is a warning."""
-    return str(replace(diagnostic, message=f"warning: {diagnostic.message}"))
+def warning(diagnostic: Diagnostic) -> Diagnostic:
+    """A diagnostic that says of itself that it is a warning."""
+    return replace(diagnostic, message=f"warning: {diagnostic.message}")
 
 
 def fail(error: FactoryError, as_json: bool) -> int:
@@ -76,10 +76,11 @@ def fail(error: FactoryError, as_json: bool) -> int:
     the exit status."""
     with suppress(OSError):
         if as_json:
-            emit({"errors": [d.as_json() for d in error.diagnostics]})
+            told = {"errors": [d.as_json() for d in error.diagnostics[:SHOWN]]}
+            more = len(error.diagnostics) - SHOWN
+            emit({**told, "errors_left_out": more} if more > 0 else told)
     with suppress(OSError):
-        for diagnostic in error.diagnostics:
-            print(diagnostic, file=sys.stderr)
+        print(error, file=sys.stderr)
     return error.exit_status
 
 

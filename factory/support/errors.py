@@ -11,6 +11,15 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from difflib import get_close_matches
 
+SHOWN = 100
+"""The most diagnostics that are printed at once; the others are counted."""
+
+LONGEST = 1000
+"""The most characters of a message or a hint that are printed."""
+
+WORD = 200
+"""A longer word is not compared with valid ones, which would take memory and time."""
+
 
 @dataclass(frozen=True, slots=True)
 class Position:
@@ -39,12 +48,12 @@ class Diagnostic:
     def __str__(self) -> str:
         """`file:line:col: CODE message`, then the source line with a caret, then the hint."""
         where = f"{self.position}: " if self.position else ""
-        lines = [_one_line(f"{where}{self.code} {self.message}")]
+        lines = [_one_line(f"{where}{self.code} {_cut(self.message)}")]
         if self.position and self.position.text:
             start, caret = _window(self.position.text, self.position.column - 1)
             lines += [f"    {_one_line(start).rstrip()}", f"    {' ' * caret}^"]
         if self.hint:
-            lines.append(f"    {_one_line(self.hint)}")
+            lines.append(f"    {_one_line(_cut(self.hint))}")
         return "\n".join(lines)
 
     def as_json(self) -> dict[str, object]:
@@ -55,9 +64,14 @@ class Diagnostic:
             "line": at.line if at else None,
             "col": at.column if at else None,
             "code": self.code,
-            "message": self.message,
-            "hint": self.hint,
+            "message": _cut(self.message),
+            "hint": _cut(self.hint),
         }
+
+
+def _cut(text: str) -> str:
+    """A text of at most LONGEST characters."""
+    return text if len(text) <= LONGEST else f"{text[: LONGEST - 3]}..."
 
 
 def _one_line(text: str) -> str:
@@ -72,14 +86,18 @@ def _window(source: str, caret: int, width: int = 100) -> tuple[str, int]:
 
 
 class FactoryError(Exception):
-    """What a stage of the factory refuses, as one or more diagnostics. Exit status 2."""
+    """What a stage of the factory refuses, as one or more diagnostics, of which the first SHOWN are
+    printed. Exit status 2."""
 
     exit_status = 2
 
     def __init__(self, diagnostics: Diagnostic | Iterable[Diagnostic]) -> None:
-        many = [diagnostics] if isinstance(diagnostics, Diagnostic) else list(diagnostics)
+        many = [diagnostics] if isinstance(diagnostics, Diagnostic) else diagnostics
         self.diagnostics: tuple[Diagnostic, ...] = tuple(many)
-        super().__init__("\n".join(str(d) for d in self.diagnostics))
+        super().__init__()
+
+    def __str__(self) -> str:
+        return "\n".join(printed(self.diagnostics, "errors"))
 
     def __reduce__(self) -> tuple[type[FactoryError], tuple[tuple[Diagnostic, ...]]]:
         return type(self), (self.diagnostics,)
@@ -107,9 +125,16 @@ class StoppedError(FactoryError):
     exit_status = 130
 
 
+def printed(diagnostics: Sequence[Diagnostic], noun: str) -> list[str]:
+    """The texts of the first SHOWN diagnostics, and a line with the number of the others."""
+    more = len(diagnostics) - SHOWN
+    last = [f"... and {more} more {noun}"] if more > 0 else []
+    return [*map(str, diagnostics[:SHOWN]), *last]
+
+
 def did_you_mean(found: str, valid: Sequence[str], noun: str = "") -> str:
     """A hint that suggests the nearest valid name, or lists what there is (at most twelve)."""
-    near = get_close_matches(found, valid, n=1, cutoff=0.6)
+    near = get_close_matches(found, valid, n=1, cutoff=0.6) if len(found) <= WORD else []
     if near:
         return f"did you mean '{near[0]}'?"
     if not valid:

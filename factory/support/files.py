@@ -1,10 +1,12 @@
-"""Atomic writing: each file is written under another name, then moved into place."""
+"""Reading files within bounds, and writing them atomically, under another name first."""
 
 from __future__ import annotations
 
 import errno
 import os
+import select
 import shutil
+import stat
 from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from hashlib import sha256
@@ -14,6 +16,63 @@ from factory.support.errors import Diagnostic, InputError
 
 LOG = b"factory-log "
 """The first bytes of a log of a run, in every version."""
+
+MIB = 1 << 20
+
+TEXT, TABLE, NET, MESH, RECORD = 32 * MIB, MIB, 256 * MIB, 256 * MIB, 4096 * MIB
+"""Upper bounds on the bytes of a file that is read: a text (PAG, operation, tree, bill, LDraw), a
+table in TOML, a net or a certificate, a mesh, a log. A text takes up to 150 times its bytes of
+memory, a net 15 times. 10^6 labels are 20 MiB of text, and a net of 10,000 parts is 40 MiB."""
+
+PATIENCE = 2.0
+"""Time to wait for the first byte of a pipe that no process has open for writing [s]."""
+
+
+def read_bytes(path: Path, most: int) -> bytes:
+    """The content of a file, or what comes through a pipe: at most so many bytes.
+
+    Raises OSError where it cannot be read. Refused before anything is read are folders, devices and
+    larger files; pipes as soon as more has come, or that nothing writes to.
+    """
+    status = os.stat(path)
+    is_file, is_pipe = stat.S_ISREG(status.st_mode), stat.S_ISFIFO(status.st_mode)
+    if stat.S_ISDIR(status.st_mode):
+        raise IsADirectoryError(errno.EISDIR, "it is a folder", str(path))
+    if not (is_file or is_pipe):
+        raise OSError(errno.ENOTSUP, "it is neither a file nor a pipe", str(path))
+    larger = OSError(errno.EFBIG, f"it is larger than {most // MIB} MiB, the most that is read")
+    if is_file and status.st_size > most:
+        raise larger
+    content: list[bytes] = []
+    left, step = most + 1, max(status.st_size + 1, MIB)
+    with open(path, "rb", buffering=0, opener=_open) as stream:
+        if is_pipe:
+            select.select([stream], [], [], PATIENCE)
+            os.set_blocking(stream.fileno(), True)
+        while left and (chunk := stream.read(min(left, step))):
+            content.append(chunk)
+            left -= len(chunk)
+    if not left:
+        raise larger
+    if is_pipe and not content:
+        raise OSError(errno.EPIPE, "nothing is written to this pipe", str(path))
+    return b"".join(content)
+
+
+def _open(path: str, flags: int) -> int:
+    """Open without waiting for the other end of a pipe."""
+    return os.open(path, flags | os.O_NONBLOCK)
+
+
+def head_of(path: Path, count: int) -> bytes:
+    """The first bytes of a regular file; none where it is something else or cannot be read."""
+    try:
+        if not path.is_file():
+            return b""
+        with path.open("rb") as stream:
+            return stream.read(count)
+    except (OSError, ValueError):
+        return b""
 
 
 NO_ROOM = "check the path, its permissions and the space on the disk"
@@ -104,13 +163,7 @@ def is_net(file: Path) -> bool:
     """Whether a file is meant as PNML: by its ending, or because it begins as XML does."""
     if file.suffix.lower() == ".pnml":
         return True
-    try:
-        if not file.is_file():
-            return False
-        with file.open("rb") as stream:
-            return stream.read(100).lstrip(b"\xef\xbb\xbf \t\r\n").startswith(b"<")
-    except OSError:
-        return False
+    return head_of(file, 100).lstrip(b"\xef\xbb\xbf \t\r\n").startswith(b"<")
 
 
 def user_cache() -> Path:

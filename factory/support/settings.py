@@ -25,6 +25,12 @@ RANGES = {
 }
 """Least and greatest value of each setting; beyond them a run overflows or never ends."""
 
+LONGEST = 1e9
+"""Upper bound on a time that is asked for [s]: 30 years."""
+
+DWELL = 86_400.0
+"""Upper bound on the dwell of an operation [s]: a day."""
+
 AUTO: Literal["auto"] = "auto"
 """The timestep of settings that leave it to the factory."""
 

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from factory.support.errors import Diagnostic, InputError, Position, did_you_mean
+from factory.support.files import TABLE, read_bytes
 from factory.support.settings import RANGES, WHOLE, Settings, is_auto, wrong_type
 
 NAME = "factory.toml"
@@ -80,11 +81,7 @@ def load_defaults(path: Path) -> Defaults:
     """
     if not path.is_file():
         return Defaults(path)
-    try:
-        text = path.read_bytes().decode("utf-8-sig")
-        found = Defaults(path, text, tomllib.loads(text))
-    except (OSError, ValueError, RecursionError) as error:
-        raise InputError(broken_toml(path, error, "see https://toml.io")) from error
+    found = Defaults(path, *read_toml(path, "see https://toml.io"))
     faults = []
     for key, value in found.values.items():
         fault = _fault(key, value)
@@ -121,15 +118,36 @@ def key_position(path: Path, text: str, key: str) -> Position:
     return Position(str(path), 1, 1)
 
 
-def broken_toml(path: Path, error: Exception, hint: str) -> Diagnostic:
-    """The error of tomllib, at the place that it names."""
-    words = getattr(error, "strerror", None) or str(error)
-    if isinstance(error, RecursionError):
+def read_toml(path: Path, hint: str) -> tuple[str, dict[str, Any]]:
+    """A TOML file, and what it says. Raises InputError, with the hint: BadFile where it cannot be
+    read, Syntax where it is no TOML."""
+    start = Position(str(path), 1, 1)
+    try:
+        content = read_bytes(path, TABLE)
+    except OSError as error:
+        message = f"'{path}' cannot be read: {error.strerror}"
+        raise InputError(Diagnostic("BadFile", message, None, hint)) from error
+    try:
+        text = content.decode("utf-8-sig")
+        return text, tomllib.loads(text)
+    except UnicodeDecodeError as error:
+        words = f"byte 0x{content[error.start]:02x} is not UTF-8 text"
+        raise InputError(Diagnostic("Syntax", words, start, hint)) from None
+    except tomllib.TOMLDecodeError as error:
+        raise InputError(_broken(path, text, str(error), hint)) from None
+    except RecursionError:
         words = "the file is nested too deeply"
+        raise InputError(Diagnostic("Syntax", words, start, hint)) from None
+    except ValueError:
+        words = "a number has too many digits"
+        raise InputError(Diagnostic("Syntax", words, start, hint)) from None
+
+
+def _broken(path: Path, text: str, words: str, hint: str) -> Diagnostic:
+    """The error of tomllib, at the place that it names."""
     found = re.search(r" \(at line (\d+), column (\d+)\)", words)
     if found is None:
         return Diagnostic("Syntax", words, Position(str(path), 1, 1), hint)
     line, column = int(found[1]), int(found[2])
-    text = path.read_text("utf-8-sig").splitlines()[line - 1]
-    at = Position(str(path), line, column, text)
+    at = Position(str(path), line, column, text.splitlines()[line - 1])
     return Diagnostic("Syntax", words.replace(found[0], ""), at, hint)

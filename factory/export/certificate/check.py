@@ -23,10 +23,17 @@ from factory.export.certificate.refute import one_way, refute
 
 def check_certificate(document: object) -> list[str]:
     """The faults of a certificate, [] where every claim in it is proved by it."""
+    return list(_told("the certificate", _check(document)))
+
+
+def _told(where: str, faults: Iterator[str]) -> Iterator[str]:
+    """These faults; where looking for them fails, that a part is not of the documented form."""
     try:
-        return list(_check(document))
-    except (KeyError, TypeError, IndexError, ValueError, AttributeError, OverflowError) as error:
-        return [f"the certificate is not of the documented form: {type(error).__name__} {error}"]
+        yield from faults
+    except KeyError as error:
+        yield f"{where} is not of the documented form: {error} is missing"
+    except (TypeError, IndexError, ValueError, AttributeError, OverflowError):
+        yield f"{where} is not of the documented form"
 
 
 def _check(document: Any) -> Iterator[str]:
@@ -39,7 +46,7 @@ def _check(document: Any) -> Iterator[str]:
     yield from faults
     if not faults:
         for claim in CLAIMS:
-            yield from _claim(net, claim, document)
+            yield from _told(claim, _claim(net, claim, document))
 
 
 def _claim(net: Net, claim: str, document: Section) -> Iterator[str]:

@@ -19,6 +19,7 @@ from factory.record.log.header import check_header
 from factory.record.log.ticks import check_block, check_course, state_bytes
 from factory.support.claim import is_claimed
 from factory.support.errors import InputError
+from factory.support.files import RECORD, head_of, read_bytes
 
 Index = NDArray[np.int32]
 
@@ -80,7 +81,7 @@ def read_log(path: Path | str) -> Log:
     """The log in a file, whole or cut off. Raises InputError (BadLog) where it is not one."""
     path = Path(path)
     try:
-        written, data = is_claimed(path), path.read_bytes()
+        written, data = is_claimed(path), read_bytes(path, RECORD)
     except OSError as error:
         raise InputError(bad_log(path, f"cannot be read: {error.strerror}")) from error
     if not data.startswith(MAGIC):
@@ -89,17 +90,15 @@ def read_log(path: Path | str) -> Log:
         return _read(memoryview(data), written)
     except MemoryError as error:
         raise InputError(bad_log(path, f"takes more memory than there is: {error}")) from error
+    except UnicodeDecodeError as error:
+        raise InputError(bad_log(path, "is damaged: a text in it is not UTF-8")) from error
     except (ValueError, KeyError, IndexError, TypeError, OverflowError, RecursionError) as error:
         raise InputError(bad_log(path, f"is damaged: {error}")) from error
 
 
 def is_log(path: Path | str) -> bool:
     """Whether a file begins as a log does."""
-    try:
-        with Path(path).open("rb") as file:
-            return file.read(len(MAGIC)) == MAGIC
-    except OSError:
-        return False
+    return head_of(Path(path), len(MAGIC)) == MAGIC
 
 
 def _read(data: memoryview, written: bool) -> Log:

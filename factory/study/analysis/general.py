@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Iterator
 from dataclasses import dataclass
-from math import isfinite
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +13,8 @@ from factory.nets.marked import MarkedNet, marked
 from factory.study.analysis.slack import Slack, circuits, slacks
 from factory.study.analysis.tables import SHOWN, PrintedTable, cut
 from factory.support.errors import Diagnostic, InputError, did_you_mean
-from factory.support.user_defaults import broken_toml, key_position
+from factory.support.settings import LONGEST
+from factory.support.user_defaults import key_position, read_toml
 
 MOST = 1_000
 """Number of places whose slack is computed; of larger nets, those on the critical circuit."""
@@ -101,14 +100,7 @@ def read_delays(path: Path, net: GearNet | MarkedNet) -> dict[str, float]:
 
     Raises InputError with every fault: broken TOML, an unknown place, a value that is not a time.
     """
-    try:
-        text = path.read_bytes().decode("utf-8-sig")
-        table = tomllib.loads(text)
-    except OSError as error:
-        message = f"'{path}' cannot be read: {error.strerror}"
-        raise InputError(Diagnostic("BadFile", message, None, "check the path")) from error
-    except ValueError as error:
-        raise InputError(broken_toml(path, error, 'write lines as "p1" = 0.5')) from error
+    text, table = read_toml(path, 'write lines as "p1" = 0.5')
     index = marked(net).net.place_index
     faults = []
     for name, value in table.items():
@@ -118,8 +110,8 @@ def read_delays(path: Path, net: GearNet | MarkedNet) -> dict[str, float]:
             faults.append(Diagnostic("BadValue", f"the net has no place '{name}'", where, hint))
         elif isinstance(value, bool) or not isinstance(value, int | float):
             faults.append(Diagnostic("BadValue", f"{name} must be a number", where, EXAMPLE))
-        elif not (isfinite(value) and value >= 0):
-            message = f"{name} = {value:g} is no time"
+        elif not 0 <= value <= LONGEST:
+            message = f"{name} = {value!s:.20} is no time from 0 to {LONGEST:g} s"
             faults.append(Diagnostic("BadValue", message, where, EXAMPLE))
     if faults:
         raise InputError(faults)
