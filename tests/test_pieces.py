@@ -263,6 +263,23 @@ def test_nearly_convex_meshes_are_not_decomposed(tmp_path: Path, library: list[i
     assert len(solid_of(tmp_path, bump).pieces) == 1 and not library
 
 
+def test_a_rod_may_not_be_as_coarse_as_it_is_thick(
+    tmp_path: Path, library: list[int], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A share of its length would be half of its thickness."""
+    given: list[float] = []
+    cut = sys.modules["coacd"].run_coacd
+
+    def run_coacd(mesh: object, threshold: float, **_: object) -> list[tuple[Array, Array]]:
+        given.append(threshold)
+        return cut(mesh)  # type: ignore[no-any-return]
+
+    monkeypatch.setattr(sys.modules["coacd"], "run_coacd", run_coacd)
+    for height in (0.1, 0.6, 2.0):
+        solid_of(tmp_path, trimesh.creation.annulus(0.05, 0.1, height))
+    assert given == pytest.approx([0.05, 0.1 / 3, 0.02], rel=0.01)
+
+
 def test_meshes_are_decomposed_side_by_side(
     tmp_path: Path, library: list[int], monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -27,21 +27,19 @@ from factory.support.files import user_cache, write_bytes
 FULL = 0.98
 """A closed mesh that fills more than this share of its hull collides as its hull."""
 
-CONCAVITY = 0.05
-"""How far, at most, CoACD lets a body differ from its mesh: its `threshold`, in about half the
-longest edge of the mesh's box."""
+CONCAVITY, SLENDER = (0.02, 0.05), 0.1
+"""How far, at most, CoACD lets a body differ from its mesh (its `threshold`), in about half the
+longest edge of the mesh's box: between these, and no more than the last of the middle edge."""
 
 PARAMETERS = {
-    "threshold": CONCAVITY,
-    "mcts_iterations": 60,
+    "mcts_iterations": 30,
     "mcts_max_depth": 2,
     "resolution": 500,
-    "preprocess_mode": "auto",
     "preprocess_resolution": 30,
     "seed": 0,
 }
-"""What CoACD is called with: fewer cuts are tried than it tries by itself, and a mesh that
-intersects itself, which it replaces by triangles on a grid, gets a third of these."""
+"""What else CoACD is called with: it tries fewer cuts than it does by itself, and has a third of
+the triangles where it puts a mesh that intersects itself on a grid."""
 
 LOADING = Lock()
 
@@ -99,7 +97,7 @@ def cache_folder() -> Path:
 
 def _key(mesh: Mesh, release: str) -> str:
     """A digest of what a decomposition depends on."""
-    digest = hashlib.sha256(f"{release} {sorted(PARAMETERS.items())} {SLIVER}".encode())
+    digest = hashlib.sha256(f"{release} {sorted(_parameters(mesh).items())} {SLIVER}".encode())
     for array in (mesh.vertices, mesh.faces):
         digest.update(f" {array.shape} ".encode())
         digest.update(np.ascontiguousarray(array).tobytes())
@@ -112,12 +110,18 @@ def _run_coacd(mesh: Mesh) -> tuple[Array, ...]:
 
     try:
         coacd = _library()
-        bodies = coacd.run_coacd(coacd.Mesh(mesh.vertices, mesh.faces), **PARAMETERS)
+        bodies = coacd.run_coacd(coacd.Mesh(mesh.vertices, mesh.faces), **_parameters(mesh))
         hulls = [trimesh.convex.convex_hull(np.asarray(vertices, float)) for vertices, _ in bodies]
     except Exception:  # CoACD raises anything on a strange mesh
         return ()
     least = SLIVER * sum(float(hull.volume) for hull in hulls)
     return tuple(np.asarray(hull.vertices) for hull in hulls if hull.volume > least)
+
+
+def _parameters(mesh: Mesh) -> dict[str, float]:
+    """What CoACD is called with."""
+    _, middle, longest = np.sort(np.ptp(mesh.vertices, axis=0))
+    return {"threshold": float(np.clip(SLENDER * middle / longest, *CONCAVITY)), **PARAMETERS}
 
 
 def _library() -> Any:
