@@ -3,11 +3,13 @@ several, made by a library for the rest, and kept."""
 
 from __future__ import annotations
 
+import os
 import shutil
 import sys
 from collections.abc import Iterator
 from itertools import pairwise
 from pathlib import Path
+from threading import Barrier, Thread
 from time import process_time
 from types import SimpleNamespace
 
@@ -265,12 +267,105 @@ def test_nearly_convex_meshes_are_not_decomposed(tmp_path: Path, library: list[i
     assert len(solid_of(tmp_path, bump).pieces) == 1 and not library
 
 
+def test_a_rod_may_not_be_as_coarse_as_it_is_thick(
+    tmp_path: Path, library: list[int], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A share of its length would be half of its thickness."""
+    given: list[float] = []
+    cut = sys.modules["coacd"].run_coacd
+
+    def run_coacd(mesh: object, threshold: float, **_: object) -> list[tuple[Array, Array]]:
+        given.append(threshold)
+        return cut(mesh)  # type: ignore[no-any-return]
+
+    monkeypatch.setattr(sys.modules["coacd"], "run_coacd", run_coacd)
+    for height in (0.1, 0.6, 2.0):
+        solid_of(tmp_path, trimesh.creation.annulus(0.05, 0.1, height))
+    assert given == pytest.approx([0.05, 0.1 / 3, 0.02], rel=0.01)
+
+
+def test_meshes_are_decomposed_side_by_side(
+    tmp_path: Path, library: list[int], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Either of two calls of the library ends only once the other has begun; each mesh gets its
+    own pieces, and keeps its name."""
+    monkeypatch.setattr(os, "cpu_count", lambda: 2)
+    both, cut = Barrier(2), sys.modules["coacd"].run_coacd
+
+    def run_coacd(mesh: object, **given: object) -> list[tuple[Array, Array]]:
+        both.wait(10)
+        return cut(mesh, **given)  # type: ignore[no-any-return]
+
+    monkeypatch.setattr(sys.modules["coacd"], "run_coacd", run_coacd)
+    parts = []
+    for number, size in enumerate((0.1, 0.2)):
+        trimesh.creation.annulus(size / 2, size, size).export(tmp_path / f"{number}.obj")
+        parts += [(f"p{number}{k}", "atomic", "", {"mesh": f"{number}.obj"}) for k in range(2)]
+    pag = table_pag("s", ("s", "mate", "p00 p10 p01 p11", {}), *parts)  # type: ignore[arg-type]
+    solids = product_geometry(PAG(pag.root, pag.nodes, folder=str(tmp_path))).solids
+    assert len(library) == 2
+    for number, size in enumerate((0.1, 0.2)):
+        for k in range(2):
+            solid = solids[f"p{number}{k}"]
+            assert solid.mesh is not None and solid.mesh.name == f"m{number}"
+            assert [np.ptp(p, axis=0).max() for p in solid.pieces] == pytest.approx([2 * size] * 2)
+
+
+def test_the_library_is_loaded_with_one_thread(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """With more, its bodies come in the order in which threads happen to end."""
+    (tmp_path / "coacd.py").write_text(
+        "import os\nseen = os.environ['OMP_NUM_THREADS']\nset_log_level = print"
+    )
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.setitem(sys.modules, "coacd", sys)
+    del sys.modules["coacd"]  # and what is loaded in its place goes after the test
+    for before in ("7", None):
+        if before is None:
+            monkeypatch.delenv("OMP_NUM_THREADS")
+        else:
+            monkeypatch.setenv("OMP_NUM_THREADS", before)
+        assert decomposition._library().seen == "1"
+        assert os.environ.get("OMP_NUM_THREADS") == before
+
+
 def test_the_real_library(tmp_path: Path) -> None:
     pytest.importorskip("coacd")
     tube = trimesh.creation.annulus(0.05, 0.1, 0.1, sections=16)
     pieces = solid_of(tmp_path, tube).pieces
     assert len(pieces) > 3
     assert sum(map(hull_volume, pieces)) == pytest.approx(tube.volume, rel=0.1)
+
+
+def test_the_real_library_gives_the_same_bodies_again(tmp_path: Path, cache: Path) -> None:
+    """Whatever the thread did before."""
+    pytest.importorskip("coacd")
+    tube = trimesh.creation.annulus(0.05, 0.1, 0.1, sections=16)
+    other = trimesh.creation.annulus(0.02, 0.1, 0.05, sections=10)
+    found = []
+    for mesh in (tube, other, tube):
+        found.append(decomposition._run_coacd(Mesh("m", mesh.vertices, mesh.faces)))
+    assert all(np.array_equal(a, b) for a, b in zip(found[0], found[2], strict=True))
+
+
+@pytest.mark.skipif(not Path("/proc/self/task").exists(), reason="threads are counted by Linux")
+def test_the_real_library_starts_no_threads() -> None:
+    """A thread that calls it is the only one more, though OpenMP keeps those that it starts."""
+    pytest.importorskip("coacd")
+    tube = trimesh.creation.annulus(0.05, 0.1, 0.1, sections=16)
+    mesh, found = Mesh("m", tube.vertices, tube.faces), list[str]()
+    decomposition._run_coacd(mesh)
+    before = os.listdir("/proc/self/task")
+
+    def do() -> None:
+        decomposition._run_coacd(mesh)
+        found.extend(os.listdir("/proc/self/task"))
+
+    thread = Thread(target=do)
+    thread.start()
+    thread.join()
+    assert len(found) == len(before) + 1
 
 
 # --- in the engine --------------------------------------------------------------------------------

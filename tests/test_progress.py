@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import io
+import os
 import signal
 import subprocess
 import sys
 import time
 from collections.abc import Callable
+from functools import partial
 from itertools import count
 from pathlib import Path
+from threading import Barrier, get_ident
 from types import SimpleNamespace
 
 import pytest
@@ -18,7 +21,7 @@ import factory
 from factory.simulation.request import RunRequest
 from factory.simulation.simulation import Simulation
 from factory.support import progress
-from factory.support.interruption import awaited
+from factory.support.interruption import awaited, side_by_side
 from factory.support.progress import Progress, Waiting
 
 
@@ -114,3 +117,19 @@ def test_what_fails_in_awaited_work_is_raised() -> None:
     assert awaited(lambda: 7) == 7
     with pytest.raises(ValueError, match="no such"):
         awaited(lambda: int("no such"))
+
+
+def test_works_are_done_side_by_side_and_given_in_order(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Either of two ends only once the other has begun; the third is done by one of their
+    threads."""
+    monkeypatch.setattr(os, "cpu_count", lambda: 2)
+    both = Barrier(2)
+
+    def meet(number: int) -> tuple[int, int]:
+        both.wait(60)
+        return number, get_ident()
+
+    found = side_by_side([partial(meet, 1), partial(meet, 2), lambda: (3, get_ident())])
+    assert [number for number, _ in found] == [1, 2, 3]
+    assert len({thread for _, thread in found}) == 2
+    assert side_by_side([]) == []

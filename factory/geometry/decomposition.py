@@ -8,8 +8,11 @@ has its hull. Its results are kept in the user's cache.
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable
 from dataclasses import replace
+from threading import Lock
+from typing import Any
 
 import numpy as np
 
@@ -23,12 +26,21 @@ FOLDER = "pieces"
 FULL = 0.98
 """A closed mesh that fills more than this share of its hull collides as its hull."""
 
-CONCAVITY = 0.02
-"""How far, at most, CoACD lets a body differ from its mesh: its `threshold`, in about half the
-longest edge of the mesh's box."""
+CONCAVITY, SLENDER = (0.02, 0.05), 0.1
+"""How far, at most, CoACD lets a body differ from its mesh (its `threshold`), in about half the
+longest edge of the mesh's box: between these, and no more than the last of the middle edge."""
 
-PARAMETERS = {"threshold": CONCAVITY, "seed": 0, "preprocess_mode": "auto"}
-"""What CoACD is called with."""
+PARAMETERS = {
+    "mcts_iterations": 30,
+    "mcts_max_depth": 2,
+    "resolution": 500,
+    "preprocess_resolution": 30,
+    "seed": 0,
+}
+"""What else CoACD is called with: it tries fewer cuts than it does by itself, and has a third of
+the triangles where it puts a mesh that intersects itself on a grid."""
+
+LOADING = Lock()
 
 SLIVER = 1e-6
 """A body of less than this share of the mesh's volume is left out: the engine refuses flat ones."""
@@ -64,7 +76,7 @@ def _decomposed(mesh: Mesh) -> tuple[Array, ...]:
     not installed or fails, or finds that one will do."""
     if not release("coacd"):
         return ()
-    parameters = sorted(PARAMETERS.items())
+    parameters = sorted(_parameters(mesh).items())
     name = digest(release("coacd"), parameters, SLIVER, mesh.vertices, mesh.faces)
     kept = find(FOLDER, name, PACKED)
     found = _run_coacd(mesh) if kept is None else unpacked(kept)
@@ -78,12 +90,33 @@ def _run_coacd(mesh: Mesh) -> tuple[Array, ...]:
     import trimesh
 
     try:
-        import coacd
-
-        coacd.set_log_level("off")
-        bodies = coacd.run_coacd(coacd.Mesh(mesh.vertices, mesh.faces), **PARAMETERS)
+        coacd = _library()
+        bodies = coacd.run_coacd(coacd.Mesh(mesh.vertices, mesh.faces), **_parameters(mesh))
         hulls = [trimesh.convex.convex_hull(np.asarray(vertices, float)) for vertices, _ in bodies]
     except Exception:  # CoACD raises anything on a strange mesh
         return ()
     least = SLIVER * sum(float(hull.volume) for hull in hulls)
     return tuple(np.asarray(hull.vertices) for hull in hulls if hull.volume > least)
+
+
+def _parameters(mesh: Mesh) -> dict[str, float]:
+    """What CoACD is called with."""
+    _, middle, longest = np.sort(np.ptp(mesh.vertices, axis=0))
+    return {"threshold": float(np.clip(SLENDER * middle / longest, *CONCAVITY)), **PARAMETERS}
+
+
+def _library() -> Any:
+    """CoACD with one thread a mesh: with several its bodies come, and are merged, in the order in
+    which threads happen to end. Its OpenMP looks into the environment when it is loaded."""
+    with LOADING:
+        before = os.environ.get("OMP_NUM_THREADS")
+        os.environ["OMP_NUM_THREADS"] = "1"
+        try:
+            import coacd
+        finally:
+            if before is None:
+                del os.environ["OMP_NUM_THREADS"]
+            else:
+                os.environ["OMP_NUM_THREADS"] = before
+        coacd.set_log_level("off")
+    return coacd

@@ -8,6 +8,8 @@ box, with a warning that names it.
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -38,6 +40,7 @@ from factory.geometry.solids import Product, Solid, from_mesh, primitive
 from factory.problem.pag import PAG, Assembly
 from factory.support.errors import Diagnostic, InputError
 from factory.support.files import MESH, read_bytes
+from factory.support.interruption import side_by_side
 
 LATTICE = 0.2
 """Longest edge of the lattice of parts with no geometry [m]."""
@@ -53,6 +56,7 @@ def product_geometry(pag: PAG) -> Product:
     reader = _Reader(Path(pag.folder))
     leaves = [node for node in pag.postorder() if not node.inputs]
     plain = [node for node in leaves if not _has_shape(node)]
+    reader.read([node for node in leaves if node.parameter("mesh") is not None])
     found = {n.label: reader.solid(n, i) for i, n in enumerate(leaves) if _has_shape(n)}
     solids = {label: solid for label, solid in found.items() if solid is not None}
     lift = max((float(solid.high[2]) for solid in solids.values()), default=0.0)
@@ -102,7 +106,15 @@ class _Reader:
         self.folder = folder
         self.errors: list[Diagnostic] = []
         self.warnings: dict[tuple[str, str], Diagnostic] = {}
-        self._meshes: dict[tuple[str, float], MassProperties | None] = {}
+        self._meshes: dict[tuple[str, float], MassProperties | Diagnostic] = {}
+
+    def read(self, nodes: list[Assembly]) -> None:
+        """Read the meshes of these parts, and mend, decompose and measure them side by side."""
+        first: dict[tuple[str, float], Assembly] = {}
+        for node in nodes:
+            first.setdefault(_file(node), node)
+        works = [self._opened(node, f"m{n}") for n, node in enumerate(first.values())]
+        self._meshes = dict(zip(first, side_by_side(works), strict=True))
 
     def solid(self, node: Assembly, number: int) -> Solid | None:
         """The solid of a part, None where there is an error."""
@@ -124,40 +136,54 @@ class _Reader:
 
     def _mesh(self, node: Assembly) -> MassProperties | None:
         """The mesh of a part as it can be used, None where there is an error."""
-        path, scale = str(node.parameter("mesh")), float(node.parameter("scale", 1.0))  # type: ignore[arg-type]
-        if (path, scale) in self._meshes:
-            return self._meshes[path, scale]
-        found = self._meshes[path, scale] = self._read(node, path, scale)
-        if found and found.remark:
-            said, position = found.remark, value_position(node, "mesh")
+        found, position = self._meshes[_file(node)], value_position(node, "mesh")
+        if isinstance(found, Diagnostic):
+            if found not in self.errors:
+                self.errors.append(found)
+            return None
+        if found.remark:
+            path, said = _file(node)[0], found.remark
             warning = Diagnostic("BadMesh", f"{path} {said.text}", position, said.hint, said.many)
             self.warnings.setdefault((path, said.text), warning)
         return found
 
-    def _read(self, node: Assembly, path: str, scale: float) -> MassProperties | None:
-        name = f"m{len(self._meshes)}"
+    def _opened(self, node: Assembly, name: str) -> Callable[[], MassProperties | Diagnostic]:
+        """What is left to do for a part's mesh once its file is read."""
+        path, scale = _file(node)
         try:
             content, suffix = read_bytes(self.folder / path, MESH), Path(path).suffix.lower()
             key = kept_meshes.key_of(content, suffix, scale)
             kept = kept_meshes.find(key, name)
             if kept is not None:
-                return kept
+                return lambda: kept
             file = read_mesh(content, suffix)
         except (OSError, UnreadableMesh) as error:
             why = error.strerror if isinstance(error, OSError) else error
             message, position = f"cannot read '{path}': {why}", value_position(node, "mesh")
-            self.errors.append(Diagnostic("BadMesh", message, position, ANEW))
-            return None
+            fault = Diagnostic("BadMesh", message, position, ANEW)
+            return lambda: fault
         vertices, faces = file.merged()
         if not np.abs(vertices).max() * scale <= FURTHEST:
-            self.errors.append(too_far(node, "scale", "mesh"))
-            return None
-        mesh, remark = usable(name, vertices * scale, faces)
-        if remark is None:
-            vertices, faces, was = mended(mesh.vertices, mesh.faces)
-            remark = mend_remark(was) if was else None
-            mesh = in_pieces(Mesh(mesh.name, vertices, faces), lambda: _apart(file, scale))
-        return kept_meshes.keep(key, measured(mesh, remark))
+            return partial(too_far, node, "scale", "mesh")
+        return partial(_finished, key, file, scale, name, vertices * scale, faces)
+
+
+def _file(node: Assembly) -> tuple[str, float]:
+    """The file of a part's mesh, and its scale."""
+    return str(node.parameter("mesh")), float(node.parameter("scale", 1.0))  # type: ignore[arg-type]
+
+
+@np.errstate(all="ignore")
+def _finished(
+    key: str, file: MeshFile, scale: float, name: str, vertices: Array, faces: Indices
+) -> MassProperties:
+    """The mesh of a file, its vertices in one place made one, as the engine can use it."""
+    mesh, remark = usable(name, vertices, faces)
+    if remark is None:
+        vertices, faces, was = mended(mesh.vertices, mesh.faces)
+        remark = mend_remark(was) if was else None
+        mesh = in_pieces(Mesh(name, vertices, faces), lambda: _apart(file, scale))
+    return kept_meshes.keep(key, measured(mesh, remark))
 
 
 def _apart(file: MeshFile, scale: float) -> tuple[Array, Indices]:

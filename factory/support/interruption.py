@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import os
 import signal
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future
 from threading import Thread
 from types import FrameType
@@ -32,19 +33,28 @@ def stop_on_signals(handler: Callable[[int, FrameType | None], Any]) -> Mapping[
 
 
 def awaited(work: Callable[[], T]) -> T:
-    """What `work` gives, done in a thread of its own: a long call of the engine, which lets the
-    interpreter go on meanwhile, does not keep signals waiting. Raises as `work` does. Work that is
-    interrupted is left alone, and ends with the program."""
-    done: Future[T] = Future()
+    """What `work` gives, done as `side_by_side` does: a long call of the engine, which lets the
+    interpreter go on meanwhile, does not keep signals waiting. Raises as `work` does."""
+    return side_by_side([work])[0]
+
+
+def side_by_side(works: Sequence[Callable[[], T]]) -> list[T]:
+    """What each of `works` gives, in their order, done in as many threads as there are processors,
+    while the caller hears signals. Raises as the first that fails does. Work that is interrupted is
+    left alone, and ends with the program."""
+    tasks = [(work, Future[T]()) for work in works]
+    left = iter(tasks)
 
     def do() -> None:
-        try:
-            done.set_result(work())
-        except BaseException as error:
-            done.set_exception(error)
+        for work, done in left:
+            try:
+                done.set_result(work())
+            except BaseException as error:
+                done.set_exception(error)
 
-    Thread(target=do, daemon=True).start()
-    return done.result()
+    for _ in range(min(len(tasks), os.cpu_count() or 1)):
+        Thread(target=do, daemon=True).start()
+    return [done.result() for _, done in tasks]
 
 
 class Interruption(Closing):
