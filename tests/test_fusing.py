@@ -261,9 +261,9 @@ def test_large_factories_are_fused_by_themselves(tmp_path: Path) -> None:
     assert not fusing_pays(small.factory, small.product)
     tree = "root = n1;\n" + "".join(f"n{k} = mate(n{2 * k}, n{2 * k + 1});\n" for k in range(1, 64))
     assert fuses(tmp_path, tree + ";\n".join(f"n{k} = atomic()" for k in range(64, 128)))
-    chain = "root = n119;\nn1 = mate(q0, q1);\n"
-    chain += "".join(f"n{k} = mate(n{k - 1}, q{k});\n" for k in range(2, 120))
-    assert not fuses(tmp_path, chain + ";\n".join(f"q{n} = atomic()" for n in range(120)))
+    chain = "root = n239;\nn1 = mate(q0, q1);\n"
+    chain += "".join(f"n{k} = mate(n{k - 1}, q{k});\n" for k in range(2, 240))
+    assert not fuses(tmp_path, chain + ";\n".join(f"q{n} = atomic()" for n in range(240)))
     with pytest.MonkeyPatch.context() as patch:  # convex pieces count, not parts
         patch.setattr("factory.plant.fused_bodies.FUSE_FROM", 1)
         assert fusing_pays(small.factory, small.product)

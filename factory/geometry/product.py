@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
+from threading import Lock
 
 import numpy as np
 
@@ -107,6 +108,7 @@ class _Reader:
         self.errors: list[Diagnostic] = []
         self.warnings: dict[tuple[str, str], Diagnostic] = {}
         self._meshes: dict[tuple[str, float], MassProperties | Diagnostic] = {}
+        self._locks: dict[str, Lock] = {}
 
     def read(self, nodes: list[Assembly]) -> None:
         """Read the meshes of these parts, and mend, decompose and measure them side by side."""
@@ -165,7 +167,8 @@ class _Reader:
         vertices, faces = file.merged()
         if not np.abs(vertices).max() * scale <= FURTHEST:
             return partial(too_far, node, "scale", "mesh")
-        return partial(_finished, key, file, scale, name, vertices * scale, faces)
+        alone = self._locks.setdefault(key, Lock())
+        return partial(_finished, key, alone, file, scale, name, vertices * scale, faces)
 
 
 def _file(node: Assembly) -> tuple[str, float]:
@@ -175,9 +178,23 @@ def _file(node: Assembly) -> tuple[str, float]:
 
 @np.errstate(all="ignore")
 def _finished(
+    key: str,
+    alone: Lock,
+    file: MeshFile,
+    scale: float,
+    name: str,
+    vertices: Array,
+    faces: Indices,
+) -> MassProperties:
+    """The mesh of a file, its vertices in one place made one, as the engine can use it. `alone`:
+    files with one content wait for the first of them."""
+    with alone:
+        return kept_meshes.find(key, name) or _measured(key, file, scale, name, vertices, faces)
+
+
+def _measured(
     key: str, file: MeshFile, scale: float, name: str, vertices: Array, faces: Indices
 ) -> MassProperties:
-    """The mesh of a file, its vertices in one place made one, as the engine can use it."""
     mesh, remark = usable(name, vertices, faces)
     if remark is None:
         vertices, faces, was = mended(mesh.vertices, mesh.faces)

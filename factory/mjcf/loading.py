@@ -2,20 +2,60 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from xml.etree import ElementTree
+
 from factory.mjcf.model import Model
-from factory.support.engine import mujoco
+from factory.support.engine import mujoco, unwarned
 from factory.support.errors import Diagnostic, InputError
 from factory.support.interruption import awaited
+
+MANY = 20_000
+"""A model of more geoms is read in pieces."""
+
+PIECE = 10_000
+"""Elements of a piece."""
 
 
 def load(model: Model) -> mujoco.MjModel:
     """The engine's model of a factory. Raises InputError (BadMesh, BadValue, Engine) where the
     engine refuses it."""
     files = {f"meshes/{name}": content for name, content in model.files.items()}
+    read = _by_pieces if model.xml.count("<geom") > MANY else mujoco.MjModel.from_xml_string
     try:
-        return awaited(lambda: mujoco.MjModel.from_xml_string(model.xml, files))
+        return awaited(lambda: read(model.xml, files))
     except ValueError as error:
         raise InputError(_explained(model, str(error))) from error
+
+
+def _by_pieces(xml: str, files: Mapping[str, bytes]) -> mujoco.MjModel:
+    """The same model to the last byte, read piece by piece. Each element that the engine's reader
+    adds makes it list all that it has read, so that reading is quadratic in the size of a piece."""
+    root = ElementTree.fromstring(xml)
+    world, shared = root.find("worldbody"), [root.find("compiler"), root.find("default")]
+    assert world is not None
+    pieces: list[list[ElementTree.Element]] = [[]]
+    size = 0
+    for body in world.findall("body"):
+        world.remove(body)
+        size += sum(1 for _ in body.iter())
+        pieces[-1].append(body)
+        if size > PIECE:
+            size = 0
+            pieces.append([])
+    spec = mujoco.MjSpec.from_string(_text(root), assets=dict(files))
+    with unwarned():  # that names could clash: here they are those of one model
+        for bodies in pieces:
+            piece = ElementTree.Element("mujoco")
+            piece.extend(part for part in shared if part is not None)
+            ElementTree.SubElement(piece, "worldbody").extend(bodies)
+            child = mujoco.MjSpec.from_string(_text(piece))
+            spec.attach(child, prefix="", frame=spec.worldbody.add_frame())
+        return spec.compile()
+
+
+def _text(root: ElementTree.Element) -> str:
+    return ElementTree.tostring(root, encoding="unicode")
 
 
 def _explained(model: Model, words: str) -> Diagnostic:

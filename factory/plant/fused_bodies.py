@@ -16,7 +16,7 @@ from factory.problem.pag import NOPART
 FUSE_FROM = 40
 """From so many robots on, runs are fused unless told otherwise."""
 
-GEOMS = 40
+GEOMS = 100
 """But not where sub-assemblies would have more convex bodies than this for each part: each has
 those of all that it is made of, so that a chain of n parts has n / 2 for each."""
 

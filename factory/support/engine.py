@@ -8,7 +8,9 @@ module that needs the engine imports it from here: `from factory.support.engine 
 from __future__ import annotations
 
 import sys
-from contextlib import suppress
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 
 from factory.support.environment import environment
 from factory.support.errors import Diagnostic, MissingError
@@ -30,6 +32,17 @@ def _warn(words: str) -> None:
         print(f"engine: {words}", file=sys.stderr)
 
 
+@contextmanager
+def unwarned() -> Iterator[None]:
+    """Warnings of the engine, and of its Python binding, are not printed."""
+    mujoco.set_mju_user_warning(lambda words: None)
+    try:
+        with warnings.catch_warnings(action="ignore"):
+            yield
+    finally:
+        mujoco.set_mju_user_warning(_warn)
+
+
 mujoco.set_mju_user_warning(_warn)
 
-__all__ = ["mujoco"]
+__all__ = ["mujoco", "unwarned"]
