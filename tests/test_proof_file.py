@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 
 from factory.export.certificate.listing import digest
-from factory.export.proof_file import first_difference
+from factory.export.certificate.proof_file import first_difference
 from tests.command_line import PAPER, Done, Terminal
 
 Json = dict[str, Any]

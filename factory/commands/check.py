@@ -82,7 +82,7 @@ def _proved(certificate: Path, checked: Checked) -> dict[str, bool | None]:
     """What a certificate of the net that was checked proves (True), or refutes, by property. Raises
     InputError, and RunError where it is refuted itself."""
     from factory.export.certificate.listing import CLAIMS
-    from factory.export.proof_file import check_against
+    from factory.export.certificate.proof_file import check_against
 
     document = check_against(certificate, checked.net, checked.verdict)
     return {claim: document[claim]["holds"] for claim in CLAIMS}
