@@ -63,8 +63,8 @@ def section(results: dict[str, Any]) -> str:
         [
             "## Products",
             "`factory run`, once each, from the empty factory until the last unit is delivered: no"
-            " steady window. MuJoCo at the timestep that `run` chooses, contact between payloads on, bodies as `run` chooses,"
-            " a pool for the units asked for, jitter 0.",
+            " steady window. MuJoCo at the timestep that `run` chooses, contact between payloads"
+            " on, bodies as `run` chooses, a pool for the units asked for, jitter 0.",
             table(head, rows),
         ]
     )
