@@ -16,8 +16,9 @@ from factory.commands.outputs import writable, writable_folder
 from factory.commands.requests import OutputOptions, ProjectOptions
 from factory.commands.warnings import told
 from factory.support.collector import collector_paused
-from factory.support.console import emit, say, warning
+from factory.support.console import POOL_BOUND, emit, say, warning
 from factory.support.errors import printed
+from factory.support.progress import Waiting
 
 if TYPE_CHECKING:
     from factory.export.build import Built
@@ -63,7 +64,6 @@ def build(
         from factory.export.build import BuildRequest, files_read
         from factory.export.build import build as build_files
         from factory.nets.verify import proved
-        from factory.support.progress import Waiting
 
         project = given.project()
         with Waiting("reading the shapes and laying out", out.silent):
@@ -101,7 +101,6 @@ def _printed(project: Project, built: Built, spent: float, wip: int | None) -> d
     """What a build prints: the document of `--json`, the lines for people, the warnings."""
     from factory.layout.durations import Pace
     from factory.layout.gain import gain
-    from factory.support.console import POOL_BOUND
     from factory.support.settings import AUTO
 
     layout, settings, model = project.layout, project.settings, built.model

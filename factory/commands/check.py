@@ -11,9 +11,9 @@ import click
 from factory.commands.options import OUTPUT, PATH, RELAY, SOURCE, WIP, for_a_pag
 from factory.commands.outputs import writable, writable_folder
 from factory.commands.requests import OutputOptions, ProjectOptions
-from factory.commands.warnings import told
+from factory.commands.warnings import announced
 from factory.support.collector import collector_paused
-from factory.support.console import emit, say, table, warn
+from factory.support.console import emit, say, table
 from factory.support.files import is_net
 from factory.support.progress import Waiting
 
@@ -57,7 +57,7 @@ def check(
     writable_folder(clashes)
     with Waiting("reading the shapes and proving", out.silent):
         checked = check_net(file) if is_net(file) else check_project(project_of(given), wip)
-    warn(told(checked.warnings, out.verbose), out.silent)
+    announced(checked.warnings, out)
     proved = None if against is None else _proved(against, checked)
     if clashes is not None:
         files = _pictures(checked, clashes)

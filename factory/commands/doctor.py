@@ -12,6 +12,7 @@ from factory.commands.options import OUTPUT
 from factory.commands.requests import OutputOptions
 from factory.support.console import emit, say
 from factory.support.errors import FactoryError
+from factory.support.version import release
 
 PACKAGES = (
     "mujoco",
@@ -75,12 +76,9 @@ def _python() -> Finding:
 
 
 def _package(name: str) -> Finding:
-    from importlib.metadata import PackageNotFoundError, version
-
-    try:
-        return Finding(name, True, version(name))
-    except PackageNotFoundError:
-        return Finding(name, False, "not installed", f"pip install {name}")
+    if found := release(name):
+        return Finding(name, True, found)
+    return Finding(name, False, "not installed", f"pip install {name}")
 
 
 def _assets() -> Finding:

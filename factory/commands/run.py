@@ -21,8 +21,8 @@ from factory.commands.requests import (
     RunOptions,
     check_ideal,
 )
-from factory.commands.warnings import told
-from factory.support.console import POOL_BOUND, emit, say, table, warn
+from factory.commands.warnings import announced
+from factory.support.console import POOL_BOUND, emit, say, table
 from factory.support.errors import Diagnostic, InputError, StoppedError
 from factory.support.progress import Progress, Waiting
 
@@ -69,7 +69,7 @@ def run(
     project = given.project()
     with Waiting("reading the shapes and laying out", out.silent):
         layout = project.layout
-    warn(told(project.warnings, out.verbose), out.silent)
+    warnings = announced(project.warnings, out)
     shown.area()
     if asked.world == "ideal":
         check_ideal(asked.fuse, monitor)
@@ -79,7 +79,6 @@ def run(
         document = record.as_json()
         document.pop("schema")
         trouble = [record.trouble.as_json()] if record.trouble else []
-        warnings = [diagnostic.as_json() for diagnostic in project.warnings]
         emit({**document, "warnings": warnings, **({"errors": trouble} if trouble else {})})
     elif not out.quiet:
         summarise(record, layout.factory, out.verbose)

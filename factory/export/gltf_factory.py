@@ -59,7 +59,7 @@ def _row(log: Log, at: str) -> int:
     if not at:
         return -1
     try:
-        row = int(np.searchsorted(log.time, float(at) - 1e-9)) if float(at) >= 0 else len(log)
+        row = log.row_at(float(at)) if float(at) >= 0 else len(log)
     except ValueError:
         row = len(log)
     if row >= len(log):

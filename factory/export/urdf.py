@@ -16,7 +16,7 @@ from xml.etree.ElementTree import Element
 import numpy as np
 
 from factory.export.subject import Subject
-from factory.geometry.meshes import Array, Mesh
+from factory.geometry.meshes import Array, Mesh, hull_mesh
 from factory.geometry.solids import rotation
 from factory.layout.layout import Layout
 from factory.mjcf import names
@@ -146,18 +146,13 @@ class _Writer:
 
     def _mesh(self, geom: int, colliding: bool) -> Element:
         """A mesh as a file; of one that collides the hull, as which it does."""
-        import trimesh
-
         from factory.mjcf.replica import mesh_of
 
-        vertices, faces = mesh_of(self.m, geom)
+        mesh = Mesh("", *mesh_of(self.m, geom))
         name = self.m.mesh(int(self.m.geom_dataid[geom])).name
         name = f"{name}{'.hull' if colliding else ''}.stl"
         if name not in self.files:
-            if colliding:
-                hull = trimesh.convex.convex_hull(vertices)
-                vertices, faces = np.asarray(hull.vertices), np.asarray(hull.faces)
-            self.files[name] = stl(Mesh(name, vertices, faces))
+            self.files[name] = stl(hull_mesh(name, mesh.vertices) if colliding else mesh)
         return Element("mesh", {"filename": f"{self.folder}/{name}"})
 
     def _shape(self, link: Element, tag: str, geom: int, offset: Array, shape: Element) -> Element:

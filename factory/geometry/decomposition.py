@@ -8,7 +8,6 @@ has its hull. Its results are kept in the user's cache.
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable
 from dataclasses import replace
 from threading import Lock
@@ -18,7 +17,9 @@ import numpy as np
 
 from factory.geometry.meshes import Array, Indices, Mesh, is_closed, volume_of
 from factory.geometry.pieces import FLATNESS, convex_bodies, joined
-from factory.support.array_cache import PACKED, digest, find, keep, packed, release, unpacked
+from factory.support.array_cache import PACKED, digest, find, keep, packed, unpacked
+from factory.support.environment import environment
+from factory.support.version import release
 
 FOLDER = "pieces"
 """Where decompositions are kept, in the user's cache."""
@@ -107,16 +108,9 @@ def _parameters(mesh: Mesh) -> dict[str, float]:
 
 def _library() -> Any:
     """CoACD with one thread a mesh: with several its bodies come, and are merged, in the order in
-    which threads happen to end. Its OpenMP looks into the environment when it is loaded."""
-    with LOADING:
-        before = os.environ.get("OMP_NUM_THREADS")
-        os.environ["OMP_NUM_THREADS"] = "1"
-        try:
-            import coacd
-        finally:
-            if before is None:
-                del os.environ["OMP_NUM_THREADS"]
-            else:
-                os.environ["OMP_NUM_THREADS"] = before
+    which threads happen to end. OpenMP reads the number of threads when the library is loaded."""
+    with LOADING, environment("OMP_NUM_THREADS", "1"):
+        import coacd
+
         coacd.set_log_level("off")
     return coacd

@@ -17,6 +17,9 @@ FOLDER = "meshes"
 PACKAGES = ("trimesh", "numpy", "scipy", "coacd")
 """What reads, measures and decomposes meshes."""
 
+UNNAMED = ""
+"""The name of a mesh here: it is that of the part's file in a product."""
+
 KEYS = ("vertices", "faces", "remark", "volume", "centre", "inertia", "hull", *PACKED)
 """The arrays of an entry."""
 
@@ -27,14 +30,14 @@ def key_of(content: bytes, suffix: str, scale: float) -> str:
     return digest(content, suffix, scale, program(Path(__file__).parent, *PACKAGES))
 
 
-def find(key: str, name: str) -> MassProperties | None:
-    """What was found of a mesh, which is to have this name; None where nothing is kept."""
+def find(key: str) -> MassProperties | None:
+    """What was found of a mesh; None where nothing is kept."""
     kept = array_cache.find(FOLDER, key, KEYS)
     if kept is None:
         return None
     remark = Remark(*map(str, kept["remark"])) if len(kept["remark"]) else None
     volume, centre, inertia = float(kept["volume"]), kept["centre"], kept["inertia"]
-    mesh = Mesh(name, kept["vertices"], kept["faces"], unpacked(kept))
+    mesh = Mesh(UNNAMED, kept["vertices"], kept["faces"], unpacked(kept))
     return MassProperties(mesh, remark, volume, centre, inertia, kept["hull"])
 
 

@@ -128,7 +128,7 @@ def usable(name: str, vertices: Array, faces: Indices) -> tuple[Mesh, Remark | N
     if float(np.prod(high - low)) < LEAST_BOX:
         return _box_mesh(name, low, high, np.eye(3)), TINY
     if len(faces) > MOST_FACES:
-        return _hull_mesh(name, vertices), Remark(
+        return _coarse_hull(name, vertices), Remark(
             f"has {len(faces)} triangles; its convex hull is used instead",
             f"meshes have more than {MOST_FACES} triangles: their convex hulls are used",
             f"simplify it to {MOST_FACES} triangles at most",
@@ -156,16 +156,21 @@ def _box_mesh(name: str, low: Array, high: Array, axes: Array) -> Mesh:
     return Mesh(name, (np.asarray(box.vertices) + (low + high) / 2) @ axes, np.asarray(box.faces))
 
 
-def _hull_mesh(name: str, vertices: Array) -> Mesh:
-    """The convex hull, of the vertices moved to a grid if it has too many faces itself."""
+def hull_mesh(name: str, points: Array) -> Mesh:
+    """The convex hull of points (n, 3), its faces turned outwards."""
     import trimesh
 
-    step = float(np.ptp(vertices, axis=0).max()) / 250
-    for points in (vertices, np.unique(np.round(vertices / step), axis=0) * step):
-        hull = trimesh.convex.convex_hull(points)
-        if len(hull.faces) <= MOST_FACES:
-            break
+    hull = trimesh.convex.convex_hull(points)
     return Mesh(name, np.asarray(hull.vertices), np.asarray(hull.faces))
+
+
+def _coarse_hull(name: str, vertices: Array) -> Mesh:
+    """The convex hull, of the vertices moved to a grid if it has too many faces itself."""
+    hull = hull_mesh(name, vertices)
+    if len(hull.faces) <= MOST_FACES:
+        return hull
+    step = float(np.ptp(vertices, axis=0).max()) / 250
+    return hull_mesh(name, np.unique(np.round(vertices / step), axis=0) * step)
 
 
 def is_closed(faces: Indices) -> bool:

@@ -9,9 +9,9 @@ box, with a warning that names it.
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from threading import Lock
 
 import numpy as np
 
@@ -42,6 +42,8 @@ from factory.problem.pag import PAG, Assembly
 from factory.support.errors import Diagnostic, InputError
 from factory.support.files import MESH, read_bytes
 from factory.support.interruption import side_by_side
+
+Work = Callable[[], MassProperties | Diagnostic]
 
 LATTICE = 0.2
 """Longest edge of the lattice of parts with no geometry [m]."""
@@ -108,15 +110,17 @@ class _Reader:
         self.errors: list[Diagnostic] = []
         self.warnings: dict[tuple[str, str], Diagnostic] = {}
         self._meshes: dict[tuple[str, float], MassProperties | Diagnostic] = {}
-        self._locks: dict[str, Lock] = {}
 
     def read(self, nodes: list[Assembly]) -> None:
         """Read the meshes of these parts, and mend, decompose and measure them side by side."""
         first: dict[tuple[str, float], Assembly] = {}
         for node in nodes:
             first.setdefault(_file(node), node)
-        works = [self._opened(node, f"m{n}") for n, node in enumerate(first.values())]
-        self._meshes = dict(zip(first, side_by_side(works), strict=True))
+        opened = {file: self._opened(node) for file, node in first.items()}
+        works = dict(opened.values())
+        found = dict(zip(works, side_by_side([*works.values()]), strict=True))
+        for number, (file, (key, _)) in enumerate(opened.items()):
+            self._meshes[file] = _named(found[key], f"m{number}")
 
     def solid(self, node: Assembly, number: int) -> Solid | None:
         """The solid of a part, None where there is an error."""
@@ -149,26 +153,32 @@ class _Reader:
             self.warnings.setdefault((path, said.text), warning)
         return found
 
-    def _opened(self, node: Assembly, name: str) -> Callable[[], MassProperties | Diagnostic]:
-        """What is left to do for a part's mesh once its file is read."""
+    def _opened(self, node: Assembly) -> tuple[str, Work]:
+        """What is left to do for a part's mesh once its file is read, and what that depends on:
+        files with one content are measured once."""
         path, scale = _file(node)
         try:
             content, suffix = read_bytes(self.folder / path, MESH), Path(path).suffix.lower()
             key = kept_meshes.key_of(content, suffix, scale)
-            kept = kept_meshes.find(key, name)
+            kept = kept_meshes.find(key)
             if kept is not None:
-                return lambda: kept
+                return key, lambda: kept
             file = read_mesh(content, suffix)
         except (OSError, UnreadableMesh) as error:
             why = error.strerror if isinstance(error, OSError) else error
             message, position = f"cannot read '{path}': {why}", value_position(node, "mesh")
             fault = Diagnostic("BadMesh", message, position, ANEW)
-            return lambda: fault
+            return f"{path} {scale}", lambda: fault
         vertices, faces = file.merged()
         if not np.abs(vertices).max() * scale <= FURTHEST:
-            return partial(too_far, node, "scale", "mesh")
-        alone = self._locks.setdefault(key, Lock())
-        return partial(_finished, key, alone, file, scale, name, vertices * scale, faces)
+            return f"{path} {scale}", partial(too_far, node, "scale", "mesh")
+        return key, partial(_finished, key, file, scale, vertices * scale, faces)
+
+
+def _named(found: MassProperties | Diagnostic, name: str) -> MassProperties | Diagnostic:
+    if isinstance(found, Diagnostic):
+        return found
+    return replace(found, mesh=replace(found.mesh, name=name))
 
 
 def _file(node: Assembly) -> tuple[str, float]:
@@ -178,28 +188,14 @@ def _file(node: Assembly) -> tuple[str, float]:
 
 @np.errstate(all="ignore")
 def _finished(
-    key: str,
-    alone: Lock,
-    file: MeshFile,
-    scale: float,
-    name: str,
-    vertices: Array,
-    faces: Indices,
+    key: str, file: MeshFile, scale: float, vertices: Array, faces: Indices
 ) -> MassProperties:
-    """The mesh of a file, its vertices in one place made one, as the engine can use it. `alone`:
-    files with one content wait for the first of them."""
-    with alone:
-        return kept_meshes.find(key, name) or _measured(key, file, scale, name, vertices, faces)
-
-
-def _measured(
-    key: str, file: MeshFile, scale: float, name: str, vertices: Array, faces: Indices
-) -> MassProperties:
-    mesh, remark = usable(name, vertices, faces)
+    """The mesh of a file, its vertices in one place made one, as the engine can use it."""
+    mesh, remark = usable(kept_meshes.UNNAMED, vertices, faces)
     if remark is None:
         vertices, faces, was = mended(mesh.vertices, mesh.faces)
         remark = mend_remark(was) if was else None
-        mesh = in_pieces(Mesh(name, vertices, faces), lambda: _apart(file, scale))
+        mesh = in_pieces(Mesh(mesh.name, vertices, faces), lambda: _apart(file, scale))
     return kept_meshes.keep(key, measured(mesh, remark))
 
 

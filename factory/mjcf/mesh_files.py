@@ -14,7 +14,7 @@ import struct
 import numpy as np
 
 from factory.geometry.insets import inset
-from factory.geometry.meshes import Array, Indices, Mesh
+from factory.geometry.meshes import Array, Indices, Mesh, hull_mesh
 
 CREASE = 31.0
 """Triangles that meet at a smaller angle are shaded as one rounded surface [degrees]."""
@@ -40,7 +40,7 @@ def piece_files(mesh: Mesh) -> list[tuple[str, bytes]]:
     found = []
     for number, vertices in enumerate(mesh.pieces, 1):
         name = f"{mesh.name}.{number}"
-        found.append((f"{name}.stl", stl(_hull(name, vertices))))
+        found.append((f"{name}.stl", stl(hull_mesh(name, vertices))))
     return found
 
 
@@ -54,14 +54,7 @@ def inset_file(mesh: Mesh, number: int, depth: float) -> tuple[str, bytes]:
     """The file of that body: name and content. A mesh without pieces has one, its hull."""
     name = inset_name(mesh, number, depth)
     whole = mesh.pieces[number] if mesh.pieces else mesh.vertices
-    return f"{name}.stl", stl(_hull(name, inset(whole, depth)))
-
-
-def _hull(name: str, vertices: Array) -> Mesh:
-    import trimesh
-
-    hull = trimesh.convex.convex_hull(vertices)
-    return Mesh(name, np.asarray(hull.vertices), np.asarray(hull.faces))
+    return f"{name}.stl", stl(hull_mesh(name, inset(whole, depth)))
 
 
 def stl(mesh: Mesh) -> bytes:

@@ -78,7 +78,8 @@ class Model:
 
     `carried`: what bodies there are, `copies`: how many of each; `masses`: of each label carried
     [kg]; `drives`: of each robot; `insets`: what is taken from the shapes that collide; `wip`: the
-    most units inside at once that they are enough for, None where more never are.
+    most units inside at once that they are enough for, None where more never are; `apart`: the
+    pairs of parts that are `excluded`, each part with the body that brings it to the other.
     """
 
     layout: Layout
@@ -93,6 +94,7 @@ class Model:
     joints: int = 0
     welds: int = 0
     wip: int | None = None
+    apart: tuple[tuple[Inside, Inside], ...] = ()
 
     def __post_init__(self) -> None:
         for name in ("copies", "masses", "files"):
@@ -107,11 +109,6 @@ class Model:
     def excluded(self) -> tuple[Pair, ...]:
         """The pairs of parts between which there is no contact."""
         return self.insets.excluded
-
-    @cached_property
-    def apart(self) -> tuple[tuple[Inside, Inside], ...]:
-        """The same, each part with the body that brings it to the other."""
-        return tuple(self.carried.meeting(self.factory, pair) for pair in self.excluded)
 
     @cached_property
     def bodies(self) -> int:
@@ -176,7 +173,7 @@ def build_model(
     fill(section["option"], timestep=settings.step)
     add_paints(section["asset"])
     insets = insets_of(layout, settings.overlap)
-    apart = [bodies.meeting(factory, pair) for pair in insets.excluded]
+    apart = tuple(bodies.meeting(factory, pair) for pair in insets.excluded)
     files = add_meshes(section["asset"], product, insets)
     add_scene(world, section["statistic"], layout)
     hoists = _hoists(factory, masses, settings)
@@ -193,15 +190,15 @@ def build_model(
     _home(section["keyframe"], layout, actuator)
     if not shown:
         leave_out_what_is_shown(root)
-    fill(section["size"], memory=f"{ARENA + _pairs(root) // 2**20}M")
+    fill(section["size"], memory=f"{ARENA + _broad_phase(root) // 2**20}M")
     ElementTree.indent(root)
     xml = ElementTree.tostring(root, encoding="unicode") + "\n"
     joints = len(factory.robots) + len(hoists) + 1 + sum(copies.values())
     made = Model(layout, settings, bodies, copies, masses, drives, insets, xml, files)
-    return replace(made, joints=joints, welds=len(equality), wip=wip)
+    return replace(made, joints=joints, welds=len(equality), wip=wip, apart=apart)
 
 
-def _pairs(root: Element) -> int:
+def _broad_phase(root: Element) -> int:
     """What the engine's broad phase sets aside [bytes]: two arrays with four bytes for each pair of
     bodies. Only what is written to is taken from the machine's memory."""
     bodies = sum(1 for _ in root.iter("body")) + 1

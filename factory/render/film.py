@@ -6,8 +6,6 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from factory.mjcf.model import product_name
 from factory.record.log import Log
 from factory.record.log.model import model_of
@@ -175,7 +173,7 @@ def _row(log: Log, take: Take, at: When) -> int:
     """The row of a log that a still at that time shows."""
     last = len(log) - 1
     if at != "end":
-        row = int(np.searchsorted(log.time, at - TIE))
+        row = log.row_at(at)
         if row > last:
             raise past_the_end(at, "log", float(log.time[-1]))
         return row

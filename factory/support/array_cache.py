@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from factory.support.files import user_cache, write_bytes
+from factory.support.version import release
 
 MOST = 500_000_000
 """The most bytes that the entries of a folder take together."""
@@ -45,16 +46,6 @@ def program(folder: Path, *packages: str) -> str:
     """A digest of the modules in a folder, and of the versions of packages that they use."""
     modules = [path.read_bytes() for path in sorted(folder.glob("*.py"))]
     return digest(*modules, *map(release, packages))
-
-
-def release(package: str) -> str:
-    """The version of a package, "" where it is not installed."""
-    from importlib.metadata import PackageNotFoundError, version
-
-    try:
-        return version(package)
-    except PackageNotFoundError:
-        return ""
 
 
 def find(folder: str, name: str, keys: Iterable[str]) -> Arrays | None:

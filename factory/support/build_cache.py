@@ -11,11 +11,11 @@ import json
 import os
 from collections.abc import Iterable, Mapping
 from contextlib import suppress
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
 from factory.support.files import user_cache, write_text
+from factory.support.version import release
 
 KEPT = 200
 """The most receipts that are kept; the oldest are removed first."""
@@ -33,10 +33,7 @@ def request(file: Path, wanted: Mapping[str, Any]) -> str:
         for path in own.rglob("*.*")
         if path.suffix in (".py", ".lark", ".xml")
     )
-    versions = []
-    for package in ENGINES:
-        with suppress(PackageNotFoundError):
-            versions.append(f"{package} {version(package)}")
+    versions = [f"{package} {found}" for package in ENGINES if (found := release(package))]
     given = {key: _named(value) for key, value in wanted.items()}
     parts = [_named(file), versions, program, given]
     return hashlib.sha256(json.dumps(parts).encode()).hexdigest()

@@ -17,7 +17,7 @@ from factory.support.errors import SHOWN, Diagnostic, FactoryError, printed
 
 SCHEMA = 1
 
-POOL_BOUND = "more take too many bodies for the engine, unless --wip asks for them"
+POOL_BOUND = "a larger pool of parts has too many bodies for the engine; --wip overrides this"
 """Why the factory bounds the units inside at once."""
 
 STDOUT = "what is printed"

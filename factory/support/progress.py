@@ -105,13 +105,13 @@ class Waiting(ProgressBar):
 
 
 class Progress(ProgressBar):
-    """The bar of a run, which it observes. `seconds`: how long it is expected to take [simulated
-    s]; it tells the time left, and is too long rather than too short."""
+    """The bar of a run, which it observes. `seconds`: a bound on its length [simulated s], from
+    which the time left is told."""
 
     def __init__(self, units: int, quiet: bool = False, seconds: float = 0.0) -> None:
         super().__init__(quiet)
         self.units, self.seconds = units, seconds
-        self.next = 0.0
+        self.last = 0.0
         self.before: int | None = None
 
     def drawn(self) -> tuple[Bar, TaskID]:
@@ -130,29 +130,28 @@ class Progress(ProgressBar):
             return
         if self.before is None:
             self.before = int(world.delivered())
-        now = perf_counter()
+        wall = perf_counter() - self.begin
         made = int(world.delivered()) - self.before
+        is_due = wall >= self.last + (LINES if self.bar is None else PERIOD)
         if self.bar is None:
-            self._line(made, world.time, now - self.begin)
-        elif now >= self.next or made >= self.units:
-            self.next = now + PERIOD
+            if is_due:
+                self.last = wall
+                print(self._line(made, world.time, wall), file=sys.stderr)
+        elif is_due or made >= self.units:
+            self.last = wall
             self.bar.update(
                 self.task,
                 completed=self.seconds if made >= self.units else min(world.time, self.seconds),
                 time=f"{world.time:.1f} s",
                 units=f"{made}/{self.units}",
-                speed=f"{world.time / max(now - self.begin, 1e-9):.1f} x real time",
+                speed=f"{world.time / max(wall, 1e-9):.1f} x real time",
             )
 
-    def _line(self, made: int, time: float, wall: float) -> None:
-        if wall < self.next + LINES:
-            return
-        self.next = wall
+    def _line(self, made: int, time: float, wall: float) -> str:
         left = f", at most {_clock(wall * (self.seconds / time - 1))} left"
-        print(
+        return (
             f"{made} of {self.units} units, {time:.1f} s simulated, {time / wall:.1f} x real time"
-            f"{left if time < self.seconds else ''}",
-            file=sys.stderr,
+            f"{left if time < self.seconds else ''}"
         )
 
 

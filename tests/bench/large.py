@@ -22,8 +22,8 @@ TOWN = (("5935-1-IslandHopper", 6), ("889-1-RadarTruck", 1))
 APART = 0.35
 """Between two of them [m]."""
 
-HAIR = 1e-5
-"""[m]"""
+OFFSET = 1e-5
+"""Between two bricks that a model has in one place [m]."""
 
 
 def town() -> dict[str, Any]:
@@ -41,14 +41,16 @@ def town() -> dict[str, Any]:
 
 def tree(pag: PAG, node: Assembly, number: int, placed: dict[object, int]) -> dict[str, Any]:
     """A sub-assembly with all its parts, whose labels end with a number. Bricks that the model has
-    twice in one place, which `import` refuses, are a hair further up each time."""
+    twice in one place, which `import` refuses, are raised by an offset each time."""
     name = f"{node.label}-{number}"
     if node.inputs:
         return {"name": name, "children": [tree(pag, pag[i], number, placed) for i in node.inputs]}
     given = {p.name: p.value for p in node.parameters}
     mesh, (x, y, z) = Path(str(given.pop("mesh"))).name, given.pop("pos")
-    again = placed[key] = placed.get(key := (mesh, x, y, z, given.get("quat")), -1) + 1
-    return {"name": name, "part": mesh, "at": [x, y, z + HAIR * again], **given}
+    key = mesh, x, y, z, given.get("quat")
+    again = placed.get(key, 0)
+    placed[key] = again + 1
+    return {"name": name, "part": mesh, "at": [x, y, z + OFFSET * again], **given}
 
 
 def measure(quick: bool = False) -> dict[str, Any]:

@@ -50,7 +50,7 @@ CASES: Sequence[tuple[Case, float | None]] = tuple(
 LEAST = 10.0
 """Simulated at least [s] in steady production, and at least one cycle."""
 
-RUNS = 3
+RUNS = 5
 """Processes a case: other load on the machine shows in single ones."""
 
 MEMORY = 1500.0

@@ -28,6 +28,10 @@ ROOM, FOLD = 1 << 30, 1000
 take 5 to 15 times those; one in which 1,000 robots stand still for hours takes 200 times."""
 
 
+ROUNDING = 1e-9
+"""Times that differ by less are one [s]."""
+
+
 @dataclass(frozen=True, slots=True)
 class Ragged:
     """An array for each row i of a log: `values` from starts[i] to ends[i]."""
@@ -69,6 +73,11 @@ class Log:
 
     def __len__(self) -> int:
         return len(self.time)
+
+    def row_at(self, time: float) -> int:
+        """The first row from a time on [s], len(self) after the last. Times may be off by what
+        rounding takes."""
+        return int(np.searchsorted(self.time, time - ROUNDING))
 
     @cached_property
     def events(self) -> tuple[tuple[float, str], ...]:

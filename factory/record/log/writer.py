@@ -9,7 +9,6 @@ import sys
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import asdict
-from importlib.metadata import PackageNotFoundError, version
 from os import SEEK_CUR
 from pathlib import Path
 from typing import Any
@@ -26,6 +25,7 @@ from factory.record.observed import Observed, Recorder
 from factory.support.claim import claimed
 from factory.support.errors import Diagnostic, FactoryError, InputError
 from factory.support.files import unwritten
+from factory.support.version import release
 
 STATES = ("qpos", "qvel", "ctrl")
 
@@ -242,8 +242,5 @@ def _header(
 
 
 def _versions() -> dict[str, str]:
-    found = {}
-    for name in ("klavins-factory", "mujoco", "numpy"):
-        with suppress(PackageNotFoundError):
-            found[name] = version(name)
-    return found
+    names = ("klavins-factory", "mujoco", "numpy")
+    return {name: found for name in names if (found := release(name))}

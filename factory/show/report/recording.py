@@ -81,7 +81,7 @@ class Recording:
         for operation in self.factory.operations:
             event = ends.get(operation.end)
             if event is not None:
-                row = int(np.searchsorted(log.time, log.fired_t[event] - 1e-9))
+                row = log.row_at(log.fired_t[event])
                 yield operation, log.qpos[min(row, len(log) - 1)]
 
 
