@@ -81,6 +81,14 @@ def test_a_log_says_what_happened_to_the_bit(recorded) -> None:
     )
 
 
+def test_a_row_is_found_by_its_time(recorded) -> None:
+    log = read_log(recorded[0])
+    for row, time in enumerate(log.time.tolist()):
+        assert {log.row_at(time), log.row_at(time + 5e-10), log.row_at(time - 5e-10)} == {row}
+    assert log.row_at(log.time[-1] + 1e-3) == len(log)
+    assert log.row_at((log.time[0] + log.time[1]) / 2) == 1
+
+
 def test_the_header_has_all_that_made_the_run(recorded) -> None:
     path, _, _, simulation = recorded
     header = read_log(path).header

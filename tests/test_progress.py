@@ -97,20 +97,30 @@ def test_a_run_takes_no_longer_than_expected(name: str) -> None:
         assert made.run().sim_time_s <= made.duration <= 2 * made.run().sim_time_s + 5
 
 
-def test_a_signal_is_heard_while_the_engine_works(tmp_path: Path) -> None:
-    script = tmp_path / "waits.py"
+@pytest.mark.parametrize(("done", "heard"), [("awaited(work)", True), ("work()", False)])
+def test_a_signal_is_heard_while_the_engine_works(tmp_path: Path, done: str, heard: bool) -> None:
+    """The work computes for minutes outside the interpreter, as the engine does. The second case
+    shows that a signal then waits without `awaited`."""
+    script = tmp_path / "works.py"
     script.write_text(
-        "import time\n"
+        "from hashlib import pbkdf2_hmac\n"
         "from factory.support.interruption import awaited\n"
-        "try:\n    print('begun', flush=True)\n    awaited(lambda: time.sleep(60))\n"
+        "def work():\n    pbkdf2_hmac('sha256', b'x', b'y', 500_000_000)\n"
+        f"try:\n    print('begun', flush=True)\n    {done}\n"
         "except KeyboardInterrupt:\n    print('heard', flush=True)\n"
     )
     command = [sys.executable, str(script)]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as child:
         assert child.stdout is not None and child.stdout.readline() == "begun\n"
+        time.sleep(0.5)
         child.send_signal(signal.SIGINT)
-        assert child.stdout.readline() == "heard\n"
-        assert child.wait(10) == 0
+        if heard:
+            assert child.stdout.readline() == "heard\n"
+            assert child.wait(10) == 0
+        else:
+            with pytest.raises(subprocess.TimeoutExpired):
+                child.wait(2)
+            child.kill()
 
 
 def test_what_fails_in_awaited_work_is_raised() -> None:
