@@ -84,9 +84,19 @@ class Project:
 
     @property
     def warnings(self) -> tuple[Diagnostic, ...]:
-        """What is wrong with the geometry of its parts, and what is blocked."""
+        """What is wrong with the geometry of its parts, what is blocked, and what no hand can
+        hold."""
         product = () if is_plain(self.pag) else self.product.warnings
-        return (*product, *(self.matings.warnings if self.matings else ()))
+        return (*product, *(self.matings.warnings if self.matings else ()), *self.no_grips)
+
+    @cached_property
+    def no_grips(self) -> tuple[Diagnostic, ...]:
+        """What no hand can hold, where hands are chosen; nothing for a product of default boxes."""
+        if not (self.settings.hands and is_shaped(self.pag)):
+            return ()
+        from factory.layout.hands.choosing import no_grips
+
+        return no_grips(self.plain, self.product)
 
     @cached_property
     def plain(self) -> Factory:

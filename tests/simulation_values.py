@@ -86,9 +86,10 @@ def states(simulation: Simulation, tick: Callable[[], object], ticks: int) -> li
 
 
 def gone_wild(simulation: Simulation, seed: int) -> Callable[[], None]:
-    """After a second some robots run wherever they like, and through what rests there; gives what
-    a tick is from then on."""
+    """After a second some robots run wherever they like, past their end stops, and through what
+    rests there; gives what a tick is from then on."""
     world, rng = simulation.physical, np.random.default_rng(seed)
+    world.m.jnt_limited[:] = False
     for _ in range(100):
         simulation.supervisor.step()
     axes = rng.choice(world.motion.axes.tray, min(6, world.motion.axes.tray), replace=False)

@@ -27,7 +27,7 @@ from pag_values import SHAPES
 from factory.layout.certificate import ALWAYS, KINDS, PAYLOAD_BODY, STATIONS, Certificate, Region
 from factory.layout.clearance import _Search, certify, separation
 from factory.layout.crossings import touching
-from factory.layout.dimensions import PAYLOADS
+from factory.layout.dimensions import PAYLOADS, SIDE
 from factory.layout.layout import Layout
 
 
@@ -87,7 +87,8 @@ def every_pair(document: dict[str, Any]) -> list[tuple[Any, Any]]:
         if one["robot"] == other["robot"] and "outfeed" in (one["of"], other["of"]) and not made:
             continue
         lower, upper = sorted((one["z"], other["z"]))
-        if "boom" in (one["of"], other["of"]) and upper[0] - lower[1] >= c:
+        raised = {"boom", "housing"} & {one["of"], other["of"]}
+        if raised and upper[0] - lower[1] >= c:
             continue
         coupled = one["operation"] is not None or other["operation"] is not None
         pair = tuple(sorted((one["robot"], other["robot"])))
@@ -136,7 +137,7 @@ def test_a_guidepath_shortened_by_30_mm() -> None:
         name = layout.factory.robots[robot].name
         found = certify(shortened(layout, robot, 0.03))
         assert not found.holds, name
-        assert max(fault.lacking for fault in found.faults) >= 0.029
+        assert max(fault.lacking for fault in found.faults) >= 0.029 - SIDE
     alone = with_path(layout, 2, travel=layout.guidepaths[2].travel - 0.03)
     broken(alone, "ends 30.0 mm away from the junction of 'sub1' on r3's guidepath")
 
@@ -144,7 +145,7 @@ def test_a_guidepath_shortened_by_30_mm() -> None:
 def test_a_fault_says_where_and_by_how_much() -> None:
     found = certify(shortened(paper_layout(), 4, 0.012))
     fault = next(fault for fault in found.faults if set(fault.robots) == {"r5", "r3"})
-    assert fault.lacking == pytest.approx(0.012, abs=0.0015)
+    assert fault.lacking == pytest.approx(0.012, abs=0.0015 + SIDE)
     assert fault.layer == "payloads"
     assert {"part1", "sub1"} & set(fault.labels)
     assert len(fault.positions) == 2
@@ -268,12 +269,13 @@ def test_faults_are_listed_up_to_a_limit() -> None:
 # --- as short as clearance allows, and in linear time --------------------------------------------
 
 
-def test_most_guidepaths_cannot_be_2_mm_shorter() -> None:
+def test_most_guidepaths_cannot_be_5_mm_shorter() -> None:
+    """A robot keeps the width of its feeder's housing free all along its path: 2 mm a side."""
     tight = total = 0
     for layout in (paper_layout(), row_of_inserts(6), *many_layouts(14, range(12))):
         for robot in robots_with_payload(layout):
             total += 1
-            tight += not certify(shortened(layout, robot, 0.002)).holds
+            tight += not certify(shortened(layout, robot, 0.001 + 2 * SIDE)).holds
     assert tight >= 0.75 * total, f"{tight} of {total}"
 
 

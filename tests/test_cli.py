@@ -38,14 +38,20 @@ RUN: dict[str, Any] = {
     **dict.fromkeys(("unintended_contacts", "engine_warnings"), int),
     **dict.fromkeys(("sim_time_s", "wall_time_s", "physics_time_s"), NUMBER),
     **dict.fromkeys(("supervisor_time_s", "realtime_factor", "predicted_cycle_time_s"), NUMBER),
-    **dict.fromkeys(("handoff_gap_max_mm", "weld_residual_max_mm"), NUMBER),
+    **dict.fromkeys(("handoff_gap_max_mm", "grip_gap_max_mm", "weld_residual_max_mm"), NUMBER),
     "product_error_max_mm": NUMBER,
     "cycle_time_s": MAYBE,
     "refines_net": bool,
     "events": list,
 }
 OF_PHYSICS = [
-    *("physics_time_s", "handoffs", "handoff_gap_max_mm", "weld_residual_max_mm"),
+    *(
+        "physics_time_s",
+        "handoffs",
+        "handoff_gap_max_mm",
+        "weld_residual_max_mm",
+        "grip_gap_max_mm",
+    ),
     *("product_error_max_mm", "unintended_contacts", "engine_warnings"),
 ]
 

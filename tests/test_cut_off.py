@@ -105,7 +105,8 @@ def test_a_run_that_makes_its_units_is_not_cut_off(run: Terminal, whole: Path, o
     log = read_log(whole)
     assert log.complete and log.cut_off is None
     done = run("monitor", whole)
-    assert done.status == 0 and done.out.endswith("; they explain the run\n") and not done.err
+    assert done.status == 0 and not done.err
+    assert done.out.endswith("; they explain the run\nthe run succeeded\n")
     assert run("monitor", whole, "--json").json["cut_off"] is None
     assert run("report", whole, "-o", out / "a.html").status == 0
     words = Page((out / "a.html").read_text("utf-8")).words

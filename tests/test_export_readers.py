@@ -179,7 +179,7 @@ def dxf_by_ezdxf(folder: Path) -> None:
     found = Counter((e.dxf.layer, e.dxftype()) for e in document.modelspace())
     assert found["GUIDEPATHS", "LINE"] == len(layout.guidepaths)
     assert found["ROBOTS", "LWPOLYLINE"] == 2 * len(layout.guidepaths)
-    assert found["FEEDERS", "LWPOLYLINE"] == 2 * len(layout.factory.leaves)
+    assert found["FEEDERS", "LWPOLYLINE"] == 3 * len(layout.factory.leaves)
     (floor,) = document.modelspace().query('LWPOLYLINE[layer=="FLOOR"]')
     corners = np.array(floor.get_points("xy")) / 1e3
     xlo, xhi, ylo, yhi = layout.floor

@@ -51,13 +51,13 @@ def test_it_is_to_scale() -> None:
     layout = paper_layout()
     root = drawn(layout)
     floor = next(r for r in root.iter(f"{SVG}rect") if r.get("class") == "floor")
-    assert float(floor.get("width", 0)) == pytest.approx(887.2, abs=0.11)
-    assert float(floor.get("height", 0)) == pytest.approx(528, abs=0.11)
+    assert float(floor.get("width", 0)) == pytest.approx(627.2, abs=0.11)
+    assert float(floor.get("height", 0)) == pytest.approx(530, abs=0.11)
     dots = [r for r in group(root, "robots") if r.get("class") in ("dot", "tool")]
     assert all(float(dot.get("width", 0)) == 60 for dot in dots)
-    assert "0.887 m" in texts(group(root, "sheet"))
-    assert "0.528 m" in texts(group(root, "sheet"))
-    assert "6 robots, 3 parts, floor 0.47 m²" in texts(group(root, "sheet"))
+    assert "0.627 m" in texts(group(root, "sheet"))
+    assert "0.530 m" in texts(group(root, "sheet"))
+    assert "6 robots, 3 parts, floor 0.33 m²" in texts(group(root, "sheet"))
 
 
 def test_nothing_sticks_out_of_the_page() -> None:

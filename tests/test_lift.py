@@ -102,8 +102,8 @@ def test_what_a_lift_serves_is_made_at_its_height() -> None:
     assert up[inside] == factory.strokes[inside] > 0
     assert up[robot["f2"]] == up[inside]
     assert up[ball] == up[inside] + factory.strokes[ball]
-    assert layout.feeder("f2").height == pytest.approx(
-        layout.feeder("f1").height + up[inside] + 0.0105, abs=1e-9
+    assert layout.feeder("f2").low == pytest.approx(
+        layout.feeder("f1").low + up[inside] + 0.0105, abs=1e-9
     )
 
 

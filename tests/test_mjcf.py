@@ -173,7 +173,7 @@ def test_names_carry_meaning(paper: Layout, tmp_path: Path) -> None:
 def test_robots_come_before_parts(paper: Layout, tmp_path: Path) -> None:
     m = compiled(physical_model(paper), tmp_path)
     kinds = [names.kind(m.body(int(b)).name) for b in m.dof_bodyid]
-    assert kinds == sorted(kinds, key=["robot", "outfeed", "part"].index)
+    assert kinds == sorted(kinds, key=["robot", "outfeed", "feeder", "part"].index)
 
 
 def principal_axis(m: mujoco.MjModel, seen: np.ndarray) -> np.ndarray:
@@ -203,7 +203,8 @@ def test_bodies_that_collide_have_no_geoms_that_are_only_shown(
     m = compiled(physical_model(paper, 1), tmp_path)
     collides = (m.geom_contype | m.geom_conaffinity) != 0
     boxed = ((m.body_contype | m.body_conaffinity) != 0)[m.geom_bodyid]
-    assert collides.sum() == 3 * 6 + 2 * 3 + 1 + 1 + 3  # robots, feeders, outfeed, floor, parts
+    robots, feeders, outfeed = 3 * 6, (3 + 4 + 1) * 3, 3 + 6 + 2
+    assert collides.sum() == robots + feeders + outfeed + 1 + 3  # and the floor, and parts
     assert (boxed == collides).all()
 
 
@@ -219,7 +220,7 @@ def test_a_weld_for_every_pair_that_can_be_joined(tmp_path: Path, text: str) -> 
                 for part in made.contents[label]:
                     assert (names.carriage(made.robots[robot].name), part) in joined
     for part in made.contents[made.pag.root]:
-        assert (names.feeder(part), part) in joined
+        assert (names.slider(part), part) in joined
         assert (names.OUTFEED_TRAY, part) in joined
 
 

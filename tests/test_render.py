@@ -242,8 +242,10 @@ def test_the_factory_fills_pictures_of_any_shape(layout, tmp_path: Path, size, c
     picture = iio.imread(tmp_path / "a.png").astype(int)
     floor = np.median(picture.reshape(-1, 3), axis=0)
     rows, columns = np.nonzero(np.abs(picture - floor).sum(axis=-1) > 90)
-    tall, wide = np.ptp(rows) / size[1], np.ptp(columns) / size[0]
-    assert max(tall, wide) > 0.85
+    framing = Framing(size[0] / size[1])  # its margins are fractions of the height
+    tall = np.ptp(rows) / size[1] / (1 - framing.below - framing.above)
+    wide = np.ptp(columns) / size[1] / (framing.aspect - 2 * framing.beside)
+    assert max(tall, wide) > 0.91
 
 
 @given(

@@ -35,6 +35,7 @@ from factory.simulation.simulation import Simulation
 from factory.support.errors import InputError
 from tests.command_line import PAPER, Terminal, files_in
 from tests.opengl import needs_gl
+from tests.pag_texts import TEMPLATES
 from tests.strategies import random_pag_text
 
 EXAMPLES = Path(__file__).parent.parent / "examples"
@@ -296,11 +297,27 @@ def test_a_part_is_followed_from_its_feeder_to_the_dropoff(fuse: bool) -> None:
 # Cameras, areas, words.
 
 
+BOX = read_pag("root = all; all = mate(lid, box); lid = atomic(); box = atomic()", TEMPLATES)
+
+
+def test_cameras_may_look_where_a_label_is_taken() -> None:
+    for label in ("lid", "all"):
+        assert camera_named(f"handover:{label}", BOX) == f"handover:{label}"
+    assert camera_named("handover:anything") == "handover:anything"
+    with pytest.raises(InputError) as caught:
+        camera_named("handover:al", BOX)
+    diagnostic = caught.value.diagnostics[0]
+    assert diagnostic.message == "there is no label 'al'"
+    assert diagnostic.hint == "did you mean 'all'? valid labels: all, lid, box"
+
+
 def test_cameras_may_follow_a_part() -> None:
-    assert camera_named("part:lid", ["lid", "box"]) == "part:lid"
+    assert camera_named("part:lid", BOX) == "part:lid"
     assert camera_named("part:anything") == "part:anything"
     with pytest.raises(InputError, match=r"there is no part 'lod'\n.*did you mean 'lid'"):
-        camera_named("part:lod", ["lid", "box"])
+        camera_named("part:lod", BOX)
+    with pytest.raises(InputError, match="there is no part 'all'"):
+        camera_named("part:all", BOX)
     with pytest.raises(InputError, match="did you mean 'orbit'"):
         camera_named("orbt")
 
@@ -495,11 +512,11 @@ def test_a_still_of_a_time_that_does_not_come_is_not_written(tmp_path: Path) -> 
 
 
 def test_a_wrong_camera_lists_the_right_ones() -> None:
-    every = "valid cameras: overview, orbit, top, product, part:LABEL"
+    every = "valid cameras: overview, orbit, top, product, part:LABEL, handover:LABEL"
     for name, hint in (("orbt", f"did you mean 'orbit'? {every}"), ("zzz", every)):
         with pytest.raises(InputError) as caught:
             camera_named(name)
         assert caught.value.diagnostics[0].hint == hint
     with pytest.raises(InputError) as caught:
-        camera_named("part:lod", ["lid", "box"])
+        camera_named("part:lod", BOX)
     assert caught.value.diagnostics[0].hint == "did you mean 'lid'? valid parts: lid, box"

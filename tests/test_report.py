@@ -117,7 +117,8 @@ def test_every_view_has_every_robot_label_transition_and_place(made: Page, recor
 
 
 def test_what_is_only_shown_is_drawn_and_linked_too(made: Page, recording) -> None:
-    """Fingers on the floor plan and in 3-D with their robots; caps of feeders with their parts."""
+    """Fingers on the floor plan and in 3-D with their robots; feeders, their sliders and rods with
+    their parts."""
     robots, leaves = recording.factory.robots, recording.factory.leaves
     styles = [a.get("class") for tag, a in made.tags if tag == "polygon"]
     assert styles.count("arm") == 2 * len(robots)
@@ -125,9 +126,14 @@ def test_what_is_only_shown_is_drawn_and_linked_too(made: Page, recording) -> No
     things = made.data["scene"]["things"]
     seen = [t["robot"] for t in things if "robot" in t]
     assert all(seen.count(robot.index) >= 3 for robot in robots)  # rail, carriage, shell
-    labels = labels_of(recording.factory)
-    still = [t["label"] for t in things if t["body"] == 0 and "label" in t]
-    assert sorted(still) == sorted(labels[leaf.label] for leaf in leaves)
+    labels, m = labels_of(recording.factory), recording.motion.m
+    theirs = [(m.body(t["body"]).name, t["label"]) for t in things if "label" in t]
+    feeders = {pair for pair in theirs if pair[0].startswith("feeder/")}
+    assert feeders == {
+        (f"feeder/{leaf.label}{body}", labels[leaf.label])
+        for leaf in leaves
+        for body in ("", "/slider", "/rod")
+    }
 
 
 def test_the_scale_bar_is_beneath_the_robots(recording) -> None:
@@ -212,7 +218,7 @@ def _exceeded(figures: Mapping[str, float | None]) -> dict[str, float | None]:
 
 def test_a_good_run_has_good_figures(recording) -> None:
     found = fidelity(recording)
-    assert found.refines and found.monitor is not None and found.monitor.refines_net
+    assert found.verdict.refines and found.monitor is not None and found.monitor.refines_net
     figures = found.figures
     assert not _exceeded(figures)
     assert figures["handoffs"] == 22
@@ -233,7 +239,8 @@ def test_planted_faults_show_in_the_figures(recording) -> None:
     assert bad["weld_residual_max_mm"] == pytest.approx(2, abs=0.2)
     assert bad["tracking_error_max_mm"] == pytest.approx(5, abs=0.5)
     fired = log.fired[::-1].copy()
-    assert not fidelity(replace(recording, log=replace(log, fired=fired), layout=None)).refines
+    changed = fidelity(replace(recording, log=replace(log, fired=fired), layout=None))
+    assert not changed.verdict.refines
 
 
 def test_hostile_names_are_text(log: Path, tmp_path: Path, made: Page) -> None:
@@ -383,3 +390,4 @@ def test_bodies_that_replace_others_are_no_hand_overs(tmp_path: Path) -> None:
     assert run.physics is not None
     assert figures["handoffs"] == run.physics.handoffs
     assert figures["handoff_gap_max_mm"] == pytest.approx(run.physics.handoff_gap_max_mm, abs=0.02)
+    assert figures["grip_gap_max_mm"] == pytest.approx(run.physics.grip_gap_max_mm, abs=0.02)

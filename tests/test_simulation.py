@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -14,7 +15,7 @@ from factory.nets.history import firings, legal_marking
 from factory.nets.replay import replay
 from factory.pipeline import all_templates
 from factory.plant.programs import program_of, write_program
-from factory.simulation.distributed import Link
+from factory.simulation.distributed import DistributedSupervisor
 from factory.simulation.request import RunRequest
 from factory.simulation.run import Event, busy_times
 from factory.simulation.simulation import Simulation
@@ -152,12 +153,51 @@ def test_robots_that_touch_are_seen_in_the_ideal_world(paper: Layout) -> None:
         simulation.supervisor.step()
 
 
+def linked(paper: Layout) -> DistributedSupervisor:
+    """The paper's robots before they begin, each with its own program."""
+    simulation = Simulation(paper, RunRequest("ideal", units=2, distributed=True))
+    assert isinstance(simulation.supervisor, DistributedSupervisor)
+    return simulation.supervisor
+
+
 def test_a_robot_reads_only_its_own_mode(paper: Layout) -> None:
-    """Planted fault: r1 asks for the state of a mode it is not in."""
-    link = Link(Simulation(paper, RunRequest(world="ideal", units=1)).world, paper.factory.axes)
-    assert len(link.read(paper.factory.by_label["sub1"], 2)[0]) == 3
-    with pytest.raises(AssertionError, match="not in the mode of sub1"):
-        link.read(paper.factory.by_label["sub1"], 0)
+    """Of the operation that it is at now it reads all robots, of any other none."""
+    label = paper.factory.by_label
+    link = linked(paper).processes[2].link
+    assert len(link.state()[0]) == 3
+    assert link.waits(4, "part1") is link.waits(5, "part2") is link.has_left(5) is False
+    for read in (lambda: link.has_left(3), lambda: link.waits(0, "nopart")):
+        with pytest.raises(AssertionError, match=r"robot 2 reads robot \d, which is not in the"):
+            read()
+    link.at(label["sub2"], 0)
+    assert not link.has_left(3)
+    with pytest.raises(AssertionError, match="robot 2 reads robot 4, which is not in the mode of"):
+        link.has_left(4)
+    with pytest.raises(AssertionError, match="robot 2 is not in the mode of part1"):
+        link.at(label["part1"], 0)
+
+
+@pytest.mark.parametrize("carrier", [True, False])
+def test_a_program_that_reads_more_is_refused(paper: Layout, carrier: bool) -> None:
+    """Planted fault: r3, or r4, waits until r1 shows something, too."""
+    supervisor = linked(paper)
+    process = supervisor.processes[2 if carrier else 3]
+    steps = [replace(s, until=((0, "nopart"), *s.until)) for s in process.program.steps]
+    process.program = replace(process.program, steps=tuple(steps))
+    with pytest.raises(AssertionError, match="reads robot 0, which is not in the mode of"):
+        for _ in range(500):
+            supervisor.step()
+
+
+def test_no_program_reads_the_record(paper: Layout) -> None:
+    """Without one everything happens at the same time."""
+    told, untold = linked(paper), linked(paper)
+    untold.record = SimpleNamespace(start=lambda *_: None, end=lambda *_: None)  # type: ignore[assignment]
+    for _ in range(1200):
+        told.step()
+        untold.step()
+    assert len(told.world.dropoffs) == 2
+    assert told.world.dropoffs == untold.world.dropoffs
 
 
 def test_the_outfeed_may_be_the_bottleneck() -> None:
@@ -192,15 +232,17 @@ def test_a_carrier_goes_on_when_all_others_have_followed() -> None:
             operation, unit = process.step.operation, process.unit
             carrier = supervisor.processes[operation.carrier]
             if process.stage == "run" and process is not carrier:
-                assert carrier.turns <= supervisor.cells.turn(operation.carrier, operation, unit)
+                gear = [step.operation for step in carrier.program.steps]
+                assert carrier.turns <= unit * len(gear) + gear.index(operation)
                 inside += carrier.stage == "leave"
     assert inside, "some carrier has waited for others"
 
 
 def test_a_contact_that_lasts_is_one(paper: Layout) -> None:
-    """Robots driven into each other, looked at step by step."""
+    """Robots driven into each other, without end stops, looked at step by step."""
     simulation = ready(paper, units=1, distributed=True)
     world, onsets, before, lasted = simulation.physical, 0, set(), 0
+    world.m.jnt_limited[:] = False
     for _ in range(50):
         simulation.supervisor.step()
     axes = np.arange(world.motion.axes.tray)

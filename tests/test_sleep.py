@@ -38,11 +38,11 @@ def test_what_creeps_stays_awake(fast: bool, monkeypatch: pytest.MonkeyPatch) ->
 
 
 def awake(simulation: Simulation) -> np.ndarray:
-    """The axes that are in an active mode, or the tray's while it is under way."""
+    """The axes that are in an active mode, or those of the outfeed while its tray is under way."""
     motion = simulation.physical.motion
     moving = np.zeros(len(motion.axes), bool)
     moving[motion.active] = True
-    moving[motion.axes.tray] = motion.outfeed.moves or motion.outfeed.follower.course is not None
+    moving[motion.outfeed.axes] = motion.outfeed.moves or motion.outfeed.follower.course is not None
     return moving
 
 

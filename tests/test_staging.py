@@ -355,7 +355,7 @@ def loaded_too(layout: Layout, modes: Any) -> Any:
             if (robot, operation.index) not in known and len(operation.robots) > 1:
                 own = slice(slot, slot + 1)
                 alone = type(mode)(mode.goals[own], mode.lower[own], mode.upper[own], mode.eps)
-                found.append(staging.HeadStart(robot, operation.index, slot, alone, 0.0))
+                found.append(staging.HeadStart(robot, operation.index, slot, alone, 0.0, robot))
     return tuple(found)
 
 

@@ -79,8 +79,11 @@ def laid(seed: int) -> Layout:
     return Ground().lay_out(made, product_geometry(made.pag), asked(seed)[0])
 
 
-def measured(simulation: Simulation, max_time: float | None = None) -> dict[str, float]:
-    """The figures that a timestep is chosen by, of a run that goes well."""
+def measured(
+    simulation: Simulation, max_time: float | None = None, touching: bool = False
+) -> dict[str, float]:
+    """The figures that a timestep is chosen by, of a run that goes well, but for things that touch
+    where they may."""
     world, worst = simulation.physical, [0.0]
     qpos, control = world.motion.axes.qpos, world.motion.drives.control
 
@@ -92,7 +95,7 @@ def measured(simulation: Simulation, max_time: float | None = None) -> dict[str,
     assert run.trouble is None, str(run.trouble)
     assert run.physics is not None
     assert run.refines_net
-    assert run.physics.unintended_contacts == 0, run.physics.contacts
+    assert touching or run.physics.unintended_contacts == 0, run.physics.contacts
     gap, residual = run.physics.handoff_gap_max_mm, run.physics.weld_residual_max_mm
     return dict(zip(LIMITS, (1e3 * worst[0], gap, residual), strict=True))
 
@@ -216,9 +219,9 @@ def test_products_keep_half_their_limits(name: str, seed: int) -> None:
 SEEDS = range(24)
 
 
-def outcomes(seeds: range = SEEDS) -> list[tuple[float, float, float]]:
+def outcomes(seeds: range = SEEDS, touching: bool = False) -> list[tuple[float, float, float]]:
     """Of random products and settings: the timestep, the error predicted and the largest measured
-    figure [mm], of those that have a good timestep."""
+    figure [mm], of those that have a good timestep; things may touch if told so."""
     found = []
     for seed in seeds:
         settings, jitter = asked(seed)
@@ -233,7 +236,9 @@ def outcomes(seeds: range = SEEDS) -> list[tuple[float, float, float]]:
                 floor, RunRequest(units=2, seed=seed, jitter=jitter, settings=settings)
             )
             assert simulation.request.settings == made
-            found.append((made.step, 1e3 * error, max(measured(simulation).values())))
+            found.append(
+                (made.step, 1e3 * error, max(measured(simulation, touching=touching).values()))
+            )
     return found
 
 
@@ -248,7 +253,8 @@ def test_random_products_with_random_settings_keep_their_limits() -> None:
 
 def test_a_prediction_that_promises_too_much_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(timestep, "SURE", 0.2)
-    found = outcomes()
+    monkeypatch.setattr(timestep, "OVERLOAD", -1.0)  # nor do end stops ask for a shorter one
+    found = outcomes(touching=True)  # a shutter that overshoots so far meets the belt
     assert sum(most > error for _, error, most in found) > len(found) / 3
     assert max(most for *_, most in found) > 1e3 * ALLOWED
 

@@ -9,8 +9,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+from factory.mjcf.masks import ALL, NOBODY
 from factory.plant.factory import Operation
-from factory.simulation.mujoco.contacts import ALL, LAST, NOBODY
+from factory.simulation.mujoco.contacts import LAST
 from factory.simulation.mujoco.parts import Parts
 from factory.simulation.mujoco.sleep import AWAKE, FRESH
 from factory.simulation.mujoco.world import MujocoWorld
@@ -148,8 +149,8 @@ def test_one_after_the_other_is_the_same(
     monkeypatch.setattr(Parts, "hand_over", one_by_one)
     assert states(singly, singly.supervisor.step, 700) == expected
     one, other = at_once.physical.parts.welds, singly.physical.parts.welds
-    assert one.handoffs == other.handoffs > 0
-    assert one.gap == other.gap > 0.0
+    assert one.taken.count == other.taken.count > 0
+    assert one.taken.gap == other.taken.gap > 0.0
 
 
 # --- gaps -----------------------------------------------------------------------------------------
@@ -161,30 +162,30 @@ def test_gaps_are_those_where_bodies_are_taken_over() -> None:
     world = under_way()
     m, d, parts = world.m, world.d, world.parts
     grip, body = parts.hands.grip[0, "part1"], int(parts.copies.body["part1"][0])
-    before, count = parts.welds.gap, parts.welds.handoffs
+    before, count = parts.welds.taken.gap, parts.welds.taken.count
     parts.welds.join({grip: body})
     parts.welds.write()
-    assert (parts.welds.gap, parts.welds.handoffs) == (before, count)
+    assert (parts.welds.taken.gap, parts.welds.taken.count) == (before, count)
     at = m.jnt_qposadr[m.body_jntadr[body]]
     holder = m.eq_obj1id[grip]
     turn = d.xmat[holder].reshape(3, 3)
     d.qpos[at : at + 3] = d.xpos[holder] + turn @ m.eq_data[grip, 3:6] + [0.0, 0.3, 0.4]
     parts.welds.grip({grip: body})
     parts.welds.write()
-    assert parts.welds.handoffs == count + 1
-    assert parts.welds.gap == pytest.approx(0.5, abs=2e-3)
+    assert parts.welds.taken.count == count + 1
+    assert parts.welds.taken.gap == pytest.approx(0.5, abs=2e-3)
 
 
 def test_a_loosened_grip_is_not_measured() -> None:
     """A weld that is let go in the same tick in which it took over holds nothing."""
     world = under_way()
-    parts, count = world.parts, world.parts.welds.handoffs
+    parts, count = world.parts, world.parts.welds.taken.count
     grip, body = parts.hands.grip[0, "part1"], int(parts.copies.body["part1"][0])
     parts.welds.grip({grip: body})
     parts.welds.loose([grip])
     parts.welds.write()
     assert not world.d.eq_active[grip]
-    assert parts.welds.handoffs == count
+    assert parts.welds.taken.count == count
 
 
 # --- hands ----------------------------------------------------------------------------------------

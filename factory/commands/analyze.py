@@ -210,15 +210,15 @@ def _tell(found: Analysis, verbose: bool) -> None:
 def _run(
     project: Project, timing: Timing, asked: RunOptions, silent: bool
 ) -> tuple[RunRecord, int]:
-    """A run on the spot, in which no parts fuse; status 1 where it was troubled."""
+    """A run on the spot, in which no parts fuse; status 1 where it failed."""
     from factory.simulation.simulation import Simulation
     from factory.study.analysis.recorded import record_of
 
     request = replace(asked, fuse=False).request(project, shown=False)
     run = carry_out(Simulation(timing.layout, request), silent)
-    if run.trouble is not None:
-        print(run.trouble, file=sys.stderr)
-    return record_of(run), 0 if run.trouble is None else 1
+    for failure in run.verdict.failures:
+        print(failure, file=sys.stderr)
+    return record_of(run), 0 if run.succeeded else 1
 
 
 def _robot(robots: dict[str, int], name: str) -> int:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from factory.commands.options import OUTPUT, PATH, RELAY, SOURCE, WIP, for_a_pag
+from factory.commands.options import HANDS, OUTPUT, PATH, RELAY, SOURCE, WIP, for_a_pag
 from factory.commands.outputs import writable, writable_folder
 from factory.commands.requests import OutputOptions, ProjectOptions
 from factory.commands.warnings import announced
@@ -36,6 +36,7 @@ POOLED = 8
 @WIP
 @click.option("--clashes", type=PATH, help="Write a picture of each blocked operation in a folder.")
 @RELAY
+@HANDS
 @OUTPUT
 @collector_paused()
 def check(
@@ -108,10 +109,11 @@ def _pictures(checked: Checked, folder: Path) -> dict[Path, bytes]:
 
 def project_of(given: ProjectOptions) -> Project:
     """The project of a command without options of motion. It reads settings only for relays, whose
-    number depends on the layout. Raises InputError."""
+    number depends on the layout, and for hands. Raises InputError."""
     from factory.pipeline import read
 
-    return given.project() if given.ground().relays else read(given.file, given.folders)
+    wanted = given.ground().relays or given.hands
+    return given.project() if wanted else read(given.file, given.folders)
 
 
 def _describe(checked: Checked, verbose: bool) -> None:

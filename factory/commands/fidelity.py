@@ -122,3 +122,5 @@ def _tell(found: Fidelity, studied: Study | None, verbose: bool) -> None:
     for record in found.seeds:
         for pair in record.contacts:
             say(f"  seed {record.seed} touched: {pair}")
+        for penetration in record.hidden if verbose else ():
+            say(f"  seed {record.seed}, one inside the other by {penetration}")

@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
 
-from factory.commands.options import OUTPUT, PATH
+from factory.commands.options import LENIENT, OUTPUT, PATH
 from factory.commands.requests import OutputOptions
 from factory.support.console import emit, say
 
 if TYPE_CHECKING:
     from factory.record.ending import CutOff
     from factory.record.monitor import Report
+    from factory.record.verdict import RunVerdict
 
 SHOWN = 8
 """The most violations that are printed, unless `-v` asks for all."""
@@ -22,17 +24,20 @@ SHOWN = 8
 
 @click.command()
 @click.argument("file", metavar="LOG", type=PATH)
+@LENIENT
 @OUTPUT
-def monitor(file: Path, out: OutputOptions) -> int:
-    """Judge the run in a LOG that `run --log` has kept against its net, from its states alone.
+def monitor(file: Path, lenient: bool, out: OutputOptions) -> int:
+    """Judge the run in a LOG that `run --log` has kept against its net, from its states.
 
-    The status is 1 for a run that does not follow its net, or was cut off before its units were
-    made, and 2 for a LOG that ends before there is anything to judge."""
+    The status is 1 for a run that does not follow its net, in which bodies did otherwise than the
+    net says, or that was cut off before its units were made, and 2 for a LOG that ends before there
+    is anything to judge."""
     from factory.record.log import read_log
-    from factory.record.monitor.record import watch_log
+    from factory.record.monitor.record import verdict_on, watch_log
 
     log = read_log(file)
     report, subject = watch_log(log)
+    verdict = replace(verdict_on(log, subject.factory.net, report), lenient=lenient)
     if out.as_json:
         document = {
             "log": str(file),
@@ -41,11 +46,14 @@ def monitor(file: Path, out: OutputOptions) -> int:
             "complete": log.complete,
             "cut_off": log.cut_off and log.cut_off.as_json(),
             **report.as_json(),
+            "refines_net": verdict.refines and report.refines_net,
             "monitor_time_s": report.time_s,
+            "verdict": verdict.as_json(),
         }
         emit(document)
     elif not out.quiet:
-        say(verdict(report, log.cut_off))
+        say(found_by(report, log.cut_off))
+        say_verdict(verdict)
         for firing in (*report.seen, *report.inferred) if out.verbose else ():
             how = "inferred" if firing.seen is None else "seen"
             span = f"{firing.earliest:.3f} to {firing.latest:.3f} s"
@@ -53,10 +61,22 @@ def monitor(file: Path, out: OutputOptions) -> int:
     say_violations(report, len(report.violations) if out.verbose else SHOWN)
     if log.cut_off:
         print(log.cut_off.diagnostic(file), file=sys.stderr)
-    return 0 if report.refines_net and not log.cut_off else 1
+    return 0 if verdict.succeeded else 1
 
 
-def verdict(report: Report, cut_off: CutOff | None) -> str:
+def say_verdict(verdict: RunVerdict) -> None:
+    """Whether a run succeeded and, in a line each, what of its verdict failed."""
+    if verdict.failures and verdict.succeeded:
+        say("the run succeeded, as --lenient leaves this out:")
+    else:
+        say("the run succeeded" if verdict.succeeded else "the run FAILED:")
+    for failure in verdict.failures[:SHOWN]:
+        say(f"  {failure.code}: {failure.message}")
+    if more := len(verdict.failures[SHOWN:]):
+        say(f"  ... and {more} more")
+
+
+def found_by(report: Report, cut_off: CutOff | None) -> str:
     """What a monitor found, in a line for people."""
     counts = f"{len(report.seen)} firings seen, {len(report.inferred)} inferred"
     judged = f"{len(report.violations)} VIOLATIONS"

@@ -8,7 +8,7 @@ from dataclasses import fields
 from functools import wraps
 from math import isfinite
 from pathlib import Path
-from typing import Any, TypeVar, cast
+from typing import TYPE_CHECKING, Any, TypeVar, cast
 
 import click
 from click.core import ParameterSource
@@ -17,6 +17,9 @@ from click.shell_completion import CompletionItem
 from factory.commands.requests import OutputOptions, PictureOptions, ProjectOptions, RunOptions
 from factory.support.errors import Diagnostic, FactoryError, InputError
 from factory.support.settings import LONGEST
+
+if TYPE_CHECKING:
+    from factory.problem.pag import PAG
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -61,13 +64,12 @@ class CameraName(click.ParamType[str]):
 
         # Of a line that is not complete click keeps the arguments apart, and sets no parameter.
         files = [ctx.params.get("file"), *map(Path, ctx.args)]
-        parts = _parts(next(filter(None, files), None), ctx.params["folders"])
-        names = camera_names(sorted(parts))
+        names = camera_names(_pag(next(filter(None, files), None), ctx.params["folders"]))
         return [CompletionItem(name) for name in names if name.startswith(incomplete)]
 
 
-def _parts(file: Path | None, folders: Sequence[Path]) -> list[str]:
-    """The labels of the parts in a PAG or a log; none where it cannot be read."""
+def _pag(file: Path | None, folders: Sequence[Path]) -> PAG | None:
+    """The PAG in a file or a log; None where it cannot be read."""
     from factory.lang import load_pag
     from factory.pipeline import all_templates
     from factory.record.log import is_log, read_log
@@ -75,12 +77,12 @@ def _parts(file: Path | None, folders: Sequence[Path]) -> list[str]:
 
     try:
         if file is None:
-            return []
+            return None
         if is_log(file):
-            return [part.label for part in factory_of(read_log(file).header).leaves]
-        return [part.label for part in load_pag(file, all_templates(folders)).parts()]
+            return factory_of(read_log(file).header).pag
+        return load_pag(file, all_templates(folders))
     except FactoryError:
-        return []
+        return None
 
 
 def options(*decorators: Callable[[F], F]) -> Callable[[F], F]:
@@ -154,6 +156,11 @@ class Timestep(click.ParamType[float | str]):
         return value if is_auto("timestep", value) else click.FLOAT.convert(value, param, ctx)
 
 
+HANDS = click.option(
+    "--hands/--no-hands",
+    default=None,
+    help="Robots hold by solid hands that are chosen from the geometry of the parts.",
+)
 MOTION = options(
     click.option("--speed", type=float, help="Speed of a robot [m/s]."),
     click.option("--acceleration", type=float, help="Acceleration of a robot [m/s²]."),
@@ -178,6 +185,7 @@ MOTION = options(
         default=None,
         help="Robots that wait empty-handed go ahead to where they are needed next.",
     ),
+    HANDS,
 )
 FLOOR = options(
     click.option("--clearance", type=float, help="Least distance between things [m]."),
@@ -197,6 +205,9 @@ WIP = click.option(
     "--wip", type=click.IntRange(1, 10**9), help="Copies of each part let in at once."
 )
 RUNS = gathered(RunOptions, "asked")
+LENIENT = click.option(
+    "--lenient", is_flag=True, help="A run succeeds whatever its bodies do, if it makes its units."
+)
 DRAW = options(
     click.option("--seed", type=SEEDS, default=0, help="Of what jitter draws."),
     click.option(
@@ -234,7 +245,8 @@ PICTURE = options(
         "--camera",
         type=CameraName(),
         default="overview",
-        help="overview, orbit, top, product, or part:LABEL to follow a part.",
+        help="overview, orbit, top, product, part:LABEL to follow a part, or handover:LABEL to look"
+        " from near by where it is taken.",
     ),
     click.option(
         "--with", "panels", help="Beside the 3-D: net, gantt or net,gantt (modes over time)."

@@ -24,7 +24,7 @@ from factory.commands.outputs import writable
 from factory.commands.requests import OutputOptions, PictureOptions, ProjectOptions, RunOptions
 from factory.commands.run import carry_out
 from factory.commands.warnings import announced
-from factory.support.console import emit, say
+from factory.support.console import emit, say, warn
 from factory.support.errors import Diagnostic, InputError
 
 if TYPE_CHECKING:
@@ -88,7 +88,8 @@ def render(
             else Film(made, output, picture, shown.fps, shown.poster)
         )
         enough = moment if is_still and moment != "end" else asked.max_time
-        carry_out(made, out.silent, enough, [lambda: taken])
+        run = carry_out(made, out.silent, enough, [lambda: taken])
+        warn(run.verdict.bodies, out.silent)
         frames = taken.frames if isinstance(taken, Film) else 1
     seconds = 0.0 if is_still else round(frames / shown.fps, 6)
     if out.as_json:

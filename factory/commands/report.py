@@ -13,6 +13,7 @@ import click
 from factory.commands.options import (
     DRAW,
     FLOOR,
+    LENIENT,
     MOTION,
     OUTPUT,
     PATH,
@@ -48,6 +49,7 @@ if TYPE_CHECKING:
 @DRAW
 @WIP
 @click.option("--max-time", type=SECONDS, help="Stop after this time [s].")
+@LENIENT
 @RUNS
 @FLOOR
 @RELAY
@@ -56,8 +58,8 @@ if TYPE_CHECKING:
 def report(given: ProjectOptions, asked: RunOptions, out: OutputOptions, output: Path) -> int:
     """Write one HTML page about a run of FILE.pag, or the run in a LOG that `run --log` kept.
 
-    The status is 1 for a run that failed, or was cut off before its units were made; the page is
-    written, and says so."""
+    The status is 1 for a run that failed, or was cut off before its units were made: --lenient
+    leaves out what its bodies do. The page is written, and says so."""
     from factory.record.log import is_log
     from factory.show.report import page, recording_of
     from factory.support.files import write_text
@@ -66,13 +68,14 @@ def report(given: ProjectOptions, asked: RunOptions, out: OutputOptions, output:
     run = None
     warnings: list[dict[str, object]] = []
     if is_log(given.file):
-        for_a_pag(given.file, "a log", "output")
+        for_a_pag(given.file, "a log", "output", "lenient")
         recording = recording_of(given.file)
     else:
         recording, run, warnings = _run(given, asked, out)
     text = page(recording)
     write_text(output, text)
     size, cut = len(text.encode()), recording.log.cut_off
+    verdict = run.verdict if run else replace(recording.verdict, lenient=asked.lenient)
     document = {
         "output": str(output),
         "bytes": size,
@@ -80,6 +83,7 @@ def report(given: ProjectOptions, asked: RunOptions, out: OutputOptions, output:
         "sim_time_s": round(recording.end, 6),
         "cut_off": cut and cut.as_json(),
         "predicted": recording.layout is not None,
+        "verdict": verdict.as_json(),
         "warnings": warnings,
     }
     if out.as_json:
@@ -92,7 +96,9 @@ def report(given: ProjectOptions, asked: RunOptions, out: OutputOptions, output:
             summarise(run, recording.factory, out.verbose)
     if cut and run is None:
         print(cut.diagnostic(given.file), file=sys.stderr)
-    return 0 if not cut and (run is None or run.succeeded) else 1
+    for failure in verdict.failures if run else verdict.failures[bool(cut) :]:
+        print(failure, file=sys.stderr)
+    return 0 if verdict.succeeded else 1
 
 
 def _run(given: ProjectOptions, asked: RunOptions, out: OutputOptions) -> _Made:
@@ -106,6 +112,4 @@ def _run(given: ProjectOptions, asked: RunOptions, out: OutputOptions) -> _Made:
         log = Path(folder) / "run.log"
         run = run_project(project, replace(asked, fuse=False), out.silent, log)
         recording = recording_of(log, project.layout)
-    if run.trouble is not None:
-        print(run.trouble, file=sys.stderr)
     return recording, run, warnings

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -12,6 +11,7 @@ from factory.support.errors import Diagnostic, InputError
 if TYPE_CHECKING:
     from factory.layout.request import Ground
     from factory.pipeline import Project
+    from factory.problem.pag import PAG
     from factory.render import Picture
     from factory.simulation.request import RunRequest, WorldName
     from factory.support.settings import Settings
@@ -45,6 +45,7 @@ class ProjectOptions:
     timestep: float | str | None = None
     substeps: int | None = None
     stage: bool | None = None
+    hands: bool | None = None
     clearance: float | None = None
     overlap: float | None = None
     floor: str | None = None
@@ -60,6 +61,7 @@ class ProjectOptions:
         names = ("speed", "acceleration", "force", "timestep", "substeps", "clearance", "overlap")
         given = {name: getattr(self, name) for name in names}
         given["stage"] = None if self.stage is None else int(self.stage)
+        given["hands"] = None if self.hands is None else int(self.hands)
         settings = defaults_for(self.file).settings().with_options(environment())
         return settings.with_options(given)
 
@@ -80,7 +82,7 @@ class ProjectOptions:
 
 @dataclass(frozen=True, slots=True)
 class RunOptions:
-    """The options of RUN, DRAW and WIP that a command has."""
+    """The options of RUN, DRAW, WIP and LENIENT that a command has."""
 
     world: WorldName = "mujoco"
     units: int = 1
@@ -91,6 +93,7 @@ class RunOptions:
     fuse: bool | None = None
     max_time: float | None = None
     distributed: bool = False
+    lenient: bool = False
 
     def request(self, project: Project, shown: bool = True) -> RunRequest:
         """The run that is asked for, and whether it is to be `shown`. Raises InputError."""
@@ -129,15 +132,15 @@ class PictureOptions:
         """Width and height [px]. Raises InputError (BadValue)."""
         return pair(self.size, "--size", "1280x720", int, LARGEST)
 
-    def picture(self, parts: Sequence[str] | None = None) -> Picture:
-        """The picture that is asked for, whose camera may follow one of the `parts`, or any where
-        None. Raises InputError (BadValue) for a name that does not exist, a size without room for
-        the panels, or a poster that cannot be a still."""
+    def picture(self, pag: PAG | None = None) -> Picture:
+        """The picture that is asked for, whose camera may be of any label in a product, or of any
+        where that is None. Raises InputError (BadValue) for a name that does not exist, a size
+        without room for the panels, or a poster that cannot be a still."""
         from factory.render import Picture, camera_named, check_output, panels_named
         from factory.render.picture import shared
 
         size = self.area()
-        camera, panels = camera_named(self.camera, parts), panels_named(self.panels)
+        camera, panels = camera_named(self.camera, pag), panels_named(self.panels)
         shared(size, panels)
         if self.poster is not None:
             check_output(self.poster, size, still=True)

@@ -11,8 +11,18 @@ from typing import TYPE_CHECKING
 
 import click
 
-from factory.commands.monitor import say_violations, verdict
-from factory.commands.options import FLOOR, MOTION, OUTPUT, PATH, PICTURE, RELAY, RUN, SOURCE
+from factory.commands.monitor import found_by, say_verdict, say_violations
+from factory.commands.options import (
+    FLOOR,
+    LENIENT,
+    MOTION,
+    OUTPUT,
+    PATH,
+    PICTURE,
+    RELAY,
+    RUN,
+    SOURCE,
+)
 from factory.commands.outputs import writable
 from factory.commands.requests import (
     OutputOptions,
@@ -32,7 +42,7 @@ if TYPE_CHECKING:
     from factory.record.observed import Recorder
     from factory.render import Film
     from factory.simulation.run import PhysicsFigures, Run
-    from factory.simulation.simulation import Observer, Simulation
+    from factory.simulation.simulation import Simulation
 
     Filming = Callable[[Simulation], Film]
     Opening = Callable[[], Recorder]
@@ -48,8 +58,11 @@ if TYPE_CHECKING:
     "--distributed", is_flag=True, help="Each robot runs its own program (paper, section 6)."
 )
 @click.option(
-    "--monitor", is_flag=True, help="Watch the engine alone, and judge the run against the net."
+    "--monitor/--no-monitor",
+    default=None,
+    help="Judge the run from the engine alone, which is the default: in every tick, or not at all.",
 )
+@LENIENT
 @PICTURE
 @FLOOR
 @RELAY
@@ -62,9 +75,12 @@ def run(
     out: OutputOptions,
     video: Path | None,
     log: Path | None,
-    monitor: bool,
+    monitor: bool | None,
 ) -> int:
-    """Run FILE.pag until its products are dropped off."""
+    """Run FILE.pag until its products are dropped off.
+
+    The status is 1 for a run that does not make its units, or does not follow its net, or in which
+    bodies do otherwise than the net says: --lenient leaves those out."""
     writable(given.file, video, log, shown.poster)
     project = given.project()
     with Waiting("reading the shapes and laying out", out.silent):
@@ -72,12 +88,14 @@ def run(
     warnings = announced(project.warnings, out)
     shown.area()
     if asked.world == "ideal":
-        check_ideal(asked.fuse, monitor)
+        check_ideal(asked.fuse, bool(monitor))
     film = _film(project, asked, video, shown)
     record = run_project(project, asked, out.silent, log, film, monitor)
     if out.as_json:
         document = record.as_json()
         document.pop("schema")
+        if monitor and record.monitor:
+            document["monitor"] = record.monitor.as_json()
         trouble = [record.trouble.as_json()] if record.trouble else []
         emit({**document, "warnings": warnings, **({"errors": trouble} if trouble else {})})
     elif not out.quiet:
@@ -106,7 +124,7 @@ def _film(
     from factory.support.gl import probe
 
     check_output(video, shown.area(), shown.fps)
-    picture = shown.picture([part.label for part in project.factory.leaves])
+    picture = shown.picture(project.pag)
     probe()
     return lambda made: Film(made, video, picture, shown.fps, shown.poster)
 
@@ -117,14 +135,15 @@ def run_project(
     silent: bool,
     log: Path | None = None,
     film: Filming | None = None,
-    monitor: bool = False,
+    monitor: bool | None = None,
 ) -> Run:
-    """One run, with the log, the film and the judgement of a monitor that are asked for."""
+    """One run, with the log and the film that are asked for, and with a monitor: one that looks in
+    every tick where `monitor` is true, none where it is false."""
     from factory.nets.verify import proved
     from factory.simulation.simulation import Simulation
 
     proved(project.factory.net)
-    seen = log is not None or film is not None or monitor
+    seen = log is not None or film is not None
     with Waiting("compiling the model", silent):
         made = Simulation(project.layout, asked.request(project, seen))
     recorders: list[Opening] = []
@@ -134,14 +153,8 @@ def run_project(
         recorders.append(lambda: LogWriter(log, made, project.pag))
     if film is not None:
         recorders.append(lambda: film(made))
-    if not monitor:
-        return carry_out(made, silent, asked.max_time, recorders)
-    from factory.record.monitor import beside
-
-    watcher = beside(made)
-    record = carry_out(made, silent, asked.max_time, recorders, [watcher.observe])
-    report = watcher.report()
-    return replace(record, monitor=report, refines_net=record.refines_net and report.refines_net)
+    record = carry_out(made, silent, asked.max_time, recorders, monitor)
+    return replace(record, lenient=asked.lenient)
 
 
 def carry_out(
@@ -149,19 +162,23 @@ def carry_out(
     silent: bool,
     max_time: float | None = None,
     recorders: Sequence[Opening] = (),
-    watchers: Sequence[Observer] = (),
+    monitor: bool | None = None,
 ) -> Run:
     """A run with a progress bar. A signal ends it at the end of a tick, so that the recorders'
     files are complete; StoppedError then says how far it came."""
     from factory.record.ending import CutOff
+    from factory.simulation.watched import watched
     from factory.support.interruption import Interruption
 
     try:
         with Interruption() as stop, ExitStack() as stack:
             opened = [stack.enter_context(recorder()) for recorder in recorders]
             bar = stack.enter_context(Progress(made.request.units, silent, made.duration))
-            seeing = [*watchers, *(recorder.observe for recorder in opened)]
-            record = made.run(seeing, max_time, [stop.observe, bar.observe])
+            seeing, glances = [r.observe for r in opened], [stop.observe, bar.observe]
+            if monitor is False:
+                record = made.run(seeing, max_time, glances)
+            else:
+                record = watched(made, seeing, max_time, glances, bool(monitor))
             for recorder in opened:
                 recorder.end(record.trouble)
             return record
@@ -188,7 +205,7 @@ def summarise(record: Run, factory: Factory, verbose: bool) -> None:
     )
     say(
         f"{len(record.events)} transitions fired, "
-        f"the record {'refines' if record.refines_net else 'DOES NOT REFINE'} the net"
+        f"the record {'refines' if record.replays else 'DOES NOT REFINE'} the net"
     )
     physics = record.physics
     if physics is not None:
@@ -202,9 +219,12 @@ def summarise(record: Run, factory: Factory, verbose: bool) -> None:
         warnings = f"{physics.engine_warnings} engine warnings"
         say(
             f"{physics.handoffs} hand-offs, gap at most {physics.handoff_gap_max_mm:.3f} mm; "
-            f"product error {'none measured' if error is None else f'{error:.3f} mm'}; "
+            f"product error {'none measured' if error is None else f'{error:.3f} mm'}, "
+            f"{physics.joining_error_max_mm:.3f} mm as grips closed; "
             + (warnings if physics.excluded else f"{contacts}, {warnings}")
         )
+        if physics.grip_gap_max_mm is not None:
+            say(f"what is taken is at most {physics.grip_gap_max_mm:.3f} mm from its holder's pad")
         if physics.excluded:
             say(f"{contacts}; {not_tested(physics)}{'' if verbose else ' (list: -v)'}")
         for one, other in physics.excluded if verbose else ():
@@ -217,7 +237,8 @@ def summarise(record: Run, factory: Factory, verbose: bool) -> None:
         if physics.fused:
             say("parts joined for good are one rigid body (--no-fuse keeps them apart)")
     if record.monitor is not None:
-        say(verdict(record.monitor, record.cut_off))
+        say(found_by(record.monitor, record.cut_off))
+    say_verdict(record.verdict)
     busy = sorted(zip(factory.robots, record.utilisation, strict=True), key=lambda p: -p[1])
     rows = [(r.name, r.type, f"{100 * u:.0f} %") for r, u in (busy if verbose else busy[:6])]
     table("Utilisation", ("robot", "type", "busy"), rows)

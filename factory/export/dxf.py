@@ -23,7 +23,7 @@ LAYERS = {
     "FLOOR": (8, ("floor",)),
     "OUTFEED": (9, ("belt",)),
     "SWEEPS": (30, ("uncoupled",)),
-    "FEEDERS": (40, ("boom", "post")),
+    "FEEDERS": (40, ("boom", "post", "housing")),
     "GUIDEPATHS": (5, ("path",)),
     "ROBOTS": (150, ("arm", "dot", "tool")),
     "PARTS": (3, ("part",)),

@@ -10,7 +10,8 @@ import numpy as np
 from factory.geometry.solids import Solid
 from factory.layout.certificate import ALWAYS, PAYLOAD_BODY
 from factory.layout.dimensions import ARM_WIDTH, CARRIAGE
-from factory.layout.layout import Box, Extent, Guidepath, Layout, Point2
+from factory.layout.hands.limbs import limbs
+from factory.layout.layout import Box, Extent, Layout, Point2
 from factory.layout.sweeps import piles, regions
 from factory.support.canvas import hexadecimal, hull
 
@@ -39,9 +40,9 @@ class Flat:
 
 def flat_shapes(layout: Layout) -> Iterator[Flat]:
     """All of them, from the ground up: `floor`, `coupled` and `uncoupled` sweeps, `belt` with the
-    `product` on it, `boom` and `post` of feeders, `path` (where carriages go) and `last` (from
-    there to A) of guidepaths, `finger`, `arm` and carriage (`dot` or `tool`) of robots at home,
-    `part`, `junction`."""
+    `product` on it, `boom`, `post` and `housing` of feeders, `path` (where carriages go) and `last`
+    (from there to A) of guidepaths, `finger`, `arm` and carriage (`dot` or `tool`) of robots at
+    home, `part`, `junction`."""
     yield Flat.of_box("floor", layout.floor)
     yield from _sweeps(layout)
     yield Flat.of_box("belt", layout.outfeed)
@@ -52,12 +53,13 @@ def flat_shapes(layout: Layout) -> Iterator[Flat]:
         feeder = layout.feeder(leaf.label)
         yield Flat.of_box("boom", feeder.boom)
         yield Flat.of_box("post", feeder.post)
+        yield Flat.of_box("housing", feeder.housing)
     for path in layout.guidepaths:
         stop = path.carriage(path.reach)
         yield Flat("path", (path.carriage(path.length), stop))
         yield Flat("last", (stop, path.a))
-    for robot, path in zip(layout.factory.robots, layout.guidepaths, strict=True):
-        yield from _robot(path, "tool" if robot.type == "tool" else "dot")
+    for robot in layout.factory.robots:
+        yield from _robot(layout, robot.index, "tool" if robot.type == "tool" else "dot")
     for leaf in leaves:
         goal = layout.goal(leaf.index, leaf.template.carrier - 1)
         at = layout.guidepaths[leaf.carrier].middle(goal)
@@ -99,11 +101,13 @@ def _sweeps(layout: Layout) -> Iterator[Flat]:
         yield from (Flat.of_box(style, box) for box in dict.fromkeys(found))
 
 
-def _robot(path: Guidepath, style: str) -> Iterator[Flat]:
+def _robot(layout: Layout, robot: int, style: str) -> Iterator[Flat]:
+    path = layout.guidepaths[robot]
     half, rim, foot = CARRIAGE / 2, path.reach - path.arm, path.carriage(path.length)
-    nest = max(path.reach + path.nest, rim)
-    (x, y), (u, v) = foot, path.heading
-    yield Flat("finger", ((x + rim * u, y + rim * v), (x + nest * u, y + nest * v)))
+    for limb in limbs(layout, robot):
+        sides = sorted((limb.low[1] * path.left, limb.high[1] * path.left))
+        box: Extent = (limb.low[0], limb.high[0], sides[0], sides[1])
+        yield Flat.of_box("finger", path.world(box, foot))
     arm: Extent = (0.0, rim, -ARM_WIDTH / 2, ARM_WIDTH / 2)
     yield Flat.of_box("arm", path.world(arm, foot))
     yield Flat.of_box(style, path.world((-half, half, -half, half), foot))

@@ -25,7 +25,7 @@ GROUPS = {
     "floor": ("floor",),
     "sweeps": ("coupled", "uncoupled"),
     "outfeed": ("belt", "product"),
-    "feeders": ("boom", "post"),
+    "feeders": ("boom", "post", "housing"),
     "guidepaths": ("path", "last"),
     "robots": ("finger", "arm", "dot", "tool"),
     "parts": ("part",),
@@ -59,6 +59,7 @@ STYLE = """
 .part { stroke: #323f4b; stroke-width: 1.5; fill-opacity: 0.5; stroke-linejoin: round; }
 .product { fill: #ffffff; fill-opacity: 0.5; stroke: #323f4b; stroke-width: 1.5; }
 .post { fill: #e6b422; stroke: #8d6708; stroke-width: 1.5; } .boom { fill: #efcf73; }
+.housing { fill: none; stroke: #8d6708; stroke-width: 1.5; }
 .dot { fill: #2a5c9a; stroke: #1b3f6b; stroke-width: 2; }
 .tool { fill: #d9731a; stroke: #94480a; stroke-width: 2; }
 .arm { fill: #9aa5b1; stroke: #52606d; stroke-width: 1; }

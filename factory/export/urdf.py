@@ -18,7 +18,6 @@ import numpy as np
 from factory.export.subject import Subject
 from factory.geometry.meshes import Array, Mesh, hull_mesh
 from factory.geometry.solids import rotation
-from factory.layout.layout import Layout
 from factory.mjcf import names
 from factory.mjcf.elements import add, exact, numbers
 from factory.mjcf.mesh_files import stl
@@ -35,10 +34,9 @@ def export(subject: Subject) -> str | Mapping[str, bytes]:
     from factory.mjcf.loading import load
 
     project = subject.project
-    layout = project.layout
-    model = physical_model(layout, 1, project.settings, project.catalogue)
+    model = physical_model(project.layout, 1, project.settings, project.catalogue)
     folder = f"{subject.name.rpartition('.')[0] or subject.name or subject.stem}_meshes"
-    writer = _Writer(load(model), layout, project.settings.speed, folder)
+    writer = _Writer(load(model), project.settings.speed, folder)
     text = writer.text(subject.stem)
     if not writer.files:
         return text
@@ -48,9 +46,8 @@ def export(subject: Subject) -> str | Mapping[str, bytes]:
 class _Writer:
     """Writes the bodies of a compiled model as links; notes the meshes that it meets."""
 
-    def __init__(self, m: mujoco.MjModel, layout: Layout, speed: float, folder: str) -> None:
+    def __init__(self, m: mujoco.MjModel, speed: float, folder: str) -> None:
         self.m, self.speed, self.folder = m, speed, folder
-        self.limits = _limits(layout)
         self.files: dict[str, bytes] = {}
         self.force = {
             int(joint): float(most)
@@ -118,7 +115,7 @@ class _Writer:
         add(element, "child", link=name)
         if slides:
             add(element, "axis", xyz=numbers(m.jnt_axis[joint]))
-            low, high = self.limits.get(m.joint(joint).name, m.jnt_range[joint])
+            low, high = m.jnt_range[joint]
             effort = exact([self.force.get(int(joint), 0.0)])
             limit = {"lower": numbers([low]), "upper": numbers([high]), "effort": effort}
             add(element, "limit", **limit, velocity=numbers([self.speed]))
@@ -162,16 +159,6 @@ class _Writer:
         _origin(element, self.m.geom_pos[geom] + rotation(turn) @ offset, turn)
         add(element, "geometry").append(shape)
         return element
-
-
-def _limits(layout: Layout) -> dict[str, tuple[float, float]]:
-    """How far each joint goes [m]."""
-    found = {names.OUTFEED_SLIDE: (0.0, layout.outfeed_way)}
-    for robot, path in zip(layout.factory.robots, layout.guidepaths, strict=True):
-        found[names.slide(robot.name)] = min(path.reach, path.length), path.length
-    for index, stroke in layout.factory.strokes.items():
-        found[names.lift(layout.factory.robots[index].name)] = 0.0, stroke
-    return found
 
 
 def _origin(parent: Element, at: Iterable[float], quaternion: Array) -> None:

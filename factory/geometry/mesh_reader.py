@@ -27,6 +27,9 @@ EXPECTED = {
 }
 """What a file of a suffix should hold."""
 
+EMPTY_STL = 84
+"""Bytes of a binary STL file without triangles."""
+
 ANEW = "export it again as .obj, .stl, .ply or .glb with triangles"
 """The way out of a file that cannot be read."""
 
@@ -91,6 +94,8 @@ def _by_trimesh(content: bytes, suffix: str) -> list[tuple[Array, Indices]]:
             logger.setLevel(logging.CRITICAL)
             scene = trimesh.load_scene(io.BytesIO(content), file_type=suffix[1:], process=False)
             found = [body for body in scene.dump() if isinstance(body, trimesh.Trimesh)]
+            if suffix == ".stl" and not found and len(content) != EMPTY_STL:
+                content.decode()  # without triangles it is a text, or no STL file at all
             return [(np.array(b.vertices, float), np.array(b.faces, np.int64)) for b in found]
     except Exception as error:  # trimesh's readers raise anything on a broken file
         raise UnreadableMesh(f"it is not {EXPECTED[suffix]}") from error

@@ -13,7 +13,7 @@ from factory.layout.guidepath import Box
 from factory.layout.layout import carriers
 from factory.layout.outline import Outline
 from factory.layout.packing import Packing, Task
-from factory.layout.shapes import OUTPUT, Frame, Shape, Sides, oriented_shape, turned
+from factory.layout.shapes import OUTPUT, Frame, Shape, Sides, held_shape, oriented_shape, turned
 from factory.layout.sides import admitted
 from factory.layout.stretching import Stretched, outgoing
 from factory.plant.factory import Operation
@@ -24,11 +24,11 @@ def arrange(
 ) -> tuple[Stretched, list[Shape]]:
     """Travels, stations and sides with the shapes that they give; with `sides` these alone are
     looked at. Linear."""
-    factory, on, c = task.factory, carriers(task.factory), task.clearance
+    factory, on = task.factory, carriers(task.factory)
     table: list[dict[Frame, Outline]] = [{} for _ in factory.robots]
     for robot, frames in reversed(list(enumerate(_frames(on, sides)))):
         for frame in frames:
-            shape = oriented_shape(factory, payloads, robot, on[robot], frame, c, task.wide)
+            shape = shape_of(task, payloads, robot, on[robot], frame)
 
             def outline(guest: int, side: int, frame: Frame = frame) -> Outline:
                 return table[guest][turned(frame, side)]
@@ -40,6 +40,16 @@ def arrange(
 
             table[robot][frame] = Packing(task, robot, shape, outline, admits).packed()
     return _chosen(task, table)
+
+
+def shape_of(
+    task: Task, payloads: Mapping[str, Box], robot: int, carrier: int, frame: Frame
+) -> Shape:
+    """The shape of a robot that lies in a frame, with its hand if hands are chosen."""
+    lies = robot, carrier, frame, task.clearance, task.wide
+    if task.hands is not None:
+        return held_shape(task.hands, payloads, *lies)
+    return oriented_shape(task.factory, payloads, *lies)
 
 
 def _frames(on: Sequence[int], sides: Sides | None) -> list[tuple[Frame, ...]]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+from factory.layout.dimensions import Clearance
 from factory.layout.guidepath import Box, Point2
 from factory.plant.factory import Factory
 from factory.support.errors import Diagnostic, Position
@@ -14,11 +15,17 @@ MILLI = 1000.0
 NAMES = ("carriages", "masts and arms", "payloads")
 """The layers' names."""
 
-KINDS = ("carriage", "mast", "arm", "payload", "post", "boom", "outfeed")
-"""What a region is swept by; STATIONS are those that stand still."""
+KINDS = ("carriage", "mast", "arm", "payload", "post", "boom", "outfeed", "housing", "shed", "hand")
+"""What a region is swept by."""
 
-CARRIAGE_BODY, MAST_BODY, ARM_BODY, PAYLOAD_BODY, POST_BODY, BOOM, OUTFEED = range(len(KINDS))
-STATIONS = (POST_BODY, BOOM, OUTFEED)
+CARRIAGE_BODY, MAST_BODY, ARM_BODY, PAYLOAD_BODY, POST_BODY, BOOM, OUTFEED = range(7)
+HOUSING, SHED, HAND_BODY = range(7, len(KINDS))
+STATIONS = (POST_BODY, BOOM, OUTFEED, HOUSING, SHED)
+RAISED = (BOOM, HOUSING)
+"""Stations that stand clear of the floor: payloads go below them."""
+
+LOADS = (PAYLOAD_BODY, HAND_BODY)
+"""What robots carry, and hold it with."""
 
 ALWAYS = -1
 """The mode of a region that is uncoupled."""
@@ -40,8 +47,8 @@ class Region:
 
     def named(self, factory: Factory) -> str:
         """What is there, in words."""
-        if self.kind == OUTFEED:
-            return "the outfeed"
+        if self.kind in (OUTFEED, SHED):
+            return "the outfeed" if self.kind == OUTFEED else "the outfeed's shed"
         if self.kind in STATIONS:
             return f"the {KINDS[self.kind]} of '{self.label}''s feeder"
         label = f" '{self.label}'" if self.label else ""
@@ -120,9 +127,10 @@ class Certificate:
     """That no two robots which are not coupled by a mode can touch, nor their payloads.
 
     Uncoupled regions of different robots in one layer are at least `clearance` [m] apart in plan;
-    `layers` gives each layer's z range and `gaps` the vertical distance to the one below [m]; where
-    a coupled region is nearer to another robot's, `shared` names the junction. It holds if there is
-    no fault; at most `clearance.MOST` faults are listed.
+    end stops are beyond the regions by less than half of that. `layers` gives each layer's z range
+    and `gaps` the vertical distance to the one below [m]; where a coupled region is nearer to
+    another robot's, `shared` names the junction. It holds if there is no fault; at most
+    `clearance.MOST` faults are listed.
     """
 
     clearance: float
@@ -146,6 +154,7 @@ class Certificate:
             "schema": 1,
             "holds": self.holds,
             "clearance_m": self.clearance,
+            "stops_beyond_m": round(Clearance(self.clearance).stop, 6),
             "layers": [
                 {"layer": name, "z_low_m": round(low, 6), "z_high_m": round(high, 6)}
                 for name, low, high in self.layers

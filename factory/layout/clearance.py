@@ -19,10 +19,12 @@ import shapely
 
 from factory.layout.certificate import (
     ALWAYS,
-    BOOM,
+    HAND_BODY,
+    LOADS,
     NAMES,
     OUTFEED,
     PAYLOAD_BODY,
+    RAISED,
     STATIONS,
     Certificate,
     Fault,
@@ -136,16 +138,18 @@ class _Search:
         kinds = {one.kind, other.kind}
         if one.robot == other.robot and OUTFEED in kinds:
             return self._serves(one) and self._serves(other)
-        if BOOM in kinds and kinds <= {BOOM, PAYLOAD_BODY}:
+        if one.robot == other.robot and HAND_BODY in kinds and not kinds.isdisjoint(RAISED):
+            return True  # a feeder leaves room for the hand that takes its part (Layout.feeder)
+        if not kinds.isdisjoint(RAISED) and kinds <= {*RAISED, *LOADS}:
             gap = max(one.z[0] - other.z[1], other.z[0] - one.z[1])
             return gap >= self.layout.clearance - TOLERANCE
-        if kinds != {PAYLOAD_BODY}:
+        if not kinds <= {*LOADS}:
             return False
         return self._joined(one, other) or self._joined(other, one) or self._in_turn(one, other)
 
     def _serves(self, region: Region) -> bool:
         """Whether the outfeed takes a region in: itself, the robot under it, the product let go."""
-        return region.kind != PAYLOAD_BODY or region.mode == self.layout.factory.dropoff.index
+        return region.kind not in LOADS or region.mode == self.layout.factory.dropoff.index
 
     def _joined(self, one: Region, other: Region) -> bool:
         """Whether one is coupled in a mode of the other's robot."""

@@ -28,6 +28,9 @@ MAST = 0.02
 
 ARM_WIDTH = 0.016
 
+FINGER = 0.01
+"""Width of a finger, and of the bars and beams of tall hands."""
+
 STUB = 0.03
 """The shortest arm, from the middle of the mast."""
 
@@ -35,9 +38,28 @@ POST = 0.03
 """Width of a feeder's post."""
 
 BOOM = 0.016
-"""Width of the boom from which a feeder holds its part; `BOOM_HEIGHT` its height."""
+"""Width of the boom that carries a feeder's housing; `BOOM_HEIGHT` its height."""
 
 BOOM_HEIGHT = 0.014
+
+PLAY = 0.001
+"""Between a housing's walls, or a shed's, and what is inside."""
+
+WALL = 0.001
+"""Thickness of the walls of a housing and of the shed, of their lids, and of its shutter."""
+
+SIDE = PLAY + WALL
+"""How much wider on each side a housing is than its part, and the shed than a product."""
+
+PAD = 0.004
+"""Height of the suction pad from which a part hangs."""
+
+RISE = 1 / 3
+"""No line of sight that rises by less than this share of its way in plan gets to a part in its
+housing, which is above the housing's lower edge by so much of the housing's diagonal."""
+
+BEHIND = 0.015
+"""How far behind the shed's shutter a product ends."""
 
 TOOL_TRAVEL = 0.12
 """How far a tool comes from its home to its station."""
@@ -67,6 +89,17 @@ class Clearance:
         return max(MAST, POST) / 2 + self.c
 
     @property
+    def stop(self) -> float:
+        """How far beyond the ends of its guidepath a robot is stopped: two that are pressed against
+        their stops, one towards the other, keep a tenth of the clearance."""
+        return 0.45 * self.c
+
+    @property
+    def play(self) -> float:
+        """How far beyond the ends its buffers begin: it stays clear of them unless it is pushed."""
+        return self.c / 20
+
+    @property
     def spread(self) -> float:
         """How far the lanes of robots that relay each other lie to either side of the line on which
         one robot would run."""
@@ -76,6 +109,11 @@ class Clearance:
         """How far the carriage stays behind: of the arm's end, and of the other robot's carriage
         whose line is `lane` nearer than the product's middle."""
         return max(arm + STUB, CARRIAGE + self.c + lane)
+
+    @property
+    def room(self) -> float:
+        """The height between a part that is presented and the lower edge of its housing."""
+        return self.c
 
     def post(self, reach: float, rear: float) -> float:
         """How far behind the product's middle the centre of a feeder's post stands: behind the

@@ -5,21 +5,25 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from math import floor
+from math import floor, inf
 
 from factory.geometry.solids import Product
-from factory.layout.certificate import ALWAYS, ARM_BODY, CARRIAGE_BODY, MAST_BODY, OUTFEED, Region
-from factory.layout.dimensions import Clearance, up
+from factory.layout.certificate import (
+    ALWAYS,
+    ARM_BODY,
+    CARRIAGE_BODY,
+    MAST_BODY,
+    OUTFEED,
+    SHED,
+    Region,
+)
+from factory.layout.dimensions import BEHIND, SIDE, WALL, Clearance, up
 from factory.layout.guidepath import Box, Extent, Guidepath
 from factory.layout.layout import Layout, carriers
 from factory.layout.shapes import Shape, headings
 from factory.layout.stretching import Stretched
 from factory.layout.sweeps import piles, regions
 from factory.plant.factory import Factory
-
-SHED = 0.1
-"""Length of the open part of the outfeed beyond the product, and of what its end has to spare
-[m]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,6 +57,7 @@ class LayoutDraft:
             tuple(self.stretched.stations),
             self.payloads,
             _outfeed(guidepaths[0], self.shapes[0].last, self.clearance),
+            tuple(s.hand for s in self.shapes) if any(s.hand for s in self.shapes) else (),
         )
 
     def _guidepaths(self, travel: Sequence[float], lane: int) -> tuple[Guidepath, ...]:
@@ -74,27 +79,26 @@ class LayoutDraft:
 
 
 def _outfeed(path: Guidepath, last: Extent, c: Clearance) -> Box:
-    """The conveyor: under the product at A and ahead, twice the product's length and some. It is
-    no wider than the product, so that what keeps clear of the one keeps clear of the other."""
-    ahead = 2 * last[1] - last[0] + 3 * SHED
+    """The conveyor: under the product at A and ahead to the end of the shed. It is no wider than
+    the product, so that what keeps clear of the one keeps clear of the other."""
+    ahead = 2 * last[1] - last[0] + c.c + WALL + BEHIND + SIDE
     return path.world((last[0] - c.c / 2, ahead, last[2], last[3]), path.a)
 
 
 def _spare(layout: Layout) -> float:
     """How much shorter the output robot's path can be: the outfeed has to be clear of what is
     beside its own course, of the product in the making, and of no more [whole mm]."""
-    start, _, low, high = layout.outfeed
-    c = layout.clearance
-    ahead = [
-        region.box[1]
+    c, spare = layout.clearance, inf
+    swept = [
+        region
         for region in regions(layout, piles(layout.factory, layout.product))
-        if region.kind != OUTFEED
+        if region.kind not in (OUTFEED, SHED)
         and (region.robot != 0 or region.mode == ALWAYS)
-        and region.box[2] < high + c
-        and region.box[3] > low - c
         and not _runs_under(region)
     ]
-    spare = start - c - max(ahead)
+    for start, _, low, high in (layout.outfeed, layout.shed):
+        beside = (r.box[1] for r in swept if r.box[2] < high + c and r.box[3] > low - c)
+        spare = min(spare, start - c - max(beside, default=-inf))
     return min(floor(spare * 1000 + 1e-6) / 1000, layout.guidepaths[0].travel - up(c))
 
 

@@ -29,13 +29,15 @@ def lay_out(
     clearance: float = 0.02,
     floor: Point2 | None = None,
     pace: Pace | None = None,
+    hands: bool = False,
 ) -> Layout:
     """The layout of a factory with its clearance certificate, the best found for robots of a
-    `pace`. Raises RunError (Layout) where it does not fit a floor of the given width and depth,
-    saying by how much and where, or where an operation's template asks for what cannot be kept
-    clear."""
+    `pace`, with `hands` chosen from the geometry if so wanted. Raises RunError (Layout) where it
+    does not fit a floor of the given width and depth, saying by how much and where, or where an
+    operation's template asks for what cannot be kept clear."""
     known = judged(factory, product)
-    return certified(optimised(known, product, Clearance(clearance), pace or Pace(), floor), floor)
+    c = Clearance(clearance)
+    return certified(optimised(known, product, c, pace or Pace(), floor, (), hands), floor)
 
 
 def certified(layout: Layout, floor: Point2 | None = None) -> Layout:

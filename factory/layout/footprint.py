@@ -13,7 +13,7 @@ from functools import cached_property
 from itertools import accumulate
 from math import inf
 
-from factory.layout.dimensions import CARRIAGE, MAST, PAYLOADS, POST, Clearance, up
+from factory.layout.dimensions import CARRIAGE, MAST, PAYLOADS, POST, SIDE, Clearance, up
 from factory.layout.guidepath import Extent
 from factory.layout.shapes import Shape
 from factory.plant.factory import Factory, Operation
@@ -53,32 +53,33 @@ class Footprint:
         return bool(self.operations) and len(self.operations[0].robots) == 1
 
     @cached_property
-    def boom(self) -> float:
-        """How far ahead the boom of the feeder reaches, over the middle of the part; what is put on
-        the part later has to be clear of it [m]."""
+    def housing(self) -> Extent:
+        """The housing of the feeder about the product's middle, nowhere without one [m]."""
         if not self.fed:
-            return -inf
-        part = self.shape.piles[self.operations[0].index]
-        return round((part[0] + part[1]) / 2, 3)
+            return inf, -inf, inf, -inf
+        rear, front, low, high = self.shape.piles[self.operations[0].index]
+        return rear - SIDE, front + SIDE, low - SIDE, high + SIDE
 
     @cached_property
     def frontier(self) -> tuple[float, float, float]:
-        """Where along the path, by layer, something may come to it from the side: behind the end of
-        the boom."""
-        return (-inf, -inf, self.boom + self.half)
+        """Where along the path, by layer, something may come to it from the side: ahead of the
+        housing."""
+        return (-inf, -inf, self.housing[1] + self.half)
 
     @cached_property
     def strips(self) -> dict[int, Strip]:
         """What is taken of the floor on each side, with the last pile."""
-        return {side: self.strip(side, self.shape.last) for side in (-1, +1)}
+        last = self.shape.laden(self.shape.last)
+        return {side: self.strip(side, last) for side in (-1, +1)}
 
     def strip(self, side: int, pile: Extent) -> Strip:
         """What is taken of the floor on one side, with a pile on the path."""
         shape, half = self.shape, self.half
         lane = side * shape.offset + half + shape.spread
-        post = side * shape.offset + POST / 2 + half if self.fed else -inf
-        ahead = extent_to(shape.last, side) + half if self.corridor else -inf
-        load = -inf if shape.tool else max(extent_to(pile, side) + half, post)
+        post = side * shape.post + POST / 2 + half if self.fed else -inf
+        ahead = extent_to(shape.last, side) + SIDE + half if self.corridor else -inf
+        wide = max(extent_to(pile, side), extent_to(self.housing, side))
+        load = -inf if shape.tool else max(wide + half, post)
         return max(lane + CARRIAGE / 2, post, ahead), max(lane + MAST / 2, post, ahead), load
 
     def strip_at(self, piles: Sequence[Placed]) -> Callable[[int, float], Strip]:
@@ -104,7 +105,7 @@ class Footprint:
             rear = shape.piles[self.operations[0].index][0]
             post, room = -self.clearance.post(shape.reach, rear), POST / 2 + half
             taken = [(min(low, post - room), max(high, post + room)) for low, high in taken]
-            taken[PAYLOADS] = taken[PAYLOADS][0], max(taken[PAYLOADS][1], self.boom + half)
+            taken[PAYLOADS] = taken[PAYLOADS][0], max(taken[PAYLOADS][1], self.housing[1] + half)
         return taken
 
     def blocks(self, piles: Sequence[Placed]) -> list[tuple[Block, ...]]:
@@ -114,15 +115,16 @@ class Footprint:
 
     def least(self, operation: Operation, station: float) -> float:
         """The least station of an operation after another station [m]: what joins the part of a
-        feeder is clear of the boom."""
+        feeder is clear of the housing."""
         if not self.fed or len(operation.inputs) < 2:
             return station
         pile = self.shape.piles[operation.index]
-        return max(station, up(self.boom + self.clearance.c - pile[0]))
+        return max(station, up(self.housing[1] + self.clearance.c - pile[0]))
 
     def placed(self, operation: Operation, station: float) -> Placed:
         """The pile that an operation at a station makes."""
-        return station + ahead_of(operation, self.shape.reach), self.shape.piles[operation.index]
+        pile = self.shape.laden(self.shape.piles[operation.index])
+        return station + ahead_of(operation, self.shape.reach), pile
 
 
 def footprint(

@@ -111,13 +111,18 @@ class Guidepath:
 
 @dataclass(frozen=True, slots=True)
 class Feeder:
-    """Where a part is presented. About the product's middle, in the frame (u, t) of the robot: the
-    post is at `back`, the boom reaches from there to `ahead`, both `across` from the middle; in the
-    world: the boxes `post` and `boom`, and the `height` of the boom's lower edge [m]."""
+    """A magazine, from which a part comes down to where it is presented. About the product's
+    middle, in the frame (u, t) of the robot: the post is at `back`, `across` from the middle, and
+    `inside` is the box that the housing's walls are round. In the world: the boxes of `post`,
+    `boom` and `housing`; from what height to what height the housing reaches, `low` and `high`,
+    and the `stroke` by which the part is higher in it than where it is presented [m]."""
 
     back: float
-    ahead: float
     across: float
+    inside: Extent
     post: Box
     boom: Box
-    height: float
+    housing: Box
+    low: float
+    high: float
+    stroke: float

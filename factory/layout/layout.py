@@ -5,12 +5,30 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
+from math import hypot
 from types import MappingProxyType
 
 from factory.geometry.solids import Product
 from factory.layout.certificate import Certificate
-from factory.layout.dimensions import BOOM, PAYLOAD, POST, Clearance
+from factory.layout.dimensions import (
+    BEHIND,
+    BELT_GAP,
+    BOOM,
+    BOOM_HEIGHT,
+    FINGER,
+    MAST,
+    PAD,
+    PAYLOAD,
+    PLAY,
+    POST,
+    RISE,
+    SIDE,
+    TRAY,
+    WALL,
+    Clearance,
+)
 from factory.layout.guidepath import Box, Extent, Feeder, Guidepath, Point2
+from factory.layout.hands.hand import BEAM, Hand
 from factory.plant.approaches import Overlap
 from factory.plant.factory import Factory, Operation
 from factory.problem.pag import NOPART
@@ -26,6 +44,7 @@ class Layout:
 
     `stations[i]`: distance [m] of operation i from its carrier's B end; `payloads[label]`: the box
     of a sub-assembly about the product's middle; `outfeed`: the box of the conveyor in the world;
+    `hands`: those of the robots, None for tools, nothing where they are not chosen;
     `plain`: the layout without relays, None where this is one; `ground`: what it was made for, by
     the names that `request.Ground` has.
     """
@@ -37,6 +56,7 @@ class Layout:
     stations: tuple[float, ...] = field(repr=False)
     payloads: Mapping[str, Box] = field(repr=False)
     outfeed: Box = (0.0, 0.0, 0.0, 0.0)
+    hands: tuple[Hand | None, ...] = field(default=(), repr=False)
     floor: Box = (0.0, 0.0, 0.0, 0.0)
     certificate: Certificate | None = field(default=None, repr=False, compare=False)
     plain: Layout | None = field(default=None, repr=False, compare=False)
@@ -45,6 +65,10 @@ class Layout:
     def __post_init__(self) -> None:
         object.__setattr__(self, "payloads", MappingProxyType(dict(self.payloads)))
         object.__setattr__(self, "ground", MappingProxyType(dict(self.ground)))
+
+    def hand(self, robot: int) -> Hand | None:
+        """The hand of a robot; None for a tool, and where hands are not chosen."""
+        return self.hands[robot] if self.hands else None
 
     @cached_property
     def guidepath_length(self) -> float:
@@ -88,6 +112,11 @@ class Layout:
             self.goal(number, operations[number].robots.index(robot))
             for number in self.factory.robots[robot].operations
         ]
+
+    def ends(self, robot: int) -> tuple[float, float]:
+        """The least and the greatest arc length at which a robot ever stands."""
+        path, stops = self.guidepaths[robot], self.stops(robot)
+        return min(path.reach, *stops), max(path.length, *stops)
 
     @cached_property
     def legs(self) -> Mapping[tuple[int, int], tuple[float, float]]:
@@ -147,26 +176,49 @@ class Layout:
         return self.legs[operation, robot][0]
 
     def feeder(self, label: str) -> Feeder:
-        """The feeder of a part, behind the rear stop of the robot that it serves."""
-        operation = self.factory.by_label[label]
-        path = self.guidepaths[operation.carrier]
+        """The feeder of a part: a housing over the place where it is presented, and the post that
+        carries it, behind the rear stop of the robot that it serves."""
+        operation, room = self.factory.by_label[label], Clearance(self.clearance).room
+        path, solid = self.guidepaths[operation.carrier], self.product.solids[label]
         middle = self.meeting(operation)
-        rear, front, _, _ = path.frame(self.payloads[label])
+        rear, front, near, far = path.frame(self.payloads[label])
+        inside = rear - PLAY, front + PLAY, near - PLAY, far + PLAY
+        housing = rear - SIDE, front + SIDE, near - SIDE, far + SIDE
         back = -Clearance(self.clearance).post(path.reach, rear)
-        ahead = round((rear + front) / 2, 3)
         across, half = path.offset + path.aside, POST / 2
-        solid = self.product.solids[label]
+        hand = self.hand(operation.carrier)
+        if hand is not None and hand.tall:
+            top = max(hand.beam + BEAM, hand.places[0][2] + max(hand.radius, FINGER / 2))
+            room = max(room, round(top - float(solid.high[2]) + self.clearance, 6))
+            if hand.kind == "above":
+                across = round((near + far) / 2, 3)
+        over = PAYLOAD + self.elevations[operation.carrier] - self.product.low[2]
+        low = float(over + solid.high[2]) + room
+        high_up = RISE * hypot(inside[1] - inside[0], inside[3] - inside[2])
+        stroke = room + high_up + float(solid.high[2] - solid.low[2])
         return Feeder(
             back,
-            ahead,
             across,
+            inside,
             path.world((back - half, back + half, across - half, across + half), middle),
-            path.world((back, ahead, across - BOOM / 2, across + BOOM / 2), middle),
-            PAYLOAD
-            + self.elevations[operation.carrier]
-            + float(solid.high[2] - self.product.low[2])
-            + self.clearance,
+            path.world((back, housing[0], across - BOOM / 2, across + BOOM / 2), middle),
+            path.world(housing, middle),
+            low,
+            max(low - room + stroke + PAD + SIDE, low + BOOM_HEIGHT),
+            stroke,
         )
+
+    def passing(self, leaf: Operation) -> float:
+        """How far the robot of a feeder goes until all that it ever carries is clear of the part
+        that comes down next [m]."""
+        path, operations = self.guidepaths[leaf.carrier], self.factory.operations
+        carried = (
+            operations[number].label
+            for number in self.factory.robots[leaf.carrier].operations
+            if operations[number].carrier == leaf.carrier and number != self.factory.dropoff.index
+        )
+        rear = min(path.frame(self.payloads[label])[0] for label in carried)
+        return path.frame(self.payloads[leaf.label])[1] - rear + self.clearance
 
     def standoff(self, operation: Operation, slot: int) -> float:
         """How far short of the meeting point the robot in `slot` waits until the carrier stands
@@ -176,21 +228,52 @@ class Layout:
         clear of the pile wherever that is on its way. What is lowered comes above the pile, and
         waits just beside its place.
         """
-        if slot == operation.lowered:
-            return BESIDE
         carrier = operation.template.carrier - 1
         pile, label = operation.before[carrier], operation.before[slot]
-        if slot == carrier or NOPART in (pile, label):
+        if slot == operation.lowered:
+            return max(BESIDE, self._beside_hand(operation, slot) if pile == NOPART else 0.0)
+        if slot == carrier or label == NOPART:
             return 0.0
+        if pile == NOPART:
+            return self._beside_hand(operation, slot)
         path = self.guidepaths[operation.robots[slot]]
         ahead = path.frame(self.payloads[label])[1]
         towards = -path.frame(self.payloads[pile])[0]
         return max(0.0, ahead + towards + self.clearance)
 
+    def _beside_hand(self, operation: Operation, slot: int) -> float:
+        """How far short of the meeting point what is brought is clear of the way of the carrier's
+        hand, where that has to be there first [m]; else 0."""
+        hand = self.hand(operation.carrier)
+        if hand is None or not hand.first:
+            return 0.0
+        path, on = self.guidepaths[operation.robots[slot]], self.guidepaths[operation.carrier]
+        ahead = path.frame(self.payloads[operation.before[slot]])[1]
+        lines = [
+            path.heading[0] * on.side[0] * line + path.heading[1] * on.side[1] * line
+            for line in (on.offset - MAST / 2, on.offset + MAST / 2)
+        ]
+        return round(max(0.0, ahead - min(lines) + self.clearance), 6)
+
     @property
     def outfeed_way(self) -> float:
         """How far the outfeed takes a product until it is out of sight [m]."""
-        return self.product_length + 0.12
+        return self.product_length + self.clearance + WALL + BEHIND
+
+    @property
+    def shed(self) -> Box:
+        """The shed that the outfeed takes products into, in the world: its shutter is a clearance
+        ahead of a product that is dropped off."""
+        xlo, xhi, ylo, yhi = self.payloads[self.factory.pag.root]
+        x, y = self.guidepaths[0].a
+        start = x + xhi + self.clearance
+        return start, start + WALL + BEHIND + xhi - xlo + SIDE, y + ylo - SIDE, y + yhi + SIDE
+
+    @property
+    def shutter_stroke(self) -> float:
+        """How far the shed's shutter comes down: from above any product to the belt [m]."""
+        tall = float(self.product.high[2] - self.product.low[2])
+        return tall + PLAY + BELT_GAP + TRAY
 
     @cached_property
     def product_length(self) -> float:

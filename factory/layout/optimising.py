@@ -12,15 +12,16 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 
 from factory.geometry.solids import Product
-from factory.layout.arranging import arrange
+from factory.layout.arranging import arrange, shape_of
 from factory.layout.certificate import Region
 from factory.layout.dimensions import Clearance
 from factory.layout.drafting import LayoutDraft
 from factory.layout.durations import Pace, gear_times
 from factory.layout.guidepath import Box, Point2, hull
+from factory.layout.hands.choosing import Hands
 from factory.layout.layout import Layout, carriers
 from factory.layout.packing import Task
-from factory.layout.shapes import Sides, headings, oriented_shape, payload_boxes, symmetric_shapes
+from factory.layout.shapes import Sides, headings, payload_boxes, symmetric_shapes
 from factory.layout.sides import admissible
 from factory.layout.stretching import stretch
 from factory.layout.sweeps import piles, regions
@@ -40,13 +41,18 @@ LARGE = 1500
 
 
 def first_feasible(
-    factory: Factory, product: Product, c: Clearance, wide: Collection[int] = ()
+    factory: Factory,
+    product: Product,
+    c: Clearance,
+    wide: Collection[int] = (),
+    hands: Hands | None = None,
 ) -> Layout:
     """The layout of the simple construction."""
     payloads = payload_boxes(factory, product)
     sides = _first_sides(factory, payloads, c)
+    task = Task(factory, c, Pace(), (), wide=wide, hands=hands)
     lying = enumerate(zip(carriers(factory), headings(factory, sides), strict=True))
-    shapes = [oriented_shape(factory, payloads, r, on, frame, c, wide) for r, (on, frame) in lying]
+    shapes = [shape_of(task, payloads, robot, on, frame) for robot, (on, frame) in lying]
     stretched = stretch(factory, shapes, c, sides)
     return LayoutDraft(factory, product, c, payloads, shapes, stretched).layout()
 
@@ -58,17 +64,19 @@ def optimised(
     pace: Pace,
     floor: Point2 | None = None,
     wide: Collection[int] = (),
+    hands: bool = False,
 ) -> Layout:
     """The best layout found, of those that fit a floor if there are any. Never worse than the first
-    feasible one, but for a factory that is LARGE. `wide`: robots whose ways have room for relays.
-    Near linear, deterministic."""
+    feasible one, but for a factory that is LARGE. `wide`: robots whose ways have room for relays;
+    `hands`: with hands chosen from the geometry. Near linear, deterministic."""
     payloads = payload_boxes(factory, product)
+    chosen = Hands(factory, product) if hands else None
     count = len(factory.robots)
-    task = Task(factory, c, pace, [1.0] * count, wide=wide)
+    task = Task(factory, c, pace, [1.0] * count, wide=wide, hands=chosen)
     if count > LARGE:
         sides = _first_sides(factory, payloads, c)
         return _packed(replace(task, width=1), product, payloads, sides)
-    best = first_feasible(factory, product, c, wide)
+    best = first_feasible(factory, product, c, wide, chosen)
     times = gear_times(best, pace)
     least = _score(best, times, floor)
     for number, (corridor, breadth) in enumerate(WAYS[: max(1, EFFORT // count)]):

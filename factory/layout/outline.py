@@ -133,5 +133,5 @@ def outlined(
         blocks = tuple((*blocks[layer], *crowns(guests, layer)) for layer in LAYERS)
         if boxed:
             blocks = tuple((hull(found),) if found else () for found in blocks)
-    least = max(TOOL_TRAVEL if own.shape.tool else 0.0, own.clearance.c)
+    least = max(TOOL_TRAVEL if own.shape.tool else own.shape.least, own.clearance.c)
     return Outline(own.shape, choice, blocks, least)

@@ -16,6 +16,7 @@ from factory.layout.dimensions import PAYLOADS, Clearance, up
 from factory.layout.durations import Pace
 from factory.layout.footprint import Placed, extent_to, footprint, guests_of
 from factory.layout.guidepath import Extent
+from factory.layout.hands.choosing import Hands
 from factory.layout.layout import BESIDE
 from factory.layout.outline import Choice, Guest, Outline, outlined
 from factory.layout.shapes import Shape, Sides
@@ -44,7 +45,7 @@ class Task:
     its extent to the sides a robot is charged to be slower for those it delivers to; `width`: how
     many ways are kept; `corridor`: whether the output robot's way ahead is kept free for the
     product, so that the outfeed can begin beside the others; `wide`: robots whose ways have room
-    for relays.
+    for relays; `hands`: those of the robots, None where they are not chosen.
     """
 
     factory: Factory
@@ -55,6 +56,7 @@ class Task:
     width: int = 6
     corridor: bool = True
     wide: Collection[int] = ()
+    hands: Hands | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -34,7 +34,8 @@ class Ground:
         from factory.layout.embedding import lay_out
 
         pace = Pace.of(settings)
-        layout = lay_out(factory, product, settings.clearance, self.floor, pace)
+        hands = bool(settings.hands)
+        layout = lay_out(factory, product, settings.clearance, self.floor, pace, hands)
         if self.relays:
             from factory.layout.relaying import relayed
 

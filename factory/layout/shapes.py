@@ -7,8 +7,10 @@ from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 
 from factory.geometry.solids import Product
-from factory.layout.dimensions import Clearance, up
-from factory.layout.guidepath import Box, Extent, Point2, project
+from factory.layout.dimensions import FINGER, MAST, Clearance, up
+from factory.layout.guidepath import Box, Extent, Point2, hull, project
+from factory.layout.hands.choosing import Hands
+from factory.layout.hands.hand import ROOT, Hand
 from factory.layout.layout import carriers
 from factory.layout.sweeps import piles
 from factory.plant.factory import Factory
@@ -30,8 +32,10 @@ NOWHERE: Extent = (0.0, 0.0, 0.0, 0.0)
 class Shape:
     """What the layout must know of a robot: the box of each pile it carries, by operation, and
     of the last one, how far its carriage line is to the side, how far behind the middle its arm
-    ends and its carriage is (`reach`, 2r), how far ahead its finger goes (`nest`), and how far its
-    lane reaches to either side for relays (`spread`) [m]."""
+    ends and its carriage is (`reach`, 2r), how far ahead its finger goes (`nest`), how far its lane
+    reaches to either side for relays (`spread`), and its `least` travel [m]; its `hand`, None
+    where none is chosen, and the box `grip` of what of that is among the payloads; how far to the
+    side the `post` of its feeder stands [m]."""
 
     piles: Mapping[int, Extent]
     last: Extent
@@ -41,6 +45,14 @@ class Shape:
     nest: float
     tool: bool
     spread: float = 0.0
+    hand: Hand | None = None
+    grip: Extent | None = None
+    post: float = 0.0
+    least: float = 0.0
+
+    def laden(self, pile: Extent) -> Extent:
+        """The box of a pile with the hand that holds it."""
+        return hull([pile, self.grip]) if self.grip else pile
 
 
 def turned(frame: Frame, side: int) -> Frame:
@@ -103,7 +115,69 @@ def oriented_shape(
     arm = up(max(c.rim, c.rim + lane, belt))
     offset, nest = round((held[2] + held[3]) / 2, 3), round((held[0] + held[1]) / 2, 3)
     spread = c.spread if robot in wide else 0.0
-    return Shape(boxes, last, offset, arm, up(c.reach(arm, lane)), nest, tool, spread)
+    reach = up(c.reach(arm, lane))
+    return Shape(boxes, last, offset, arm, reach, nest, tool, spread, post=offset)
+
+
+def held_shape(
+    hands: Hands,
+    payloads: Mapping[str, Box],
+    robot: int,
+    carrier: int,
+    frame: Frame,
+    c: Clearance,
+    wide: Collection[int] = (),
+) -> Shape:
+    """The shape of a robot with a hand that lies in a frame. Its guidepath runs under the line of
+    its hand; its arm ends beside the line of its carrier. A tower stands behind all that its
+    payload is joined to; that of a robot which holds a feeder's part from above passes beside the
+    part too. `wide`: robots with room for relays, which run to either side of such a line."""
+    factory, (u, t) = hands.holding.factory, frame
+
+    def lies(label: str) -> Extent:
+        return project(payloads[label], *frame)
+
+    def line(robot: int, heading: Point2, side: Point2) -> float:
+        across = 0 if side[0] else 1
+        at = hands.line(robot, heading) - float(hands.holding.product.middle[across])
+        return round(at * side[across], 3)
+
+    operations = factory.operations
+    boxes = {n: lies(operations[n].label) for n in carried(factory, robot)}
+    last, hand = _last(boxes), hands.hand(robot, u, t)
+    final = operations[factory.robots[robot].operations[-1]]
+    lane, belt = 0.0, c.c - last[0]
+    if carrier >= 0:
+        lane = -line(carrier, t, u) + (c.spread if carrier in wide else 0.0)
+        belt = 0.0
+    arm = up(max(c.rim, c.rim + lane, belt))
+    reach = up(c.reach(arm, lane))
+    spread = c.spread if robot in wide else 0.0
+    if hand is None:
+        held = lies(operations[factory.robots[robot].operations[0]].label)
+        offset = round((held[2] + held[3]) / 2, 3)
+        return Shape(
+            boxes, last, offset, arm, reach, round((held[0] + held[1]) / 2, 3), True, spread
+        )
+    x, y = (hands.holding.product.middle[:2]).tolist()
+    pads = [(px - x, py - y) for px, py, _ in hand.places]
+    ahead = [px * u[0] + py * u[1] for px, py in pads]
+    side = pads[0][0] * t[0] + pads[0][1] * t[1]
+    offset, half = round(side, 3), max(hand.radius, FINGER / 2)
+    across, post, least = (side - half, side + half), offset, 0.0
+    rear = min(min(ahead) - half, -arm - ROOT)
+    grip: Extent = (rear, max(ahead) + half, *across)
+    if hand.tall:
+        joined = last if final.index == factory.dropoff.index else lies(final.label)
+        reach = arm = up(max(reach, c.c + MAST / 2 - joined[0]))
+        if hand.kind == "above" and hands.holding.is_fed(robot):
+            post, offset = round((last[2] + last[3]) / 2, 3), round(last[2] - c.c - MAST / 2, 3)
+            if hand.waits and robot not in factory.strokes:
+                least = last[1] + max(ahead) - min(ahead) + 2 * half - joined[0] + 2 * c.c
+        across = min(across[0], offset - MAST / 2), max(across[1], offset + MAST / 2)
+        grip = (-reach - MAST / 2, max(ahead) + half, *across)
+    nest = round(max(ahead), 6)
+    return Shape(boxes, last, offset, arm, reach, nest, False, spread, hand, grip, post, up(least))
 
 
 def carried(factory: Factory, robot: int) -> list[int]:

@@ -18,10 +18,13 @@ from factory.layout.certificate import (
     ARM_BODY,
     BOOM,
     CARRIAGE_BODY,
+    HAND_BODY,
+    HOUSING,
     MAST_BODY,
     OUTFEED,
     PAYLOAD_BODY,
     POST_BODY,
+    SHED,
     Region,
 )
 from factory.layout.dimensions import (
@@ -37,8 +40,10 @@ from factory.layout.dimensions import (
     MAST,
     PAYLOAD,
     PAYLOADS,
+    SIDE,
 )
 from factory.layout.guidepath import Box, Extent, hull
+from factory.layout.hands.limbs import grip_box
 from factory.layout.layout import Layout
 from factory.plant.factory import Factory
 from factory.problem.pag import NOPART
@@ -84,13 +89,13 @@ def regions(layout: Layout, found: Mapping[str, Pile]) -> list[Region]:
         result.extend(_feeder(layout, leaf.label, leaf.carrier))
     top = max(pile.z[1] for pile in found.values())
     result.extend(_upright(0, OUTFEED, layout.outfeed, top, ""))
+    result.extend(_upright(0, SHED, layout.shed, top + layout.shutter_stroke + 2 * SIDE, ""))
     return result
 
 
 def _bodies(layout: Layout, robot: int) -> Iterator[Region]:
     """Carriage, mast and arm, anywhere on the guidepath."""
-    path, stops = layout.guidepaths[robot], layout.stops(robot)
-    start, end = min(path.reach, *stops), max(path.length, *stops)
+    path, ends = layout.guidepaths[robot], layout.ends(robot)
     mast, width = (CARRIAGE_TOP, ARM_TOP), MAST / 2
     for kind, layer, half, ahead, side, z in (
         (CARRIAGE_BODY, CARRIAGES, CARRIAGE / 2, CARRIAGE / 2, CARRIAGE / 2, (0.0, CARRIAGE_TOP)),
@@ -98,13 +103,15 @@ def _bodies(layout: Layout, robot: int) -> Iterator[Region]:
         (ARM_BODY, ARMS, 0.0, path.reach - path.arm, ARM_WIDTH / 2, (ARM_LOW, ARM_TOP)),
     ):
         foot: Extent = (-half, max(ahead, 0.0), -side, side)
-        box = hull([path.world(foot, path.carriage(x)) for x in (start, end)])
+        box = hull([path.world(foot, path.carriage(x)) for x in ends])
         yield Region(robot, layer, kind, box, z)
 
 
 def _payloads(layout: Layout, robot: int, found: Mapping[str, Pile]) -> Iterator[Region]:
-    """Each pile from where it is taken or made to where the next operation has its goal."""
+    """Each pile, with the hand that holds it, from where it is taken or made to where the next
+    operation has its goal."""
     path, operations = layout.guidepaths[robot], layout.factory.operations
+    grip = grip_box(layout, robot)
     gear, stops = layout.factory.robots[robot].operations, layout.stops(robot)
     for step, number in enumerate(gear):
         operation = operations[number]
@@ -115,18 +122,23 @@ def _payloads(layout: Layout, robot: int, found: Mapping[str, Pile]) -> Iterator
         step = (step + 1) % len(gear)
         onward = operations[gear[step]]
         leaves = onward.after[onward.robots.index(robot)] == NOPART
-        stand = path.sweep(pile.box, at, at if leaves else stops[step])
-        yield Region(robot, PAYLOADS, PAYLOAD_BODY, stand, pile.z, label)
-        if leaves:
-            way = path.sweep(pile.box, at, stops[step])
-            yield Region(robot, PAYLOADS, PAYLOAD_BODY, way, pile.z, label, onward.index)
+        found_here = [(PAYLOAD_BODY, pile)]
+        if grip is not None:
+            found_here.append((HAND_BODY, Pile(path.world(grip, (0.0, 0.0)), pile.z)))
+        for kind, held in found_here:
+            stand = path.sweep(held.box, at, at if leaves else stops[step])
+            yield Region(robot, PAYLOADS, kind, stand, held.z, label)
+            if leaves:
+                way = path.sweep(held.box, at, stops[step])
+                yield Region(robot, PAYLOADS, kind, way, held.z, label, onward.index)
 
 
 def _feeder(layout: Layout, label: str, robot: int) -> Iterator[Region]:
     feeder = layout.feeder(label)
-    height = feeder.height, feeder.height + BOOM_HEIGHT
-    yield from _upright(robot, POST_BODY, feeder.post, height[1], label)
+    yield from _upright(robot, POST_BODY, feeder.post, feeder.high, label)
+    height = feeder.high - BOOM_HEIGHT, feeder.high
     yield Region(robot, PAYLOADS, BOOM, feeder.boom, height, label)
+    yield Region(robot, PAYLOADS, HOUSING, feeder.housing, (feeder.low, feeder.high), label)
 
 
 def _upright(robot: int, kind: int, box: Box, top: float, label: str) -> Iterator[Region]:

@@ -10,22 +10,31 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from math import ceil
 from pathlib import Path
 from types import MappingProxyType
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
 from xml.sax.saxutils import quoteattr
 
+from factory.control.profile import SpeedProfile
 from factory.layout.layout import Layout
 from factory.mjcf import names
 from factory.mjcf.elements import add, fill
+from factory.mjcf.feeders import SLIDER_MASS, add_feeders
 from factory.mjcf.insets import Insets, insets_of
-from factory.mjcf.outfeed import TRAY_MASS, add_tray
+from factory.mjcf.outfeed import SHUTTER_MASS, TRAY_MASS, add_outfeed
 from factory.mjcf.parts import add_meshes, add_parts, add_wholes
-from factory.mjcf.robots import Drive, Hoist, add_paints, instantiate, load_robot_model
-from factory.mjcf.scene import add_follower, add_scene
+from factory.mjcf.robot_bodies import add_robots
+from factory.mjcf.robots import (
+    Drive,
+    Hoist,
+    add_paints,
+)
+from factory.mjcf.scene import add_scene
+from factory.mjcf.stops import lift_stops
 from factory.mjcf.unseen import leave_out_what_is_shown
-from factory.mjcf.welds import add_exclusions, add_welds, held_at
+from factory.mjcf.welds import add_exclusions, add_welds
 from factory.plant.approaches import Pair
 from factory.plant.factory import Factory, Robot
 from factory.plant.fused_bodies import FusedBodies, Inside, bodies_of
@@ -70,6 +79,10 @@ ARENA = 64
 
 GRAVITY = 9.81
 """[m/s²]; the engine's own."""
+
+ROLLING = 0.003
+"""Friction of a carriage's and the tray's guide, as a share of the weight that it bears: that of a
+profile rail with balls (docs/decisions/guides.md)."""
 
 
 @dataclass(frozen=True)
@@ -176,24 +189,32 @@ def build_model(
     apart = tuple(bodies.meeting(factory, pair) for pair in insets.excluded)
     files = add_meshes(section["asset"], product, insets)
     add_scene(world, section["statistic"], layout)
-    hoists = _hoists(factory, masses, settings)
-    _robots(layout, catalogue, drives, hoists, section)
+    hoists = _hoists(layout, masses, settings)
+    add_robots(layout, catalogue, drives, hoists, section)
     load = masses[factory.pag.root]
-    drive = drive_for(TRAY_MASS, load, settings.outfeed_acceleration, settings)
-    add_tray(world, actuator, layout, drive)
+    fast = settings.outfeed_acceleration
+    tray = drive_for(TRAY_MASS, load, fast, settings)
+    shutter = drive_for(
+        HOIST_MASS, 0.0, settings.shutter_limits[1] + GRAVITY, settings, HOIST_STIFFNESS
+    )
+    add_outfeed(world, actuator, layout, tray, shutter)
+    sliders = _sliders(layout, masses, settings)
+    add_feeders(world, actuator, layout, sliders)
     add_parts(world, layout, copies, insets)
     add_wholes(world, layout, bodies, copies, insets, {inside for both in apart for inside in both})
     add_welds(equality, layout, bodies, copies)
     add_exclusions(section["contact"], apart, copies)
     if not len(section["contact"]):
         root.remove(section["contact"])
-    _home(section["keyframe"], layout, actuator)
+    weights = {names.slider(label): SLIDER_MASS + masses[label] for label in sliders}
+    weights[names.SHUTTER] = SHUTTER_MASS
+    _home(section["keyframe"], layout, actuator, weights)
     if not shown:
         leave_out_what_is_shown(root)
     fill(section["size"], memory=f"{ARENA + _broad_phase(root) // 2**20}M")
     ElementTree.indent(root)
     xml = ElementTree.tostring(root, encoding="unicode") + "\n"
-    joints = len(factory.robots) + len(hoists) + 1 + sum(copies.values())
+    joints = len(factory.robots) + len(hoists) + 2 + len(sliders) + sum(copies.values())
     made = Model(layout, settings, bodies, copies, masses, drives, insets, xml, files)
     return replace(made, joints=joints, welds=len(equality), wip=wip, apart=apart)
 
@@ -243,66 +264,49 @@ def drive_for(
     return Drive(round(kp, 3), round(kv, 3), round(force, 3), settings.samples, round(inertia, 3))
 
 
-def _hoists(factory: Factory, masses: Mapping[str, float], settings: Settings) -> dict[int, Hoist]:
+def _hoists(layout: Layout, masses: Mapping[str, float], settings: Settings) -> dict[int, Hoist]:
     """The lifts, for the heaviest load of each: what it delivers."""
-    found = {}
+    factory, found = layout.factory, {}
     for robot, stroke in factory.strokes.items():
         load, most = masses[factory.delivered(robot)], settings.acceleration + GRAVITY
         drive = drive_for(HOIST_MASS, load, most, settings, HOIST_STIFFNESS)
-        found[robot] = Hoist(stroke, drive)
+        found[robot] = Hoist(stroke, drive, lift_stops(stroke, layout.clearance))
     return found
 
 
-def _robots(
-    layout: Layout,
-    catalogue: Catalogue,
-    drives: tuple[Drive, ...],
-    hoists: Mapping[int, Hoist],
-    section: Mapping[str, Element],
+def _sliders(layout: Layout, masses: Mapping[str, float], settings: Settings) -> dict[str, Drive]:
+    """The drives of the feeders' sliders, for what they bring down. Their buffers hold the
+    setpoints of a whole stroke of any of them, and longer than until it is seen to be over: what is
+    shown of a stroke meanwhile comes after those."""
+    most = settings.feeder_limits[1] + GRAVITY
+    samples = (stroke_ticks(layout, settings) + 2 * settings.stride) * settings.steps + 2
+    found = {}
+    for leaf in layout.factory.leaves:
+        load = masses[leaf.label]
+        drive = drive_for(HOIST_MASS, load, most, settings, HOIST_STIFFNESS)
+        found[leaf.label] = replace(drive, samples=samples)
+    return found
+
+
+def stroke_ticks(layout: Layout, settings: Settings) -> int:
+    """No stroke of a feeder's slider takes more ticks."""
+    profile = SpeedProfile(*settings.feeder_limits)
+    strokes = (layout.feeder(leaf.label).stroke for leaf in layout.factory.leaves)
+    return ceil(profile.rest(max(strokes)) / settings.tick) + 4
+
+
+def _home(
+    keyframe: Element, layout: Layout, actuator: Element, weights: Mapping[str, float]
 ) -> None:
-    factory, product = layout.factory, layout.product
-    models = {}
-    for robot, path, drive in zip(factory.robots, layout.guidepaths, drives, strict=True):
-        if robot.type not in models:
-            model = models[robot.type] = load_robot_model(catalogue[robot.type])
-            section["default"].append(model.defaults)
-            section["asset"].extend(model.assets)
-        carried = factory.delivered(robot.index)
-        parts = factory.contents[carried] if carried else ()
-        low = min((float(product.solids[p].low[2]) for p in parts), default=float(product.low[2]))
-        body, actuators = instantiate(
-            models[robot.type],
-            robot.name,
-            path,
-            drive,
-            low - float(product.low[2]) + held_at(layout, robot.index),
-            role_of(factory, robot.index),
-            hoists.get(robot.index),
-        )
-        if robot.index == 0:
-            add_follower(body, layout)
-        section["worldbody"].append(body)
-        section["actuator"].extend(actuators)
-
-
-def _home(keyframe: Element, layout: Layout, actuator: Element) -> None:
-    """The keyframe `home`: setpoints at which every robot stays at the end B of its guidepath."""
+    """The keyframe `home`: setpoints at which every robot stays at the end B of its guidepath, and
+    what actuators (by name) carry stays where it is [kg]."""
     ends = {
         names.drive(robot.name): path.length
         for robot, path in zip(layout.factory.robots, layout.guidepaths, strict=True)
     }
     setpoints: list[float] = []
     for element in actuator:
-        inputs = len((element.get("input") or "pos").split())
-        setpoints += [ends.get(element.get("name") or "", 0.0), *[0.0] * (inputs - 1)]
+        name, inputs = element.get("name") or "", len((element.get("input") or "pos").split())
+        setpoint = [ends.get(name, 0.0), 0.0, weights.get(name, 0.0) * GRAVITY]
+        setpoints += [*setpoint, *[0.0] * inputs][:inputs]
     add(keyframe, "key", name="home", ctrl=tuple(setpoints))
-
-
-def role_of(factory: Factory, robot: int) -> str:
-    """What a robot does, for its paint."""
-    if robot == 0:
-        return "output"
-    if not factory.delivered(robot):
-        return "tool"
-    first = factory.operations[factory.robots[robot].operations[0]]
-    return "carrier" if first.inputs else "fed"

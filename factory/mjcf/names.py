@@ -71,14 +71,39 @@ def feed(label: str) -> str:
 
 
 def feeder(label: str) -> str:
-    """The static body of a feeder, `feeder/part1`."""
+    """The static body of a feeder, `feeder/part1`; its geoms are `feeder/part1/post` and so on."""
     return f"feeder/{label}"
+
+
+def slider(label: str) -> str:
+    """The body in a feeder's housing that brings parts down, its joint and its actuator,
+    `feeder/part1/slider`."""
+    return f"feeder/{label}/slider"
+
+
+def pad(label: str) -> str:
+    """The geom from which a feeder's part hangs, `feeder/part1/pad`."""
+    return f"feeder/{label}/pad"
 
 
 def hold(label: str) -> str:
     """The weld by which the outfeed's tray holds a part of a finished product, `hold/part2`; it is
     aimed at the copy it holds."""
     return f"hold/{label}"
+
+
+def holder(body: str) -> str:
+    """What a body that holds parts is of: `r3/head` -> `r3`; itself where it is no robot's."""
+    return body.partition("/")[0] if kind(body) == "robot" else body
+
+
+def pad_of(geom: str) -> str:
+    """The holder whose pad a geom is, on which what it holds rests, "" for none: `r3/pad` -> `r3`,
+    `feeder/part1/pad` -> `feeder/part1`; the tray's own geoms are its pads."""
+    owner, _, last = geom.rpartition("/")
+    if geom.startswith(OUTFEED_TRAY):
+        return OUTFEED_TRAY
+    return holder(owner) if last == "pad" else ""
 
 
 COMPASS = "compass"
@@ -92,6 +117,9 @@ OUTFEED_SLIDE = "outfeed/slide"
 
 OUTFEED_DRIVE = "outfeed/drive"
 """Its actuator."""
+
+SHUTTER = "outfeed/shutter"
+"""The body that closes the outfeed's shed, its geom, its joint and its actuator."""
 
 
 def exclusion(one: str, other: str, number: int) -> str:
@@ -119,3 +147,11 @@ def kind(name: str) -> str:
 def label_of(name: str) -> str:
     """The label in a part's body name, `part/part1#2` -> `part1`."""
     return name.partition("/")[2].rpartition("#")[0]
+
+
+def without_copy(name: str) -> str:
+    """The name of a geom, the same for all copies of a part and all pieces of a copy:
+    `part/part1#2/3` -> `part/part1`."""
+    body, _, rest = name.partition("#")
+    words = rest.split("/")[1:]
+    return "/".join([body, *(word for word in words if not word.isdigit())])

@@ -1,4 +1,5 @@
-"""The outfeed: a track under the output robot's A end, and a tray on it that takes a product away.
+"""The outfeed: a track under the output robot's A end, a tray on it that takes a product away, and
+the shed into which it does. A shutter closes the shed before the product's bodies are used again.
 
 The tray holds a finished product as robots do, by a star of welds to a body that is heavy beside
 any part. A product need not stand by itself, nor can it tip on the way out.
@@ -8,11 +9,15 @@ from __future__ import annotations
 
 from xml.etree.ElementTree import Element
 
-from factory.layout.dimensions import BELT_GAP, FINGER_TOP, PAYLOAD, TRAY
+from factory.layout.dimensions import BELT_GAP, FINGER_TOP, PAYLOAD, PLAY, TRAY, WALL
+from factory.layout.guidepath import Box
+from factory.layout.hands.limbs import limbs
 from factory.layout.layout import Layout, Point2
 from factory.mjcf import names
-from factory.mjcf.elements import add, add_shown, add_station
-from factory.mjcf.robots import Drive, add_inertia
+from factory.mjcf.elements import add, add_station
+from factory.mjcf.masks import masks_of, tray_code
+from factory.mjcf.robots import MOTOR, Drive, add_inertia
+from factory.mjcf.stops import shutter_stops, tray_stops
 
 TRAY_MASS = 4.0
 """Mass of the empty tray [kg]."""
@@ -21,60 +26,159 @@ LEAST_WIDTH, SLENDEREST = 1e-5, 1e-7
 """Half the least width of tray and belt [m], and in half their length: of what is thinner the
 engine cannot make out the inertia."""
 
+SHUTTER_MASS = 0.4
+"""Mass of the shed's shutter [kg]."""
+
+BELT = PAYLOAD - BELT_GAP - TRAY
+"""Height of the belt [m]."""
+
+SLOT = 0.001
+"""How far the slot in tray and belt is from the hand that comes through it [m]."""
+
+SLIT = 2e-4
+"""Between the shutter when it is down and the belt [m]."""
+
+CRACK = 2e-5
+"""Between the shutter and the walls before which it slides [m]: so narrow that no line of sight
+through it gets to a product of less than 0.7 m."""
+
+UPRIGHT, LEG = 0.004, 0.006
+"""Half the widths of the uprights on which the shutter slides, and of the legs [m]."""
+
 Point3 = tuple[float, float, float]
 
-SHED = (0.87, 0.88, 0.89, 1.0)
+
+def add_outfeed(
+    world: Element, actuator: Element, layout: Layout, tray: Drive, shutter: Drive
+) -> None:
+    """The belt at the output robot's A end and the shed that it leads into, then what moves: the
+    tray under the place where the output robot delivers, and the shutter of the shed."""
+    _add_table(world, layout)
+    _add_tray(world, actuator, layout, tray)
+    _add_shutter(world, actuator, layout, shutter)
 
 
-def add_tray(world: Element, actuator: Element, layout: Layout, drive: Drive) -> None:
-    """The tray under the place where the output robot delivers, its joint and its drive."""
+def _add_tray(world: Element, actuator: Element, layout: Layout, drive: Drive) -> None:
+    """It touches the product that it holds by design, so it is masked as what it holds."""
     x, y = layout.guidepaths[0].a
     xlo, xhi, ylo, yhi = layout.payloads[layout.factory.pag.root]
     body = add(world, "body", name=names.OUTFEED_TRAY, pos=(x, y, 0), sleep="allowed")
     slide = names.OUTFEED_SLIDE
     joint = add(body, "joint", name=slide, type="slide", axis="1 0 0", frictionloss=0.2)
     add_inertia(joint, drive)
-    add_shown(
-        body,
-        names.OUTFEED_TRAY,
-        "box",
-        mass=TRAY_MASS,
-        pos=((xlo + xhi) / 2, (ylo + yhi) / 2, PAYLOAD - BELT_GAP - TRAY / 2),
-        size=(*_plate((xhi - xlo) / 2, (yhi - ylo) / 2), TRAY / 2 - 1e-4),
-        material="tray",
-    )
+    tray_stops(layout).limit(joint)
+    contype, conaffinity = masks_of(tray_code(layout.factory))
+    plate = xlo, xhi, ylo, yhi
+    for number, (at, half) in enumerate(_slotted(plate, _slot(layout)), 1):
+        add(
+            body,
+            "geom",
+            name=names.OUTFEED_TRAY + (f"/{number}" if number > 1 else ""),
+            type="box",
+            mass=TRAY_MASS if number == 1 else 0,
+            pos=(*at, PAYLOAD - BELT_GAP - TRAY / 2),
+            size=(*_plate(*half), TRAY / 2 - 1e-4),
+            contype=contype,
+            conaffinity=conaffinity,
+            material="tray",
+        )
     gains = drive.attributes()
     add(actuator, "pid", name=names.OUTFEED_DRIVE, joint=slide, input="pos vel ff", **gains)
 
 
-def add_outfeed(world: Element, layout: Layout) -> None:
-    """A table with a track at the output robot's A end, into a shed."""
+def _add_shutter(world: Element, actuator: Element, layout: Layout, drive: Drive) -> None:
+    """A plate before the mouth of the shed, up; its joint goes down from there."""
+    start, _, ylo, yhi = layout.shed
+    stroke = layout.shutter_stroke
+    body = add(world, "body", name=names.SHUTTER, pos=(start, (ylo + yhi) / 2, 0), sleep="allowed")
+    slide = {"type": "slide", "axis": "0 0 1", "armature": MOTOR, "frictionloss": 0.2}
+    joint = add(body, "joint", name=names.SHUTTER, **slide)
+    shutter_stops(layout).limit(joint)
+    add_inertia(joint, drive)
+    thick = (WALL - CRACK) / 2
+    low = BELT + SLIT + stroke
+    add(
+        body,
+        "geom",
+        name=names.SHUTTER,
+        class_="station",
+        type="box",
+        mass=SHUTTER_MASS,
+        pos=(thick, 0, low + (stroke + PLAY) / 2),
+        size=(thick, (yhi - ylo) / 2, (stroke + PLAY) / 2),
+        material="tray",
+    )
+    gains = drive.attributes()
+    name = names.SHUTTER
+    add(actuator, "pid", name=name, joint=name, input="pos vel ff", **gains)
+
+
+def _add_table(world: Element, layout: Layout) -> None:
+    """The belt on its legs, and the shed's walls, roof and back, with uprights for the shutter."""
     xlo, xhi, ylo, yhi = layout.outfeed
-    top = PAYLOAD - BELT_GAP - TRAY
-    thick = (top - FINGER_TOP) * 0.8
+    thick = (BELT - FINGER_TOP) * 0.8
     (x, y), half = ((xlo + xhi) / 2, (ylo + yhi) / 2), ((xhi - xlo) / 2, (yhi - ylo) / 2)
     body = add(world, "body", name="outfeed", pos=(x, y, 0.0))
-    size = (*_plate(*half), thick / 2)
-    add_station(body, "outfeed/belt", pos=(0, 0, top - thick / 2), size=size, material="belt")
-    tall = float(layout.product.high[2] - layout.product.low[2])
-    length = layout.product_length + 0.1
-    shed, wall = half[0] - length / 2, top + tall / 2 + 0.005
-    shown: list[tuple[str, Point3, Point3]] = []
+    mouth, back, low, high = layout.shed
+    mouth += WALL
+    stroke = layout.shutter_stroke
+    top = BELT + SLIT + stroke + WALL
+    length, width = back - mouth - WALL, high - low
+    along, across = mouth + length / 2 - x, (low + high) / 2 - y
+    end = mouth + length + WALL / 2 - x
+    a, slot = layout.guidepaths[0].a, _slot(layout)
+    if slot is not None:
+        slot = slot[0] + a[0] - x, slot[1] + a[1] - y, slot[2] + a[1] - y
+    belt = -half[0], min(half[0], mouth + length - x - SLIT), -half[1], half[1]
+    for number, (at, rest) in enumerate(_slotted(belt, slot), 1):
+        name = "outfeed/belt" + (f"/{number}" if number > 1 else "")
+        place = {"pos": (*at, BELT - thick / 2), "size": (*_plate(*rest), thick / 2)}
+        add_station(body, name, **place, material="belt")
+    shown: list[tuple[str, Point3, Point3]] = [
+        ("roof", (along, across, top - WALL / 2), (length / 2, width / 2 - WALL, WALL / 2)),
+        ("back", (end, across, top / 2), (WALL / 2, width / 2, top / 2)),
+    ]
     for side in (-1, 1):
-        rim = (x, y + side * (half[1] + 0.006), top - 0.008)
-        shown.append((f"side{side}", rim, (half[0], 0.0055, 0.012)))
-        for end in (-1, 1):
-            foot = (x + end * (half[0] - 0.03), y + side * (half[1] - 0.008), (top - thick) / 2)
-            shown.append((f"leg{side}{end}", foot, (0.006, 0.006, (top - thick) / 2)))
-        beside = (x + shed, y + side * (half[1] + 0.0165), wall)
-        shown.append((f"wall{side}", beside, (length / 2, 0.004, tall / 2 + 0.025)))
-    roof = (x + shed + 0.002, y, top + tall + 0.0335)
-    shown.append(("roof", roof, (length / 2 + 0.008, half[1] + 0.024, 0.004)))
-    back = (x + half[0] + 0.0045, y, wall)
-    shown.append(("back", back, (0.004, half[1] + 0.0205, tall / 2 + 0.025)))
+        beside = across + side * (width - WALL) / 2
+        shown.append((f"wall{side}", (along, beside, top / 2), (length / 2, WALL / 2, top / 2)))
+        upright = mouth + UPRIGHT - x, beside, top + stroke / 2
+        shown.append((f"upright{side}", upright, (UPRIGHT, WALL / 2, stroke / 2)))
     for name, pos, size in shown:
-        look = {"material": "frame"} if name.startswith(("side", "leg")) else {"rgba": SHED}
-        add_shown(world, f"outfeed/{name}", "box", pos=pos, size=size, **look)
+        add_station(body, f"outfeed/{name}", pos=pos, size=size, material="housing")
+    leg, front = min(LEG, *half), layout.payloads[layout.factory.pag.root][1]
+    for side in (-1, 1):
+        foot = a[0] + front + 2 * leg - x, side * (half[1] - leg), (BELT - thick) / 2
+        size = leg, leg, (BELT - thick) / 2
+        add_station(body, f"outfeed/leg{side}", pos=foot, size=size, material="frame")
+
+
+def _slot(layout: Layout) -> tuple[float, float, float] | None:
+    """The slot through which the output robot's hand comes up to the product, about the product's
+    middle: how far it reaches, and its sides [m]; None where the hand is not below."""
+    path, hand = layout.guidepaths[0], layout.hand(0)
+    upright = [limb for limb in limbs(layout, 0) if limb.name.endswith(("column", "pad"))]
+    if hand is None or hand.kind != "below":
+        return None
+    ends = max(limb.high[0] for limb in upright) - path.reach + SLOT
+    low = min(limb.low[1] for limb in upright) + path.offset - SLOT
+    return ends, low, max(limb.high[1] for limb in upright) + path.offset + SLOT
+
+
+def _slotted(plate: Box, slot: tuple[float, float, float] | None) -> list[tuple[Point2, Point2]]:
+    """The rectangles, middles and half sizes, that make up a plate with a slot from its rear."""
+    xlo, xhi, ylo, yhi = plate
+    boxes = [plate]
+    if slot is not None:
+        end, low, high = slot
+        boxes = [
+            (xlo, xhi, ylo, low),
+            (xlo, xhi, high, yhi),
+            (end, xhi, max(low, ylo), min(high, yhi)),
+        ]
+        boxes = [box for box in boxes if min(box[1] - box[0], box[3] - box[2]) > SLOT] or [plate]
+    return [
+        (((x0 + x1) / 2, (y0 + y1) / 2), ((x1 - x0) / 2, (y1 - y0) / 2)) for x0, x1, y0, y1 in boxes
+    ]
 
 
 def _plate(x: float, y: float) -> Point2:

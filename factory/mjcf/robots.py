@@ -9,12 +9,32 @@ from pathlib import Path
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
 
-from factory.layout.dimensions import FINGER_TOP, PAYLOAD
+from factory.layout.dimensions import FINGER_TOP, MAST, PAYLOAD
+from factory.layout.hands.limbs import Limb
 from factory.layout.layout import Guidepath, Point2
 from factory.mjcf.elements import add, number, numbers
-from factory.mjcf.names import carriage
+from factory.mjcf.hands import Styles, add_hand
+from factory.mjcf.names import carriage, head
+from factory.mjcf.stops import Stops
 from factory.problem.robot_types import RobotType
 from factory.support.errors import Diagnostic, InputError, Position
+
+OWN_HAND = {"finger", "pin", "column", "pad"}
+"""Geoms of a type's own file that stand for a hand, where none is chosen."""
+
+LIFTED = 0.4
+"""Mass of a lift's head without what stands for a hand [kg]."""
+
+
+@dataclass(frozen=True, slots=True)
+class Held:
+    """How a robot holds. Without a hand: `top`, how far above z0 the lowest point of its payload is
+    carried, with the lift down [m]; the finger's pad reaches up to it. With one: the `limbs` of it,
+    and what they look like, `styles`, None without."""
+
+    top: float
+    styles: Styles | None = None
+    limbs: tuple[Limb, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,6 +68,10 @@ class Drive:
             "forcerange": numbers((-self.force, self.force)),
             "nsample": str(self.samples),
         }
+
+
+MOTOR = 1.6
+"""Inertia that the motors of the feeders' sliders and of the shutter add, like a lift's [kg]."""
 
 
 def add_inertia(joint: Element, drive: Drive) -> None:
@@ -109,10 +133,11 @@ def add_paints(asset: Element) -> None:
 
 @dataclass(frozen=True, slots=True)
 class Hoist:
-    """A robot's lift: how far it goes up [m], and its drive."""
+    """A robot's lift: how far it goes up [m], its drive, and its stops."""
 
     stroke: float
     drive: Drive
+    stops: Stops
 
 
 def instantiate(
@@ -120,15 +145,15 @@ def instantiate(
     robot: str,
     path: Guidepath,
     drive: Drive,
-    top: float,
+    stops: Stops,
+    held: Held,
     role: str = "",
     hoist: Hoist | None = None,
 ) -> tuple[Element, list[Element]]:
-    """The body of one robot at its B end, its lift down, and its actuators.
+    """The body of one robot at its B end, its lift down, between its `stops`, and its actuators.
 
-    `top`: how far above z0 the lowest point of its payload is carried, with the lift down; the
-    finger's pin reaches up to it [m]. `role`: one of ROLES; geometry of the material `paint` takes
-    its colour. `hoist`: for a type with a lift.
+    `held`: how it holds. `role`: one of ROLES; geometry of the material `paint` takes its colour.
+    `hoist`: for a type with a lift.
     """
     body = _prefixed(model.body, model.name, names=False)
     for node in body.iter():
@@ -141,9 +166,15 @@ def instantiate(
     body.set("pos", numbers((x, y, 0)))
     body.set("quat", numbers(heading_quaternion(path)))
     body.set("sleep", "allowed")
-    _stretch(body, path, top, hoist.stroke if hoist else 0.0)
+    if held.styles is None:
+        _stretch(body, path, held.top, hoist)
+    else:
+        _fit_arm(body, path)
+        lifted = next((b for b in body.iter("body") if b.get("name") == head(robot)), None)
+        add_hand(body, lifted, held.styles, robot, held.limbs, model.name)
     slide = next(j for j in body.iter("joint") if j.get("name") == f"{robot}/slide")
     slide.set("ref", number(path.length))
+    stops.limit(slide)
     actuators = []
     for actuator in model.actuators:
         copy = _prefixed(actuator, model.name, names=False)
@@ -154,7 +185,10 @@ def instantiate(
         gains = chosen.get(actuator.get("name") or "")
         if gains is not None:
             copy.attrib.update(gains.attributes())
-            add_inertia(next(j for j in body.iter("joint") if j.get("name") == joint), gains)
+            moved = next(j for j in body.iter("joint") if j.get("name") == joint)
+            add_inertia(moved, gains)
+            if hoist and gains is hoist.drive:
+                hoist.stops.limit(moved)
         actuators.append(copy)
     return body, actuators
 
@@ -167,17 +201,37 @@ def heading_quaternion(path: Guidepath) -> tuple[float, float, float, float]:
     return (w, 0.0, 0.0, z)
 
 
-def _stretch(body: Element, path: Guidepath, top: float, stroke: float) -> None:
-    """Arm to the rim, finger to the nest, pin up to the payload, or to where the column goes into
-    it."""
+def _fit_arm(body: Element, path: Guidepath) -> None:
+    """The arm from the mast to the rim, of a robot whose hand goes on from there; a tool's head
+    reaches a little further."""
+    rim = max(path.reach - path.arm, MAST / 2 + 0.002)
+    parents = {child: parent for parent in body.iter() for child in parent}
+    for geom in list(body.iter("geom")):
+        name = (geom.get("name") or "").rpartition("/")[2]
+        if name == "arm":
+            _span(geom, (0.0, 0.0), (rim, 0.0))
+        elif name in OWN_HAND:
+            parents[geom].remove(geom)
+    for lifted in body.iter("body"):
+        if (lifted.get("name") or "").endswith("/head"):
+            inertia = {"pos": "0 0 0.1", "mass": number(LIFTED), "diaginertia": "2e-4 2e-4 2e-4"}
+            lifted.insert(1, Element("inertial", inertia))
+    for site in body.iter("site"):
+        if (site.get("name") or "").endswith("/nest"):
+            site.set("pos", numbers((path.reach, 0.0, PAYLOAD)))
+
+
+def _stretch(body: Element, path: Guidepath, top: float, hoist: Hoist | None) -> None:
+    """Arm to the rim, finger to the nest, pad up to the payload; with a lift, pin up to the column,
+    which carries the pad."""
     rim, top = path.reach - path.arm, PAYLOAD + top
     nest = (max(path.reach + path.nest, rim + 0.01), path.aside * path.left + 0.0)
     lines = {"arm": ((0.0, 0.0), (rim, 0.0)), "finger": ((rim - 0.01, 0.0), nest)}
-    uprights = {
-        "pin": (FINGER_TOP, top - 1e-3),
-        "column": (top - 2e-3 - stroke, top - 2e-3),
-        "plate": (top - 2e-3, top),
-    }
+    pin = (FINGER_TOP, top - 1e-3)
+    uprights = {"pad": pin}
+    if hoist is not None:
+        column = (top - 2e-3 - hoist.stroke, top - 2e-3)
+        uprights = {"pin": pin, "column": column, "pad": (top - 2e-3, top)}
     for geom in body.iter("geom"):
         name = (geom.get("name") or "").rpartition("/")[2]
         for kind, ends in lines.items():

@@ -1,21 +1,23 @@
-"""The scene: floor, light, cameras, guidepaths, feeders and the outfeed. Nothing here moves by
-itself."""
+"""The scene: floor, light, cameras, and rails. Nothing here moves."""
 
 from __future__ import annotations
 
 from math import cos, hypot, radians, sin, tan
 from xml.etree.ElementTree import Element
 
-from factory.layout.dimensions import BOOM, BOOM_HEIGHT, CARRIAGE, PAYLOAD, POST
+from factory.layout.dimensions import CARRIAGE, PAYLOAD
 from factory.layout.layout import Layout
 from factory.mjcf.elements import add, add_shown, add_station, fill, numbers
-from factory.mjcf.names import COMPASS, feeder
-from factory.mjcf.outfeed import add_outfeed
+from factory.mjcf.names import COMPASS
 from factory.mjcf.robots import heading_quaternion
+from factory.mjcf.stops import robot_room
 
 VIEW = 32.0
 """Vertical field of view of the cameras [degrees]: narrow, for a calm perspective. The free
 camera's is the same (skeleton.xml)."""
+
+SHOE = 0.026
+"""Half the length of the shoe of a carriage on its rail (mjcf/*.xml) [m]."""
 
 FAR = 1e5
 """How far away the ends of the compass are [m]."""
@@ -36,22 +38,34 @@ def add_scene(world: Element, statistic: Element, layout: Layout) -> None:
     fill(statistic, center=(x, y, 0.1), extent=radius)
     _floor_and_light(world, layout)
     _cameras(world, layout)
-    for robot, path in zip(layout.factory.robots, layout.guidepaths, strict=True):
-        a, b = path.carriage(path.reach), path.carriage(path.length)
-        middle = ((a[0] + b[0]) / 2, (a[1] + b[1]) / 2, 0.004)
-        half = path.travel / 2 + CARRIAGE / 2
+    for robot in range(len(layout.guidepaths)):
+        _rail(world, layout, robot)
+
+
+def _rail(world: Element, layout: Layout, robot: int) -> None:
+    """A robot's rail, and a buffer at either end: its shoe meets it where the joint's limit
+    begins (`stops.py`), its carriage passes over it."""
+    name, path, room = (
+        layout.factory.robots[robot].name,
+        layout.guidepaths[robot],
+        robot_room(layout.clearance),
+    )
+    (low, high), over = layout.ends(robot), CARRIAGE / 2 + room.stop
+    face = SHOE + room.play
+    for kind, start, end, (side, bottom, top) in (
+        ("rail", low - over, high + over, (0.010, 0.0, 0.008)),
+        ("buffer/A", low - over, low - face, (0.009, 0.008, 0.014)),
+        ("buffer/B", high + face, high + over, (0.009, 0.008, 0.014)),
+    ):
         add_shown(
             world,
-            f"{robot.name}/rail",
+            f"{name}/{kind}",
             "box",
-            pos=middle,
+            pos=(*path.carriage((start + end) / 2), (bottom + top) / 2),
             quat=heading_quaternion(path),
-            size=(half, 0.010, 0.004),
-            material="rail",
+            size=((end - start) / 2, side, (top - bottom) / 2),
+            material="rail" if kind == "rail" else "buffer",
         )
-    for operation in layout.factory.leaves:
-        _feeder(world, layout, operation.label)
-    add_outfeed(world, layout)
 
 
 def _floor(layout: Layout) -> tuple[float, float, float]:
@@ -153,34 +167,3 @@ def add_follower(body: Element, layout: Layout) -> None:
     at, axes = _aim(radians(32), radians(-125), 2.2 * size + 0.15)
     pos = (layout.guidepaths[0].reach + at[0], at[1], PAYLOAD + 0.3 * size + at[2])
     add(body, "camera", name="product", pos=pos, xyaxes=axes, fovy=VIEW)
-
-
-def _feeder(world: Element, layout: Layout, label: str) -> None:
-    """A post behind the robot's rear stop and a boom over the place where the part is presented."""
-    operation, found = layout.factory.by_label[label], layout.feeder(label)
-    path, name = layout.guidepaths[operation.carrier], feeder(label)
-    x, y = layout.meeting(operation)
-    u, quat = path.heading, heading_quaternion(path)
-    body = add(world, "body", name=name, pos=(x, y, 0.0), quat=quat)
-    back, ahead, across = found.back, found.ahead, found.across * path.left
-    top, beam = found.height, BOOM_HEIGHT
-    post = (POST / 2, POST / 2, (top + beam) / 2)
-    boom = ((ahead - back) / 2, BOOM / 2, beam / 2)
-    for kind, at, size in (
-        ("post", (back, across, (top + beam) / 2), post),
-        ("boom", ((back + ahead) / 2, across, top + beam / 2), boom),
-    ):
-        add_station(body, f"{name}/{kind}", pos=at, size=size, material="post")
-    for kind, along, z, shape, shown in (
-        ("cap", back, top + beam, "box", (POST / 2 + 0.001, POST / 2 + 0.001, 0.002)),
-        ("head", ahead, top + beam / 2, "cylinder", (0.012, beam / 2 + 0.002)),
-    ):
-        add_shown(
-            world,
-            f"{name}/{kind}",
-            shape,
-            pos=(x + along * u[0] - across * u[1], y + along * u[1] + across * u[0], z),
-            quat=quat,
-            size=shown,
-            rgba=layout.product.solids[label].rgba,
-        )

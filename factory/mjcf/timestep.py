@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from math import sqrt
+from math import inf, sqrt
 
 from factory.control.profile import World
 from factory.layout.layout import Layout
@@ -20,11 +20,13 @@ from factory.mjcf.model import (
     HEAD_MASS,
     HOIST_MASS,
     HOIST_STIFFNESS,
+    ROLLING,
     STIFFNESS,
     drive_for,
     heaviest,
 )
 from factory.mjcf.outfeed import TRAY_MASS
+from factory.mjcf.stops import OVERLOAD, robot_room, tray_room
 from factory.support.settings import AUTO, TICK, Settings
 
 STEPS = (1, 2, 4, 5, 10, 20)
@@ -37,7 +39,7 @@ ALLOWED = 0.5e-3
 """Half of what a good factory keeps of tracking errors, gaps and residuals (`fidelity`) [m]."""
 
 FRICTION = 0.2
-"""Dry friction of the axes of all robots (`mjcf/`) and of the tray [N]."""
+"""Dry friction of the axes of all robots (`mjcf/`) and of the tray, without a load [N]."""
 
 SLACK = 0.3
 """Share of a lift's weight that its drive must hold without having been told: drives that are a
@@ -51,8 +53,8 @@ SURE = 1.25
 class DrivenAxis:
     """What a drive moves: its `own` mass and a `load` [kg], with an `acceleration` [m/s²] that
     changes by up to twice its amount, times `jump`, at once; `push` [m/s²] is what its force is
-    for; its `stiffness` [rad/s] and the least `gain` that jitter draws for it;
-    `held`: what it must push against untold [N]."""
+    for; its `stiffness` [rad/s] and the least `gain` that jitter draws for it; `held`: what it must
+    push against untold [N]; `room`: how far its end stops may let it go [m]."""
 
     own: float
     load: float
@@ -62,6 +64,13 @@ class DrivenAxis:
     gain: float
     jump: float = 1.0
     held: float = 2 * FRICTION
+    room: float = inf
+
+    @classmethod
+    def loaded(cls, own: float, load: float, acceleration: float, **more: float) -> DrivenAxis:
+        """One whose guide bears its load, and which pushes for its acceleration alone."""
+        held = 2 * (FRICTION + ROLLING * load * GRAVITY)
+        return cls(own, load, acceleration, acceleration, STIFFNESS, held=held, **more)
 
     def error(self, settings: Settings) -> float:
         """How far it may get off its reference [m]: the speed that it misses, times the peak of a
@@ -71,6 +80,13 @@ class DrivenAxis:
         stiff, damping = self.gain * drive.kp / mass, self.gain * drive.kv / mass
         missed = self.jump * self.acceleration * h * abs(1 - damping * h)
         return SURE * (missed / (sqrt(stiff) + 0.85 * damping) + self.rest(settings))
+
+    def leap(self, settings: Settings) -> float:
+        """How far it goes from rest in the step in which it meets the buffer of its stop [m], when
+        it is empty and under all that a stop withstands."""
+        drive = drive_for(self.own, self.load, self.push, settings, self.stiffness)
+        force = (1 + OVERLOAD) * drive.force
+        return force / (self.own + drive.inertia) * settings.step**2
 
     def rest(self, settings: Settings) -> float:
         """How far off its reference it may be held for ever [m]."""
@@ -83,8 +99,9 @@ def timed(
 ) -> Settings:
     """Settings whose timestep and substeps are numbers: what was asked for, or with AUTO the
     longest timestep in which nothing goes as far as the certified clearance, with which no axis is
-    predicted to get off its reference by more than ALLOWED, and every robot gets into its goal
-    ball; 2 ms, or the longest below it that the clearance allows, where none does that."""
+    predicted to get off its reference by more than ALLOWED, all end stops hold, and every robot
+    gets into its goal ball; 2 ms, or the longest below it that the clearance allows, where none
+    does that."""
     if settings.timestep != AUTO:
         return replace(settings, substeps=settings.steps)
     least = settings.substeps or 1
@@ -110,30 +127,36 @@ def predicted_error(settings: Settings, layout: Layout, jitter: float = 0.0) -> 
 
 
 def _good(settings: Settings, axes: Sequence[DrivenAxis]) -> bool:
-    """Whether no error is beyond what is allowed, nor is any axis kept out of its goal ball, but
-    for one that is kept out with the usual timestep as well."""
+    """Whether no error is beyond what is allowed, every end stop holds, and no axis is kept out of
+    its goal ball, but for one that is kept out with the usual timestep as well."""
     usual = replace(settings, timestep=TICK / USUAL, substeps=USUAL)
     return all(
         axis.error(settings) < ALLOWED
+        and axis.leap(settings) < axis.room
         and axis.rest(settings) <= max(settings.eps, axis.rest(usual))
         for axis in axes
     )
 
 
 def _axes(settings: Settings, layout: Layout, jitter: float) -> Iterator[DrivenAxis]:
-    """Every robot, lift and the tray with the heaviest that it carries; those that are alike
-    once."""
+    """Every robot, lift and the tray with the heaviest that it carries, and the shutter; those that
+    are alike once."""
+    room, far = robot_room(layout.clearance).c, tray_room(layout.clearance).c
     factory, solids, a = layout.factory, layout.product.solids, settings.acceleration
     masses: dict[str, float] = {}
     for operation in reversed(factory.operations[:-1]):
         inputs = [masses[label] for label in operation.inputs]
         masses[operation.label] = sum(inputs) if inputs else solids[operation.label].mass
     for load in sorted({heaviest(factory, robot, masses) for robot in factory.robots}):
-        yield DrivenAxis(CARRIAGE_MASS, load, a, a, STIFFNESS, 1 - jitter)
+        yield DrivenAxis.loaded(CARRIAGE_MASS, load, a, gain=1 - jitter, room=room)
     for load in sorted({masses[factory.delivered(robot)] for robot in factory.strokes}):
         held = 2 * FRICTION + SLACK * (HEAD_MASS + load) * GRAVITY
-        yield DrivenAxis(HOIST_MASS, load, a, a + GRAVITY, HOIST_STIFFNESS, 1 - jitter, held=held)
+        push, stiff = a + GRAVITY, HOIST_STIFFNESS
+        yield DrivenAxis(HOIST_MASS, load, a, push, stiff, 1 - jitter, held=held, room=room)
     fast = settings.outfeed_acceleration
     reverses = layout.outfeed_way * fast < 1.2 * settings.outfeed**2
     product = masses[factory.pag.root]
-    yield DrivenAxis(TRAY_MASS, product, fast, fast, STIFFNESS, 1.0, 1.0 if reverses else 0.7)
+    jump = 1.0 if reverses else 0.7
+    yield DrivenAxis.loaded(TRAY_MASS, product, fast, gain=1.0, jump=jump, room=far)
+    shut = settings.shutter_limits[1]
+    yield DrivenAxis(HOIST_MASS, 0.0, shut, shut + GRAVITY, HOIST_STIFFNESS, gain=1.0)

@@ -1,13 +1,15 @@
 """The model of a run that is not shown: without what is only there to be seen.
 
 The engine places every geom of all that does not sleep in every step, seen or not. Left out are
-geoms of classes that say of themselves that they weigh nothing and touch nothing, and bodies that
-have nothing else; whatever moves, moves the same to the last bit.
+geoms of classes that say of themselves that they weigh nothing and touch nothing, pads aside, and
+bodies that have nothing else; whatever moves, moves the same to the last bit.
 """
 
 from __future__ import annotations
 
 from xml.etree.ElementTree import Element
+
+from factory.mjcf.names import pad_of
 
 SHOWN = {"contype": "0", "conaffinity": "0", "mass": "0", "group": "1"}
 """What a class of geoms that are only shown says of them."""
@@ -33,11 +35,17 @@ def leave_out_what_is_shown(root: Element) -> None:
                 asset.remove(mesh)
 
 
+def _is_needed(geom: Element) -> bool:
+    """Whether a geom of such a class weighs or touches, or is a pad, from which distances are
+    measured."""
+    return bool(SHOWN.keys() & geom.keys()) or bool(pad_of(geom.get("name") or ""))
+
+
 def _leave_out(body: Element, classes: set[str | None]) -> None:
     for child in list(body):
         if child.tag == "body":
             _leave_out(child, classes)
             if not len(child):
                 body.remove(child)
-        elif child.get("class") in classes and not SHOWN.keys() & child.keys():
+        elif child.get("class") in classes and not _is_needed(child):
             body.remove(child)

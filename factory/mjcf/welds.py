@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from xml.etree.ElementTree import Element
 
+from factory.layout.hands.limbs import held_at
 from factory.layout.layout import Layout
 from factory.mjcf import names
 from factory.mjcf.elements import add, numbers
@@ -32,7 +33,7 @@ def add_welds(
         height = layout.elevations[operation.carrier]
         offset = place_in(layout.product, bodies.centre[label], (0.0, 0.0), height)
         pose = (*_turned(offset, path.heading), w, 0, 0, -z)
-        _weld(equality, names.feed(label), names.feeder(label), names.part(label, 1), pose, True)
+        _weld(equality, names.feed(label), names.slider(label), names.part(label, 1), pose, True)
         _park(equality, layout, label, copies[label], 1)
     for label in bodies.wholes:
         _park(equality, layout, label, copies[label], 0)
@@ -58,11 +59,6 @@ def add_exclusions(
             pair = names.solid(one, n, part), names.solid(other, n, partner)
             name = names.exclusion(part, partner, n)
             add(contact, "exclude", name=name, body1=pair[0], body2=pair[1])
-
-
-def held_at(layout: Layout, robot: int) -> float:
-    """How far above its place in the product a robot holds its payload with its lift down [m]."""
-    return layout.elevations[robot] - layout.factory.strokes.get(robot, 0.0)
 
 
 def grip_position(

@@ -105,7 +105,12 @@ def operation_mode(layout: Layout, operation: Operation, eps: float) -> Mode:
         for slot, label in enumerate(operation.before):
             if slot != carrier and label != NOPART:
                 gate[slot], standoff[slot] = carrier, layout.standoff(operation, slot)
-    elif operation.lowered >= 0:
+    elif any(layout.standoff(operation, slot) for slot in range(len(paths))):
+        for slot, label in enumerate(operation.before):
+            if label != NOPART and slot != operation.lowered:
+                standoff[slot] = layout.standoff(operation, slot)
+                gate[slot] = carrier if standoff[slot] else -1
+    if operation.lowered >= 0 and gate[operation.lowered] < 0:
         others = (s for s, label in enumerate(operation.before) if label != NOPART)
         slot = operation.lowered
         gate[slot] = next(other for other in others if other != slot)

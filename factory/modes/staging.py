@@ -9,27 +9,31 @@ from those it is to meet until their mode begins.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from factory.control.mode import ROUNDING, Array, Mode
+from factory.layout.hands.leaving import awaited_positions, rises_first
 from factory.layout.layout import Layout
 from factory.modes.modes import operation_starts
+from factory.plant.factory import Operation
 from factory.support.settings import Settings
 
 
 @dataclass(frozen=True, slots=True)
 class HeadStart:
-    """The way of a robot ahead of one of its operations: the `mode` that moves its carriage alone,
-    to the goal of its `slot` there, and where it `starts` in the long run [m]."""
+    """The way of a robot ahead of one of its operations: the `mode` that moves one `axis` of it
+    alone, its carriage or its lift, to the goal of its `slot` there, and where it `starts` in the
+    long run [m]."""
 
     robot: int
     operation: int
     slot: int
     mode: Mode = field(repr=False)
     start: float
+    axis: int
 
     @property
     def goal(self) -> float:
@@ -39,26 +43,53 @@ class HeadStart:
 
 def stages(layout: Layout, modes: Sequence[Mode]) -> tuple[HeadStart, ...]:
     """Every way that a robot can go ahead: it brings nothing and has others to wait for, and none
-    of them comes near it on its way, whatever their speeds."""
-    found = []
-    starts = operation_starts(layout)
+    of them comes near it on its way, whatever their speeds. A lift that holds from above rises
+    before its robot goes home."""
+    found: list[HeadStart] = []
+    starts, awaited = operation_starts(layout), awaited_positions(layout)
     for operation, mode, start in zip(layout.factory.operations, modes, starts, strict=True):
         homes = start.copy()
         homes[: len(operation.robots)] = [layout.home(r, operation.index) for r in operation.robots]
-        if not all(map(mode.clear_from, (start, homes))):
-            continue
+        clear = all(map(mode.clear_from, (start, homes)))
         for slot, robot in enumerate(operation.robots):
-            way = abs(float(start[slot] - mode.goals[slot]))
-            if operation.awaits_empty(slot) and mode.gate[slot] < 0 and way > ROUNDING:
-                own = slice(slot, slot + 1)
-                alone = Mode(mode.goals[own], mode.lower[own], mode.upper[own], mode.eps)
-                found.append(HeadStart(robot, operation.index, slot, alone, float(start[slot])))
+            if rises_first(layout, robot):
+                found += _rising(layout, operation, mode, robot)
+                continue
+            goal, hand = float(mode.goals[slot]), layout.hand(robot)
+            ahead = clear and operation.awaits_empty(slot) and mode.gate[slot] < 0
+            if not operation.inputs or (hand is not None and hand.tall):
+                # others may be where a tall hand comes home to, and a part before a hand above it
+                empty = operation.awaits_empty(slot) or not operation.inputs
+                ahead, goal = empty and robot in awaited, awaited.get(robot, goal)
+            if ahead and abs(float(start[slot]) - goal) > ROUNDING:
+                found.append(_ahead(operation, mode, slot, goal, float(start[slot])))
     return tuple(found)
 
 
+def _rising(layout: Layout, operation: Operation, mode: Mode, robot: int) -> Iterator[HeadStart]:
+    """The way up of a lift before the first operation of its robot."""
+    if layout.factory.robots[robot].operations[0] == operation.index:
+        axis = len(layout.factory.robots) + layout.lifts.index(robot)
+        slot = layout.factory.axes[operation.index].index(axis)
+        goal = float(mode.goals[slot])
+        stage = _ahead(operation, mode, slot, goal, 0.0)
+        yield replace(stage, robot=robot, axis=axis)
+
+
+def _ahead(operation: Operation, mode: Mode, slot: int, goal: float, start: float) -> HeadStart:
+    own = slice(slot, slot + 1)
+    alone = Mode(np.array([goal]), mode.lower[own], mode.upper[own], mode.eps)
+    robot = operation.robots[slot] if slot < len(operation.robots) else -1
+    return HeadStart(robot, operation.index, slot, alone, start, robot)
+
+
 def stages_of(layout: Layout, modes: Sequence[Mode], settings: Settings) -> tuple[HeadStart, ...]:
-    """Those, where the settings ask for them."""
-    return stages(layout, modes) if settings.stage else ()
+    """Those, where the settings ask for them; else those that something may wait for."""
+    found = stages(layout, modes)
+    if settings.stage:
+        return found
+    awaited = awaited_positions(layout)
+    return tuple(stage for stage in found if stage.axis in awaited or stage.axis != stage.robot)
 
 
 def staged(starts: Sequence[Array], ahead: Sequence[HeadStart]) -> list[Array]:

@@ -29,6 +29,11 @@ class CutOff:
         """The same, and what ended it."""
         return f"{self}; {self.message}" if self.message else str(self)
 
+    @property
+    def failure(self) -> Diagnostic:
+        """What ended it, as a failure of the run."""
+        return Diagnostic(self.code or "CutOff", self.message or str(self))
+
     def as_json(self) -> dict[str, object]:
         """The key `cut_off` of a `--json` document; it is null where the units were made."""
         return {

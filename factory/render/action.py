@@ -40,7 +40,7 @@ def action_of(m: mujoco.MjModel, d: mujoco.MjData) -> Action:
     points: defaultdict[Own, list[Array]] = defaultdict(list)
     for own, found in (*_bodies(m, d), *_loads(m, d)):
         points[own].append(found)
-    boxes = {own: _box(np.concatenate(found)) for own, found in points.items()}
+    boxes = {own: box_of(np.concatenate(found)) for own, found in points.items()}
     beside = [placed(m, d, g) for g in range(m.ngeom) if _feeds(m, g)]
     robots: list[Array] = []
     for (body, _), box in boxes.items():
@@ -58,7 +58,8 @@ def _bodies(m: mujoco.MjModel, d: mujoco.MjData) -> Iterator[tuple[Own, Array]]:
     """Points round each geom of what moves by itself."""
     roots = m.body_rootid[m.geom_bodyid]
     slides = m.jnt_bodyid[m.jnt_type == mujoco.mjtJoint.mjJNT_SLIDE]
-    for g in np.flatnonzero(np.isin(roots, m.body_rootid[slides])).tolist():
+    moving = [b for b in m.body_rootid[slides] if names.kind(m.body(int(b)).name) != "feeder"]
+    for g in np.flatnonzero(np.isin(roots, moving)).tolist():
         yield (int(roots[g]), "body"), placed(m, d, g)
 
 
@@ -72,22 +73,23 @@ def _loads(m: mujoco.MjModel, d: mujoco.MjData) -> Iterator[tuple[Own, Array]]:
             continue
         holder, body = int(m.eq_obj1id[e]), int(m.eq_obj2id[e])
         if body not in shapes:
-            shapes[body] = _shape(m, body)
+            shapes[body] = shape_of(m, body)
         own = int(m.body_rootid[holder]), "load"
         yield own, held[e] + shapes[body]
         yield own, held[e] + shapes[body] + (0.0, 0.0, _stroke(m, holder))
 
 
-def _shape(m: mujoco.MjModel, body: int) -> Array:
+def shape_of(m: mujoco.MjModel, body: int) -> Array:
     """The corners of a body's box in its own frame."""
     first = int(m.body_geomadr[body])
     geoms = range(first, first + int(m.body_geomnum[body]))
-    return _box(
+    return box_of(
         np.concatenate([corners(m, g) @ rotation(m.geom_quat[g]).T + m.geom_pos[g] for g in geoms])
     )
 
 
-def _box(points: Array) -> Array:
+def box_of(points: Array) -> Array:
+    """The corners (8, 3) of the box round points (n, 3)."""
     low, high = points.min(axis=0), points.max(axis=0)
     return np.asarray((low + high) / 2 + SIGNS * (high - low) / 2)
 
@@ -99,8 +101,8 @@ def _stroke(m: mujoco.MjModel, holder: int) -> float:
 
 
 def _way(m: mujoco.MjModel, d: mujoco.MjData, body: int, load: Array) -> Array:
-    """The way of a robot from the B end of its guidepath to the A end, or of the tray until half of
-    its load is in the shed (3,) [m]."""
+    """The way of a robot from the B end of its guidepath to that of its rail at A, or of the tray
+    until half of its load is in the shed (3,) [m]."""
     name, along = m.body(body).name, d.xaxis[m.body_jntadr[body]]
     if name != names.OUTFEED_TRAY:
         rail = f"{name.partition('/')[0]}/rail"

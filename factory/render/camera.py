@@ -13,6 +13,7 @@ from typing import Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
+from factory.problem.pag import PAG
 from factory.support.errors import Diagnostic, InputError, did_you_mean
 
 Array = NDArray[np.float64]
@@ -23,10 +24,11 @@ above; `product`: follows the product that is furthest on its way."""
 
 CAMERAS: tuple[Standing, ...] = get_args(Standing)
 
-PART = "part:"
+PART, HANDOVER = "part:", "handover:"
 
 Camera = str
-"""One of CAMERAS, or `part:LABEL`, which follows that part from its feeder to the dropoff."""
+"""One of CAMERAS; or `part:LABEL`, which follows that part from its feeder to the dropoff; or
+`handover:LABEL`, which looks from near by where that part or sub-assembly is taken."""
 
 TURN = 8.0
 """How fast `orbit` goes round [degrees/s]."""
@@ -80,22 +82,31 @@ class View:
         return self.dip < 0.3
 
 
-def camera_names(parts: Sequence[str]) -> tuple[Camera, ...]:
-    """The names of all cameras of a factory with these parts."""
-    return (*CAMERAS, *(PART + part for part in parts))
+def camera_names(pag: PAG | None) -> tuple[Camera, ...]:
+    """The names of all cameras of a product; of those with a label none where it is None."""
+    return (*CAMERAS, *(head + k for head, (_, ks) in _labels(pag).items() for k in sorted(ks)))
 
 
-def camera_named(name: str, parts: Sequence[str] | None = None) -> Camera:
-    """Raises InputError (BadValue) for a name that no camera has, and for a part that is none of
-    `parts`, if these are known. Both list what there is."""
+def camera_named(name: str, pag: PAG | None = None) -> Camera:
+    """Raises InputError (BadValue) for a name that no camera has, and for a part or label that is
+    not in the product, if that is known. Both list what there is."""
     head, colon, label = name.partition(":")
-    if head + colon == PART:
-        if parts is None or label in parts:
+    labels = _labels(pag)
+    if head + colon in labels:
+        noun, found = labels[head + colon]
+        if pag is None or label in found:
             return name
-        raise _none_of("part", label, parts)
+        raise _none_of(noun, label, found)
     if name in CAMERAS:
         return name
-    raise _none_of("camera", name, (*CAMERAS, "part:LABEL"))
+    raise _none_of("camera", name, (*CAMERAS, *(f"{head}LABEL" for head in labels)))
+
+
+def _labels(pag: PAG | None) -> dict[str, tuple[str, tuple[str, ...]]]:
+    """What the labels of cameras are, by what these begin with, and those of a product."""
+    nodes = () if pag is None else pag.nodes
+    parts = tuple(node.label for node in nodes if not node.inputs)
+    return {PART: ("part", parts), HANDOVER: ("label", tuple(node.label for node in nodes))}
 
 
 def _none_of(noun: str, found: str, valid: Sequence[str]) -> InputError:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from factory.mjcf.model import role_of
+from factory.mjcf.robot_bodies import role_of
 from factory.mjcf.robots import ROLES
 from factory.plant.factory import Factory
 from factory.render.ink import Colour, mixed

@@ -1,4 +1,5 @@
-"""What stands in front of the action fades: feeders, and the shed that products end in.
+"""What stands in front of the action fades: the posts and booms of feeders. Their housings do not,
+nor does the shed: what is in them is out of sight.
 
 How much follows from the view alone, so a still, a film of a run and one of its log show the same.
 """
@@ -22,8 +23,8 @@ SEEN, HIDDEN = 0.05, 0.20
 ROUND = 0.03
 """How far about a box counts as that box [m]: what is thin is not hidden all of a sudden."""
 
-STANDS = ("wall", "roof", "back")
-"""What of the outfeed stands up: its shed."""
+STANDS = ("post", "boom")
+"""What of a feeder fades."""
 
 
 class Fading:
@@ -32,10 +33,11 @@ class Fading:
     def __init__(self, replica: Replica) -> None:
         self.m, d = replica.m, replica.d
         self.last: View | None = None
-        found = [(g, group) for g in shown(self.m, 0) if (group := _group(self.m.geom(g).name))]
+        found: list[tuple[int, str]] = []
         for body in range(1, self.m.nbody):
             if names.kind(name := self.m.body(body).name) == "feeder":
-                found += [(g, name) for g in shown(self.m, body)]
+                geoms = shown(self.m, body)
+                found += [(g, name) for g in geoms if self.m.geom(g).name.endswith(STANDS)]
         self.geoms = np.array([g for g, _ in found], np.intp)
         self.groups = np.unique([group for _, group in found], return_inverse=True)[1]
         self.paint = np.array([paint(self.m, g) for g in self.geoms]).reshape(-1, 4)
@@ -67,14 +69,6 @@ class Fading:
         found = np.zeros(int(self.groups.max()) + 1)
         np.maximum.at(found, pairs // count, together)
         return found
-
-
-def _group(geom: str) -> str:
-    """What a geom of the world fades with, "" for what stays."""
-    head, _, rest = geom.partition("/")
-    if head == "outfeed":
-        return head if rest.startswith(STANDS) else ""
-    return geom.rpartition("/")[0] if head == "feeder" else ""
 
 
 def _outlines(view: View, boxes: Array) -> tuple[Array, Array]:

@@ -30,7 +30,7 @@ class _Observer(Recorder):
         if simulation.model is None:
             raise pictureless()
         self.simulation, factory = simulation, simulation.layout.factory
-        picture.check([part.label for part in factory.leaves])
+        picture.check(factory.pag)
         subject = subject_of_run(simulation)
         m, self.history = simulation.physical.m, History(subject)
         name, units = product_name(factory), simulation.request.units
@@ -158,7 +158,7 @@ def take_of(log: Log, picture: Picture) -> Take:
     if log.header["world"] == "ideal":
         raise pictureless()
     m, subject = model_of(log), recorded_subject(log.header)
-    picture.check([part.label for part in subject.factory.leaves])
+    picture.check(subject.factory.pag)
     return Take(m, subject, log.header["product"], log.header["units"], picture, History(subject))
 
 

@@ -16,6 +16,7 @@ from factory.mjcf.replica import Replica
 from factory.record.monitor.subject import MonitorSubject
 from factory.render.action import action_of
 from factory.render.camera import (
+    HANDOVER,
     PART,
     Array,
     Camera,
@@ -27,6 +28,7 @@ from factory.render.camera import (
     overview,
     towards,
 )
+from factory.render.junction import handover_view
 from factory.render.subject import SIGNS, Snapshot, corners
 from factory.support.engine import mujoco
 
@@ -48,7 +50,12 @@ class Viewpoint:
         self.d, self.framing = replica.d, framing
         found = action_of(replica.m, replica.d)
         self.watched, self.points = found.robots, found.points
-        self.goes = _standing(camera, self.points, framing)
+        if camera.startswith(HANDOVER):
+            label = camera.removeprefix(HANDOVER)
+            self.watched, near = handover_view(replica, subject, label, framing)
+            self.goes: Callable[[float], View] = lambda time: near
+        else:
+            self.goes = _standing(camera, self.points, framing)
         self.followed: Followed | None = None
         if camera == "product" or camera.startswith(PART):
             part = camera.removeprefix(PART) if ":" in camera else ""

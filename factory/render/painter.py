@@ -6,6 +6,7 @@ from functools import cache
 
 import numpy as np
 
+from factory.mjcf import names
 from factory.mjcf.replica import SHOWN, Replica
 from factory.record.monitor.subject import MonitorSubject
 from factory.render.camera import Array, Camera, Framing, View
@@ -56,7 +57,8 @@ class Painter(Closing):
         framing = Framing(size[0] / size[1], below=0.03 + caption)
         self.viewpoint = Viewpoint(self.replica, camera, framing, subject)
         self.fading = Fading(self.replica)
-        self.shadows = int((m.jnt_type == mujoco.mjtJoint.mjJNT_SLIDE).sum()) <= MANY
+        joints = (names.kind(m.joint(n).name) for n in range(m.njnt))
+        self.shadows = sum(kind == "robot" for kind in joints) <= MANY
         self.renderer = _Renderer(self.replica, size)
 
     def close(self) -> None:

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal, get_args
 
+from factory.problem.pag import PAG
 from factory.render.camera import Camera, camera_named
 from factory.support.errors import Diagnostic, InputError, did_you_mean
 
@@ -35,10 +36,10 @@ class Picture:
     panels: tuple[PanelName, ...] = ()
     title: str = ""
 
-    def check(self, parts: Sequence[str]) -> None:
-        """Raises InputError (BadValue) for a camera that follows none of the parts, and where there
-        is no room for the panels."""
-        camera_named(self.camera, parts)
+    def check(self, pag: PAG) -> None:
+        """Raises InputError (BadValue) for a camera of a label that is not in the product, and
+        where there is no room for the panels."""
+        camera_named(self.camera, pag)
         shared(self.size, self.panels)
 
 

@@ -12,11 +12,12 @@ from factory.simulation.world import World
 
 @dataclass(slots=True)
 class Cell:
-    """What a robot shows to all others: the label it carries and how many operations it has
-    finished."""
+    """What a robot shows to those of its mode: the label it carries, how many operations it has
+    finished, and how many it has entered."""
 
     label: str
     turn: int = 0
+    entered: int = 0
 
 
 class Cells:
@@ -38,27 +39,59 @@ class Cells:
         """How many operations a robot has finished when it comes to this one for that unit."""
         return unit * self._length[robot] + self._place[robot, operation.index]
 
-    def waits(self, robot: int, label: str, operation: Operation, unit: int) -> bool:
-        """Whether a robot has done all that it does before an operation, and brings its label."""
-        cell, wanted = self._cells[robot], self.turn(robot, operation, unit)
-        return cell.turn > wanted or (cell.turn == wanted and cell.label == label)
-
-    def has_left(self, robot: int, operation: Operation, unit: int) -> bool:
-        """Whether a robot has finished an operation for a unit."""
-        return self._cells[robot].turn > self.turn(robot, operation, unit)
-
 
 class Link:
-    """The continuous state that the robots of one mode share; reading any other robot is an
-    error."""
+    """All that the program of a robot (index) reads and writes, while it is `at` an operation for a
+    unit: its own cell, and the cells and the continuous state of the robots of that operation.
+    Reading any other robot is an error."""
 
-    def __init__(self, world: World, axes: Sequence[tuple[int, ...]]) -> None:
-        self._world, self._axes = world, axes
+    def __init__(
+        self, robot: int, cells: Cells, world: World, axes: Sequence[tuple[int, ...]]
+    ) -> None:
+        self._robot, self._cells, self._world, self._axes = robot, cells, world, axes
 
-    def read(self, operation: Operation, robot: int) -> tuple[Array, Array]:
-        """Positions and speeds of an operation's axes, for one of its robots."""
-        if robot not in operation.robots:
-            raise AssertionError(f"robot {robot} is not in the mode of {operation.label}")
+    def at(self, operation: Operation, unit: int) -> None:
+        """From now on the robot waits for an operation, or takes part in it."""
+        if self._robot not in operation.robots:
+            raise AssertionError(f"robot {self._robot} is not in the mode of {operation.label}")
+        self._operation, self._unit = operation, unit
+
+    def waits(self, robot: int, label: str) -> bool:
+        """Whether a robot has done all that it does before the operation, and brings its label."""
+        cell, wanted = self._cell(robot), self._turn(robot)
+        return cell.turn > wanted or (cell.turn == wanted and cell.label == label)
+
+    def has_started(self) -> bool:
+        """Whether some robot has entered the operation for the unit."""
+        robots = self._operation.robots
+        return any(self._cell(robot).entered > self._turn(robot) for robot in robots)
+
+    def has_left(self, robot: int) -> bool:
+        """Whether a robot has finished the operation for the unit."""
+        return self._cell(robot).turn > self._turn(robot)
+
+    def state(self) -> tuple[Array, Array]:
+        """Positions [m] and speeds [m/s] of the operation's axes."""
         x, v = self._world.sense()
-        axes = list(self._axes[operation.index])
+        axes = list(self._axes[self._operation.index])
         return x[axes], v[axes]
+
+    def enter(self) -> None:
+        """Show that the robot takes part."""
+        self._cells[self._robot].entered += 1
+
+    def finish(self, label: str) -> None:
+        """Show that the robot has finished the operation, and carries a label from now on."""
+        cell = self._cells[self._robot]
+        cell.label, cell.turn = label, cell.turn + 1
+
+    def _turn(self, robot: int) -> int:
+        return self._cells.turn(robot, self._operation, self._unit)
+
+    def _cell(self, robot: int) -> Cell:
+        if robot not in self._operation.robots:
+            label = self._operation.label
+            raise AssertionError(
+                f"robot {self._robot} reads robot {robot}, which is not in the mode of {label}"
+            )
+        return self._cells[robot]

@@ -1,11 +1,11 @@
 """The paper's own way of running (section 6): every robot executes its program by itself.
 
 Robots share a cell each, for the label they carry, and the continuous state of the mode they are
-in; nothing else. Each has its own control rate and phase. Reads of labels alone would race: a
-tool's label never changes, and a slow robot may see a label of the next unit. So a cell counts,
-beside its label, the operations its robot has finished, and a condition asks for a count; the
-carrier alone ends an operation, and goes on when all others have followed. The reasons are in
-docs/decisions/distributed.md.
+in; nothing else, and they read it by their `Link` alone. Each has its own control rate and phase.
+Reads of labels alone would race: a tool's label never changes, and a slow robot may see a label of
+the next unit. So a cell counts, beside its label, the operations its robot has entered and
+finished, and a condition asks for a count; the carrier alone ends an operation, and goes on when
+all others have followed. The reasons are in docs/decisions/distributed.md.
 """
 
 from __future__ import annotations
@@ -33,11 +33,12 @@ PERIODS = (0.006, 0.02)
 
 @dataclass(slots=True)
 class Process:
-    """One robot executing its program: the step it is at and its phase in it, `wait`, `run` or
-    `leave`; the `reference` and `speed` of each of its `axes`, its lift's after its carriage's;
-    whether it `goes_ahead` while it waits."""
+    """One robot executing its program: its `link` to others; the step it is at and its phase in it,
+    `wait`, `run` or `leave`; the `reference` and `speed` of each of its `axes`, its lift's after
+    its carriage's; whether it `goes_ahead` while it waits."""
 
     program: Program
+    link: Link
     period: int
     phase: int
     axes: Index
@@ -58,17 +59,23 @@ class Process:
         """Which time round its loop a robot is: the number of the unit it works on."""
         return self.turns // len(self.program.steps)
 
+    def go_on(self) -> None:
+        """Wait for the operation of the next step."""
+        self.stage = "wait"
+        self.turns += 1
+        self.link.at(self.step.operation, self.unit)
+
 
 class Record:
     """The record of a distributed run, in the terms of the net: X_s when the first robot enters an
-    operation, X_e when its carrier ends it. `marked`: 1 for each place that is."""
+    operation, X_e when its carrier ends it; no program reads it. `marked`: 1 for each place that
+    is."""
 
     def __init__(self, factory: Factory) -> None:
         self._net, self.events = factory.net.threaded, list[Event]()
         self.marked = bytearray(len(self._net.places))
         for place in factory.net.initial_marking:
             self.marked[place] = 1
-        self._started: set[tuple[int, int]] = set()
         self._under_way: list[int] = []
 
     @property
@@ -76,20 +83,14 @@ class Record:
         """The operations under way."""
         return Active(tuple(self._under_way))
 
-    def has_started(self, operation: Operation, unit: int) -> bool:
-        """Whether some robot has entered an operation for a unit."""
-        return (operation.index, unit) in self._started
-
-    def start(self, operation: Operation, unit: int, time: float) -> None:
+    def start(self, operation: Operation, time: float) -> None:
         """The first robot enters an operation."""
-        self._started.add((operation.index, unit))
         self._under_way.append(operation.index)
         self._fire(operation.start, time)
 
-    def end(self, operation: Operation, unit: int, time: float) -> None:
+    def end(self, operation: Operation, time: float) -> None:
         """The carrier ends an operation."""
         self._fire(operation.end, time)
-        self._started.discard((operation.index, unit - 1))
         self._under_way.remove(operation.index)
 
     def _fire(self, transition: int, time: float) -> None:
@@ -119,12 +120,10 @@ class DistributedSupervisor:
         self.factory, self.world, self.timestep, self.ticks = factory, world, timestep, ticks
         count = len(factory.operations)
         self.stages = {(s.robot, s.operation): (n, s) for n, s in enumerate(stages, start=count)}
-        axes_of = [*factory.axes, *((stage.robot,) for stage in stages)]
+        axes_of = [*factory.axes, *((stage.axis,) for stage in stages)]
         self.bundles = Bundles([*modes, *(stage.mode for stage in stages)], axes_of, limits)
         self.random = np.random.default_rng([seed, 7])
         programs = [program_of(factory, robot.index) for robot in factory.robots]
-        self.link = Link(world, factory.axes)
-        self.cells = Cells(factory, [program.steps[0].label for program in programs])
         self.processes = self._processes(programs)
         self.record = Record(factory)
         self.count = 0
@@ -132,13 +131,16 @@ class DistributedSupervisor:
     def _processes(self, programs: Sequence[Program]) -> list[Process]:
         low, high = (max(1, round(period / self.timestep)) for period in PERIODS)
         periods = self.random.integers(low, high + 1, size=len(programs))
+        cells = Cells(self.factory, [program.steps[0].label for program in programs])
         x = self.world.sense()[0]
         lifts = {robot: len(programs) + n for n, robot in enumerate(self.factory.strokes)}
         found = []
         for p, n in zip(programs, periods, strict=True):
             axes = np.array([p.robot, *([lifts[p.robot]] if p.robot in lifts else [])])
             phase = int(self.random.integers(n))
-            found.append(Process(p, int(n), phase, axes, np.array(x[axes]), np.zeros(len(axes))))
+            link, still = Link(p.robot, cells, self.world, self.factory.axes), np.zeros(len(axes))
+            link.at(p.steps[0].operation, 0)
+            found.append(Process(p, link, int(n), phase, axes, np.array(x[axes]), still))
         return found
 
     @property
@@ -181,47 +183,47 @@ class DistributedSupervisor:
         if process.stage == "wait":
             if self._may_enter(process, step):
                 process.stage, process.clock, process.goes_ahead = "run", 0.0, False
-                self._enter(step.operation, process.unit)
+                self._enter(process, step.operation)
             else:
                 self._go_ahead(process, step)
         if process.stage == "run":
             self._run(process, step)
         elif process.stage == "leave" and self._followed(process, step):
-            self._advance(process)
+            process.go_on()
 
     def _may_enter(self, process: Process, step: ProgramStep) -> bool:
         """Every other robot of the operation has finished all that it does before this, and shows
         what it must bring; the world is prepared; all are in the domain."""
-        operation, unit = step.operation, process.unit
-        if not all(self.cells.waits(r, label, operation, unit) for r, label in step.until):
+        operation, link = step.operation, process.link
+        if not all(link.waits(robot, label) for robot, label in step.until):
             return False
-        started = self.record.has_started(operation, unit)
-        if step.is_carrier and not started and not self.world.prepared(operation, unit):
+        if link.has_started():
+            return True
+        if step.is_carrier and not self.world.prepared(operation, process.unit):
             return False
-        x, _ = self.link.read(operation, process.program.robot)
-        return started or bool(self._bundle(operation).in_domain(x)[0])
+        return bool(self._bundle(operation).in_domain(link.state()[0])[0])
 
     def _run(self, process: Process, step: ProgramStep) -> None:
-        operation, me = step.operation, process.program.robot
+        operation, link = step.operation, process.link
         if not step.is_carrier:
-            if self.cells.has_left(operation.carrier, operation, process.unit):
+            if link.has_left(operation.carrier):
                 self._stop(process)
-                self._finish(process, step)
-                self._advance(process)
+                link.finish(operation.after[step.slot])
+                process.go_on()
                 return
         elif self._at_goal(process, step):
             self._stop(process)
-            self.record.end(operation, process.unit, self.world.time)
+            self.record.end(operation, self.world.time)
             self.world.apply([], [(operation, process.unit)])
-            self._finish(process, step)
+            link.finish(operation.after[step.slot])
             process.stage = "leave"
             return
-        self._move(process, operation, me)
+        self._move(process, operation)
 
-    def _move(self, process: Process, operation: Operation, me: int) -> None:
+    def _move(self, process: Process, operation: Operation) -> None:
         """ẋ_i = π_i ∘ F_p, governed by the robot's own limits at its own rate; its lift's too."""
         dt = process.period * self.timestep
-        x = self.link.read(operation, me)[0].copy()
+        x = process.link.state()[0]
         slots, mine = np.nonzero(np.equal.outer(self.factory.axes[operation.index], process.axes))
         x[slots] = process.reference[mine] + process.speed[mine] * dt / 2
         self._drive(process, mine, self._bundle(operation).field(x, dt)[slots])
@@ -259,7 +261,7 @@ class DistributedSupervisor:
 
     def _at_goal(self, process: Process, step: ProgramStep) -> bool:
         """The carrier judges the goal of the whole mode, and keeps its clock."""
-        x, v = self.link.read(step.operation, process.program.robot)
+        x, v = process.link.state()
         bundle = self._bundle(step.operation)
         if not bundle.at_goal(x)[0] or np.abs(v).max() >= STILL:
             process.clock = 0.0
@@ -268,27 +270,16 @@ class DistributedSupervisor:
         process.clock += process.period * self.timestep
         return done
 
-    def _finish(self, process: Process, step: ProgramStep) -> None:
-        """Write one's own cell: a new label, one more operation finished."""
-        cell = self.cells[process.program.robot]
-        cell.label = step.operation.after[step.slot]
-        cell.turn += 1
-
     def _followed(self, process: Process, step: ProgramStep) -> bool:
         """Whether all other robots have left the operation."""
-        return all(
-            self.cells.has_left(other, step.operation, process.unit) for other, _ in step.until
-        )
-
-    def _advance(self, process: Process) -> None:
-        process.stage = "wait"
-        process.turns += 1
+        return all(process.link.has_left(other) for other, _ in step.until)
 
     def _bundle(self, operation: Operation) -> Bundle:
         return self.bundles.of((operation.index,))[0]
 
-    def _enter(self, operation: Operation, unit: int) -> None:
+    def _enter(self, process: Process, operation: Operation) -> None:
         """The first robot that enters starts the operation."""
-        if not self.record.has_started(operation, unit):
-            self.world.apply([(operation, unit)], [])
-            self.record.start(operation, unit, self.world.time)
+        if not process.link.has_started():
+            self.world.apply([(operation, process.unit)], [])
+            self.record.start(operation, self.world.time)
+        process.link.enter()

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, NamedTuple
+from functools import cached_property
+from typing import NamedTuple
 
 from factory.plant.approaches import Pair
 from factory.plant.factory import Factory
 from factory.record.ending import CutOff
+from factory.record.monitor.report import Report
+from factory.record.verdict import RunVerdict, judged, kept_figures
 from factory.support.errors import Diagnostic
-
-if TYPE_CHECKING:
-    from factory.record.monitor.report import Report
 
 
 class Event(NamedTuple):
@@ -55,10 +55,12 @@ def busy_times(factory: Factory, events: Iterable[Event]) -> tuple[float, ...]:
 class PhysicsFigures:
     """What only the engine can tell; see the specification of `run` for each.
 
-    `mating_forces`: by operation, the largest force of a contact between inputs that it was
-    joining [N]; `pairs`: how many pairs of parts there are; `excluded`: those whose contact was
-    off; `timestep_chosen`: by the factory, not by the user; `wip_chosen`: the bound on units inside
-    at once where the factory chose one.
+    `joining_error_max_mm`: how far any vertex of a part was from its place as a grip closed on it,
+    before welds pulled: `product_error_max_mm` is what is left of that. `mating_forces`: by
+    operation, the largest force of a contact between inputs that it was joining [N]; `pairs`: how
+    many pairs of parts there are; `excluded`: those whose contact was off; `timestep_chosen`: by
+    the factory, not by the user; `wip_chosen`: the bound on units inside at once where the factory
+    chose one.
     """
 
     handoffs: int = 0
@@ -75,6 +77,8 @@ class PhysicsFigures:
     timestep_s: float = 0.0
     timestep_chosen: bool = False
     wip_chosen: int | None = None
+    grip_gap_max_mm: float | None = None
+    joining_error_max_mm: float = 0.0
 
     @property
     def pairs_excluded(self) -> int:
@@ -92,11 +96,11 @@ class PhysicsFigures:
         return max(self.mating_forces.values(), default=0.0)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Run:
-    """The record of a run: figures and events. `trouble` is None for a run that reached its end;
-    `monitor` the verdict of a monitor, if one watched it: `refines_net` is then its and that of the
-    replay."""
+    """The record of a run: figures and events. `replays`: an independent replay of the events is a
+    run of the net; `trouble` is None for a run that reached its end; `monitor` is what a monitor
+    reports that watched it, if one did. `lenient`: what is wrong with the bodies does not count."""
 
     world: str
     units: int
@@ -108,7 +112,7 @@ class Run:
     supervisor_time_s: float
     predicted_cycle_time_s: float | None
     bottleneck: str
-    refines_net: bool
+    replays: bool
     events: tuple[Event, ...] = field(repr=False)
     dropoffs: tuple[float, ...] = field(repr=False)
     busy: tuple[float, ...] = field(repr=False)
@@ -117,11 +121,23 @@ class Run:
     jitter: float = 0.0
     trouble: Diagnostic | None = None
     monitor: Report | None = None
+    lenient: bool = False
+
+    @property
+    def refines_net(self) -> bool:
+        """Whether its events are a run of the net, and what a monitor saw, if one did."""
+        return self.replays and (self.monitor is None or self.monitor.refines_net)
+
+    @cached_property
+    def verdict(self) -> RunVerdict:
+        """Whether it made its units, as a run of the net, and its bodies agree."""
+        figures = None if self.physics is None else kept_figures(self.physics)
+        return judged(self.trouble, self.replays, figures, self.monitor, self.lenient)
 
     @property
     def succeeded(self) -> bool:
-        """Whether it came to its end, and its events are a run of the net."""
-        return self.trouble is None and self.refines_net
+        """Whether nothing is wrong with it that counts."""
+        return self.verdict.succeeded
 
     @property
     def cut_off(self) -> CutOff | None:
@@ -150,14 +166,14 @@ class Run:
     def as_json(self) -> dict[str, object]:
         """The document that `run --json` prints."""
         physics, monitor, cut = self.physics, self.monitor, self.cut_off
-        watched = (
-            {"monitor_time_s": monitor.time_s, "monitor": monitor.as_json()} if monitor else {}
-        )
+        watched = {"monitor_time_s": monitor.time_s} if monitor else {}
         keys = (
             "handoffs",
             "handoff_gap_max_mm",
+            "grip_gap_max_mm",
             "weld_residual_max_mm",
             "product_error_max_mm",
+            "joining_error_max_mm",
             "unintended_contacts",
             "pairs_tested",
             "pairs_excluded",
@@ -192,5 +208,6 @@ class Run:
             "fused": physics.fused if physics else None,
             "excluded": [list(pair) for pair in physics.excluded] if physics else None,
             **watched,
+            "verdict": self.verdict.as_json(),
             "events": [{"t": round(e.t, 6), "transition": e.transition} for e in self.events],
         }

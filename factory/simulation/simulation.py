@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from factory.control.mode import Limits, Mode
+from factory.layout.hands.leaving import rises_first
 from factory.layout.layout import Layout
 from factory.mjcf.timestep import timed
 from factory.modes.modes import operation_modes, robot_limits
@@ -30,7 +31,7 @@ from factory.support.errors import Diagnostic, InputError, RunError
 from factory.support.settings import AUTO, MOST, Settings
 from factory.timing.cycle_time import CycleTime
 from factory.timing.pool import part_pool
-from factory.timing.prediction import duration, operation_delays, predict, ways_ahead
+from factory.timing.prediction import all_ways, duration, operation_delays, predict
 
 if TYPE_CHECKING:
     from factory.mjcf.model import Model
@@ -83,7 +84,7 @@ class Simulation:
         self.limits, gains = robot_limits(layout, settings, request.seed, request.jitter)
         stages = stages_of(layout, self.modes, settings)
         self.delays = operation_delays(layout, self.modes, self.limits, settings, world, stages)
-        self.ways = ways_ahead(stages, self.limits, settings, world)
+        self.ways = all_ways(layout, stages, self.delays, self.limits, settings, world)
         self.counts = firings(net, self.start)
         self.model: Model | None = None
         self.world: World
@@ -186,12 +187,13 @@ class Simulation:
         observers several ticks may go by between them. Where the engine gives up it begins anew by
         itself, at time 0: nobody is shown that, and the run has lasted until then."""
         patience = PATIENCE * max(self.delays)
-        begin, watched, trouble = perf_counter(), 0.0, None
         supervisor, world, goal = self.supervisor, self.world, self.before + self.request.units
+        begin, watched, trouble = perf_counter(), -world.hooks.ended_time, None
         while world.delivered() < goal and trouble is None:
             before = world.time
             supervisor.step(1 if observers else self._unseen(max_time))
             if reason := world.unstable():
+                watched += world.hooks.ended_time
                 trouble = self._trouble("Unstable", f"{reason}, after {before:.2f} s", SMALLER)
                 return self._record(perf_counter() - begin - watched, before, trouble)
             if observers or glances:
@@ -205,10 +207,13 @@ class Simulation:
             elif max_time is not None and world.time >= max_time:
                 what = f"not finished after {max_time:.2f} s of simulated time"
                 trouble = self._trouble("Timeout", what, LOOK)
+        watched += world.hooks.ended_time
         return self._record(perf_counter() - begin - watched, world.time, trouble)
 
     def _unseen(self, max_time: float | None) -> int:
-        """So many ticks may go by at once where nobody looks."""
+        """So many ticks may go by at once where nobody looks, and nobody acts between two steps."""
+        if self.world.hooks.before_step:
+            return 1
         if max_time is None:
             return MOST
         left = (max_time - float(self.world.time)) / self.request.settings.tick
@@ -322,14 +327,15 @@ def physical_model(
 
 def start_positions(layout: Layout, marking: Marking) -> np.ndarray:
     """Every axis in a marking: a robot where its last operation left it, or at its B end where it
-    waits with no part at the beginning of its cycle, and then its lift may still be down."""
+    waits with no part at the beginning of its cycle, and then its lift may still be down, unless
+    its hand is above what it takes."""
     factory, net = layout.factory, layout.factory.net
     positions = np.zeros(len(factory.robots) + len(layout.lifts))
     lifts = {robot: len(factory.robots) + n for n, robot in enumerate(layout.lifts)}
     for robot, gear in zip(factory.robots, net.gears, strict=True):
         step = next(i for i, place in enumerate(gear.places) if place in marking) // 2
         positions[robot.index] = layout.home(robot.index, robot.operations[step])
-        if robot.index in lifts and step:
+        if robot.index in lifts and (step or rises_first(layout, robot.index)):
             positions[lifts[robot.index]] = factory.strokes[robot.index]
     return positions
 

@@ -73,7 +73,7 @@ class Supervisor:
         stages: Sequence[HeadStart],
     ) -> None:
         self.factory, self.world, self.tick = factory, world, tick
-        axes_of = [*factory.axes, *((stage.robot,) for stage in stages)]
+        axes_of = [*factory.axes, *((stage.axis,) for stage in stages)]
         self.bundles = Bundles([*modes, *(stage.mode for stage in stages)], axes_of, limits)
         net = factory.net
         starts = [operation.start for operation in factory.operations]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from time import perf_counter
 from typing import Protocol
 
 from factory.control.mode import Array, Index
@@ -20,12 +21,16 @@ class Hooks:
     """Where others take part in a world.
 
     `before_step`: called before every timestep. `sensors`: from positions [m] and speeds [m/s] of
-    all axes to what is sensed. `gates`: an operation may start only where all say so.
+    all axes to what is sensed. `gates`: an operation may start only where all say so. `ended`:
+    called when operations have ended and parts have changed hands, before the world goes on, to
+    look at it; `ended_time` [s]: what that took.
     """
 
     before_step: list[Callable[[], None]] = field(default_factory=list)
     sensors: list[Callable[[Array, Array], tuple[Array, Array]]] = field(default_factory=list)
     gates: list[Callable[[Operation, int], bool]] = field(default_factory=list)
+    ended: list[Callable[[], None]] = field(default_factory=list)
+    ended_time: float = 0.0
 
     def sensed(self, x: Array, v: Array) -> tuple[Array, Array]:
         """What sensors make of positions and speeds."""
@@ -36,6 +41,13 @@ class Hooks:
     def admit(self, operation: Operation, unit: int) -> bool:
         """Whether all gates are open for an operation."""
         return all(gate(operation, unit) for gate in self.gates)
+
+    def tell_ended(self) -> None:
+        """Operations have ended."""
+        begin = perf_counter()
+        for look in self.ended:
+            look()
+        self.ended_time += perf_counter() - begin
 
 
 class World(Protocol):

@@ -22,6 +22,7 @@ RANGES = {
     "settle": (0.0, 10.0),
     "outfeed": (1e-3, 10.0),
     "stage": (0, 1),
+    "hands": (0, 1),
 }
 """Least and greatest value of each setting; beyond them a run overflows or never ends."""
 
@@ -44,7 +45,7 @@ LOOK = 0.1
 MOST = 10
 """The most ticks that the engine takes at once."""
 
-WHOLE = ("substeps", "stage")
+WHOLE = ("substeps", "stage", "hands")
 """Settings that are whole numbers."""
 
 
@@ -61,7 +62,8 @@ class Settings:
     are smaller where they collide; `force`: the actuators'
     limit as a multiple of what the payload needs; `settle`: time to come to rest within eps [s],
     used only to predict; `outfeed` speed [m/s]; `stage`: 1 where robots that wait empty-handed go
-    ahead to where their next operation needs them.
+    ahead to where their next operation needs them; `hands`: 1 where robots hold by solid hands that
+    are chosen from the geometry of the parts.
 
     With AUTO a tick is TICK, whatever is chosen for a layout (`factory.mjcf.timestep`): so layouts
     and predictions need not know.
@@ -78,11 +80,25 @@ class Settings:
     settle: float = 0.0
     outfeed: float = 1.0
     stage: int = 0
+    hands: int = 0
 
     @property
     def outfeed_acceleration(self) -> float:
         """Acceleration of the outfeed's tray: twice that of a robot [m/s²]."""
         return 2 * self.acceleration
+
+    @property
+    def feeder_limits(self) -> tuple[float, float]:
+        """Speed [m/s] and acceleration [m/s²] of the feeders' sliders: the speed of the tray, eight
+        times the acceleration of a robot."""
+        return self.outfeed, 8 * self.acceleration
+
+    @property
+    def shutter_limits(self) -> tuple[float, float]:
+        """Speed [m/s] and acceleration [m/s²] of the shutter, which carries nothing: twice the
+        speed of the tray, four times the acceleration of a robot. It comes to within 0.2 mm of
+        the belt, so it is not to overshoot."""
+        return 2 * self.outfeed, 4 * self.acceleration
 
     @property
     def step(self) -> float:

@@ -29,6 +29,7 @@ OPTIONS: Mapping[str, object] = {
     "size": "1280x720",
     "fps": 30,
     "camera": "overview",
+    "lenient": True,
 }
 """The keys that are options of commands, each with an example; the others are those of Settings."""
 
@@ -37,6 +38,7 @@ _KINDS = {
     int: "a whole number",
     float: "a number",
     list: "a list of texts",
+    bool: "true or false",
 }
 
 
@@ -103,9 +105,9 @@ def _fault(key: str, value: object) -> Diagnostic | None:
     right = isinstance(value, int | float if kind is float else kind)
     if isinstance(value, list):
         right = right and all(isinstance(item, str) for item in value)
-    if right and not isinstance(value, bool):
+    if right and isinstance(value, bool) == (kind is bool):
         return None
-    example = repr(OPTIONS[key]).replace("'", '"')
+    example = repr(OPTIONS[key]).replace("'", '"').replace("True", "true")
     message = f"{key} must be {_KINDS[kind]}"
     return Diagnostic("BadValue", message, None, f"for example {key} = {example}")
 

@@ -13,7 +13,8 @@ from types import MappingProxyType
 import numpy as np
 
 from factory.control.mode import Limits, Mode
-from factory.control.profile import SpeedProfile, World, mode_time
+from factory.control.profile import World, mode_time
+from factory.layout.hands.leaving import Leaving, going_on
 from factory.layout.layout import Layout
 from factory.modes.modes import operation_starts
 from factory.modes.staging import HeadStart, staged
@@ -25,6 +26,7 @@ from factory.timing.cycle_time import (
     with_ways,
 )
 from factory.timing.pool import with_wip
+from factory.timing.serving import serving
 
 
 def operation_delays(
@@ -53,10 +55,52 @@ def ways_ahead(
     the robot and the operation to come. It sets out at once."""
     return {
         (stage.robot, stage.operation): way_time(
-            stage, stage.start, limits.of((stage.robot,)), settings, world
+            stage, stage.start, limits.of((stage.axis,)), settings, world
         )
         for stage in ahead
     }
+
+
+def waits_for_hands(
+    layout: Layout, delays: Sequence[float], limits: Limits, settings: Settings
+) -> dict[tuple[int, int], float]:
+    """The time [s] from the end of a carrier's operation to that of its next one, where that waits
+    for hands to be clear of what they have delivered, by the carrier and the operation to come.
+    They set out at once."""
+    found: dict[tuple[int, int], float] = {}
+    for robot in layout.factory.robots:
+        for number, leaving in going_on(layout, robot.index).items():
+            gone = max(_gone(layout, one, limits) for one in leaving) + 2 * settings.tick
+            found[robot.index, number] = gone + delays[number]
+    return found
+
+
+def _gone(layout: Layout, leaving: Leaving, limits: Limits) -> float:
+    """How long an axis takes to be clear, from rest [s]: it goes on from there."""
+    own = limits.of((leaving.axis,))
+    speed, acceleration = float(own.speed[0]), float(own.acceleration[0])
+    way, rising = leaving.least, leaving.axis >= len(layout.factory.robots)
+    if not rising:
+        way -= layout.guidepaths[leaving.axis].reach
+    gaining = speed / acceleration
+    if way < speed * gaining / 2:
+        return float(np.sqrt(2 * way / acceleration))
+    return gaining + (way - speed * gaining / 2) / speed
+
+
+def all_ways(
+    layout: Layout,
+    stages: Sequence[HeadStart],
+    delays: Sequence[float],
+    limits: Limits,
+    settings: Settings,
+    world: World,
+) -> dict[tuple[int, int], float]:
+    """The ways ahead, and in MuJoCo the waits for hands, which the ideal world has not."""
+    found = ways_ahead(stages, limits, settings, world)
+    if world == "mujoco":
+        found |= waits_for_hands(layout, delays, limits, settings)
+    return found
 
 
 def way_time(
@@ -88,15 +132,14 @@ def predict(
     ways: Mapping[tuple[int, int], float] = MappingProxyType({}),
 ) -> CycleTime:
     """The cycle time of the compiled net and its bottleneck: the greatest sum along a gear of the
-    operations' `delays`, or of the `ways` that robots go ahead of them where those are longer. Two
-    things may allow no less and be it: in MuJoCo the outfeed, whose tray must be back before the
-    next dropoff, and the bound `wip` on what is inside."""
+    operations' `delays`, or of the `ways` that robots go ahead of them where those are longer.
+    Others may allow no less and be it: in MuJoCo the outfeed, whose tray must be back before the
+    next dropoff, and a feeder whose part comes later than its robot; the bound `wip` on what is
+    inside."""
     factory = layout.factory
     found = [cycle_time(factory, delays, ways)]
     if world == "mujoco":
-        tray = SpeedProfile(settings.outfeed, settings.outfeed_acceleration)
-        away = 2 * (tray.rest(layout.outfeed_way) + settings.tick)
-        found.append(CycleTime(delays[-1] + away, "outfeed"))
+        found += serving(layout, delays, settings)
     if wip is not None:
         most = min(wip, len(factory.robots))  # no more are inside without a bound
         bounded = with_wip(factory, most)

@@ -1,9 +1,9 @@
 """The floor: the bare engine stepping the same model through the same motion.
 
 While a factory runs, everything that is written into the engine between two calls of it is
-recorded: setpoints, welds, contact masks, bodies put somewhere, sleepers woken. The replay writes
-the same and steps as often, with nothing else in the loop; it ends in the same state to the last
-bit, which is asserted, so both did the same physics.
+recorded: setpoints, welds, contact masks, friction under loads, bodies put somewhere, sleepers
+woken. The replay writes the same and steps as often, with nothing else in the loop; it ends in the
+same state to the last bit, which is asserted, so both did the same physics.
 """
 
 from __future__ import annotations
@@ -23,6 +23,7 @@ from tests.bench.factories import Case, Steady, produce, run_in, run_until
 DATA = ("ctrl", "history", "qpos", "qvel", "eq_active", "tree_asleep", "xpos", "xmat", "xquat")
 MODEL = (
     "tree_sleep_policy",
+    "dof_frictionloss",
     "eq_obj2id",
     "geom_contype",
     "geom_conaffinity",

@@ -60,9 +60,9 @@ class Diary:
         self.seen = len(world.dropoffs)
         inspection = world.inspection
         self.error_mm.append(1e3 * (inspection.error or 0.0))
-        self.gap_mm.append(1e3 * world.parts.welds.gap)
+        self.gap_mm.append(1e3 * world.parts.welds.taken.gap)
         self.residual_mm.append(1e3 * inspection.residual)
-        inspection.error, inspection.residual, world.parts.welds.gap = None, 0.0, 0.0
+        inspection.error, inspection.residual, world.parts.welds.taken.gap = None, 0.0, 0.0
         self.memory_kib.append(resident_kib())
         self.lost += misplaced(world)
 

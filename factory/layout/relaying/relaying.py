@@ -74,7 +74,7 @@ def _roomy(
 ) -> Layout:
     """The layout with room for two lanes on the guidepaths of these robots."""
     c, pace = Clearance(plain.clearance), Pace.of(settings)
-    return optimised(plain.factory, plain.product, c, pace, floor, wide)
+    return optimised(plain.factory, plain.product, c, pace, floor, wide, bool(settings.hands))
 
 
 def _searched(

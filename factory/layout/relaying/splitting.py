@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 
 from factory.compiler.compiler import compile_pag
 from factory.layout.dimensions import Clearance
+from factory.layout.hands.hand import Hand
 from factory.layout.layout import Guidepath, Layout
 from factory.layout.relaying.naming import Named, named
 from factory.layout.relaying.ways import Way
@@ -46,6 +47,7 @@ def split(
     factory = compile_pag(names.pag, templates, catalogue, _approaches(before, names))
     paths: dict[int, Guidepath] = {}
     starts: dict[int, float] = {}
+    hands: dict[int, Hand | None] = {}
     for robot in range(len(before.robots)):
         pieces = list(_pieces(layout, robot, ways, names, factory))
         for number, piece in enumerate(reversed(pieces)):
@@ -54,6 +56,7 @@ def split(
                 lane = Clearance(layout.clearance).spread * (-1) ** number
             paths[piece.robot] = _path(layout.guidepaths[robot], piece, lane)
             starts[piece.robot] = piece.start
+            hands[piece.robot] = layout.hand(robot)
     stations = [0.0] * len(factory.operations)
     for operation in before.operations:
         made = _made(names, factory, operation.label)
@@ -66,6 +69,7 @@ def split(
         factory=factory,
         guidepaths=tuple(paths[robot.index] for robot in factory.robots),
         stations=tuple(stations),
+        hands=tuple(hands[r.index] for r in factory.robots) if layout.hands else (),
         payloads=payload_boxes(factory, layout.product),
         certificate=None,
     )

@@ -11,7 +11,8 @@ appended to.
     blocks                   see blocks.py: a letter, length, CRC-32, compressed arrays
 
     M  the model, once: `xml`, and `mesh/NAME` for each mesh file, bytes (mujoco only)
-    T  ticks, about a simulated second of them:
+    T  ticks, about a simulated second of them, and the ends of operations (mujoco only), each
+       before the engine goes on, in the order of time:
        time (n,) [s], delivered (n,)      products that have left since the run began
        qpos (n, nq), qvel (n, nv)         the engine's; in the ideal world arc lengths and speeds
        ctrl (n, nu)                       the engine's setpoints
@@ -20,8 +21,11 @@ appended to.
        contact_at, _count, contact        rows with contacts, how many, pairs of geoms
        contact_dist                       their distances [m]
        fired_at, fired, fired_t           row, number and time [s] of the transitions fired
-    E  the end: the file was closed properly. Where the run ended before its units were made:
-       code, message, bytes             what ended it, as a diagnostic has it
+       ended_at                           the rows that are ends of operations, not ticks
+    E  the end: the file was closed properly
+       figures, bytes (mujoco only)       what its verdict rests on, JSON: see `record.verdict`
+       code, message, bytes               what ended the run, as a diagnostic has it, where it
+                                          ended before its units were made
 
 Every block stands for itself and is written at once, so a file that ends in the middle of one lacks
 at most the last second. While it is written it is locked (`flock`)."""

@@ -17,6 +17,7 @@ from factory.record.ending import CutOff
 from factory.record.log.blocks import LENGTH, MAGIC, Arrays, bad_log, blocks, is_cut, unpack_rows
 from factory.record.log.header import check_header
 from factory.record.log.ticks import check_block, check_course, state_bytes
+from factory.record.verdict import check_figures
 from factory.support.claim import is_claimed
 from factory.support.errors import InputError
 from factory.support.files import RECORD, head_of, read_bytes
@@ -43,6 +44,24 @@ class Ragged:
     def __getitem__(self, row: int) -> NDArray[Any]:
         return self.values[self.starts[row] : self.ends[row]]
 
+    def chosen(self, rows: NDArray[np.bool_]) -> Ragged:
+        """That of some rows."""
+        return Ragged(self.values, self.starts[rows], self.ends[rows])
+
+
+@dataclass(frozen=True, slots=True)
+class Ends:
+    """The state where operations had ended and parts had changed hands, before the engine went on:
+    between the ticks `row` - 1 and `row`, in the order of time; the other fields are as in `Log`.
+    """
+
+    row: NDArray[np.int64] = field(repr=False)
+    time: NDArray[np.float64] = field(repr=False)
+    qpos: NDArray[np.float64] = field(repr=False)
+    qvel: NDArray[np.float64] = field(repr=False)
+    ctrl: NDArray[np.float64] = field(repr=False)
+    active: Ragged = field(repr=False)
+
 
 @dataclass(frozen=True)
 class Log:
@@ -52,7 +71,9 @@ class Log:
     bodies each joins; `contacts[i]` (k, 2) geoms, `distances[i]` (k,) [m]; `fired` and `fired_t`:
     transitions by number and time [s]. `ctrl`: the setpoints; None in the ideal world, and in
     logs of older versions. `complete`: whether the file was closed properly; `cut_off`: how far the
-    run came, None where all of its units were made and the log has all of it."""
+    run came, None where all of its units were made and the log has all of it. `ends`: the state as
+    operations ended, and `figures` of the bodies, as `kept_figures` gives them; None in the ideal
+    world and in logs of older versions."""
 
     header: Mapping[str, Any] = field(repr=False)
     xml: str = field(repr=False)
@@ -70,6 +91,8 @@ class Log:
     ctrl: NDArray[np.float64] | None = field(default=None, repr=False)
     complete: bool = True
     cut_off: CutOff | None = None
+    ends: Ends | None = field(default=None, repr=False)
+    figures: Mapping[str, Any] | None = field(default=None, repr=False)
 
     def __len__(self) -> int:
         return len(self.time)
@@ -139,30 +162,56 @@ def _read(data: memoryview, written: bool) -> Log:
     why = ("", "")
     if not complete:
         why = "BadLog", _broken(data, kept, written)
-    elif trouble:
+    elif "code" in trouble:
         why = trouble["code"].tobytes().decode(), trouble["message"].tobytes().decode()
     made, units = int(delivered[-1]) if len(time) else 0, header["units"]
     last = float(time[-1]) if len(time) else 0.0
     cut = made < units or any(why)
     wide = len(ticks[0]["ctrl_first"]) if ticks and "ctrl_first" in ticks[0] else None
+    at_end = _at_end(ticks, counts)
+    tick = ~at_end
+    qpos, qpos_ended = _states("qpos", header["nq"], ticks, at_end)
+    qvel, qvel_ended = _states("qvel", header["nv"], ticks, at_end)
+    ctrl, ctrl_ended = (None, None) if wide is None else _states("ctrl", wide, ticks, at_end)
+    active = _lasting("active", ticks, counts)
+    follows = np.cumsum(tick, dtype=np.int64)[at_end]
     return Log(
         MappingProxyType(header),
         xml,
         MappingProxyType(files),
-        time,
-        delivered,
-        _states("qpos", header["nq"], ticks),
-        _states("qvel", header["nv"], ticks),
-        _lasting("marking", ticks, counts),
-        _lasting("active", ticks, counts),
-        _single("contact", "contact", ticks, counts),
-        _single("contact", "contact_dist", ticks, counts),
+        _locked(time[tick]),
+        _locked(delivered[tick]),
+        qpos,
+        qvel,
+        _lasting("marking", ticks, counts).chosen(tick),
+        active.chosen(tick),
+        _single("contact", "contact", ticks, counts).chosen(tick),
+        _single("contact", "contact_dist", ticks, counts).chosen(tick),
         _joined("fired", ticks, np.int32),
         _joined("fired_t", ticks, np.float64),
-        _states("ctrl", wide, ticks) if wide is not None else None,
+        ctrl,
         complete,
         CutOff(last, made, units, *why) if cut else None,
+        None
+        if ctrl_ended is None
+        else Ends(follows, time[at_end], qpos_ended, qvel_ended, ctrl_ended, active.chosen(at_end)),
+        _figures(trouble["figures"]) if "figures" in trouble else None,
     )
+
+
+def _at_end(ticks: Sequence[Arrays], counts: Sequence[int]) -> NDArray[np.bool_]:
+    """Whether each row is the end of an operation, not a tick."""
+    found = np.zeros(sum(counts), bool)
+    for arrays, base in zip(ticks, np.cumsum([0, *counts]), strict=False):
+        found[base + arrays.get("ended_at", np.zeros(0, np.int32))] = True
+    return found
+
+
+def _figures(content: NDArray[Any]) -> Mapping[str, Any]:
+    """The figures in the last block. Raises ValueError where they are none."""
+    found = json.loads(content.tobytes())
+    check_figures(found)
+    return MappingProxyType(found)
 
 
 def _broken(data: memoryview, kept: int, written: bool) -> str:
@@ -176,9 +225,19 @@ def _broken(data: memoryview, kept: int, written: bool) -> str:
     return f"the log is damaged in the block that begins at byte {kept} of {len(data)}"
 
 
-def _states(name: str, width: int, ticks: Sequence[Arrays]) -> Any:
-    rows = (unpack_rows(name, a, len(a["time"])) for a in ticks)
-    return _locked(np.concatenate([np.zeros((0, width)), *rows]))
+def _states(
+    name: str, width: int, ticks: Sequence[Arrays], at_end: NDArray[np.bool_]
+) -> tuple[Any, Any]:
+    """The rows of a state, those that are ends of operations apart."""
+    none = np.zeros((0, width))
+    kept, ended, base = [none], [none], 0
+    for arrays in ticks:
+        rows = unpack_rows(name, arrays, len(arrays["time"]))
+        ends = at_end[base : base + len(rows)]
+        kept.append(rows[~ends])
+        ended.append(rows[ends])
+        base += len(rows)
+    return _locked(np.concatenate(kept)), _locked(np.concatenate(ended))
 
 
 def _locked(values: Any) -> Any:

@@ -45,6 +45,9 @@ def check_block(arrays: Arrays, header: Mapping[str, Any]) -> None:
     for one, other in PAIRS:
         if len(arrays[one]) != len(arrays[other]):
             raise ValueError(f"{one} and {other} differ in length")
+    if "ended_at" in arrays:  # logs of older versions lack it
+        _check_kind("ended_at", arrays["ended_at"], "<i4", ())
+        _check_range("ended_at", arrays["ended_at"], count - 1)
     _check_range("time", arrays["time"], LARGE)
     _check_range("fired_t", arrays["fired_t"], LARGE)
     _check_range("marking", arrays["marking"], len(header["places"]) - 1)

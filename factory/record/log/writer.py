@@ -22,6 +22,7 @@ from factory.record.log.blocks import LENGTH, MAGIC, Arrays, bad_log, block, pac
 from factory.record.monitor.observation import EngineView
 from factory.record.monitor.subject import subject_of_run
 from factory.record.observed import Observed, Recorder
+from factory.record.verdict import kept_figures
 from factory.support.claim import claimed
 from factory.support.errors import Diagnostic, FactoryError, InputError
 from factory.support.files import unwritten
@@ -32,7 +33,8 @@ STATES = ("qpos", "qvel", "ctrl")
 
 class _Ticks:
     """The ticks of a block: lists with an entry for each, or with a row number and what is recorded
-    of that row; the marking and the active constraints recorded last."""
+    of that row; rows of the ends of operations; the marking and the active constraints recorded
+    last."""
 
     def __init__(self) -> None:
         self.time: list[float] = []
@@ -42,6 +44,7 @@ class _Ticks:
         self.active: list[tuple[int, Any]] = []
         self.contacts: list[tuple[int, Any, Any]] = []
         self.fired: list[tuple[int, int, float]] = []
+        self.ended: list[int] = []
         self.marked: bytes | None = None
         self.welds: NDArray[np.intp] | None = None
 
@@ -64,6 +67,7 @@ class _Ticks:
             "fired_at": fired[:, 0].astype(np.int32),
             "fired": fired[:, 1].astype(np.int32),
             "fired_t": fired[:, 2],
+            "ended_at": np.array(self.ended, np.int32),
         }
 
 
@@ -83,7 +87,7 @@ class LogWriter(Recorder):
         pag: PAG | None = None,
         command: Sequence[str] | None = None,
     ) -> None:
-        self.path, self.world = Path(path), simulation.world
+        self.path, self.world, self.supervisor = Path(path), simulation.world, simulation.supervisor
         self.view = EngineView(self.world.m, self.world.d) if simulation.model else None
         self.before = int(simulation.before)
         net = simulation.layout.factory.net.threaded
@@ -107,7 +111,15 @@ class LogWriter(Recorder):
                 self.path.unlink()
             self.file.close()
             raise
-        self.observe(simulation.world, simulation.supervisor)
+        self.observe(self.world, self.supervisor)
+        if self.view is not None:
+            self.world.hooks.ended.append(self.ended)
+
+    def ended(self) -> None:
+        """Operations have ended: record what is there before the engine goes on."""
+        if not self.file.closed:
+            self.ticks.ended.append(len(self.ticks.time))
+            self.observe(self.world, self.supervisor)
 
     def observe(self, world: Any, supervisor: Any) -> None:
         ticks, row = self.ticks, len(self.ticks.time)
@@ -162,9 +174,11 @@ class LogWriter(Recorder):
 
     def _end(self) -> Arrays:
         """The arrays of the last block."""
-        if self.trouble is None:
-            return {}
-        texts = {"code": self.trouble.code, "message": self.trouble.message}
+        texts = {}
+        if self.trouble is not None:
+            texts = {"code": self.trouble.code, "message": self.trouble.message}
+        if (figures := self.world.figures()) is not None:
+            texts["figures"] = json.dumps(kept_figures(figures))
         return {name: np.frombuffer(text.encode(), "u1") for name, text in texts.items()}
 
     def _append(self, content: bytes) -> None:

@@ -12,11 +12,14 @@ from factory.record.observed import Observed
 
 
 def beside(simulation: Observed) -> EngineMonitor:
-    """A monitor that watches the engine of a simulation; it is an observer of its run. Of the
-    simulation it takes the engine, the layout and where it starts, and nothing that goes on."""
+    """A monitor that watches the engine of a simulation: `observe` is an observer of its run, and
+    `glance` one that need not be called after every tick. Of the simulation it takes the engine,
+    the layout, where it starts and when operations end, and nothing else that goes on."""
     m, d = simulation.world.m, simulation.world.d
     anatomy = Anatomy.of(m, simulation.layout.factory)
-    return EngineMonitor(subject_of_run(simulation), anatomy, m, d)
+    monitor = EngineMonitor(subject_of_run(simulation), anatomy, m, d)
+    simulation.world.hooks.ended.append(monitor.ended)
+    return monitor
 
 
 __all__ = ["MonitorSubject", "Report", "beside", "subject_of"]

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
-from factory.mjcf.weld_frames import GRIP, HOLD
+from factory.mjcf.weld_frames import GRIP, HOLD, WeldFrames
 from factory.record.monitor.anatomy import Anatomy
 from factory.record.monitor.observation import Array, Index, Observation
 
@@ -15,8 +17,16 @@ HANGS = 2e-3
 the goal balls in which robots hand over. The engine's welds yield by 0.03 mm, and a hand-over with
 a gap above 1 mm is a fault already."""
 
+MISSED = 1e-4
+"""As an operation ends, a robot is not at its goal that is further than this beyond its goal ball
+[m]; nor is a part where its next holder takes it over that is further than this beyond twice the
+radius of those balls."""
+
 TURNS = 0.05
 """A part that is turned by more than this is not held either [rad]."""
+
+FIRST = np.zeros((1, 1), np.intp)
+"""The only one of several looks."""
 
 STRAIGHT = float(np.cos(TURNS / 2))
 """The least product of two quaternions that are no further apart."""
@@ -31,54 +41,119 @@ class Switch:
     after: tuple[int, ...]
 
 
+@dataclass(frozen=True, slots=True)
+class _Kept:
+    """The welds that are active, by number, the copies they hold, the addresses (n, 7) of those,
+    and where they are kept."""
+
+    welds: Index
+    copies: Index
+    at: Index
+    frames: WeldFrames
+
+
 class Grips:
     """The welds on each copy, kept from tick to tick: `held[copy]`. `radius`: the largest goal ball
     [m]."""
 
     def __init__(self, anatomy: Anatomy, radius: float) -> None:
-        self.anatomy, self.limit = anatomy, HANGS + 2 * radius
+        self.anatomy, self.limit, self.near = anatomy, HANGS + 2 * radius, MISSED + 2 * radius
         self.held: list[tuple[int, ...]] = [()] * len(anatomy.copies)
         self._of_parts = np.array([holder is not None for holder in anatomy.holder], bool)
+        self._copy = np.full(len(anatomy.holder), -1, np.intp)
         self._welds: Index | None = None
+        self._kept: _Kept | None = None
         self._off: set[int] = set()
+        self._taking: list[Observation] = []
+        self._taken: list[tuple[int, int, int]] = []
 
     def switched(self, seen: Observation) -> list[Switch]:
         """The copies whose welds have changed since the observation before."""
         if seen.welds is self._welds:
             return []
-        self._welds = seen.welds
-        of_parts = seen.welds[self._of_parts[seen.welds[:, 0]]]
-        copies = self.anatomy.copy_of[of_parts[:, 2]]
-        order = np.argsort(copies, kind="stable")
-        self._on, self._copies = of_parts[order, 0], copies[order]
-        self._at = self.anatomy.body[self._copies][:, None] + np.arange(7)
-        self._frames = self.anatomy.frames.chosen(self._on)
-        now: dict[int, list[int]] = {}
-        for copy, weld in zip(self._copies.tolist(), self._on.tolist(), strict=True):
-            now.setdefault(copy, []).append(weld)
-        found = []
-        for copy, before in enumerate(self.held):
-            after = tuple(now.get(copy, ()))
-            if after != before:
+        self._welds, self._kept, before = seen.welds, None, self._copy
+        on = seen.welds[:, 0]
+        now = np.full_like(before, -1)
+        now[on] = np.where(self._of_parts[on], self.anatomy.copy_of[seen.welds[:, 2]], -1)
+        self._copy = now
+        changed = (now != before).nonzero()[0]
+        welds = zip(*(x.tolist() for x in (changed, before[changed], now[changed])), strict=True)
+        found: dict[int, set[int]] = {}
+        for weld, old, new in welds:
+            if old >= 0:
+                found.setdefault(old, set(self.held[old])).discard(weld)
+            if new >= 0:
+                found.setdefault(new, set(self.held[new])).add(weld)
+        switches = []
+        for copy in sorted(found):
+            after, held = tuple(sorted(found[copy])), self.held[copy]
+            if after != held:
                 self.held[copy] = after
-                found.append(Switch(copy, before, after))
+                switches.append(Switch(copy, held, after))
+        return switches
+
+    def take(self, seen: Observation, switches: Sequence[Switch]) -> int:
+        """Robots or the tray take copies over, and nothing has pulled at them yet; gives how many
+        observations of that wait for `missed`."""
+        holder = self.anatomy.holder
+        taken = [
+            (len(self._taking), switch.copy, weld)
+            for switch in switches
+            for weld in switch.after
+            if weld not in switch.before and (held := holder[weld]) and held[0] in (GRIP, HOLD)
+        ]
+        if taken:
+            self._taking.append(seen)
+            self._taken += taken
+        return len(self._taking)
+
+    def missed(self) -> list[tuple[float, int, int, float]]:
+        """Of the copies that were taken over those that were not where their weld keeps them: when
+        [s], copy, weld, and how far off they were [m]."""
+        if not self._taken:
+            return []
+        looks, copies, welds = np.array(self._taken).T
+        at, frames = self.anatomy.body[copies][:, None] + np.arange(7), self.anatomy.frames
+        qpos = np.array([seen.qpos for seen in self._taking])
+        gap, turned = _apart(qpos, looks[:, None], at, frames.chosen(welds))
+        rows = np.flatnonzero((gap > self.near) | turned).tolist()
+        found = [
+            (self._taking[look].time, copy, weld, float(gap[row]))
+            for row in rows
+            for look, copy, weld in (self._taken[row],)
+        ]
+        self._taking.clear()
+        self._taken.clear()
         return found
 
     def dropped(self, seen: Observation) -> list[tuple[int, int, float]]:
         """Copies that since the last observation have left the place where their weld keeps them:
         copy, weld, and how far off they are [m]."""
-        pose, frames = seen.qpos[self._at], self._frames
-        apart = pose[:, :3] - frames.at(seen.qpos[frames.along])
-        gap = np.einsum("ni,ni->n", apart, apart)
-        along = np.abs(np.einsum("ni,ni->n", pose[:, 3:], frames.turn))
-        if gap.max(initial=0.0) <= self.limit**2 and along.min(initial=1.0) >= STRAIGHT:
+        if self._kept is None:
+            on = (self._copy >= 0).nonzero()[0]
+            copies = self._copy[on]
+            at = self.anatomy.body[copies][:, None] + np.arange(7)
+            self._kept = _Kept(on, copies, at, self.anatomy.frames.chosen(on))
+        kept = self._kept
+        gap, turned = _apart(seen.qpos[None], FIRST, kept.at, kept.frames)
+        rows = np.flatnonzero((gap > self.limit) | turned).tolist()
+        if not rows:
             self._off.clear()
             return []
-        off = ~((gap <= self.limit**2) & (along >= STRAIGHT))
-        rows = np.flatnonzero(off).tolist()
-        fresh = [row for row in rows if int(self._copies[row]) not in self._off]
-        self._off = {int(self._copies[row]) for row in rows}
-        return [(int(self._copies[r]), int(self._on[r]), float(gap[r] ** 0.5)) for r in fresh]
+        fresh = [row for row in rows if int(kept.copies[row]) not in self._off]
+        self._off = {int(kept.copies[row]) for row in rows}
+        return [(int(kept.copies[r]), int(kept.welds[r]), float(gap[r])) for r in fresh]
+
+
+def _apart(
+    qpos: Array, look: Index, at: Index, frames: WeldFrames
+) -> tuple[Array, NDArray[np.bool_]]:
+    """How far bodies, at these addresses (n, 7) in the states (k, nq) of looks (n, 1), are from
+    where welds keep them [m], and whether they are turned; bodies that are nowhere are."""
+    pose = qpos[look, at]
+    apart = pose[:, :3] - frames.at(qpos[look, frames.along])
+    along = np.abs(np.einsum("ni,ni->n", pose[:, 3:], frames.turn))
+    return np.sqrt(np.einsum("ni,ni->n", apart, apart)), ~(along >= STRAIGHT)
 
 
 def misplaced(anatomy: Anatomy, places: dict[str, Array], tolerance: float = 1e-6) -> list[int]:

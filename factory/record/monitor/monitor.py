@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import islice
 from time import perf_counter
 from typing import Any
 
 import numpy as np
 
 from factory.plant.factory import Factory, Operation
+from factory.record.monitor.agreement import Recorded, disagreements
 from factory.record.monitor.anatomy import Anatomy
 from factory.record.monitor.explanation import SeenFirings
 from factory.record.monitor.grips import Grips, misplaced
@@ -18,9 +20,20 @@ from factory.record.monitor.observation import EngineView, Observation
 from factory.record.monitor.report import Report, Violation
 from factory.record.monitor.subject import MonitorSubject
 from factory.record.monitor.transfers import Transfers
+from factory.support.collector import collector_paused
 
 MOST = 100
 """Number of violations that are kept, the first ones: a fault is often followed by others."""
+
+LOOK = 0.5
+"""A monitor that does not look after every tick looks at everything after this time [s], and at
+what moves and what holds the parts where those change hands."""
+
+KEPT = 64
+"""So many looks are judged at a time."""
+
+NOBODY = (np.empty(0, np.intp),) * 3
+"""No robots that leave, arrive, or pass."""
 
 TICKS = 1.5
 """Times that are seen tick by tick may be off by so many ticks."""
@@ -73,11 +86,14 @@ class Monitor:
 
     # --- a tick --------------------------------------------------------------------------------
 
-    def see(self, seen: Observation) -> None:
-        """Take in the state after a tick."""
+    def see(self, seen: Observation, thorough: bool = True) -> None:
+        """Take in the state after a tick, or as operations end; unless `thorough`, of the former
+        only what holds the parts."""
         clock = self.clock
         clock.before, clock.now = clock.now, seen.time
-        left, arrived, passed = self.motion.look(seen)
+        left, arrived, passed = NOBODY
+        if seen.at_end or thorough:
+            left, arrived, passed = self.motion.look(seen)
         switches = self.grips.switched(seen)
         if switches:
             clock.changed = clock.now
@@ -86,21 +102,31 @@ class Monitor:
         for robot in passed.tolist():
             self._passed(robot)
         for robot in left.tolist():
-            if not self.motion.gone[robot]:
+            if self.motion.leaves(robot):
                 self._leaves(robot)
         if len(arrived):
             clock.changed = clock.now
+        if seen.at_end and self.grips.take(seen, switches) >= KEPT:
+            self._look_at_transfers()
+        if seen.at_end or not thorough:
+            return
         self._look_at_parts(seen)
         for actuator, since in self.lags.stuck(seen):
             self._stuck(actuator, since, seen)
         if clock.now - clock.changed > self.subject.patience and not clock.stalled:
             self._stalled()
 
-    def report(self) -> Report:
-        """The verdict on what was seen so far."""
+    @collector_paused()
+    def report(self, recorded: Recorded | None = None) -> Report:
+        """The verdict on what was seen so far and, where nothing is wrong with that, on whether a
+        record agrees with it."""
         begin = perf_counter()
+        self._look_at_transfers()
         seen, inferred, unexplained = self.explanation.solve(self.clock.begun, self.clock.now)
         every = sorted([*self.violations, *unexplained], key=lambda v: v.t)[:MOST]
+        if recorded is not None and not every:
+            found = disagreements(self.subject, (*seen, *inferred), recorded)
+            every = [*islice(found, MOST)]
         self.time_s += perf_counter() - begin
         return Report(tuple(seen), tuple(inferred), tuple(every), self.time_s)
 
@@ -119,11 +145,19 @@ class Monitor:
             words = f"{name} is {1e3 * gap:.1f} mm from where its weld keeps it, or turned"
             self._blame("Dropped", holder[1] if holder else -1, self.anatomy.label[copy], words)
 
+    def _look_at_transfers(self) -> None:
+        """Blame holders of parts that were elsewhere than where these took them over."""
+        for t, copy, weld, gap in self.grips.missed():
+            holder, name = self.anatomy.holder[weld], self.anatomy.copies[copy]
+            words = f"it takes {name} over, which is {1e3 * gap:.2f} mm off, or turned"
+            self._blame("Missed", holder[1] if holder else -1, self.anatomy.label[copy], words, t)
+
     # --- what is seen --------------------------------------------------------------------------
 
     def _ended(self, operation: Operation, unit: int) -> None:
         """The parts of an operation have changed hands: X_e."""
-        robots, before, now = self.factory.robots, self.clock.before, self.clock.now
+        robots, now = self.factory.robots, self.clock.now
+        before = now if self.motion.now.at_end else self.clock.before
         carrier = robots[operation.carrier].name
         self.explanation.saw(operation.end, unit, before, now, before, carrier)
         gears = {r: robots[r].operations for r in operation.robots}
@@ -138,22 +172,23 @@ class Monitor:
     def _leaves(self, robot: int) -> None:
         """A robot leaves the place where it stood: the next operation that has its goal elsewhere
         has started, if it was not to go ahead, and those before are over."""
-        anchor, ball = self.motion.anchor[robot], self.motion.ball[robot]
-        size = len(self.factory.robots[robot].operations)
-        first = self.turn[robot]
-        for turn in range(first, first + size + 1):
-            operation, unit = self._at(robot, turn)
-            goal = self.subject.goal(operation, robot)
-            if abs(goal - anchor) > ball:
+        spot, ball = float(self.motion.spot[robot]), float(self.motion.ball[robot])
+        goals, first = self.subject.gear_goals[robot], self.turn[robot]
+        for turn in range(first, first + len(goals) + 1):
+            goal = goals[turn % len(goals)]
+            if abs(goal - spot) > ball:
+                operation, unit = self._at(robot, turn)
                 break
         else:
+            operation, _ = self._at(robot, first)
             words = "it moves, though its program keeps it where it is"
             self._blame("Order", robot, operation.label, words)
-            self.motion.anchor[robot] = self.motion.now.s[robot]
+            self.motion.spot[robot] = self.motion.now.s[robot]
             return
-        begun = self.motion.leave(robot, goal)
+        begun = self.motion.begun(robot)
         self.clock.changed = self.clock.now
         self._over(robot, turn, begun)
+        self.motion.leave(robot, goal)
         if self.subject.goes_ahead(operation, robot):
             return  # it may leave before the operation starts
         name = self.factory.robots[robot].name
@@ -166,8 +201,9 @@ class Monitor:
         words = f"it passes its goal of {self.subject.name(operation)} without stopping"
         self._blame("Early", robot, operation.label, words)
         self.judged[operation.index] += 1
-        self.motion.stand(robot, float(self.motion.target[robot]))
-        self.motion.anchor[robot] = self.motion.target[robot]
+        goal = float(self.motion.spot[robot])
+        self.motion.stand(robot, goal)
+        self.motion.spot[robot] = goal
         self._leaves(robot)
 
     def _over(self, robot: int, turn: int, t: float) -> None:
@@ -194,8 +230,9 @@ class Monitor:
                 words = f"{name} ended while it was {1e3 * off:.1f} mm from its goal, or moved"
                 self._blame("Early", robot, operation.label, words)
                 return
-        last = max(operation.robots, key=lambda r: float(self.motion.came[r]))
-        stayed = t - float(self.motion.came[last])
+        came = self.motion.came[0]
+        last = max(operation.robots, key=lambda r: float(came[r]))
+        stayed = t - float(came[last])
         if stayed < operation.dwell - self.explanation.slack:
             words = f"{name} ended {stayed:.3f} s after it came, and takes {operation.dwell:g} s"
             self._blame("Early", last, operation.label, words)
@@ -212,7 +249,7 @@ class Monitor:
         operations that all their robots have come to."""
         self.clock.stalled = True
         when = f"nothing has happened for {self.clock.now - self.clock.changed:.1f} s"
-        away = [r for r in range(len(self.turn)) if self.motion.gone[r]]
+        away = self.motion.way.nonzero()[0].tolist()
         for robot in away[:3]:
             operation, _ = self._at(robot, self.turn[robot])
             words = f"{when} while it was on its way in {self.subject.name(operation)}"
@@ -254,14 +291,55 @@ class Monitor:
 
 
 class EngineMonitor(Monitor):
-    """A monitor of a running engine, which begins before the run does; an observer of that run."""
+    """A monitor of a running engine, which begins before the run does: it is told where operations
+    end, and is an observer of that run beside. What it sees is judged some looks at a time, which
+    takes half as long as to do so between steps of the engine."""
 
     def __init__(self, subject: MonitorSubject, anatomy: Anatomy, m: Any, d: Any) -> None:
         self.view = EngineView(m, d)
-        super().__init__(subject, anatomy, self.view.look())
+        first = self.view.look()
+        super().__init__(subject, anatomy, first)
+        self._looked, self._welds = first.time, first.welds
+        self._kept: list[tuple[Observation, bool]] = []
 
     def observe(self, world: Any, supervisor: Any) -> None:
         """Look at the engine after a tick; what it is called with is not looked at."""
         begin = perf_counter()
-        self.see(self.view.look())
+        self._keep()
         self.time_s += perf_counter() - begin
+
+    def glance(self, world: Any, supervisor: Any) -> None:
+        """After some ticks, look only where a weld has been switched, or nothing has been looked at
+        for a while."""
+        begin = perf_counter()
+        due = self.view.d.time - self._looked >= LOOK
+        if due or self.view.welds() is not self._welds:
+            self._keep(thorough=due)
+        self.time_s += perf_counter() - begin
+
+    def ended(self) -> None:
+        """Operations have ended, and parts have changed hands."""
+        begin = perf_counter()
+        self._keep(at_end=True)
+        self.time_s += perf_counter() - begin
+
+    def report(self, recorded: Recorded | None = None) -> Report:
+        begin = perf_counter()
+        self._judge_all()
+        self.time_s += perf_counter() - begin
+        return super().report(recorded)
+
+    def _keep(self, at_end: bool = False, thorough: bool = True) -> None:
+        seen = self.view.look(at_end).kept()
+        self._welds = seen.welds
+        if thorough and not at_end:
+            self._looked = seen.time
+        self._kept.append((seen, thorough))
+        if len(self._kept) >= KEPT:
+            self._judge_all()
+
+    @collector_paused()
+    def _judge_all(self) -> None:
+        for seen, thorough in self._kept:
+            self.see(seen, thorough)
+        self._kept.clear()

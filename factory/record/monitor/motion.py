@@ -3,12 +3,13 @@ follow their setpoints."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from factory.record.monitor.anatomy import Anatomy
+from factory.record.monitor.grips import MISSED
 from factory.record.monitor.observation import Array, Index, Observation
 from factory.support.settings import Settings
 
@@ -31,16 +32,17 @@ LATE = 0.2
 @dataclass(frozen=True, slots=True)
 class Tolerance:
     """What counts as at rest at a place: slower than `slow` [m/s], and within `slack` [m] of a goal
-    ball."""
+    ball; `tick` [s]: what is seen is no older where it is seen tick by tick."""
 
     slow: float
     slack: float
+    tick: float
 
     @classmethod
     def of(cls, settings: Settings) -> Tolerance:
         """That of a run that is seen tick by tick."""
         slow = REST + min(settings.acceleration * settings.tick, 5 * REST)
-        return cls(slow, min(slow * settings.tick, NEAREST))
+        return cls(slow, min(slow * settings.tick, NEAREST), settings.tick)
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,21 +53,36 @@ class _State:
     x: Array = field(repr=False)
     v: Array = field(repr=False)
     s: Array = field(repr=False)
+    at_end: bool = False
 
     @classmethod
     def of(cls, anatomy: Anatomy, seen: Observation) -> _State:
         """That in an observation."""
         x, v = seen.qpos[anatomy.slide], seen.qvel[anatomy.dof]
-        return cls(seen.time, x, v, seen.ctrl[anatomy.drive])
+        return cls(seen.time, x, v, seen.ctrl[anatomy.drive], seen.at_end)
+
+
+class _Setpoints:
+    """When the setpoints of robots (R,) stood last, `still` [s], and moved first after that,
+    `first`; `seen`: when they were looked at."""
+
+    def __init__(self, count: int, t: float) -> None:
+        self.still, self.first, self.seen = np.full(count, t), np.full(count, t), t
+
+    def look(self, moved: NDArray[np.bool_], t: float) -> None:
+        """Some have moved since they were looked at."""
+        np.copyto(self.first, t, where=moved & (self.still == self.seen))
+        np.copyto(self.still, t, where=~moved)
+        self.seen = t
 
 
 class AxisMotion:
-    """The motion of all robots (R,) along their guidepaths, from tick to tick.
+    """The motion of all robots (R,) along their guidepaths, from look to look.
 
-    `gone`: whether a robot has left `anchor`, where it stood, for `target`, both arc lengths [m];
-    `ball`: how near to either it is there; `came`: since when it has been at rest there [s], as of
-    its last stay; `still`: when its setpoint stood last; `first`: when it moved first after that.
-    `radius`: each robot's largest goal ball [m].
+    `spot`: where a robot stands, or goes to, arc lengths [m]; `way`: the direction in which it goes
+    there, 0 where it stands; `ball`: how near to a spot it is there; `inside`: whether it is at
+    rest there; `came` (2, R): between which times [s] it came to rest there, in its last stay;
+    `ended`: when its operation was seen to end [s]. `radius`: each robot's largest goal ball [m].
     """
 
     def __init__(
@@ -74,56 +91,83 @@ class AxisMotion:
         self.anatomy, self.rest = anatomy, Tolerance.of(settings)
         self.ball = radius + self.rest.slack
         self.now = self.before = _State.of(anatomy, first)
-        self.anchor, self.target = self.now.s.copy(), self.now.s.copy()
-        self.gone, self.inside = np.zeros(len(radius), bool), np.ones(len(radius), bool)
-        self.came, self.still, self.first = (np.full(len(radius), first.time) for _ in range(3))
+        self.spot, self.way = self.now.s.copy(), np.zeros(len(radius))
+        self.inside = np.ones(len(radius), bool)
+        self.came = np.full((2, len(radius)), first.time)
+        self.ended = np.full(len(radius), -np.inf)
+        self.setpoints = _Setpoints(len(radius), first.time)
 
     def look(self, seen: Observation) -> tuple[Index, Index, Index]:
         """The robots that now leave, that arrive, and that pass their target without stopping."""
-        self.before, self.now = self.now, _State.of(self.anatomy, seen)
-        now, t = self.now, seen.time
-        moved = now.s != self.before.s
-        np.copyto(self.first, t, where=moved & (self.still == self.before.t))
-        np.copyto(self.still, t, where=~moved)
-        spot = np.where(self.gone, self.target, self.anchor)
-        away = now.s - spot
-        near = (np.abs(now.x - spot) <= self.ball) & (np.abs(now.v) <= self.rest.slow)
-        inside = near & (~self.gone | (np.abs(away) <= self.ball))
-        np.copyto(self.came, t, where=inside & ~self.inside)
+        self.before, self.now, t = self.now, _State.of(self.anatomy, seen), seen.time
+        if seen.at_end and t - self.before.t <= self.rest.tick:
+            # within a tick, a robot that runs its own program has its setpoints written ahead
+            self.now = replace(self.now, s=self.before.s)
+        else:
+            self.setpoints.look(self.now.s != self.before.s, t)
+        now, gone = self.now, self.way != 0.0
+        away = now.s - self.spot
+        far = np.abs(away) > self.ball
+        near = (np.abs(now.x - self.spot) <= self.ball) & (np.abs(now.v) <= self.rest.slow)
+        inside = near & ~(gone & far)
+        fresh = inside > self.inside
+        self.came[0, fresh], self.came[1, fresh] = self.before.t, t
         self.inside = inside
-        left = ~self.gone & (np.abs(away) > self.ball)
-        arrived = self.gone & inside
-        passed = self.gone & (np.sign(spot - self.anchor) * away > self.ball)
-        self.anchor[arrived] = self.target[arrived]
-        self.gone[arrived] = False
-        return np.flatnonzero(left), np.flatnonzero(arrived), np.flatnonzero(passed)
+        left = far > gone
+        if left.any():
+            creeping = left & (t - self.ended <= self.rest.tick)
+            if creeping.any():  # one that runs its own program hears of the end within a tick
+                np.copyto(self.spot, now.s, where=creeping)
+                left &= ~creeping
+        arrived = (gone & inside).nonzero()[0]
+        passed = (self.way * away > self.ball).nonzero()[0]
+        self.way[arrived] = 0.0
+        return left.nonzero()[0], arrived, passed
 
     def stand(self, robot: int, goal: float) -> None:
         """A robot has ended an operation: it stands at its goal, or where its setpoint is now."""
-        s = float(self.now.s[robot])
-        there = abs(s - goal) <= self.ball[robot]
-        if self.gone[robot]:
-            self.came[robot] = self.now.t
+        s, ball = float(self.now.s[robot]), self.ball[robot]
+        spot = goal if abs(s - goal) <= ball else s
+        if self.way[robot] or abs(spot - self.spot[robot]) > ball:
+            self.came[:, robot] = self.before.t, self.now.t
             self.inside[robot] = True
-        self.anchor[robot] = goal if there else s
-        self.gone[robot] = False
+        self.spot[robot] = spot
+        self.way[robot] = 0.0
+        self.ended[robot] = self.now.t
+        self.setpoints.still[robot] = -np.inf  # it has come, and has not been seen to stand since
 
-    def leave(self, robot: int, target: float) -> float:
-        """A robot makes for a target; gives the time [s] by which it has begun to."""
-        stood = self.still[robot] >= self.came[robot]
-        self.target[robot] = target
-        self.gone[robot] = True
-        self.inside[robot] = False
-        return float(self.first[robot]) if stood else self.now.t
+    def leaves(self, robot: int) -> bool:
+        """Whether a robot leaves the place where it stood: not if its operation has ended since."""
+        away = abs(self.now.s[robot] - self.spot[robot]) > self.ball[robot]
+        return bool(away and not self.way[robot])
+
+    def begun(self, robot: int) -> float:
+        """The time [s] by which a robot that leaves has begun to."""
+        stood = self.setpoints.still[robot] >= self.came[1, robot]
+        return float(self.setpoints.first[robot]) if stood else self.now.t
+
+    def leave(self, robot: int, target: float) -> None:
+        """A robot makes for a target, where it may be already."""
+        self.way[robot] = 1.0 if target > self.spot[robot] else -1.0
+        self.spot[robot] = target
+        now, ball = self.now, self.ball[robot]
+        there = max(abs(now.s[robot] - target), abs(now.x[robot] - target)) <= ball
+        self.inside[robot] = there and abs(now.v[robot]) <= self.rest.slow
+        if self.inside[robot]:
+            self.way[robot] = 0.0
+            self.came[:, robot] = self.before.t, now.t
 
     def misses(self, robot: int, goal: float, radius: float) -> float:
-        """How far [m] a robot was off a goal ball as of this tick and the one before, 0 where it
-        was at rest in it in either."""
-        for state in (self.before, self.now):
-            near = abs(state.x[robot] - goal) <= radius + self.rest.slack
+        """How far [m] a robot is off a goal ball, 0 where it is at rest in it; after a tick, where
+        it was before or after that."""
+        looked, slack = (self.before, self.now), self.rest.slack
+        if self.now.at_end:
+            looked, slack = (self.now, self.now), MISSED
+        for state in looked:
+            near = abs(state.x[robot] - goal) <= radius + slack
             if near and abs(state.v[robot]) <= self.rest.slow:
                 return 0.0
-        return max(abs(float(self.before.x[robot]) - goal), 1e-9)
+        return max(abs(float(looked[0].x[robot]) - goal), 1e-9)
 
 
 class Lags:

@@ -3,26 +3,32 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
+from factory.nets.gears import GearNet
+from factory.nets.replay import replay
 from factory.record.log.header import settings_of
 from factory.record.log.model import model_of
-from factory.record.log.reader import Log
+from factory.record.log.reader import Ends, Log
 from factory.record.log.recompiled import AGAIN, factory_of, of_its_factory
+from factory.record.monitor.agreement import contradictions
 from factory.record.monitor.anatomy import Anatomy
 from factory.record.monitor.monitor import Monitor
 from factory.record.monitor.observation import Observation
 from factory.record.monitor.report import Report
 from factory.record.monitor.subject import MonitorSubject, subject_from
+from factory.record.verdict import RunVerdict, judged
 from factory.support.errors import Diagnostic, InputError
 
 
 def watch_log(log: Log) -> tuple[Report, MonitorSubject]:
     """The verdict on a recorded run, and its factory, compiled again from the log's header.
 
-    The log's events and markings are not read. Raises InputError (BadLog) for a log of the ideal
+    Only when nothing is wrong with the states are the log's firings and markings looked at: whether
+    they agree with those, and with each other. Raises InputError (BadLog) for a log of the ideal
     world, of an older version, or of another factory than its header says.
     """
     m = model_of(log)
@@ -35,21 +41,50 @@ def watch_log(log: Log) -> tuple[Report, MonitorSubject]:
         monitor = Monitor(subject, Anatomy.of(m, subject.factory), next(seen))
         for observation in seen:
             monitor.see(observation)
-    return monitor.report(), subject
+        report = monitor.report(log.events)
+        if report.refines_net:
+            found = contradictions(subject, log.events, _markings(log))
+            report = replace(report, violations=tuple(found))
+    return report, subject
+
+
+def verdict_on(log: Log, net: GearNet, report: Report | None) -> RunVerdict:
+    """The verdict on a run of a net that is recorded in a log, with a monitor's report on that
+    where there is one."""
+    cut, names = log.cut_off, [name for _, name in log.events]
+    refines = replay(net, names, frozenset(log.header["start"])).refines
+    trouble = None if cut is None else cut.failure
+    return judged(trouble, refines, log.figures, report)
+
+
+def _markings(log: Log) -> Iterator[tuple[float, list[int]]]:
+    """Each marking in a log that differs from the one before, and when it was seen first [s]."""
+    rows = np.flatnonzero(np.diff(log.marking.starts, prepend=-1))
+    return ((float(log.time[row]), log.marking[row].tolist()) for row in rows.tolist())
 
 
 def observations(log: Log) -> Iterator[Observation]:
-    """The observations in a log, row by row; `welds` is one array as long as none is switched."""
-    assert log.ctrl is not None
+    """The observations in a log, in the order of time; `welds` is one array as long as none is
+    switched."""
     welds = np.empty((0, 3), np.intp)
-    span = (-1, -1)
-    for row in range(len(log)):
-        now = int(log.active.starts[row]), int(log.active.ends[row])
-        if now != span:
-            found, span = log.active[row].astype(np.intp), now
-            if not np.array_equal(found, welds):
-                welds = found
-        yield Observation(float(log.time[row]), log.qpos[row], log.qvel[row], log.ctrl[row], welds)
+    for rows, row, at_end in _rows(log):
+        assert rows.ctrl is not None
+        found = rows.active[row]
+        if not np.array_equal(found, welds):
+            welds = found.astype(np.intp)
+        state = rows.qpos[row], rows.qvel[row], rows.ctrl[row]
+        yield Observation(float(rows.time[row]), *state, welds, at_end)
+
+
+def _rows(log: Log) -> Iterator[tuple[Log | Ends, int, bool]]:
+    """The rows of a log and of the ends of operations in it, and whether they are of those."""
+    ends, ended = log.ends, 0
+    for row in range(len(log) + 1):
+        while ends is not None and ended < len(ends.row) and ends.row[ended] == row:
+            yield ends, ended, True
+            ended += 1
+        if row < len(log):
+            yield log, row, False
 
 
 @of_its_factory()

@@ -8,6 +8,7 @@ from functools import cached_property
 from types import MappingProxyType
 from typing import Any
 
+from factory.layout.hands.leaving import goes_early
 from factory.layout.layout import Layout
 from factory.nets.history import firings
 from factory.nets.petri import Marking
@@ -27,7 +28,8 @@ class MonitorSubject:
     `goals[i]`: arc length [m] of the goal of each robot of operation i; `radii[i]`: its goal ball
     [m]; `places[label]`: the centre of mass of a part, or a sub-assembly that is one body, in the
     frame of the product [m]; `start`: the marking in which the run begins; `wip`: the bound on
-    what is let in; `patience` [s].
+    what is let in; `patience` [s]; `early`: (operation, robot) where a robot goes ahead whatever
+    the settings, since its hand has to be gone.
     """
 
     factory: Factory
@@ -38,6 +40,7 @@ class MonitorSubject:
     start: Marking
     patience: float
     wip: int | None = None
+    early: frozenset[tuple[int, int]] = frozenset()
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "places", MappingProxyType(dict(self.places)))
@@ -68,6 +71,15 @@ class MonitorSubject:
             for o in self.factory.operations
         )
 
+    @cached_property
+    def gear_goals(self) -> tuple[tuple[float, ...], ...]:
+        """Arc lengths [m] of the goals of each robot, in the order of its gear."""
+        operations = self.factory.operations
+        return tuple(
+            tuple(self.goal(operations[o], robot.index) for o in robot.operations)
+            for robot in self.factory.robots
+        )
+
     def goal(self, operation: Operation, robot: int) -> float:
         """Arc length [m] at which a robot has its goal in an operation."""
         return self.goals[operation.index][self.slots[operation.index, robot]]
@@ -75,7 +87,8 @@ class MonitorSubject:
     def goes_ahead(self, operation: Operation, robot: int) -> bool:
         """Whether a robot may go to its goal in an operation before that starts."""
         slot = self.slots[operation.index, robot]
-        return bool(self.settings.stage) and operation.awaits_empty(slot)
+        stays = self.settings.stage and operation.awaits_empty(slot)
+        return bool(stays) or (operation.index, robot) in self.early
 
     def name(self, operation: Operation) -> str:
         """The name of an operation in messages: `mate(sub1)`."""
@@ -88,6 +101,7 @@ class MonitorSubject:
             "radii": list(self.radii),
             "places": {part: list(place) for part, place in self.places.items()},
             "patience": self.patience,
+            "early": sorted(list(pair) for pair in self.early),
         }
 
 
@@ -118,9 +132,8 @@ def subject_of(
     travel += (4 * longest / settings.acceleration) ** 0.5
     travel += layout.outfeed_way / settings.outfeed + max(o.dwell for o in factory.operations)
     marking = factory.net.initial_marking if start is None else start
-    return MonitorSubject(
-        factory, goals, radii, places, settings, marking, round(PATIENCE * travel, 6), wip
-    )
+    patience, early = round(PATIENCE * travel, 6), frozenset(goes_early(layout))
+    return MonitorSubject(factory, goals, radii, places, settings, marking, patience, wip, early)
 
 
 def subject_of_run(simulation: Observed) -> MonitorSubject:
@@ -151,4 +164,6 @@ def subject_from(
         raise ValueError("its goals are not those of its PAG")
     places = {str(k): (float(x), float(y), float(z)) for k, (x, y, z) in kept["places"].items()}
     patience = float(kept["patience"])
-    return MonitorSubject(factory, goals, radii, places, settings, frozenset(start), patience, wip)
+    early = frozenset((int(o), int(r)) for o, r in kept.get("early", ()))
+    marking = frozenset(start)
+    return MonitorSubject(factory, goals, radii, places, settings, marking, patience, wip, early)

@@ -28,6 +28,8 @@ class Transfers:
         self.ended = [counts.get(o.end, 0) for o in factory.operations]
         self.presented = {o.label: counts.get(o.end, 0) for o in factory.leaves}
         self.load: dict[Holder, set[int]] = {}
+        contents = {label: frozenset(parts) for label, parts in factory.contents.items()}
+        self.contents, self.inside = contents, [contents[label] for label in anatomy.label]
 
     def begin(self, switches: Sequence[Switch]) -> None:
         """Record what is held at the start; blame what the marking does not account for."""
@@ -66,43 +68,58 @@ class Transfers:
 
     def _fused(self, switches: Sequence[Switch]) -> list[Switch]:
         """The switches, without those by which bodies that one robot held have become one body made
-        of the same parts: they are parked, and it was parked before."""
-        anatomy, at = self.anatomy, self.at
+        of the same parts: they are put away, and that one was before, or has been put away by
+        another robot at the same time."""
+        at = self.at
         gone: dict[Holder, list[int]] = {}
         for switch in switches:
             held = at[switch.copy]
-            if held and held[0] == GRIP and self._kinds(switch) == {PARK}:
+            if held and held[0] == GRIP and held not in self._holders(switch):
                 gone.setdefault(held, []).append(switch.copy)
-        parked: set[int] = set()
-        for switch in switches if gone else ():
-            label, held = anatomy.label[switch.copy], at[switch.copy]
-            if not held or held[0] != PARK or PARK in self._kinds(switch):
-                continue
-            parts = set(self.subject.factory.contents[label])
+        if not gone:
+            return list(switches)
+        became = self._became(switches, gone)
+        inside = {copy for _, _, copies in became for copy in copies}
+        units = [self._unit_of(*found) for found in became]
+        for copy in inside:
+            self._put(copy, (PARK, -1))
+            self.unit[copy] = -1
+        for (whole, holder, _), unit in zip(became, units, strict=True):
+            self._put(whole, holder)
+            self.unit[whole] = unit
+        away = {s.copy for s in switches if s.copy in inside and (PARK, -1) in self._holders(s)}
+        return [switch for switch in switches if switch.copy not in away]
+
+    def _became(
+        self, switches: Sequence[Switch], gone: dict[Holder, list[int]]
+    ) -> list[tuple[int, Holder, list[int]]]:
+        """The copies that have taken the place of others: each with what held those, and them. A
+        copy that was parked comes before one that is used anew at once."""
+        found = []
+        fresh = [s for s in switches if self.at[s.copy] and (PARK, -1) not in self._holders(s)]
+        for switch in sorted(fresh, key=lambda s: self.at[s.copy] != (PARK, -1)):
+            parts = self.inside[switch.copy]
             for holder, copies in gone.items():
-                others = [c for c in copies if anatomy.label[c] != label]
-                inside = [c for c in others if parts.issuperset(self._parts([c]))]
-                if set(self._parts(inside)) == parts:
-                    parked.update(inside)
-                    self._become(switch.copy, holder, inside)
-        return [switch for switch in switches if switch.copy not in parked]
+                inside = [c for c in copies if self.inside[c] < parts]
+                if sum(len(self.inside[c]) for c in inside) == len(parts):
+                    found.append((switch.copy, holder, inside))
+                    gone[holder] = [c for c in copies if c not in inside]
+                    break
+        return found
 
-    def _kinds(self, switch: Switch) -> set[int]:
-        """The kinds of holders that a copy has now."""
-        return {holder[0] for weld in switch.after if (holder := self.anatomy.holder[weld])}
+    def _holders(self, switch: Switch) -> set[Holder]:
+        """What holds a copy now."""
+        return {holder for weld in switch.after if (holder := self.anatomy.holder[weld])}
 
-    def _become(self, whole: int, holder: Holder, copies: Sequence[int]) -> None:
-        """Copies that a robot held have become one body; blame that they are for several units."""
+    def _unit_of(self, whole: int, holder: Holder, copies: Sequence[int]) -> int:
+        """The unit of copies that a robot held and that have become one body; blame that they are
+        for several."""
         units = {self.unit[copy] for copy in copies}
         if len(units) > 1:
             name, label = self.anatomy.copies[whole], self.anatomy.label[whole]
             message = f"{name} is made of parts for units {sorted(units)}"
             self.blame("Exchanged", holder[1], label, message)
-        for copy in copies:
-            self._put(copy, (PARK, -1))
-            self.unit[copy] = -1
-        self._put(whole, holder)
-        self.unit[whole] = max(units)
+        return max(units)
 
     def _parts(self, copies: Sequence[int]) -> list[str]:
         """The labels of the parts in copies."""
@@ -184,8 +201,9 @@ class Transfers:
         label = self.subject.factory.pag.root if last else operation.label
         load = self.load.get(holder, set())
         self._complete(operation.carrier, label, load, "Exchanged")
-        others = sorted(copy for copy in {*load, *copies} if self.unit[copy] != unit)
+        others = [copy for copy in {*load, *copies} if self.unit[copy] != unit]
         if others:
+            others.sort()
             name, other = self.anatomy.copies[others[0]], self.unit[others[0]]
             self.blame(
                 "Exchanged",
@@ -200,7 +218,10 @@ class Transfers:
 
     def _complete(self, robot: int, label: str, copies: set[int], code: str) -> None:
         """Blame parts that are missing or too many in what should be the sub-assembly `label`."""
-        wanted = set(self.subject.factory.contents.get(label, ()))
+        wanted = self.contents.get(label, frozenset())
+        held = [self.inside[copy] for copy in copies]
+        if sum(map(len, held)) == len(wanted) and all(parts <= wanted for parts in held):
+            return
         found = self._parts(sorted(copies))
         missing, extra = sorted(wanted - set(found)), sorted(set(found) - wanted)
         twice = sorted({part for part in found if found.count(part) > 1}) if not extra else []

@@ -24,7 +24,7 @@ MARGIN = 80.0
 RULER_ROOM = 3.0
 """What the scale bar takes beneath everything, in sizes of its letters."""
 
-STANDS = {"rail": "rail", "post": "post", "boom": "boom", "head": "boom"}
+STANDS = {"rail": "rail", "post": "post", "boom": "boom", "lid": "boom"}
 """The style of what stands still, by the last word of its name; what has none is not drawn."""
 
 MOVES = {"arm": "arm", "finger": "arm", "carriage": "carriage"}

@@ -10,13 +10,13 @@ from math import comb
 import numpy as np
 
 from factory.mjcf import names
+from factory.mjcf.pads import Pads
 from factory.mjcf.parts import HIDDEN
 from factory.mjcf.replica import Replica
-from factory.mjcf.weld_frames import GRIP, HOLD, gaps
-from factory.nets.replay import replay
+from factory.mjcf.weld_frames import FEED, GRIP, HOLD, gaps
 from factory.plant.approaches import Pair
-from factory.record.monitor.record import watch_log
 from factory.record.monitor.report import Report
+from factory.record.verdict import RunVerdict
 from factory.show.report.recording import Recording
 from factory.simulation.request import RunRequest
 from factory.simulation.run import Event
@@ -24,7 +24,6 @@ from factory.simulation.simulation import Simulation
 from factory.study.analysis.recorded import conditions
 from factory.study.fidelity.causality import causal_record, duration_differences
 from factory.study.fidelity.readings import ActiveWelds
-from factory.support.errors import InputError
 
 EVERY = 5
 """Residuals of welds are measured every so many ticks."""
@@ -32,12 +31,12 @@ EVERY = 5
 
 @dataclass(frozen=True)
 class RecordedFidelity:
-    """The figures by the keys of their definitions, whether the record refines the net, and the
-    verdict of the monitor, None where the log is not one to be judged; of how many `pairs` of parts
-    there are those whose contact was off."""
+    """The figures by the keys of their definitions, the verdict on the run, and what the monitor
+    reports, None where the log is not one to be judged; of how many `pairs` of parts there are
+    those whose contact was off."""
 
     figures: Mapping[str, float | None]
-    refines: bool
+    verdict: RunVerdict
     monitor: Report | None
     pairs: int
     excluded: tuple[Pair, ...]
@@ -45,13 +44,7 @@ class RecordedFidelity:
 
 def fidelity(recording: Recording) -> RecordedFidelity:
     """The fidelity of a recording."""
-    log = recording.log
-    try:
-        monitor = watch_log(log)[0]
-    except InputError:
-        monitor = None
-    events = [name for _, name in log.events]
-    record = replay(recording.factory.net, events, frozenset(recording.start))
+    monitor = recording.monitor
     violations = None if monitor is None else float(len(monitor.violations))
     found = {
         "monitor_violations": violations,
@@ -60,7 +53,7 @@ def fidelity(recording: Recording) -> RecordedFidelity:
         **_ideal(recording),
     }
     pairs = comb(len(recording.factory.leaves), 2)
-    return RecordedFidelity(found, record.refines, monitor, pairs, _excluded(recording))
+    return RecordedFidelity(found, recording.verdict, monitor, pairs, _excluded(recording))
 
 
 def _excluded(recording: Recording) -> tuple[Pair, ...]:
@@ -84,13 +77,17 @@ def _tracking(recording: Recording) -> float | None:
 
 
 def _welds(recording: Recording) -> dict[str, float | None]:
-    """Number of hand-offs, largest gap, residual and displacement of a part in the product [mm]."""
+    """Number of hand-offs, largest gaps, residual and displacement of a part in the product
+    [mm]."""
     log, replica = recording.log, Replica(recording.motion.m)
     m, d = replica.m, replica.d
     replica.switch(log.active[0])
     welds = ActiveWelds(m, d)
-    gap = residual = product = 0.0
+    pads, residual, product = Pads(m), 0.0, 0.0
     handoffs, finished = 0, bool(log.delivered[-1])
+    replica.place(log.qpos[0])
+    fed = np.flatnonzero(welds.active & (welds.kinds == FEED))
+    gap, grip_gap = 0.0, pads.first_taken(d, fed, fed)
     for row, switched in _rows(recording):
         if switched:
             replica.place(log.qpos[row - 1])
@@ -101,6 +98,8 @@ def _welds(recording: Recording) -> dict[str, float | None]:
             ]  # without bodies that replace others
             handoffs += len(fresh)
             gap = max(gap, float(gaps(m, fresh, d.xpos, d.xmat).max(initial=0.0)))
+            taken = pads.first_taken(d, fresh, np.flatnonzero(welds.active))
+            grip_gap = max(grip_gap, taken, key=lambda apart: apart or 0.0)
             continue
         replica.place(log.qpos[row])
         on = np.flatnonzero(welds.active & (welds.kinds >= GRIP))
@@ -112,6 +111,7 @@ def _welds(recording: Recording) -> dict[str, float | None]:
     return {
         "handoffs": float(handoffs),
         "handoff_gap_max_mm": 1e3 * gap,
+        "grip_gap_max_mm": None if grip_gap is None else 1e3 * grip_gap,
         "weld_residual_max_mm": 1e3 * residual,
         "product_position_max_mm": 1e3 * product if finished else None,
     }

@@ -23,7 +23,9 @@ from factory.problem.pag import PAG
 from factory.problem.template import Template
 from factory.record.log import Log, read_log
 from factory.record.log.recompiled import factory_of
-from factory.record.monitor import subject_of
+from factory.record.monitor import Report, subject_of
+from factory.record.monitor.record import verdict_on, watch_log
+from factory.record.verdict import RunVerdict
 from factory.show.report.scene import DrawnFactory, stations
 from factory.study.analysis.recorded import conditions
 from factory.support.errors import InputError, RunError
@@ -59,6 +61,19 @@ class Recording:
     def end(self) -> float:
         """When the run ended [s]."""
         return float(self.log.time[-1])
+
+    @cached_property
+    def monitor(self) -> Report | None:
+        """What a monitor reports on the log; None where it is not one to be judged."""
+        try:
+            return watch_log(self.log)[0]
+        except InputError:
+            return None
+
+    @cached_property
+    def verdict(self) -> RunVerdict:
+        """Whether the run succeeded."""
+        return verdict_on(self.log, self.factory.net, self.monitor)
 
     @cached_property
     def stage(self) -> DrawnFactory:

@@ -119,7 +119,7 @@ def scene(stage: DrawnFactory, labels: dict[str, int], pack: Pack) -> dict[str, 
 
 
 def _groups(m: mujoco.MjModel) -> Iterator[tuple[int, list[int]]]:
-    """The geoms that make one thing: those of a body; of the world those of a robot or a feeder."""
+    """The geoms that make one thing: those of a body; of the world those of a robot."""
     owned: dict[str, list[int]] = {}
     for geom in shown(m, 0):
         owned.setdefault(owner(m.geom(geom).name), []).append(geom)
@@ -136,14 +136,16 @@ def owner(geom: str) -> str:
 
 
 def stands_for(name: str, robots: dict[str, int], labels: dict[str, int]) -> dict[str, int]:
-    """What a body, or a geom of the world, is about: a robot, or a part with its feeder."""
+    """What a body, or a geom of the world, is about: a robot, or a part with its feeder and what
+    moves in that."""
     head, _, rest = name.partition("/")
     if head in robots:
         return {"robot": robots[head]}
     if head == "part" and names.label_of(name) in labels:
         return {"label": labels[names.label_of(name)], "copy": 1}
-    if head == "feeder" and rest in labels:
-        return {"label": labels[rest]}
+    if head == "feeder":
+        label = rest if rest in labels else rest.rpartition("/")[0]
+        return {"label": labels[label]} if label in labels else {}
     return {}
 
 

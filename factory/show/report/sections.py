@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from html import escape
 
 from factory.plant.factory import Factory
@@ -15,6 +15,7 @@ from factory.show.report.recording import Recording
 from factory.show.report.words import Proof
 from factory.simulation.run import STEADY
 from factory.study.fidelity.quantities import QUANTITIES
+from factory.support.errors import Diagnostic
 
 SIGNS = {True: "✓", False: "✗", None: "?"}
 
@@ -49,14 +50,16 @@ def heading(
         hourly = f"{_figure(_per_hour(run.cycle))} products an hour"
         cards.append(("Cycle time", f"{run.cycle:.3f} <small>s</small>", f"measured; {hourly}"))
     cards.append(("Net", *_verdict(proof.holds, "proved", "not proved"), "live, safe, reversible"))
-    held = found.refines and (found.monitor is None or found.monitor.refines_net)
+    held = found.verdict.follows
     judge = "record only" if found.monitor is None else "record and monitor agree"
     cut = recording.log.cut_off
     if held and cut:
         judge = f"follows the net until then; {judge}"
         cards.append(("Run", *_verdict(False, "", f"cut off at {cut.t:.2f} s"), judge))
     else:
-        cards.append(("Run", *_verdict(held, "follows the net", "does not follow the net"), judge))
+        follows = found.verdict.refines and (not found.monitor or found.monitor.refines_net)
+        wrong = "bodies disagree" if follows else "does not follow the net"
+        cards.append(("Run", *_verdict(held, "follows the net", wrong), judge))
     return "".join(_card(*card) for card in cards)
 
 
@@ -227,18 +230,24 @@ def _untested(found: RecordedFidelity) -> str:
 
 
 def _judged(found: RecordedFidelity, cut: CutOff | None) -> Iterator[str]:
-    yield "<p>The record of firings " + ("refines" if found.refines else "does not refine")
+    yield "<p>The record of firings " + ("refines" if found.verdict.refines else "does not refine")
     yield " the net. "
     if found.monitor is None:
         yield "The log has nothing for the monitor to judge.</p>"
+        yield from _listed(found.verdict.bodies)
         return
     report = found.monitor
     yield f"The monitor, which sees the engine alone, saw {len(report.seen)} firings and inferred "
     yield f"{len(report.inferred)}; "
     explain = f"they explain the run{', as far as it goes' if cut else ''}.</p>"
     yield explain if report.refines_net else "some things nothing explains:</p>"
-    if report.violations:
-        words = (escape(str(v.diagnostic())) for v in report.violations[:8])
+    yield from _listed(found.verdict.bodies)
+
+
+def _listed(failures: Sequence[Diagnostic]) -> Iterator[str]:
+    """What is wrong with the bodies of a run."""
+    if failures:
+        words = (escape(str(failure)) for failure in failures[:8])
         yield "<ul class='violations'>" + "".join(f"<li>{w}</li>" for w in words) + "</ul>"
 
 

@@ -54,7 +54,7 @@ class _Acting:
         self.pushes: list[tuple[int, Push]] = []
 
     def add(self, disturbance: Disturbance) -> None:
-        act, count = self.interference, len(self.world.motion.axes) - 1
+        act, count = self.interference, self.world.motion.axes.tray
         match disturbance:
             case Push():
                 self.pushes.append((self._body(disturbance.body), disturbance))
@@ -99,7 +99,7 @@ class _Acting:
         """The axes of some robots, of all for none."""
         chosen = dict.fromkeys(robots)
         if not chosen:
-            return np.arange(len(self.world.motion.axes) - 1)
+            return np.arange(self.world.motion.axes.tray)
         known = {robot.name: robot.index for robot in self.simulation.layout.factory.robots}
         for name in chosen:
             _known(name, known, "robot")

@@ -64,7 +64,7 @@ class Gain:
 @dataclass(frozen=True, slots=True)
 class Friction:
     """Dry friction of `newtons` [N] in every axis of all robots, or of those named, instead of what
-    their type has (0.2 N)."""
+    their type has empty (0.2 N). What the weight of a load adds is the same as ever."""
 
     newtons: float
     robots: tuple[str, ...] = ()

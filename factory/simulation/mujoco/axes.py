@@ -15,7 +15,8 @@ from factory.support.engine import mujoco
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Axes:
-    """All slides: the carriages of robots in order, then their lifts, then the outfeed's tray.
+    """The slides of robots and of the outfeed: carriages in order, then lifts, then the outfeed's
+    tray and the shutter of its shed.
 
     Each (axes,): `qpos`, `dof`, `body`, `tree`, `actuator`: addresses in the engine's model.
     `lift`: the axis of a robot's lift, by the robot (index).
@@ -33,8 +34,10 @@ class Axes:
         """The axes of a factory in its compiled model."""
         carriages = [robot.name for robot in factory.robots]
         lifts = [carriages[robot] for robot in factory.strokes]
-        slides = [*map(names.slide, carriages), *map(names.lift, lifts), names.OUTFEED_SLIDE]
-        drives = [*map(names.drive, carriages), *map(names.hoist, lifts), names.OUTFEED_DRIVE]
+        slides = [*map(names.slide, carriages), *map(names.lift, lifts)]
+        drives = [*map(names.drive, carriages), *map(names.hoist, lifts)]
+        slides += names.OUTFEED_SLIDE, names.SHUTTER
+        drives += names.OUTFEED_DRIVE, names.SHUTTER
         joint = np.array([m.joint(name).id for name in slides])
         body = m.jnt_bodyid[joint]
         actuator = np.array([m.actuator(name).id for name in drives])
@@ -47,8 +50,8 @@ class Axes:
 
     @property
     def tray(self) -> int:
-        """The axis of the outfeed's tray, the last."""
-        return len(self.qpos) - 1
+        """The axis of the outfeed's tray; that of the shutter is the next, and the last."""
+        return len(self.qpos) - 2
 
     def of_robot(self, robot: int) -> list[int]:
         """The axes of a robot (index): its carriage, and its lift if it has one."""
@@ -56,4 +59,4 @@ class Axes:
 
     def measured(self, d: mujoco.MjData) -> tuple[Array, Array]:
         """Positions [m] and speeds [m/s] of all carriages and lifts."""
-        return d.qpos[self.qpos[:-1]], d.qvel[self.dof[:-1]]
+        return d.qpos[self.qpos[: self.tray]], d.qvel[self.dof[: self.tray]]

@@ -1,10 +1,7 @@
 """Contact masks of parts by who holds them, and the pairs of parts left out.
 
-Parts in the same hands are joined and ignore each other; everything else collides. A holder has a
-code; a part in its hands has the code for its contype and the code's complement for its
-conaffinity, so two parts collide exactly if their codes differ. The lowest bit is that of robots
-and stations, which collide with every part. Masks are written on geoms *and* bodies: the broad
-phase looks at those of bodies.
+Parts in the same hands are joined and ignore each other; everything else collides: see
+`mjcf/masks.py`. Masks are written on geoms *and* bodies: the broad phase looks at those of bodies.
 """
 
 from __future__ import annotations
@@ -15,15 +12,10 @@ import numpy as np
 
 from factory.control.mode import Index, Truth
 from factory.mjcf import names
+from factory.mjcf.masks import masks_of
 from factory.mjcf.shells import trunks
 from factory.plant.fused_bodies import Inside
 from factory.support.engine import mujoco
-
-NOBODY = 0
-"""The code of no holder: such a part, a spare one out of sight, touches nothing."""
-
-ALL = (1 << 30) - 1
-"""All bits of a code."""
 
 LAST = 2**32 - 1
 """The greatest of all signatures, which no pair has."""
@@ -95,8 +87,7 @@ class ContactMasks:
         m = self._m
         for body, holder in holders.items():
             geoms = self.solid[body]
-            contype = holder << 1
-            conaffinity = 0 if holder == NOBODY else ((~holder & ALL) << 1) | 1
+            contype, conaffinity = masks_of(holder)
             own = self._own[body]
             self.code[own] = holder
             self.fresh.add(holder)

@@ -8,9 +8,9 @@ from collections.abc import Iterable
 import numpy as np
 
 from factory.mjcf import names
+from factory.mjcf.masks import NOBODY
 from factory.mjcf.model import Model
 from factory.mjcf.parts import parked_at
-from factory.simulation.mujoco.contacts import NOBODY
 from factory.simulation.mujoco.welds import Welds
 from factory.support.engine import mujoco
 

@@ -24,7 +24,8 @@ INPUTS = 3
 
 
 class Drives:
-    """The drives of some axes, of which `actuators` (axes,) are the numbers.
+    """The drives of some axes, of which `actuators` (axes,) are the numbers; their buffers are of
+    one size, and side by side.
 
     `mass` [kg] (axes,): what the force of a setpoint accelerates; `own` without a load. `weight`
     [N] (axes,): what it carries. `control` (axes,): where an axis's setpoint is in `ctrl`.
@@ -39,7 +40,9 @@ class Drives:
         self.most = samples - 2
         m.actuator_delay[actuators] = self.most * self.timestep
         size = 2 + (1 + INPUTS) * samples
-        self._buffers = d.history.reshape(-1, size)
+        at = m.actuator_historyadr[actuators]
+        first, self._row = int(at.min()), (at - at.min()) // size
+        self._buffers = d.history[first : first + len(at) * size].reshape(-1, size)
         early = np.arange(samples) - samples - self.most - 0.5
         self._head = np.concatenate([[samples - 1.0], self.timestep * early])
 
@@ -70,10 +73,10 @@ class Drives:
         """Let axes follow setpoints (n, samples, 3), one a timestep from now on; the last is
         held."""
         samples = setpoints.shape[1]
-        drives, head = self._actuators[axes], self._head.copy()
+        rows, head = self._row[axes], self._head.copy()
         head[1:] += self.time + samples * self.timestep
-        self._buffers[drives, 1 : 1 + len(head)] = head
-        self._buffers[drives, -INPUTS * samples :] = setpoints.reshape(len(axes), -1)
+        self._buffers[rows, 1 : 1 + len(head)] = head
+        self._buffers[rows, -INPUTS * samples :] = setpoints.reshape(len(axes), -1)
         self.show(axes, setpoints[:, -1])
 
     def show(self, axes: Index, setpoint: Array) -> None:

@@ -1,25 +1,68 @@
-"""Feeders: each presents the next part of its label, the n-th for unit n."""
+"""Feeders: each presents the next part of its label, the n-th for unit n.
+
+A copy gets into a housing while the slider is up, where nothing of it can be seen. It comes down
+when the robot that has taken the last one is out of the way.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 
+import numpy as np
+
+from factory.control.mode import Index
 from factory.mjcf import names
+from factory.mjcf.masks import feeder_codes
 from factory.mjcf.model import Model
 from factory.mjcf.parts import presented_at
-from factory.problem.pag import NOPART
+from factory.plant.factory import Operation
 from factory.simulation.mujoco.copies import Copies
-from factory.simulation.mujoco.welds import Welds
+from factory.simulation.mujoco.passing import Passing
+from factory.simulation.mujoco.sliders import NEVER, Sliders
+from factory.simulation.mujoco.welds import Place, Welds
 from factory.simulation.request import RunRequest
 from factory.support.engine import mujoco
 
 
-class Feeders:
-    """The feeders of a factory, for as many products as are requested beside those that have been
-    `released` to the outfeed. `counts`: how often each transition has
-    fired where the run starts.
+@dataclass(frozen=True, slots=True)
+class Station:
+    """A feeder: the label of its parts, the weld by which it holds one, its code, and where the
+    part is while the slider is down, and up."""
 
-    `welds` (by label): what holds the part that a feeder presents.
+    label: str
+    weld: int
+    code: int
+    down: Place
+    up: Place
+
+
+class Supply:
+    """Which units need a part of each label: as many as are requested beside those that have been
+    `released` to the outfeed, or were begun where the run starts, at most `wip` at once."""
+
+    def __init__(self, model: Model, request: RunRequest, counts: Mapping[int, int]) -> None:
+        leaves = model.factory.leaves
+        self.next = {o.label: counts.get(o.end, 0) for o in leaves}
+        self._begun = {o.label: counts.get(o.start, 0) for o in leaves}
+        self.released = counts.get(model.factory.dropoff.end, 0)
+        self._units, self._wip = self.released + request.units, request.wip
+
+    def wants(self, label: str) -> bool:
+        """Whether some unit has yet to get its part."""
+        return self.next[label] < max(self._units, self._begun[label])
+
+    def admits(self, unit: int) -> bool:
+        """Whether a unit may be let in."""
+        return self._wip is None or unit < self.released + self._wip
+
+
+class Feeders:
+    """The feeders of a factory (n,), in the order of their labels. `counts`: how often each
+    transition has fired where the run starts.
+
+    `welds`: what holds the part that a feeder presents, by label. `due`: when a part that a robot
+    has asked for too early comes soon enough [s].
     """
 
     def __init__(
@@ -28,79 +71,113 @@ class Feeders:
         model: Model,
         copies: Copies,
         welds: Welds,
-        request: RunRequest,
-        counts: Mapping[int, int],
+        sliders: Sliders,
+        passing: Passing,
+        supply: Supply,
     ) -> None:
-        self._copies, self._welds = copies, welds
-        leaves, tray = model.factory.leaves, len(model.factory.robots) + 1
-        self.welds = {o.label: m.equality(names.feed(o.label)).id for o in leaves}
-        self._code_at = {
-            o.label: (tray + 1 + n, presented_at(model.layout, o.label))
-            for n, o in enumerate(leaves)
-        }
-        self._next = {o.label: counts.get(o.end, 0) for o in leaves}
-        self._begun = {o.label: counts.get(o.start, 0) for o in leaves}
-        self.released = counts.get(model.factory.dropoff.end, 0)
-        self._units, self._wip = self.released + request.units, request.wip
+        self._copies, self._welds, self._sliders = copies, welds, sliders
+        self._passing, self.supply = passing, supply
+        self._stations = [
+            _station(m, model, label, code) for label, code in feeder_codes(model.factory).items()
+        ]
+        self.welds = {station.label: station.weld for station in self._stations}
+        self._number = {station.label: n for n, station in enumerate(self._stations)}
         self._shown: dict[str, int] = {}
-        self._away: set[str] = set()
-        self._refilled = _refilled(model)
+        self._asked: set[int] = set()
+        self.due = NEVER
+        count = len(self._stations)
+        self._vacant = np.ones(count, bool)
+
+    @property
+    def trees(self) -> dict[int, int]:
+        """The code of the feeder that each slider is of, by its kinematic tree."""
+        codes = (station.code for station in self._stations)
+        return dict(zip(self._sliders.trees.tolist(), codes, strict=True))
 
     def grips(self) -> Iterator[tuple[int, int]]:
         """The welds that hold what is presented, each with the code of its feeder."""
-        return ((weld, self._code_at[label][0]) for label, weld in self.welds.items())
+        return ((station.weld, station.code) for station in self._stations)
 
-    def presents(self, label: str, unit: int) -> bool:
-        """Whether the feeder shows the part for that unit, and it may be let in."""
-        allowed = self._wip is None or unit < self.released + self._wip
-        return allowed and self._shown.get(label) == unit
+    def begin(self) -> None:
+        """Where the run starts, each feeder presents a part if it can and its robot is not yet
+        under way with another."""
+        down = self._load(np.flatnonzero(~self._passing.holds), down=True)
+        self._sliders.begin(np.setdiff1d(np.arange(len(self._stations)), down))
 
-    def feed(self, label: str) -> None:
-        """Put the next copy into its empty feeder, if there is one to spare and a unit that needs
-        it, and the robot has delivered the part it took last: until then it may still stand
-        there."""
-        unit = self._next[label]
-        if label in self._away or label in self._shown or not self._copies.free[label]:
-            return
-        if unit >= max(self._units, self._begun[label]):
-            return
-        self._shown[label] = unit
-        self._next[label] += 1
-        body = self._copies.take(label, unit)
-        code, at = self._code_at[label]
-        self._welds.place(body, at)
-        self._welds.hold([body], code)
-        self._welds.join({self.welds[label]: body})
+    def presents(self, label: str, unit: int, now: float) -> bool:
+        """Whether a robot may come for the part for that unit: it is down before the robot can be
+        there, and may be let in."""
+        if not self.supply.admits(unit):
+            return False
+        number = self._number[label]
+        if self._shown.get(label) != unit:
+            self._asked.add(number)
+            return False
+        ends = float(self._sliders.ends[number])
+        enough = ends - self._passing.soonest(number) if ends < NEVER else now
+        if enough > now:
+            self.due = min(self.due, enough)
+        return enough <= now
 
     def taken(self, label: str) -> None:
         """The robot has taken the part."""
+        number = self._number[label]
         del self._shown[label]
-        self._welds.loose([self.welds[label]])
-        self._away.add(label)
+        self._welds.loose([self._stations[number].weld])
+        self._passing.holds[number] = self._vacant[number] = True
 
-    def away(self, label: str) -> None:
-        """The robot is under way with a part where the run starts."""
-        self._away.add(label)
+    def end(self, operations: Sequence[Operation]) -> None:
+        """These operations have ended: sliders whose parts have been taken go up."""
+        for operation in operations:
+            self._passing.end(operation)
+        taken = [self._number[o.label] for o in operations if o.label in self._number]
+        self._send(np.array(taken, np.intp), down=False)
 
     def retire(self, labels: Iterable[str], unit: int) -> None:
-        """Put bodies of a unit out of sight, and parts into their feeders where those are empty."""
+        """Put bodies of a unit out of sight; their feeders may be empty."""
         for label in labels:
             self._copies.put_back(label, unit)
-        for label in labels:
-            if label in self.welds:
-                self.feed(label)
+            if label in self._number and label not in self._shown:
+                self._vacant[self._number[label]] = True
 
-    def refill(self, operation: int) -> None:
-        """Feed what is fed again when an operation (index) has ended."""
-        for label in self._refilled[operation]:
-            self._away.discard(label)
-            self.feed(label)
+    def tend(self) -> bool:
+        """Let the next parts come down from housings whose sliders have come up, where the robots
+        are out of the way. Whether one comes that a robot has asked for."""
+        self._sliders.settle()
+        free = self._vacant & (self._sliders.ends == NEVER) & self._passing.clear()
+        if not np.count_nonzero(free):
+            return False
+        loaded = self._load(free.nonzero()[0])
+        self._welds.write()
+        self._send(loaded, down=True)
+        come = self._asked & {*loaded.tolist()}
+        self._asked -= come
+        return bool(come)
+
+    def _send(self, numbers: Index, down: bool) -> None:
+        self._sliders.send(numbers, down)
+        self._welds.masks.fresh.update(self._stations[n].code for n in numbers.tolist())
+
+    def _load(self, numbers: Index, down: bool = False) -> Index:
+        """Put the next copies into feeders, where there are some to spare and units that need
+        them; where not, they are looked for again when one has become free. Gives which."""
+        self._vacant[numbers] = False
+        loaded = [n for n in numbers.tolist() if self._supplied(self._stations[n].label)]
+        for number in loaded:
+            station, supply = self._stations[number], self.supply
+            unit = self._shown[station.label] = supply.next[station.label]
+            supply.next[station.label] += 1
+            body = self._copies.take(station.label, unit)
+            self._welds.place(body, station.down if down else station.up)
+            self._welds.hold([body], station.code)
+            self._welds.join({station.weld: body})
+        return np.array(loaded, np.intp)
+
+    def _supplied(self, label: str) -> bool:
+        return bool(self._copies.free[label]) and self.supply.wants(label)
 
 
-def _refilled(model: Model) -> list[list[str]]:
-    """For each operation the labels that its end delivers from a feeder's robot."""
-    fed = {o.carrier: o.label for o in model.factory.leaves}
-    return [
-        [fed[r] for r, k in zip(o.robots, o.after, strict=True) if r in fed and k == NOPART]
-        for o in model.factory.operations
-    ]
+def _station(m: mujoco.MjModel, model: Model, label: str, code: int) -> Station:
+    x, y, z = presented_at(model.layout, label)
+    up = x, y, z + model.layout.feeder(label).stroke
+    return Station(label, m.equality(names.feed(label)).id, code, (x, y, z), up)

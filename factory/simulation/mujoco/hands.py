@@ -12,19 +12,19 @@ from factory.support.engine import mujoco
 
 
 @dataclass(slots=True)
-class Hand:
+class Grasp:
     """The `bodies` that a robot holds, by label, and the `unit` that they are for."""
 
     unit: int
     bodies: dict[str, int]
 
 
-class Hands:
+class Grasps:
     """The hands of all robots: `of[robot]` for each that holds something (index); `grip`: the weld
     by which a robot holds a label."""
 
     def __init__(self, m: mujoco.MjModel, model: Model, welds: Welds) -> None:
-        self.of: dict[int, Hand] = {}
+        self.of: dict[int, Grasp] = {}
         self._welds, self._mass = welds, model.carried.mass
         self.grip = {
             (robot.index, label): m.equality(names.grip(robot.name, label)).id
@@ -44,9 +44,9 @@ class Hands:
 
     def _hold(self, robot: int, unit: int, bodies: Mapping[str, int]) -> None:
         self._welds.hold(bodies.values(), robot + 1)
-        self.of.setdefault(robot, Hand(unit, {})).bodies.update(bodies)
+        self.of.setdefault(robot, Grasp(unit, {})).bodies.update(bodies)
 
-    def let_go(self, robot: int) -> Hand:
+    def let_go(self, robot: int) -> Grasp:
         """A robot lets go of all that it holds, and says what that was."""
         hand = self.of.pop(robot)
         self._welds.loose([self.grip[robot, label] for label in hand.bodies])

@@ -88,9 +88,10 @@ class Inspection:
     def figures(self, welds: Welds) -> PhysicsFigures:
         """The figures of the run so far."""
         pairs = dict.fromkeys(f"{a} - {b}" for a, b in self.unintended)
+        pads = welds.pads.largest
         return PhysicsFigures(
-            welds.handoffs,
-            1e3 * welds.gap,
+            welds.taken.count,
+            1e3 * welds.taken.gap,
             1e3 * self.residual,
             None if self.error is None else 1e3 * self.error,
             len(self.unintended),
@@ -101,4 +102,6 @@ class Inspection:
             self._model.excluded,
             bool(self._model.carried.wholes),
             float(self._m.opt.timestep),
+            grip_gap_max_mm=None if pads is None else 1e3 * pads,
+            joining_error_max_mm=1e3 * welds.taken.off,
         )

@@ -25,13 +25,14 @@ it, and nothing ever sticks."""
 
 
 class Interference:
-    """Acts on a world. Axes are carriages and lifts, by number; the tray is left alone."""
+    """Acts on a world. Axes are carriages and lifts, by number; the outfeed is left alone."""
 
     def __init__(self, world: MujocoWorld) -> None:
         self._world, self._m, self._d = world, world.m, world.d
         axes = world.motion.axes
-        self._qpos, self._dof = axes.qpos[:-1], axes.dof[:-1]
-        self._actuator = axes.actuator[:-1]
+        self._robots = slice(axes.tray)
+        self._qpos, self._dof = axes.qpos[self._robots], axes.dof[self._robots]
+        self._actuator = axes.actuator[self._robots]
         self._gain = np.ones(len(self._actuator))
         self._measures: list[Measure] = []
         self._measured: tuple[Array, Array] | None = None
@@ -46,8 +47,8 @@ class Interference:
         self._world.parts.joining.weigh(self._m, self._d)
 
     def rub(self, axes: Index, newtons: float) -> None:
-        """Axes have dry friction."""
-        self._m.dof_frictionloss[self._dof[axes]] = newtons
+        """Axes have dry friction when they are empty, and as much more under a load as ever."""
+        self._world.motion.guides.rub(axes, newtons)
         self._m.dof_solimp[self._dof[axes], :2] = HARD
 
     def drag(self, axes: Index, speed: Array) -> None:
@@ -95,7 +96,7 @@ class Interference:
             q, v = self._measured
             kp, kv = self._m.actuator_biasprm[self._actuator, 1:3].T
             bias += kp * (q - self._d.qpos[self._qpos]) + kv * (v - self._d.qvel[self._dof])
-            self._world.motion.sleep.wake(self._world.motion.axes.body[:-1].tolist())
+            self._world.motion.sleep.wake(self._world.motion.axes.body[self._robots].tolist())
         self._m.actuator_biasprm[self._actuator, 0] = bias
 
     def _setpoint(self, axis: int) -> Array:

@@ -11,7 +11,7 @@ from factory.mjcf.model import Model
 from factory.simulation.mujoco.copies import Copies
 from factory.simulation.mujoco.feeders import Feeders
 from factory.simulation.mujoco.fusing import RIGID, SETTLING, Fusion
-from factory.simulation.mujoco.hands import Hands
+from factory.simulation.mujoco.hands import Grasps
 from factory.simulation.mujoco.welds import Welds
 from factory.support.engine import mujoco
 
@@ -24,7 +24,7 @@ class Joining:
     when they became one [m]."""
 
     def __init__(
-        self, model: Model, hands: Hands, copies: Copies, feeders: Feeders, welds: Welds
+        self, model: Model, hands: Grasps, copies: Copies, feeders: Feeders, welds: Welds
     ) -> None:
         self._model, self._hands, self._copies = model, hands, copies
         self._feeders, self._welds = feeders, welds

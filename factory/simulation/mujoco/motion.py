@@ -12,8 +12,10 @@ from factory.mjcf.model import GRAVITY, HEAD_MASS, Model
 from factory.simulation.mujoco.axes import Axes
 from factory.simulation.mujoco.courses import Follower, along, planned
 from factory.simulation.mujoco.drives import Drives
+from factory.simulation.mujoco.guides import Guides
 from factory.simulation.mujoco.outfeed import Outfeed
 from factory.simulation.mujoco.sleep import Sleep
+from factory.simulation.mujoco.sliders import Sliders
 from factory.simulation.mujoco.stepping import Stepping
 from factory.support.engine import mujoco
 
@@ -32,16 +34,19 @@ class Motion:
         self, m: mujoco.MjModel, d: mujoco.MjData, model: Model, start: Array, gains: Array
     ) -> None:
         self.axes, self.settings = Axes.of(m, model.factory), model.settings
-        m.actuator_biasprm[self.axes.actuator[:-1], 1:3] *= np.asarray(gains)[:, None]
+        robots = self.axes.actuator[: self.axes.tray]
+        m.actuator_biasprm[robots, 1:3] *= np.asarray(gains)[:, None]
         body, dof = self.axes.body, self.axes.dof
         own = m.body_subtreemass[body] + m.dof_armature[dof]
         self.drives = Drives(m, d, self.axes.actuator, own.round(9))
+        self.guides = Guides(m, dof)
         self.sleep = Sleep(m, d, self.axes.tree)
-        x, v = np.append(start, 0.0), np.zeros(len(self.axes))
+        x, v = np.append(start, [0.0, 0.0]), np.zeros(len(self.axes))
         d.qpos[self.axes.qpos] = x
         self.robots = Follower(x, v, self.drives, self.settings.steps)
         tray = Follower(x, v, self.drives, self.settings.steps)
         self.outfeed = Outfeed(d, model, self.axes, tray, self.drives)
+        self.sliders = Sliders(m, d, model, self.sleep)
         self.active: Index = np.empty(0, np.intp)
         self.plan = np.zeros((4, len(self.axes)))
 
@@ -53,12 +58,13 @@ class Motion:
         self.robots.stop(every)
 
     def load(self, robots: Sequence[int], loads: Sequence[float]) -> None:
-        """From now on robots (index) carry so much [kg]: those with a lift that stands hold it at
-        once, all others from their next courses on."""
+        """From now on robots (index) carry so much [kg], and their guides: those with a lift that
+        stands hold it at once, all others from their next courses on."""
         if not robots:
             return
-        lift, mass = self.axes.lift, np.array(loads)
-        self.drives.load(np.array(robots), mass, np.zeros(len(mass)))
+        lift, mass, carriages = self.axes.lift, np.array(loads), np.array(robots)
+        self.drives.load(carriages, mass, np.zeros(len(mass)))
+        self.guides.load(carriages, mass)
         lifts = [n for n, robot in enumerate(robots) if robot in lift]
         if lifts:
             axes = np.array([lift[robots[n]] for n in lifts])
@@ -80,7 +86,7 @@ class Motion:
             self.sleep.may_sleep(over)
         self.sleep.stay_awake(active)
         self.active, self.robots.course = active, None
-        moving = [active, self.outfeed.axis] if self.outfeed.moves else [active]
+        moving = [active, self.outfeed.axes] if self.outfeed.moves else [active]
         self.stepping.turn(np.concatenate(moving))
 
     def step(self, bundle: Bundle | None, ticks: int) -> int:
@@ -97,6 +103,7 @@ class Motion:
         self.outfeed.loading = False
         if bundle is not None:
             self.robots.show(ticks)
+        self.sliders.show(ticks * self.settings.steps)
         self.stepping.advance(ticks * self.settings.steps)
         return ticks
 
@@ -115,11 +122,11 @@ class Motion:
         """The tray's next course begins where one is over. Come to its goal, it stands."""
         outfeed, follower = self.outfeed, self.outfeed.follower
         if outfeed.moves and not follower.left:
-            follower.begin(outfeed.axis, self.stepping.course(outfeed.beginning, outfeed.course))
+            follower.begin(outfeed.axes, self.stepping.course(outfeed.beginning, outfeed.course))
             follower.show(0)
         elif not outfeed.moves and follower.course is not None:
-            follower.stop(outfeed.axis)
-            self.sleep.may_sleep(outfeed.axis)
+            follower.stop(outfeed.axes)
+            self.sleep.may_sleep(outfeed.axes)
 
     def _plan(self, bundle: Bundle) -> None:
         """The next stride of the active modes. The load of each robot is that of its operation."""
@@ -140,7 +147,8 @@ class Motion:
     def send_tray(self, loaded: bool) -> None:
         """The tray goes away with a product, or home without."""
         self.outfeed.send(loaded)
-        self.sleep.stay_awake(self.outfeed.axis)
+        self.guides.load(self.outfeed.axes, self.outfeed.load)
+        self.sleep.stay_awake(self.outfeed.axes)
 
     def move(self, axes: Index, x: Array, v: Array, a: Array) -> None:
         """From now on `axes` run from x [m] at speed v [m/s] under acceleration a [m/s²], for as
@@ -162,6 +170,7 @@ class Motion:
         where they are now."""
         if self.outfeed.follower.left:
             self.outfeed.follower.show(1)
+        self.sliders.show(0)
         axes = np.flatnonzero(self.plan[2:].any(axis=0))
         if len(axes):
             begun, *_, a = self.plan[:, axes]

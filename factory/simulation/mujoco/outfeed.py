@@ -1,4 +1,5 @@
-"""The outfeed's tray: it goes to the end of its way with a product, and comes back without."""
+"""The outfeed's tray: it goes into the shed with a product, and comes back without. In between the
+shed is shut."""
 
 from __future__ import annotations
 
@@ -6,72 +7,94 @@ from collections.abc import Hashable
 
 import numpy as np
 
-from factory.control.governor import govern
-from factory.control.mode import ROUNDING, Array
-from factory.control.profile import landing_speed
-from factory.mjcf.model import Model
+from factory.control.mode import Array
+from factory.layout.dimensions import BEHIND, PLAY
+from factory.mjcf.model import GRAVITY, Model
+from factory.mjcf.outfeed import SHUTTER_MASS
 from factory.simulation.mujoco.axes import Axes
-from factory.simulation.mujoco.courses import AHEAD, Course, Follower, Move, planned
+from factory.simulation.mujoco.courses import AHEAD, Course, Follower, Move, planned, towards
 from factory.simulation.mujoco.drives import Drives
 from factory.support.engine import mujoco
 
 NEAR = 1e-3
 """The tray is somewhere when it is within this [m]."""
 
+WEIGHT = np.array([0.0, SHUTTER_MASS * GRAVITY])
+"""What the drives of tray and shutter carry [N]."""
+
 CLOSE = NEAR + AHEAD
 """It may be there when its reference is within this [m]."""
 
 
 class Outfeed:
-    """The tray and its way. `goal` [m]: where it goes, 0 is home. `busy`: it is away, or has not
-    been seen at rest at home since. `loading`: it has just been given a product, and leaves a tick
-    later."""
+    """The tray and its way, and the shutter of its shed. `goal` [m]: where the tray goes, 0 is
+    home. `busy`: it is away, or has not been seen at rest at home, the shed open, since. `loading`:
+    it has just been given a product, and leaves a tick later."""
 
     def __init__(
         self, d: mujoco.MjData, model: Model, axes: Axes, follower: Follower, drives: Drives
     ) -> None:
         self.follower, self.goal = follower, 0.0
         self.busy = self.loading = False
-        self.axis = np.array([axes.tray])
+        self.axes = np.array([axes.tray, axes.tray + 1])
         self._d, self._drives, self._settings = d, drives, model.settings
-        self._address = int(axes.qpos[-1]), int(axes.dof[-1])
+        self._address = axes.qpos[self.axes], axes.dof[self.axes]
         self._product = model.masses[model.factory.pag.root]
-        self._way = model.layout.outfeed_way
+        self._far = model.layout.outfeed_way, -model.layout.shutter_stroke
+        drives.load(self.axes, np.zeros(2), WEIGHT)
+        settings = model.settings
+        tray = settings.outfeed, settings.outfeed_acceleration
+        speed, acceleration = np.array([tray, settings.shutter_limits]).T
+        self._limits = speed, acceleration
 
     def send(self, loaded: bool) -> None:
         """From now on it carries a product, or none, and goes away, or home."""
-        self.goal, self.busy, self.loading = self._way if loaded else 0.0, True, loaded
-        self._drives.load(self.axis, np.array([loaded * self._product]), np.zeros(1))
+        self.goal, self.busy, self.loading = self._far[0] if loaded else 0.0, True, loaded
+        self._drives.load(self.axes, self.load, WEIGHT)
         self.follower.course = None
 
+    @property
+    def load(self) -> Array:
+        """What tray and shutter carry (2,) [kg]."""
+        return np.array([self._product if self.goal else 0.0, 0.0])
+
+    @property
+    def ends(self) -> Array:
+        """Where tray and shutter go (2,) [m]: the shed is shut while a product is in it."""
+        return np.array([self.goal, self._far[1] if self.goal else 0.0])
+
     def rests(self) -> bool:
-        """Whether it rests where it goes."""
+        """Whether tray and shutter rest where they go."""
         x, v = self._d.qpos[self._address[0]], self._d.qvel[self._address[1]]
-        return bool(abs(x - self.goal) < NEAR and abs(v) < NEAR / self._settings.tick)
+        slow = NEAR / self._settings.tick
+        return all(
+            abs(at - end) < NEAR and abs(speed) < slow
+            for at, end, speed in zip(x.tolist(), self.ends.tolist(), v.tolist(), strict=True)
+        )
 
     @property
     def moves(self) -> bool:
-        """Whether its reference has yet to come to rest at the goal, or it is busy."""
-        x, v = self.follower.x[self.axis[0]], self.follower.v[self.axis[0]]
-        return self.busy or bool(x != self.goal or v != 0.0)
+        """Whether a reference has yet to come to rest at its end, or it is busy."""
+        if self.busy:
+            return True
+        x, v = self.follower.x[self.axes], self.follower.v[self.axes]
+        return bool((x != self.ends).any() or v.any())
 
     @property
     def beginning(self) -> Hashable:
         """All that its next course depends on."""
-        x, v = self.follower.x[self.axis], self.follower.v[self.axis]
+        x, v = self.follower.x[self.axes], self.follower.v[self.axes]
         return self.goal, x.tobytes(), v.tobytes()
 
     def course(self) -> Course:
         """A stride of its way, as fast as its limits allow, until it is nearly there."""
-        x, v = self.follower.x[self.axis], self.follower.v[self.axis]
+        x, v = self.follower.x[self.axes], self.follower.v[self.axes]
         ticks = self._settings.stride, self._settings.steps
-        return planned(self._drives, self.axis, (x, v), ticks, self._go)
+        return planned(self._drives, self.axes, (x, v), ticks, self._go)
 
     def _go(self, x: Array, v: Array) -> Move:
-        dt, limit = self._settings.tick, np.array([self._settings.outfeed_acceleration])
-        left = self.goal - (x + v * (dt / 2))
-        wanted = np.minimum(landing_speed(np.abs(left), limit, dt), self._settings.outfeed)
-        x1, v1, a = govern(x, v, np.copysign(wanted, left), limit, dt)
-        if abs(x1[0] - self.goal) < ROUNDING and abs(v1[0]) < ROUNDING:
-            x1, v1 = np.array([self.goal]), np.zeros(1)
-        return x1, v1, a, abs(float(x1[0]) - self.goal) < CLOSE
+        """A tick: the shutter begins to come down when the product is past it."""
+        ends = self.ends
+        goals = ends if x[0] >= self._far[0] - BEHIND + PLAY else np.array([self.goal, 0.0])
+        x1, v1, a = towards(goals, x, v, self._limits, self._settings.tick)
+        return x1, v1, a, bool((np.abs(x1 - ends) < CLOSE).all())

@@ -7,15 +7,17 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 import numpy as np
 
 from factory.mjcf import names
+from factory.mjcf.masks import tray_code
 from factory.mjcf.model import Model
 from factory.mjcf.weld_frames import held_at
 from factory.plant.factory import Operation
 from factory.simulation.mujoco.contacts import ContactMasks
 from factory.simulation.mujoco.copies import Copies, copies_of
-from factory.simulation.mujoco.feeders import Feeders
-from factory.simulation.mujoco.hands import Hands
+from factory.simulation.mujoco.feeders import Feeders, Supply
+from factory.simulation.mujoco.hands import Grasps
 from factory.simulation.mujoco.joining import Joining
-from factory.simulation.mujoco.sleep import Sleep
+from factory.simulation.mujoco.motion import Motion
+from factory.simulation.mujoco.passing import Passing
 from factory.simulation.mujoco.welds import Welds
 from factory.simulation.request import RunRequest
 from factory.support.engine import mujoco
@@ -34,7 +36,7 @@ class Parts:
         m: mujoco.MjModel,
         d: mujoco.MjData,
         model: Model,
-        sleep: Sleep,
+        motion: Motion,
         request: RunRequest,
         counts: Mapping[int, int],
     ) -> None:
@@ -43,19 +45,22 @@ class Parts:
         self.labels = model.carried.carried[factory.pag.root]
         self.on_tray: int | None = None
         self.masks = ContactMasks(m, body, model.apart)
-        self.welds = Welds(m, d, self.masks, sleep)
+        radii = np.zeros(m.nbody)
+        for label, ids in body.items():
+            radii[ids] = model.carried.radius[label]
+        self.welds = Welds(m, d, self.masks, motion.sleep, radii)
         self.hold = {label: m.equality(names.hold(label)).id for label in self.labels}
         self.copies = Copies(m, model, body, self.welds)
-        self.feeders = Feeders(m, model, self.copies, self.welds, request, counts)
-        self.hands = Hands(m, model, self.welds)
+        passing, supply = Passing(m, d, model, request), Supply(model, request, counts)
+        self.feeders = Feeders(m, model, self.copies, self.welds, motion.sliders, passing, supply)
+        self.hands = Grasps(m, model, self.welds)
         self.joining = Joining(model, self.hands, self.copies, self.feeders, self.welds)
         self.joining.weigh(m, d)
         self.welds.loose([*self.feeders.welds.values(), *self.hold.values()])
         mujoco.mj_kinematics(m, d)
-        for label, unit, robot in self._under_way(counts):
+        for label, unit, robot in self._under_way(counts, passing):
             self._give(m, label, unit, robot)
-        for label in self.feeders.welds:
-            self.feeders.feed(label)
+        self.feeders.begin()
         self.welds.write()
 
     def complete(self, ended: Sequence[tuple[Operation, int]]) -> None:
@@ -75,7 +80,7 @@ class Parts:
                 self.feeders.taken(operation.label)
                 body = self.copies[operation.label, unit]
                 self.hands.take(operation.carrier, unit, {operation.label: body})
-            self.feeders.refill(operation.index)
+        self.feeders.end([operation for operation, _ in ended])
         self.welds.write()
 
     def _pass_on(self, operation: Operation, unit: int) -> None:
@@ -90,7 +95,7 @@ class Parts:
         self.welds.grip({self.hold[label]: body for label, body in bodies.items()})
         self.welds.hold(bodies.values(), self.tray)
         self.on_tray = unit
-        self.feeders.released += 1
+        self.feeders.supply.released += 1
 
     def recycle(self) -> None:
         """Return the bodies of the product on the tray to their feeders, out of sight."""
@@ -110,7 +115,7 @@ class Parts:
     @property
     def tray(self) -> int:
         """The code of the tray; that of a robot is its number."""
-        return len(self.model.factory.robots) + 1
+        return tray_code(self.model.factory)
 
     def grips(self) -> Iterator[tuple[int, int]]:
         """All welds by which holders hold parts, each with the code of its holder."""
@@ -118,12 +123,14 @@ class Parts:
         yield from ((weld, self.tray) for weld in self.hold.values())
         yield from self.feeders.grips()
 
-    def _under_way(self, counts: Mapping[int, int]) -> Iterable[tuple[str, int, int]]:
+    def _under_way(
+        self, counts: Mapping[int, int], passing: Passing
+    ) -> Iterable[tuple[str, int, int]]:
         """The bodies that are in robots' hands in a marking: label, unit, and the robot (index) of
         the last operation on its way that has ended for its unit."""
         factory = self.model.factory
-        for leaf in factory.leaves:
-            for unit in range(self.feeders.released, counts.get(leaf.end, 0)):
+        for number, leaf in enumerate(factory.leaves):
+            for unit in range(self.feeders.supply.released, counts.get(leaf.end, 0)):
                 holder = operation = leaf
                 while (
                     operation.index != factory.dropoff.index and counts.get(operation.end, 0) > unit
@@ -131,7 +138,7 @@ class Parts:
                     holder = operation
                     operation = factory.operations[factory.parents[operation.index]]
                 if holder.carrier == leaf.carrier:
-                    self.feeders.away(leaf.label)
+                    passing.holds[number] = True
                 for label in self.model.carried.carried[holder.label]:
                     if (label, unit) not in self.copies:
                         yield label, unit, holder.carrier

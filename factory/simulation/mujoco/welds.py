@@ -8,10 +8,11 @@ from collections.abc import Iterable, Mapping
 
 import numpy as np
 
-from factory.control.mode import Index
-from factory.mjcf.weld_frames import WeldFrames
+from factory.control.mode import Array
 from factory.simulation.mujoco.contacts import ContactMasks
+from factory.simulation.mujoco.pad_gaps import PadGaps
 from factory.simulation.mujoco.sleep import Sleep
+from factory.simulation.mujoco.takeovers import Takeovers
 from factory.support.engine import mujoco
 
 Place = tuple[float, float, float]
@@ -20,17 +21,18 @@ Place = tuple[float, float, float]
 class Welds:
     """Gathers what is to be switched until `write`; the last that is said of a weld or body counts.
 
-    `gap` [m]: the largest distance between the frames that a grip joined. `handoffs`: how many
-    bodies have been taken over.
+    `radii` (nbody,): how far vertices are from their body's origin [m]; `taken`: what was measured
+    of bodies that were taken over; `pads`: how far holders' pads were from them.
     """
 
     def __init__(
-        self, m: mujoco.MjModel, d: mujoco.MjData, masks: ContactMasks, sleep: Sleep
+        self, m: mujoco.MjModel, d: mujoco.MjData, masks: ContactMasks, sleep: Sleep, radii: Array
     ) -> None:
-        self.masks, self.gap, self.handoffs = masks, 0.0, 0
+        self.masks = masks
         self._m, self._d, self._sleep = m, d, sleep
         mujoco.mj_kinematics(m, d)
-        self._frames = WeldFrames.of(m, d)
+        self.taken = Takeovers(m, d, radii)
+        self.pads = PadGaps(m, d)
         self._on: dict[int, int] = {}
         self._off: set[int] = set()
         self._gripped: dict[int, int] = {}
@@ -66,10 +68,10 @@ class Welds:
         if not (self._on or self._off or self._held or self._placed):
             return
         self._put()
+        self.pads.measure(self._on, self._off)
         if self._gripped:
             welds, bodies = np.array([*self._gripped.items()]).T
-            self.gap = max(self.gap, self._apart(welds, bodies))
-            self.handoffs += len(welds)
+            self.taken.measure(welds, bodies)
         m, d = self._m, self._d
         off, on = np.array([*self._off], np.intp), np.array([*self._on], np.intp)
         bodies = np.array([*self._on.values()], np.intp)
@@ -80,14 +82,6 @@ class Welds:
         self.masks.hold(self._held)
         for gathered in (self._on, self._off, self._gripped, self._held, self._placed):
             gathered.clear()
-
-    def _apart(self, welds: Index, bodies: Index) -> float:
-        """The largest distance [m] between where welds hold bodies and where those are: now, which
-        `xpos` tells of where the last step began."""
-        q, frames = self._d.qpos, self._frames.chosen(welds)
-        free = self._m.jnt_qposadr[self._m.body_jntadr[bodies]][:, None] + np.arange(3)
-        offset = q[free] - frames.at(q[frames.along])
-        return float(np.linalg.norm(offset, axis=1).max())
 
     def _put(self) -> None:
         """Put bodies where they belong; `xpos` too, which the engine renews in its next step."""

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from copy import copy
+from math import ceil
 
 from factory.control.mode import Array, Index
 from factory.control.navigation import Bundle
@@ -17,14 +18,19 @@ from factory.mjcf.model import Model
 from factory.plant.factory import Operation
 from factory.simulation.mujoco.fast.neighbours import Neighbours
 from factory.simulation.mujoco.fast.strides import Strides
+from factory.simulation.mujoco.hands_away import HandsAway
 from factory.simulation.mujoco.inspection import Inspection
 from factory.simulation.mujoco.motion import Motion
 from factory.simulation.mujoco.parts import Parts
+from factory.simulation.mujoco.sliders import NEVER
 from factory.simulation.mujoco.stepping import SingleSteps
 from factory.simulation.request import RunRequest
 from factory.simulation.run import PhysicsFigures
 from factory.simulation.world import Hooks, Job
 from factory.support.engine import mujoco
+
+ROUNDED = 0.01
+"""What is due so much of a tick later is due."""
 
 GIVEN_UP = tuple(
     int(getattr(mujoco.mjtWarning, f"mjWARN_{name}"))
@@ -58,7 +64,8 @@ class MujocoWorld:
         self._before = counts.get(model.factory.dropoff.end, 0)
         self._unseen = 0
         self.motion = Motion(self.m, self.d, model, start, gains)
-        self.parts = Parts(self.m, self.d, model, self.motion.sleep, request, counts)
+        self._away = HandsAway(self.d, model.layout, self.motion.axes.qpos)
+        self.parts = Parts(self.m, self.d, model, self.motion, request, counts)
         self.inspection = Inspection(self.m, self.d, model, self.parts.masks)
         for operation in model.factory.operations:
             begun, over = (counts.get(t, 0) for t in (operation.start, operation.end))
@@ -89,10 +96,10 @@ class MujocoWorld:
 
     def prepared(self, operation: Operation, unit: int) -> bool:
         """A feeder presents the part of that unit; the outfeed has room for a product."""
-        if not self.hooks.admit(operation, unit):
+        if not self.hooks.admit(operation, unit) or self._away.hold_up(operation):
             return False
         if operation.label in self.parts.feeders.welds:
-            return self.parts.feeders.presents(operation.label, unit)
+            return self.parts.feeders.presents(operation.label, unit, self.time)
         if operation.index != self.model.factory.dropoff.index:
             return True
         outfeed = self.motion.outfeed
@@ -102,8 +109,11 @@ class MujocoWorld:
         """Hand the parts of ended operations over: welds off and on in one tick."""
         for operation, unit in started:
             self.inspection.joining[operation.index] = unit
-        if not ended:
-            return
+        if ended:
+            self._hand_over(ended)
+            self.hooks.tell_ended()
+
+    def _hand_over(self, ended: Sequence[Job]) -> None:
         self.parts.complete(ended)
         for operation, unit in ended:
             self.inspection.joining.pop(operation.index, None)
@@ -121,11 +131,16 @@ class MujocoWorld:
         as many as are asked for, but not past the end of a course. Whether any mode may have come
         to its goal: no robot is far ahead of its reference, nor at rest before that is."""
         motion = self.motion
+        if self._away.waiting:  # it is asked for again after every tick
+            self._away.waiting, self.supplied, ticks = False, True, 1
         if axes is not motion.active:
             motion.turn(axes)
             self._look()
         if bundle is None:
             ticks = min(ticks, self.model.settings.stride - self._unseen)
+        left = (self.parts.feeders.due - self.time) / self.model.settings.tick
+        if left < ticks:
+            ticks = max(1, ceil(left - ROUNDED))
         self._settle(motion.step(bundle, ticks))
         return motion.robots.near
 
@@ -151,7 +166,9 @@ class MujocoWorld:
         self.inspection.tick()
         if over and self._unseen > stride // 2:
             self._look()
-        outfeed, unit = self.motion.outfeed, self.parts.on_tray
+        outfeed, unit, feeders = self.motion.outfeed, self.parts.on_tray, self.parts.feeders
+        if feeders.due <= self.time + ROUNDED * self.model.settings.tick:
+            feeders.due, self.supplied = NEVER, True
         if outfeed.busy and outfeed.rests():
             self.supplied = True
             if unit is None:
@@ -166,6 +183,7 @@ class MujocoWorld:
         """At what is looked at when other modes begin, and about once in a stride from then."""
         self._unseen = 0
         self.inspection.welds()
+        self.supplied |= self.parts.feeders.tend()
         if self.parts.joining.waiting:
             self.parts.joining.settle(self.time)
 

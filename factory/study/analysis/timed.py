@@ -15,6 +15,7 @@ from factory.study.analysis.slack import Slack, circuits
 from factory.study.analysis.timing import AS_IT_IS, Change, Timing
 from factory.timing.cycle_time import with_ways
 from factory.timing.pool import with_wip
+from factory.timing.serving import serving
 
 SAME = 1e-9
 """Relative difference up to which times are equal."""
@@ -122,7 +123,10 @@ def timed_net(timing: Timing, change: Change = AS_IT_IS, wip: int | None = None)
     tokens, places = list(moving.tokens), list(moving.net.places)
     back = [(f"station {factory.operations[n].label}", n, 0.0) for n in _alone(timing, change)]
     if timing.outfeed:
-        back.append(("outfeed", factory.dropoff.index, timing.outfeed))
+        for time in serving(timing.layout, seconds, timing.settings):
+            served = factory.by_label.get(time.bottleneck.partition(" ")[2], factory.dropoff)
+            number = served.index
+            back.append((time.bottleneck, number, time.seconds - seconds[number]))
     named = _gears(timing, seconds, tokens, ways)
     for name, number, delay in back:
         operation = factory.operations[number]

@@ -18,6 +18,7 @@ from factory.plant.factory import Factory
 from factory.simulation.simulation import start_positions
 from factory.support.settings import Settings
 from factory.timing.prediction import way_time
+from factory.timing.serving import away, leaving
 
 AT_ONCE = 1e6
 """A factor on a speed that leaves only the acceleration as a bound."""
@@ -173,15 +174,14 @@ class Timing:
         """How long the outfeed's tray is away after a dropoff [s]; 0 in the ideal world."""
         if self.world == "ideal":
             return 0.0
-        return 2 * self.leaving
+        return away(self.layout, self.settings)
 
     @cached_property
     def leaving(self) -> float:
         """How long a product takes from its dropoff until it counts [s]; 0 in the ideal world."""
         if self.world == "ideal":
             return 0.0
-        tray = SpeedProfile(self.settings.outfeed, self.settings.outfeed_acceleration)
-        return tray.rest(self.layout.outfeed_way) + self.settings.tick
+        return leaving(self.layout, self.settings)
 
     def _of(self, number: int) -> tuple[int, ...]:
         """The robot of each axis of an operation."""

@@ -1,8 +1,9 @@
 """The least distances of bodies that are not meant to touch, against those certified.
 
 Left out are pairs that are meant to be near: a part and what holds it, parts held by one body,
-parts whose robots are in one and the same active operation, robots on the floor, and the output
-robot at the outfeed that it serves."""
+parts whose robots are in one and the same active operation, robots on the floor, the output robot
+at the outfeed that it serves, bodies of one feeder or of the outfeed, sliders, which hand over, and
+spare copies."""
 
 from __future__ import annotations
 
@@ -46,7 +47,13 @@ class Approaches:
         self.certified, self.trunk = certified(layout), trunks(m)
         words = [m.body(i).name for i in range(m.nbody)]
         kinds = [names.kind(word) for word in words]
-        self.kind = np.array([KINDS.index(k) if k in KINDS else NONE for k in kinds])
+        sliders = {names.slider(leaf.label) for leaf in layout.factory.leaves}
+        self.kind = np.array(
+            [
+                KINDS.index(k) if k in KINDS and word not in sliders else NONE
+                for k, word in zip(kinds, words, strict=True)
+            ]
+        )
         self.robot = _robots(words, [r.name for r in layout.factory.robots])
         self.operation = np.full(len(layout.factory.robots) + 1, -1)
         self.operations = layout.factory.operations
@@ -92,7 +99,9 @@ class Approaches:
         kinds = self.kind[a] + self.kind[b]
         serving = (kinds == ROBOT + OUTFEED) & (np.minimum(self.robot[a], self.robot[b]) == 0)
         serving &= (self.kind[a] == OUTFEED) | (self.kind[b] == OUTFEED)
-        return np.asarray(held | together | joining | serving)
+        own = (root[a] == root[b]) | ((self.kind[a] == OUTFEED) & (self.kind[b] == OUTFEED))
+        spare = (hold_a == 0) | (hold_b == 0)
+        return np.asarray(held | together | joining | serving | own | spare)
 
     def _keep(self, pairs: Index, dist: Array) -> None:
         for nearest in np.argsort(-dist):  # the nearest of a kind comes last, and is kept

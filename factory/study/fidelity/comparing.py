@@ -32,6 +32,9 @@ from factory.support.engine import mujoco
 from factory.support.errors import Diagnostic, RunError
 from factory.support.settings import Settings
 
+WORST = 10
+"""So many pairs of things that are inside each other are listed of a seed."""
+
 Alter = Callable[[mujoco.MjModel], None]
 """Changes the engine's model before a run."""
 
@@ -123,10 +126,11 @@ def measure_seed(case: Case, seed: int) -> SeedRecord:
         measurement.handoffs.all(),
         measurement.finished.found(),
         measurement.approaches.found(),
+        measurement.hidden.found()[:WORST],
         tuple(np.round(apart, 9).tolist()),
         tuple(np.round(spent, 9).tolist()),
         run.physics.contacts if run.physics else (),
-        tuple(t for t in (thought.trouble, run.trouble) if t is not None),
+        (*thought.verdict.failures, *run.verdict.failures),
         took - measurement.seconds,
         measurement.seconds,
     )

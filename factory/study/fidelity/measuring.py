@@ -16,6 +16,7 @@ from factory.study.fidelity.approach import BEYOND, Approaches
 from factory.study.fidelity.dynamics import DriveFigures, Payload, Residual
 from factory.study.fidelity.finished import Finished
 from factory.study.fidelity.handoffs import HandOffs
+from factory.study.fidelity.hidden import HiddenPenetrations
 from factory.study.fidelity.readings import ActiveWelds, Shadow, Steps, Velocities
 
 
@@ -30,13 +31,14 @@ class Measurement:
         world = simulation.physical
         m, d = world.m, world.d
         self.simulation = simulation
-        self.shadow = Shadow(m, d, layout.clearance + BEYOND)
+        shadow = Shadow(m, d, layout.clearance + BEYOND)
         self.welds = ActiveWelds(m, d)
-        velocities = Velocities(m, self.shadow.d)
+        velocities = Velocities(m, shadow.d)
         self.handoffs = HandOffs(m, self.welds, velocities)
         self.payload = Payload(self.welds, velocities, float(m.opt.timestep))
         self.drives = DriveFigures(world)
-        self.approaches = Approaches(world, layout, self.welds, self.shadow)
+        self.approaches = Approaches(world, layout, self.welds, shadow)
+        self.hidden = HiddenPenetrations.of(simulation)
         self.finished = Finished(model)
         self.residual = Residual(m, d, velocities.slides)
         self.seconds = 0.0
@@ -48,20 +50,20 @@ class Measurement:
         watcher = beside(self.simulation)
         with self._steps:
             run = self.simulation.run([self.observe, watcher.observe], max_time)
-        report = watcher.report()
+        report = watcher.report(run.events)
         self.seconds += report.time_s
         return replace(run, monitor=report)
 
     def observe(self, world: Any, supervisor: Any) -> None:
         """Measure a tick. The shadow is in the configuration in which the tick began, in which
         welds were switched."""
-        begin = perf_counter()
+        begin, shadow = perf_counter(), self.approaches.shadow
         v, force = self._steps.take()
         happened = self._what_happened()
         if happened != self._seen:
             self._seen = happened
             fresh = self.welds.scan()
-            xpos, xmat = self.shadow.d.xpos, self.shadow.d.xmat
+            xpos, xmat = shadow.d.xpos, shadow.d.xmat
             self.finished.tick(self.welds, fresh, xpos, xmat)
             if len(fresh):
                 begun = world.time - (len(v) - 1) * float(world.m.opt.timestep)
@@ -70,8 +72,9 @@ class Measurement:
         self.payload.tick(v)
         self.drives.tick(v, force)
         self.residual.tick(v[-1])
-        self.shadow.follow()
+        shadow.follow()
         self.approaches.tick(supervisor.active.operations)
+        self.hidden.look(world.d.qpos, world.time)
         self.seconds += perf_counter() - begin
 
     def _what_happened(self) -> tuple[int, int]:
@@ -103,6 +106,8 @@ class Measurement:
             "product_vertex_max_mm": max((m.vertex_mm for m in misplaced), default=None),
             "closest_approach_mm": 1e3 * self.approaches.closest(),
             "clearance_margin_mm": 1e3 * self.approaches.margin(),
+            "hidden_penetration_max_mm": self.hidden.deepest(),
+            "grip_gap_max_mm": physics.grip_gap_max_mm,
             "force_saturated_percent": 1e2 * drives.saturation,
             "force_peak_percent": 1e2 * drives.peak,
             "drive_work_J": drives.work,

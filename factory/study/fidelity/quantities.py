@@ -182,6 +182,19 @@ _ALL = (
         least=True,
     ),
     Quantity(
+        "hidden_penetration_max_mm",
+        "mm",
+        "Deepest penetration between any two things that are drawn, with all of them solid, every "
+        "20 ms: no contact is left out but between what is fixed to each other. Of parts that "
+        "overlap in the finished product, what they are deeper than there.",
+    ),
+    Quantity(
+        "grip_gap_max_mm",
+        "mm",
+        "Largest distance between the pads of a robot, a feeder or the tray and the nearest of the "
+        "bodies that it takes, when it takes what it holds first.",
+    ),
+    Quantity(
         "force_saturated_percent",
         "%",
         "Share of timesteps in which a drive's force is at least 99.9 % of its limit; the worst "

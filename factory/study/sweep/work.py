@@ -18,6 +18,7 @@ from factory.plant.fused_bodies import fusing_pays
 from factory.simulation.request import RunRequest
 from factory.simulation.run import Run
 from factory.simulation.simulation import Compiled, Simulation, compiled
+from factory.simulation.watched import watched
 from factory.study.sweep.grid import SETTINGS, Point
 from factory.study.sweep.recipe import Recipe
 from factory.support.errors import FactoryError
@@ -110,7 +111,7 @@ class Runner:
         shared = _or_raise(self._compiled(settings, request))
         request = replace(request, seed=values["seed"], jitter=values["jitter"])
         simulation = Simulation(layout, request, shared)
-        return simulation.run(max_time=self.recipe.max_time)
+        return watched(simulation, max_time=self.recipe.max_time)
 
     def _lay_out(self, settings: Settings) -> Layout | FactoryError:
         recipe = self.recipe
@@ -143,9 +144,7 @@ def _outcome(point: Point, reason: str, figures: Mapping[str, Any], took: float)
 
 def _reason(run: Run) -> str:
     """Why a run counts as failed, "" if it does not."""
-    if run.trouble is not None:
-        return f"{run.trouble.code} {run.trouble.message}"
-    return "" if run.refines_net else "NotRefined the record does not refine the net"
+    return "; ".join(f"{d.code} {d.message}" for d in run.verdict.failures[:3])
 
 
 def _or_raise(found: T | FactoryError) -> T:

@@ -15,9 +15,10 @@ from collections.abc import Iterable
 import numpy as np
 
 from factory.control.mode import Array, Index, Truth
+from factory.mjcf.masks import NOBODY
 from factory.mjcf.weld_frames import held_at
 from factory.simulation.mujoco.axes import Axes
-from factory.simulation.mujoco.contacts import NOBODY, ContactMasks
+from factory.simulation.mujoco.contacts import ContactMasks
 from factory.simulation.mujoco.parts import Parts
 from factory.support.engine import mujoco
 
@@ -41,7 +42,9 @@ class Neighbours:
 
     def __init__(self, m: mujoco.MjModel, d: mujoco.MjData, parts: Parts, axes: Axes) -> None:
         self._d, self._masks, self._holder = d, parts.masks, _holders(parts, axes)
-        trees = dict(zip(axes.tree.tolist(), self._holder.tolist(), strict=True))
+        trees = (
+            dict(zip(axes.tree.tolist(), self._holder.tolist(), strict=True)) | parts.feeders.trees
+        )
         count = parts.masks.own(trees, parts.tray + len(parts.feeders.welds)) + 1
         self.culls, self._calm = count > FEW, -np.inf
         self._seen = np.ones(count, bool)
@@ -110,7 +113,8 @@ class Neighbours:
 def _holders(parts: Parts, axes: Axes) -> Index:
     """The code of the holder that each axis (axes,) is of."""
     robots = len(parts.model.factory.robots)
-    return np.array([*range(1, robots + 1), *(robot + 1 for robot in axes.lift), parts.tray])
+    lifts = (robot + 1 for robot in axes.lift)
+    return np.array([*range(1, robots + 1), *lifts, parts.tray, parts.tray])
 
 
 def _slides(parts: Parts, axes: Axes) -> tuple[Index, Array]:

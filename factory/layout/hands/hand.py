@@ -1,0 +1,77 @@
+"""A hand: where and how a robot holds what it carries.
+
+It touches places of the payload's surface with pads, and reaches there in one of three ways.
+*Below*: a finger under the plane of payloads, and a column from it up to the place. *Behind*: a
+tower behind the payload, and a bar from it ahead to the place. *Above*: a tower, a beam over all
+that there is, and a stem from it down to the place.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+from factory.layout.dimensions import FINGER
+
+Point3 = tuple[float, float, float]
+
+Kind = Literal["below", "behind", "above", "none"]
+
+AIR = 2e-4
+"""How far a pad stays off the surface that it holds [m]: it slides along it without touching."""
+
+SLENDER = 0.004
+"""Least width of a finger [m]."""
+
+STEM = 0.006
+"""Diameter of the thinnest column or stem [m]."""
+
+ROOT = 0.01
+"""How far a finger begins before the end of its arm [m]."""
+
+BEAM = 0.012
+"""How high a beam is [m]."""
+
+PAD = 0.0015
+"""Thickness of a pad [m]."""
+
+
+@dataclass(frozen=True, slots=True)
+class Hand:
+    """How a robot holds: `places`: the points of the payload's surface that the middles of its pads
+    are at, in the frame of the finished product [m]: one, or, from below, two on one line along its
+    heading; `radius` of a pad [m]; `beam`: how
+    high the beam of a hand above is, in that frame, at its lower edge [m]; `share`: which share of
+    the pad's strength weight and acceleration take, as predicted; `first`: whether it has to be in
+    its place before what it takes comes there; `waits`: how far it has to go back until what it has
+    delivered can go on, 0 where that need not wait [m]. Of the kind `none` where nothing can hold:
+    `why` says what is in the way."""
+
+    kind: Kind
+    places: tuple[Point3, ...]
+    radius: float = 0.003
+    beam: float = 0.0
+    share: float = 0.0
+    first: bool = False
+    waits: float = 0.0
+    why: str = ""
+
+    @property
+    def tall(self) -> bool:
+        """Whether its mast reaches up among the payloads."""
+        return self.kind in ("behind", "above")
+
+    @property
+    def width(self) -> float:
+        """Width of its finger, or of what goes across to its stem [m]."""
+        return breadth(self.radius)
+
+    @property
+    def column(self) -> float:
+        """Diameter of its column or stem [m]: half the pad's, within STEM and FINGER."""
+        return min(2 * self.radius, max(STEM, min(self.radius, FINGER)))
+
+
+def breadth(radius: float) -> float:
+    """Width of the finger of a pad with a radius [m]: no wider than that, within bounds."""
+    return min(FINGER, max(2 * radius, SLENDER))

@@ -1,0 +1,103 @@
+"""What robots hold, in which places, and what is around it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import product as pairs
+
+import numpy as np
+
+from factory.geometry.meshes import Array
+from factory.geometry.solids import Product
+from factory.layout.hands.hand import Kind
+from factory.layout.hands.places import Places, places
+from factory.layout.hands.surfaces import Surfaces, Way
+from factory.layout.layout import carriers
+from factory.plant.factory import Factory, Operation
+
+
+class Holding:
+    """The robots of a factory and the surfaces of what they hold. `on`: the carrier that each
+    delivers to, -1 for none; `axis`: along which each lies, 0 for x."""
+
+    def __init__(self, factory: Factory, product: Product) -> None:
+        self.factory, self.product = factory, product
+        self.surfaces = Surfaces(product)
+        self.on = carriers(factory)
+        self.axis = [0] * len(factory.robots)
+        for robot, carrier in enumerate(self.on):
+            if carrier >= 0:
+                self.axis[robot] = 1 - self.axis[carrier]
+        self._places: dict[tuple[str, Kind, int, int], Places] = {}
+        self._boxes: dict[str, Array] = {}
+
+    def frames(self, robot: int) -> Iterator[tuple[Way, Way]]:
+        """How a robot may lie on the floor."""
+        if self.on[robot] < 0:
+            yield (1.0, 0.0), (0.0, 1.0)
+            return
+        for one, other in pairs((-1.0, 1.0), (-1.0, 1.0)):
+            along, across = (one, 0.0), (0.0, other)
+            yield (along, across) if self.axis[robot] == 0 else (along[::-1], across[::-1])
+
+    def is_carrier(self, robot: int) -> bool:
+        """Whether others come to a robot, with something or to work on what it holds."""
+        return any(len(operation.robots) > 1 for operation in self.made(robot))
+
+    def is_fed(self, robot: int) -> bool:
+        """Whether a feeder presents what a robot takes."""
+        first = self.factory.operations[self.factory.robots[robot].operations[0]]
+        return len(first.robots) == 1
+
+    def made(self, robot: int) -> list[Operation]:
+        """The operations of which a robot is the carrier."""
+        operations = (self.factory.operations[o] for o in self.factory.robots[robot].operations)
+        return [operation for operation in operations if operation.carrier == robot]
+
+    def last(self, robot: int) -> Operation:
+        """The operation that a robot delivers to."""
+        return self.factory.operations[self.factory.robots[robot].operations[-1]]
+
+    def places(self, label: str, kind: Kind, axis: int, way: int) -> Places:
+        """The places on a side of a sub-assembly, found once."""
+        key = label, kind, axis, way
+        if key not in self._places:
+            parts = self.factory.contents[label]
+            self._places[key] = places(self.surfaces, self.product, parts, kind, axis, way)
+        return self._places[key]
+
+    def around(self, label: str, low: Array, high: Array) -> Array:
+        """The boxes of a sub-assembly's bodies among which a hand could come."""
+        boxes = self.boxes(label)
+        if not len(low):
+            return boxes[:0]
+        floor, top = float(low[:, 2].min()), float(high[:, 2].max()) + 10.0
+        return boxes[(boxes[:, 0, 2] < top) & (boxes[:, 1, 2] > floor)]
+
+    def boxes(self, label: str) -> Array:
+        """The boxes (n, 2, 3) of a sub-assembly's bodies."""
+        if label not in self._boxes:
+            self._boxes[label] = self.surfaces.boxes(self.factory.contents[label])
+        return self._boxes[label]
+
+    def box(self, label: str) -> Array:
+        """The box (2, 3) of a sub-assembly."""
+        found = self.boxes(label)
+        return np.array([found[:, 0].min(axis=0), found[:, 1].max(axis=0)])
+
+    def top(self, operation: Operation) -> float:
+        """How high the result of an operation is [m]."""
+        parts = self.factory.contents.get(
+            operation.label, self.factory.contents[self.factory.pag.root]
+        )
+        return float(max(self.product.solids[part].high[2] for part in parts))
+
+
+def held(factory: Factory, robot: int, at_last: bool = False) -> str:
+    """What a robot takes first, and holds by the same place ever after, or what it has `at_last`;
+    "" for a tool."""
+    for number in factory.robots[robot].operations[:: -1 if at_last else 1]:
+        operation = factory.operations[number]
+        if operation.carrier == robot and operation.index != factory.dropoff.index:
+            return operation.label
+    return ""

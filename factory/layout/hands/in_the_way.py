@@ -1,0 +1,239 @@
+"""What is in the way of hands: parts, and the hands of those that they deliver to.
+
+Parts are looked at by boxes, swept along every way that one goes past the other.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+
+import numpy as np
+
+from factory.control.mode import Truth
+from factory.geometry.meshes import Array
+from factory.layout.dimensions import FINGER, MAST
+from factory.layout.hands.hand import AIR, BEAM, Hand, Kind, breadth
+from factory.layout.hands.holding import Holding, held
+from factory.layout.hands.places import Places
+from factory.layout.hands.surfaces import Way, hit, retreat, swept
+from factory.problem.pag import NOPART
+
+Swept = tuple[Array, Array, Array]
+"""Boxes that hands sweep, from `low` to `high` (n, 3), and boxes (m, 2, 3) that could be in the
+way [m]."""
+
+IN_THE_WAY = {
+    "joined": "parts that it is joined to are in the way",
+    "brought": "parts that are brought to it are in the way",
+    "lowered": "parts that are lowered onto it are in the way",
+    "own": "other surfaces of its own are in the way",
+    "hands": "hands that hold beside it are in the way",
+    "feeder": "there is no room beside its feeder's pad",
+}
+"""What can be in the way of a hand."""
+
+BESIDE = 0.001
+"""How far a hand stays to its own side of the line of another [m]."""
+
+ROD = 0.008
+"""Radius of the pad by which a feeder holds a part, at most [m]."""
+
+
+class InTheWay:
+    """What is in the way of a factory's hands. `hand_of`: that of a carrier with a heading."""
+
+    def __init__(self, holding: Holding, hand_of: Callable[[int, Way], Hand]) -> None:
+        self.holding, self._hand_of = holding, hand_of
+
+    def on_side(self, label: str, kind: Kind, frames: Sequence[tuple[Way, Way]]) -> Places:
+        """The places on the side of a sub-assembly that a kind of hand holds."""
+        axis, way = (2, -1 if kind == "below" else 1)
+        if kind == "behind":
+            u, _ = frames[0]
+            axis, way = (0, -round(u[0])) if u[0] else (1, -round(u[1]))
+        return self.holding.places(label, kind, axis, way)
+
+    def checks(
+        self, robot: int, label: str, kind: Kind, found: Places, frames: Sequence[tuple[Way, Way]]
+    ) -> tuple[dict[str, Truth], Truth, Array]:
+        """Whether a hand at each place (n,) is clear in every frame, by what could be in its way;
+        the rest as `_clear`."""
+        free = {why: np.ones(len(found), bool) for why in IN_THE_WAY}
+        first, waits = np.zeros(len(found), bool), np.zeros(len(found))
+        for u, t in frames:
+            free["hands"] &= self._own_side(robot, kind, found, u, t)
+            for ways in self._leaving(robot, label, kind, found, u):
+                free["joined"] &= ~hit(*ways)
+            waits = np.maximum(waits, self._going_on(robot, kind, found, u, t))
+            waits = np.maximum(waits, self._crossing(robot, found, u, t))
+            for hand in self._carriers_hand(robot, kind, found, u, t):
+                free["hands"] &= ~hit(*hand)
+            for ways in self._coming(robot, label, kind, found, u, t):
+                first |= hit(*ways)
+            for ways in self._lowered(robot, kind, found, u):
+                free["lowered"] &= ~hit(*ways)
+        if self.holding.is_fed(robot) and kind != "below":
+            free["own"] &= ~first
+        if self.holding.is_fed(robot) and kind == "above":
+            free["feeder"] &= self._beside_rod(label, found, *frames[0])
+        if kind == "behind" or (kind == "above" and not self.holding.is_fed(robot)):
+            first |= True
+        for u, t in frames:
+            for later, joined in self._joined(robot, kind, found, u, t):
+                free["brought"] &= ~((first | later) & hit(*joined))
+        return free, first, waits
+
+    def _own_side(self, robot: int, kind: Kind, found: Places, u: Way, t: Way) -> Truth:
+        """Whether a hand at a place stays on its own side: of the line of the carrier, where that
+        comes from below too, else of what another that comes from the opposite side holds."""
+        carrier, free = self.holding.on[robot], np.ones(len(found), bool)
+        if carrier < 0:
+            return free
+        axis, side = (0, u[0]) if u[0] else (1, u[1])
+        hand = self._hand_of(carrier, t)
+        if hand.kind == "below" and kind == "below":
+            half = max(FINGER / 2, hand.radius) + BESIDE
+            free &= (hand.places[0][axis] - found.at[:, axis]) * side >= found.radius + half
+        last = self.holding.last(robot)
+        brought = [label for label in last.before if label != NOPART]
+        if last.before[last.template.carrier - 1] == NOPART and len(brought) > 1:
+            boxes = [self.holding.box(label) for label in brought]
+            middle = float(np.mean([(box[0] + box[1])[axis] / 2 for box in boxes]))
+            halves = np.array([max(r, breadth(r) / 2) for r in found.radius.tolist()])
+            free &= (middle - found.at[:, axis]) * side >= halves + BESIDE / 2
+        return free
+
+    def _crossing(self, robot: int, found: Places, u: Way, t: Way) -> Array:
+        """How far a hand reaches over the line of a carrier whose tall mast comes along there (n,)
+        [m]."""
+        carrier = self.holding.on[robot]
+        if carrier < 0 or not self._hand_of(carrier, t).tall:
+            return np.zeros(len(found))
+        axis, side = (0, u[0]) if u[0] else (1, u[1])
+        over = (found.at[:, axis] - self._hand_of(carrier, t).places[0][axis]) * side
+        return np.maximum(0.0, over + found.radius + MAST / 2 + BESIDE)
+
+    def _carriers_hand(
+        self, robot: int, kind: Kind, found: Places, u: Way, t: Way
+    ) -> Iterator[Swept]:
+        """A hand with all that is behind it, and the tall hand of the carrier with all that is
+        behind that: both are there at once."""
+        carrier = self.holding.on[robot]
+        if carrier < 0 or not (hand := self._hand_of(carrier, t)).tall:
+            return
+        own = swept(*self._reach(kind, found, u), _back(u))
+        at, radius = np.array(hand.places), np.full(len(hand.places), hand.radius)
+        theirs = swept(*self._reach(hand.kind, Places(at, radius, radius), t), _back(t))
+        yield (*own, np.stack(theirs, axis=1))
+
+    def _beside_rod(self, label: str, found: Places, u: Way, t: Way) -> Truth:
+        """Whether a part has room for what its feeder holds it by: behind a hand above it, or on
+        the side away from its tower, which stands against t."""
+        solid, room = self.holding.product.solids[label], np.zeros(len(found), bool)
+        for (x, y), far in ((u, -1.0), (t, 1.0)):
+            axis, way = (0, x) if x else (1, y)
+            end = float((solid.high if way * far > 0 else solid.low)[axis])
+            widths = np.array([breadth(radius) for radius in found.radius.tolist()])
+            left = abs(end - found.at[:, axis]) - np.maximum(found.radius, widths / 2)
+            least = min(ROD, float((solid.high - solid.low)[:2].min()) / 4)
+            room |= left >= least + BESIDE
+        return room
+
+    def _leaving(
+        self, robot: int, label: str, kind: Kind, found: Places, u: Way
+    ) -> Iterator[Swept]:
+        """What a hand sweeps as seen from the parts of what it has delivered to, with their boxes,
+        as it comes there and leaves: along its heading, and where it lowers its payload from above.
+        """
+        last, (low, high) = self.holding.last(robot), self._reach(kind, found, u)
+        if last.index == self.holding.factory.dropoff.index:
+            back = swept(low, high, _back(u))
+            if kind != "behind":
+                yield (*back, self.holding.around(label, *back))
+            return
+        lifted = robot in self.holding.factory.strokes
+        back = swept(low, high) if kind == "above" and lifted else swept(low, high, _back(u))
+        if kind == "below":
+            back[1][:, 2] += self.holding.factory.strokes.get(robot, 0.0)
+        if kind != "behind":
+            yield (*back, self.holding.around(last.label, *back))
+            return
+        # its payload comes along the same way, or takes the bar down with it
+        back[1][:, 2] += 10.0 * lifted
+        for other, guest in zip(last.before, last.robots, strict=True):
+            if guest != robot and other != NOPART:
+                yield (*back, self.holding.around(other, *back))
+
+    def _going_on(self, robot: int, kind: Kind, found: Places, u: Way, t: Way) -> Array:
+        """How far a hand has to go back (n,) [m] until what it has delivered can leave along t,
+        with all that is joined beside it while the hand may still be there."""
+        last = self.holding.last(robot)
+        if last.index == self.holding.factory.dropoff.index:
+            return np.zeros(len(found))
+        low, high = self._reach(kind, found, u)
+        whole = held(self.holding.factory, last.carrier, at_last=True)
+        return retreat(low, high, self.holding.around(whole, low, high), (_back(u), _back(t)))
+
+    def _coming(
+        self, robot: int, label: str, kind: Kind, found: Places, u: Way, t: Way
+    ) -> Iterator[Swept]:
+        """The same of what it takes, which is there before it comes home against u: a part, or
+        inputs that come from either side."""
+        low, high = self._reach(kind, found, u)
+        own = self.holding.around(label, low, high)
+        if not self.holding.is_fed(robot):
+            for side in (t, _back(t)):
+                yield (*swept(low, high, u, side), own)
+        elif kind == "behind":
+            # the part comes down along the pad
+            low[:, 2] -= 10.0
+            yield low, high, self.holding.around(label, low, high)
+        else:
+            yield (*swept(low, high, u), own)
+
+    def _joined(
+        self, robot: int, kind: Kind, found: Places, u: Way, t: Way
+    ) -> Iterator[tuple[bool, Swept]]:
+        """The same of each input of its operations, which comes from either side when it is there
+        already; with it whether that is so whatever else, since it has a pile by then."""
+        low, high = self._reach(kind, found, u)
+        for operation in self.holding.made(robot):
+            later = operation.before[operation.template.carrier - 1] != NOPART
+            for guest, label in zip(operation.robots, operation.before, strict=True):
+                if guest != robot and label != NOPART:
+                    parts = self.holding.around(label, low, high)
+                    for side in (t, _back(t)):
+                        yield later, (*swept(low, high, side), parts)
+
+    def _lowered(self, robot: int, kind: Kind, found: Places, u: Way) -> Iterator[Swept]:
+        """The same of each input that comes down to a carrier from above."""
+        low, high = self._reach(kind, found, u)
+        if kind != "below":
+            low, high = swept(low, high, _back(u))
+        for operation in self.holding.made(robot):
+            if operation.lowered < 0:
+                continue
+            boxes = self.holding.surfaces.boxes(
+                self.holding.factory.contents[operation.before[operation.lowered]]
+            )
+            boxes[:, 1, 2] = np.inf
+            yield low, high, boxes
+
+    def _reach(self, kind: Kind, found: Places, u: Way) -> tuple[Array, Array]:
+        """The boxes (n, 3) of pad and column, of pad and stem, or of pad and bar."""
+        half, at = found.radius[:, None], found.at
+        low, high = at - half, at + half
+        if kind == "below":
+            low[:, 2], high[:, 2] = self.holding.product.low[2] - 1.0, at[:, 2] - AIR
+        elif kind == "above":
+            low[:, 2], high[:, 2] = at[:, 2] + AIR, self.holding.product.high[2] + 10.0
+        else:
+            low[:, 2] = np.minimum(low[:, 2], at[:, 2] - BEAM / 2)
+            high[:, 2] = np.maximum(high[:, 2], at[:, 2] + BEAM / 2)
+            axis, ahead = (0, u[0]) if u[0] else (1, u[1])
+            (high if ahead > 0 else low)[:, axis] = at[:, axis] - ahead * AIR
+        return low, high
+
+
+def _back(way: Way) -> Way:
+    return -way[0], -way[1]

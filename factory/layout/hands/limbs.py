@@ -1,0 +1,135 @@
+"""The limbs of a hand: boxes and rods from the carriage to the payload, stretched to its places."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Literal
+
+from factory.layout.dimensions import CARRIAGE_TOP, FINGER, FINGER_LOW, FINGER_TOP, MAST, PAYLOAD
+from factory.layout.guidepath import Extent
+from factory.layout.hands.hand import AIR, BEAM, PAD, ROOT, Hand, Point3
+
+if TYPE_CHECKING:
+    from factory.layout.layout import Layout
+
+Round = Literal["", "x", "z"]
+
+
+@dataclass(frozen=True, slots=True)
+class Limb:
+    """A limb in the frame of its robot: x ahead of the carriage, y to the left of it, z above the
+    floor with the lift down. Its box from `low` to `high` [m]; the axis along which it is `round`,
+    "" for a box; whether it is `lifted` with the payload."""
+
+    name: str
+    low: Point3
+    high: Point3
+    round: Round = ""
+    lifted: bool = False
+
+
+def limbs(layout: Layout, robot: int) -> tuple[Limb, ...]:
+    """The limbs of a robot's hand; none for a tool, or where nothing can hold."""
+    hand = layout.hand(robot)
+    if hand is None:
+        return ()
+    reached = _places(layout, robot, hand)
+    if hand.kind == "below":
+        return tuple(_below(layout, robot, hand, reached))
+    if hand.kind == "behind":
+        return tuple(_behind(layout, robot, hand, reached[0]))
+    if hand.kind == "above":
+        return tuple(_above(layout, robot, hand, reached[0]))
+    return ()
+
+
+def grip_box(layout: Layout, robot: int) -> Extent | None:
+    """The box about the product's middle, in the robot's frame (u, t), of what its hand and mast
+    take among the payloads; None for nothing."""
+    found = limbs(layout, robot)
+    if not found:
+        return None
+    path = layout.guidepaths[robot]
+    ahead = [limb.low[0] for limb in found], [limb.high[0] for limb in found]
+    sides = sorted((min(limb.low[1] for limb in found), max(limb.high[1] for limb in found)))
+    across = sorted(path.offset + side * path.left for side in sides)
+    return min(ahead[0]) - path.reach, max(ahead[1]) - path.reach, across[0], across[1]
+
+
+def held_at(layout: Layout, robot: int) -> float:
+    """How far above its place in the product a robot holds its payload with its lift down [m]."""
+    return layout.elevations[robot] - layout.factory.strokes.get(robot, 0.0)
+
+
+def _places(layout: Layout, robot: int, hand: Hand) -> list[Point3]:
+    """Where the pads touch, in the robot's frame, the nearest first."""
+    path, product = layout.guidepaths[robot], layout.product
+    x, y, _ = product.middle.tolist()
+    up = PAYLOAD - float(product.low[2]) + held_at(layout, robot)
+    (u, v), (s, t) = path.heading, path.side
+    found = []
+    for px, py, pz in hand.places:
+        ahead = (px - x) * u + (py - y) * v + path.reach
+        aside = ((px - x) * s + (py - y) * t - path.offset) * path.left
+        found.append((round(ahead, 6), round(aside, 6) + 0.0, round(pz + up, 6)))
+    return sorted(found)
+
+
+def _below(layout: Layout, robot: int, hand: Hand, reached: list[Point3]) -> Iterator[Limb]:
+    path = layout.guidepaths[robot]
+    half, lifted = hand.column / 2, robot in layout.factory.strokes
+    rim, end = path.reach - path.arm - ROOT, reached[-1][0]
+    aside = reached[0][1]
+    width = hand.width / 2
+    if abs(aside) > FINGER / 2:
+        low, high = sorted((0.0, aside))
+        yield Limb("cross", (rim, low - width, FINGER_LOW), (rim + ROOT, high + width, FINGER_TOP))
+    yield Limb(
+        "finger",
+        (min(rim, end - width), aside - width, FINGER_LOW),
+        (end + width, aside + width, FINGER_TOP),
+    )
+    for number, (x, y, z) in enumerate(reached, 1):
+        top, which = z - AIR, f"{number}/" if len(reached) > 1 else ""
+        yield from _rod(f"{which}column", x, y, half, FINGER_TOP, top - PAD, lifted)
+        low = max(top - PAD, FINGER_TOP)
+        yield from _rod(f"{which}pad", x, y, hand.radius, low, top, lifted)
+
+
+def _behind(layout: Layout, robot: int, hand: Hand, reached: Point3) -> Iterator[Limb]:
+    x, y, z = reached
+    stroke = layout.factory.strokes.get(robot, 0.0)
+    half, end, lifted = hand.width / 2, x - AIR, bool(stroke)
+    yield Limb(
+        "tower",
+        (-MAST / 2, y - MAST / 2, CARRIAGE_TOP),
+        (MAST / 2, y + MAST / 2, z + half + stroke),
+    )
+    start = MAST / 2 + 0.001
+    yield Limb("bar", (start, y - half, z - half), (end - PAD, y + half, z + half), "", lifted)
+    r = hand.radius
+    yield Limb("pad", (end - PAD, y - r, z - r), (end, y + r, z + r), "x", lifted)
+
+
+def _above(layout: Layout, robot: int, hand: Hand, reached: Point3) -> Iterator[Limb]:
+    x, y, z = reached
+    product, stroke = layout.product, layout.factory.strokes.get(robot, 0.0)
+    beam = round(hand.beam + PAYLOAD - float(product.low[2]) + held_at(layout, robot), 6)
+    half, wide, top, lifted = FINGER / 2, hand.width / 2, beam + BEAM, bool(stroke)
+    yield Limb("tower", (-MAST / 2, -MAST / 2, CARRIAGE_TOP), (MAST / 2, MAST / 2, top + stroke))
+    start = MAST / 2 + 0.001
+    yield Limb("beam", (start, -half, beam), (x + wide, half, top), "", lifted)
+    if abs(y) > half:
+        low, high = sorted((half if y > 0 else -half, y + wide if y > 0 else y - wide))
+        yield Limb("cross", (x - wide, low, beam), (x + wide, high, top), "", lifted)
+    foot = z + AIR
+    yield from _rod("stem", x, y, hand.column / 2, foot + PAD, beam, lifted)
+    yield from _rod("pad", x, y, hand.radius, foot, foot + PAD, lifted)
+
+
+def _rod(
+    name: str, x: float, y: float, radius: float, low: float, high: float, lifted: bool
+) -> Iterator[Limb]:
+    if high - low > 1e-5:
+        yield Limb(name, (x - radius, y - radius, low), (x + radius, y + radius, high), "z", lifted)

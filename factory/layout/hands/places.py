@@ -1,0 +1,248 @@
+"""Places of a sub-assembly's surface where a pad fits, and how well it holds there."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import hypot, pi
+
+import numpy as np
+
+from factory.control.mode import Index, Truth
+from factory.geometry.meshes import Array
+from factory.geometry.solids import Product
+from factory.layout.hands.hand import Kind
+from factory.layout.hands.surfaces import Body, Surfaces
+
+RADII = (0.02, 0.014, 0.01, 0.007, 0.005, 0.0035, 0.0025, 0.0016, 0.001)
+"""Radii of pads [m]."""
+
+GRID = 7
+"""So many places are tried along either side of a body's box."""
+
+BODIES = 24
+"""So many bodies of a sub-assembly are looked at, those nearest to its centre of mass."""
+
+TRIED, NEAR = 24, 60
+"""So many places are measured: of the outermost, and of those near the centre of mass."""
+
+LINES = 12
+"""So many lines under a sub-assembly are tried in either direction."""
+
+BELLOWS = 0.25
+"""A pad's bellows reach back by this share of its radius: it holds on round shapes too."""
+
+VACUUM = 5e4
+"""What a suction pad pulls with [Pa]: half an atmosphere."""
+
+GRIP = 0.5
+"""Coefficient of friction of a pad's rubber."""
+
+GRAVITY, PUSH = 9.81, 2.0
+"""What a payload's mass is pulled and pushed by [m/s²]: its weight, and robots' acceleration."""
+
+EASY = 0.25
+"""Of the pads that fit, the smallest is taken of whose strength no more than this is used."""
+
+LEAST = 0.0035
+"""But none smaller than this where a larger one fits [m]."""
+
+PARTLY = 0.6
+"""A pad that is not all covered is so at least to this share, but for the smallest."""
+
+RAYS = 6
+"""In so many directions from its middle it is looked at what a pad covers."""
+
+SMALLER = (2, 4, 6, 8)
+"""Where there is little room, these of the RADII are tried too."""
+
+
+@dataclass(frozen=True, eq=False)
+class Places:
+    """Places (n, 3) on one side of a sub-assembly's surface, the best first, each with the largest
+    pad that is of use there: `radius` (n,) [m], and the `share` (n,) of its strength that is
+    used."""
+
+    at: Array
+    radius: Array
+    share: Array
+
+    def chosen(self, which: Index | Truth) -> Places:
+        """Some of them."""
+        return Places(self.at[which], self.radius[which], self.share[which])
+
+    def __len__(self) -> int:
+        return len(self.at)
+
+
+def centre_of(product: Product, parts: Sequence[str]) -> tuple[float, Array]:
+    """Mass [kg] and centre of mass (3,) of some parts."""
+    masses = np.array([product.solids[part].mass for part in parts])
+    centres = np.array([product.solids[part].centre for part in parts])
+    return float(masses.sum()), np.asarray(masses @ centres / masses.sum())
+
+
+def places(
+    surfaces: Surfaces, product: Product, parts: Sequence[str], kind: Kind, axis: int, way: int
+) -> Places:
+    """Places on the side of a sub-assembly that faces the direction `way` (+1, -1) of an `axis`,
+    where nothing of it is further out."""
+    mass, centre = centre_of(product, parts)
+    across = [a for a in range(3) if a != axis]
+    bodies = [b for part in parts for b in surfaces.bodies[part]]
+    points = _tried(bodies, centre, axis, way)
+    if kind == "below":
+        points = np.concatenate([points, _lines(bodies, centre)])
+    points = _rounded(points, bodies, across, product)
+    face = _face(surfaces, parts, points, axis, way)
+    points, face = points[np.isfinite(face)], face[np.isfinite(face)]
+    points[:, axis] = face
+    away = np.linalg.norm((points - centre)[:, across], axis=1)
+    # the outermost, of which nothing is in the way, and those near the centre of mass
+    outermost = np.lexsort((away, np.round(-way * face, 3)))[:TRIED]
+    points = points[np.unique(np.concatenate([outermost, np.argsort(away)[:NEAR]]))]
+    used = [_used(kind, radius, mass, points - centre, axis) for radius in RADII]
+    useful = [n for n, radius in enumerate(RADII) if radius <= LEAST or used[n].max() > EASY]
+    largest = max(0, useful[0] - 1)  # larger pads are of no more use
+    covered, plane = _covered(surfaces, parts, points, (axis, way), RADII[largest:])
+    blank = np.zeros((largest, len(points)))
+    covered, plane = np.concatenate([blank, covered]), np.concatenate([blank, plane])
+    best, share = np.full(len(points), -1), np.full(len(points), np.inf)
+    for number, radius in enumerate(RADII):
+        better = (covered[number] == 1.0) & (
+            (share > EASY) & (used[number] < share) | (used[number] <= EASY) & (radius >= LEAST)
+        )
+        best[better], share[better] = number, used[number][better]
+    # smaller pads have room where large ones do not, and one that is not all covered holds less
+    found = [(best >= 0, best[best >= 0], share[best >= 0])]
+    for number in SMALLER:
+        least = PARTLY if number < SMALLER[-1] else 0.0
+        chosen = (covered[number] > least) & (number > best)
+        shares = used[number][chosen] / covered[number][chosen]
+        found.append((chosen, np.full(len(shares), number), shares))
+    at = np.concatenate([points[chosen] for chosen, _, _ in found])
+    size = np.concatenate([numbers for _, numbers, _ in found])
+    at[:, axis] = np.concatenate([plane[n, chosen.nonzero()[0]] for chosen, n, _ in found])
+    shares = np.concatenate([shares for _, _, shares in found])
+    result = Places(at, np.array(RADII)[size], shares)
+    return result.chosen(np.argsort(np.round(result.share, 2), kind="stable"))
+
+
+def _tried(bodies: Sequence[Body], centre: Array, axis: int, way: int) -> Array:
+    """Points (n, 3) of lines to be tried: a grid over the bodies that are outermost or near the
+    centre of mass, and the centre itself."""
+    across = [a for a in range(3) if a != axis]
+    outer = [-way * (body.high if way > 0 else body.low)[axis] for body in bodies]
+    near = [
+        float(np.linalg.norm(np.clip(centre, body.low, body.high)[across] - centre[across]))
+        for body in bodies
+    ]
+    ranked = sorted(range(len(bodies)), key=lambda n: (round(outer[n], 4), near[n]))
+    chosen = {*ranked[:BODIES], *sorted(range(len(bodies)), key=near.__getitem__)[: BODIES // 2]}
+    found = [centre]
+    for body in (bodies[number] for number in sorted(chosen)):
+        low, high = body.low[across], body.high[across]
+        shares = (np.arange(GRID) + 0.5) / GRID
+        one, other = np.meshgrid(*(low[:, None] + np.outer(high - low, shares)))
+        grid = np.zeros((one.size, 3))
+        grid[:, across] = np.stack([one.ravel(), other.ravel()], axis=1)
+        inner = np.zeros((1, 3))
+        inner[:, across] = np.clip(centre[across], low, high)
+        found += [*grid, *inner]
+    return np.array(found)
+
+
+def _lines(bodies: Sequence[Body], centre: Array) -> Array:
+    """Points (n, 3) under a sub-assembly, several on one line along x or y: near the centre of
+    mass, and where it crosses bodies."""
+    low, high = np.array([b.low for b in bodies]), np.array([b.high for b in bodies])
+    found = [centre]
+    for along, across in ((0, 1), (1, 0)):
+        middles = (low + high)[:, across] / 2
+        tried = np.unique(np.round([centre[across], *middles], 3))
+        for line in tried[np.argsort(abs(tried - centre[across]))][:LINES]:
+            crossed = np.flatnonzero((low[:, across] < line) & (high[:, across] > line))
+            nearest = np.argsort(abs((low + high)[crossed, along] / 2 - centre[along]))
+            for body in crossed[nearest[: 2 * LINES]]:
+                ends = low[body, along], high[body, along]
+                for at in (*np.linspace(*ends, 7)[1:-1], np.clip(centre[along], *ends)):
+                    point = np.zeros(3)
+                    point[along], point[across] = at, line
+                    found.append(point)
+    return np.array(found)
+
+
+def _rounded(
+    points: Array, bodies: Sequence[Body], across: Sequence[int], product: Product
+) -> Array:
+    """Points (n, 3) in whole millimetres from the product's middle, or in tenths if bodies are
+    small; each once."""
+    least = min(float((body.high - body.low)[list(across)].min()) for body in bodies)
+    step = 1e-3 if least > 8e-3 else 1e-4
+    middle = product.middle
+    return np.unique(middle + np.round((points - middle) / step) * step, axis=0)
+
+
+def _face(surfaces: Surfaces, parts: Sequence[str], points: Array, axis: int, way: int) -> Array:
+    """Where lines along an axis meet some parts first as seen from the side `way` (n,) [m]; inf for
+    nowhere."""
+    first, last = surfaces.met(parts, points, axis)
+    return np.asarray(np.where(np.isfinite(first), last if way > 0 else first, np.inf))
+
+
+def _covered(
+    surfaces: Surfaces,
+    parts: Sequence[str],
+    points: Array,
+    side: tuple[int, int],
+    radii: Sequence[float],
+) -> tuple[Array, Array]:
+    """On a side, an axis and a way along it, for each pad and point (radii, n): with which share of
+    the pad its bellows reach the surface, and where its face is along the axis, on what stands out
+    the most under it [m]."""
+    (axis, way), sizes = side, np.array(radii)
+    across = [a for a in range(3) if a != axis]
+    turns = np.arange(RAYS) * 2 * pi / RAYS
+    rim = np.stack([np.cos(turns), np.sin(turns)], axis=1)
+    ring = np.zeros((2 * RAYS + 1, 3))
+    ring[:-1, across] = np.concatenate([rim, rim / 2])
+    rims = points[None, :, None] + sizes[:, None, None, None] * ring
+    found = _face(surfaces, parts, rims.reshape(-1, 3), axis, way).reshape(rims.shape[:3])
+    out = np.where(np.isfinite(found), way * found, -np.inf)
+    most = out.max(axis=2)
+    reached = most[:, :, None] - out <= BELLOWS * sizes[:, None, None]
+    return np.asarray(reached.mean(axis=2)), way * most
+
+
+def _used(kind: Kind, radius: float | Array, mass: float, arm: Array, axis: int) -> Array:
+    """The share (n,) of a pad's strength that is used at places `arm` (n, 3) [m] away from the
+    centre of mass: its pull, its friction, and the moment that its rim bears."""
+    pull, weight, push = VACUUM * pi * radius**2, mass * GRAVITY, mass * PUSH
+    level = np.hypot(arm[:, 0], arm[:, 1])
+    high = np.abs(arm[:, 2])
+    if kind == "below":
+        moment = weight * level + push * high
+        used = np.maximum(push / (GRIP * (pull + weight)), moment / ((pull + weight) * radius / 2))
+    elif kind == "above":
+        used = (weight + push) / pull + (weight * level + push * high) / (pull * radius / 2)
+    else:
+        out = np.abs(arm[:, axis])
+        used = hypot(weight, push) / (GRIP * pull) + (weight + push) * out / (pull * radius / 2)
+    return np.asarray(used)
+
+
+def used_on_line(at: Array, radius: Array, mass: float, centre: Array, along: int) -> float:
+    """The share of the strength of pads (k, 3) on one line under a payload that is used: between
+    two of them the centre of mass is carried by both."""
+    pull, weight, push = VACUUM * pi * float((radius**2).sum()), mass * GRAVITY, mass * PUSH
+    ends = float(at[:, along].min()), float(at[:, along].max())
+    over = float(centre[along]) - float(np.clip(centre[along], *ends))
+    beside = float(at[0, 1 - along] - centre[1 - along])
+    high = push * float(np.abs(at[:, 2] - centre[2]).max())
+    rim = (pull + weight) * float(radius.mean()) / 2
+    lever = (VACUUM * pi * float(radius.min()) ** 2 + weight / 2) * (ends[1] - ends[0])
+    return max(
+        push / (GRIP * (pull + weight)),
+        (weight * abs(over) + high) / (rim + lever),
+        (weight * abs(beside) + high) / rim,
+    )

@@ -1,0 +1,124 @@
+"""The surfaces of sub-assemblies, looked at from below, from above and from behind.
+
+Everything is read from the convex bodies of the parts. A body is met by a line exactly; what could
+be in the way of a hand is boxed, which is exact for boxes and on the safe side for others.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+
+from factory.compiler.mating.depth import polytope
+from factory.control.mode import Truth
+from factory.geometry.meshes import Array
+from factory.geometry.solids import Product
+
+Way = tuple[float, float]
+"""A direction of the world in the plane."""
+
+FLAT = 1e-9
+"""A face whose normal has a smaller share along a line is parallel to it."""
+
+
+@dataclass(frozen=True, eq=False)
+class Body:
+    """A convex body: its box `low`, `high` (3,), and its faces: outward `normals` (f, 3) and how
+    far they reach along them, `offsets` (f,) [m]."""
+
+    low: Array
+    high: Array
+    vertices: Array = field(repr=False)
+
+    @cached_property
+    def _faces(self) -> tuple[Array, Array]:
+        found = polytope(self.vertices)
+        return found.normals, found.reach
+
+    def crossed(self, points: Array, axis: int) -> tuple[Array, Array]:
+        """From where to where lines along an axis through points (n, 3), which are within its box
+        across it, are inside (n,); (inf, -inf) where a line passes it by."""
+        if len(self.vertices) == 8 and np.isin(self.vertices, [self.low, self.high]).all():
+            count = len(points)  # of a box along the axes
+            return np.full(count, self.low[axis]), np.full(count, self.high[axis])
+        normals, offsets = self._faces
+        across = [a for a in range(3) if a != axis]
+        room = offsets - points[:, across] @ normals[:, across].T
+        along = normals[:, axis]
+        flat = np.abs(along) < FLAT
+        inside = (room[:, flat] >= -FLAT).all(axis=1)
+        ends = room / np.where(flat, 1.0, along)
+        first = np.where(along < -FLAT, ends, -np.inf).max(axis=1)
+        last = np.where(along > FLAT, ends, np.inf).min(axis=1)
+        inside &= first <= last
+        return np.where(inside, first, np.inf), np.where(inside, last, -np.inf)
+
+
+class Surfaces:
+    """The bodies of a product's parts, and what lines through them meet."""
+
+    def __init__(self, product: Product) -> None:
+        self.bodies = {
+            label: tuple(
+                Body(piece.min(axis=0), piece.max(axis=0), piece) for piece in solid.pieces
+            )
+            for label, solid in product.solids.items()
+        }
+
+    def boxes(self, parts: Iterable[str]) -> Array:
+        """The boxes (n, 2, 3) of the bodies of some parts."""
+        found = [(body.low, body.high) for part in parts for body in self.bodies[part]]
+        return np.array(found).reshape(-1, 2, 3)
+
+    def met(self, parts: Sequence[str], points: Array, axis: int) -> tuple[Array, Array]:
+        """Where lines along an axis through points (n, 3) enter some parts for the first time and
+        leave them for the last (n,) [m]."""
+        first, last = np.full(len(points), np.inf), np.full(len(points), -np.inf)
+        across = [a for a in range(3) if a != axis]
+        for part in parts:
+            for body in self.bodies[part]:
+                at = points[:, across]
+                near = ((at >= body.low[across]) & (at <= body.high[across])).all(axis=1)
+                if near.any():
+                    low, high = body.crossed(points[near], axis)
+                    first[near] = np.minimum(first[near], low)
+                    last[near] = np.maximum(last[near], high)
+        return first, last
+
+
+def swept(low: Array, high: Array, *ways: Way) -> tuple[Array, Array]:
+    """Boxes from `low` to `high` (n, 3) [m] and all that they sweep as they go any way along each
+    of some world directions in the plane, and along them together."""
+    low, high = low.copy(), high.copy()
+    for x, y in ways:
+        for axis, way in ((0, x), (1, y)):
+            if way < -0.5:
+                low[:, axis] = -np.inf
+            elif way > 0.5:
+                high[:, axis] = np.inf
+    return low, high
+
+
+def hit(low: Array, high: Array, boxes: Array, spare: float = 1e-5) -> Truth:
+    """Which boxes (n,) from `low` to `high` (n, 3) overlap any of `boxes` (m, 2, 3), by more than
+    `spare` [m]."""
+    found = np.zeros(len(low), bool)
+    for box in boxes:
+        found |= ((low < box[1] - spare) & (high > box[0] + spare)).all(axis=1)
+    return found
+
+
+def retreat(low: Array, high: Array, boxes: Array, ways: tuple[Way, Way]) -> Array:
+    """How far boxes from `low` to `high` (n, 3) have to go the first of two ways until nothing of
+    `boxes` (m, 2, 3) is in their way along the second (n,) [m]; 0 where nothing is."""
+    wide, far = swept(low, high, *ways), np.zeros(len(low))
+    (x, y), _ = ways
+    axis, side = (0, x) if x else (1, y)
+    for box in boxes:
+        met = hit(*wide, box[None])
+        past = high[:, axis] - box[0, axis] if side < 0 else box[1, axis] - low[:, axis]
+        far = np.maximum(far, np.where(met, past, 0.0))
+    return far

@@ -1,0 +1,38 @@
+"""Contact masks by holder.
+
+A holder of parts (a robot, the outfeed's tray, a feeder) has a code. What it holds has the code for
+its contype and the code's complement for its conaffinity, so two such things collide exactly if
+their codes differ. The lowest bit is that of robots and stations, which collide with all of them.
+"""
+
+from __future__ import annotations
+
+from factory.plant.factory import Factory
+
+NOBODY = 0
+"""The code of no holder: such a part, a spare one out of sight, touches nothing."""
+
+ALL = (1 << 30) - 1
+"""All bits of a code."""
+
+
+def masks_of(holder: int) -> tuple[int, int]:
+    """Contype and conaffinity of what a holder (its code) holds, and of what touches that by
+    design."""
+    return holder << 1, 0 if holder == NOBODY else ((~holder & ALL) << 1) | 1
+
+
+def robot_code(robot: int) -> int:
+    """The code of a robot (index)."""
+    return robot + 1
+
+
+def tray_code(factory: Factory) -> int:
+    """The code of the outfeed's tray."""
+    return len(factory.robots) + 1
+
+
+def feeder_codes(factory: Factory) -> dict[str, int]:
+    """The code of each feeder, by its label."""
+    first = tray_code(factory) + 1
+    return {leaf.label: first + n for n, leaf in enumerate(factory.leaves)}

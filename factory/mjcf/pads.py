@@ -1,0 +1,70 @@
+"""The pads of robots, feeders and the tray, on which what they hold rests, and how far it is from
+them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+
+from factory.control.mode import Index
+from factory.mjcf import names
+from factory.mjcf.shells import trunks
+from factory.support.engine import mujoco
+
+FREE = 6
+"""Degrees of freedom of a part's body; what holds parts has fewer."""
+
+FAR = 10.0
+"""Distances are measured up to this [m]."""
+
+
+class Pads:
+    """The pads of a model: `of`, by body that holds parts, its pads (geoms); `solid`, by body of a
+    part or sub-assembly, the geoms that collide, those of its shells among them."""
+
+    def __init__(self, m: mujoco.MjModel) -> None:
+        self._m = m
+        trunk = trunks(m)[m.geom_bodyid]
+        part = m.body_dofnum[trunk] == FREE
+        geoms = np.flatnonzero(part & (m.geom_group != 1))
+        geoms = geoms[np.argsort(trunk[geoms], kind="stable")]
+        bodies, first = np.unique(trunk[geoms], return_index=True)
+        self.solid: dict[int, Index] = dict(
+            zip(bodies.tolist(), np.split(geoms, first[1:]), strict=True)
+        )
+        named: dict[str, list[int]] = {}
+        for geom in np.flatnonzero(~part).tolist():
+            named.setdefault(names.pad_of(m.geom(geom).name), []).append(geom)
+        holders = {int(b): named.get(names.holder(m.body(b).name)) for b in np.unique(m.eq_obj1id)}
+        self.of = {body: np.array(pads) for body, pads in holders.items() if pads}
+
+    def first_taken(self, d: mujoco.MjData, fresh: Index, active: Index) -> float | None:
+        """The largest distance [m] of holders' pads from the nearest of the bodies that `fresh`
+        welds hold, of those whose other welds are not among the `active`; None for no such."""
+        holder, body = self._m.eq_obj1id, self._m.eq_obj2id
+        busy = np.isin(holder[fresh], holder[np.setdiff1d(active, fresh)])
+        found = [
+            self.apart(d, one, self.geoms(body[fresh[holder[fresh] == one]].tolist()))
+            for one in np.unique(holder[fresh[~busy]]).tolist()
+            if one in self.of
+        ]
+        return max(found, default=None)
+
+    def geoms(self, bodies: Iterable[int]) -> Index:
+        """The geoms that collide of the bodies of parts, one after the other."""
+        return np.concatenate([self.solid[body] for body in bodies])
+
+    def apart(self, d: mujoco.MjData, holder: int, geoms: Index) -> float:
+        """The least distance [m] of a holder's pads from some geoms, 0 where one is in the other.
+        The nearest are tried first: spheres round geoms bound how near the others are."""
+        m, least = self._m, FAR
+        for pad in self.of[holder].tolist():
+            far = np.linalg.norm(d.geom_xpos[geoms] - d.geom_xpos[pad], axis=1)
+            bound = far - m.geom_rbound[geoms] - m.geom_rbound[pad]
+            for k in np.argsort(bound).tolist():
+                if max(bound[k], 0.0) >= least:
+                    break
+                apart = mujoco.mj_geomDistance(m, d, pad, int(geoms[k]), least, None)
+                least = max(0.0, min(least, apart))
+        return least

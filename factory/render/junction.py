@@ -1,0 +1,100 @@
+"""The view of one hand-over: where a label meets what takes it, from near by.
+
+Its operation is the one that takes the label: the next in the product, or the dropoff. The camera
+stands still, and sees the label as its carrier brings it there, with the hands of all robots that
+hold something in that operation.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from factory.mjcf import names
+from factory.mjcf.pads import Pads
+from factory.mjcf.replica import Replica
+from factory.mjcf.weld_frames import held_at
+from factory.plant.factory import Operation
+from factory.problem.pag import NOPART
+from factory.record.monitor.subject import MonitorSubject
+from factory.render.action import box_of, shape_of
+from factory.render.camera import Array, Framing, View, fit, towards
+from factory.render.subject import placed
+
+ROOM = 1.3
+"""What a label takes of the picture is so many times its size."""
+
+ELEVATION = 6.0
+"""How high the camera stands [degrees]: hands are below what they hold, and hardly stick out."""
+
+AZIMUTH, STEP = -62.0, 15.0
+"""From where it looks if all is equal, that of an overview, and what is between the directions that
+are tried [degrees]."""
+
+
+def handover_view(
+    replica: Replica, subject: MonitorSubject, label: str, framing: Framing
+) -> tuple[Array, View]:
+    """What is to be seen of the hand-over of a label, as boxes (n, 8, 3) by their corners [m], and
+    the view of it. The replica is left as it is found."""
+    factory, before = subject.factory, replica.d.qpos.copy()
+    made = factory.by_label[label]
+    taking = factory.operations[factory.parents[made.index]]
+    _gather(replica, subject, taking)
+    load = _load(replica, subject, made)
+    hands, arms = _hands(replica, subject, taking)
+    replica.place(before)
+    middle = load.mean(axis=0)
+    reach = [hand + np.append(arm / 2, 0.0) for hand, arm in zip(hands, arms, strict=True)]
+    points = np.concatenate([middle + ROOM * (load - middle), *hands, *reach])
+    return np.array([load, *hands]), fit(points, towards(_azimuth(arms), ELEVATION), framing)
+
+
+def _gather(replica: Replica, subject: MonitorSubject, operation: Operation) -> None:
+    """Put the robots of an operation where they have their goals in it, lifts down."""
+    m, qpos = replica.m, replica.d.qpos.copy()
+    for robot in operation.robots:
+        slide = m.joint(names.slide(subject.factory.robots[robot].name))
+        qpos[slide.qposadr[0]] = subject.goal(operation, robot)
+    replica.place(qpos)
+
+
+def _load(replica: Replica, subject: MonitorSubject, made: Operation) -> Array:
+    """The corners (8, 3) of the box round a label in the hands of its carrier."""
+    m, d = replica.m, replica.d
+    robot, parts = subject.factory.robots[made.carrier].name, subject.factory.contents[made.label]
+    wanted = {names.grip(robot, part) for part in parts}
+    welds = np.array([e for e in range(m.neq) if m.equality(e).name in wanted], np.intp)
+    at = held_at(m, welds, d.xpos, d.xmat)
+    bodies = m.eq_obj2id[welds].tolist()
+    return box_of(np.concatenate([p + shape_of(m, b) for p, b in zip(at, bodies, strict=True)]))
+
+
+def _hands(
+    replica: Replica, subject: MonitorSubject, operation: Operation
+) -> tuple[list[Array], list[Array]]:
+    """The corners (8, 3) of each pad of the robots that hold something in an operation, and the
+    ways (2,), seen from above, from these to their carriages [m]."""
+    m, d, pads = replica.m, replica.d, Pads(replica.m).of
+    corners, arms = list[Array](), list[Array]()
+    held = zip(operation.robots, operation.before, operation.after, strict=True)
+    for name in (subject.factory.robots[r].name for r, *k in held if set(k) != {NOPART}):
+        foot = m.body(names.carriage(name)).id
+        for pad in (p for b, found in pads.items() if m.body_rootid[b] == foot for p in found):
+            corners.append(placed(m, d, pad))
+            arms.append((d.xpos[foot] - d.geom_xpos[pad])[:2])
+    return corners, arms
+
+
+def _azimuth(arms: Sequence[Array]) -> float:
+    """The direction [degrees] in which no arm points to the camera or away from it; rather away,
+    and rather from where an overview looks."""
+    tried = np.arange(AZIMUTH - 180.0, AZIMUTH + 180.0, STEP)
+    angles = np.radians(tried)
+    towards_it = np.stack([np.cos(angles), np.sin(angles)], axis=1)
+    arms = [arm / max(float(np.linalg.norm(arm)), 1e-9) for arm in arms]
+    along = np.stack([towards_it @ arm for arm in arms] or [np.zeros(len(tried))])
+    seen = (np.sqrt(1 - np.minimum(along**2, 1.0)) - 0.2 * np.maximum(along, 0.0)).min(axis=0)
+    usual = np.cos(angles - np.radians(AZIMUTH))
+    return float(tried[np.argmax(seen + 0.05 * usual)])

@@ -1,0 +1,35 @@
+"""The dry friction of slides: what a guide has empty, and more under the weight of a load."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from factory.control.mode import Array, Index
+from factory.mjcf.model import GRAVITY, ROLLING
+from factory.support.engine import mujoco
+
+
+class Guides:
+    """The guides of some axes, of which `dof` (axes,) are the degrees of freedom.
+
+    `empty` (axes,): friction without a load [N], which the model has when this is made.
+    """
+
+    def __init__(self, m: mujoco.MjModel, dof: Index) -> None:
+        self._m, self._dof = m, dof
+        self.empty = m.dof_frictionloss[dof].copy()
+        self._loads = np.zeros(len(dof))
+
+    def load(self, axes: Index, loads: Array) -> None:
+        """From now on axes bear loads [kg] beside their own weight."""
+        self._loads[axes] = loads
+        self._rub(axes)
+
+    def rub(self, axes: Index, newtons: float) -> None:
+        """From now on axes have another friction when they are empty [N]."""
+        self.empty[axes] = newtons
+        self._rub(axes)
+
+    def _rub(self, axes: Index) -> None:
+        weight = self._loads[axes] * GRAVITY
+        self._m.dof_frictionloss[self._dof[axes]] = self.empty[axes] + ROLLING * weight

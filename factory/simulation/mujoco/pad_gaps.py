@@ -1,0 +1,66 @@
+"""How far the pads of holders are from what they take, as they take it.
+
+All of it is of now: the engine tells of where its last step began.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+
+import numpy as np
+
+from factory.mjcf.pads import Pads
+from factory.mjcf.weld_frames import WeldFrames
+from factory.simulation.mujoco.fusing import rotations
+from factory.support.engine import mujoco
+
+
+class PadGaps:
+    """`largest` [m]: the largest distance between the pads of a holder and the nearest of the
+    bodies that it holds, None while no holder with pads has taken any.
+
+    A holder's pads are measured when it takes what it holds first. Welds are rigid: what it takes
+    besides makes the nearest of its bodies no farther.
+    """
+
+    def __init__(self, m: mujoco.MjModel, d: mujoco.MjData) -> None:
+        self.largest: float | None = None
+        self._m, self._d = m, d
+        self._frames = WeldFrames.of(m, d)
+        self._pads = Pads(m)
+        self._at_zero, self._turned = d.geom_xpos.copy(), rotations(m.geom_quat)
+        for holder, weld in zip(*np.unique(m.eq_obj1id, return_index=True), strict=True):
+            if (pads := self._pads.of.get(int(holder))) is not None:
+                moved = d.qpos[self._frames.along[weld]] @ self._frames.way[weld]
+                self._at_zero[pads] = d.geom_xpos[pads] - moved
+
+    def measure(self, on: Mapping[int, int], off: Iterable[int]) -> None:
+        """Measure welds that are about to be switched `on`, each with its body, while others go
+        `off`."""
+        taken: dict[int, tuple[int, list[int]]] = {}
+        for weld, body in on.items():
+            holder = int(self._m.eq_obj1id[weld])
+            if holder in self._pads.of and body in self._pads.solid:
+                taken.setdefault(holder, (weld, []))[1].append(body)
+        if not taken:
+            return
+        active = self._d.eq_active.copy()
+        active[[*off, *on]] = 0
+        busy = np.bincount(self._m.eq_obj1id[active > 0], minlength=self._m.nbody)
+        for holder, (weld, bodies) in taken.items():
+            if not busy[holder]:
+                self._pads_of(holder, weld, bodies)
+
+    def _pads_of(self, holder: int, weld: int, bodies: Sequence[int]) -> None:
+        m, d, pads, flat = self._m, self._d, self._pads.of[holder], np.empty(9)
+        along, way = self._frames.along[weld], self._frames.way[weld]
+        d.geom_xpos[pads] = self._at_zero[pads] + d.qpos[along] @ way
+        for body in bodies:
+            geoms = self._pads.solid[body]
+            at = m.jnt_qposadr[m.body_jntadr[body]] + np.arange(7)
+            mujoco.mju_quat2Mat(flat, d.qpos[at[3:]])
+            turn = flat.reshape(3, 3)
+            d.geom_xpos[geoms] = d.qpos[at[:3]] + m.geom_pos[geoms] @ turn.T
+            d.geom_xmat[geoms] = (turn @ self._turned[geoms]).reshape(-1, 9)
+        apart = self._pads.apart(d, holder, self._pads.geoms(bodies))
+        self.largest = max(self.largest or 0.0, apart)

@@ -1,0 +1,62 @@
+"""The robots that feeders serve: whether they are out of the way, and how soon they can be back."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from factory.control.mode import Truth
+from factory.control.profile import SpeedProfile
+from factory.mjcf import names
+from factory.mjcf.model import Model
+from factory.plant.factory import Operation
+from factory.problem.pag import NOPART
+from factory.simulation.request import RunRequest
+from factory.support.engine import mujoco
+
+HOME = 1e-3
+"""A robot is at home within this [m]."""
+
+
+class Passing:
+    """The robots that take parts from feeders (n,), in the order of the labels. `holds` (n,): it
+    has yet to deliver the part that it took last."""
+
+    def __init__(
+        self, m: mujoco.MjModel, d: mujoco.MjData, model: Model, request: RunRequest
+    ) -> None:
+        factory, layout = model.factory, model.layout
+        carriers = [leaf.carrier for leaf in factory.leaves]
+        joints = [m.joint(names.slide(factory.robots[robot].name)).id for robot in carriers]
+        self._d, self._address = d, m.jnt_qposadr[joints]
+        self._home = np.array([layout.guidepaths[robot].length for robot in carriers])
+        self._clear = self._home - [layout.passing(leaf) for leaf in factory.leaves]
+        hands = (layout.hand(robot) for robot in carriers)
+        self._kinds = ["none" if hand is None else hand.kind for hand in hands]
+        hands = (layout.hand(robot) for robot in carriers)
+        self._first = np.array([hand is not None and hand.first for hand in hands], bool)
+        settings = request.settings
+        fastest = settings.speed * (1 + request.jitter)
+        self._fastest = SpeedProfile(fastest, settings.acceleration)
+        self._fed = {robot: n for n, robot in enumerate(carriers)}
+        self.holds = np.zeros(len(carriers), bool)
+
+    def end(self, operation: Operation) -> None:
+        """An operation has ended: robots of it may have delivered."""
+        for robot, label in zip(operation.robots, operation.after, strict=True):
+            if robot in self._fed and label == NOPART:
+                self.holds[self._fed[robot]] = False
+
+    def clear(self) -> Truth:
+        """Whether each robot (n,) is so far away with its part that the next can come down; or, if
+        its hand has to be there first, is at home without one."""
+        at = self._d.qpos[self._address]
+        home = ~self.holds & (at >= self._home - HOME)
+        return np.asarray(np.where(self._first, home, ~self.holds | (at <= self._clear)))
+
+    def soonest(self, number: int) -> float:
+        """The least time in which a robot can be at its feeder [s]; 0 for one whose hand comes from
+        above: the part has to be down before."""
+        if self._kinds[number] == "above":
+            return 0.0
+        way = float(self._home[number] - self._d.qpos[self._address[number]])
+        return self._fastest.rest(max(way, 0.0))

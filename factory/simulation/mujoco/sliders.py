@@ -1,0 +1,143 @@
+"""The sliders of the feeders: each goes up empty and comes down with a part.
+
+A stroke is planned once for all, and written ahead as a whole when it begins. So nothing is done
+for a slider while it is under way.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from factory.control.mode import Array, Index
+from factory.mjcf import names
+from factory.mjcf.feeders import SLIDER_MASS
+from factory.mjcf.model import GRAVITY, Model, stroke_ticks
+from factory.simulation.mujoco.courses import Course, Move, planned, towards
+from factory.simulation.mujoco.drives import Drives
+from factory.simulation.mujoco.sleep import Sleep
+from factory.support.engine import mujoco
+from factory.support.settings import Settings
+from factory.timing.serving import CALM
+
+NEVER = np.inf
+"""When a slider that rests comes to the end of its way [s]."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Strokes:
+    """The ways of n sliders, up without a load and then down with it: their `lengths` (n,) [m], the
+    `seconds` (2, n) that they take, and the `setpoints` (2, n, samples, 3) of their drives."""
+
+    lengths: Array
+    seconds: Array
+    setpoints: Array = field(repr=False)
+
+    @classmethod
+    def of(cls, drives: Drives, loads: Array, lengths: Array, ticks: int, s: Settings) -> Strokes:
+        """Those of sliders that go so far [m] with such loads [kg], in no more than so many
+        ticks."""
+        every, zero = np.arange(len(lengths)), np.zeros(len(lengths))
+        limits = _limits(s, len(lengths))
+        ways: list[Course] = []
+        for begin, goals, load in ((zero, lengths, zero), (lengths, zero, loads)):
+
+            def go(x: Array, v: Array, goals: Array = goals) -> Move:
+                x1, v1, a = towards(goals, x, v, limits, s.tick)
+                return x1, v1, a, bool((x1 == goals).all() and not v1.any())
+
+            drives.load(every, load, (SLIDER_MASS + load) * GRAVITY)
+            ways.append(planned(drives, every, (begin, zero), (ticks, s.steps), go))
+        longest = max(way.setpoints.shape[1] for way in ways)
+        return cls(
+            lengths,
+            np.stack([((way.x != way.x[-1]).sum(axis=0) + CALM) * s.tick for way in ways]),
+            np.stack([_padded(way.setpoints, longest) for way in ways]),
+        )
+
+
+class Sliders:
+    """The sliders of the feeders (n,), in the order of their labels.
+
+    `ends` (n,): when each that is under way comes to the end of its way [s], NEVER for others.
+    `trees` (n,): their kinematic trees.
+    """
+
+    def __init__(self, m: mujoco.MjModel, d: mujoco.MjData, model: Model, sleep: Sleep) -> None:
+        labels = [leaf.label for leaf in model.factory.leaves]
+        joint = np.array([m.joint(names.slider(label)).id for label in labels])
+        drives = np.array([m.actuator(names.slider(label)).id for label in labels])
+        self._body, settings = m.jnt_bodyid[joint], model.settings
+        self.trees = m.body_treeid[self._body]
+        self._d, self._step, self._address = d, settings.step, m.jnt_qposadr[joint]
+        own = m.body_subtreemass[self._body] + m.dof_armature[m.jnt_dofadr[joint]]
+        self._drives, self._sleep = Drives(m, d, drives, own.round(9)), sleep
+        self._loads = np.array([model.masses[label] for label in labels])
+        lengths = np.array([model.layout.feeder(label).stroke for label in labels])
+        ticks = stroke_ticks(model.layout, settings)
+        self._strokes = Strokes.of(self._drives, self._loads, lengths, ticks, settings)
+        self._begun, self.ends = np.zeros(len(labels)), np.full(len(labels), NEVER)
+        self._down = np.zeros(len(labels), np.intp)
+
+    def _load(self, chosen: Index, loaded: bool) -> None:
+        """Sliders carry their loads, or nothing."""
+        load = self._loads[chosen] * loaded
+        self._drives.load(chosen, load, (SLIDER_MASS + load) * GRAVITY)
+
+    def begin(self, up: Index) -> None:
+        """All sliders stand where the run begins: down with their loads, but for those that are
+        `up` without."""
+        self._stand(np.arange(len(self.ends)), True)
+        self._d.qpos[self._address[up]] = self._strokes.lengths[up]
+        self._stand(up, False)
+
+    def _stand(self, chosen: Index, down: bool) -> None:
+        """Sliders stand down with their loads, or up without."""
+        if len(chosen):
+            self._load(chosen, down)
+            self._drives.stand(chosen, self._strokes.lengths[chosen] * (not down))
+
+    def send(self, chosen: Index, down: bool) -> None:
+        """Sliders set out, down with their loads or up without."""
+        if not len(chosen):
+            return
+        self._load(chosen, down)
+        self._drives.follow(chosen, self._strokes.setpoints[int(down), chosen])
+        self._down[chosen], self._begun[chosen] = down, self._drives.time
+        self.ends[chosen] = self._drives.time + self._strokes.seconds[int(down), chosen]
+        self.show(0)
+        self._sleep.wake(self._body[chosen])
+
+    def show(self, steps: int) -> None:
+        """Some timesteps are about to pass: the setpoints of sliders under way are those of
+        then."""
+        (moving,) = (self.ends < NEVER).nonzero()
+        if len(moving):
+            since = (self._drives.time - self._begun[moving]) / self._step
+            setpoints = self._strokes.setpoints
+            at = np.rint(since).astype(np.intp) + steps
+            at = np.clip(at, 0, setpoints.shape[2] - 1)
+            self._drives.show(moving, setpoints[self._down[moving], moving, at])
+
+    def settle(self) -> None:
+        """Sliders that have come to the end of their ways since stand. The engine lets them sleep
+        by itself: until there they are never slow."""
+        (over,) = (self.ends <= self._drives.time + self._step / 2).nonzero()
+        if len(over):
+            down = self._down[over] == 1
+            self._stand(over[down], True)
+            self._stand(over[~down], False)
+            self.ends[over] = NEVER
+
+
+def _limits(settings: Settings, count: int) -> tuple[Array, Array]:
+    """The speeds and accelerations of so many sliders."""
+    speed, acceleration = settings.feeder_limits
+    return np.full(count, speed), np.full(count, acceleration)
+
+
+def _padded(setpoints: Array, samples: int) -> Array:
+    """So many setpoints (n, samples, 3), the last one again and again."""
+    more = samples - setpoints.shape[1]
+    return np.pad(setpoints, ((0, 0), (0, more), (0, 0)), mode="edge")

@@ -1,0 +1,33 @@
+"""What is measured of bodies as a grip closes on them, before it pulls."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from factory.control.mode import Array, Index
+from factory.mjcf.weld_frames import WeldFrames
+from factory.support.engine import mujoco
+
+
+class Takeovers:
+    """`count`: how many bodies have been taken over; `gap` [m]: the largest distance between the
+    frames that a grip joined; `off` [m]: the largest way of any vertex to where its grip keeps it,
+    turns included. `radii` (nbody,): how far vertices are from their body's origin [m]. The
+    kinematics in `d` are up to date."""
+
+    def __init__(self, m: mujoco.MjModel, d: mujoco.MjData, radii: Array) -> None:
+        self.count, self.gap, self.off = 0, 0.0, 0.0
+        self._d, self._frames, self._radii = d, WeldFrames.of(m, d), radii
+        self._qpos = m.jnt_qposadr[m.body_jntadr][:, None] + np.arange(7)
+
+    def measure(self, welds: Index, bodies: Index) -> None:
+        """Welds close on bodies: where those are now, while `xpos` tells of where the last step
+        began."""
+        q, frames = self._d.qpos, self._frames.chosen(welds)
+        pose = q[self._qpos[bodies]]
+        gap = np.linalg.norm(pose[:, :3] - frames.at(q[frames.along]), axis=1)
+        along = (pose[:, 3:] * frames.turn).sum(axis=1) ** 2
+        turned = 2 * np.sqrt(np.maximum(0.0, 1.0 - along)) * self._radii[bodies]
+        self.count += len(welds)
+        self.gap = max(self.gap, float(gap.max()))
+        self.off = max(self.off, float((gap + turned).max()))

@@ -1,0 +1,32 @@
+"""A run with a monitor beside it, which judges whether its bodies do what its record says."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from factory.record.monitor import beside
+from factory.simulation.run import Run
+from factory.simulation.simulation import Observer, Simulation
+
+
+def watched(
+    simulation: Simulation,
+    observers: Sequence[Observer] = (),
+    max_time: float | None = None,
+    glances: Sequence[Observer] = (),
+    every_tick: bool = False,
+) -> Run:
+    """`simulation.run`, with a monitor where there are bodies. It looks where operations end, where
+    a weld is switched, and at times; with `every_tick` after every tick, and so it does where
+    robots run their own programs, which stop within ticks."""
+    if simulation.model is None:
+        return simulation.run(observers, max_time, glances)
+    monitor = beside(simulation)
+    if every_tick:
+        observers = [monitor.observe, *observers]
+    else:
+        look = monitor.observe if simulation.request.distributed else monitor.glance
+        glances = [look, *glances]
+    run = simulation.run(observers, max_time, glances)
+    return replace(run, monitor=monitor.report(run.events))

@@ -1,0 +1,191 @@
+"""Hands from geometry: they touch what they hold, and go through nothing on any way."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import factory
+from factory.geometry.product import product_geometry
+from factory.layout.clearance import certify
+from factory.layout.embedding import lay_out
+from factory.layout.hands.choosing import Hands
+from factory.layout.hands.hand import AIR
+from factory.layout.hands.holding import held
+from factory.layout.hands.leaving import leavings
+from factory.layout.hands.limbs import limbs
+from factory.layout.hands.surfaces import Surfaces, hit, retreat, swept
+from factory.layout.layout import Layout
+from factory.mjcf import names
+from factory.pipeline import read
+from factory.simulation.request import RunRequest
+from factory.simulation.simulation import Simulation
+from factory.study.fidelity.hidden import HiddenPenetrations
+from factory.support.settings import Settings
+
+EXAMPLES = Path(factory.__file__).parent.parent / "examples"
+AT_MOST_MM = 0.1
+"""Nothing that is drawn is deeper in anything."""
+
+GRIP_MM = 0.5
+"""A grip closes within this."""
+
+
+@cache
+def with_hands(name: str) -> Layout:
+    """An example laid out with hands."""
+    plan = factory.compile(factory.load_pag(EXAMPLES / f"{name}.pag"))
+    return lay_out(plan, product_geometry(plan.pag), hands=True)
+
+
+def looked_at(layout: Layout, units: int = 3) -> tuple[Simulation, HiddenPenetrations]:
+    """A run of a layout, with everything solid looked at."""
+    simulation = Simulation(layout, RunRequest(units=units, jitter=0.3))
+    hidden = HiddenPenetrations.of(simulation)
+    simulation.run([lambda world, _: hidden.look(world.d.qpos, world.time)], max_time=120.0)
+    return simulation, hidden
+
+
+def deepest(hidden: HiddenPenetrations) -> float:
+    """The greatest depth [mm] of anything, a carriage's shoe on its rail left out."""
+    return max((p.depth_mm for p in hidden.found() if "shoe" not in "".join(p.geoms)), default=0.0)
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "paper",
+        "lamp",
+        "stool",
+        pytest.param("truck", marks=pytest.mark.slow),
+        pytest.param("chair", marks=pytest.mark.slow),
+        pytest.param("balanced", marks=pytest.mark.slow),
+    ],
+)
+def test_what_holds_touches_and_goes_through_nothing(name: str) -> None:
+    simulation, hidden = looked_at(with_hands(name))
+    figures = simulation.physical.figures()
+    assert simulation.world.delivered() == 3
+    assert figures.unintended_contacts == 0
+    assert figures.grip_gap_max_mm is not None and figures.grip_gap_max_mm < GRIP_MM
+    assert deepest(hidden) < AT_MOST_MM
+
+
+def test_without_hands_pins_are_far_off_and_inside_other_things() -> None:
+    plan = factory.compile(factory.load_pag(EXAMPLES / "lamp.pag"))
+    simulation, hidden = looked_at(lay_out(plan, product_geometry(plan.pag)))
+    figures = simulation.physical.figures()
+    assert figures.grip_gap_max_mm is not None and figures.grip_gap_max_mm > GRIP_MM
+    assert deepest(hidden) > 10
+
+
+@pytest.mark.parametrize("axis", [0, 1, 2])
+def test_a_hand_moved_by_2_mm_is_seen(axis: int) -> None:
+    layout = with_hands("lamp")
+    robot, hand = next(
+        (r, h) for r, h in enumerate(layout.hands) if h is not None and h.kind == "behind"
+    )
+    x, y, z = np.array(hand.places[0]) + 2e-3 * np.eye(3)[axis]
+    moved = replace(hand, places=((float(x), float(y), float(z)),))
+    hands = tuple(moved if r == robot else h for r, h in enumerate(layout.hands))
+    simulation, hidden = looked_at(replace(layout, hands=hands), units=1)
+    heading = np.array([*layout.guidepaths[robot].heading, 0.0])
+    if abs(heading[axis]) < 0.5:
+        return  # along the face it still touches
+    gap = simulation.physical.figures().grip_gap_max_mm
+    assert gap is not None
+    assert gap > GRIP_MM or deepest(hidden) > AT_MOST_MM
+
+
+def test_pads_are_off_the_surface_by_the_air_between() -> None:
+    for name in ("paper", "lamp", "stool", "shelf"):
+        layout = with_hands(name)
+        surfaces = Surfaces(layout.product)
+        for robot, hand in enumerate(layout.hands):
+            if hand is None or hand.kind != "below":
+                continue
+            label = held(layout.factory, robot)
+            parts = layout.factory.contents[label]
+            first, _ = surfaces.met(parts, np.array(hand.places), 2)
+            reach = hand.radius * 0.25
+            assert np.all(first - np.array(hand.places)[:, 2] <= reach + 1e-9)
+            pads = [limb for limb in limbs(layout, robot) if limb.name.endswith("pad")]
+            assert len(pads) == len(hand.places)
+            low = layout.product.low[2] - 0.1 - layout.elevations[robot]
+            tops = sorted(limb.high[2] + low for limb in pads)
+            assert np.allclose(tops, sorted(z - AIR for _, _, z in hand.places), atol=1e-6)
+
+
+def test_layouts_with_hands_are_certified() -> None:
+    for name in ("paper", "lamp", "stool", "shelf", "chest"):
+        layout = with_hands(name)
+        assert certify(layout).holds
+        hands = {region.robot for region in layout.certificate.regions if region.kind == 9}
+        assert hands == {r for r, hand in enumerate(layout.hands) if hand is not None}
+
+
+TUB = """root = all; all = mate ( tub, axle ); axle = mate ( shaft, gear );
+tub = mate ( base, walls ); walls = mate ( left, right, front, back );
+base = atomic ( box = ( 0.1, 0.1, 0.01 ), pos = ( 0, 0, 0.005 ) );
+left = atomic ( box = ( 0.01, 0.1, 0.06 ), pos = ( -0.045, 0, 0.04 ) );
+right = atomic ( box = ( 0.01, 0.1, 0.06 ), pos = ( 0.045, 0, 0.04 ) );
+front = atomic ( box = ( 0.08, 0.01, 0.06 ), pos = ( 0, -0.045, 0.04 ) );
+back = atomic ( box = ( 0.08, 0.01, 0.06 ), pos = ( 0, 0.045, 0.04 ) );
+shaft = atomic ( box = ( 0.01, 0.01, 0.03 ), pos = ( 0, 0, 0.025 ) );
+gear = atomic ( box = ( 0.03, 0.03, 0.01 ), pos = ( 0, 0, 0.045 ) )
+"""
+
+
+def test_what_no_hand_can_hold_is_said(tmp_path: Path) -> None:
+    file = tmp_path / "tub.pag"
+    file.write_text(TUB)
+    asked = read(file, (), Settings(hands=1))
+    (found,) = (warning for warning in asked.warnings if warning.code == "NoGrip")
+    assert "no hand can hold 'axle': above, " in found.message
+    assert "parts that are lowered onto it are in the way" in found.message
+    assert found.position is not None and found.position.line == 1
+    assert not [w for w in read(file).warnings if w.code == "NoGrip"]
+    assert not read(EXAMPLES / "stool.pag", (), Settings(hands=1)).no_grips
+
+
+def test_those_that_wait_for_a_hand_wait_for_one_that_leaves() -> None:
+    layout = with_hands("truck")
+    waited = {leaving.axis for many in leavings(layout).values() for leaving in many}
+    assert waited
+    for axis in waited:
+        assert axis < len(layout.guidepaths) + len(layout.lifts)
+
+
+def test_hands_of_carriers_depend_on_their_heading_alone() -> None:
+    layout = with_hands("truck")
+    hands = Hands(layout.factory, layout.product)
+    for robot, path in enumerate(layout.guidepaths[1:], start=1):
+        t = layout.guidepaths[hands.holding.on[robot]].heading
+        back = -t[0], -t[1]
+        if hands.holding.is_carrier(robot):
+            assert hands.hand(robot, path.heading, t) == hands.hand(robot, path.heading, back)
+
+
+def test_boxes_are_swept_and_hit() -> None:
+    low, high = np.array([[0.0, 0.0, 0.0]]), np.array([[1.0, 1.0, 1.0]])
+    box = np.array([[[3.0, 0.2, 0.2], [4.0, 0.8, 0.8]]])
+    assert not hit(low, high, box)[0]
+    assert hit(*swept(low, high, (1.0, 0.0)), box)[0]
+    assert not hit(*swept(low, high, (-1.0, 0.0)), box)[0]
+    aside = box + np.array([-3.5, 5.0, 0.0])
+    assert not hit(*swept(low, high, (1.0, 0.0)), aside)[0]
+    assert retreat(low, high, aside, ((1.0, 0.0), (0.0, 1.0)))[0] == pytest.approx(0.5)
+    assert retreat(low, high, aside, ((-1.0, 0.0), (0.0, 1.0)))[0] == pytest.approx(1.5)
+    assert retreat(low, high, aside, ((1.0, 0.0), (0.0, -1.0)))[0] == 0.0
+
+
+def test_a_hand_is_drawn_of_limbs_that_collide() -> None:
+    simulation = Simulation(with_hands("lamp"), RunRequest(units=1))
+    m = simulation.physical.m
+    drawn = [m.geom(i) for i in range(m.ngeom) if names.pad_of(m.geom(i).name).startswith("r")]
+    assert len(drawn) == sum(hand is not None for hand in with_hands("lamp").hands)
+    assert all(int(geom.contype[0]) and int(geom.conaffinity[0]) for geom in drawn)
