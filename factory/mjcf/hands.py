@@ -18,8 +18,8 @@ Styles = Mapping[str, Element]
 
 
 def load_hand(kind: str, folder: Path | None = None) -> Styles:
-    """The geoms of a kind of hand by name. Raises InputError (BadTemplate) where its file is no
-    MJCF of one body with geoms."""
+    """The geoms of a kind of hand, or of a tip, by name. Raises InputError (BadTemplate) where its
+    file is no MJCF of one body with geoms."""
     path = (folder or mjcf_folder()) / "hands" / f"{kind}.xml"
     try:
         geoms = ElementTree.parse(path).getroot().findall("worldbody/body")[0].findall("geom")

@@ -63,12 +63,13 @@ def _low(layout: Layout, robot: int) -> float:
 
 
 def _style(hand: Hand | None, loaded: dict[str, Styles]) -> Styles:
-    """What the limbs of a hand look like, each kind read once; nothing for none."""
+    """What the limbs of a hand and its tip look like, each file read once; nothing for none."""
     if hand is None or hand.kind == "none":
         return {}
-    if hand.kind not in loaded:
-        loaded[hand.kind] = load_hand(hand.kind)
-    return loaded[hand.kind]
+    for name in (hand.kind, hand.tip):
+        if name not in loaded:
+            loaded[name] = load_hand(name)
+    return {**loaded[hand.kind], **loaded[hand.tip]}
 
 
 def role_of(factory: Factory, robot: int) -> str:

@@ -9,6 +9,7 @@ parts (`in_the_way.py`).
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from itertools import product as pairs
 
 import numpy as np
@@ -20,8 +21,9 @@ from factory.layout.dimensions import FINGER
 from factory.layout.hands.hand import BEAM, Hand, Kind
 from factory.layout.hands.holding import Holding, held
 from factory.layout.hands.in_the_way import BESIDE, IN_THE_WAY, InTheWay
-from factory.layout.hands.places import Places, centre_of, used_on_line
+from factory.layout.hands.places import Places, centre_of, strain
 from factory.layout.hands.surfaces import Way
+from factory.layout.hands.tips import TipName, tip
 from factory.plant.factory import Factory
 from factory.problem.pag import NOPART
 from factory.support.errors import Diagnostic
@@ -32,11 +34,9 @@ ENOUGH = 0.8
 APART = 0.03
 """Two pads under a payload are at least so far apart [m]."""
 
-STRONG = 0.9
-"""The first kind is taken of which no more than this share is used."""
-
-WEAK = 3.0
-"""A share of a hand's strength that is as bad as none at all."""
+PINNED, WEAK = 1.0, 3.0
+"""How bad it is to hold by a pin, which needs a bore, and that there is no place at all. Suction
+that holds well costs nothing."""
 
 PAIRED = 8
 """Of so many places on either side of the centre of mass pairs are tried."""
@@ -44,6 +44,30 @@ PAIRED = 8
 OVER, LEVEL = 0.01, 0.003
 """How far above everything the beam of a hand above is, and how far those of robots that lie across
 each other are apart [m]."""
+
+
+UP = np.array([0.0, 0.0, 1.0])
+"""From a tip below to its payload."""
+
+
+@dataclass(frozen=True, slots=True)
+class Group:
+    """Places (their numbers) that one hand could hold together, the share of the strength of its
+    tips that is used by suction and if they are `pinned`, and how badly those that deliver to it
+    would hold from below then."""
+
+    chosen: tuple[int, ...]
+    share: float
+    pinned: float
+    served: float
+
+    def rank(self, first: Truth, waits: Array) -> tuple[float, ...]:
+        """How good a hand is, the less the better: strong enough, in nobody's way, never waiting,
+        simple, strong. `first`, `waits` (n,) are those of the places."""
+        at = list(self.chosen)
+        bad = float(_bad(np.array(self.share), np.array(self.pinned))) + self.served
+        share = self.share if self.share <= ENOUGH else self.pinned
+        return bad, float(waits[at].max()), float(first[at].any()), len(at), share
 
 
 class Hands:
@@ -87,7 +111,7 @@ class Hands:
         return found
 
     def _served(self, robot: int, found: Places) -> Array:
-        """How weakly those that deliver to a carrier would hold from below on their own side of its
+        """How badly those that deliver to a carrier would hold from below on their own side of its
         line, all together, by the place (n,) of its hand."""
         across = 1 - self.holding.axis[robot]
         line, spare = found.at[:, across], np.maximum(found.radius, FINGER / 2) + BESIDE
@@ -97,8 +121,9 @@ class Hands:
             for guest, label in zip(operation.robots, operation.before, strict=True):
                 if guest != robot and label != NOPART:
                     under = self.holding.places(held(self.holding.factory, guest), "below", 2, -1)
-                    before = _least(under.at[:, across] + under.radius, under.share, line - spare)
-                    after = _least(under.radius - under.at[:, across], under.share, -line - spare)
+                    at, bad = under.at[:, across], _bad(under.share, under.pinned)
+                    before = _least(at + under.radius, bad, line - spare)
+                    after = _least(under.radius - at, bad, -line - spare)
                     sides.append((before, after))
             if len(sides) == 1:
                 total += np.minimum(*sides[0])
@@ -119,9 +144,9 @@ class Hands:
         best: Hand | None = None
         for kind in kinds:
             hand = self._best(robot, label, kind, frames)
-            if hand is not None and (best is None or hand.share < best.share):
+            if hand is not None and (best is None or hand.tip == "suction"):
                 best = hand
-            if best is not None and best.share <= STRONG:
+            if best is not None and best.tip == "suction":
                 break
         if best is not None:
             return best
@@ -146,7 +171,8 @@ class Hands:
         groups = list(self._groups(robot, label, kind, found))
         if not groups:
             return None
-        chosen, share, _ = min(groups, key=lambda group: self._rank(group, first, waits))
+        group = min(groups, key=lambda group: group.rank(first, waits))
+        chosen, holds_well = group.chosen, group.share <= ENOUGH
         at = sorted(chosen, key=lambda n: tuple(found.at[n]))
         x, y, z = (found.at[at, axis].round(6).tolist() for axis in range(3))
         radius = float(found.radius[at].min())
@@ -158,45 +184,33 @@ class Hands:
                 + self.holding.axis[robot] * (BEAM + LEVEL)
             )
         early, late = bool(first[at].any()), round(float(waits[at].max()), 6)
-        return Hand(kind, tuple(zip(x, y, z, strict=True)), radius, beam, share, early, late)
+        share = group.share if holds_well else group.pinned
+        with_tip: TipName = "suction" if holds_well else "pin"
+        return Hand(
+            kind, tuple(zip(x, y, z, strict=True)), radius, beam, share, with_tip, early, late
+        )
 
-    def _groups(
-        self, robot: int, label: str, kind: Kind, found: Places
-    ) -> Iterator[tuple[tuple[int, ...], float, float]]:
-        """Places that one hand could hold together, the share of its strength that is used, and how
-        many that deliver to it could not hold from below then: each place alone, and under a
-        payload two on one line."""
+    def _groups(self, robot: int, label: str, kind: Kind, found: Places) -> Iterator[Group]:
+        """Places that one hand could hold together: each alone, and under a payload two on one
+        line."""
         carries = kind == "below" and self.holding.is_carrier(robot)
         served = self._served(robot, found) if carries else np.zeros(len(found))
-        for number in range(len(found)):
-            yield (number,), float(found.share[number]), float(served[number])
+        rows = zip(found.share.tolist(), found.pinned.tolist(), served.tolist(), strict=True)
+        for number, row in enumerate(rows):
+            yield Group((number,), *row)
         if kind != "below":
             return
         along = self.holding.axis[robot]
         mass, centre = centre_of(self.holding.product, self.holding.factory.contents[label])
-        lines: dict[float, list[int]] = {}
-        for number, line in enumerate(np.round(found.at[:, 1 - along], 6).tolist()):
-            lines.setdefault(line, []).append(number)
-        for on in lines.values():
-            before = [n for n in on if found.at[n, along] < centre[along]]
-            after = [n for n in on if found.at[n, along] >= centre[along]]
-            for pair in pairs(_spread(before), _spread(after)):
-                two = list(pair)
-                if found.at[two[1], along] - found.at[two[0], along] < APART:
-                    continue
-                share = used_on_line(found.at[two], found.radius[two], mass, centre, along)
-                yield pair, share, float(served[two].max())
-
-    @staticmethod
-    def _rank(
-        group: tuple[tuple[int, ...], float, float], first: Truth, waits: Array
-    ) -> tuple[float, ...]:
-        """How good a hand is, the less the better: strong enough, in nobody's way, never waiting,
-        simple, strong."""
-        chosen, share, served = group
-        at = list(chosen)
-        weak = max(round(share, 1), ENOUGH) + served
-        return weak, float(waits[at].max()), float(first[at].any()), len(chosen), share
+        two = np.array(list(_in_line(found.at, along, float(centre[along]))), int).reshape(-1, 2)
+        if not len(two):
+            return
+        at, radius = found.at[two], found.radius[two].min(axis=1)
+        load = UP, radius, at.mean(axis=1), at[:, 1] - at[:, 0], mass, centre
+        shares = strain(tip("suction"), *load), strain(tip("pin"), *load)
+        rows = np.column_stack([*shares, served[two].max(axis=1)]).tolist()
+        for pair, (share, pinned, bad) in zip(two.tolist(), rows, strict=True):
+            yield Group(tuple(pair), share, pinned, bad)
 
     def _clear(
         self, robot: int, label: str, kind: Kind, frames: Sequence[tuple[Way, Way]]
@@ -210,12 +224,29 @@ class Hands:
         return found.chosen(free), first[free], waits[free]
 
 
-def _least(reach: Array, share: Array, bound: Array) -> Array:
-    """The least share, from ENOUGH to WEAK, of those that reach no further than a bound (n,)."""
+def _bad(share: Array, pinned: Array) -> Array:
+    """How bad it is (n,) to hold with tips of which these shares are used."""
+    return np.where(share <= ENOUGH, 0.0, np.where(pinned <= 1.0, PINNED, WEAK))
+
+
+def _least(reach: Array, bad: Array, bound: Array) -> Array:
+    """How bad the best is of those that reach no further than a bound (n,)."""
     order = np.argsort(reach)
-    least = np.minimum.accumulate(np.append(WEAK, share[order]))
-    chosen = least[np.searchsorted(reach[order], bound, side="right")]
-    return np.asarray(np.maximum(chosen, ENOUGH))
+    least = np.minimum.accumulate(np.append(WEAK, bad[order]))
+    return np.asarray(least[np.searchsorted(reach[order], bound, side="right")])
+
+
+def _in_line(at: Array, along: int, centre: float) -> Iterator[tuple[int, int]]:
+    """Pairs of places on one line along an axis, on either side of a centre and well apart."""
+    lines: dict[float, list[int]] = {}
+    for number, line in enumerate(np.round(at[:, 1 - along], 6).tolist()):
+        lines.setdefault(line, []).append(number)
+    for on in lines.values():
+        before = [n for n in on if at[n, along] < centre]
+        after = [n for n in on if at[n, along] >= centre]
+        for one, other in pairs(_spread(before), _spread(after)):
+            if at[other, along] - at[one, along] >= APART:
+                yield one, other
 
 
 def _spread(numbers: Sequence[int]) -> list[int]:

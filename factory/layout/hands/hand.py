@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from factory.layout.dimensions import FINGER
+from factory.layout.hands.tips import TipName
 
 Point3 = tuple[float, float, float]
 
@@ -38,20 +39,21 @@ PAD = 0.0015
 
 @dataclass(frozen=True, slots=True)
 class Hand:
-    """How a robot holds: `places`: the points of the payload's surface that the middles of its pads
+    """How a robot holds: `places`: the points of the payload's surface that the middles of its tips
     are at, in the frame of the finished product [m]: one, or, from below, two on one line along its
-    heading; `radius` of a pad [m]; `beam`: how
-    high the beam of a hand above is, in that frame, at its lower edge [m]; `share`: which share of
-    the pad's strength weight and acceleration take, as predicted; `first`: whether it has to be in
-    its place before what it takes comes there; `waits`: how far it has to go back until what it has
-    delivered can go on, 0 where that need not wait [m]. Of the kind `none` where nothing can hold:
-    `why` says what is in the way."""
+    heading; `radius` of a tip [m]; `beam`: how high the beam of a hand above is, in that frame, at
+    its lower edge [m]; `share`: which share of the strength of its tips weight and acceleration
+    take, as predicted; `tip`: what it holds with; `first`: whether it has to be in its place before
+    what it takes comes there; `waits`: how far it has to go back until what it has delivered can go
+    on, 0 where that need not wait [m]. Of the kind `none` where nothing can hold: `why` says what
+    is in the way."""
 
     kind: Kind
     places: tuple[Point3, ...]
     radius: float = 0.003
     beam: float = 0.0
     share: float = 0.0
+    tip: TipName = "suction"
     first: bool = False
     waits: float = 0.0
     why: str = ""

@@ -23,6 +23,7 @@ Swept = tuple[Array, Array, Array]
 way [m]."""
 
 IN_THE_WAY = {
+    "weak": "not even a pin bears the load",
     "joined": "parts that it is joined to are in the way",
     "brought": "parts that are brought to it are in the way",
     "lowered": "parts that are lowered onto it are in the way",
@@ -59,6 +60,7 @@ class InTheWay:
         """Whether a hand at each place (n,) is clear in every frame, by what could be in its way;
         the rest as `_clear`."""
         free = {why: np.ones(len(found), bool) for why in IN_THE_WAY}
+        free["weak"] &= found.pinned <= 1.0
         first, waits = np.zeros(len(found), bool), np.zeros(len(found))
         for u, t in frames:
             free["hands"] &= self._own_side(robot, kind, found, u, t)
@@ -123,7 +125,7 @@ class InTheWay:
             return
         own = swept(*self._reach(kind, found, u), _back(u))
         at, radius = np.array(hand.places), np.full(len(hand.places), hand.radius)
-        theirs = swept(*self._reach(hand.kind, Places(at, radius, radius), t), _back(t))
+        theirs = swept(*self._reach(hand.kind, Places(at, radius, radius, radius), t), _back(t))
         yield (*own, np.stack(theirs, axis=1))
 
     def _beside_rod(self, label: str, found: Places, u: Way, t: Way) -> Truth:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import hypot, pi
+from math import pi
 
 import numpy as np
 
@@ -13,6 +13,7 @@ from factory.geometry.meshes import Array
 from factory.geometry.solids import Product
 from factory.layout.hands.hand import Kind
 from factory.layout.hands.surfaces import Body, Surfaces
+from factory.layout.hands.tips import Tip, tip
 
 RADII = (0.02, 0.014, 0.01, 0.007, 0.005, 0.0035, 0.0025, 0.0016, 0.001)
 """Radii of pads [m]."""
@@ -32,14 +33,11 @@ LINES = 12
 BELLOWS = 0.25
 """A pad's bellows reach back by this share of its radius: it holds on round shapes too."""
 
-VACUUM = 5e4
-"""What a suction pad pulls with [Pa]: half an atmosphere."""
-
-GRIP = 0.5
-"""Coefficient of friction of a pad's rubber."""
-
 GRAVITY, PUSH = 9.81, 2.0
 """What a payload's mass is pulled and pushed by [m/s²]: its weight, and robots' acceleration."""
+
+PUSHES = np.vstack([np.zeros(3), np.eye(3), -np.eye(3)])
+"""Where to it is pushed."""
 
 EASY = 0.25
 """Of the pads that fit, the smallest is taken of whose strength no more than this is used."""
@@ -61,15 +59,16 @@ SMALLER = (2, 4, 6, 8)
 class Places:
     """Places (n, 3) on one side of a sub-assembly's surface, the best first, each with the largest
     pad that is of use there: `radius` (n,) [m], and the `share` (n,) of its strength that is
-    used."""
+    used, by suction and if it is `pinned`."""
 
     at: Array
     radius: Array
     share: Array
+    pinned: Array
 
     def chosen(self, which: Index | Truth) -> Places:
         """Some of them."""
-        return Places(self.at[which], self.radius[which], self.share[which])
+        return Places(self.at[which], self.radius[which], self.share[which], self.pinned[which])
 
     def __len__(self) -> int:
         return len(self.at)
@@ -101,7 +100,11 @@ def places(
     # the outermost, of which nothing is in the way, and those near the centre of mass
     outermost = np.lexsort((away, np.round(-way * face, 3)))[:TRIED]
     points = points[np.unique(np.concatenate([outermost, np.argsort(away)[:NEAR]]))]
-    used = [_used(kind, radius, mass, points - centre, axis) for radius in RADII]
+    outward = -way * np.eye(3)[axis]
+    used = [
+        strain(tip("suction"), outward, np.array(r), points, np.zeros(3), mass, centre)
+        for r in RADII
+    ]
     useful = [n for n, radius in enumerate(RADII) if radius <= LEAST or used[n].max() > EASY]
     largest = max(0, useful[0] - 1)  # larger pads are of no more use
     covered, plane = _covered(surfaces, parts, points, (axis, way), RADII[largest:])
@@ -124,7 +127,9 @@ def places(
     size = np.concatenate([numbers for _, numbers, _ in found])
     at[:, axis] = np.concatenate([plane[n, chosen.nonzero()[0]] for chosen, n, _ in found])
     shares = np.concatenate([shares for _, _, shares in found])
-    result = Places(at, np.array(RADII)[size], shares)
+    radius = np.array(RADII)[size]
+    pinned = strain(tip("pin"), outward, radius, at, np.zeros(3), mass, centre)
+    result = Places(at, radius, shares, pinned)
     return result.chosen(np.argsort(np.round(result.share, 2), kind="stable"))
 
 
@@ -214,35 +219,14 @@ def _covered(
     return np.asarray(reached.mean(axis=2)), way * most
 
 
-def _used(kind: Kind, radius: float | Array, mass: float, arm: Array, axis: int) -> Array:
-    """The share (n,) of a pad's strength that is used at places `arm` (n, 3) [m] away from the
-    centre of mass: its pull, its friction, and the moment that its rim bears."""
-    pull, weight, push = VACUUM * pi * radius**2, mass * GRAVITY, mass * PUSH
-    level = np.hypot(arm[:, 0], arm[:, 1])
-    high = np.abs(arm[:, 2])
-    if kind == "below":
-        moment = weight * level + push * high
-        used = np.maximum(push / (GRIP * (pull + weight)), moment / ((pull + weight) * radius / 2))
-    elif kind == "above":
-        used = (weight + push) / pull + (weight * level + push * high) / (pull * radius / 2)
-    else:
-        out = np.abs(arm[:, axis])
-        used = hypot(weight, push) / (GRIP * pull) + (weight + push) * out / (pull * radius / 2)
-    return np.asarray(used)
-
-
-def used_on_line(at: Array, radius: Array, mass: float, centre: Array, along: int) -> float:
-    """The share of the strength of pads (k, 3) on one line under a payload that is used: between
-    two of them the centre of mass is carried by both."""
-    pull, weight, push = VACUUM * pi * float((radius**2).sum()), mass * GRAVITY, mass * PUSH
-    ends = float(at[:, along].min()), float(at[:, along].max())
-    over = float(centre[along]) - float(np.clip(centre[along], *ends))
-    beside = float(at[0, 1 - along] - centre[1 - along])
-    high = push * float(np.abs(at[:, 2] - centre[2]).max())
-    rim = (pull + weight) * float(radius.mean()) / 2
-    lever = (VACUUM * pi * float(radius.min()) ** 2 + weight / 2) * (ends[1] - ends[0])
-    return max(
-        push / (GRIP * (pull + weight)),
-        (weight * abs(over) + high) / (rim + lever),
-        (weight * abs(beside) + high) / rim,
-    )
+def strain(
+    tip: Tip, outward: Array, radius: Array, at: Array, apart: Array, mass: float, centre: Array
+) -> Array:
+    """The largest share (n,) of the strength of tips about places `at` (n, 3) that a payload uses,
+    at rest and as it is accelerated: its mass [kg] at its centre (3,) [m]. The rest as `Tip.used`.
+    """
+    forces = mass * (np.array([0.0, 0.0, -GRAVITY]) + PUSH * PUSHES)
+    used = [
+        tip.used(outward, radius, apart, force, np.cross(centre - at, force)) for force in forces
+    ]
+    return np.asarray(np.max(used, axis=0))
