@@ -51,7 +51,7 @@ UP = np.array([0.0, 0.0, 1.0])
 
 
 @dataclass(frozen=True, slots=True)
-class Group:
+class TipPlaces:
     """Places (their numbers) that one hand could hold together, the share of the strength of its
     tips that is used by suction and if they are `pinned`, and how badly those that deliver to it
     would hold from below then."""
@@ -190,14 +190,14 @@ class Hands:
             kind, tuple(zip(x, y, z, strict=True)), radius, beam, share, with_tip, early, late
         )
 
-    def _groups(self, robot: int, label: str, kind: Kind, found: Places) -> Iterator[Group]:
+    def _groups(self, robot: int, label: str, kind: Kind, found: Places) -> Iterator[TipPlaces]:
         """Places that one hand could hold together: each alone, and under a payload two on one
         line."""
         carries = kind == "below" and self.holding.is_carrier(robot)
         served = self._served(robot, found) if carries else np.zeros(len(found))
         rows = zip(found.share.tolist(), found.pinned.tolist(), served.tolist(), strict=True)
         for number, row in enumerate(rows):
-            yield Group((number,), *row)
+            yield TipPlaces((number,), *row)
         if kind != "below":
             return
         along = self.holding.axis[robot]
@@ -210,7 +210,7 @@ class Hands:
         shares = strain(tip("suction"), *load), strain(tip("pin"), *load)
         rows = np.column_stack([*shares, served[two].max(axis=1)]).tolist()
         for pair, (share, pinned, bad) in zip(two.tolist(), rows, strict=True):
-            yield Group(tuple(pair), share, pinned, bad)
+            yield TipPlaces(tuple(pair), share, pinned, bad)
 
     def _clear(
         self, robot: int, label: str, kind: Kind, frames: Sequence[tuple[Way, Way]]
