@@ -40,6 +40,11 @@ class HeadStart:
         """Where it goes, an arc length [m]."""
         return float(self.mode.goals[0])
 
+    def is_past(self, at: float) -> bool:
+        """Whether a position is at the goal or beyond it, as a robot that has not delivered yet may
+        be: it does not go back."""
+        return (at - self.goal) * (self.goal - self.start) >= 0.0
+
 
 def stages(layout: Layout, modes: Sequence[Mode]) -> tuple[HeadStart, ...]:
     """Every way that a robot can go ahead: it brings nothing and has others to wait for, and none

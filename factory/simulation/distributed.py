@@ -235,9 +235,10 @@ class DistributedSupervisor:
         if found is None:
             return
         number, stage = found
-        dt, mine = process.period * self.timestep, np.zeros(1, np.intp)
+        dt, mine = process.period * self.timestep, np.flatnonzero(process.axes == stage.axis)
         at, speed = process.reference[mine], process.speed[mine]
-        if abs(at[0] - stage.goal) < ROUNDING and abs(speed[0]) < ROUNDING:
+        there = abs(at[0] - stage.goal) < ROUNDING or stage.is_past(float(at[0]))
+        if there and abs(speed[0]) < ROUNDING:
             if process.goes_ahead:
                 self._stop(process)
                 process.goes_ahead = False

@@ -44,12 +44,22 @@ class Ahead:
         self.of: list[list[int]] = [[] for _ in range(count)]
         self.after: list[list[int]] = [[] for _ in range(count)]
         self.place: dict[int, int] = {}
+        self._stages = dict(enumerate(stages, start=count))
         for number, stage in enumerate(stages, start=count):
             gear = factory.robots[stage.robot].operations
             step = gear.index(stage.operation)
             self.of[stage.operation].append(number)
             self.after[gear[step - 1]].append(number)
             self.place[number] = factory.net.gears[stage.robot].places[2 * step]
+
+    def waiting(self, marked: bytearray, x: Array) -> list[int]:
+        """Those of robots that wait where a run starts, with its axes at `x`, and have a way to
+        go."""
+        return [
+            number
+            for number, stage in self._stages.items()
+            if marked[self.place[number]] and not stage.is_past(float(x[stage.axis]))
+        ]
 
 
 class Supervisor:
@@ -85,7 +95,7 @@ class Supervisor:
         marked = self.threads.marked
         self._activate(
             [o.index for o in factory.operations if marked[o.place]],
-            [number for number, place in self.ahead.place.items() if marked[place]],
+            self.ahead.waiting(marked, self.world.sense()[0]),
         )
 
     @property

@@ -74,14 +74,15 @@ def _delivering(layout: Layout, carrier: int) -> Iterator[tuple[int, str, int]]:
 
 def awaited_positions(layout: Layout) -> dict[int, float]:
     """Where robots go as soon as they have let go, since what they have delivered waits for that:
-    clear of it; and those of feeders home whose hands have to be there before their part."""
+    clear of it; and home those whose hands have to be there before what they take, unless others
+    could be where a tall hand comes to."""
     found: dict[int, float] = {}
     factory = layout.factory
     for robot, hand in enumerate(layout.hands):
         if hand is None or hand.kind == "none":
             continue
         first, last = (factory.operations[factory.robots[robot].operations[n]] for n in (0, -1))
-        if hand.first and not first.inputs:
+        if hand.first and not (first.inputs and hand.tall):
             found[robot] = layout.guidepaths[robot].length
         elif hand.waits and not rises_first(layout, robot):
             clear = _gone(layout, robot, last.label).least + 2 * SPARE
