@@ -89,9 +89,10 @@ class Settings:
 
     @property
     def feeder_limits(self) -> tuple[float, float]:
-        """Speed [m/s] and acceleration [m/s²] of the feeders' sliders: the speed of the tray, eight
-        times the acceleration of a robot."""
-        return self.outfeed, 8 * self.acceleration
+        """Speed [m/s] and acceleration [m/s²] of the feeders' sliders: the speed of the tray, four
+        times the acceleration of a robot. Parts come to within 0.2 mm of pads, so they are not to
+        overshoot."""
+        return self.outfeed, 4 * self.acceleration
 
     @property
     def shutter_limits(self) -> tuple[float, float]:

@@ -99,7 +99,8 @@ def all_ways(
     """The ways ahead, and in MuJoCo the waits for hands, which the ideal world has not."""
     found = ways_ahead(stages, limits, settings, world)
     if world == "mujoco":
-        found |= waits_for_hands(layout, delays, limits, settings)
+        for key, seconds in waits_for_hands(layout, delays, limits, settings).items():
+            found[key] = max(seconds, found.get(key, 0.0))
     return found
 
 

@@ -17,7 +17,7 @@ from factory.modes.staging import HeadStart, staged, stages_of
 from factory.plant.factory import Factory
 from factory.simulation.simulation import start_positions
 from factory.support.settings import Settings
-from factory.timing.prediction import way_time
+from factory.timing.prediction import waits_for_hands, way_time
 from factory.timing.serving import away, leaving
 
 AT_ONCE = 1e6
@@ -84,11 +84,20 @@ class Timing:
         return staged(self.left, self.stages)
 
     def ways(self, change: Change = AS_IT_IS) -> dict[tuple[int, int], float]:
-        """The time [s] of a robot to go ahead to an operation, by (robot, operation)."""
-        return {
+        """The time [s] of a robot to go ahead to an operation, or of a carrier to wait for hands
+        and do it, by (robot, operation)."""
+        found = {
             (stage.robot, stage.operation): self._way(stage, stage.start, change)
             for stage in self.stages
         }
+        if self.world == "mujoco":
+            count = len(self.factory.robots)
+            robots = [*range(count), *self.layout.lifts]
+            limits = self._limits(range(len(robots)), robots, change)
+            waits = waits_for_hands(self.layout, self.changed(change), limits, self.settings)
+            for key, seconds in waits.items():
+                found[key] = max(seconds, found.get(key, 0.0))
+        return found
 
     @cached_property
     def first_ways(self) -> Mapping[tuple[int, int], float]:
