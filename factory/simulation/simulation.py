@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from factory.control.mode import Limits, Mode
-from factory.layout.hands.leaving import rises_first
+from factory.layout.hands.leaving import awaited_positions, rises_first
 from factory.layout.layout import Layout
 from factory.mjcf.timestep import timed
 from factory.modes.modes import operation_modes, robot_limits
@@ -328,13 +328,15 @@ def physical_model(
 def start_positions(layout: Layout, marking: Marking) -> np.ndarray:
     """Every axis in a marking: a robot where its last operation left it, or at its B end where it
     waits with no part at the beginning of its cycle, and then its lift may still be down, unless
-    its hand is above what it takes."""
-    factory, net = layout.factory, layout.factory.net
+    its hand is above what it takes. One that goes back from what it has delivered, and waits there,
+    waits there from the beginning: from its B end it would pass its goals on the way."""
+    factory, net, awaited = layout.factory, layout.factory.net, awaited_positions(layout)
     positions = np.zeros(len(factory.robots) + len(layout.lifts))
     lifts = {robot: len(factory.robots) + n for n, robot in enumerate(layout.lifts)}
     for robot, gear in zip(factory.robots, net.gears, strict=True):
         step = next(i for i, place in enumerate(gear.places) if place in marking) // 2
-        positions[robot.index] = layout.home(robot.index, robot.operations[step])
+        home = layout.home(robot.index, robot.operations[step])
+        positions[robot.index] = home if step else awaited.get(robot.index, home)
         if robot.index in lifts and (step or rises_first(layout, robot.index)):
             positions[lifts[robot.index]] = factory.strokes[robot.index]
     return positions
