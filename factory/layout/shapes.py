@@ -10,7 +10,8 @@ from factory.geometry.solids import Product
 from factory.layout.dimensions import FINGER, MAST, Clearance, up
 from factory.layout.guidepath import Box, Extent, Point2, hull, project
 from factory.layout.hands.choosing import Hands
-from factory.layout.hands.hand import ROOT, Hand
+from factory.layout.hands.hand import Hand
+from factory.layout.hands.limbs import Mount, grip_of
 from factory.layout.layout import carriers
 from factory.layout.sweeps import piles
 from factory.plant.factory import Factory
@@ -162,21 +163,17 @@ def held_shape(
     x, y = (hands.holding.product.middle[:2]).tolist()
     pads = [(px - x, py - y) for px, py, _ in hand.places]
     ahead = [px * u[0] + py * u[1] for px, py in pads]
-    side = pads[0][0] * t[0] + pads[0][1] * t[1]
-    offset, half = round(side, 3), max(hand.radius, FINGER / 2)
-    across, post, least = (side - half, side + half), offset, 0.0
-    rear = min(min(ahead) - half, -arm - ROOT)
-    grip: Extent = (rear, max(ahead) + half, *across)
+    offset = post = round(pads[0][0] * t[0] + pads[0][1] * t[1], 3)
+    least = 0.0
     if hand.tall:
         joined = last if final.index == factory.dropoff.index else lies(final.label)
         reach = arm = up(max(reach, c.c + MAST / 2 - joined[0]))
         if hand.kind == "above" and hands.holding.is_fed(robot):
             post, offset = round((last[2] + last[3]) / 2, 3), round(last[2] - c.c - MAST / 2, 3)
             if hand.waits and robot not in factory.strokes:
-                least = last[1] + max(ahead) - min(ahead) + 2 * half - joined[0] + 2 * c.c
-        across = min(across[0], offset - MAST / 2), max(across[1], offset + MAST / 2)
-        grip = (-reach - MAST / 2, max(ahead) + half, *across)
-    nest = round(max(ahead), 6)
+                thick = 2 * max(hand.radius, FINGER / 2)
+                least = last[1] + max(ahead) - min(ahead) + thick - joined[0] + 2 * c.c
+    grip, nest = grip_of(hand, Mount(u, t, reach, arm, offset, (x, y))), round(max(ahead), 6)
     return Shape(boxes, last, offset, arm, reach, nest, False, spread, hand, grip, post, up(least))
 
 

@@ -18,7 +18,7 @@ from factory.control.mode import Truth
 from factory.geometry.meshes import Array
 from factory.geometry.solids import Product
 from factory.layout.dimensions import FINGER
-from factory.layout.hands.hand import BEAM, Hand, Kind
+from factory.layout.hands.hand import Hand, Kind
 from factory.layout.hands.holding import Holding, held
 from factory.layout.hands.in_the_way import BESIDE, IN_THE_WAY, InTheWay
 from factory.layout.hands.places import Places, centre_of, strain
@@ -40,10 +40,6 @@ that holds well costs nothing."""
 
 PAIRED = 8
 """Of so many places on either side of the centre of mass pairs are tried."""
-
-OVER, LEVEL = 0.01, 0.003
-"""How far above everything the beam of a hand above is, and how far those of robots that lie across
-each other are apart [m]."""
 
 
 UP = np.array([0.0, 0.0, 1.0])
@@ -178,11 +174,7 @@ class Hands:
         radius = float(found.radius[at].min())
         beam = 0.0
         if kind == "above":
-            beam = (
-                self.holding.top(self.holding.last(robot))
-                + OVER
-                + self.holding.axis[robot] * (BEAM + LEVEL)
-            )
+            beam = self._in_the_way.beam(robot, found.chosen(np.array(at)), frames)
         early, late = bool(first[at].any()), round(float(waits[at].max()), 6)
         share = group.share if holds_well else group.pinned
         with_tip: TipName = "suction" if holds_well else "pin"

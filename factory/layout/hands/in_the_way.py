@@ -36,6 +36,10 @@ IN_THE_WAY = {
 BESIDE = 0.001
 """How far a hand stays to its own side of the line of another [m]."""
 
+OVER, LEVEL = 0.01, 0.003
+"""How far above everything the beam of a hand above is, and how far those of robots that lie across
+each other are apart [m]."""
+
 ROD = 0.008
 """Radius of the pad by which a feeder holds a part, at most [m]."""
 
@@ -101,7 +105,7 @@ class InTheWay:
         if last.before[last.template.carrier - 1] == NOPART and len(brought) > 1:
             boxes = [self.holding.box(label) for label in brought]
             middle = float(np.mean([(box[0] + box[1])[axis] / 2 for box in boxes]))
-            halves = np.array([max(r, breadth(r) / 2) for r in found.radius.tolist()])
+            halves = np.maximum(found.radius, _breadths(found) / 2)
             free &= (middle - found.at[:, axis]) * side >= halves + BESIDE / 2
         return free
 
@@ -113,7 +117,21 @@ class InTheWay:
             return np.zeros(len(found))
         axis, side = (0, u[0]) if u[0] else (1, u[1])
         over = (found.at[:, axis] - self._hand_of(carrier, t).places[0][axis]) * side
-        return np.maximum(0.0, over + found.radius + MAST / 2 + BESIDE)
+        half = np.maximum(found.radius, _breadths(found) / 2)
+        return np.maximum(0.0, over + half + MAST / 2 + BESIDE)
+
+    def beam(self, robot: int, at: Places, frames: Sequence[tuple[Way, Way]]) -> float:
+        """How high the beam of a hand above at some places is at its lower edge [m]: over all that
+        its payload is joined to, and over the beam of its carrier where it reaches over the
+        carrier's line."""
+        height = self.holding.top(self.holding.last(robot)) + OVER
+        height += self.holding.axis[robot] * (BEAM + LEVEL)
+        for u, t in frames:
+            if self._crossing(robot, at, u, t).any():
+                carriers = self._hand_of(self.holding.on[robot], t)
+                if carriers.kind == "above":
+                    height = max(height, carriers.beam + BEAM + LEVEL)
+        return height
 
     def _carriers_hand(
         self, robot: int, kind: Kind, found: Places, u: Way, t: Way
@@ -125,8 +143,13 @@ class InTheWay:
             return
         own = swept(*self._reach(kind, found, u), _back(u))
         at, radius = np.array(hand.places), np.full(len(hand.places), hand.radius)
-        theirs = swept(*self._reach(hand.kind, Places(at, radius, radius, radius), t), _back(t))
-        yield (*own, np.stack(theirs, axis=1))
+        low, high = self._reach(hand.kind, Places(at, radius, radius, radius), t)
+        if hand.kind == "above":
+            yield (*own, np.stack((low, high), axis=1))
+            half = max(FINGER, hand.width) / 2
+            low, high = at - half, at + half
+            low[:, 2], high[:, 2] = hand.beam, hand.beam + BEAM
+        yield (*own, np.stack(swept(low, high, _back(t)), axis=1))
 
     def _beside_rod(self, label: str, found: Places, u: Way, t: Way) -> Truth:
         """Whether a part has room for what its feeder holds it by: behind a hand above it, or on
@@ -135,8 +158,7 @@ class InTheWay:
         for (x, y), far in ((u, -1.0), (t, 1.0)):
             axis, way = (0, x) if x else (1, y)
             end = float((solid.high if way * far > 0 else solid.low)[axis])
-            widths = np.array([breadth(radius) for radius in found.radius.tolist()])
-            left = abs(end - found.at[:, axis]) - np.maximum(found.radius, widths / 2)
+            left = abs(end - found.at[:, axis]) - np.maximum(found.radius, _breadths(found) / 2)
             least = min(ROD, float((solid.high - solid.low)[:2].min()) / 4)
             room |= left >= least + BESIDE
         return room
@@ -224,6 +246,8 @@ class InTheWay:
     def _reach(self, kind: Kind, found: Places, u: Way) -> tuple[Array, Array]:
         """The boxes (n, 3) of pad and column, of pad and stem, or of pad and bar."""
         half, at = found.radius[:, None], found.at
+        if kind == "behind":
+            half = np.maximum(half, _breadths(found)[:, None] / 2)
         low, high = at - half, at + half
         if kind == "below":
             low[:, 2], high[:, 2] = self.holding.product.low[2] - 1.0, at[:, 2] - AIR
@@ -235,6 +259,11 @@ class InTheWay:
             axis, ahead = (0, u[0]) if u[0] else (1, u[1])
             (high if ahead > 0 else low)[:, axis] = at[:, axis] - ahead * AIR
         return low, high
+
+
+def _breadths(found: Places) -> Array:
+    """How wide what reaches to places (n,) is [m]."""
+    return np.array([breadth(radius) for radius in found.radius.tolist()])
 
 
 def _back(way: Way) -> Way:

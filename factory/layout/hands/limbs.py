@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
 
 from factory.layout.dimensions import CARRIAGE_TOP, FINGER, FINGER_LOW, FINGER_TOP, MAST, PAYLOAD
-from factory.layout.guidepath import Extent
+from factory.layout.guidepath import Extent, Point2
 from factory.layout.hands.hand import AIR, BEAM, PAD, ROOT, Hand, Point3
 
 if TYPE_CHECKING:
@@ -29,32 +29,73 @@ class Limb:
     lifted: bool = False
 
 
+@dataclass(frozen=True, slots=True)
+class Mount:
+    """Where a hand is mounted: the `heading` u of its robot and the `side` t of its frame; how far
+    behind the product's middle the carriage is (`reach`) and the arm ends (`arm`), and how far to
+    the side t the carriage's line is (`offset`); the product's `middle` (x, y); how far above the
+    floor the product's frame is with the lift down (`up`), and how far that goes up (`stroke`) [m];
+    whether it has a lift."""
+
+    heading: Point2
+    side: Point2
+    reach: float
+    arm: float
+    offset: float
+    middle: Point2
+    up: float = 0.0
+    stroke: float = 0.0
+    lifted: bool = False
+
+    @property
+    def left(self) -> float:
+        """+1 where the side t is to the left of the heading u, -1 where it is to the right."""
+        return self.heading[0] * self.side[1] - self.heading[1] * self.side[0]
+
+    def reached(self, hand: Hand) -> list[Point3]:
+        """Where the pads touch, in the robot's frame, the nearest first."""
+        (x, y), (u, v), (s, t) = self.middle, self.heading, self.side
+        found = []
+        for px, py, pz in hand.places:
+            ahead = (px - x) * u + (py - y) * v + self.reach
+            aside = ((px - x) * s + (py - y) * t - self.offset) * self.left
+            found.append((round(ahead, 6), round(aside, 6) + 0.0, round(pz + self.up, 6)))
+        return sorted(found)
+
+
 def limbs(layout: Layout, robot: int) -> tuple[Limb, ...]:
     """The limbs of a robot's hand; none for a tool, or where nothing can hold."""
     hand = layout.hand(robot)
-    if hand is None:
-        return ()
-    reached = _places(layout, robot, hand)
+    return limbs_of(hand, _mount(layout, robot)) if hand is not None else ()
+
+
+def limbs_of(hand: Hand, mount: Mount) -> tuple[Limb, ...]:
+    """The limbs of a hand that is mounted somewhere; none where nothing can hold."""
     if hand.kind == "below":
-        return tuple(_below(layout, robot, hand, reached))
+        return tuple(_below(mount, hand))
     if hand.kind == "behind":
-        return tuple(_behind(layout, robot, hand, reached[0]))
+        return tuple(_behind(mount, hand))
     if hand.kind == "above":
-        return tuple(_above(layout, robot, hand, reached[0]))
+        return tuple(_above(mount, hand))
     return ()
 
 
 def grip_box(layout: Layout, robot: int) -> Extent | None:
     """The box about the product's middle, in the robot's frame (u, t), of what its hand and mast
     take among the payloads; None for nothing."""
-    found = limbs(layout, robot)
+    hand = layout.hand(robot)
+    return grip_of(hand, _mount(layout, robot)) if hand is not None else None
+
+
+def grip_of(hand: Hand, mount: Mount) -> Extent | None:
+    """The same of a hand that is mounted somewhere."""
+    found = limbs_of(hand, mount)
     if not found:
         return None
-    path = layout.guidepaths[robot]
     ahead = [limb.low[0] for limb in found], [limb.high[0] for limb in found]
-    sides = sorted((min(limb.low[1] for limb in found), max(limb.high[1] for limb in found)))
-    across = sorted(path.offset + side * path.left for side in sides)
-    return min(ahead[0]) - path.reach, max(ahead[1]) - path.reach, across[0], across[1]
+    sides = min(limb.low[1] for limb in found), max(limb.high[1] for limb in found)
+    across = sorted(mount.offset + side * mount.left for side in sides)
+    return min(ahead[0]) - mount.reach, max(ahead[1]) - mount.reach, across[0], across[1]
 
 
 def held_at(layout: Layout, robot: int) -> float:
@@ -62,24 +103,26 @@ def held_at(layout: Layout, robot: int) -> float:
     return layout.elevations[robot] - layout.factory.strokes.get(robot, 0.0)
 
 
-def _places(layout: Layout, robot: int, hand: Hand) -> list[Point3]:
-    """Where the pads touch, in the robot's frame, the nearest first."""
-    path, product = layout.guidepaths[robot], layout.product
-    x, y, _ = product.middle.tolist()
-    up = PAYLOAD - float(product.low[2]) + held_at(layout, robot)
-    (u, v), (s, t) = path.heading, path.side
-    found = []
-    for px, py, pz in hand.places:
-        ahead = (px - x) * u + (py - y) * v + path.reach
-        aside = ((px - x) * s + (py - y) * t - path.offset) * path.left
-        found.append((round(ahead, 6), round(aside, 6) + 0.0, round(pz + up, 6)))
-    return sorted(found)
+def _mount(layout: Layout, robot: int) -> Mount:
+    path, (x, y, _) = layout.guidepaths[robot], layout.product.middle.tolist()
+    up = PAYLOAD - float(layout.product.low[2]) + held_at(layout, robot)
+    lift = layout.factory.strokes.get(robot)
+    return Mount(
+        path.heading,
+        path.side,
+        path.reach,
+        path.arm,
+        path.offset,
+        (x, y),
+        up,
+        lift or 0.0,
+        lift is not None,
+    )
 
 
-def _below(layout: Layout, robot: int, hand: Hand, reached: list[Point3]) -> Iterator[Limb]:
-    path = layout.guidepaths[robot]
-    half, lifted = hand.column / 2, robot in layout.factory.strokes
-    rim, end = path.reach - path.arm - ROOT, reached[-1][0]
+def _below(mount: Mount, hand: Hand) -> Iterator[Limb]:
+    reached, half, lifted = mount.reached(hand), hand.column / 2, mount.lifted
+    rim, end = mount.reach - mount.arm - ROOT, reached[-1][0]
     aside = reached[0][1]
     width = hand.width / 2
     if abs(aside) > FINGER / 2:
@@ -97,10 +140,9 @@ def _below(layout: Layout, robot: int, hand: Hand, reached: list[Point3]) -> Ite
         yield from _rod(f"{which}pad", x, y, hand.radius, low, top, lifted)
 
 
-def _behind(layout: Layout, robot: int, hand: Hand, reached: Point3) -> Iterator[Limb]:
-    x, y, z = reached
-    stroke = layout.factory.strokes.get(robot, 0.0)
-    half, end, lifted = hand.width / 2, x - AIR, bool(stroke)
+def _behind(mount: Mount, hand: Hand) -> Iterator[Limb]:
+    (x, y, z), stroke = mount.reached(hand)[0], mount.stroke
+    half, end, lifted = hand.width / 2, x - AIR, mount.lifted
     yield Limb(
         "tower",
         (-MAST / 2, y - MAST / 2, CARRIAGE_TOP),
@@ -112,11 +154,10 @@ def _behind(layout: Layout, robot: int, hand: Hand, reached: Point3) -> Iterator
     yield Limb("pad", (end - PAD, y - r, z - r), (end, y + r, z + r), "x", lifted)
 
 
-def _above(layout: Layout, robot: int, hand: Hand, reached: Point3) -> Iterator[Limb]:
-    x, y, z = reached
-    product, stroke = layout.product, layout.factory.strokes.get(robot, 0.0)
-    beam = round(hand.beam + PAYLOAD - float(product.low[2]) + held_at(layout, robot), 6)
-    half, wide, top, lifted = FINGER / 2, hand.width / 2, beam + BEAM, bool(stroke)
+def _above(mount: Mount, hand: Hand) -> Iterator[Limb]:
+    (x, y, z), stroke = mount.reached(hand)[0], mount.stroke
+    beam, lifted = round(hand.beam + mount.up, 6), mount.lifted
+    half, wide, top = FINGER / 2, hand.width / 2, beam + BEAM
     yield Limb("tower", (-MAST / 2, -MAST / 2, CARRIAGE_TOP), (MAST / 2, MAST / 2, top + stroke))
     start = MAST / 2 + 0.001
     yield Limb("beam", (start, -half, beam), (x + wide, half, top), "", lifted)

@@ -12,6 +12,7 @@ from factory.control.mode import Index, Truth
 from factory.geometry.meshes import Array
 from factory.geometry.solids import Product
 from factory.layout.hands.hand import Kind
+from factory.layout.hands.outermost import outermost
 from factory.layout.hands.surfaces import Body, Surfaces
 from factory.layout.hands.tips import Tip, tip
 
@@ -214,7 +215,13 @@ def _covered(
     rims = points[None, :, None] + sizes[:, None, None, None] * ring
     found = _face(surfaces, parts, rims.reshape(-1, 3), axis, way).reshape(rims.shape[:3])
     out = np.where(np.isfinite(found), way * found, -np.inf)
-    most = out.max(axis=2)
+    bodies = [body for part in parts for body in surfaces.bodies[part]]
+    most = np.array(
+        [
+            outermost(bodies, points, radius, side, reached)
+            for radius, reached in zip(radii, out.max(axis=2), strict=True)
+        ]
+    )
     reached = most[:, :, None] - out <= BELLOWS * sizes[:, None, None]
     return np.asarray(reached.mean(axis=2)), way * most
 

@@ -9,6 +9,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from itertools import combinations
+from itertools import product as pairs
 
 import numpy as np
 
@@ -26,25 +28,45 @@ FLAT = 1e-9
 
 @dataclass(frozen=True, eq=False)
 class Body:
-    """A convex body: its box `low`, `high` (3,), and its faces: outward `normals` (f, 3) and how
-    far they reach along them, `offsets` (f,) [m]."""
+    """A convex body: its box `low`, `high` (3,) and its `vertices` (n, 3) [m]."""
 
     low: Array
     high: Array
     vertices: Array = field(repr=False)
 
     @cached_property
-    def _faces(self) -> tuple[Array, Array]:
+    def faces(self) -> tuple[Array, Array]:
+        """The outward normals (f, 3) of its faces and how far they reach along them (f,) [m]."""
         found = polytope(self.vertices)
         return found.normals, found.reach
+
+    @cached_property
+    def edges(self) -> Array:
+        """The ends (e, 2, 3) of its edges, and of lines across faces [m]; of what is too thin for
+        faces those of its box."""
+        from scipy.spatial import ConvexHull, QhullError
+
+        try:
+            corners, faces = self.vertices, ConvexHull(self.vertices).simplices
+        except QhullError:
+            corners = np.array([[*p] for p in pairs(*zip(self.low, self.high, strict=True))])
+            return corners[np.array(list(combinations(range(8), 2)))]
+        found = np.sort(np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [0, 2]]]))
+        return np.asarray(corners[np.unique(found, axis=0)])
+
+    @cached_property
+    def boxed(self) -> bool:
+        """Whether it is a box along the axes."""
+        corners = (self.vertices == self.low) | (self.vertices == self.high)
+        return len(np.unique(self.vertices, axis=0)) == 8 and bool(corners.all())
 
     def crossed(self, points: Array, axis: int) -> tuple[Array, Array]:
         """From where to where lines along an axis through points (n, 3), which are within its box
         across it, are inside (n,); (inf, -inf) where a line passes it by."""
-        if len(self.vertices) == 8 and np.isin(self.vertices, [self.low, self.high]).all():
+        if self.boxed:
             count = len(points)  # of a box along the axes
             return np.full(count, self.low[axis]), np.full(count, self.high[axis])
-        normals, offsets = self._faces
+        normals, offsets = self.faces
         across = [a for a in range(3) if a != axis]
         room = offsets - points[:, across] @ normals[:, across].T
         along = normals[:, axis]

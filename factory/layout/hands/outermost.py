@@ -1,0 +1,73 @@
+"""How far out convex bodies reach within round pads, exactly.
+
+Lines through a pad miss the crests and corners between them. Within a disc a body is highest on one
+of its edges, where that is inside the disc, or where one of its faces rises to the disc's rim.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from factory.geometry.meshes import Array
+from factory.layout.hands.surfaces import FLAT, Body
+
+SAME = 1e-6
+"""What reaches no further out by this is not looked at [m]."""
+
+
+def outermost(
+    bodies: Sequence[Body], points: Array, radius: float, side: tuple[int, int], known: Array
+) -> Array:
+    """How far bodies reach on a side, an axis and a way along it, within discs across it about
+    points (n, 3), at least as far as is `known` (n,) [m]."""
+    (axis, way), found = side, known.copy()
+    across = [a for a in range(3) if a != axis]
+    at = points[:, across]
+    for body in bodies:
+        out = way * float((body.high if way > 0 else body.low)[axis])
+        beside = np.maximum(np.maximum(body.low[across] - at, at - body.high[across]), 0.0)
+        near = (np.hypot(*beside.T) < radius) & (found < out - SAME)
+        if near.any():
+            if body.boxed:
+                found[near] = out
+            else:
+                found[near] = np.maximum(found[near], _within(body, at[near], radius, side))
+    return found
+
+
+def _within(body: Body, at: Array, radius: float, side: tuple[int, int]) -> Array:
+    """How far out one body reaches within discs about points (n, 2); -inf for nowhere."""
+    axis, way = side
+    across = [a for a in range(3) if a != axis]
+    on_edges = _on_edges(body.edges[:, :, across], way * body.edges[:, :, axis], at, radius)
+    normals = body.faces[0]
+    level = np.hypot(*normals[:, across].T)
+    rising = normals[(way * normals[:, axis] > FLAT) & (level > FLAT)]
+    if not len(rising):
+        return on_edges
+    up = -rising[:, across] / np.hypot(*rising[:, across].T)[:, None]
+    rim = np.zeros((len(at) * len(up), 3))
+    rim[:, across] = (at[:, None] + radius * up).reshape(-1, 2)
+    first, last = body.crossed(rim, axis)
+    out = np.where(first <= last, last if way > 0 else -first, -np.inf)
+    return np.maximum(on_edges, out.reshape(len(at), -1).max(axis=1))
+
+
+def _on_edges(ends: Array, out: Array, at: Array, radius: float) -> Array:
+    """How far out edges reach within discs: their `ends` (e, 2, 2) in plan, how far `out` (e, 2)
+    they are there."""
+    begin, way = ends[:, 0] - at[:, None], ends[:, 1] - ends[:, 0]
+    square, middle = (way**2).sum(axis=1), (begin * way).sum(axis=2)
+    apart = (begin**2).sum(axis=2) - radius**2
+    upright = square < FLAT**2
+    room = middle**2 - square * apart
+    half = np.sqrt(np.maximum(room, 0.0))
+    square = np.where(upright, 1.0, square)
+    low = np.where(upright, 0.0, np.clip((-middle - half) / square, 0.0, 1.0))
+    high = np.where(upright, 1.0, np.clip((-middle + half) / square, 0.0, 1.0))
+    meets = np.where(upright, apart <= 0, (room > 0) & (low < high))
+    rise = out[:, 1] - out[:, 0]
+    most = out[:, 0] + np.maximum(low * rise, high * rise)
+    return np.asarray(np.where(meets, most, -np.inf).max(axis=1))
