@@ -1,7 +1,7 @@
 """How far out convex bodies reach within round pads, exactly.
 
 Lines through a pad miss the crests and corners between them. Within a disc a body is highest on one
-of its edges, where that is inside the disc, or where one of its faces rises to the disc's rim.
+of its edges, where that is inside the disc, or where the face that rises least comes to the rim.
 """
 
 from __future__ import annotations
@@ -42,17 +42,18 @@ def _within(body: Body, at: Array, radius: float, side: tuple[int, int]) -> Arra
     axis, way = side
     across = [a for a in range(3) if a != axis]
     on_edges = _on_edges(body.edges[:, :, across], way * body.edges[:, :, axis], at, radius)
-    normals = body.faces[0]
-    level = np.hypot(*normals[:, across].T)
-    rising = normals[(way * normals[:, axis] > FLAT) & (level > FLAT)]
-    if not len(rising):
-        return on_edges
-    up = -rising[:, across] / np.hypot(*rising[:, across].T)[:, None]
-    rim = np.zeros((len(at) * len(up), 3))
-    rim[:, across] = (at[:, None] + radius * up).reshape(-1, 2)
+    normals, reach = body.faces
+    facing = way * normals[:, axis] > FLAT
+    up, slopes = np.abs(normals[facing, axis]), normals[facing][:, across]
+    steep = np.hypot(*slopes.T)
+    rises = (reach[facing] - at @ slopes.T + radius * steep) / up
+    # the body is below all its faces, so it rises no higher than the one that rises least
+    least = rises.argmin(axis=1)
+    rim = np.zeros((len(at), 3))
+    rim[:, across] = at - radius * (slopes / np.maximum(steep, FLAT)[:, None])[least]
     first, last = body.crossed(rim, axis)
     out = np.where(first <= last, last if way > 0 else -first, -np.inf)
-    return np.maximum(on_edges, out.reshape(len(at), -1).max(axis=1))
+    return np.asarray(np.maximum(on_edges, out))
 
 
 def _on_edges(ends: Array, out: Array, at: Array, radius: float) -> Array:
