@@ -69,7 +69,7 @@ def waits_for_hands(
     They set out at once."""
     found: dict[tuple[int, int], float] = {}
     for robot in layout.factory.robots:
-        for number, leaving in going_on(layout, robot.index).items():
+        for number, leaving in going_on(layout, robot.index, later=False).items():
             gone = max(_gone(layout, one, limits) for one in leaving) + 2 * settings.tick
             found[robot.index, number] = gone + delays[number]
     return found

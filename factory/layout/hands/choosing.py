@@ -38,6 +38,10 @@ PINNED, WEAK = 1.0, 3.0
 """How bad it is to hold by a pin, which needs a bore, and that there is no place at all. Suction
 that holds well costs nothing."""
 
+WAIT, LONG = 40.0, 1.5
+"""How bad each metre is that a carrier waits for, and all of it at most: 25 mm are as bad as a
+bore."""
+
 PAIRED = 8
 """Of so many places on either side of the centre of mass pairs are tried."""
 
@@ -63,7 +67,8 @@ class TipPlaces:
         at = list(self.chosen)
         bad = float(_bad(np.array(self.share), np.array(self.pinned))) + self.served
         share = self.share if self.share <= ENOUGH else self.pinned
-        return bad, float(waits[at].max()), float(first[at].any()), len(at), share
+        wait = float(waits[at, 0].max())
+        return bad + min(WAIT * wait, LONG), wait, float(first[at].any()), len(at), share
 
 
 class Hands:
@@ -140,9 +145,9 @@ class Hands:
         best: Hand | None = None
         for kind in kinds:
             hand = self._best(robot, label, kind, frames)
-            if hand is not None and (best is None or hand.tip == "suction"):
+            if hand is not None and (best is None or _cost(hand) < _cost(best)):
                 best = hand
-            if best is not None and best.tip == "suction":
+            if best is not None and not _cost(best):
                 break
         if best is not None:
             return best
@@ -175,11 +180,13 @@ class Hands:
         beam = 0.0
         if kind == "above":
             beam = self._in_the_way.beam(robot, found.chosen(np.array(at)), frames)
-        early, late = bool(first[at].any()), round(float(waits[at].max()), 6)
+        early, late = bool(first[at].any()), waits[at].max(axis=0).round(6).tolist()
+        while late and not late[-1]:
+            late.pop()
         share = group.share if holds_well else group.pinned
         with_tip: TipName = "suction" if holds_well else "pin"
         return Hand(
-            kind, tuple(zip(x, y, z, strict=True)), radius, beam, share, with_tip, early, late
+            kind, tuple(zip(x, y, z, strict=True)), radius, beam, share, with_tip, early, (*late,)
         )
 
     def _groups(self, robot: int, label: str, kind: Kind, found: Places) -> Iterator[TipPlaces]:
@@ -208,12 +215,18 @@ class Hands:
         self, robot: int, label: str, kind: Kind, frames: Sequence[tuple[Way, Way]]
     ) -> tuple[Places, Truth, Array]:
         """The places at which a hand is clear of all parts in every frame; whether (n,) it has to
-        be there before what it takes, and how far (n,) it goes back until what it has delivered
-        can leave [m]."""
+        be there before what it takes, and how far (n, k) it goes back until each of the
+        carrier's next operations may start [m]."""
         found = self._in_the_way.on_side(label, kind, frames)
         checks, first, waits = self._in_the_way.checks(robot, label, kind, found, frames)
         free = np.logical_and.reduce([*checks.values(), np.ones(len(found), bool)])
         return found.chosen(free), first[free], waits[free]
+
+
+def _cost(hand: Hand) -> float:
+    """How bad a hand is."""
+    wait = hand.waits[0] if hand.waits else 0.0
+    return PINNED * (hand.tip == "pin") + min(WAIT * wait, LONG)
 
 
 def _bad(share: Array, pinned: Array) -> Array:

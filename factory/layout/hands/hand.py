@@ -44,9 +44,9 @@ class Hand:
     heading; `radius` of a tip [m]; `beam`: how high the beam of a hand above is, in that frame, at
     its lower edge [m]; `share`: which share of the strength of its tips weight and acceleration
     take, as predicted; `tip`: what it holds with; `first`: whether it has to be in its place before
-    what it takes comes there; `waits`: how far it has to go back until what it has delivered can go
-    on, 0 where that need not wait [m]. Of the kind `none` where nothing can hold: `why` says what
-    is in the way."""
+    what it takes comes there; `waits`: how far it has to go back until each of its carrier's next
+    operations may start [m], none where they need not wait. Of the kind `none` where nothing can
+    hold: `why` says what is in the way."""
 
     kind: Kind
     places: tuple[Point3, ...]
@@ -55,13 +55,18 @@ class Hand:
     share: float = 0.0
     tip: TipName = "suction"
     first: bool = False
-    waits: float = 0.0
+    waits: tuple[float, ...] = ()
     why: str = ""
 
     @property
     def tall(self) -> bool:
         """Whether its mast reaches up among the payloads."""
         return self.kind in ("behind", "above")
+
+    @property
+    def clear(self) -> float:
+        """How far it has to go back until none of these waits for it [m]."""
+        return max(self.waits, default=0.0)
 
     @property
     def width(self) -> float:

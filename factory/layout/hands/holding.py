@@ -68,7 +68,11 @@ class Holding:
 
     def around(self, label: str, low: Array, high: Array) -> Array:
         """The boxes of a sub-assembly's bodies among which a hand could come."""
-        boxes = self.boxes(label)
+        return self.beside(self.boxes(label), low, high)
+
+    @staticmethod
+    def beside(boxes: Array, low: Array, high: Array) -> Array:
+        """Those of some boxes that are as high as a hand."""
         if not len(low):
             return boxes[:0]
         floor, top = float(low[:, 2].min()), float(high[:, 2].max()) + 10.0

@@ -13,7 +13,7 @@ from factory.control.mode import Truth
 from factory.geometry.meshes import Array
 from factory.layout.dimensions import FINGER, MAST
 from factory.layout.hands.hand import AIR, BEAM, Hand, Kind, breadth
-from factory.layout.hands.holding import Holding, held
+from factory.layout.hands.holding import Holding
 from factory.layout.hands.places import Places
 from factory.layout.hands.surfaces import Way, hit, retreat, swept
 from factory.problem.pag import NOPART
@@ -65,13 +65,14 @@ class InTheWay:
         the rest as `_clear`."""
         free = {why: np.ones(len(found), bool) for why in IN_THE_WAY}
         free["weak"] &= found.pinned <= 1.0
-        first, waits = np.zeros(len(found), bool), np.zeros(len(found))
+        first, waits = np.zeros(len(found), bool), np.zeros((len(found), 1))
         for u, t in frames:
             free["hands"] &= self._own_side(robot, kind, found, u, t)
             for ways in self._leaving(robot, label, kind, found, u):
                 free["joined"] &= ~hit(*ways)
-            waits = np.maximum(waits, self._going_on(robot, kind, found, u, t))
-            waits = np.maximum(waits, self._crossing(robot, found, u, t))
+            going = self._going_on(robot, kind, found, u, t)
+            going[:, 0] = np.maximum(going[:, 0], self._crossing(robot, found, u, t))
+            waits = np.maximum(waits, going)
             for hand in self._carriers_hand(robot, kind, found, u, t):
                 free["hands"] &= ~hit(*hand)
             for ways in self._coming(robot, label, kind, found, u, t):
@@ -189,14 +190,27 @@ class InTheWay:
                 yield (*back, self.holding.around(other, *back))
 
     def _going_on(self, robot: int, kind: Kind, found: Places, u: Way, t: Way) -> Array:
-        """How far a hand has to go back (n,) [m] until what it has delivered can leave along t,
-        with all that is joined beside it while the hand may still be there."""
-        last = self.holding.last(robot)
-        if last.index == self.holding.factory.dropoff.index:
-            return np.zeros(len(found))
+        """How far a hand has to go back (n, k) [m] until each of the next k operations of its
+        carrier may start, which leaves along t."""
+        if self.holding.last(robot).index == self.holding.factory.dropoff.index:
+            return np.zeros((len(found), 1))
         low, high = self._reach(kind, found, u)
-        whole = held(self.holding.factory, last.carrier, at_last=True)
-        return retreat(low, high, self.holding.around(whole, low, high), (_back(u), _back(t)))
+        ways = _back(u), _back(t)
+        return np.stack(
+            [retreat(low, high, boxes, ways) for boxes in self._onward(robot, low, high)], axis=1
+        )
+
+    def _onward(self, robot: int, low: Array, high: Array) -> Iterator[Array]:
+        """The boxes of what a hand could meet in each of its carrier's next operations: all that is
+        there by the end of the first, and what each later one adds."""
+        factory, last = self.holding.factory, self.holding.last(robot)
+        made = [o for o in self.holding.made(last.carrier) if o.index != factory.dropoff.index]
+        labels = [o.label for o in made[made.index(last) + 1 :]] if last in made else []
+        there: set[str] = set()
+        for label in labels or [last.label]:
+            added = [part for part in factory.contents[label] if part not in there]
+            there.update(added)
+            yield self.holding.beside(self.holding.surfaces.boxes(added), low, high)
 
     def _coming(
         self, robot: int, label: str, kind: Kind, found: Places, u: Way, t: Way

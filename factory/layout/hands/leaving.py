@@ -14,8 +14,11 @@ from factory.layout.hands.limbs import grip_box
 from factory.layout.layout import Layout
 from factory.problem.pag import NOPART
 
-SPARE = 0.005
+SPARE = 0.001
 """A hand is clear that is so far from all that it has delivered to [m]."""
+
+ON = 0.009
+"""A robot whose hand has to be clear goes on by so much: it does not slow down before [m]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,24 +40,28 @@ def leavings(layout: Layout) -> dict[int, tuple[Leaving, ...]]:
             found.setdefault(number, []).extend(leaving)
         first = found.setdefault(robot.operations[0], [])
         if rises_first(layout, robot.index):
-            first.append(_gone(layout, robot.index, ""))
+            first.append(_up(layout, robot.index))
         hand = layout.hand(robot.index)
         if hand is not None and hand.tall:
             first += [
-                _gone(layout, guest, label, lifts=False)
+                _gone_behind(layout, guest, label)
                 for guest, label, _ in _delivering(layout, robot.index)
             ]
     return {number: tuple(dict.fromkeys(leaving)) for number, leaving in found.items() if leaving}
 
 
-def going_on(layout: Layout, carrier: int) -> dict[int, tuple[Leaving, ...]]:
-    """For each operation (index) of a carrier the hands that have delivered to it in the one before
-    and must be clear of that."""
+def going_on(layout: Layout, carrier: int, later: bool = True) -> dict[int, tuple[Leaving, ...]]:
+    """For each operation (index) of a carrier the hands that have delivered to it in the one
+    before, or `later` in any before, and must be clear of what is there."""
     found: dict[int, list[Leaving]] = {}
-    for guest, label, onward in _delivering(layout, carrier):
-        hand = layout.hand(guest)
-        if hand is not None and hand.waits:
-            found.setdefault(onward, []).append(_gone(layout, guest, label))
+    gear = layout.factory.robots[carrier].operations
+    for guest, _, onward in _delivering(layout, carrier):
+        hand, step = layout.hand(guest), gear.index(onward)
+        assert hand is not None
+        for number, back in enumerate(hand.waits if later else hand.waits[:1]):
+            if back:
+                awaited = found.setdefault(gear[(step + number) % len(gear)], [])
+                awaited.append(_gone(layout, guest, back))
     return {number: tuple(leaving) for number, leaving in found.items()}
 
 
@@ -81,11 +88,11 @@ def awaited_positions(layout: Layout) -> dict[int, float]:
     for robot, hand in enumerate(layout.hands):
         if hand is None or hand.kind == "none":
             continue
-        first, last = (factory.operations[factory.robots[robot].operations[n]] for n in (0, -1))
+        first = factory.operations[factory.robots[robot].operations[0]]
         if hand.first and not (first.inputs and hand.tall):
             found[robot] = layout.guidepaths[robot].length
         elif hand.waits and not rises_first(layout, robot):
-            clear = _gone(layout, robot, last.label).least + 2 * SPARE
+            clear = _gone(layout, robot, hand.clear).least + ON
             found[robot] = min(clear, layout.guidepaths[robot].length)
     return found
 
@@ -103,18 +110,24 @@ def rises_first(layout: Layout, robot: int) -> bool:
     return hand is not None and hand.kind == "above" and robot in layout.factory.strokes
 
 
-def _gone(layout: Layout, robot: int, label: str, lifts: bool = True) -> Leaving:
-    """When a robot's hand is clear of a sub-assembly: its lift is up, or it has gone back behind
-    it."""
-    if lifts and rises_first(layout, robot):
-        axis = len(layout.factory.robots) + list(layout.lifts).index(robot)
-        return Leaving(axis, layout.factory.strokes[robot] - SPARE)
-    path, hand = layout.guidepaths[robot], layout.hand(robot)
-    assert hand is not None
-    back = hand.waits
-    if not lifts:
-        grip = grip_box(layout, robot)
-        assert grip is not None
-        back = max(0.0, grip[1] - path.frame(layout.payloads[label])[0])
-    back += SPARE
-    return Leaving(robot, min(path.reach + back, path.length - SPARE))
+def _up(layout: Layout, robot: int) -> Leaving:
+    """When a robot's lift is up."""
+    axis = len(layout.factory.robots) + list(layout.lifts).index(robot)
+    return Leaving(axis, layout.factory.strokes[robot] - SPARE)
+
+
+def _gone(layout: Layout, robot: int, back: float) -> Leaving:
+    """When a robot's hand is clear of what it has to go back from by so much [m], or its lift is
+    up."""
+    if rises_first(layout, robot):
+        return _up(layout, robot)
+    path = layout.guidepaths[robot]
+    return Leaving(robot, min(path.reach + back + SPARE, path.length - SPARE))
+
+
+def _gone_behind(layout: Layout, robot: int, label: str) -> Leaving:
+    """When all of a robot's hand has gone back behind a sub-assembly."""
+    path, grip = layout.guidepaths[robot], grip_box(layout, robot)
+    assert grip is not None
+    back = max(0.0, grip[1] - path.frame(layout.payloads[label])[0])
+    return Leaving(robot, min(path.reach + back + SPARE, path.length - SPARE))
