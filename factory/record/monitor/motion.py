@@ -63,14 +63,14 @@ class _State:
 
 
 class _Setpoints:
-    """When the setpoints of robots (R,) stood last, `still` [s], and moved first after that,
-    `first`; `seen`: when they were looked at."""
+    """When the setpoints of robots (R,) stood last, or came nearer to where they stand, `still`
+    [s], and went from there first after that, `first`; `seen`: when they were looked at."""
 
     def __init__(self, count: int, t: float) -> None:
         self.still, self.first, self.seen = np.full(count, t), np.full(count, t), t
 
     def look(self, moved: NDArray[np.bool_], t: float) -> None:
-        """Some have moved since they were looked at."""
+        """Some have gone off since they were looked at."""
         np.copyto(self.first, t, where=moved & (self.still == self.seen))
         np.copyto(self.still, t, where=~moved)
         self.seen = t
@@ -104,7 +104,8 @@ class AxisMotion:
             # within a tick, a robot that runs its own program has its setpoints written ahead
             self.now = replace(self.now, s=self.before.s)
         else:
-            self.setpoints.look(self.now.s != self.before.s, t)
+            off, before = np.abs(self.now.s - self.spot), np.abs(self.before.s - self.spot)
+            self.setpoints.look(off > before, t)
         now, gone = self.now, self.way != 0.0
         away = now.s - self.spot
         far = np.abs(away) > self.ball
