@@ -44,8 +44,8 @@ class Hand:
     high the beam of a hand above is, in that frame, at its lower edge [m]; `share`: which share of
     the pad's strength weight and acceleration take, as predicted; `first`: whether it has to be in
     its place before what it takes comes there; `waits`: how far it has to go back until what it has
-    delivered can go on, 0 where that need not wait [m]. Of the kind `none` where nothing can hold:
-    `why` says what is in the way."""
+    delivered can go on, 0 where that need not wait [m]. Of the kind `none` where nothing can
+    hold."""
 
     kind: Kind
     places: tuple[Point3, ...]
@@ -54,7 +54,6 @@ class Hand:
     share: float = 0.0
     first: bool = False
     waits: float = 0.0
-    why: str = ""
 
     @property
     def tall(self) -> bool:
