@@ -31,7 +31,7 @@ DOT, RING = 2.4, 9.0
 UNIT = 21.4
 """What the sizes of the legend are multiples of."""
 
-LINE = 96
+LINE = 112
 """The most letters of a line of words."""
 
 WAYS = {"below": "from below", "behind": "from behind", "above": "from above"}

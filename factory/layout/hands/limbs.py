@@ -6,7 +6,16 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
 
-from factory.layout.dimensions import CARRIAGE_TOP, FINGER, FINGER_LOW, FINGER_TOP, MAST, PAYLOAD
+from factory.layout.dimensions import (
+    ARM_LOW,
+    ARM_TOP,
+    CARRIAGE_TOP,
+    FINGER,
+    FINGER_LOW,
+    FINGER_TOP,
+    MAST,
+    PAYLOAD,
+)
 from factory.layout.guidepath import Extent
 from factory.layout.hands.hand import AIR, BEAM, PAD, ROOT, Hand, Point3
 
@@ -57,6 +66,16 @@ def grip_box(layout: Layout, robot: int) -> Extent | None:
     return min(ahead[0]) - path.reach, max(ahead[1]) - path.reach, across[0], across[1]
 
 
+def cross_of(layout: Layout, robot: int) -> tuple[float, float]:
+    """From where to where the arm of a robot in a lane reaches across to the line of its finger, to
+    the left of its carriage's line [m]; (0, 0) where it does not."""
+    hand = layout.hand(robot)
+    if hand is None or hand.kind != "below":
+        return 0.0, 0.0
+    aside, half = _places(layout, robot, hand)[0][1], hand.width / 2
+    return (min(0.0, aside - half), max(0.0, aside + half)) if abs(aside) > FINGER / 2 else (0, 0)
+
+
 def held_at(layout: Layout, robot: int) -> float:
     """How far above its place in the product a robot holds its payload with its lift down [m]."""
     return layout.elevations[robot] - layout.factory.strokes.get(robot, 0.0)
@@ -82,9 +101,11 @@ def _below(layout: Layout, robot: int, hand: Hand, reached: list[Point3]) -> Ite
     rim, end = path.reach - path.arm - ROOT, reached[-1][0]
     aside = reached[0][1]
     width = hand.width / 2
-    if abs(aside) > FINGER / 2:
-        low, high = sorted((0.0, aside))
-        yield Limb("cross", (rim, low - width, FINGER_LOW), (rim + ROOT, high + width, FINGER_TOP))
+    if abs(aside) > FINGER / 2:  # in a lane: it goes across below the fingers of others
+        low, high = cross_of(layout, robot)
+        yield Limb("cross", (rim, low, ARM_LOW), (rim + ROOT, high, ARM_TOP))
+        beside = aside - width, aside + width
+        yield Limb("riser", (rim, beside[0], ARM_TOP), (rim + ROOT, beside[1], FINGER_LOW))
     yield Limb(
         "finger",
         (min(rim, end - width), aside - width, FINGER_LOW),
