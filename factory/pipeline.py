@@ -30,6 +30,7 @@ from factory.support.settings import Settings
 if TYPE_CHECKING:
     from factory.compiler.mating.findings import Matings
     from factory.geometry.solids import Product
+    from factory.layout.hands.misses import NoGrip
     from factory.layout.layout import Layout
 
 
@@ -87,14 +88,15 @@ class Project:
         """What is wrong with the geometry of its parts, what is blocked, and what no hand can
         hold."""
         product = () if is_plain(self.pag) else self.product.warnings
-        return (*product, *(self.matings.warnings if self.matings else ()), *self.no_grips)
+        blocked = self.matings.warnings if self.matings else ()
+        return (*product, *blocked, *(found.warning() for found in self.no_grips))
 
     @cached_property
-    def no_grips(self) -> tuple[Diagnostic, ...]:
+    def no_grips(self) -> tuple[NoGrip, ...]:
         """What no hand can hold, where hands are chosen; nothing for a product of default boxes."""
         if not (self.settings.hands and is_shaped(self.pag)):
             return ()
-        from factory.layout.hands.choosing import no_grips
+        from factory.layout.hands.nearest import no_grips
 
         return no_grips(self.plain, self.product)
 

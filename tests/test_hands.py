@@ -21,11 +21,9 @@ from factory.layout.hands.limbs import limbs
 from factory.layout.hands.surfaces import Surfaces, hit, retreat, swept
 from factory.layout.layout import Layout
 from factory.mjcf import names
-from factory.pipeline import read
 from factory.simulation.request import RunRequest
 from factory.simulation.simulation import Simulation
 from factory.study.fidelity.hidden import HiddenPenetrations
-from factory.support.settings import Settings
 
 EXAMPLES = Path(factory.__file__).parent.parent / "examples"
 AT_MOST_MM = 0.1
@@ -126,30 +124,6 @@ def test_layouts_with_hands_are_certified() -> None:
         assert certify(layout).holds
         hands = {region.robot for region in layout.certificate.regions if region.kind == 9}
         assert hands == {r for r, hand in enumerate(layout.hands) if hand is not None}
-
-
-TUB = """root = all; all = mate ( tub, axle ); axle = mate ( shaft, gear );
-tub = mate ( base, walls ); walls = mate ( left, right, front, back );
-base = atomic ( box = ( 0.1, 0.1, 0.01 ), pos = ( 0, 0, 0.005 ) );
-left = atomic ( box = ( 0.01, 0.1, 0.06 ), pos = ( -0.045, 0, 0.04 ) );
-right = atomic ( box = ( 0.01, 0.1, 0.06 ), pos = ( 0.045, 0, 0.04 ) );
-front = atomic ( box = ( 0.08, 0.01, 0.06 ), pos = ( 0, -0.045, 0.04 ) );
-back = atomic ( box = ( 0.08, 0.01, 0.06 ), pos = ( 0, 0.045, 0.04 ) );
-shaft = atomic ( box = ( 0.01, 0.01, 0.03 ), pos = ( 0, 0, 0.025 ) );
-gear = atomic ( box = ( 0.03, 0.03, 0.01 ), pos = ( 0, 0, 0.045 ) )
-"""
-
-
-def test_what_no_hand_can_hold_is_said(tmp_path: Path) -> None:
-    file = tmp_path / "tub.pag"
-    file.write_text(TUB)
-    asked = read(file, (), Settings(hands=1))
-    (found,) = (warning for warning in asked.warnings if warning.code == "NoGrip")
-    assert "no hand can hold 'axle': above, " in found.message
-    assert "parts that are lowered onto it are in the way" in found.message
-    assert found.position is not None and found.position.line == 1
-    assert not [w for w in read(file).warnings if w.code == "NoGrip"]
-    assert not read(EXAMPLES / "stool.pag", (), Settings(hands=1)).no_grips
 
 
 def test_those_that_wait_for_a_hand_wait_for_one_that_leaves() -> None:

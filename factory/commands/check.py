@@ -25,6 +25,9 @@ if TYPE_CHECKING:
 SHOWN = 24
 """The most robots that are printed, unless `-v` asks for all."""
 
+PICTURES = "Write a picture of each blocked operation, and of what no hand can hold, in a folder."
+"""What `--clashes` does."""
+
 POOLED = 8
 """The most parts whose copies are printed."""
 
@@ -34,7 +37,7 @@ POOLED = 8
 @click.option("--certificate", type=PATH, help="Write the proof here.")
 @click.option("--against", type=PATH, help="Check a proof that --certificate has written.")
 @WIP
-@click.option("--clashes", type=PATH, help="Write a picture of each blocked operation in a folder.")
+@click.option("--clashes", type=PATH, help=PICTURES)
 @RELAY
 @HANDS
 @OUTPUT
@@ -99,12 +102,18 @@ def _claims(proved: dict[str, bool | None]) -> str:
 
 
 def _pictures(checked: Checked, folder: Path) -> dict[Path, bytes]:
-    """The files that `--clashes` writes, one for each blocked operation."""
-    from factory.export.clash_picture import pictures
+    """The files that `--clashes` writes, one for each blocked operation, and for each
+    sub-assembly that no hand can hold."""
+    from factory.export import clash_picture, grip_picture
 
-    if checked.matings is None or checked.product is None:
-        return {}
-    return pictures(folder, checked.matings, checked.product)
+    found: dict[Path, bytes] = {}
+    if checked.product is None:
+        return found
+    if checked.matings is not None:
+        found |= clash_picture.pictures(folder, checked.matings, checked.product)
+    if checked.no_grips:
+        found |= grip_picture.pictures(folder, checked.no_grips, checked.product)
+    return found
 
 
 def project_of(given: ProjectOptions) -> Project:

@@ -4,17 +4,17 @@ bytes."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from factory.compiler.mating.findings import Mating, Matings
+from factory.export.part_view import PartView, bodies_of
 from factory.geometry.meshes import Array
-from factory.geometry.solids import Product, Solid
-from factory.support.canvas import Box, Canvas, Point, shortened
+from factory.geometry.solids import Product
+from factory.support.canvas import Canvas, shortened
 
 WIDTH, VIEWS, EDGE, HEAD, GAP, FOOT = 900.0, 640.0, 50.0, 150.0, 74.0, 92.0
 """Of the sheet: the width of a view and height of both together, the margin, the room for
@@ -65,25 +65,6 @@ def draw(mating: Mating, matings: Matings, product: Product) -> str:
     return _Picture(mating, matings, product).text()
 
 
-@dataclass(frozen=True, slots=True)
-class _View:
-    """A projection `axes` (2, 3) onto a `box` of the sheet, at a scale [1/m], with (x, y) `low` at
-    the lower left and `high` at the upper right [m]."""
-
-    name: str
-    axes: Array
-    low: Array
-    high: Array
-    scale: float
-    box: Box
-
-    def points(self, flat: Array) -> list[Point]:
-        """Projected points (n, 2) on the sheet."""
-        x = self.box[0] + (flat[:, 0] - self.low[0]) * self.scale
-        y = self.box[3] - (flat[:, 1] - self.low[1]) * self.scale
-        return list(zip(x.tolist(), y.tolist(), strict=True))
-
-
 class _Picture:
     """Draws it on a canvas. The parts `striking`, on its way, and `struck` clash after a `shift`
     (3,) [m] of the first from its place."""
@@ -129,7 +110,7 @@ class _Picture:
             pairs = "another pair clashes" if more == 1 else f"{more} other pairs clash"
             self.canvas.text((EDGE, 89), f"{pairs} on the way", 17, "grey")
 
-    def _views(self) -> list[_View]:
+    def _views(self) -> list[PartView]:
         """Plan and side view, one below the other, of the box about the two parts, where they clash
         and finished; for what comes along y the sheet's up is -x."""
         solids = self.product.solids
@@ -149,29 +130,29 @@ class _Picture:
             beside = np.array([(WIDTH / scale - span[0]) / 2, 0.0])
             box = EDGE, EDGE + WIDTH, top, top + float(span[1]) * scale
             ends = flat[name].min(axis=0) - beside, flat[name].max(axis=0) + beside
-            found.append(_View(name, np.stack(axes), *ends, scale, box))
+            found.append(PartView(name, np.stack(axes), *ends, scale, box))
             top = box[3] + GAP
         return found
 
-    def _view(self, view: _View) -> None:
+    def _view(self, view: PartView) -> None:
         """The parts, those farther away first, the two that clash on top, and how deep they are in
         each other."""
         self.canvas.rectangle(view.box, "view")
         solids, here = self.product.solids, np.zeros(3)
-        struck = self._flat(view, self.struck, here)
-        striking = self._flat(view, self.striking, self.shift)
+        struck = view.seen(self.product, self.struck)
+        striking = view.seen(self.product, self.striking, self.shift)
         for number, style, shift in ((0, "standing", here), (-1, "coming", self.shift)):
             labels = self.parts[self.mating.inputs[number]]
-            for name in sorted(labels, key=lambda n: _depth(view, solids[n])):
+            for name in sorted(labels, key=lambda n: view.nearness(solids[n])):
                 if name not in (self.struck, self.striking):
-                    self._area(view, self._flat(view, name, shift), style, name)
-        self._area(view, struck, "struck", self.struck)
-        self._area(view, striking, "striking", self.striking)
-        self._area(view, self._flat(view, self.striking, here), "place")
+                    view.area(self.canvas, view.seen(self.product, name, shift), style, name)
+        view.area(self.canvas, struck, "struck", self.struck)
+        view.area(self.canvas, striking, "striking", self.striking)
+        view.area(self.canvas, view.seen(self.product, self.striking), "place")
         x, y = (view.box[0] + view.box[1]) / 2, (view.box[2] + view.box[3]) / 2
         overlap = self._overlap(view)
         if not overlap.is_empty:
-            self._area(view, overlap, "clash")
+            view.area(self.canvas, overlap, "clash")
             ((x, y),) = view.points(np.array(overlap.centroid.coords))
             left, low, right, high = overlap.bounds
             if max(right - left, high - low) * view.scale < SMALL:
@@ -187,7 +168,7 @@ class _Picture:
             self.canvas.place(at, label, 17.0, 14.0, "name")
         self._approach(view)
 
-    def _approach(self, view: _View) -> None:
+    def _approach(self, view: PartView) -> None:
         """An arrow the way the last input comes, above the view."""
         left, right, y = view.box[0], view.box[1], view.box[2] - 18.0
         middle = (left + right) / 2
@@ -197,57 +178,22 @@ class _Picture:
         axis, sign = "xy"[self.axis], "+" if self.side > 0 else "-"
         self.canvas.text((right, y), f"along {axis}, from {sign}{axis}", 16, "grey", "end")
 
-    def _flat(self, view: _View, label: str, shift: Array) -> Any:
-        """A part as it is seen (shapely geometry) [m]."""
-        from shapely import MultiPoint, union_all
-
-        bodies = _bodies(self.product, label)
-        return union_all([MultiPoint((body + shift) @ view.axes.T).convex_hull for body in bodies])
-
-    def _overlap(self, view: _View) -> Any:
+    def _overlap(self, view: PartView) -> Any:
         """What both parts take up, as it is seen [m]."""
         from shapely import MultiPoint, union_all
 
         common = (
             _common(mine + self.shift, other)
-            for mine in _bodies(self.product, self.striking)
-            for other in _bodies(self.product, self.struck)
+            for mine in bodies_of(self.product, self.striking)
+            for other in bodies_of(self.product, self.struck)
         )
         seen = (corners @ view.axes.T for corners in common if corners is not None)
         return union_all([MultiPoint(corners).convex_hull for corners in seen])
-
-    def _area(self, view: _View, shape: Any, style: str, name: str = "") -> None:
-        """A geometry as one element, as far as it is in view."""
-        from shapely import box
-
-        seen = shape.intersection(box(*view.low, *view.high))
-        if rings := [view.points(ring) for ring in _rings(seen)]:
-            self.canvas.loops(rings, style, name)
 
 
 def millimetres(length: float) -> str:
     """A length in millimetres, to a hundredth."""
     return f"{length * 1e3:.2f}"
-
-
-def _depth(view: _View, solid: Solid) -> float:
-    """How near the middle of a part is to the eye, times two [m]."""
-    return float(np.cross(*view.axes) @ (solid.low + solid.high))
-
-
-def _bodies(product: Product, label: str) -> tuple[Array, ...]:
-    solid = product.solids[label]
-    return solid.pieces or (solid.corners,)
-
-
-def _rings(shape: Any) -> Iterator[Array]:
-    """The rings (n, 2) of all polygons of a geometry."""
-    from shapely import get_coordinates, get_parts
-
-    for area in get_parts(shape):
-        if area.geom_type == "Polygon" and not area.is_empty:
-            for ring in (area.exterior, *area.interiors):
-                yield get_coordinates(ring)[:-1]
 
 
 def _common(one: Array, other: Array) -> Array | None:

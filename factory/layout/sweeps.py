@@ -43,7 +43,8 @@ from factory.layout.dimensions import (
     SIDE,
 )
 from factory.layout.guidepath import Box, Extent, hull
-from factory.layout.hands.limbs import grip_box
+from factory.layout.hands.hand import ROOT
+from factory.layout.hands.limbs import cross_of, grip_box
 from factory.layout.layout import Layout
 from factory.plant.factory import Factory
 from factory.problem.pag import NOPART
@@ -105,6 +106,11 @@ def _bodies(layout: Layout, robot: int) -> Iterator[Region]:
         foot: Extent = (-half, max(ahead, 0.0), -side, side)
         box = hull([path.world(foot, path.carriage(x)) for x in ends])
         yield Region(robot, layer, kind, box, z)
+    if any(across := cross_of(layout, robot)):
+        rim, (low, high) = path.reach - path.arm, sorted(side * path.left for side in across)
+        foot = rim - ROOT, rim, low, high
+        box = hull([path.world(foot, path.carriage(x)) for x in ends])
+        yield Region(robot, ARMS, ARM_BODY, box, (ARM_LOW, ARM_TOP))
 
 
 def _payloads(layout: Layout, robot: int, found: Mapping[str, Pile]) -> Iterator[Region]:

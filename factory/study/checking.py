@@ -20,13 +20,15 @@ from factory.timing.pool import part_pool
 if TYPE_CHECKING:
     from factory.compiler.mating.findings import Matings
     from factory.geometry.solids import Product
+    from factory.layout.hands.misses import NoGrip
 
 
 @dataclass(frozen=True)
 class Checked:
     """A net with its verdict, of a PAG called `name` or read from PNML. `pool`: copies of each part
     that are inside at once; `matings`: how its inputs come together, None where no part has a shape
-    of its own; `product`: None where every part is a default box."""
+    of its own; `product`: None where every part is a default box; `no_grips`: what no hand can
+    hold, None where hands are not chosen."""
 
     name: str
     net: GearNet | MarkedNet
@@ -36,12 +38,14 @@ class Checked:
     matings: Matings | None = None
     product: Product | None = None
     warnings: tuple[Diagnostic, ...] = ()
+    no_grips: tuple[NoGrip, ...] | None = None
 
     def as_json(self) -> dict[str, Any]:
         """The keys of `check --json`."""
         subject = marked(self.net)
         places = subject.net.places
         blocked = self.matings.of_kind("blocked") if self.matings else ()
+        no_grips = None if self.no_grips is None else [found.as_json() for found in self.no_grips]
         return {
             "product": self.name,
             "labels": self.labels,
@@ -55,6 +59,7 @@ class Checked:
             "part_pool": dict(self.pool),
             "approaches": self.matings.as_json() if self.matings else None,
             "clashes": [mating.clashes_as_json() for mating in blocked],
+            **({} if no_grips is None else {"no_grips": no_grips}),
             "warnings": [warning.as_json() for warning in self.warnings],
         }
 
@@ -84,6 +89,7 @@ def check_project(project: Project, wip: int | None = None) -> Checked:
         project.matings,
         None if is_plain(project.pag) else project.product,
         project.warnings,
+        project.no_grips if project.settings.hands else None,
     )
 
 

@@ -20,13 +20,12 @@ from factory.geometry.solids import Product
 from factory.layout.dimensions import FINGER
 from factory.layout.hands.hand import Hand, Kind
 from factory.layout.hands.holding import Holding, held
-from factory.layout.hands.in_the_way import BESIDE, IN_THE_WAY, InTheWay
+from factory.layout.hands.in_the_way import BESIDE, InTheWay
 from factory.layout.hands.places import Places, centre_of, strain
 from factory.layout.hands.surfaces import Way
-from factory.layout.hands.tips import TipName, tip
+from factory.layout.hands.tips import STRONG, TipName, tip
 from factory.plant.factory import Factory
 from factory.problem.pag import NOPART
-from factory.support.errors import Diagnostic
 
 ENOUGH = 0.8
 """A hand holds well if no more than this share of its strength is used."""
@@ -77,7 +76,7 @@ class Hands:
 
     def __init__(self, factory: Factory, product: Product) -> None:
         self.holding = Holding(factory, product)
-        self._in_the_way = InTheWay(self.holding, self._carrier)
+        self.in_the_way = InTheWay(self.holding, self._carrier)
         self._fed: dict[tuple[int, Way, Way], Hand] = {}
         self._carriers: dict[tuple[int, Way], Hand] = {}
 
@@ -105,11 +104,23 @@ class Hands:
     def _carrier(self, robot: int, u: Way) -> Hand:
         found = self._carriers.get((robot, u))
         if found is None:
-            sides = ((u[1], u[0]), (-u[1], -u[0])) if robot else ((0.0, 1.0),)
-            frames = [(u, (x + 0.0, y + 0.0)) for x, y in sides]
+            frames = self._sides(robot, u)
             found = self._chosen(robot, held(self.holding.factory, robot), frames)
             self._carriers[robot, u] = found
         return found
+
+    @staticmethod
+    def _sides(robot: int, u: Way) -> tuple[tuple[Way, Way], ...]:
+        """How a carrier that heads along u may lie."""
+        sides = ((u[1], u[0]), (-u[1], -u[0])) if robot else ((0.0, 1.0),)
+        return tuple((u, (x + 0.0, y + 0.0)) for x, y in sides)
+
+    def all_frames(self, robot: int) -> list[tuple[tuple[Way, Way], ...]]:
+        """How a robot may lie on the floor: together what one hand has to be clear in."""
+        found = list(self.holding.frames(robot))
+        if self.holding.is_carrier(robot):
+            return [self._sides(robot, u) for u in dict.fromkeys(u for u, _ in found)]
+        return [(frame,) for frame in found]
 
     def _served(self, robot: int, found: Places) -> Array:
         """How badly those that deliver to a carrier would hold from below on their own side of its
@@ -135,14 +146,7 @@ class Hands:
 
     def _chosen(self, robot: int, label: str, frames: Sequence[tuple[Way, Way]]) -> Hand:
         """The best place that is clear in all of some frames, of the first kind that has one."""
-        last = self.holding.last(robot)
-        lowered = last.lowered >= 0 and last.robots[last.lowered] == robot
-        kinds: tuple[Kind, ...] = ("below", "behind", "above")
-        if lowered:
-            kinds = ("above", "behind", "below")
-        if self.holding.is_fed(robot) and self.holding.is_carrier(robot):
-            kinds = ("below", "behind")  # the tower of a hand above stands beside a feeder's part
-        best: Hand | None = None
+        kinds, best = self.kinds(robot), None
         for kind in kinds:
             hand = self._best(robot, label, kind, frames)
             if hand is not None and (best is None or _cost(hand) < _cost(best)):
@@ -152,17 +156,16 @@ class Hands:
         if best is not None:
             return best
         x, y, z = centre_of(self.holding.product, self.holding.factory.contents[label])[1].tolist()
-        why = "; ".join(self._missed(robot, label, kind, frames) for kind in kinds)
-        return Hand("none", ((float(x), float(y), float(z)),), why=why)
+        return Hand("none", ((float(x), float(y), float(z)),))
 
-    def _missed(self, robot: int, label: str, kind: Kind, frames: Sequence[tuple[Way, Way]]) -> str:
-        """What is in the way of most places of a kind, in words."""
-        found = self._in_the_way.on_side(label, kind, frames)
-        if not len(found):
-            return f"{kind} there is no place for a pad"
-        checks, _, _ = self._in_the_way.checks(robot, label, kind, found, frames)
-        why, free = min(checks.items(), key=lambda item: int(item[1].sum()))
-        return f"{kind}, {len(found) - int(free.sum())} of {len(found)} places: {IN_THE_WAY[why]}"
+    def kinds(self, robot: int) -> tuple[Kind, ...]:
+        """The kinds of hands that are tried for a robot, the first of them first."""
+        if self.holding.is_fed(robot) and self.holding.is_carrier(robot):
+            return "below", "behind"  # the tower of a hand above stands beside a feeder's part
+        last = self.holding.last(robot)
+        if last.lowered >= 0 and last.robots[last.lowered] == robot:
+            return "above", "behind", "below"
+        return "below", "behind", "above"
 
     def _best(
         self, robot: int, label: str, kind: Kind, frames: Sequence[tuple[Way, Way]]
@@ -179,7 +182,7 @@ class Hands:
         radius = float(found.radius[at].min())
         beam = 0.0
         if kind == "above":
-            beam = self._in_the_way.beam(robot, found.chosen(np.array(at)), frames)
+            beam = self.in_the_way.beam(robot, found.chosen(np.array(at)), frames)
         early, late = bool(first[at].any()), waits[at].max(axis=0).round(6).tolist()
         while late and not late[-1]:
             late.pop()
@@ -217,8 +220,8 @@ class Hands:
         """The places at which a hand is clear of all parts in every frame; whether (n,) it has to
         be there before what it takes, and how far (n, k) it goes back until each of the
         carrier's next operations may start [m]."""
-        found = self._in_the_way.on_side(label, kind, frames)
-        checks, first, waits = self._in_the_way.checks(robot, label, kind, found, frames)
+        found = self.in_the_way.on_side(label, kind, frames)
+        checks, first, waits = self.in_the_way.checks(robot, label, kind, found, frames)
         free = np.logical_and.reduce([*checks.values(), np.ones(len(found), bool)])
         return found.chosen(free), first[free], waits[free]
 
@@ -231,7 +234,7 @@ def _cost(hand: Hand) -> float:
 
 def _bad(share: Array, pinned: Array) -> Array:
     """How bad it is (n,) to hold with tips of which these shares are used."""
-    return np.where(share <= ENOUGH, 0.0, np.where(pinned <= 1.0, PINNED, WEAK))
+    return np.where(share <= ENOUGH, 0.0, np.where(pinned <= STRONG, PINNED, WEAK))
 
 
 def _least(reach: Array, bad: Array, bound: Array) -> Array:
@@ -258,17 +261,3 @@ def _spread(numbers: Sequence[int]) -> list[int]:
     """Some of many, the first and others all over."""
     step = max(1, len(numbers) // (PAIRED // 2))
     return list(dict.fromkeys([*numbers[: PAIRED // 2], *numbers[::step]]))
-
-
-def no_grips(factory: Factory, product: Product) -> tuple[Diagnostic, ...]:
-    """A warning (NoGrip) for each sub-assembly that no hand can hold, however its robot lies."""
-    hands, found = Hands(factory, product), []
-    for robot in factory.robots:
-        chosen = [hands.hand(robot.index, u, t) for u, t in hands.holding.frames(robot.index)]
-        if chosen and all(hand is not None and hand.kind == "none" for hand in chosen):
-            label, why = held(factory, robot.index), chosen[0].why if chosen[0] else ""
-            message = f"no hand can hold '{label}': {why}"
-            hint = "it is held without one; join it in another order, or by a relay from above"
-            position = factory.by_label[label].position
-            found.append(Diagnostic("NoGrip", message, position, hint))
-    return tuple(found)

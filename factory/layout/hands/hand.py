@@ -46,7 +46,7 @@ class Hand:
     take, as predicted; `tip`: what it holds with; `first`: whether it has to be in its place before
     what it takes comes there; `waits`: how far it has to go back until each of its carrier's next
     operations may start [m], none where they need not wait. Of the kind `none` where nothing can
-    hold: `why` says what is in the way."""
+    hold."""
 
     kind: Kind
     places: tuple[Point3, ...]
@@ -56,7 +56,6 @@ class Hand:
     tip: TipName = "suction"
     first: bool = False
     waits: tuple[float, ...] = ()
-    why: str = ""
 
     @property
     def tall(self) -> bool:

@@ -16,6 +16,7 @@ from factory.layout.hands.hand import AIR, BEAM, Hand, Kind, breadth
 from factory.layout.hands.holding import Holding
 from factory.layout.hands.places import Places
 from factory.layout.hands.surfaces import Way, hit, retreat, swept
+from factory.layout.hands.tips import STRONG
 from factory.problem.pag import NOPART
 
 Swept = tuple[Array, Array, Array]
@@ -64,21 +65,17 @@ class InTheWay:
         """Whether a hand at each place (n,) is clear in every frame, by what could be in its way;
         the rest as `_clear`."""
         free = {why: np.ones(len(found), bool) for why in IN_THE_WAY}
-        free["weak"] &= found.pinned <= 1.0
+        free["weak"] &= found.pinned <= STRONG
         first, waits = np.zeros(len(found), bool), np.zeros((len(found), 1))
         for u, t in frames:
             free["hands"] &= self._own_side(robot, kind, found, u, t)
-            for ways in self._leaving(robot, label, kind, found, u):
-                free["joined"] &= ~hit(*ways)
             going = self._going_on(robot, kind, found, u, t)
             going[:, 0] = np.maximum(going[:, 0], self._crossing(robot, found, u, t))
             waits = np.maximum(waits, going)
-            for hand in self._carriers_hand(robot, kind, found, u, t):
-                free["hands"] &= ~hit(*hand)
-            for ways in self._coming(robot, label, kind, found, u, t):
+            for ways in self.coming(robot, label, kind, found, u, t):
                 first |= hit(*ways)
-            for ways in self._lowered(robot, kind, found, u):
-                free["lowered"] &= ~hit(*ways)
+            for why, ways in self.met(robot, label, kind, found, u, t):
+                free[why] &= ~hit(*ways)
         if self.holding.is_fed(robot) and kind != "below":
             free["own"] &= ~first
         if self.holding.is_fed(robot) and kind == "above":
@@ -86,9 +83,20 @@ class InTheWay:
         if kind == "behind" or (kind == "above" and not self.holding.is_fed(robot)):
             first |= True
         for u, t in frames:
-            for later, joined in self._joined(robot, kind, found, u, t):
+            for later, joined in self.joined(robot, kind, found, u, t):
                 free["brought"] &= ~((first | later) & hit(*joined))
         return free, first, waits
+
+    def met(
+        self, robot: int, label: str, kind: Kind, found: Places, u: Way, t: Way
+    ) -> Iterator[tuple[str, Swept]]:
+        """What may not be in the way of a hand at each place, and why it is there."""
+        for ways in self._leaving(robot, label, kind, found, u):
+            yield "joined", ways
+        for ways in self._carriers_hand(robot, kind, found, u, t):
+            yield "hands", ways
+        for ways in self._lowered(robot, kind, found, u):
+            yield "lowered", ways
 
     def _own_side(self, robot: int, kind: Kind, found: Places, u: Way, t: Way) -> Truth:
         """Whether a hand at a place stays on its own side: of the line of the carrier, where that
@@ -142,9 +150,9 @@ class InTheWay:
         carrier = self.holding.on[robot]
         if carrier < 0 or not (hand := self._hand_of(carrier, t)).tall:
             return
-        own = swept(*self._reach(kind, found, u), _back(u))
+        own = swept(*self.reach(kind, found, u), _back(u))
         at, radius = np.array(hand.places), np.full(len(hand.places), hand.radius)
-        low, high = self._reach(hand.kind, Places(at, radius, radius, radius), t)
+        low, high = self.reach(hand.kind, Places(at, radius, radius, radius), t)
         if hand.kind == "above":
             yield (*own, np.stack((low, high), axis=1))
             half = max(FINGER, hand.width) / 2
@@ -170,7 +178,7 @@ class InTheWay:
         """What a hand sweeps as seen from the parts of what it has delivered to, with their boxes,
         as it comes there and leaves: along its heading, and where it lowers its payload from above.
         """
-        last, (low, high) = self.holding.last(robot), self._reach(kind, found, u)
+        last, (low, high) = self.holding.last(robot), self.reach(kind, found, u)
         if last.index == self.holding.factory.dropoff.index:
             back = swept(low, high, _back(u))
             if kind != "behind":
@@ -194,7 +202,7 @@ class InTheWay:
         carrier may start, which leaves along t."""
         if self.holding.last(robot).index == self.holding.factory.dropoff.index:
             return np.zeros((len(found), 1))
-        low, high = self._reach(kind, found, u)
+        low, high = self.reach(kind, found, u)
         ways = _back(u), _back(t)
         return np.stack(
             [retreat(low, high, boxes, ways) for boxes in self._onward(robot, low, high)], axis=1
@@ -212,12 +220,12 @@ class InTheWay:
             there.update(added)
             yield self.holding.beside(self.holding.surfaces.boxes(added), low, high)
 
-    def _coming(
+    def coming(
         self, robot: int, label: str, kind: Kind, found: Places, u: Way, t: Way
     ) -> Iterator[Swept]:
         """The same of what it takes, which is there before it comes home against u: a part, or
         inputs that come from either side."""
-        low, high = self._reach(kind, found, u)
+        low, high = self.reach(kind, found, u)
         own = self.holding.around(label, low, high)
         if not self.holding.is_fed(robot):
             for side in (t, _back(t)):
@@ -229,12 +237,12 @@ class InTheWay:
         else:
             yield (*swept(low, high, u), own)
 
-    def _joined(
+    def joined(
         self, robot: int, kind: Kind, found: Places, u: Way, t: Way
     ) -> Iterator[tuple[bool, Swept]]:
         """The same of each input of its operations, which comes from either side when it is there
         already; with it whether that is so whatever else, since it has a pile by then."""
-        low, high = self._reach(kind, found, u)
+        low, high = self.reach(kind, found, u)
         for operation in self.holding.made(robot):
             later = operation.before[operation.template.carrier - 1] != NOPART
             for guest, label in zip(operation.robots, operation.before, strict=True):
@@ -245,7 +253,7 @@ class InTheWay:
 
     def _lowered(self, robot: int, kind: Kind, found: Places, u: Way) -> Iterator[Swept]:
         """The same of each input that comes down to a carrier from above."""
-        low, high = self._reach(kind, found, u)
+        low, high = self.reach(kind, found, u)
         if kind != "below":
             low, high = swept(low, high, _back(u))
         for operation in self.holding.made(robot):
@@ -257,7 +265,7 @@ class InTheWay:
             boxes[:, 1, 2] = np.inf
             yield low, high, boxes
 
-    def _reach(self, kind: Kind, found: Places, u: Way) -> tuple[Array, Array]:
+    def reach(self, kind: Kind, found: Places, u: Way) -> tuple[Array, Array]:
         """The boxes (n, 3) of pad and column, of pad and stem, or of pad and bar."""
         half, at = found.radius[:, None], found.at
         if kind == "behind":

@@ -6,7 +6,16 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
 
-from factory.layout.dimensions import CARRIAGE_TOP, FINGER, FINGER_LOW, FINGER_TOP, MAST, PAYLOAD
+from factory.layout.dimensions import (
+    ARM_LOW,
+    ARM_TOP,
+    CARRIAGE_TOP,
+    FINGER,
+    FINGER_LOW,
+    FINGER_TOP,
+    MAST,
+    PAYLOAD,
+)
 from factory.layout.guidepath import Extent, Point2
 from factory.layout.hands.hand import AIR, BEAM, PAD, ROOT, Hand, Point3
 
@@ -98,6 +107,16 @@ def grip_of(hand: Hand, mount: Mount) -> Extent | None:
     return min(ahead[0]) - mount.reach, max(ahead[1]) - mount.reach, across[0], across[1]
 
 
+def cross_of(layout: Layout, robot: int) -> tuple[float, float]:
+    """From where to where the arm of a robot in a lane reaches across to the line of its finger, to
+    the left of its carriage's line [m]; (0, 0) where it does not."""
+    hand = layout.hand(robot)
+    if hand is None or hand.kind != "below":
+        return 0.0, 0.0
+    aside, half = _mount(layout, robot).reached(hand)[0][1], hand.width / 2
+    return (min(0.0, aside - half), max(0.0, aside + half)) if abs(aside) > FINGER / 2 else (0, 0)
+
+
 def held_at(layout: Layout, robot: int) -> float:
     """How far above its place in the product a robot holds its payload with its lift down [m]."""
     return layout.elevations[robot] - layout.factory.strokes.get(robot, 0.0)
@@ -125,9 +144,11 @@ def _below(mount: Mount, hand: Hand) -> Iterator[Limb]:
     rim, end = mount.reach - mount.arm - ROOT, reached[-1][0]
     aside = reached[0][1]
     width = hand.width / 2
-    if abs(aside) > FINGER / 2:
-        low, high = sorted((0.0, aside))
-        yield Limb("cross", (rim, low - width, FINGER_LOW), (rim + ROOT, high + width, FINGER_TOP))
+    beside = aside - width, aside + width
+    if abs(aside) > FINGER / 2:  # in a lane: it goes across below the fingers of others
+        low, high = min(0.0, beside[0]), max(0.0, beside[1])
+        yield Limb("cross", (rim, low, ARM_LOW), (rim + ROOT, high, ARM_TOP))
+        yield Limb("riser", (rim, beside[0], ARM_TOP), (rim + ROOT, beside[1], FINGER_LOW))
     yield Limb(
         "finger",
         (min(rim, end - width), aside - width, FINGER_LOW),

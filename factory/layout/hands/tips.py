@@ -19,6 +19,9 @@ TipName = Literal["suction", "pin"]
 """`suction`: a pad with bellows, which holds whatever has a surface. `pin`: a collar that a pin in
 it, locked in a bore of the part, draws onto the surface."""
 
+STRONG = 1.0
+"""No more than this share of a tip's strength may be used."""
+
 TWIST = 1.5
 """A round pad that slips about its middle bears as much as one that slips as a whole at 1/TWIST of
 its radius."""

@@ -84,15 +84,16 @@ def _searched(
     cycle: float | None,
     floor: Point2 | None,
 ) -> _Search:
-    """What was found with relays for these robots alone, such that it can be certified."""
+    """What was found with relays for these robots alone, such that it can be certified, and all
+    that robots in line hold can be held."""
     layout = _roomy(plain, wide, settings, floor)
     chosen = {label: way for label, way in ways(layout).items() if way.robot in wide}
     templates = {o.template.name: o.template for o in plain.factory.operations}
     templates = {**load_templates([templates_folder()]), **templates}
     search = _Search(layout, chosen, templates, load_catalogue(), settings)
     search.look(cycle)
-    while search.ways and not (certificate := certify(search.found)).holds:
-        search.forbid({name for fault in certificate.faults for name in fault.robots})
+    while search.ways and (faulty := search.faulty()):
+        search.forbid(faulty)
         search.look(cycle)
     return search
 
@@ -146,6 +147,18 @@ class _Search:
         while more := self._more():
             self.numbers = {label: n + (label in more) for label, n in self.numbers.items()}
             self.found, self.origins = self._split(self.numbers)
+
+    def faulty(self) -> set[str]:
+        """The robots (by name) of what was found that no hand can hold, though it can without
+        relays; where there are none, those with a fault of the certificate."""
+        robots, hands = self.found.factory.robots, self.found.hands
+        none = {h for h in self.layout.hands if h is not None and h.kind == "none"}
+        held = {
+            robots[number].name
+            for number, hand in enumerate(hands)
+            if hand is not None and hand.kind == "none" and hand not in none
+        }
+        return held or {name for fault in certify(self.found).faults for name in fault.robots}
 
     def forbid(self, robots: Collection[str]) -> None:
         """Cut no way any more that one of these robots (by name) has a piece of; where they have

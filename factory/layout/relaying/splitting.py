@@ -6,13 +6,13 @@ lie in one line, their carriages in two lanes beside it by turns.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from factory.compiler.compiler import compile_pag
 from factory.layout.dimensions import Clearance
-from factory.layout.hands.hand import Hand
 from factory.layout.layout import Guidepath, Layout
+from factory.layout.relaying.in_line import InLine, hands_in_line
 from factory.layout.relaying.naming import Named, named
 from factory.layout.relaying.ways import Way
 from factory.layout.shapes import payload_boxes
@@ -45,18 +45,16 @@ def split(
     before = layout.factory
     names = named(before, numbers)
     factory = compile_pag(names.pag, templates, catalogue, _approaches(before, names))
+    cut = {r: list(_pieces(layout, r, ways, names, factory)) for r in range(len(before.robots))}
+    found = _hands(layout, factory, names, cut)
     paths: dict[int, Guidepath] = {}
     starts: dict[int, float] = {}
-    hands: dict[int, Hand | None] = {}
-    for robot in range(len(before.robots)):
-        pieces = list(_pieces(layout, robot, ways, names, factory))
+    for robot, pieces in cut.items():
+        spread = Clearance(layout.clearance).spread * (-1 if robot in found.turned else 1)
         for number, piece in enumerate(reversed(pieces)):
-            lane = 0.0
-            if len(pieces) > 1:
-                lane = Clearance(layout.clearance).spread * (-1) ** number
+            lane = spread * (-1) ** number if len(pieces) > 1 else 0.0
             paths[piece.robot] = _path(layout.guidepaths[robot], piece, lane)
             starts[piece.robot] = piece.start
-            hands[piece.robot] = layout.hand(robot)
     stations = [0.0] * len(factory.operations)
     for operation in before.operations:
         made = _made(names, factory, operation.label)
@@ -69,11 +67,23 @@ def split(
         factory=factory,
         guidepaths=tuple(paths[robot.index] for robot in factory.robots),
         stations=tuple(stations),
-        hands=tuple(hands[r.index] for r in factory.robots) if layout.hands else (),
+        hands=found.hands,
         payloads=payload_boxes(factory, layout.product),
         certificate=None,
     )
     return relayed, names.origins
+
+
+def _hands(
+    layout: Layout, factory: Factory, names: Named, cut: Mapping[int, Sequence[Piece]]
+) -> InLine:
+    """The hands of robots with relays; none where they are not chosen."""
+    if not layout.hands:
+        return InLine((), frozenset())
+    origins = {piece.robot: robot for robot, pieces in cut.items() for piece in pieces}
+    lines = {r: [p.robot for p in reversed(pieces)] for r, pieces in cut.items() if len(pieces) > 1}
+    relays = {factory.by_label[name].index for added in names.relays.values() for name in added}
+    return hands_in_line(layout, factory, [origins[r.index] for r in factory.robots], lines, relays)
 
 
 def _made(names: Named, factory: Factory, label: str) -> int:

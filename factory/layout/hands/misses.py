@@ -1,0 +1,142 @@
+"""What no hand can hold, and how near each kind of hand comes to it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from factory.geometry.meshes import Array
+from factory.layout.hands.hand import Kind, Point3
+from factory.layout.hands.surfaces import Way
+from factory.support.errors import Diagnostic, Position
+
+THERE = {
+    "joined": "joined to it",
+    "brought": "brought to it",
+    "lowered": "lowered onto it",
+    "own": "its own",
+    "hands": "a hand beside it",
+    "feeder": "its feeder's pad",
+    "weak": "its weight, for which it is too far from its middle",
+}
+"""Why something is in the way of a hand, in few words."""
+
+NAMED = 3
+"""The most parts in the way that a warning names."""
+
+
+@dataclass(frozen=True, slots=True)
+class Obstacle:
+    """A thing in the way of a hand, and `why` it is there: a `part`, "" for a hand. What the hand
+    takes up on its way and the bodies that it meets there, as boxes (n, 2, 3) [m], which may be
+    endless."""
+
+    why: str
+    part: str = ""
+    ways: Array = field(default_factory=lambda: np.zeros((0, 2, 3)), compare=False, repr=False)
+    bodies: Array = field(default_factory=lambda: np.zeros((0, 2, 3)), compare=False, repr=False)
+
+    @property
+    def named(self) -> str:
+        """In words."""
+        if self.why == "own":
+            return f"its own {self.part}"
+        return f"{self.part} {THERE[self.why]}" if self.part else THERE[self.why]
+
+
+@dataclass(frozen=True, slots=True)
+class Miss:
+    """How near a kind of hand is to holding: the places `tried` (n, 3), and of these the nearest
+    miss `at`, None where no pad fits anywhere [m]; the pad's `radius` [m], the `share` of its
+    strength that is used by a pin, the `box` (2, 3) of the hand there, which may be endless, the
+    `heading` of its robot, and what is in its way; what is in the way of most places (`why`)."""
+
+    kind: Kind
+    heading: Way
+    tried: Array = field(compare=False, repr=False)
+    at: Point3 | None = None
+    radius: float = 0.0
+    share: float = 0.0
+    box: Array = field(default_factory=lambda: np.zeros((2, 3)), compare=False, repr=False)
+    obstacles: tuple[Obstacle, ...] = ()
+    why: str = ""
+
+    @property
+    def words(self) -> str:
+        """Where it is and what is in its way, in words."""
+        if self.at is None:
+            return f"{self.kind} there is no place for a pad"
+        at = ", ".join(f"{c * 1e3:.4g}" for c in self.at)
+        weak = f" ({self.strength})" if self.share > 1 else ""
+        return f"{self.kind}, {self.why}, at the nearest miss, ({at}) mm, {self.named}{weak}"
+
+    @property
+    def parts(self) -> tuple[str, ...]:
+        """The parts in the way, each once."""
+        return tuple(dict.fromkeys(found.part for found in self.obstacles if found.part))
+
+    @property
+    def strength(self) -> str:
+        """How strong a hand would be there, in words."""
+        if self.share > 1:
+            return f"it would take {self.share:.3g} times its strength"
+        return f"it would take {100 * self.share:.0f} % of its strength"
+
+    @property
+    def named(self) -> str:
+        """What is in the way, in words."""
+        names = [found.named for found in self.obstacles]
+        more = len(names) - NAMED
+        return ", ".join(names[:NAMED]) + (f" and {more} more" if more > 0 else "")
+
+    def as_json(self) -> dict[str, Any]:
+        """How many places were tried, and the nearest miss."""
+        found = {"kind": self.kind, "tried": len(self.tried)}
+        if self.at is None:
+            return {**found, "at_m": None, "in_the_way": []}
+        return {
+            **found,
+            "most": self.why,
+            "at_m": list(self.at),
+            "heading": list(self.heading),
+            "radius_mm": round(self.radius * 1e3, 4),
+            "strength_used": round(self.share, 4),
+            "in_the_way": [{"part": o.part or None, "why": THERE[o.why]} for o in self.obstacles],
+        }
+
+
+@dataclass(frozen=True, slots=True)
+class NoGrip:
+    """A sub-assembly that no hand can hold: its `robot`, its `parts`, those `beside` them once it
+    is delivered, and the nearest miss of each kind that was tried."""
+
+    label: str
+    robot: str
+    parts: tuple[str, ...]
+    beside: tuple[str, ...]
+    misses: tuple[Miss, ...]
+    position: Position | None = field(default=None, compare=False)
+
+    def warning(self) -> Diagnostic:
+        """What is told of it."""
+        words = "; ".join(miss.words for miss in self.misses)
+        hint = "it is held without one; join it in another order, or by a relay from above"
+        return Diagnostic(
+            "NoGrip",
+            f"no hand can hold '{self.label}': {words}",
+            self.position,
+            f"{hint} (--clashes DIR draws it)",
+        )
+
+    def as_json(self) -> dict[str, Any]:
+        """The nearest misses."""
+        return {
+            "label": self.label,
+            "robot": self.robot,
+            "file": self.position.file if self.position else None,
+            "line": self.position.line if self.position else None,
+            "col": self.position.column if self.position else None,
+            "nearest_misses": [miss.as_json() for miss in self.misses],
+        }

@@ -1,0 +1,168 @@
+"""Look for what no hand can hold, and for the nearest misses: of each kind of hand the place that
+is strong enough and has the fewest things in its way."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from factory.control.mode import Index, Truth
+from factory.geometry.meshes import Array
+from factory.geometry.solids import Product
+from factory.layout.hands.choosing import Hands
+from factory.layout.hands.hand import Kind
+from factory.layout.hands.holding import Holding, held
+from factory.layout.hands.in_the_way import IN_THE_WAY, Swept
+from factory.layout.hands.misses import Miss, NoGrip, Obstacle
+from factory.layout.hands.places import Places
+from factory.layout.hands.surfaces import Way, hit
+from factory.layout.hands.tips import STRONG
+from factory.plant.factory import Factory
+
+Frames = tuple[tuple[Way, Way], ...]
+"""How a robot may lie: along u, to a carrier that lies along t."""
+
+AS_WEAK = 1.5
+"""Where no place is strong, those count that use no more than so many times the least share."""
+
+
+def no_grips(factory: Factory, product: Product) -> tuple[NoGrip, ...]:
+    """Each sub-assembly that no hand can hold, however its robot lies."""
+    hands, found = Hands(factory, product), []
+    for robot in factory.robots:
+        chosen = [hands.hand(robot.index, u, t) for u, t in hands.holding.frames(robot.index)]
+        if chosen and all(hand is not None and hand.kind == "none" for hand in chosen):
+            search = _Search(hands, robot.index, held(factory, robot.index))
+            found.append(search.found())
+    return tuple(found)
+
+
+class _Search:
+    """Looks for the nearest misses of a robot that is to hold a sub-assembly."""
+
+    def __init__(self, hands: Hands, robot: int, label: str) -> None:
+        self.hands, self.in_the_way, self.holding = hands, hands.in_the_way, hands.holding
+        self.robot, self.label = robot, label
+        self.all_frames = hands.all_frames(robot)
+        self._parts = _named_boxes(self.holding)
+        self._own = frozenset(self.holding.factory.contents[label])
+
+    def found(self) -> NoGrip:
+        """What is told of it."""
+        factory, last = self.holding.factory, self.holding.last(self.robot).label
+        made = factory.contents.get(last, factory.contents[factory.pag.root])
+        return NoGrip(
+            self.label,
+            factory.robots[self.robot].name,
+            factory.contents[self.label],
+            tuple(part for part in made if part not in self._own),
+            tuple(self.nearest(kind) for kind in self.hands.kinds(self.robot)),
+            factory.by_label[self.label].position,
+        )
+
+    def nearest(self, kind: Kind) -> Miss:
+        """The nearest miss of a kind of hand, however the robot lies."""
+        best: tuple[tuple[bool, int, float], Frames, Places] | None = None
+        for frames in self.all_frames:
+            found = self.in_the_way.on_side(self.label, kind, frames)
+            if not len(found):
+                continue
+            number = self._counted(kind, found, frames)
+            enough = max(STRONG, AS_WEAK * float(found.pinned.min()))
+            place = np.lexsort((found.pinned, number, found.pinned > enough))[0]
+            share = float(found.pinned[place])
+            rank = share > STRONG, int(number[place]), share
+            if best is None or rank < best[0]:
+                best = rank, frames, found.chosen(np.arange(len(found)) == place)
+        if best is None:
+            return Miss(kind, self.all_frames[0][0][0], np.zeros((0, 3)))
+        _, frames, place = best
+        x, y, z = place.at[0].tolist()
+        low, high = self.in_the_way.reach(kind, place, frames[0][0])
+        return Miss(
+            kind,
+            frames[0][0],
+            self.in_the_way.on_side(self.label, kind, frames).at,
+            (round(x, 6), round(y, 6), round(z, 6)),
+            float(place.radius[0]),
+            float(place.pinned[0]),
+            np.array([low[0], high[0]]),
+            self._obstacles(kind, place, frames),
+            self._why(kind, frames),
+        )
+
+    def _why(self, kind: Kind, frames: Frames) -> str:
+        """What is in the way of most places, in words."""
+        found = self.in_the_way.on_side(self.label, kind, frames)
+        checks, _, _ = self.in_the_way.checks(self.robot, self.label, kind, found, frames)
+        why, free = min(checks.items(), key=lambda item: int(item[1].sum()))
+        return f"{len(found) - int(free.sum())} of {len(found)} places: {IN_THE_WAY[why]}"
+
+    def _counted(self, kind: Kind, found: Places, frames: Frames) -> Index:
+        """How many things are in the way of a hand at each place (n,)."""
+        things: dict[tuple[str, str], Truth] = {}
+        for key, met, _, _ in self._met(kind, found, frames):
+            things[key] = things.get(key, np.zeros(len(found), bool)) | met
+        return np.asarray(np.sum([np.zeros(len(found), np.intp), *things.values()], axis=0))
+
+    def _obstacles(self, kind: Kind, place: Places, frames: Frames) -> tuple[Obstacle, ...]:
+        """What is in the way of a hand at one place."""
+        things: dict[tuple[str, str], tuple[list[Array], list[Array]]] = {}
+        for key, met, way, body in self._met(kind, place, frames):
+            if met[0]:
+                ways, bodies = things.setdefault(key, ([], []))
+                if way is not None and body is not None:
+                    ways.append(np.array([way[0][0], way[1][0]]))
+                    bodies.append(body)
+        return tuple(
+            Obstacle(why, part, np.reshape(ways, (-1, 2, 3)), np.reshape(bodies, (-1, 2, 3)))
+            for (why, part), (ways, bodies) in things.items()
+        )
+
+    def _met(
+        self, kind: Kind, found: Places, frames: Frames
+    ) -> Iterator[tuple[tuple[str, str], Truth, tuple[Array, Array] | None, Array | None]]:
+        """Why and which part, whether that is in the way of a hand at each place (n,), what the
+        hand sweeps there (low and high), and the part's box (2, 3); None for both where it is no
+        matter of boxes."""
+        checks, _, _ = self.in_the_way.checks(self.robot, self.label, kind, found, frames)
+        for why, late, (low, high, boxes) in self._ways(kind, found, frames):
+            for box in boxes:
+                met = late & hit(low, high, box[None])
+                if met.any():
+                    part = "" if why == "hands" else self._parts.get(_key(box), "")
+                    own = why == "joined" and part in self._own
+                    yield ("own" if own else why, part), met, (low, high), box
+        for why in ("weak", "hands", "feeder"):
+            if not checks[why].all():
+                yield (why, ""), ~checks[why], None, None
+
+    def _ways(
+        self, kind: Kind, found: Places, frames: Frames
+    ) -> Iterator[tuple[str, Truth, Swept]]:
+        """What may be in the way and why, with the places (n,) where that matters."""
+        robot, label, always = self.robot, self.label, np.ones(len(found), bool)
+        _, first, _ = self.in_the_way.checks(robot, label, kind, found, frames)
+        own = self.holding.is_fed(robot) and kind != "below"
+        for u, t in frames:
+            for why, ways in self.in_the_way.met(robot, label, kind, found, u, t):
+                yield why, always, ways
+            for ways in self.in_the_way.coming(robot, label, kind, found, u, t) if own else ():
+                yield "own", always, ways
+            for later, ways in self.in_the_way.joined(robot, kind, found, u, t):
+                yield "brought", first | later, ways
+
+
+def _named_boxes(holding: Holding) -> dict[tuple[float, ...], str]:
+    """The part that a box of a body is of."""
+    return {
+        _key(np.array([body.low, body.high])): part
+        for part, bodies in holding.surfaces.bodies.items()
+        for body in bodies
+    }
+
+
+def _key(box: Array) -> tuple[float, ...]:
+    """A box (2, 3) without its upper end, which is endless for what is lowered."""
+    return tuple(np.round(box.ravel()[:5], 9).tolist())

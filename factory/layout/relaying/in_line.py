@@ -1,0 +1,158 @@
+"""The hands of robots that relay each other.
+
+They run in one line, in two lanes beside it by turns. Giver and taker of a hand-over hold different
+places, each on the side of the line on which its carriage runs, from below. So nothing of one comes
+over the line, and none of two meets the other, whatever the robots do. As seen from what is handed
+over every hand leaves against its heading and comes from ahead.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from factory.layout.dimensions import ARM_WIDTH
+from factory.layout.hands.choosing import Hands
+from factory.layout.hands.hand import Hand
+from factory.layout.hands.holding import held
+from factory.layout.hands.places import Places, centre_of
+from factory.layout.hands.surfaces import Way
+from factory.layout.hands.tips import STRONG
+from factory.layout.layout import Layout, carriers
+from factory.layout.relaying.lanes import HoldingInLanes, InTheWayInLanes, Lane
+from factory.plant.factory import Factory
+
+
+@dataclass(frozen=True, slots=True)
+class InLine:
+    """The hands of a factory with relays, and the robots (of that without) whose lanes are the
+    other way round."""
+
+    hands: tuple[Hand | None, ...]
+    turned: frozenset[int]
+
+
+def hands_in_line(
+    before: Layout,
+    factory: Factory,
+    origins: Sequence[int],
+    lines: Mapping[int, Sequence[int]],
+    relays: Collection[int],
+) -> InLine:
+    """The hands of a factory with hand-overs in line, the operations `relays`: new ones of the
+    robots that have one guidepath now, the last first (`lines`, by the robot whose it was), of
+    others those of the robots that they were (`origins`). Of the kind `none` where nothing can
+    hold strongly enough."""
+    cut = {robot for pieces in lines.values() for robot in pieces}
+    settled = [None if robot in cut else before.hand(old) for robot, old in enumerate(origins)]
+    choice = _Choice(before, HoldingInLanes(before, factory, origins, cut, relays), settled)
+    on, turned = carriers(before.factory), set()
+    for old in sorted(lines, key=lambda robot: _depth(on, robot)):
+        if choice.settle(old, on[old], lines[old]) < 0:
+            turned.add(old)
+    return InLine(tuple(settled), frozenset(turned))
+
+
+def _depth(on: Sequence[int], robot: int) -> int:
+    """How many robots carry on what a robot delivers."""
+    count = 0
+    while on[robot] >= 0:
+        count, robot = count + 1, on[robot]
+    return count
+
+
+class _Choice(Hands):
+    """Chooses the hands of robots in lanes, those of carriers first, and of those that deliver to
+    them; `settled`: those that are chosen."""
+
+    holding: HoldingInLanes
+    in_the_way: InTheWayInLanes
+
+    def __init__(self, before: Layout, holding: HoldingInLanes, settled: list[Hand | None]) -> None:
+        self.before, self.holding, self.settled = before, holding, settled
+        self.lanes: dict[int, Lane] = {}
+        self.in_the_way = InTheWayInLanes(holding, self.lanes, settled)
+
+    def settle(self, old: int, carrier: int, pieces: Sequence[int]) -> int:
+        """Choose the hands of the robots that have a robot's guidepath now, and its lanes: gives
+        which way round, +1 or -1."""
+        known = self.before.hand(old)
+        if known is None or known.kind == "none":
+            for robot in pieces:
+                self.settled[robot] = known
+            return 1
+        tried = []
+        for way in (1, -1):
+            hands = self._hands(old, carrier, pieces, way, max(STRONG, known.share))
+            lacking = sum(hand.kind == "none" for hand in hands.values())
+            tried.append((lacking, max(hand.share for hand in hands.values()), way, hands))
+            if not lacking and tried[-1][1] <= STRONG:
+                break
+        _, _, way, hands = min(tried, key=lambda found: found[:2])
+        for robot, hand in hands.items():
+            self.settled[robot] = hand
+        return way
+
+    def _hands(
+        self, old: int, carrier: int, pieces: Sequence[int], way: int, most: float
+    ) -> dict[int, Hand]:
+        """The hands of the robots that have a robot's guidepath now, and of those that deliver to
+        them, with the lanes one way round."""
+        found: dict[int, Hand] = {}
+        for number, robot in enumerate(pieces):
+            self.lanes[robot] = self._lane(old, carrier, pieces, way * (-1) ** number)
+        for robot in pieces:
+            lane = self.lanes[robot]
+            found[robot] = self._below(robot, [(lane.heading, lane.toward)], most)
+        for robot in pieces:
+            self.settled[robot] = found[robot]
+        for robot in pieces:
+            guests = {g for o in self.holding.made(robot) for g in o.robots} - {robot}
+            for guest in sorted(guests):
+                if hand := self._guest(guest, robot):
+                    found[guest] = hand
+        return found
+
+    def _guest(self, guest: int, robot: int) -> Hand | None:
+        """The hand from below of a robot that delivers to one in a lane, on its own side; None
+        where it has none from below, or where that is to be chosen."""
+        known = self.before.hand(self.holding.origins[guest])
+        if self.holding.on[guest] != robot or self.holding.cut(guest):
+            return None
+        if known is None or known.kind != "below":
+            return None
+        u, t = self.holding.headings[guest], self.holding.headings[robot]
+        sides = (t, (-t[0], -t[1])) if self.holding.is_carrier(guest) else (t,)
+        at, radius = np.array(known.places), np.full(len(known.places), known.radius)
+        self.in_the_way.kept[guest] = known
+        free = self.in_the_way.own_side(guest, Places(at, radius, radius, radius), u, t)
+        if free.all():
+            return known
+        return self._below(guest, [(u, side) for side in sides], max(STRONG, known.share))
+
+    def _lane(self, old: int, carrier: int, pieces: Sequence[int], side: int) -> Lane:
+        """A lane to one side (of the guidepath's own) of a robot's guidepath. What the robots hold
+        is divided near its centre of mass, where their crosses do not come to each other's arms."""
+        path, layout = self.before.guidepaths[old], self.before
+        toward = layout.guidepaths[carrier].heading if carrier >= 0 else (0.0, 1.0)
+        across, way = (0 if path.side[0] else 1), round(path.side[0] + path.side[1])
+        under = float(layout.product.middle[across]) + path.offset * way
+        parts = self.holding.factory.contents[held(self.holding.factory, pieces[-1])]
+        middle = float(centre_of(layout.product, parts)[1][across])
+        c = self.holding.clearance
+        room = c.spread - ARM_WIDTH / 2 - c.c / 2
+        line = min(max(middle, under - room), under + room)
+        return Lane(path.heading, toward, line, side * way)
+
+    def _below(self, robot: int, frames: Sequence[tuple[Way, Way]], most: float) -> Hand:
+        """The best hand from below of a robot, of whose strength no more than so much is used; of
+        the kind `none` if there is none."""
+        label = held(self.holding.factory, robot)
+        found = self._best(robot, label, "below", frames)
+        if found is not None and found.share <= most:
+            return found
+        parts = self.holding.factory.contents[label]
+        x, y, z = centre_of(self.holding.product, parts)[1].tolist()
+        return Hand("none", ((x, y, z),), share=most)

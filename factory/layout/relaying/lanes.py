@@ -1,0 +1,144 @@
+"""What robots in lanes hold, and what is in the way of their hands there."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from factory.control.mode import Truth
+from factory.geometry.meshes import Array
+from factory.layout.dimensions import CARRIAGE, FINGER, Clearance
+from factory.layout.hands.hand import Hand, Kind, breadth
+from factory.layout.hands.holding import Holding, held
+from factory.layout.hands.in_the_way import BESIDE, InTheWay, Swept
+from factory.layout.hands.places import Places
+from factory.layout.hands.surfaces import Way, swept
+from factory.layout.layout import Layout
+from factory.plant.factory import Factory, Operation
+
+
+@dataclass(frozen=True, slots=True)
+class Lane:
+    """Where a robot runs that relays another: how it lies (`heading`, and `toward`, that of the
+    carrier at the end of the line), the `line` across its heading in the frame of the product [m]
+    to one `side` of which (+1, -1 along the axis) its lane is and it holds."""
+
+    heading: Way
+    toward: Way
+    line: float
+    side: int
+
+    @property
+    def across(self) -> int:
+        """The axis across its heading."""
+        return 1 if self.heading[0] else 0
+
+
+SAME = 1e-5
+"""Places that are no further apart across are on one line [m]."""
+
+NOTHING = Hand("none", ((0.0, 0.0, 0.0),))
+"""Where there is no hand."""
+
+
+class HoldingInLanes(Holding):
+    """As `Holding`; hand-overs in line are no operations that others come to."""
+
+    def __init__(
+        self,
+        before: Layout,
+        factory: Factory,
+        origins: Sequence[int],
+        cut: Collection[int],
+        relays: Collection[int],
+    ) -> None:
+        super().__init__(factory, before.product)
+        self.relays, self.clearance = relays, Clearance(before.clearance)
+        self.origins, self._cut = origins, cut
+        self.headings = [before.guidepaths[old].heading for old in origins]
+        for robot in cut:
+            self.axis[robot] = 0 if self.headings[robot][0] else 1
+
+    def made(self, robot: int) -> list[Operation]:
+        return [o for o in super().made(robot) if o.index not in self.relays]
+
+    def cut(self, robot: int) -> bool:
+        """Whether a robot has a piece of a guidepath."""
+        return robot in self._cut
+
+    def gives(self, robot: int) -> bool:
+        """Whether a robot delivers to one in line with it."""
+        return self.last(robot).index in self.relays
+
+    def takes(self, robot: int) -> bool:
+        """Whether a robot takes over from one in line with it."""
+        return self.factory.robots[robot].operations[0] in self.relays
+
+
+class InTheWayInLanes(InTheWay):
+    """As `InTheWay`, for robots in lanes, and for those whose hands are chosen anew on the line of
+    the one that was `kept`; `settled`: the hands that are chosen already."""
+
+    holding: HoldingInLanes
+
+    def __init__(
+        self, holding: HoldingInLanes, lanes: Mapping[int, Lane], settled: Sequence[Hand | None]
+    ) -> None:
+        super().__init__(holding, lambda robot, _: settled[robot] or NOTHING)
+        self.lanes, self.kept = lanes, dict[int, Hand]()
+
+    def _own_side(self, robot: int, kind: Kind, found: Places, u: Way, t: Way) -> Truth:
+        if robot in self.kept:
+            known, across = self.kept[robot], 1 if u[0] else 0
+            free: Truth = np.abs(found.at[:, across] - known.places[0][across]) < SAME
+            free &= found.radius <= max(known.radius, FINGER / 2) + SAME
+            return free & super()._own_side(robot, kind, found, u, t)
+        lane, c = self.lanes[robot], self.holding.clearance
+        wide = np.array([breadth(radius) / 2 for radius in found.radius.tolist()])
+        away = (found.at[:, lane.across] - lane.line) * lane.side
+        free = (away - wide >= c.c / 2) & (away - found.radius >= BESIDE)
+        free &= away + wide <= c.spread + CARRIAGE / 2
+        if self.holding.gives(robot):
+            return free
+        return free & super()._own_side(robot, kind, found, u, t)
+
+    def own_side(self, robot: int, found: Places, u: Way, t: Way) -> Truth:
+        """Whether a hand from below at a place (n,) stays on its own side."""
+        return self._own_side(robot, "below", found, u, t)
+
+    def _going_on(self, robot: int, kind: Kind, found: Places, u: Way, t: Way) -> Array:
+        if self.holding.gives(robot):
+            return np.zeros((len(found), 1))
+        return super()._going_on(robot, kind, found, u, t)
+
+    def _crossing(self, robot: int, found: Places, u: Way, t: Way) -> Array:
+        if self.holding.gives(robot):
+            return np.zeros(len(found))
+        return super()._crossing(robot, found, u, t)
+
+    def _carriers_hand(
+        self, robot: int, kind: Kind, found: Places, u: Way, t: Way
+    ) -> Iterator[Swept]:
+        if not self.holding.gives(robot):
+            yield from super()._carriers_hand(robot, kind, found, u, t)
+
+    def _leaving(
+        self, robot: int, label: str, kind: Kind, found: Places, u: Way
+    ) -> Iterator[Swept]:
+        """Also what a hand sweeps as it comes to what it takes over, from ahead."""
+        low, high = self.reach(kind, found, u)
+        if self.holding.takes(robot):
+            yield (*swept(low, high, u), self.holding.around(label, low, high))
+        if self.holding.gives(robot):
+            last = held(self.holding.factory, robot, at_last=True)
+            yield (*swept(low, high, (-u[0], -u[1])), self.holding.around(last, low, high))
+        else:
+            yield from super()._leaving(robot, label, kind, found, u)
+
+    def coming(
+        self, robot: int, label: str, kind: Kind, found: Places, u: Way, t: Way
+    ) -> Iterator[Swept]:
+        if not self.holding.takes(robot):
+            yield from super().coming(robot, label, kind, found, u, t)

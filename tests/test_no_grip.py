@@ -1,0 +1,132 @@
+"""What no hand can hold is told, with the nearest misses and what is in their way, and drawn."""
+
+from __future__ import annotations
+
+from functools import cache
+from pathlib import Path
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+
+from factory.export.grip_picture import picture_names
+from factory.layout.hands.choosing import STRONG
+from factory.layout.hands.misses import NoGrip
+from factory.pipeline import read
+from factory.support.settings import Settings
+from tests.command_line import ROOT, Terminal
+
+GEARBOX = ROOT / "examples" / "gearbox.pag"
+
+TUB = """root = all; all = mate ( tub, axle ); axle = mate ( shaft, gear );
+tub = mate ( base, walls ); walls = mate ( left, right, front, back );
+base = atomic ( box = ( 0.1, 0.1, 0.01 ), pos = ( 0, 0, 0.005 ) );
+left = atomic ( box = ( 0.01, 0.1, 0.06 ), pos = ( -0.045, 0, 0.04 ) );
+right = atomic ( box = ( 0.01, 0.1, 0.06 ), pos = ( 0.045, 0, 0.04 ) );
+front = atomic ( box = ( 0.08, 0.01, 0.06 ), pos = ( 0, -0.045, 0.04 ) );
+back = atomic ( box = ( 0.08, 0.01, 0.06 ), pos = ( 0, 0.045, 0.04 ) );
+shaft = atomic ( box = ( 0.01, 0.01, 0.03 ), pos = ( 0, 0, 0.025 ) );
+gear = atomic ( box = ( 0.03, 0.03, 0.01 ), pos = ( 0, 0, 0.045 ) )
+"""
+
+
+@pytest.fixture
+def tub(tmp_path: Path) -> Path:
+    """An axle whose gear is lowered onto its shaft, in a tub: no hand can hold it."""
+    file = tmp_path / "tub.pag"
+    file.write_text(TUB)
+    return file
+
+
+def found(file: Path) -> tuple[NoGrip, ...]:
+    return read(file, (), Settings(hands=1)).no_grips
+
+
+@cache
+def of_the_gearbox() -> tuple[NoGrip, ...]:
+    return found(GEARBOX)
+
+
+def test_what_no_hand_can_hold_is_said(tub: Path) -> None:
+    asked = read(tub, (), Settings(hands=1))
+    (told,) = (warning for warning in asked.warnings if warning.code == "NoGrip")
+    assert (
+        "no hand can hold 'axle': above, 180 of 180 places: parts that are lowered" in told.message
+    )
+    assert "at the nearest miss, (0, 9, 50) mm, gear lowered onto it; behind, " in told.message
+    assert told.position is not None and told.position.line == 1
+    assert not [w for w in read(tub).warnings if w.code == "NoGrip"]
+    assert not found(ROOT / "examples" / "stool.pag")
+
+
+def test_the_nearest_miss_is_free_without_what_is_in_its_way(tub: Path) -> None:
+    """What is named is what there is: without the wall behind a hand from behind can hold."""
+    (grip,) = found(tub)
+    behind = next(miss for miss in grip.misses if miss.kind == "behind")
+    assert behind.named in [f"{wall} joined to it" for wall in ("front", "back", "left", "right")]
+    (wall,) = behind.parts
+    lines = [line for line in TUB.splitlines() if not line.startswith(f"{wall} =")]
+    walls = [w for w in ("left", "right", "front", "back") if w != wall]
+    tub.write_text("\n".join(lines).replace("left, right, front, back", ", ".join(walls)))
+    assert not found(tub)
+
+
+@pytest.mark.parametrize("name", ["input", "output"])
+def test_a_miss_is_met_by_all_that_it_names(name: str) -> None:
+    grip = next(grip for grip in of_the_gearbox() if grip.label == name)
+    assert {miss.kind for miss in grip.misses} == {"below", "behind", "above"}
+    for miss in grip.misses:
+        assert miss.at is not None and miss.obstacles
+        assert np.abs(miss.tried - miss.at).max(axis=1).min() < 1e-6
+        for obstacle in miss.obstacles:
+            if not obstacle.part:
+                assert obstacle.why in ("weak", "hands", "feeder")
+                continue
+            low = np.maximum(obstacle.ways[:, 0], obstacle.bodies[:, 0])
+            high = np.minimum(obstacle.ways[:, 1], obstacle.bodies[:, 1])
+            assert len(low) and (high > low).all()
+            assert obstacle.part in (*grip.parts, *grip.beside)
+
+
+def test_a_strong_place_is_nearer_than_a_weak_one(tub: Path) -> None:
+    (grip,) = found(tub)
+    assert all(miss.share <= STRONG for miss in grip.misses)
+
+
+def test_check_lists_and_draws_it(run: Terminal, tub: Path, out: Path) -> None:
+    document = run("check", tub, "--hands", "--clashes", out, "--json").json
+    (listed,) = document["no_grips"]
+    assert (listed["label"], listed["line"], listed["robot"]) == ("axle", 1, "r2")
+    above, behind, below = listed["nearest_misses"]
+    assert (above["kind"], behind["kind"], below["kind"]) == ("above", "behind", "below")
+    assert above["tried"] == 180 and above["at_m"] == [0.0, 0.009, 0.05]
+    assert above["in_the_way"] == [{"part": "gear", "why": "lowered onto it"}]
+    (file,) = out.iterdir()
+    assert file.name == "grip-001-axle.svg"
+    text = file.read_text()
+    root = ElementTree.fromstring(text)
+    assert "href" not in text and "url(" not in text
+    words = "".join(root.itertext())
+    assert "No hand can hold axle" in words and "in its way: gear lowered onto it" in words
+    drawn = [element.get("class") for element in root.iter()]
+    assert drawn.count("nearest") == 6 and drawn.count("hand") == 6 + 1
+    tried = sum(miss["tried"] for miss in listed["nearest_misses"])
+    assert drawn.count("tried") == tried + 1
+    again = run("check", tub, "--hands", "--clashes", out, "--json").json
+    assert again == document and file.read_text() == text
+
+
+def test_without_hands_nothing_is_listed_or_drawn(run: Terminal, tub: Path, out: Path) -> None:
+    assert "no_grips" not in run("check", tub, "--clashes", out, "--json").json
+    assert not list(out.iterdir())
+    stool = run("check", ROOT / "examples" / "stool.pag", "--hands", "--clashes", out, "--json")
+    assert stool.json["no_grips"] == [] and not list(out.iterdir())
+
+
+def test_names_of_pictures_are_safe_and_differ() -> None:
+    (grip, *_) = of_the_gearbox()
+    labels = ["../../etc/x", "a/2", "a_2", "..", "x" * 300]
+    fakes = [NoGrip(label, grip.robot, grip.parts, grip.beside, grip.misses) for label in labels]
+    names = picture_names(fakes)
+    assert len(set(names)) == len(labels)
+    assert all("/" not in name and len(name) < 60 for name in names)
