@@ -106,8 +106,8 @@ def runs_clean(layout: Layout) -> None:
 
 
 def test_relays_with_hands_are_faster_and_go_through_nothing() -> None:
-    before, after = plain(sawn(4)), with_relays(4)
-    assert len(hand_overs(after)) == 3
+    before, after = plain(sawn(6)), with_relays(6)
+    assert len(hand_overs(after)) == 2
     assert verify(after.factory.net).holds and certify(after).holds
     pace = Pace.of(SETTINGS)
     assert max(gear_times(after, pace)) < 0.8 * max(gear_times(before, pace))
