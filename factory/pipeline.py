@@ -96,7 +96,7 @@ class Project:
             return ()
         from factory.layout.hands.choosing import no_grips
 
-        return no_grips(self.plain, self.product)
+        return no_grips(self.plain, self.product, self.settings.acceleration)
 
     @cached_property
     def plain(self) -> Factory:

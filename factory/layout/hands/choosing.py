@@ -21,7 +21,7 @@ from factory.layout.dimensions import FINGER
 from factory.layout.hands.hand import BEAM, Hand, Kind
 from factory.layout.hands.holding import Holding, held
 from factory.layout.hands.in_the_way import BESIDE, IN_THE_WAY, InTheWay
-from factory.layout.hands.places import Places, centre_of, strain
+from factory.layout.hands.places import PUSH, Places, centre_of, strain
 from factory.layout.hands.surfaces import Way
 from factory.layout.hands.tips import TipName, tip
 from factory.plant.factory import Factory
@@ -74,8 +74,8 @@ class Hands:
     """The hands of a factory's robots. That of a carrier depends on its heading alone, since those
     that deliver to it depend on its line; that of another on its frame."""
 
-    def __init__(self, factory: Factory, product: Product) -> None:
-        self.holding = Holding(factory, product)
+    def __init__(self, factory: Factory, product: Product, push: float = PUSH) -> None:
+        self.holding = Holding(factory, product, push)
         self._in_the_way = InTheWay(self.holding, self._carrier)
         self._fed: dict[tuple[int, Way, Way], Hand] = {}
         self._carriers: dict[tuple[int, Way], Hand] = {}
@@ -201,12 +201,12 @@ class Hands:
         if kind != "below":
             return
         along = self.holding.axis[robot]
-        mass, centre = centre_of(self.holding.product, self.holding.factory.contents[label])
+        _, centre = centre_of(self.holding.product, self.holding.factory.contents[label])
         two = np.array(list(_in_line(found.at, along, float(centre[along]))), int).reshape(-1, 2)
         if not len(two):
             return
         at, radius = found.at[two], found.radius[two].min(axis=1)
-        load = UP, radius, at.mean(axis=1), at[:, 1] - at[:, 0], mass, centre
+        load = UP, radius, at.mean(axis=1), at[:, 1] - at[:, 0], self.holding.loads(label)
         shares = strain(tip("suction"), *load), strain(tip("pin"), *load)
         rows = np.column_stack([*shares, served[two].max(axis=1)]).tolist()
         for pair, (share, pinned, bad) in zip(two.tolist(), rows, strict=True):
@@ -255,9 +255,10 @@ def _spread(numbers: Sequence[int]) -> list[int]:
     return list(dict.fromkeys([*numbers[: PAIRED // 2], *numbers[::step]]))
 
 
-def no_grips(factory: Factory, product: Product) -> tuple[Diagnostic, ...]:
-    """A warning (NoGrip) for each sub-assembly that no hand can hold, however its robot lies."""
-    hands, found = Hands(factory, product), []
+def no_grips(factory: Factory, product: Product, push: float = PUSH) -> tuple[Diagnostic, ...]:
+    """A warning (NoGrip) for each sub-assembly that no hand of a robot with such an acceleration
+    [m/s²] can hold, however that robot lies."""
+    hands, found = Hands(factory, product, push), []
     for robot in factory.robots:
         chosen = [hands.hand(robot.index, u, t) for u, t in hands.holding.frames(robot.index)]
         if chosen and all(hand is not None and hand.kind == "none" for hand in chosen):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from math import pi
 
@@ -34,7 +34,8 @@ BELLOWS = 0.25
 """A pad's bellows reach back by this share of its radius: it holds on round shapes too."""
 
 GRAVITY, PUSH = 9.81, 2.0
-"""What a payload's mass is pulled and pushed by [m/s²]: its weight, and robots' acceleration."""
+"""What a payload's mass is pulled and pushed by [m/s²]: its weight, and robots' acceleration where
+nothing else is asked for."""
 
 PUSHES = np.vstack([np.zeros(3), np.eye(3), -np.eye(3)])
 """Where to it is pushed."""
@@ -74,6 +75,22 @@ class Places:
         return len(self.at)
 
 
+@dataclass(frozen=True, eq=False)
+class Loads:
+    """All that a hand ever holds, n sub-assemblies: `mass` (n,) [kg], `centre` (n, 3) of mass [m],
+    and the acceleration by which each is pushed to any side, `push` [m/s²]."""
+
+    mass: Array
+    centre: Array
+    push: float = PUSH
+
+    @classmethod
+    def of(cls, product: Product, held: Iterable[Sequence[str]], push: float = PUSH) -> Loads:
+        """Those of sub-assemblies of such parts."""
+        masses, centres = zip(*(centre_of(product, parts) for parts in held), strict=True)
+        return cls(np.array(masses), np.array(centres), push)
+
+
 def centre_of(product: Product, parts: Sequence[str]) -> tuple[float, Array]:
     """Mass [kg] and centre of mass (3,) of some parts."""
     masses = np.array([product.solids[part].mass for part in parts])
@@ -82,11 +99,17 @@ def centre_of(product: Product, parts: Sequence[str]) -> tuple[float, Array]:
 
 
 def places(
-    surfaces: Surfaces, product: Product, parts: Sequence[str], kind: Kind, axis: int, way: int
+    surfaces: Surfaces,
+    product: Product,
+    parts: Sequence[str],
+    kind: Kind,
+    side: tuple[int, int],
+    loads: Loads,
 ) -> Places:
-    """Places on the side of a sub-assembly that faces the direction `way` (+1, -1) of an `axis`,
-    where nothing of it is further out."""
-    mass, centre = centre_of(product, parts)
+    """Places on the side of a sub-assembly that faces a direction, an axis and a way (+1, -1) along
+    it, where nothing of it is further out; `loads`: what is held there."""
+    axis, way = side
+    _, centre = centre_of(product, parts)
     across = [a for a in range(3) if a != axis]
     bodies = [b for part in parts for b in surfaces.bodies[part]]
     points = _tried(bodies, centre, axis, way)
@@ -101,10 +124,7 @@ def places(
     outermost = np.lexsort((away, np.round(-way * face, 3)))[:TRIED]
     points = points[np.unique(np.concatenate([outermost, np.argsort(away)[:NEAR]]))]
     outward = -way * np.eye(3)[axis]
-    used = [
-        strain(tip("suction"), outward, np.array(r), points, np.zeros(3), mass, centre)
-        for r in RADII
-    ]
+    used = [strain(tip("suction"), outward, np.array(r), points, np.zeros(3), loads) for r in RADII]
     useful = [n for n, radius in enumerate(RADII) if radius <= LEAST or used[n].max() > EASY]
     largest = max(0, useful[0] - 1)  # larger pads are of no more use
     covered, plane = _covered(surfaces, parts, points, (axis, way), RADII[largest:])
@@ -128,7 +148,7 @@ def places(
     at[:, axis] = np.concatenate([plane[n, chosen.nonzero()[0]] for chosen, n, _ in found])
     shares = np.concatenate([shares for _, _, shares in found])
     radius = np.array(RADII)[size]
-    pinned = strain(tip("pin"), outward, radius, at, np.zeros(3), mass, centre)
+    pinned = strain(tip("pin"), outward, radius, at, np.zeros(3), loads)
     result = Places(at, radius, shares, pinned)
     return result.chosen(np.argsort(np.round(result.share, 2), kind="stable"))
 
@@ -219,14 +239,13 @@ def _covered(
     return np.asarray(reached.mean(axis=2)), way * most
 
 
-def strain(
-    tip: Tip, outward: Array, radius: Array, at: Array, apart: Array, mass: float, centre: Array
-) -> Array:
-    """The largest share (n,) of the strength of tips about places `at` (n, 3) that a payload uses,
-    at rest and as it is accelerated: its mass [kg] at its centre (3,) [m]. The rest as `Tip.used`.
-    """
-    forces = mass * (np.array([0.0, 0.0, -GRAVITY]) + PUSH * PUSHES)
+def strain(tip: Tip, outward: Array, radius: Array, at: Array, apart: Array, loads: Loads) -> Array:
+    """The largest share (n,) of the strength of tips about places `at` (n, 3) that any of some
+    loads uses, at rest and as it is accelerated. The rest as `Tip.used`."""
+    pulls = np.array([0.0, 0.0, -GRAVITY]) + loads.push * PUSHES
     used = [
-        tip.used(outward, radius, apart, force, np.cross(centre - at, force)) for force in forces
+        tip.used(outward, radius, apart, mass * pull, np.cross(centre - at, mass * pull))
+        for mass, centre in zip(loads.mass, loads.centre, strict=True)
+        for pull in pulls
     ]
     return np.asarray(np.max(used, axis=0))
