@@ -187,7 +187,15 @@ class Hands:
         share = group.share if holds_well else group.pinned
         with_tip: TipName = "suction" if holds_well else "pin"
         return Hand(
-            kind, tuple(zip(x, y, z, strict=True)), radius, beam, share, with_tip, early, late
+            kind,
+            tuple(zip(x, y, z, strict=True)),
+            radius,
+            beam,
+            share,
+            with_tip,
+            early,
+            late,
+            covered=float(found.covered[at].min()) if holds_well else 1.0,
         )
 
     def _groups(self, robot: int, label: str, kind: Kind, found: Places) -> Iterator[TipPlaces]:
@@ -207,7 +215,8 @@ class Hands:
             return
         at, radius = found.at[two], found.radius[two].min(axis=1)
         load = UP, radius, at.mean(axis=1), at[:, 1] - at[:, 0], self.holding.loads(label)
-        shares = strain(tip("suction"), *load), strain(tip("pin"), *load)
+        covered = found.covered[two].min(axis=1)
+        shares = strain(tip("suction"), *load) / covered, strain(tip("pin"), *load)
         rows = np.column_stack([*shares, served[two].max(axis=1)]).tolist()
         for pair, (share, pinned, bad) in zip(two.tolist(), rows, strict=True):
             yield TipPlaces(tuple(pair), share, pinned, bad)

@@ -42,7 +42,8 @@ class Hand:
     """How a robot holds: `places`: the points of the payload's surface that the middles of its tips
     are at, in the frame of the finished product [m]: one, or, from below, two on one line along its
     heading; `radius` of a tip [m]; `beam`: how high the beam of a hand above is, in that frame, at
-    its lower edge [m]; `share`: which share of the strength of its tips weight and acceleration
+    its lower edge [m]; `covered`: which share of a tip's face the surface covers, where that holds
+    by suction; `share`: which share of the strength of its tips weight and acceleration
     take, as predicted; `tip`: what it holds with; `first`: whether it has to be in its place before
     what it takes comes there; `waits`: how far it has to go back until what it has delivered can go
     on, 0 where that need not wait [m]. Of the kind `none` where nothing can hold: `why` says what
@@ -57,6 +58,7 @@ class Hand:
     first: bool = False
     waits: float = 0.0
     why: str = ""
+    covered: float = 1.0
 
     @property
     def tall(self) -> bool:

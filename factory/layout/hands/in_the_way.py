@@ -125,7 +125,8 @@ class InTheWay:
             return
         own = swept(*self._reach(kind, found, u), _back(u))
         at, radius = np.array(hand.places), np.full(len(hand.places), hand.radius)
-        theirs = swept(*self._reach(hand.kind, Places(at, radius, radius, radius), t), _back(t))
+        places = Places(at, radius, radius, radius, radius)
+        theirs = swept(*self._reach(hand.kind, places, t), _back(t))
         yield (*own, np.stack(theirs, axis=1))
 
     def _beside_rod(self, label: str, found: Places, u: Way, t: Way) -> Truth:

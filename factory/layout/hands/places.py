@@ -59,17 +59,19 @@ SMALLER = (2, 4, 6, 8)
 @dataclass(frozen=True, eq=False)
 class Places:
     """Places (n, 3) on one side of a sub-assembly's surface, the best first, each with the largest
-    pad that is of use there: `radius` (n,) [m], and the `share` (n,) of its strength that is
-    used, by suction and if it is `pinned`."""
+    pad that is of use there: `radius` (n,) [m], the `share` (n,) of its strength that is used, by
+    suction and if it is `pinned`, and which share of it the surface covers (n,)."""
 
     at: Array
     radius: Array
     share: Array
     pinned: Array
+    covered: Array
 
     def chosen(self, which: Index | Truth) -> Places:
         """Some of them."""
-        return Places(self.at[which], self.radius[which], self.share[which], self.pinned[which])
+        every = self.at, self.radius, self.share, self.pinned, self.covered
+        return Places(*(values[which] for values in every))
 
     def __len__(self) -> int:
         return len(self.at)
@@ -137,19 +139,17 @@ def places(
         )
         best[better], share[better] = number, used[number][better]
     # smaller pads have room where large ones do not, and one that is not all covered holds less
-    found = [(best >= 0, best[best >= 0], share[best >= 0])]
+    found = [((best >= 0).nonzero()[0], best[best >= 0])]
     for number in SMALLER:
         least = PARTLY if number < SMALLER[-1] else 0.0
-        chosen = (covered[number] > least) & (number > best)
-        shares = used[number][chosen] / covered[number][chosen]
-        found.append((chosen, np.full(len(shares), number), shares))
-    at = np.concatenate([points[chosen] for chosen, _, _ in found])
-    size = np.concatenate([numbers for _, numbers, _ in found])
-    at[:, axis] = np.concatenate([plane[n, chosen.nonzero()[0]] for chosen, n, _ in found])
-    shares = np.concatenate([shares for _, _, shares in found])
-    radius = np.array(RADII)[size]
-    pinned = strain(tip("pin"), outward, radius, at, np.zeros(3), loads)
-    result = Places(at, radius, shares, pinned)
+        chosen = ((covered[number] > least) & (number > best)).nonzero()[0]
+        found.append((chosen, np.full(len(chosen), number)))
+    point, size = (np.concatenate(numbers) for numbers in zip(*found, strict=True))
+    at, radius, covers = points[point], np.array(RADII)[size], covered[size, point]
+    at[:, axis] = plane[size, point]
+    held = outward, radius, at, np.zeros(3), loads
+    shares, pinned = strain(tip("suction"), *held) / covers, strain(tip("pin"), *held)
+    result = Places(at, radius, shares, pinned, covers)
     return result.chosen(np.argsort(np.round(result.share, 2), kind="stable"))
 
 

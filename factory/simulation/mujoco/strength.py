@@ -128,7 +128,8 @@ class Strength:
 class Tips:
     """The tips of n `hands`, of these `robots` (index): from them to the payload `outward` (n, 3),
     their `radius` (n,), from one to the other `apart` (n, 3), and their `middle` (n, 3) in the
-    frame of the product [m]. `alike`: the hands (their numbers) with a tip of a name."""
+    frame of the product [m]; `covered` (n,): which share of them has the surface before it.
+    `alike`: the hands (their numbers) with a tip of a name."""
 
     hands: tuple[Hand, ...]
     robots: tuple[int, ...]
@@ -136,6 +137,7 @@ class Tips:
     radius: Array
     apart: Array
     middle: Array
+    covered: Array
     alike: Mapping[TipName, Index]
 
     @classmethod
@@ -163,6 +165,7 @@ class Tips:
             np.array([hand.radius for hand in hands]),
             ends[:, 1] - ends[:, 0],
             ends.mean(axis=1),
+            np.array([hand.covered for hand in hands]),
             {name: np.array(numbers) for name, numbers in alike.items()},
         )
 
@@ -174,4 +177,4 @@ class Tips:
             force, moment = loads[which, :3], loads[which, 3:]
             shape = self.outward[which], self.radius[which], self.apart[which]
             found[which] = tip(name).used(*shape, force, moment)
-        return found
+        return found / self.covered
