@@ -13,7 +13,7 @@ from factory.geometry.meshes import Array
 from factory.geometry.solids import Product
 from factory.layout.hands.hand import Kind
 from factory.layout.hands.surfaces import Body, Surfaces
-from factory.layout.hands.tips import Tip, tip
+from factory.layout.hands.tips import Tip, shares, tip
 
 RADII = (0.02, 0.014, 0.01, 0.007, 0.005, 0.0035, 0.0025, 0.0016, 0.001)
 """Radii of pads [m]."""
@@ -148,8 +148,8 @@ def places(
     at, radius, covers = points[point], np.array(RADII)[size], covered[size, point]
     at[:, axis] = plane[size, point]
     held = outward, radius, at, np.zeros(3), loads
-    shares, pinned = strain(tip("suction"), *held) / covers, strain(tip("pin"), *held)
-    result = Places(at, radius, shares, pinned, covers)
+    share, pinned = strain(tip("suction"), *held) / covers, strain(tip("pin"), *held)
+    result = Places(at, radius, share, pinned, covers)
     return result.chosen(np.argsort(np.round(result.share, 2), kind="stable"))
 
 
@@ -243,9 +243,8 @@ def strain(tip: Tip, outward: Array, radius: Array, at: Array, apart: Array, loa
     """The largest share (n,) of the strength of tips about places `at` (n, 3) that any of some
     loads uses, at rest and as it is accelerated. The rest as `Tip.used`."""
     pulls = np.array([0.0, 0.0, -GRAVITY]) + loads.push * PUSHES
-    used = [
-        tip.used(outward, radius, apart, mass * pull, np.cross(centre - at, mass * pull))
-        for mass, centre in zip(loads.mass, loads.centre, strict=True)
-        for pull in pulls
-    ]
-    return np.asarray(np.max(used, axis=0))
+    force = loads.mass[:, None, None, None] * pulls[:, None]
+    moment = np.cross(loads.centre[:, None, None] - at, force)
+    load = np.concatenate(np.broadcast_arrays(force, moment), axis=-1)
+    terms = tip.gauge(outward, radius, apart) @ load[..., None]
+    return np.asarray(np.maximum(shares(terms[..., 0]).max(axis=(0, 1)), 0.0))

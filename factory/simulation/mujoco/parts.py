@@ -23,6 +23,9 @@ from factory.simulation.mujoco.welds import Welds
 from factory.simulation.request import RunRequest
 from factory.support.engine import mujoco
 
+TICKS = 0.99
+"""A tick, less what times are rounded by."""
+
 
 class Parts:
     """Copies, feeders, hands and the tray's hold, switched together.
@@ -67,12 +70,15 @@ class Parts:
 
     def bear(self) -> bool:
         """Hands whose load is more than they bear let go of it: whether there are any. Their
-        robots do not know: what they hold by the books stays the same."""
+        robots do not know: what they hold by the books stays the same. Where a weld has closed less
+        than a tick ago it may still pull its part into place, and nothing is measured."""
+        if self._d.time - self.welds.closed < TICKS * self.model.settings.tick:
+            return False
         loose = self.strength.look()
-        if len(loose):
-            self.welds.loose(loose.tolist())
+        if loose:
+            self.welds.loose(loose)
             self.welds.write()
-        return bool(len(loose))
+        return bool(loose)
 
     def complete(self, ended: Sequence[tuple[Operation, int]]) -> None:
         """What robots of operations that end have joined is one body before it changes hands."""
