@@ -138,7 +138,7 @@ class Strength:
         factory, now, robot = self._model.factory, float(self._d.time), int(self._robots[number])
         bears = _told(self._hands[robot])
         message = (
-            f"{use.robot} drops '{use.label}' at {now:.2f} s: the load is {use.share:.2f} times"
+            f"{use.robot} drops '{use.label}' at {now:.2f} s: the load is {use.share:.4g} times"
             f" what its hand bears ({bears})"
         )
         source = factory.by_label.get(use.label, factory.robots[robot])
