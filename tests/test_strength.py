@@ -24,6 +24,8 @@ from factory.layout.layout import Layout
 from factory.mjcf import names
 from factory.record.log import read_log
 from factory.record.monitor.record import verdict_on, watch_log
+from factory.show.live import Session
+from factory.show.live.commands import Command
 from factory.simulation.disturbance import Mass, disturb
 from factory.simulation.mujoco import strength
 from factory.simulation.request import RunRequest
@@ -32,6 +34,7 @@ from factory.simulation.simulation import FALL, Simulation
 from factory.simulation.watched import watched
 from factory.support.engine import mujoco
 from tests.command_line import ROOT, Terminal
+from tests.live_sessions import Stopped
 
 EXAMPLES = ROOT / "examples"
 AGREES = 1.05
@@ -306,6 +309,21 @@ def test_a_grip_that_has_just_closed_is_not_judged() -> None:
     assert not parts.bear() and simulation.world.dropped is None
     parts.welds.closed = simulation.world.time - 1.0
     assert parts.bear() and simulation.world.dropped is not None
+
+
+def test_a_live_view_says_what_was_dropped(monkeypatch: pytest.MonkeyPatch) -> None:
+    weaken(monkeypatch, 0.1)
+    session = Session(lambda: ready("paper", units=10**9))
+    session.send(Command("speed", factor=0.0))
+
+    def observe(world: Any, supervisor: Any) -> None:
+        if session.frame.note:
+            raise Stopped
+
+    with pytest.raises(Stopped):
+        session.run(observe)
+    assert session.frame.note.startswith("r3 drops 'sub1' at ")
+    assert session.frame.note.endswith(": begin anew")
 
 
 # --- what is said ---------------------------------------------------------------------------------
