@@ -98,7 +98,7 @@ class Project:
             return ()
         from factory.layout.hands.nearest import no_grips
 
-        return no_grips(self.plain, self.product)
+        return no_grips(self.plain, self.product, self.settings.acceleration)
 
     @cached_property
     def plain(self) -> Factory:

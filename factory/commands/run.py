@@ -225,6 +225,10 @@ def summarise(record: Run, factory: Factory, verbose: bool) -> None:
         )
         if physics.grip_gap_max_mm is not None:
             say(f"what is taken is at most {physics.grip_gap_max_mm:.3f} mm from its holder's pad")
+        if physics.grip_strength_share_max is not None:
+            where = f"{physics.grip_strength_robot} with '{physics.grip_strength_label}'"
+            used = 100 * physics.grip_strength_share_max
+            say(f"at most {used:.0f} % of the strength of a hand used: {where}")
         if physics.excluded:
             say(f"{contacts}; {not_tested(physics)}{'' if verbose else ' (list: -v)'}")
         for one, other in physics.excluded if verbose else ():

@@ -70,7 +70,7 @@ def optimised(
     feasible one, but for a factory that is LARGE. `wide`: robots whose ways have room for relays;
     `hands`: with hands chosen from the geometry. Near linear, deterministic."""
     payloads = payload_boxes(factory, product)
-    chosen = Hands(factory, product) if hands else None
+    chosen = Hands(factory, product, pace.acceleration) if hands else None
     count = len(factory.robots)
     task = Task(factory, c, pace, [1.0] * count, wide=wide, hands=chosen)
     if count > LARGE:

@@ -35,6 +35,12 @@ LIMITS = (
 TOUCHED = "contacts"
 """The figure that names what touched."""
 
+STRENGTH = "grip_strength_share_max"
+"""A figure that is kept to be shown: where it is too large the run has ended by that (Dropped)."""
+
+FIGURES = (*(limit.figure for limit in LIMITS), STRENGTH)
+"""The figures that are numbers, or none."""
+
 SHOWN = 4
 """So many pairs of these are named in a verdict."""
 
@@ -99,8 +105,8 @@ def judged(
 
 
 def kept_figures(physics: Any) -> dict[str, Any]:
-    """What a verdict rests on, of the figures of a run's bodies."""
-    found = {limit.figure: getattr(physics, limit.figure) for limit in LIMITS}
+    """What a verdict rests on, of the figures of a run's bodies, and what no log shows else."""
+    found = {figure: getattr(physics, figure) for figure in FIGURES}
     return {**found, TOUCHED: list(physics.contacts)}
 
 
@@ -108,10 +114,10 @@ def check_figures(figures: Any) -> None:
     """Raises ValueError where these are not as `kept_figures` gives them."""
     if not isinstance(figures, dict):
         raise ValueError("its figures are no table")
-    for limit in LIMITS:
-        value = figures.get(limit.figure)
+    for figure in FIGURES:
+        value = figures.get(figure)
         if value is not None and type(value) not in (int, float):
-            raise ValueError(f"its figure '{limit.figure}' is no number")
+            raise ValueError(f"its figure '{figure}' is no number")
     touched = figures.get(TOUCHED, [])
     if not isinstance(touched, list) or not all(isinstance(name, str) for name in touched):
         raise ValueError(f"its figure '{TOUCHED}' is no list of texts")

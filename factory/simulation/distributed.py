@@ -176,6 +176,12 @@ class DistributedSupervisor:
             self.count += 1
         self.world.settle()
 
+    def coast(self, ticks: int = 1) -> None:
+        """Let the world go on for as many timesteps as `step`, in which no robot ticks: each stops
+        where its last setpoint leads to."""
+        self.world.advance(self.ticks)
+        self.world.settle()
+
     # --- one robot's tick --------------------------------------------------------------------
 
     def _tick(self, process: Process) -> None:

@@ -95,6 +95,10 @@ class IdealWorld:
         """It is always stable."""
         return ""
 
+    @property
+    def dropped(self) -> None:
+        """Nothing is ever dropped."""
+
     def figures(self) -> PhysicsFigures | None:
         """There are no bodies."""
         return None

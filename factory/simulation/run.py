@@ -79,6 +79,9 @@ class PhysicsFigures:
     wip_chosen: int | None = None
     grip_gap_max_mm: float | None = None
     joining_error_max_mm: float = 0.0
+    grip_strength_share_max: float | None = None
+    grip_strength_robot: str | None = None
+    grip_strength_label: str | None = None
 
     @property
     def pairs_excluded(self) -> int:
@@ -171,6 +174,9 @@ class Run:
             "handoffs",
             "handoff_gap_max_mm",
             "grip_gap_max_mm",
+            "grip_strength_share_max",
+            "grip_strength_robot",
+            "grip_strength_label",
             "weld_residual_max_mm",
             "product_error_max_mm",
             "joining_error_max_mm",

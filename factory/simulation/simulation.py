@@ -8,10 +8,7 @@ from functools import cached_property
 from time import perf_counter
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from factory.control.mode import Limits, Mode
-from factory.layout.hands.leaving import rises_first
 from factory.layout.layout import Layout
 from factory.mjcf.timestep import timed
 from factory.modes.modes import operation_modes, robot_limits
@@ -25,6 +22,7 @@ from factory.simulation.distributed import DistributedSupervisor
 from factory.simulation.ideal import IdealWorld
 from factory.simulation.request import RunRequest
 from factory.simulation.run import Run, busy_times
+from factory.simulation.starting import start_positions
 from factory.simulation.supervisor import Supervisor
 from factory.simulation.world import World
 from factory.support.errors import Diagnostic, InputError, RunError
@@ -45,6 +43,9 @@ PATIENCE = 10.0
 """A run has stalled when nothing fires for this many times the longest predicted delay."""
 
 LOOK = "look at these robots in `factory render`, or give --max-time more"
+
+FALL = 0.5
+"""So long after something was dropped a run goes on, for it to be seen [s]; nothing fires then."""
 
 SMALLER = "take smaller speeds, a smaller --timestep, or check that the parts are in metres"
 
@@ -182,16 +183,17 @@ class Simulation:
         max_time: float | None = None,
         glances: Sequence[Observer] = (),
     ) -> Run:
-        """Tick until `units` products have been dropped off, the run stalls or `max_time` [s]
-        passes. Observers are called after every tick; `glances` are, but where there are no
-        observers several ticks may go by between them. Where the engine gives up it begins anew by
-        itself, at time 0: nobody is shown that, and the run has lasted until then."""
+        """Tick until `units` products have been dropped off, the run stalls, `max_time` [s] passes
+        or a robot drops what it holds. Observers are called after every tick; `glances` are, but
+        where there are no observers several ticks may go by between them. Where the engine gives up
+        it begins anew by itself, at time 0: nobody is shown that, and the run has lasted until
+        then."""
         patience = PATIENCE * max(self.delays)
         supervisor, world, goal = self.supervisor, self.world, self.before + self.request.units
         begin, watched, trouble = perf_counter(), -world.hooks.ended_time, None
-        while world.delivered() < goal and trouble is None:
-            before = world.time
-            supervisor.step(1 if observers else self._unseen(max_time))
+        while trouble is None and (world.dropped or world.delivered() < goal):
+            before, ticks = world.time, 1 if observers else self._unseen(max_time)
+            (supervisor.coast if world.dropped else supervisor.step)(ticks)
             if reason := world.unstable():
                 watched += world.hooks.ended_time
                 trouble = self._trouble("Unstable", f"{reason}, after {before:.2f} s", SMALLER)
@@ -201,14 +203,22 @@ class Simulation:
                 for observe in (*observers, *glances):
                     observe(world, supervisor)
                 watched += perf_counter() - pause
-            if self.silent > patience:
-                what = f"nothing fired for {patience:.2f} s of simulated time"
-                trouble = self._trouble("Stalled", what, LOOK)
-            elif max_time is not None and world.time >= max_time:
-                what = f"not finished after {max_time:.2f} s of simulated time"
-                trouble = self._trouble("Timeout", what, LOOK)
+            trouble = self._ends(patience, max_time)
         watched += world.hooks.ended_time
         return self._record(perf_counter() - begin - watched, world.time, trouble)
+
+    def _ends(self, patience: float, max_time: float | None) -> Diagnostic | None:
+        """What ends the run now, whether or not its products have been dropped off."""
+        world = self.world
+        if world.dropped is not None:
+            return world.dropped.diagnostic if world.time >= world.dropped.time + FALL else None
+        if self.silent > patience:
+            what = f"nothing fired for {patience:.2f} s of simulated time"
+            return self._trouble("Stalled", what, LOOK)
+        if max_time is not None and world.time >= max_time:
+            what = f"not finished after {max_time:.2f} s of simulated time"
+            return self._trouble("Timeout", what, LOOK)
+        return None
 
     def _unseen(self, max_time: float | None) -> int:
         """So many ticks may go by at once where nobody looks, and nobody acts between two steps."""
@@ -323,21 +333,6 @@ def physical_model(
         copies = part_copies(pool, units, wip, under_way)
     catalogue, settings = catalogue or load_catalogue(), timed(settings or Settings(), layout)
     return build_model(layout, catalogue, copies, settings, bodies, shown, wip)
-
-
-def start_positions(layout: Layout, marking: Marking) -> np.ndarray:
-    """Every axis in a marking: a robot where its last operation left it, or at its B end where it
-    waits with no part at the beginning of its cycle, and then its lift may still be down, unless
-    its hand is above what it takes."""
-    factory, net = layout.factory, layout.factory.net
-    positions = np.zeros(len(factory.robots) + len(layout.lifts))
-    lifts = {robot: len(factory.robots) + n for n, robot in enumerate(layout.lifts)}
-    for robot, gear in zip(factory.robots, net.gears, strict=True):
-        step = next(i for i, place in enumerate(gear.places) if place in marking) // 2
-        positions[robot.index] = layout.home(robot.index, robot.operations[step])
-        if robot.index in lifts and (step or rises_first(layout, robot.index)):
-            positions[lifts[robot.index]] = factory.strokes[robot.index]
-    return positions
 
 
 def require(run: Run) -> Run:

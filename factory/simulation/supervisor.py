@@ -127,6 +127,10 @@ class Supervisor:
             ticks = 1
         self.near = self.world.step(self.active.bundle, self.active.axes, ticks)
 
+    def coast(self, ticks: int = 1) -> None:
+        """Let the world go on in the modes under way, for some ticks in which nothing fires."""
+        self.world.step(self.active.bundle, self.active.axes, ticks)
+
     @property
     def marked(self) -> bytearray:
         """1 for each place that is marked, 0 for the others."""

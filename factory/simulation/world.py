@@ -11,6 +11,7 @@ from factory.control.mode import Array, Index
 from factory.control.navigation import Bundle
 from factory.plant.factory import Operation
 from factory.simulation.run import PhysicsFigures
+from factory.support.errors import Diagnostic
 
 Job = tuple[Operation, int]
 """An operation with the number of the unit that it works on."""
@@ -48,6 +49,14 @@ class Hooks:
         for look in self.ended:
             look()
         self.ended_time += perf_counter() - begin
+
+
+@dataclass(frozen=True, slots=True)
+class Drop:
+    """A robot has let fall what is more than its hand bears: when [s], and what is said of it."""
+
+    time: float
+    diagnostic: Diagnostic
 
 
 class World(Protocol):
@@ -106,6 +115,11 @@ class World(Protocol):
 
     def unstable(self) -> str:
         """Why the world cannot go on, "" while it can."""
+
+    @property
+    def dropped(self) -> Drop | None:
+        """The first that a robot has let fall, None while none has. From then on nothing may
+        fire."""
 
     def figures(self) -> PhysicsFigures | None:
         """What only bodies can tell, None where there are none."""

@@ -21,7 +21,7 @@ from factory.layout.dimensions import FINGER
 from factory.layout.hands.hand import Hand, Kind
 from factory.layout.hands.holding import Holding, held
 from factory.layout.hands.in_the_way import BESIDE, InTheWay
-from factory.layout.hands.places import Places, centre_of, strain
+from factory.layout.hands.places import PUSH, Places, centre_of, strain
 from factory.layout.hands.surfaces import Way
 from factory.layout.hands.tips import STRONG, TipName, tip
 from factory.plant.factory import Factory
@@ -74,8 +74,8 @@ class Hands:
     """The hands of a factory's robots. That of a carrier depends on its heading alone, since those
     that deliver to it depend on its line; that of another on its frame."""
 
-    def __init__(self, factory: Factory, product: Product) -> None:
-        self.holding = Holding(factory, product)
+    def __init__(self, factory: Factory, product: Product, push: float = PUSH) -> None:
+        self.holding = Holding(factory, product, push)
         self.in_the_way = InTheWay(self.holding, self._carrier)
         self._fed: dict[tuple[int, Way, Way], Hand] = {}
         self._carriers: dict[tuple[int, Way], Hand] = {}
@@ -189,7 +189,15 @@ class Hands:
         share = group.share if holds_well else group.pinned
         with_tip: TipName = "suction" if holds_well else "pin"
         return Hand(
-            kind, tuple(zip(x, y, z, strict=True)), radius, beam, share, with_tip, early, (*late,)
+            kind,
+            tuple(zip(x, y, z, strict=True)),
+            radius,
+            beam,
+            share,
+            with_tip,
+            early,
+            (*late,),
+            covered=float(found.covered[at].min()) if holds_well else 1.0,
         )
 
     def _groups(self, robot: int, label: str, kind: Kind, found: Places) -> Iterator[TipPlaces]:
@@ -203,13 +211,14 @@ class Hands:
         if kind != "below":
             return
         along = self.holding.axis[robot]
-        mass, centre = centre_of(self.holding.product, self.holding.factory.contents[label])
+        _, centre = centre_of(self.holding.product, self.holding.factory.contents[label])
         two = np.array(list(_in_line(found.at, along, float(centre[along]))), int).reshape(-1, 2)
         if not len(two):
             return
         at, radius = found.at[two], found.radius[two].min(axis=1)
-        load = UP, radius, at.mean(axis=1), at[:, 1] - at[:, 0], mass, centre
-        shares = strain(tip("suction"), *load), strain(tip("pin"), *load)
+        load = UP, radius, at.mean(axis=1), at[:, 1] - at[:, 0], self.holding.loads(label)
+        covered = found.covered[two].min(axis=1)
+        shares = strain(tip("suction"), *load) / covered, strain(tip("pin"), *load)
         rows = np.column_stack([*shares, served[two].max(axis=1)]).tolist()
         for pair, (share, pinned, bad) in zip(two.tolist(), rows, strict=True):
             yield TipPlaces(tuple(pair), share, pinned, bad)

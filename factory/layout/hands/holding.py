@@ -10,7 +10,7 @@ import numpy as np
 from factory.geometry.meshes import Array
 from factory.geometry.solids import Product
 from factory.layout.hands.hand import Kind
-from factory.layout.hands.places import Places, places
+from factory.layout.hands.places import PUSH, Loads, Places, places
 from factory.layout.hands.surfaces import Surfaces, Way
 from factory.layout.layout import carriers
 from factory.plant.factory import Factory, Operation
@@ -18,10 +18,11 @@ from factory.plant.factory import Factory, Operation
 
 class Holding:
     """The robots of a factory and the surfaces of what they hold. `on`: the carrier that each
-    delivers to, -1 for none; `axis`: along which each lies, 0 for x."""
+    delivers to, -1 for none; `axis`: along which each lies, 0 for x; `push`: their acceleration
+    [m/s²]."""
 
-    def __init__(self, factory: Factory, product: Product) -> None:
-        self.factory, self.product = factory, product
+    def __init__(self, factory: Factory, product: Product, push: float = PUSH) -> None:
+        self.factory, self.product, self.push = factory, product, push
         self.surfaces = Surfaces(product)
         self.on = carriers(factory)
         self.axis = [0] * len(factory.robots)
@@ -62,9 +63,17 @@ class Holding:
         """The places on a side of a sub-assembly, found once."""
         key = label, kind, axis, way
         if key not in self._places:
-            parts = self.factory.contents[label]
-            self._places[key] = places(self.surfaces, self.product, parts, kind, axis, way)
+            parts, loads = self.factory.contents[label], self.loads(label)
+            self._places[key] = places(self.surfaces, self.product, parts, kind, (axis, way), loads)
         return self._places[key]
+
+    def loads(self, label: str) -> Loads:
+        """What the robot that takes a sub-assembly holds by it: that, and all that it becomes while
+        others bring the rest."""
+        made = self.made(self.factory.by_label[label].carrier)
+        labels = [label, *(o.label for o in made if o.index != self.factory.dropoff.index)]
+        contents = dict.fromkeys(tuple(self.factory.contents[held]) for held in labels)
+        return Loads.of(self.product, contents, self.push)
 
     def around(self, label: str, low: Array, high: Array) -> Array:
         """The boxes of a sub-assembly's bodies among which a hand could come."""

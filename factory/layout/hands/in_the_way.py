@@ -152,7 +152,7 @@ class InTheWay:
             return
         own = swept(*self.reach(kind, found, u), _back(u))
         at, radius = np.array(hand.places), np.full(len(hand.places), hand.radius)
-        low, high = self.reach(hand.kind, Places(at, radius, radius, radius), t)
+        low, high = self.reach(hand.kind, Places(at, radius, radius, radius, radius), t)
         if hand.kind == "above":
             yield (*own, np.stack((low, high), axis=1))
             half = max(FINGER, hand.width) / 2

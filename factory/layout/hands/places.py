@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from math import pi
 
@@ -14,7 +14,7 @@ from factory.geometry.solids import Product
 from factory.layout.hands.hand import Kind
 from factory.layout.hands.outermost import outermost
 from factory.layout.hands.surfaces import Body, Surfaces
-from factory.layout.hands.tips import Tip, tip
+from factory.layout.hands.tips import Tip, shares, tip
 
 RADII = (0.02, 0.014, 0.01, 0.007, 0.005, 0.0035, 0.0025, 0.0016, 0.001)
 """Radii of pads [m]."""
@@ -35,7 +35,8 @@ BELLOWS = 0.25
 """A pad's bellows reach back by this share of its radius: it holds on round shapes too."""
 
 GRAVITY, PUSH = 9.81, 2.0
-"""What a payload's mass is pulled and pushed by [m/s²]: its weight, and robots' acceleration."""
+"""What a payload's mass is pulled and pushed by [m/s²]: its weight, and robots' acceleration where
+nothing else is asked for."""
 
 PUSHES = np.vstack([np.zeros(3), np.eye(3), -np.eye(3)])
 """Where to it is pushed."""
@@ -59,20 +60,38 @@ SMALLER = (2, 4, 6, 8)
 @dataclass(frozen=True, eq=False)
 class Places:
     """Places (n, 3) on one side of a sub-assembly's surface, the best first, each with the largest
-    pad that is of use there: `radius` (n,) [m], and the `share` (n,) of its strength that is
-    used, by suction and if it is `pinned`."""
+    pad that is of use there: `radius` (n,) [m], the `share` (n,) of its strength that is used, by
+    suction and if it is `pinned`, and which share of it the surface covers (n,)."""
 
     at: Array
     radius: Array
     share: Array
     pinned: Array
+    covered: Array
 
     def chosen(self, which: Index | Truth) -> Places:
         """Some of them."""
-        return Places(self.at[which], self.radius[which], self.share[which], self.pinned[which])
+        every = self.at, self.radius, self.share, self.pinned, self.covered
+        return Places(*(values[which] for values in every))
 
     def __len__(self) -> int:
         return len(self.at)
+
+
+@dataclass(frozen=True, eq=False)
+class Loads:
+    """All that a hand ever holds, n sub-assemblies: `mass` (n,) [kg], `centre` (n, 3) of mass [m],
+    and the acceleration by which each is pushed to any side, `push` [m/s²]."""
+
+    mass: Array
+    centre: Array
+    push: float = PUSH
+
+    @classmethod
+    def of(cls, product: Product, held: Iterable[Sequence[str]], push: float = PUSH) -> Loads:
+        """Those of sub-assemblies of such parts."""
+        masses, centres = zip(*(centre_of(product, parts) for parts in held), strict=True)
+        return cls(np.array(masses), np.array(centres), push)
 
 
 def centre_of(product: Product, parts: Sequence[str]) -> tuple[float, Array]:
@@ -83,11 +102,17 @@ def centre_of(product: Product, parts: Sequence[str]) -> tuple[float, Array]:
 
 
 def places(
-    surfaces: Surfaces, product: Product, parts: Sequence[str], kind: Kind, axis: int, way: int
+    surfaces: Surfaces,
+    product: Product,
+    parts: Sequence[str],
+    kind: Kind,
+    side: tuple[int, int],
+    loads: Loads,
 ) -> Places:
-    """Places on the side of a sub-assembly that faces the direction `way` (+1, -1) of an `axis`,
-    where nothing of it is further out."""
-    mass, centre = centre_of(product, parts)
+    """Places on the side of a sub-assembly that faces a direction, an axis and a way (+1, -1) along
+    it, where nothing of it is further out; `loads`: what is held there."""
+    axis, way = side
+    _, centre = centre_of(product, parts)
     across = [a for a in range(3) if a != axis]
     bodies = [b for part in parts for b in surfaces.bodies[part]]
     points = _tried(bodies, centre, axis, way)
@@ -102,10 +127,7 @@ def places(
     outermost = np.lexsort((away, np.round(-way * face, 3)))[:TRIED]
     points = points[np.unique(np.concatenate([outermost, np.argsort(away)[:NEAR]]))]
     outward = -way * np.eye(3)[axis]
-    used = [
-        strain(tip("suction"), outward, np.array(r), points, np.zeros(3), mass, centre)
-        for r in RADII
-    ]
+    used = [strain(tip("suction"), outward, np.array(r), points, np.zeros(3), loads) for r in RADII]
     useful = [n for n, radius in enumerate(RADII) if radius <= LEAST or used[n].max() > EASY]
     largest = max(0, useful[0] - 1)  # larger pads are of no more use
     covered, plane = _covered(surfaces, parts, points, (axis, way), RADII[largest:])
@@ -118,19 +140,17 @@ def places(
         )
         best[better], share[better] = number, used[number][better]
     # smaller pads have room where large ones do not, and one that is not all covered holds less
-    found = [(best >= 0, best[best >= 0], share[best >= 0])]
+    found = [((best >= 0).nonzero()[0], best[best >= 0])]
     for number in SMALLER:
         least = PARTLY if number < SMALLER[-1] else 0.0
-        chosen = (covered[number] > least) & (number > best)
-        shares = used[number][chosen] / covered[number][chosen]
-        found.append((chosen, np.full(len(shares), number), shares))
-    at = np.concatenate([points[chosen] for chosen, _, _ in found])
-    size = np.concatenate([numbers for _, numbers, _ in found])
-    at[:, axis] = np.concatenate([plane[n, chosen.nonzero()[0]] for chosen, n, _ in found])
-    shares = np.concatenate([shares for _, _, shares in found])
-    radius = np.array(RADII)[size]
-    pinned = strain(tip("pin"), outward, radius, at, np.zeros(3), mass, centre)
-    result = Places(at, radius, shares, pinned)
+        chosen = ((covered[number] > least) & (number > best)).nonzero()[0]
+        found.append((chosen, np.full(len(chosen), number)))
+    point, size = (np.concatenate(numbers) for numbers in zip(*found, strict=True))
+    at, radius, covers = points[point], np.array(RADII)[size], covered[size, point]
+    at[:, axis] = plane[size, point]
+    held = outward, radius, at, np.zeros(3), loads
+    share, pinned = strain(tip("suction"), *held) / covers, strain(tip("pin"), *held)
+    result = Places(at, radius, share, pinned, covers)
     return result.chosen(np.argsort(np.round(result.share, 2), kind="stable"))
 
 
@@ -226,14 +246,12 @@ def _covered(
     return np.asarray(reached.mean(axis=2)), way * most
 
 
-def strain(
-    tip: Tip, outward: Array, radius: Array, at: Array, apart: Array, mass: float, centre: Array
-) -> Array:
-    """The largest share (n,) of the strength of tips about places `at` (n, 3) that a payload uses,
-    at rest and as it is accelerated: its mass [kg] at its centre (3,) [m]. The rest as `Tip.used`.
-    """
-    forces = mass * (np.array([0.0, 0.0, -GRAVITY]) + PUSH * PUSHES)
-    used = [
-        tip.used(outward, radius, apart, force, np.cross(centre - at, force)) for force in forces
-    ]
-    return np.asarray(np.max(used, axis=0))
+def strain(tip: Tip, outward: Array, radius: Array, at: Array, apart: Array, loads: Loads) -> Array:
+    """The largest share (n,) of the strength of tips about places `at` (n, 3) that any of some
+    loads uses, at rest and as it is accelerated. The rest as `Tip.used`."""
+    pulls = np.array([0.0, 0.0, -GRAVITY]) + loads.push * PUSHES
+    force = loads.mass[:, None, None, None] * pulls[:, None]
+    moment = np.cross(loads.centre[:, None, None] - at, force)
+    load = np.concatenate(np.broadcast_arrays(force, moment), axis=-1)
+    terms = tip.gauge(outward, radius, apart) @ load[..., None]
+    return np.asarray(np.maximum(shares(terms[..., 0]).max(axis=(0, 1)), 0.0))

@@ -39,11 +39,19 @@ class Tip:
     def used(
         self, outward: Array, radius: Array, apart: Array, force: Array, moment: Array
     ) -> Array:
-        """The share (n,) of the strength of a hand's tips that a load uses; above 1 it lets go.
+        """The share (n,) of the strength of a hand's tips that a load uses; above 1 it lets go. All
+        but the load as `gauge`: `force` (n, 3) [N] and `moment` (n, 3) [Nm] about the middle of the
+        tips."""
+        load = np.concatenate(np.broadcast_arrays(force, moment), axis=-1)
+        found = shares((self.gauge(outward, radius, apart) @ load[..., None])[..., 0])
+        return np.maximum(found, 0.0)
+
+    def gauge(self, outward: Array, radius: Array, apart: Array) -> Array:
+        """What of a load uses the strength of a hand's tips, as matrices (n, 11, 6): from a force
+        [N] and a moment [Nm] about the middle of the tips to the terms of `shares`.
 
         `outward` (n, 3) or (3,): from a tip's face to the payload; `radius` (n,) of a tip [m];
-        `apart` (n, 3) or (3,): from one tip to the other [m], 0 where there is but one; `force`
-        (n, 3) [N] and `moment` (n, 3) [Nm] of the load, about the middle of the tips.
+        `apart` (n, 3) or (3,): from one tip to the other [m], 0 where there is but one.
 
         A tip holds while the pressure left at its face bears friction, twist and the bending of its
         rim. Two share the load like the bolts of a plate: their distance bears the moments about
@@ -53,18 +61,51 @@ class Tip:
         two = length > 0
         count, lever = np.where(two, 2.0, 1.0), np.where(two, length, np.inf)
         along = apart / np.where(two, length, 1.0)[..., None]
-        off = (force * outward).sum(axis=-1)
-        beside = force - off[..., None] * outward
-        turn = (moment * outward).sum(axis=-1)
-        over = moment - turn[..., None] * outward
-        rolled = (over * along).sum(axis=-1)[..., None] * along
-        bent = np.where(two[..., None], rolled, over)
-        tilted = np.sqrt(((over - bent) ** 2).sum(axis=-1)) / lever
-        slips = np.sqrt((beside**2).sum(axis=-1)) / count + np.abs(turn) / lever
-        slips += np.where(two, 0.0, TWIST * np.abs(turn) / radius)
-        bends = 2 * np.sqrt((bent**2).sum(axis=-1)) / (count * radius)
-        needed = off / count + tilted + np.maximum(slips / self.friction, bends)
-        return np.asarray(np.maximum(needed, 0.0) / (self.pull * np.pi * radius**2))
+        over = np.eye(3) - _squared(outward)
+        bent = np.where(two[..., None, None], _squared(along) @ over, over)
+        twist = (1 / lever + np.where(two, 0.0, TWIST / radius)) / self.friction
+        force = outward / count[..., None], over / _deep(count * self.friction)
+        moment = (
+            twist[..., None] * outward,
+            bent * _deep(2 / (count * radius)),
+            (over - bent) / _deep(lever),
+        )
+        found = np.zeros(
+            (*np.broadcast_shapes(outward.shape[:-1], radius.shape, two.shape), TERMS, 6)
+        )
+        found[..., OFF, :3], found[..., BESIDE, :3] = force[0], force[1]
+        found[..., TURN, 3:], found[..., BENT, 3:], found[..., TILTED, 3:] = moment
+        return np.asarray(found / _deep(self.pull * np.pi * radius**2))
+
+
+OFF, BESIDE, TURN, BENT, TILTED = 0, slice(1, 4), 4, slice(5, 8), slice(8, 11)
+"""Where the terms of a load are: what pulls off, what pulls beside, what turns about the outward
+direction, what bends rims, what tilts one tip against the other."""
+
+TERMS = 11
+"""Of so many numbers the terms of a load are."""
+
+LENGTHS = np.repeat(np.eye(5), [1, 3, 1, 3, 3], axis=0)[:, 1:]
+"""Sums up the squares of the terms of what pulls beside, turns, bends and tilts."""
+
+
+def shares(terms: Array) -> Array:
+    """The share (n,) of the strength of hands' tips that loads of such terms (n, 11) use, below 0
+    where tips are pressed on; above 1 a hand lets go. Pressure is lost to what pulls off and tilts,
+    and to what slips or bends: rim and friction have it one as well as the other."""
+    lengths = np.sqrt(terms * terms @ LENGTHS)
+    slips, bends, tilts = lengths[..., 0] + lengths[..., 1], lengths[..., 2], lengths[..., 3]
+    return np.asarray(terms[..., OFF] + tilts + np.maximum(slips, bends))
+
+
+def _squared(direction: Array) -> Array:
+    """The projection (n, 3, 3) onto a direction (n, 3)."""
+    return np.asarray(direction[..., :, None] * direction[..., None, :])
+
+
+def _deep(values: Array | float) -> Array:
+    """Values (n,) for matrices (n, 3, 3)."""
+    return np.asarray(values)[..., None, None]
 
 
 @cache

@@ -127,7 +127,7 @@ class _Choice(Hands):
         sides = (t, (-t[0], -t[1])) if self.holding.is_carrier(guest) else (t,)
         at, radius = np.array(known.places), np.full(len(known.places), known.radius)
         self.in_the_way.kept[guest] = known
-        free = self.in_the_way.own_side(guest, Places(at, radius, radius, radius), u, t)
+        free = self.in_the_way.own_side(guest, Places(at, radius, radius, radius, radius), u, t)
         if free.all():
             return known
         return self._below(guest, [(u, side) for side in sides], max(STRONG, known.share))

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from factory.show.live.commands import PUSH, Command
 from factory.simulation.disturbance.interventions import Interventions
-from factory.simulation.simulation import Observer, Simulation
+from factory.simulation.simulation import FALL, Observer, Simulation
 
 RATE = 30.0
 """Frames a second."""
@@ -152,11 +152,13 @@ class Session:
                     clock.begun = perf_counter(), world.time
                 break
             before = len(supervisor.events)
-            supervisor.step()
+            (supervisor.coast if world.dropped else supervisor.step)()
             observe(world, supervisor)
             count += 1
             if reason := world.unstable():
                 self._trouble = f"{reason}: begin anew"
+            elif (drop := world.dropped) and world.time >= drop.time + FALL:
+                self._trouble = f"{drop.diagnostic.message}: begin anew"
             elif self._stepping and len(supervisor.events) > before:
                 self._stepping = self._playing = False
         clock.mark(world.time)

@@ -16,7 +16,7 @@ from factory.mjcf.replica import Replica
 from factory.mjcf.weld_frames import FEED, GRIP, HOLD, gaps
 from factory.plant.approaches import Pair
 from factory.record.monitor.report import Report
-from factory.record.verdict import RunVerdict
+from factory.record.verdict import STRENGTH, RunVerdict
 from factory.show.report.recording import Recording
 from factory.simulation.request import RunRequest
 from factory.simulation.run import Event
@@ -49,6 +49,7 @@ def fidelity(recording: Recording) -> RecordedFidelity:
     found = {
         "monitor_violations": violations,
         **_welds(recording),
+        STRENGTH: (recording.log.figures or {}).get(STRENGTH),
         "tracking_error_max_mm": _tracking(recording),
         **_ideal(recording),
     }

@@ -104,9 +104,14 @@ class Follower:
         return 0 if self.course is None else self.course.ticks - self._at
 
     @property
+    def over(self) -> bool:
+        """Whether a course is over."""
+        return self.course is not None and not self.left
+
+    @property
     def near(self) -> bool:
         """Whether the course is over, near a goal."""
-        return self.course is not None and not self.left and self.course.near
+        return self.course is not None and self.over and self.course.near
 
     def begin(self, axes: Index, course: Course) -> None:
         """Let axes follow a course from now on."""

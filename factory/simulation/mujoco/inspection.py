@@ -11,6 +11,7 @@ from factory.mjcf.weld_frames import residuals
 from factory.plant.factory import Operation
 from factory.simulation.mujoco.contacts import ContactMasks
 from factory.simulation.mujoco.product_error import ProductError
+from factory.simulation.mujoco.strength import StrengthUse
 from factory.simulation.mujoco.welds import Welds
 from factory.simulation.run import PhysicsFigures
 from factory.support.engine import mujoco
@@ -85,8 +86,9 @@ class Inspection:
         one body."""
         self.error = max(self.error or 0.0, self._product.measure(self._d, bodies), misfit)
 
-    def figures(self, welds: Welds) -> PhysicsFigures:
-        """The figures of the run so far."""
+    def figures(self, welds: Welds, strength: StrengthUse | None = None) -> PhysicsFigures:
+        """The figures of the run so far; `strength`: the largest share of a hand's strength that
+        was used."""
         pairs = dict.fromkeys(f"{a} - {b}" for a, b in self.unintended)
         pads = welds.pads.largest
         return PhysicsFigures(
@@ -104,4 +106,7 @@ class Inspection:
             float(self._m.opt.timestep),
             grip_gap_max_mm=None if pads is None else 1e3 * pads,
             joining_error_max_mm=1e3 * welds.taken.off,
+            grip_strength_share_max=None if strength is None else strength.share,
+            grip_strength_robot=None if strength is None else strength.robot,
+            grip_strength_label=None if strength is None else strength.label,
         )

@@ -18,9 +18,13 @@ from factory.simulation.mujoco.hands import Grasps
 from factory.simulation.mujoco.joining import Joining
 from factory.simulation.mujoco.motion import Motion
 from factory.simulation.mujoco.passing import Passing
+from factory.simulation.mujoco.strength import Strength
 from factory.simulation.mujoco.welds import Welds
 from factory.simulation.request import RunRequest
 from factory.support.engine import mujoco
+
+TICKS = 0.99
+"""A tick, less what times are rounded by."""
 
 
 class Parts:
@@ -28,7 +32,7 @@ class Parts:
 
     A weld is aimed at the copy it holds by writing its body at run time; its nominal frame is the
     same for all copies. `labels`: the bodies that a finished product consists of; `on_tray`: the
-    unit on the outfeed's tray.
+    unit on the outfeed's tray; `strength`: how much of that of robots' hands is used.
     """
 
     def __init__(
@@ -54,6 +58,7 @@ class Parts:
         passing, supply = Passing(m, d, model, request), Supply(model, request, counts)
         self.feeders = Feeders(m, model, self.copies, self.welds, motion.sliders, passing, supply)
         self.hands = Grasps(m, model, self.welds)
+        self.strength = Strength(m, d, model, self.hands.grip)
         self.joining = Joining(model, self.hands, self.copies, self.feeders, self.welds)
         self.joining.weigh(m, d)
         self.welds.loose([*self.feeders.welds.values(), *self.hold.values()])
@@ -62,6 +67,18 @@ class Parts:
             self._give(m, label, unit, robot)
         self.feeders.begin()
         self.welds.write()
+
+    def bear(self) -> bool:
+        """Hands whose load is more than they bear let go of it: whether there are any. Their
+        robots do not know: what they hold by the books stays the same. Where a weld has closed less
+        than a tick ago it may still pull its part into place, and nothing is measured."""
+        if self._d.time - self.welds.closed < TICKS * self.model.settings.tick:
+            return False
+        loose = self.strength.look()
+        if loose:
+            self.welds.loose(loose)
+            self.welds.write()
+        return bool(loose)
 
     def complete(self, ended: Sequence[tuple[Operation, int]]) -> None:
         """What robots of operations that end have joined is one body before it changes hands."""

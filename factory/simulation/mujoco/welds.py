@@ -22,7 +22,8 @@ class Welds:
     """Gathers what is to be switched until `write`; the last that is said of a weld or body counts.
 
     `radii` (nbody,): how far vertices are from their body's origin [m]; `taken`: what was measured
-    of bodies that were taken over; `pads`: how far holders' pads were from them.
+    of bodies that were taken over; `pads`: how far holders' pads were from them; `closed`: when a
+    weld was switched on last [s].
     """
 
     def __init__(
@@ -33,6 +34,7 @@ class Welds:
         mujoco.mj_kinematics(m, d)
         self.taken = Takeovers(m, d, radii)
         self.pads = PadGaps(m, d)
+        self.closed = -np.inf
         self._on: dict[int, int] = {}
         self._off: set[int] = set()
         self._gripped: dict[int, int] = {}
@@ -78,6 +80,8 @@ class Welds:
         touched = [m.eq_obj1id[off], m.eq_obj2id[off], m.eq_obj1id[on], bodies]
         d.eq_active[off] = False
         m.eq_obj2id[on], d.eq_active[on] = bodies, True
+        if len(on):
+            self.closed = float(d.time)
         self._sleep.wake({*np.concatenate(touched).tolist(), *self._placed})
         self.masks.hold(self._held)
         for gathered in (self._on, self._off, self._gripped, self._held, self._placed):

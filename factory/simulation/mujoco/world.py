@@ -26,7 +26,7 @@ from factory.simulation.mujoco.sliders import NEVER
 from factory.simulation.mujoco.stepping import SingleSteps
 from factory.simulation.request import RunRequest
 from factory.simulation.run import PhysicsFigures
-from factory.simulation.world import Hooks, Job
+from factory.simulation.world import Drop, Hooks, Job
 from factory.support.engine import mujoco
 
 ROUNDED = 0.01
@@ -155,16 +155,20 @@ class MujocoWorld:
     def settle(self) -> None:
         """A tick's timesteps are over, and the tray's next tick begins."""
         self.motion.settle()
+        if self._looks(1):
+            self._bear()
         self._settle(1)
         self.motion.plan_tray()
 
     def _settle(self, ticks: int) -> None:
         """After some ticks: at the end of a course look at what is not looked at in every tick, and
         always at the outfeed's tray."""
-        stride, over = self.model.settings.stride, not self.motion.robots.left
+        looks = self._looks(ticks)
         self._unseen += ticks
         self.inspection.tick()
-        if over and self._unseen > stride // 2:
+        if self.motion.robots.over:
+            self._bear()
+        if looks:
             self._look()
         outfeed, unit, feeders = self.motion.outfeed, self.parts.on_tray, self.parts.feeders
         if feeders.due <= self.time + ROUNDED * self.model.settings.tick:
@@ -179,13 +183,29 @@ class MujocoWorld:
             self.parts.recycle()
             self.motion.send_tray(False)
 
+    def _looks(self, ticks: int) -> bool:
+        """Whether it is to be looked, after some ticks, at what is not looked at in every tick."""
+        ahead, stride = self.motion.robots.left, self.model.settings.stride
+        return not ahead and self._unseen + ticks > stride // 2
+
+    def _bear(self) -> None:
+        """Hands whose load is more than they bear let go. What falls may come anywhere: from then
+        on everything is looked at in every timestep."""
+        if self.parts.bear():
+            self.hooks.before_step.append(_anything)
+
     def _look(self) -> None:
         """At what is looked at when other modes begin, and about once in a stride from then."""
         self._unseen = 0
         self.inspection.welds()
         self.supplied |= self.parts.feeders.tend()
-        if self.parts.joining.waiting:
+        if self.parts.joining.waiting and self.dropped is None:
             self.parts.joining.settle(self.time)
+
+    @property
+    def dropped(self) -> Drop | None:
+        """The first load that was more than its hand bears, None while there was none."""
+        return self.parts.strength.dropped
 
     def delivered(self) -> int:
         """Products that have left the outfeed, since the beginning of time."""
@@ -201,4 +221,8 @@ class MujocoWorld:
 
     def figures(self) -> PhysicsFigures:
         """The figures of the run so far."""
-        return self.inspection.figures(self.parts.welds)
+        return self.inspection.figures(self.parts.welds, self.parts.strength.most)
+
+
+def _anything() -> None:
+    """Before a timestep in which anything may come anywhere: that there is a hook is enough."""

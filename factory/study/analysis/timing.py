@@ -15,7 +15,7 @@ from factory.layout.layout import Layout
 from factory.modes.modes import operation_modes, operation_starts, robot_limits
 from factory.modes.staging import HeadStart, staged, stages_of
 from factory.plant.factory import Factory
-from factory.simulation.simulation import start_positions
+from factory.simulation.starting import start_positions
 from factory.support.settings import Settings
 from factory.timing.prediction import waits_for_hands, way_time
 from factory.timing.serving import away, leaving

@@ -108,6 +108,7 @@ class Measurement:
             "clearance_margin_mm": 1e3 * self.approaches.margin(),
             "hidden_penetration_max_mm": self.hidden.deepest(),
             "grip_gap_max_mm": physics.grip_gap_max_mm,
+            "grip_strength_share_max": physics.grip_strength_share_max,
             "force_saturated_percent": 1e2 * drives.saturation,
             "force_peak_percent": 1e2 * drives.peak,
             "drive_work_J": drives.work,

@@ -195,6 +195,14 @@ _ALL = (
         "bodies that it takes, when it takes what it holds first.",
     ),
     Quantity(
+        "grip_strength_share_max",
+        "",
+        "Largest share of the strength of a hand's tips that force and moment of its load about "
+        "them use, measured several times a second; none where hands are not chosen (--hands). "
+        "Above 1 the hand lets go (Dropped).",
+        1,
+    ),
+    Quantity(
         "force_saturated_percent",
         "%",
         "Share of timesteps in which a drive's force is at least 99.9 % of its limit; the worst "

@@ -1,0 +1,30 @@
+"""What of a load uses the strength of a hand, by the hand's shape."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from factory.geometry.meshes import Array
+from factory.layout.guidepath import Point2
+from factory.layout.hands.hand import Hand
+from factory.layout.hands.tips import tip
+
+
+def middle(hand: Hand) -> Array:
+    """The middle (3,) of a hand's tips, in the frame of the product [m]."""
+    return np.asarray(np.mean(hand.places, axis=0))
+
+
+def outward(hand: Hand, heading: Point2) -> Array:
+    """From the face of a hand's tips to the payload (3,), for a robot with a heading."""
+    if hand.kind == "behind":
+        return np.array([*heading, 0.0])
+    return np.array([0.0, 0.0, -1.0 if hand.kind == "above" else 1.0])
+
+
+def gauge(hand: Hand, heading: Point2) -> Array:
+    """From a force [N] and a moment [Nm] about the middle of a hand's tips to the terms of what
+    they use of its strength (11, 6), as `tips.shares` takes them."""
+    apart = np.subtract(hand.places[-1], hand.places[0])
+    found = tip(hand.tip).gauge(outward(hand, heading), np.array(hand.radius), apart)
+    return found / hand.covered

@@ -1,0 +1,152 @@
+"""How much of the strength of hands their loads use, as measured, and which hands let go.
+
+A weld holds a body at its centre of mass. Its force and torque are the same load as a force and a
+moment about the middle of the tips, which is what tips bear: a hand that holds far from the centre
+of mass bears the moment of the weight, too. All of it is of where the engine's last step began.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from factory.control.mode import Array, Index
+from factory.layout.hands.gauges import gauge, middle
+from factory.layout.hands.hand import Hand
+from factory.layout.hands.tips import TERMS, shares
+from factory.mjcf.model import Model
+from factory.mjcf.weld_frames import ROWS
+from factory.simulation.world import Drop
+from factory.support.engine import mujoco
+from factory.support.errors import Diagnostic
+
+Grip = tuple[int, str]
+"""A robot (index) and the label of a body that it holds."""
+
+OFTEN = 0.09
+"""Hands are not measured more often than once in this time [s]: a robot gains and loses its speed
+within a quarter of a second, a lift within a tenth."""
+
+CALM, SELDOM = 0.02, 0.5
+"""Production repeats itself: where the largest share has not risen for a while they are measured
+once in this part of that while, but in this time [s] at least."""
+
+RISE = 1.01
+"""A share that is so many times the largest before is news."""
+
+STRONGER = "let its robot accelerate less (--acceleration), or make the parts lighter"
+
+
+@dataclass(frozen=True, slots=True)
+class StrengthUse:
+    """The `share` of the strength of a hand that its load used, the name of its `robot` and the
+    `label` of what it held."""
+
+    share: float
+    robot: str
+    label: str
+
+
+class Strength:
+    """The hands of a model's robots, whose grips are `welds` by robot (index) and label of a body.
+
+    `most`: where the largest share of a hand's strength was used, None while nothing was in any
+    hand. `dropped`: the first load that was too much, None while none was.
+    """
+
+    def __init__(
+        self, m: mujoco.MjModel, d: mujoco.MjData, model: Model, welds: Mapping[Grip, int]
+    ) -> None:
+        self.most: StrengthUse | None = None
+        self.dropped: Drop | None = None
+        self._d, self._model = d, model
+        self._hands = {
+            robot: hand
+            for robot, hand in enumerate(model.layout.hands)
+            if hand is not None and hand.kind != "none"
+        }
+        self._robots = np.array([*self._hands], np.intp)
+        self._grips = [(grip, weld) for grip, weld in welds.items() if grip[0] in self._hands]
+        # the last grip is of all welds that are no grips, and of no hand
+        self._grip = np.full(m.neq, len(self._grips))
+        self._grip[[weld for _, weld in self._grips]] = np.arange(len(self._grips))
+        self._gauges = self._of_grips()
+        self._holds = np.zeros((len(self._hands), len(self._grips) + 1))
+        for number, ((robot, _), _) in enumerate(self._grips):
+            self._holds[self._robots == robot, number] = 1.0
+        self._next, self._risen = -np.inf, float(d.time)
+
+    def look(self) -> list[int]:
+        """Measure all hands that hold something and are awake, if that was not done just before.
+        Gives the welds of those whose load is more than they bear."""
+        d = self._d
+        if not self._grips or not d.ne or d.time < self._next:
+            return []
+        self._next = d.time + min(SELDOM, max(OFTEN, CALM * (d.time - self._risen)))
+        grips = self._grip[d.efc_id[: d.ne : ROWS]]
+        # of all constraints only welds count: what else touches a body is a load
+        terms = self._gauges[grips] @ d.efc_force[: d.ne].reshape(-1, ROWS, 1)
+        found = shares(self._holds[:, grips] @ terms[:, :, 0])
+        share = float(found.max())
+        if self.most is None or share > self.most.share:
+            self._keep(found, grips)
+        if share <= 1.0:
+            return []
+        worst = int(found.argmax())
+        if self.dropped is None:
+            self.dropped = self._drop(worst, self._use(worst, share, grips))
+        weak = self._holds[found > 1.0].sum(axis=0) > 0
+        return [self._grips[grip][1] for grip in grips[weak[grips]].tolist()]
+
+    def _keep(self, found: Array, grips: Index) -> None:
+        """Keep the largest share of those that hold something."""
+        holding = self._holds[:, grips].sum(axis=1) > 0
+        if holding.any():
+            worst = int(np.where(holding, found, -np.inf).argmax())
+            if self.most is None or found[worst] > RISE * self.most.share:
+                self._risen = float(self._d.time)
+            self.most = self._use(worst, max(0.0, float(found[worst])), grips)
+
+    def _of_grips(self) -> Array:
+        """For each grip what of its weld's rows uses strength (grips + 1, 11, 6). Rows of place are
+        the opposite of the force on the body, those of turn twice the opposite of the torque; so
+        they are the load as it acts at the body's centre of mass. Bodies keep the axes of the
+        world."""
+        found = np.zeros((len(self._grips) + 1, TERMS, ROWS))
+        centre, layout = self._model.carried.centre, self._model.layout
+        for number, ((robot, label), _) in enumerate(self._grips):
+            hand, load = self._hands[robot], np.diag([1.0, 1.0, 1.0, 0.5, 0.5, 0.5])
+            load[3:, :3] = np.cross(centre[label] - middle(hand), np.eye(3)).T
+            found[number] = gauge(hand, layout.guidepaths[robot].heading) @ load
+        return found
+
+    def _use(self, number: int, share: float, grips: Index) -> StrengthUse:
+        """What the n-th hand holds, and which share of its strength that uses."""
+        factory, carried = self._model.factory, self._model.carried
+        robot = factory.robots[int(self._robots[number])]
+        held = grips[self._holds[number, grips] > 0].tolist()
+        bodies = [self._grips[grip][0][1] for grip in held]
+        parts = {part for body in bodies for part in carried.parts(body)}
+        made = (factory.operations[operation].label for operation in robot.operations)
+        whole = (label for label in made if parts == {*factory.contents.get(label, ())})
+        return StrengthUse(share, robot.name, next(whole, bodies[0]))
+
+    def _drop(self, number: int, use: StrengthUse) -> Drop:
+        """What is said of the n-th hand, which lets go."""
+        factory, now, robot = self._model.factory, float(self._d.time), int(self._robots[number])
+        bears = _told(self._hands[robot])
+        message = (
+            f"{use.robot} drops '{use.label}' at {now:.2f} s: the load is {use.share:.4g} times"
+            f" what its hand bears ({bears})"
+        )
+        source = factory.by_label.get(use.label, factory.robots[robot])
+        return Drop(now, Diagnostic("Dropped", message, source.position, STRONGER))
+
+
+def _told(hand: Hand) -> str:
+    """What a hand holds with, in words."""
+    what = {"suction": "suction pad", "pin": "pin"}[hand.tip]
+    tips = f"two {what}s" if len(hand.places) > 1 else f"a {what}"
+    return f"{tips}, radius {1e3 * hand.radius:g} mm"

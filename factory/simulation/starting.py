@@ -1,0 +1,24 @@
+"""Where the axes of a factory are in a marking."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from factory.layout.hands.leaving import rises_first
+from factory.layout.layout import Layout
+from factory.nets.petri import Marking
+
+
+def start_positions(layout: Layout, marking: Marking) -> np.ndarray:
+    """Every axis in a marking: a robot where its last operation left it, or at its B end where it
+    waits with no part at the beginning of its cycle, and then its lift may still be down, unless
+    its hand is above what it takes."""
+    factory, net = layout.factory, layout.factory.net
+    positions = np.zeros(len(factory.robots) + len(layout.lifts))
+    lifts = {robot: len(factory.robots) + n for n, robot in enumerate(layout.lifts)}
+    for robot, gear in zip(factory.robots, net.gears, strict=True):
+        step = next(i for i, place in enumerate(gear.places) if place in marking) // 2
+        positions[robot.index] = layout.home(robot.index, robot.operations[step])
+        if robot.index in lifts and (step or rises_first(layout, robot.index)):
+            positions[lifts[robot.index]] = factory.strokes[robot.index]
+    return positions
