@@ -29,6 +29,7 @@ from factory.layout.dimensions import (
 )
 from factory.layout.guidepath import Box, Extent, Feeder, Guidepath, Point2
 from factory.layout.hands.hand import BEAM, Hand
+from factory.layout.hands.limbs import grip_box
 from factory.plant.approaches import Overlap
 from factory.plant.factory import Factory, Operation
 from factory.problem.pag import NOPART
@@ -184,9 +185,9 @@ class Layout:
         rear, front, near, far = path.frame(self.payloads[label])
         inside = rear - PLAY, front + PLAY, near - PLAY, far + PLAY
         housing = rear - SIDE, front + SIDE, near - SIDE, far + SIDE
-        back = -Clearance(self.clearance).post(path.reach, rear)
         across, half = path.offset + path.aside, POST / 2
-        hand = self.hand(operation.carrier)
+        hand, grip = self.hand(operation.carrier), grip_box(self, operation.carrier)
+        back = -Clearance(self.clearance).post(path.reach, min(rear, grip[0]) if grip else rear)
         if hand is not None and hand.tall:
             top = max(hand.beam + BEAM, hand.places[0][2] + max(hand.radius, FINGER / 2))
             room = max(room, round(top - float(solid.high[2]) + self.clearance, 6))

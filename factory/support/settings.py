@@ -90,8 +90,9 @@ class Settings:
     @property
     def feeder_limits(self) -> tuple[float, float]:
         """Speed [m/s] and acceleration [m/s²] of the feeders' sliders: the speed of the tray, eight
-        times the acceleration of a robot."""
-        return self.outfeed, 8 * self.acceleration
+        times the acceleration of a robot. Down to a hand it is half of that: a heavy part is not to
+        come further than to 0.1 mm from the pad."""
+        return self.outfeed, (4 if self.hands else 8) * self.acceleration
 
     @property
     def shutter_limits(self) -> tuple[float, float]:

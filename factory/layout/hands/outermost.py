@@ -42,17 +42,21 @@ def _within(body: Body, at: Array, radius: float, side: tuple[int, int]) -> Arra
     axis, way = side
     across = [a for a in range(3) if a != axis]
     on_edges = _on_edges(body.edges[:, :, across], way * body.edges[:, :, axis], at, radius)
-    normals = body.faces[0]
-    level = np.hypot(*normals[:, across].T)
-    rising = normals[(way * normals[:, axis] > FLAT) & (level > FLAT)]
-    if not len(rising):
+    normals, reach = body.faces
+    outer = way * normals[:, axis] > FLAT
+    if not outer.any():
         return on_edges
-    up = -rising[:, across] / np.hypot(*rising[:, across].T)[:, None]
-    rim = np.zeros((len(at) * len(up), 3))
-    rim[:, across] = (at[:, None] + radius * up).reshape(-1, 2)
+    tilt = normals[outer][:, across] / np.abs(normals[outer, axis])[:, None]
+    steep = np.hypot(*tilt.T)
+    rise = reach[outer] / np.abs(normals[outer, axis]) - at @ tilt.T + radius * steep
+    # nothing is further out than any face at the disc's rim: only the least of these can be met
+    least = np.argmin(rise, axis=1)
+    up = -tilt[least] / np.maximum(steep[least], FLAT)[:, None]
+    rim = np.zeros((len(at), 3))
+    rim[:, across] = at + radius * up
     first, last = body.crossed(rim, axis)
     out = np.where(first <= last, last if way > 0 else -first, -np.inf)
-    return np.maximum(on_edges, out.reshape(len(at), -1).max(axis=1))
+    return np.maximum(on_edges, out)
 
 
 def _on_edges(ends: Array, out: Array, at: Array, radius: float) -> Array:
