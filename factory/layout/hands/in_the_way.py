@@ -16,6 +16,7 @@ from factory.layout.hands.hand import AIR, BEAM, Hand, Kind, breadth
 from factory.layout.hands.holding import Holding, held
 from factory.layout.hands.places import Places
 from factory.layout.hands.surfaces import Way, hit, retreat, swept
+from factory.plant.factory import Operation
 from factory.problem.pag import NOPART
 
 Swept = tuple[Array, Array, Array]
@@ -38,6 +39,9 @@ BESIDE = 0.001
 OVER, LEVEL = 0.01, 0.003
 """How far above everything the beam of a hand above is, and how far those of robots that lie across
 each other are apart [m]."""
+
+APART = 2e-4
+"""A hand is so far from all parts beside it [m]: they come and go with that play."""
 
 ROD = 0.008
 """Radius of the pad by which a feeder holds a part, at most [m]."""
@@ -173,6 +177,8 @@ class InTheWay:
             if kind != "behind":
                 yield (*back, self.holding.around(label, *back))
             return
+        for boxes in self._from_above(last, robot, (u,)):
+            yield (*swept(low, high, _back(u)), boxes)
         lifted = robot in self.holding.factory.strokes
         back = swept(low, high) if kind == "above" and lifted else swept(low, high, _back(u))
         if kind == "below":
@@ -233,20 +239,31 @@ class InTheWay:
         if kind != "below":
             low, high = swept(low, high, _back(u))
         for operation in self.holding.made(robot):
-            if operation.lowered < 0:
-                continue
-            boxes = self.holding.surfaces.boxes(
-                self.holding.factory.contents[operation.before[operation.lowered]]
-            )
-            boxes[:, 1, 2] = np.inf
-            yield low, high, boxes
+            sides = [(u[1], u[0]), (-u[1], -u[0])]
+            for boxes in self._from_above(operation, robot, sides):
+                yield low, high, boxes
+
+    def _from_above(
+        self, operation: Operation, robot: int, sides: Sequence[Way]
+    ) -> Iterator[Array]:
+        """The boxes (n, 2, 3) of what comes down to a robot in an operation from above: on the way
+        down, and before that as it comes from either of some sides over all that stands there."""
+        slot = operation.lowered
+        if slot < 0 or operation.robots[slot] == robot:
+            return
+        boxes = self.holding.boxes(operation.before[slot]).copy()
+        boxes[:, 1, 2] = np.inf
+        yield boxes.copy()
+        boxes[:, 0, 2] += self.holding.factory.strokes[operation.robots[slot]]
+        for side in sides:
+            yield np.stack(swept(boxes[:, 0], boxes[:, 1], side), axis=1)
 
     def _reach(self, kind: Kind, found: Places, u: Way) -> tuple[Array, Array]:
         """The boxes (n, 3) of pad and column, of pad and stem, or of pad and bar."""
         half, at = found.radius[:, None], found.at
         if kind == "behind":
             half = np.maximum(half, _breadths(found)[:, None] / 2)
-        low, high = at - half, at + half
+        low, high = at - half - APART, at + half + APART
         if kind == "below":
             low[:, 2], high[:, 2] = self.holding.product.low[2] - 1.0, at[:, 2] - AIR
         elif kind == "above":
