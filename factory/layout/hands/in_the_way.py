@@ -11,7 +11,7 @@ import numpy as np
 
 from factory.control.mode import Truth
 from factory.geometry.meshes import Array
-from factory.layout.dimensions import FINGER, MAST
+from factory.layout.dimensions import FINGER, FINGER_TOP, MAST, PAYLOAD
 from factory.layout.hands.hand import AIR, BEAM, Hand, Kind, breadth
 from factory.layout.hands.holding import Holding, held
 from factory.layout.hands.places import Places
@@ -43,6 +43,10 @@ each other are apart [m]."""
 APART = 2e-4
 """A hand is so far from all parts beside it [m]: they come and go with that play."""
 
+UNDER = (PAYLOAD - FINGER_TOP) / 2
+"""How far a hand behind reaches down under the plane of payloads at the most, to the fingers of
+those below [m]."""
+
 ROD = 0.008
 """Radius of the pad by which a feeder holds a part, at most [m]."""
 
@@ -70,7 +74,7 @@ class InTheWay:
         first, waits = np.zeros(len(found), bool), np.zeros(len(found))
         for u, t in frames:
             free["hands"] &= self._own_side(robot, kind, found, u, t)
-            for ways in self._leaving(robot, label, kind, found, u):
+            for ways in self._leaving(robot, kind, found, u):
                 free["joined"] &= ~hit(*ways)
             waits = np.maximum(waits, self._going_on(robot, kind, found, u, t))
             waits = np.maximum(waits, self._crossing(robot, found, u, t))
@@ -80,6 +84,9 @@ class InTheWay:
                 first |= hit(*ways)
             for ways in self._lowered(robot, kind, found, u):
                 free["lowered"] &= ~hit(*ways)
+        if kind == "behind":
+            half = np.maximum(found.radius, _breadths(found) / 2)
+            free["hands"] &= found.at[:, 2] - half >= self.holding.product.low[2] - UNDER
         if self.holding.is_fed(robot) and kind != "below":
             free["own"] &= ~first
         if self.holding.is_fed(robot) and kind == "above":
@@ -165,17 +172,15 @@ class InTheWay:
             room |= left >= least + BESIDE
         return room
 
-    def _leaving(
-        self, robot: int, label: str, kind: Kind, found: Places, u: Way
-    ) -> Iterator[Swept]:
+    def _leaving(self, robot: int, kind: Kind, found: Places, u: Way) -> Iterator[Swept]:
         """What a hand sweeps as seen from the parts of what it has delivered to, with their boxes,
         as it comes there and leaves: along its heading, and where it lowers its payload from above.
         """
         last, (low, high) = self.holding.last(robot), self._reach(kind, found, u)
         if last.index == self.holding.factory.dropoff.index:
-            back = swept(low, high, _back(u))
+            back, whole = swept(low, high, _back(u)), self._at_last(robot)
             if kind != "behind":
-                yield (*back, self.holding.around(label, *back))
+                yield (*back, self.holding.around(whole, *back))
             return
         for boxes in self._from_above(last, robot, (u,)):
             yield (*swept(low, high, _back(u)), boxes)
@@ -199,8 +204,12 @@ class InTheWay:
         if last.index == self.holding.factory.dropoff.index:
             return np.zeros(len(found))
         low, high = self._reach(kind, found, u)
-        whole = held(self.holding.factory, last.carrier, at_last=True)
+        whole = self._at_last(last.carrier)
         return retreat(low, high, self.holding.around(whole, low, high), (_back(u), _back(t)))
+
+    def _at_last(self, robot: int) -> str:
+        """What a robot has in the end."""
+        return held(self.holding.factory, robot, at_last=True)
 
     def _coming(
         self, robot: int, label: str, kind: Kind, found: Places, u: Way, t: Way
@@ -225,6 +234,8 @@ class InTheWay:
         """The same of each input of its operations, which comes from either side when it is there
         already; with it whether that is so whatever else, since it has a pile by then."""
         low, high = self._reach(kind, found, u)
+        if kind == "behind":
+            low, high = swept(low, high, _back(u))
         for operation in self.holding.made(robot):
             later = operation.before[operation.template.carrier - 1] != NOPART
             for guest, label in zip(operation.robots, operation.before, strict=True):
