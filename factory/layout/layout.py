@@ -16,7 +16,6 @@ from factory.layout.dimensions import (
     BOOM,
     BOOM_HEIGHT,
     FINGER,
-    MAST,
     PAD,
     PAYLOAD,
     PLAY,
@@ -244,15 +243,15 @@ class Layout:
 
     def _beside_hand(self, operation: Operation, slot: int) -> float:
         """How far short of the meeting point what is brought is clear of the way of the carrier's
-        hand, where that has to be there first [m]; else 0."""
-        hand = self.hand(operation.carrier)
-        if hand is None or not hand.first:
+        hand and mast, where that has to be there first [m]; else 0."""
+        hand, grip = self.hand(operation.carrier), grip_box(self, operation.carrier)
+        if hand is None or grip is None or not hand.first:
             return 0.0
         path, on = self.guidepaths[operation.robots[slot]], self.guidepaths[operation.carrier]
         ahead = path.frame(self.payloads[operation.before[slot]])[1]
         lines = [
             path.heading[0] * on.side[0] * line + path.heading[1] * on.side[1] * line
-            for line in (on.offset - MAST / 2, on.offset + MAST / 2)
+            for line in grip[2:]
         ]
         return round(max(0.0, ahead - min(lines) + self.clearance), 6)
 

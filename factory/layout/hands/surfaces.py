@@ -50,7 +50,7 @@ class Body:
             corners, faces = self.vertices, ConvexHull(self.vertices).simplices
         except QhullError:
             corners = np.array([[*p] for p in pairs(*zip(self.low, self.high, strict=True))])
-            return corners[np.array(list(combinations(range(8), 2)))]
+            return np.asarray(corners[list(combinations(range(8), 2))])
         found = np.sort(np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [0, 2]]]))
         return np.asarray(corners[np.unique(found, axis=0)])
 
