@@ -28,7 +28,7 @@ from factory.layout.dimensions import (
 )
 from factory.layout.guidepath import Box, Extent, Feeder, Guidepath, Point2
 from factory.layout.hands.hand import BEAM, Hand
-from factory.layout.hands.limbs import grip_box
+from factory.layout.hands.mounted import Mount, grip_of
 from factory.plant.approaches import Overlap
 from factory.plant.factory import Factory, Operation
 from factory.problem.pag import NOPART
@@ -69,6 +69,25 @@ class Layout:
     def hand(self, robot: int) -> Hand | None:
         """The hand of a robot; None for a tool, and where hands are not chosen."""
         return self.hands[robot] if self.hands else None
+
+    def held_at(self, robot: int) -> float:
+        """How far above its place in the product a robot holds its payload with its lift down
+        [m]."""
+        return self.elevations[robot] - self.factory.strokes.get(robot, 0.0)
+
+    def mount(self, robot: int) -> Mount:
+        """Where a robot's hand is mounted."""
+        path, (x, y, _) = self.guidepaths[robot], self.product.middle.tolist()
+        over = PAYLOAD - float(self.product.low[2]) + self.held_at(robot)
+        lies = path.heading, path.side, path.reach, path.arm, path.offset
+        stroke = self.factory.strokes.get(robot)
+        return Mount(*lies, (x, y), over, stroke or 0.0, stroke is not None)
+
+    def grip(self, robot: int) -> Extent | None:
+        """The box about the product's middle, in a robot's frame (u, t), of what its hand and mast
+        take among the payloads; None for nothing."""
+        hand = self.hand(robot)
+        return None if hand is None else grip_of(hand, self.mount(robot))
 
     @cached_property
     def guidepath_length(self) -> float:
@@ -185,7 +204,7 @@ class Layout:
         inside = rear - PLAY, front + PLAY, near - PLAY, far + PLAY
         housing = rear - SIDE, front + SIDE, near - SIDE, far + SIDE
         across, half = path.offset + path.aside, POST / 2
-        hand, grip = self.hand(operation.carrier), grip_box(self, operation.carrier)
+        hand, grip = self.hand(operation.carrier), self.grip(operation.carrier)
         back = -Clearance(self.clearance).post(path.reach, min(rear, grip[0]) if grip else rear)
         if hand is not None and hand.tall:
             top = max(hand.beam + BEAM, hand.places[0][2] + max(hand.radius, FINGER / 2))
@@ -244,7 +263,7 @@ class Layout:
     def _beside_hand(self, operation: Operation, slot: int) -> float:
         """How far short of the meeting point what is brought is clear of the way of the carrier's
         hand and mast, where that has to be there first [m]; else 0."""
-        hand, grip = self.hand(operation.carrier), grip_box(self, operation.carrier)
+        hand, grip = self.hand(operation.carrier), self.grip(operation.carrier)
         if hand is None or grip is None or not hand.first:
             return 0.0
         path, on = self.guidepaths[operation.robots[slot]], self.guidepaths[operation.carrier]

@@ -11,7 +11,7 @@ from factory.layout.dimensions import FINGER, MAST, PAYLOAD, Clearance, up
 from factory.layout.guidepath import Box, Extent, Point2, hull, project
 from factory.layout.hands.choosing import Hands
 from factory.layout.hands.hand import Hand
-from factory.layout.hands.limbs import Mount, grip_of
+from factory.layout.hands.mounted import Mount, grip_of
 from factory.layout.layout import carriers
 from factory.layout.sweeps import piles
 from factory.plant.factory import Factory

@@ -39,6 +39,7 @@ class InTheWay:
 
     def __init__(self, holding: Holding, hand_of: Callable[[int, Way], Hand]) -> None:
         self.holding, self.meeting = holding, Meeting(holding, hand_of)
+        self._checked: dict[tuple[object, ...], tuple[dict[str, Truth], Truth, Array]] = {}
 
     def on_side(self, label: str, kind: Kind, frames: Sequence[tuple[Way, Way]]) -> Places:
         """The places on the side of a sub-assembly that a kind of hand holds."""
@@ -52,7 +53,16 @@ class InTheWay:
         self, robot: int, label: str, kind: Kind, found: Places, frames: Sequence[tuple[Way, Way]]
     ) -> tuple[dict[str, Truth], Truth, Array]:
         """Whether a hand at each place (n,) is clear in every frame, by what could be in its way;
-        the rest as `_clear`."""
+        whether it has to be there before what it takes; and how far it goes back until what it has
+        delivered can leave [m]. Looked at once."""
+        key = robot, kind, tuple(frames)
+        if key not in self._checked:
+            self._checked[key] = self._looked_at(robot, label, kind, found, frames)
+        return self._checked[key]
+
+    def _looked_at(
+        self, robot: int, label: str, kind: Kind, found: Places, frames: Sequence[tuple[Way, Way]]
+    ) -> tuple[dict[str, Truth], Truth, Array]:
         free = {why: np.ones(len(found), bool) for why in IN_THE_WAY}
         first, waits = np.zeros(len(found), bool), np.zeros(len(found))
         for u, t in frames:
