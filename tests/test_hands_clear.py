@@ -10,11 +10,11 @@ import pytest
 from scipy.spatial import ConvexHull
 
 from factory.layout.dimensions import FINGER_TOP, PAYLOAD
+from factory.layout.hands.apart import LEVEL, HandsApart
 from factory.layout.hands.hand import BEAM, Hand
 from factory.layout.hands.holding import Holding
 from factory.layout.hands.leaving import awaited_positions
 from factory.layout.hands.limbs import grip_box, limbs
-from factory.layout.hands.meeting import LEVEL, Meeting
 from factory.layout.hands.outermost import outermost
 from factory.layout.hands.places import Places
 from factory.layout.hands.surfaces import Body
@@ -67,9 +67,15 @@ p5 = atomic ( box = ( 0.03, 0.04, 0.1 ), pos = ( -0.061, 0.019, 0.061 ) );
 p6 = atomic ( cylinder = ( 0.01, 0.06 ), pos = ( 0.036, 0.0365, 0.041 ) );
 p7 = atomic ( cylinder = ( 0.005, 0.02 ), pos = ( 0.033, 0.0435, 0.082 ) );
 """,
-    "a heavy part on its way down": """root = s4; s4 = mate ( p0, p1 );
-p0 = atomic ( box = ( 0.1, 0.03, 0.1 ), pos = ( 0, 0, 0.05 ), mass = 0.6 );
+    "a heavy part on its way down": """root = s6; s1 = mate ( p3, p2 ); s2 = mate ( p6, p5 );
+s3 = mate ( s1, p4 ); s4 = mate ( p0, p1 ); s5 = mate ( s3, s2 ); s6 = mate ( s4, s5 );
+p0 = atomic ( box = ( 0.1, 0.03, 0.1 ), pos = ( 0, 0, 0.05 ) );
 p1 = atomic ( sphere = 0.01, pos = ( -0.001, 0.012, 0.1105 ) );
+p2 = atomic ( box = ( 0.03, 0.04, 0.02 ), pos = ( 0.008, 0.02, 0.131 ) );
+p3 = atomic ( box = ( 0.04, 0.03, 0.02 ), pos = ( -0.0315, 0.021, 0.1105 ) );
+p4 = atomic ( sphere = 0.01, pos = ( 0.034, 0.011, 0.131 ) );
+p5 = atomic ( box = ( 0.06, 0.03, 0.06 ), pos = ( 0.021, 0.031, 0.172 ) );
+p6 = atomic ( box = ( 0.03, 0.01, 0.04 ), pos = ( -0.066, -0.007, 0.02 ) );
 """,
 }
 
@@ -174,13 +180,13 @@ def test_a_beam_is_over_that_of_the_carrier_that_it_crosses(tmp_path: Path) -> N
     holding = Holding(layout.factory, layout.product)
     guest = next(r for r, on in enumerate(holding.on) if on == 0)
     above = Hand("above", ((0.0, 0.0, 0.1),), beam=0.3)
-    meeting = Meeting(holding, lambda robot, heading: above)
+    apart = HandsApart(holding, lambda robot, heading: above)
     frames = [((0.0, 1.0), (1.0, 0.0))]
     beside, across = (
         Places(np.array([[0.0, y, 0.1]]), np.array([0.003]), np.array([0.5])) for y in (-0.05, 0.02)
     )
-    assert meeting.beam(guest, beside, frames) < above.beam
-    assert meeting.beam(guest, across, frames) == pytest.approx(above.beam + BEAM + LEVEL)
+    assert apart.beam(guest, beside, frames) < above.beam
+    assert apart.beam(guest, across, frames) == pytest.approx(above.beam + BEAM + LEVEL)
 
 
 def test_hands_behind_stay_over_the_fingers_of_others(tmp_path: Path) -> None:

@@ -17,10 +17,10 @@ from factory.control.mode import Truth
 from factory.geometry.meshes import Array
 from factory.geometry.solids import Product
 from factory.layout.dimensions import FINGER
+from factory.layout.hands.apart import BESIDE
 from factory.layout.hands.hand import Hand, Kind
 from factory.layout.hands.holding import Holding, held
 from factory.layout.hands.in_the_way import IN_THE_WAY, InTheWay
-from factory.layout.hands.meeting import BESIDE
 from factory.layout.hands.places import Places, centre_of, used_on_line
 from factory.layout.hands.surfaces import Way
 from factory.plant.factory import Factory
@@ -149,7 +149,7 @@ class Hands:
         radius = float(found.radius[at].min())
         beam = 0.0
         if kind == "above":
-            beam = self._in_the_way.meeting.beam(robot, found.chosen(np.array(at)), frames)
+            beam = self._in_the_way.apart.beam(robot, found.chosen(np.array(at)), frames)
         early, late = bool(first[at].any()), round(float(waits[at].max()), 6)
         return Hand(kind, tuple(zip(x, y, z, strict=True)), radius, beam, share, early, late)
 

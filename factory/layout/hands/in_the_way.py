@@ -11,9 +11,9 @@ import numpy as np
 
 from factory.control.mode import Truth
 from factory.geometry.meshes import Array
+from factory.layout.hands.apart import BESIDE, HandsApart, Swept
 from factory.layout.hands.hand import Hand, Kind
 from factory.layout.hands.holding import Holding, held
-from factory.layout.hands.meeting import BESIDE, Meeting, Swept
 from factory.layout.hands.places import Places
 from factory.layout.hands.reach import back, halves, reach
 from factory.layout.hands.surfaces import Way, hit, retreat, swept
@@ -38,7 +38,7 @@ class InTheWay:
     """What is in the way of a factory's hands. `hand_of`: that of a carrier with a heading."""
 
     def __init__(self, holding: Holding, hand_of: Callable[[int, Way], Hand]) -> None:
-        self.holding, self.meeting = holding, Meeting(holding, hand_of)
+        self.holding, self.apart = holding, HandsApart(holding, hand_of)
         self._checked: dict[tuple[object, ...], tuple[dict[str, Truth], Truth, Array]] = {}
 
     def on_side(self, label: str, kind: Kind, frames: Sequence[tuple[Way, Way]]) -> Places:
@@ -66,18 +66,18 @@ class InTheWay:
         free = {why: np.ones(len(found), bool) for why in IN_THE_WAY}
         first, waits = np.zeros(len(found), bool), np.zeros(len(found))
         for u, t in frames:
-            free["hands"] &= self.meeting.own_side(robot, kind, found, u, t)
+            free["hands"] &= self.apart.own_side(robot, kind, found, u, t)
             for ways in self._leaving(robot, kind, found, u):
                 free["joined"] &= ~hit(*ways)
             waits = np.maximum(waits, self._going_on(robot, kind, found, u, t))
-            waits = np.maximum(waits, self.meeting.crossing(robot, found, u, t))
-            for hand in self.meeting.carriers_hand(robot, kind, found, u, t):
+            waits = np.maximum(waits, self.apart.crossing(robot, found, u, t))
+            for hand in self.apart.carriers_hand(robot, kind, found, u, t):
                 free["hands"] &= ~hit(*hand)
             for ways in self._coming(robot, label, kind, found, u, t):
                 first |= hit(*ways)
             for ways in self._lowered(robot, kind, found, u):
                 free["lowered"] &= ~hit(*ways)
-        free["hands"] &= self.meeting.over_fingers(kind, found)
+        free["hands"] &= self.apart.over_fingers(kind, found)
         if self.holding.is_fed(robot) and kind != "below":
             free["own"] &= ~first
         if self.holding.is_fed(robot) and kind == "above":

@@ -32,7 +32,7 @@ UNDER = (PAYLOAD - FINGER_TOP) / 2
 those below [m]."""
 
 
-class Meeting:
+class HandsApart:
     """Hands of a factory's robots that could meet. `hand_of`: that of a carrier with a heading."""
 
     def __init__(self, holding: Holding, hand_of: Callable[[int, Way], Hand]) -> None:
