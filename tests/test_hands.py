@@ -16,7 +16,7 @@ from factory.layout.embedding import lay_out
 from factory.layout.hands.choosing import Hands
 from factory.layout.hands.hand import AIR
 from factory.layout.hands.holding import held
-from factory.layout.hands.leaving import leavings
+from factory.layout.hands.leaving import awaited_positions, leavings
 from factory.layout.hands.limbs import limbs
 from factory.layout.hands.surfaces import Surfaces, hit, retreat, swept
 from factory.layout.layout import Layout
@@ -163,3 +163,15 @@ def test_a_hand_is_drawn_of_limbs_that_collide() -> None:
     drawn = [m.geom(i) for i in range(m.ngeom) if names.pad_of(m.geom(i).name).startswith("r")]
     assert len(drawn) == sum(hand is not None for hand in with_hands("lamp").hands)
     assert all(int(geom.contype[0]) and int(geom.conaffinity[0]) for geom in drawn)
+
+
+def test_robots_do_not_go_back_from_home_to_where_they_would_wait() -> None:
+    """A robot begins at its B end: it has not yet delivered what its hand has to go back from."""
+    layout = with_hands("chair")
+    awaited = awaited_positions(layout)
+    short = {r for r, at in awaited.items() if at < layout.guidepaths[r].length - 0.01}
+    made = Simulation(layout, RunRequest(units=1))
+    assert short and all(made.world.sense()[0][robot] > awaited[robot] for robot in short)
+    for _ in range(3):
+        assert not made.supervisor.active.ahead
+        made.supervisor.step()

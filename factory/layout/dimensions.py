@@ -117,5 +117,6 @@ class Clearance:
 
     def post(self, reach: float, rear: float) -> float:
         """How far behind the product's middle the centre of a feeder's post stands: behind the
-        carriage's rear stop and behind the part, whose rear end is at `rear`."""
+        carriage's rear stop, and behind the part and the hand that holds it, whose rear end is at
+        `rear`."""
         return max(reach + CARRIAGE / 2, -rear) + self.c + POST / 2

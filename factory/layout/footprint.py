@@ -102,7 +102,7 @@ class Footprint:
         ends = [at + pile[1] + half for at, pile in piles]
         taken.append((min(starts, default=inf), max(ends, default=-inf)))
         if self.fed:
-            rear = shape.piles[self.operations[0].index][0]
+            rear = shape.laden(shape.piles[self.operations[0].index])[0]
             post, room = -self.clearance.post(shape.reach, rear), POST / 2 + half
             taken = [(min(low, post - room), max(high, post + room)) for low, high in taken]
             taken[PAYLOADS] = taken[PAYLOADS][0], max(taken[PAYLOADS][1], self.housing[1] + half)

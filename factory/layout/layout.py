@@ -16,7 +16,6 @@ from factory.layout.dimensions import (
     BOOM,
     BOOM_HEIGHT,
     FINGER,
-    MAST,
     PAD,
     PAYLOAD,
     PLAY,
@@ -29,6 +28,7 @@ from factory.layout.dimensions import (
 )
 from factory.layout.guidepath import Box, Extent, Feeder, Guidepath, Point2
 from factory.layout.hands.hand import BEAM, Hand
+from factory.layout.hands.mounted import Mount, grip_of
 from factory.plant.approaches import Overlap
 from factory.plant.factory import Factory, Operation
 from factory.problem.pag import NOPART
@@ -69,6 +69,25 @@ class Layout:
     def hand(self, robot: int) -> Hand | None:
         """The hand of a robot; None for a tool, and where hands are not chosen."""
         return self.hands[robot] if self.hands else None
+
+    def held_at(self, robot: int) -> float:
+        """How far above its place in the product a robot holds its payload with its lift down
+        [m]."""
+        return self.elevations[robot] - self.factory.strokes.get(robot, 0.0)
+
+    def mount(self, robot: int) -> Mount:
+        """Where a robot's hand is mounted."""
+        path, (x, y, _) = self.guidepaths[robot], self.product.middle.tolist()
+        over = PAYLOAD - float(self.product.low[2]) + self.held_at(robot)
+        lies = path.heading, path.side, path.reach, path.arm, path.offset
+        stroke = self.factory.strokes.get(robot)
+        return Mount(*lies, (x, y), over, stroke or 0.0, stroke is not None)
+
+    def grip(self, robot: int) -> Extent | None:
+        """The box about the product's middle, in a robot's frame (u, t), of what its hand and mast
+        take among the payloads; None for nothing."""
+        hand = self.hand(robot)
+        return None if hand is None else grip_of(hand, self.mount(robot))
 
     @cached_property
     def guidepath_length(self) -> float:
@@ -184,9 +203,9 @@ class Layout:
         rear, front, near, far = path.frame(self.payloads[label])
         inside = rear - PLAY, front + PLAY, near - PLAY, far + PLAY
         housing = rear - SIDE, front + SIDE, near - SIDE, far + SIDE
-        back = -Clearance(self.clearance).post(path.reach, rear)
         across, half = path.offset + path.aside, POST / 2
-        hand = self.hand(operation.carrier)
+        hand, grip = self.hand(operation.carrier), self.grip(operation.carrier)
+        back = -Clearance(self.clearance).post(path.reach, min(rear, grip[0]) if grip else rear)
         if hand is not None and hand.tall:
             top = max(hand.beam + BEAM, hand.places[0][2] + max(hand.radius, FINGER / 2))
             room = max(room, round(top - float(solid.high[2]) + self.clearance, 6))
@@ -243,15 +262,15 @@ class Layout:
 
     def _beside_hand(self, operation: Operation, slot: int) -> float:
         """How far short of the meeting point what is brought is clear of the way of the carrier's
-        hand, where that has to be there first [m]; else 0."""
-        hand = self.hand(operation.carrier)
-        if hand is None or not hand.first:
+        hand and mast, where that has to be there first [m]; else 0."""
+        hand, grip = self.hand(operation.carrier), self.grip(operation.carrier)
+        if hand is None or grip is None or not hand.first:
             return 0.0
         path, on = self.guidepaths[operation.robots[slot]], self.guidepaths[operation.carrier]
         ahead = path.frame(self.payloads[operation.before[slot]])[1]
         lines = [
             path.heading[0] * on.side[0] * line + path.heading[1] * on.side[1] * line
-            for line in (on.offset - MAST / 2, on.offset + MAST / 2)
+            for line in grip[2:]
         ]
         return round(max(0.0, ahead - min(lines) + self.clearance), 6)
 

@@ -7,11 +7,11 @@ from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 
 from factory.geometry.solids import Product
-from factory.layout.dimensions import FINGER, MAST, Clearance, up
+from factory.layout.dimensions import FINGER, MAST, PAYLOAD, Clearance, up
 from factory.layout.guidepath import Box, Extent, Point2, hull, project
 from factory.layout.hands.choosing import Hands
 from factory.layout.hands.hand import Hand
-from factory.layout.hands.limbs import Mount, grip_of
+from factory.layout.hands.mounted import Mount, grip_of
 from factory.layout.layout import carriers
 from factory.layout.sweeps import piles
 from factory.plant.factory import Factory
@@ -173,7 +173,8 @@ def held_shape(
             if hand.waits and robot not in factory.strokes:
                 thick = 2 * max(hand.radius, FINGER / 2)
                 least = last[1] + max(ahead) - min(ahead) + thick - joined[0] + 2 * c.c
-    grip, nest = grip_of(hand, Mount(u, t, reach, arm, offset, (x, y))), round(max(ahead), 6)
+    over = PAYLOAD - float(hands.holding.product.low[2])
+    grip, nest = grip_of(hand, Mount(u, t, reach, arm, offset, (x, y), over)), round(max(ahead), 6)
     return Shape(boxes, last, offset, arm, reach, nest, False, spread, hand, grip, post, up(least))
 
 

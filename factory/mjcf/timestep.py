@@ -101,7 +101,8 @@ def timed(
     longest timestep in which nothing goes as far as the certified clearance, with which no axis is
     predicted to get off its reference by more than ALLOWED, all end stops hold, and every robot
     gets into its goal ball; 2 ms, or the longest below it that the clearance allows, where none
-    does that."""
+    does that. Whether robots have hands is as the layout says."""
+    settings = replace(settings, hands=int(any(layout.hands)))
     if settings.timestep != AUTO:
         return replace(settings, substeps=settings.steps)
     least = settings.substeps or 1

@@ -89,10 +89,10 @@ class Settings:
 
     @property
     def feeder_limits(self) -> tuple[float, float]:
-        """Speed [m/s] and acceleration [m/s²] of the feeders' sliders: the speed of the tray, four
-        times the acceleration of a robot. Parts come to within 0.2 mm of pads, so they are not to
-        overshoot."""
-        return self.outfeed, 4 * self.acceleration
+        """Speed [m/s] and acceleration [m/s²] of the feeders' sliders: the speed of the tray, eight
+        times the acceleration of a robot. Down to a hand it is half of that: a heavy part is not to
+        come further than to 0.1 mm from the pad."""
+        return self.outfeed, (4 if self.hands else 8) * self.acceleration
 
     @property
     def shutter_limits(self) -> tuple[float, float]:

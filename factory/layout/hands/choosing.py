@@ -18,9 +18,10 @@ from factory.control.mode import Truth
 from factory.geometry.meshes import Array
 from factory.geometry.solids import Product
 from factory.layout.dimensions import FINGER
+from factory.layout.hands.apart import BESIDE
 from factory.layout.hands.hand import Hand, Kind
 from factory.layout.hands.holding import Holding, held
-from factory.layout.hands.in_the_way import BESIDE, InTheWay
+from factory.layout.hands.in_the_way import InTheWay
 from factory.layout.hands.places import PUSH, Places, centre_of, strain
 from factory.layout.hands.surfaces import Way
 from factory.layout.hands.tips import STRONG, TipName, tip
@@ -182,7 +183,7 @@ class Hands:
         radius = float(found.radius[at].min())
         beam = 0.0
         if kind == "above":
-            beam = self.in_the_way.beam(robot, found.chosen(np.array(at)), frames)
+            beam = self.in_the_way.apart.beam(robot, found.chosen(np.array(at)), frames)
         early, late = bool(first[at].any()), waits[at].max(axis=0).round(6).tolist()
         while late and not late[-1]:
             late.pop()

@@ -11,17 +11,15 @@ import numpy as np
 
 from factory.control.mode import Truth
 from factory.geometry.meshes import Array
-from factory.layout.dimensions import FINGER, MAST
-from factory.layout.hands.hand import AIR, BEAM, Hand, Kind, breadth
-from factory.layout.hands.holding import Holding
+from factory.layout.hands.apart import BESIDE, HandsApart, Swept
+from factory.layout.hands.hand import Hand, Kind
+from factory.layout.hands.holding import Holding, held
 from factory.layout.hands.places import Places
+from factory.layout.hands.reach import back, halves, reach
 from factory.layout.hands.surfaces import Way, hit, retreat, swept
 from factory.layout.hands.tips import STRONG
+from factory.plant.factory import Operation
 from factory.problem.pag import NOPART
-
-Swept = tuple[Array, Array, Array]
-"""Boxes that hands sweep, from `low` to `high` (n, 3), and boxes (m, 2, 3) that could be in the
-way [m]."""
 
 IN_THE_WAY = {
     "weak": "not even a pin bears the load",
@@ -34,13 +32,6 @@ IN_THE_WAY = {
 }
 """What can be in the way of a hand."""
 
-BESIDE = 0.001
-"""How far a hand stays to its own side of the line of another [m]."""
-
-OVER, LEVEL = 0.01, 0.003
-"""How far above everything the beam of a hand above is, and how far those of robots that lie across
-each other are apart [m]."""
-
 ROD = 0.008
 """Radius of the pad by which a feeder holds a part, at most [m]."""
 
@@ -49,7 +40,8 @@ class InTheWay:
     """What is in the way of a factory's hands. `hand_of`: that of a carrier with a heading."""
 
     def __init__(self, holding: Holding, hand_of: Callable[[int, Way], Hand]) -> None:
-        self.holding, self._hand_of = holding, hand_of
+        self.holding, self.apart = holding, HandsApart(holding, hand_of)
+        self._checked: dict[tuple[object, ...], tuple[dict[str, Truth], Truth, Array]] = {}
 
     def on_side(self, label: str, kind: Kind, frames: Sequence[tuple[Way, Way]]) -> Places:
         """The places on the side of a sub-assembly that a kind of hand holds."""
@@ -63,19 +55,29 @@ class InTheWay:
         self, robot: int, label: str, kind: Kind, found: Places, frames: Sequence[tuple[Way, Way]]
     ) -> tuple[dict[str, Truth], Truth, Array]:
         """Whether a hand at each place (n,) is clear in every frame, by what could be in its way;
-        the rest as `_clear`."""
+        whether it has to be there before what it takes; and how far it goes back until each of its
+        carrier's next operations may start [m]. Looked at once."""
+        key = robot, kind, tuple(frames), found.at.tobytes()
+        if key not in self._checked:
+            self._checked[key] = self._looked_at(robot, label, kind, found, frames)
+        return self._checked[key]
+
+    def _looked_at(
+        self, robot: int, label: str, kind: Kind, found: Places, frames: Sequence[tuple[Way, Way]]
+    ) -> tuple[dict[str, Truth], Truth, Array]:
         free = {why: np.ones(len(found), bool) for why in IN_THE_WAY}
         free["weak"] &= found.pinned <= STRONG
         first, waits = np.zeros(len(found), bool), np.zeros((len(found), 1))
         for u, t in frames:
-            free["hands"] &= self._own_side(robot, kind, found, u, t)
+            free["hands"] &= self.apart.own_side(robot, kind, found, u, t)
             going = self._going_on(robot, kind, found, u, t)
-            going[:, 0] = np.maximum(going[:, 0], self._crossing(robot, found, u, t))
+            going[:, 0] = np.maximum(going[:, 0], self.apart.crossing(robot, found, u, t))
             waits = np.maximum(waits, going)
             for ways in self.coming(robot, label, kind, found, u, t):
                 first |= hit(*ways)
-            for why, ways in self.met(robot, label, kind, found, u, t):
+            for why, ways in self.met(robot, kind, found, u, t):
                 free[why] &= ~hit(*ways)
+        free["hands"] &= self.apart.over_fingers(kind, found)
         if self.holding.is_fed(robot) and kind != "below":
             free["own"] &= ~first
         if self.holding.is_fed(robot) and kind == "above":
@@ -88,77 +90,19 @@ class InTheWay:
         return free, first, waits
 
     def met(
-        self, robot: int, label: str, kind: Kind, found: Places, u: Way, t: Way
+        self, robot: int, kind: Kind, found: Places, u: Way, t: Way
     ) -> Iterator[tuple[str, Swept]]:
         """What may not be in the way of a hand at each place, and why it is there."""
-        for ways in self._leaving(robot, label, kind, found, u):
+        for ways in self._leaving(robot, kind, found, u):
             yield "joined", ways
-        for ways in self._carriers_hand(robot, kind, found, u, t):
+        for ways in self.apart.carriers_hand(robot, kind, found, u, t):
             yield "hands", ways
         for ways in self._lowered(robot, kind, found, u):
             yield "lowered", ways
 
-    def _own_side(self, robot: int, kind: Kind, found: Places, u: Way, t: Way) -> Truth:
-        """Whether a hand at a place stays on its own side: of the line of the carrier, where that
-        comes from below too, else of what another that comes from the opposite side holds."""
-        carrier, free = self.holding.on[robot], np.ones(len(found), bool)
-        if carrier < 0:
-            return free
-        axis, side = (0, u[0]) if u[0] else (1, u[1])
-        hand = self._hand_of(carrier, t)
-        if hand.kind == "below" and kind == "below":
-            half = max(FINGER / 2, hand.radius) + BESIDE
-            free &= (hand.places[0][axis] - found.at[:, axis]) * side >= found.radius + half
-        last = self.holding.last(robot)
-        brought = [label for label in last.before if label != NOPART]
-        if last.before[last.template.carrier - 1] == NOPART and len(brought) > 1:
-            boxes = [self.holding.box(label) for label in brought]
-            middle = float(np.mean([(box[0] + box[1])[axis] / 2 for box in boxes]))
-            halves = np.maximum(found.radius, _breadths(found) / 2)
-            free &= (middle - found.at[:, axis]) * side >= halves + BESIDE / 2
-        return free
-
-    def _crossing(self, robot: int, found: Places, u: Way, t: Way) -> Array:
-        """How far a hand reaches over the line of a carrier whose tall mast comes along there (n,)
-        [m]."""
-        carrier = self.holding.on[robot]
-        if carrier < 0 or not self._hand_of(carrier, t).tall:
-            return np.zeros(len(found))
-        axis, side = (0, u[0]) if u[0] else (1, u[1])
-        over = (found.at[:, axis] - self._hand_of(carrier, t).places[0][axis]) * side
-        half = np.maximum(found.radius, _breadths(found) / 2)
-        return np.maximum(0.0, over + half + MAST / 2 + BESIDE)
-
-    def beam(self, robot: int, at: Places, frames: Sequence[tuple[Way, Way]]) -> float:
-        """How high the beam of a hand above at some places is at its lower edge [m]: over all that
-        its payload is joined to, and over the beam of its carrier where it reaches over the
-        carrier's line."""
-        height = self.holding.top(self.holding.last(robot)) + OVER
-        height += self.holding.axis[robot] * (BEAM + LEVEL)
-        for u, t in frames:
-            if self._crossing(robot, at, u, t).any():
-                carriers = self._hand_of(self.holding.on[robot], t)
-                if carriers.kind == "above":
-                    height = max(height, carriers.beam + BEAM + LEVEL)
-        return height
-
-    def _carriers_hand(
-        self, robot: int, kind: Kind, found: Places, u: Way, t: Way
-    ) -> Iterator[Swept]:
-        """A hand with all that is behind it, and the tall hand of the carrier with all that is
-        behind that: both are there at once."""
-        carrier = self.holding.on[robot]
-        if carrier < 0 or not (hand := self._hand_of(carrier, t)).tall:
-            return
-        own = swept(*self.reach(kind, found, u), _back(u))
-        at, radius = np.array(hand.places), np.full(len(hand.places), hand.radius)
-        low, high = self.reach(hand.kind, Places(at, radius, radius, radius, radius), t)
-        if hand.kind == "above":
-            yield (*own, np.stack((low, high), axis=1))
-            half = max(FINGER, hand.width) / 2
-            low, high = at - half, at + half
-            low[:, 2], high[:, 2] = hand.beam, hand.beam + BEAM
-        yield (*own, np.stack(swept(low, high, _back(t)), axis=1))
+    def reach(self, kind: Kind, found: Places, u: Way) -> tuple[Array, Array]:
+        """The boxes (n, 3) of pad and column, of pad and stem, or of pad and bar."""
+        return reach(self.holding.product, kind, found.at, found.radius, u)
 
     def _beside_rod(self, label: str, found: Places, u: Way, t: Way) -> Truth:
         """Whether a part has room for what its feeder holds it by: behind a hand above it, or on
@@ -167,35 +111,35 @@ class InTheWay:
         for (x, y), far in ((u, -1.0), (t, 1.0)):
             axis, way = (0, x) if x else (1, y)
             end = float((solid.high if way * far > 0 else solid.low)[axis])
-            left = abs(end - found.at[:, axis]) - np.maximum(found.radius, _breadths(found) / 2)
+            left = abs(end - found.at[:, axis]) - halves(found.radius)
             least = min(ROD, float((solid.high - solid.low)[:2].min()) / 4)
             room |= left >= least + BESIDE
         return room
 
-    def _leaving(
-        self, robot: int, label: str, kind: Kind, found: Places, u: Way
-    ) -> Iterator[Swept]:
+    def _leaving(self, robot: int, kind: Kind, found: Places, u: Way) -> Iterator[Swept]:
         """What a hand sweeps as seen from the parts of what it has delivered to, with their boxes,
         as it comes there and leaves: along its heading, and where it lowers its payload from above.
         """
         last, (low, high) = self.holding.last(robot), self.reach(kind, found, u)
         if last.index == self.holding.factory.dropoff.index:
-            back = swept(low, high, _back(u))
+            gone, whole = swept(low, high, back(u)), self._at_last(robot)
             if kind != "behind":
-                yield (*back, self.holding.around(label, *back))
+                yield (*gone, self.holding.around(whole, *gone))
             return
+        for boxes in self._from_above(last, robot, (u,)):
+            yield (*swept(low, high, back(u)), boxes)
         lifted = robot in self.holding.factory.strokes
-        back = swept(low, high) if kind == "above" and lifted else swept(low, high, _back(u))
+        gone = swept(low, high) if kind == "above" and lifted else swept(low, high, back(u))
         if kind == "below":
-            back[1][:, 2] += self.holding.factory.strokes.get(robot, 0.0)
+            gone[1][:, 2] += self.holding.factory.strokes.get(robot, 0.0)
         if kind != "behind":
-            yield (*back, self.holding.around(last.label, *back))
+            yield (*gone, self.holding.around(last.label, *gone))
             return
         # its payload comes along the same way, or takes the bar down with it
-        back[1][:, 2] += 10.0 * lifted
+        gone[1][:, 2] += 10.0 * lifted
         for other, guest in zip(last.before, last.robots, strict=True):
             if guest != robot and other != NOPART:
-                yield (*back, self.holding.around(other, *back))
+                yield (*gone, self.holding.around(other, *gone))
 
     def _going_on(self, robot: int, kind: Kind, found: Places, u: Way, t: Way) -> Array:
         """How far a hand has to go back (n, k) [m] until each of the next k operations of its
@@ -203,7 +147,7 @@ class InTheWay:
         if self.holding.last(robot).index == self.holding.factory.dropoff.index:
             return np.zeros((len(found), 1))
         low, high = self.reach(kind, found, u)
-        ways = _back(u), _back(t)
+        ways = back(u), back(t)
         return np.stack(
             [retreat(low, high, boxes, ways) for boxes in self._onward(robot, low, high)], axis=1
         )
@@ -220,6 +164,10 @@ class InTheWay:
             there.update(added)
             yield self.holding.beside(self.holding.surfaces.boxes(added), low, high)
 
+    def _at_last(self, robot: int) -> str:
+        """What a robot has in the end."""
+        return held(self.holding.factory, robot, at_last=True)
+
     def coming(
         self, robot: int, label: str, kind: Kind, found: Places, u: Way, t: Way
     ) -> Iterator[Swept]:
@@ -228,7 +176,7 @@ class InTheWay:
         low, high = self.reach(kind, found, u)
         own = self.holding.around(label, low, high)
         if not self.holding.is_fed(robot):
-            for side in (t, _back(t)):
+            for side in (t, back(t)):
                 yield (*swept(low, high, u, side), own)
         elif kind == "behind":
             # the part comes down along the pad
@@ -243,50 +191,37 @@ class InTheWay:
         """The same of each input of its operations, which comes from either side when it is there
         already; with it whether that is so whatever else, since it has a pile by then."""
         low, high = self.reach(kind, found, u)
+        if kind == "behind":
+            low, high = swept(low, high, back(u))
         for operation in self.holding.made(robot):
             later = operation.before[operation.template.carrier - 1] != NOPART
             for guest, label in zip(operation.robots, operation.before, strict=True):
                 if guest != robot and label != NOPART:
                     parts = self.holding.around(label, low, high)
-                    for side in (t, _back(t)):
+                    for side in (t, back(t)):
                         yield later, (*swept(low, high, side), parts)
 
     def _lowered(self, robot: int, kind: Kind, found: Places, u: Way) -> Iterator[Swept]:
         """The same of each input that comes down to a carrier from above."""
         low, high = self.reach(kind, found, u)
         if kind != "below":
-            low, high = swept(low, high, _back(u))
+            low, high = swept(low, high, back(u))
         for operation in self.holding.made(robot):
-            if operation.lowered < 0:
-                continue
-            boxes = self.holding.surfaces.boxes(
-                self.holding.factory.contents[operation.before[operation.lowered]]
-            )
-            boxes[:, 1, 2] = np.inf
-            yield low, high, boxes
+            sides = [(u[1], u[0]), (-u[1], -u[0])]
+            for boxes in self._from_above(operation, robot, sides):
+                yield low, high, boxes
 
-    def reach(self, kind: Kind, found: Places, u: Way) -> tuple[Array, Array]:
-        """The boxes (n, 3) of pad and column, of pad and stem, or of pad and bar."""
-        half, at = found.radius[:, None], found.at
-        if kind == "behind":
-            half = np.maximum(half, _breadths(found)[:, None] / 2)
-        low, high = at - half, at + half
-        if kind == "below":
-            low[:, 2], high[:, 2] = self.holding.product.low[2] - 1.0, at[:, 2] - AIR
-        elif kind == "above":
-            low[:, 2], high[:, 2] = at[:, 2] + AIR, self.holding.product.high[2] + 10.0
-        else:
-            low[:, 2] = np.minimum(low[:, 2], at[:, 2] - BEAM / 2)
-            high[:, 2] = np.maximum(high[:, 2], at[:, 2] + BEAM / 2)
-            axis, ahead = (0, u[0]) if u[0] else (1, u[1])
-            (high if ahead > 0 else low)[:, axis] = at[:, axis] - ahead * AIR
-        return low, high
-
-
-def _breadths(found: Places) -> Array:
-    """How wide what reaches to places (n,) is [m]."""
-    return np.array([breadth(radius) for radius in found.radius.tolist()])
-
-
-def _back(way: Way) -> Way:
-    return -way[0], -way[1]
+    def _from_above(
+        self, operation: Operation, robot: int, sides: Sequence[Way]
+    ) -> Iterator[Array]:
+        """The boxes (n, 2, 3) of what comes down to a robot in an operation from above: on the way
+        down, and before that as it comes from either of some sides over all that stands there."""
+        slot = operation.lowered
+        if slot < 0 or operation.robots[slot] == robot:
+            return
+        boxes = self.holding.boxes(operation.before[slot]).copy()
+        boxes[:, 1, 2] = np.inf
+        yield boxes.copy()
+        boxes[:, 0, 2] += self.holding.factory.strokes[operation.robots[slot]]
+        for side in sides:
+            yield np.stack(swept(boxes[:, 0], boxes[:, 1], side), axis=1)

@@ -10,10 +10,11 @@ import numpy as np
 from factory.control.mode import Index, Truth
 from factory.geometry.meshes import Array
 from factory.geometry.solids import Product
+from factory.layout.hands.apart import Swept
 from factory.layout.hands.choosing import Hands
 from factory.layout.hands.hand import Kind
-from factory.layout.hands.holding import Holding, held
-from factory.layout.hands.in_the_way import IN_THE_WAY, Swept
+from factory.layout.hands.holding import held
+from factory.layout.hands.in_the_way import IN_THE_WAY
 from factory.layout.hands.misses import Miss, NoGrip, Obstacle
 from factory.layout.hands.places import PUSH, Places
 from factory.layout.hands.surfaces import Way, hit
@@ -22,6 +23,9 @@ from factory.plant.factory import Factory
 
 Frames = tuple[tuple[Way, Way], ...]
 """How a robot may lie: along u, to a carrier that lies along t."""
+
+SAME = 1e-9
+"""Boxes whose sides are no further apart are one [m]."""
 
 AS_WEAK = 1.5
 """Where no place is strong, those count that use no more than so many times the least share."""
@@ -46,7 +50,9 @@ class _Search:
         self.hands, self.in_the_way, self.holding = hands, hands.in_the_way, hands.holding
         self.robot, self.label = robot, label
         self.all_frames = hands.all_frames(robot)
-        self._parts = _named_boxes(self.holding)
+        bodies = [(b, p) for p, of in self.holding.surfaces.bodies.items() for b in of]
+        self._boxes = np.array([[body.low, body.high] for body, _ in bodies])
+        self._names = [part for _, part in bodies]
         self._own = frozenset(self.holding.factory.contents[label])
 
     def found(self) -> NoGrip:
@@ -132,12 +138,21 @@ class _Search:
             for box in boxes:
                 met = late & hit(low, high, box[None])
                 if met.any():
-                    part = "" if why == "hands" else self._parts.get(_key(box), "")
+                    part = "" if why == "hands" else self._part(box)
                     own = why == "joined" and part in self._own
                     yield ("own" if own else why, part), met, (low, high), box
         for why in ("weak", "hands", "feeder"):
             if not checks[why].all():
                 yield (why, ""), ~checks[why], None, None
+
+    def _part(self, box: Array) -> str:
+        """The part that a box of a body is of: one that comes from above is endless to the top, and
+        where it comes over what stands there also higher, and endless to a side."""
+        level = (np.abs(self._boxes - box)[:, :, :2] < SAME) | np.isinf(box[:, :2])
+        found = np.asarray(level.all(axis=(1, 2)))
+        low = found & (np.abs(self._boxes[:, 0, 2] - box[0, 2]) < SAME)
+        chosen = np.flatnonzero(low if low.any() else found)
+        return self._names[chosen[0]] if len(chosen) else ""
 
     def _ways(
         self, kind: Kind, found: Places, frames: Frames
@@ -147,23 +162,9 @@ class _Search:
         _, first, _ = self.in_the_way.checks(robot, label, kind, found, frames)
         own = self.holding.is_fed(robot) and kind != "below"
         for u, t in frames:
-            for why, ways in self.in_the_way.met(robot, label, kind, found, u, t):
+            for why, ways in self.in_the_way.met(robot, kind, found, u, t):
                 yield why, always, ways
             for ways in self.in_the_way.coming(robot, label, kind, found, u, t) if own else ():
                 yield "own", always, ways
             for later, ways in self.in_the_way.joined(robot, kind, found, u, t):
                 yield "brought", first | later, ways
-
-
-def _named_boxes(holding: Holding) -> dict[tuple[float, ...], str]:
-    """The part that a box of a body is of."""
-    return {
-        _key(np.array([body.low, body.high])): part
-        for part, bodies in holding.surfaces.bodies.items()
-        for body in bodies
-    }
-
-
-def _key(box: Array) -> tuple[float, ...]:
-    """A box (2, 3) without its upper end, which is endless for what is lowered."""
-    return tuple(np.round(box.ravel()[:5], 9).tolist())

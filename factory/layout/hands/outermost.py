@@ -44,6 +44,8 @@ def _within(body: Body, at: Array, radius: float, side: tuple[int, int]) -> Arra
     on_edges = _on_edges(body.edges[:, :, across], way * body.edges[:, :, axis], at, radius)
     normals, reach = body.faces
     facing = way * normals[:, axis] > FLAT
+    if not facing.any():
+        return on_edges
     up, slopes = np.abs(normals[facing, axis]), normals[facing][:, across]
     steep = np.hypot(*slopes.T)
     rises = (reach[facing] - at @ slopes.T + radius * steep) / up

@@ -22,6 +22,9 @@ from factory.geometry.solids import Product
 Way = tuple[float, float]
 """A direction of the world in the plane."""
 
+TOUCH = 1e-5
+"""Boxes that overlap by no more only touch [m]."""
+
 FLAT = 1e-9
 """A face whose normal has a smaller share along a line is parallel to it."""
 
@@ -50,7 +53,7 @@ class Body:
             corners, faces = self.vertices, ConvexHull(self.vertices).simplices
         except QhullError:
             corners = np.array([[*p] for p in pairs(*zip(self.low, self.high, strict=True))])
-            return np.asarray(corners[np.array(list(combinations(range(8), 2)))])
+            return np.asarray(corners[list(combinations(range(8), 2))])
         found = np.sort(np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [0, 2]]]))
         return np.asarray(corners[np.unique(found, axis=0)])
 
@@ -124,23 +127,40 @@ def swept(low: Array, high: Array, *ways: Way) -> tuple[Array, Array]:
     return low, high
 
 
-def hit(low: Array, high: Array, boxes: Array, spare: float = 1e-5) -> Truth:
+def hit(low: Array, high: Array, boxes: Array, spare: float = TOUCH) -> Truth:
     """Which boxes (n,) from `low` to `high` (n, 3) overlap any of `boxes` (m, 2, 3), by more than
     `spare` [m]."""
-    found = np.zeros(len(low), bool)
-    for box in boxes:
-        found |= ((low < box[1] - spare) & (high > box[0] + spare)).all(axis=1)
-    return found
+    near = _near(low, high, boxes)
+    return np.asarray(_overlap(low, high, near, spare).any(axis=1))
 
 
 def retreat(low: Array, high: Array, boxes: Array, ways: tuple[Way, Way]) -> Array:
     """How far boxes from `low` to `high` (n, 3) have to go the first of two ways until nothing of
     `boxes` (m, 2, 3) is in their way along the second (n,) [m]; 0 where nothing is."""
-    wide, far = swept(low, high, *ways), np.zeros(len(low))
-    (x, y), _ = ways
+    wide, ((x, y), _) = swept(low, high, *ways), ways
     axis, side = (0, x) if x else (1, y)
-    for box in boxes:
-        met = hit(*wide, box[None])
-        past = high[:, axis] - box[0, axis] if side < 0 else box[1, axis] - low[:, axis]
-        far = np.maximum(far, np.where(met, past, 0.0))
-    return far
+    near = _near(*wide, boxes)
+    if side < 0:
+        past = high[:, None, axis] - near[:, 0, axis]
+    else:
+        past = near[:, 1, axis] - low[:, None, axis]
+    met = _overlap(*wide, near, TOUCH)
+    return np.asarray(np.where(met, past, 0.0).max(axis=1, initial=0.0))
+
+
+def _near(low: Array, high: Array, boxes: Array) -> Array:
+    """Those of `boxes` (m, 2, 3) that meet the box round boxes from `low` to `high` (n, 3)."""
+    if not len(low):
+        return boxes[:0]
+    kept = (boxes[:, 1] > low.min(axis=0)) & (boxes[:, 0] < high.max(axis=0))
+    return np.asarray(boxes[kept.all(axis=1)])
+
+
+def _overlap(low: Array, high: Array, boxes: Array, spare: float) -> Truth:
+    """Which boxes from `low` to `high` (n, 3) overlap which of `boxes` (m, 2, 3) by more than
+    `spare` [m] (n, m)."""
+    found = np.ones((len(low), len(boxes)), bool)
+    for axis in range(3):
+        found &= low[:, None, axis] < boxes[:, 1, axis] - spare
+        found &= high[:, None, axis] > boxes[:, 0, axis] + spare
+    return found

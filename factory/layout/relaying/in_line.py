@@ -126,8 +126,10 @@ class _Choice(Hands):
         u, t = self.holding.headings[guest], self.holding.headings[robot]
         sides = (t, (-t[0], -t[1])) if self.holding.is_carrier(guest) else (t,)
         at, radius = np.array(known.places), np.full(len(known.places), known.radius)
-        self.in_the_way.kept[guest] = known
-        free = self.in_the_way.own_side(guest, Places(at, radius, radius, radius, radius), u, t)
+        self.in_the_way.apart.kept[guest] = known
+        free = self.in_the_way.apart.own_side(
+            guest, "below", Places(at, radius, radius, radius, radius), u, t
+        )
         if free.all():
             return known
         return self._below(guest, [(u, side) for side in sides], max(STRONG, known.share))

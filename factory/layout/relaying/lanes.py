@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,9 +10,10 @@ import numpy as np
 from factory.control.mode import Truth
 from factory.geometry.meshes import Array
 from factory.layout.dimensions import CARRIAGE, FINGER, Clearance
+from factory.layout.hands.apart import BESIDE, HandsApart, Swept
 from factory.layout.hands.hand import Hand, Kind, breadth
 from factory.layout.hands.holding import Holding, held
-from factory.layout.hands.in_the_way import BESIDE, InTheWay, Swept
+from factory.layout.hands.in_the_way import InTheWay
 from factory.layout.hands.places import Places
 from factory.layout.hands.surfaces import Way, swept
 from factory.layout.layout import Layout
@@ -77,24 +78,27 @@ class HoldingInLanes(Holding):
         return self.factory.robots[robot].operations[0] in self.relays
 
 
-class InTheWayInLanes(InTheWay):
-    """As `InTheWay`, for robots in lanes, and for those whose hands are chosen anew on the line of
-    the one that was `kept`; `settled`: the hands that are chosen already."""
+class HandsApartInLanes(HandsApart):
+    """As `HandsApart`, for robots in lanes, and for those whose hands are chosen anew on the line
+    of the one that was `kept`."""
 
     holding: HoldingInLanes
 
     def __init__(
-        self, holding: HoldingInLanes, lanes: Mapping[int, Lane], settled: Sequence[Hand | None]
+        self,
+        holding: HoldingInLanes,
+        lanes: Mapping[int, Lane],
+        hand_of: Callable[[int, Way], Hand],
     ) -> None:
-        super().__init__(holding, lambda robot, _: settled[robot] or NOTHING)
+        super().__init__(holding, hand_of)
         self.lanes, self.kept = lanes, dict[int, Hand]()
 
-    def _own_side(self, robot: int, kind: Kind, found: Places, u: Way, t: Way) -> Truth:
+    def own_side(self, robot: int, kind: Kind, found: Places, u: Way, t: Way) -> Truth:
         if robot in self.kept:
             known, across = self.kept[robot], 1 if u[0] else 0
             free: Truth = np.abs(found.at[:, across] - known.places[0][across]) < SAME
             free &= found.radius <= max(known.radius, FINGER / 2) + SAME
-            return free & super()._own_side(robot, kind, found, u, t)
+            return free & super().own_side(robot, kind, found, u, t)
         lane, c = self.lanes[robot], self.holding.clearance
         wide = np.array([breadth(radius) / 2 for radius in found.radius.tolist()])
         away = (found.at[:, lane.across] - lane.line) * lane.side
@@ -102,40 +106,57 @@ class InTheWayInLanes(InTheWay):
         free &= away + wide <= c.spread + CARRIAGE / 2
         if self.holding.gives(robot):
             return free
-        return free & super()._own_side(robot, kind, found, u, t)
+        return free & super().own_side(robot, kind, found, u, t)
 
-    def own_side(self, robot: int, found: Places, u: Way, t: Way) -> Truth:
-        """Whether a hand from below at a place (n,) stays on its own side."""
-        return self._own_side(robot, "below", found, u, t)
+    def crossing(self, robot: int, found: Places, u: Way, t: Way) -> Array:
+        if self.holding.gives(robot):
+            return np.zeros(len(found))
+        return super().crossing(robot, found, u, t)
+
+    def carriers_hand(
+        self, robot: int, kind: Kind, found: Places, u: Way, t: Way
+    ) -> Iterator[Swept]:
+        if not self.holding.gives(robot):
+            yield from super().carriers_hand(robot, kind, found, u, t)
+
+
+class InTheWayInLanes(InTheWay):
+    """As `InTheWay`, for robots in lanes; `settled`: the hands that are chosen already."""
+
+    holding: HoldingInLanes
+    apart: HandsApartInLanes
+
+    def __init__(
+        self, holding: HoldingInLanes, lanes: Mapping[int, Lane], settled: Sequence[Hand | None]
+    ) -> None:
+        def hand_of(robot: int, _: Way) -> Hand:
+            return settled[robot] or NOTHING
+
+        super().__init__(holding, hand_of)
+        self.apart = HandsApartInLanes(holding, lanes, hand_of)
+
+    def checks(
+        self, robot: int, label: str, kind: Kind, found: Places, frames: Sequence[tuple[Way, Way]]
+    ) -> tuple[dict[str, Truth], Truth, Array]:
+        """Looked at anew, since lanes and the hands that are settled change."""
+        return self._looked_at(robot, label, kind, found, frames)
 
     def _going_on(self, robot: int, kind: Kind, found: Places, u: Way, t: Way) -> Array:
         if self.holding.gives(robot):
             return np.zeros((len(found), 1))
         return super()._going_on(robot, kind, found, u, t)
 
-    def _crossing(self, robot: int, found: Places, u: Way, t: Way) -> Array:
-        if self.holding.gives(robot):
-            return np.zeros(len(found))
-        return super()._crossing(robot, found, u, t)
-
-    def _carriers_hand(
-        self, robot: int, kind: Kind, found: Places, u: Way, t: Way
-    ) -> Iterator[Swept]:
-        if not self.holding.gives(robot):
-            yield from super()._carriers_hand(robot, kind, found, u, t)
-
-    def _leaving(
-        self, robot: int, label: str, kind: Kind, found: Places, u: Way
-    ) -> Iterator[Swept]:
+    def _leaving(self, robot: int, kind: Kind, found: Places, u: Way) -> Iterator[Swept]:
         """Also what a hand sweeps as it comes to what it takes over, from ahead."""
         low, high = self.reach(kind, found, u)
         if self.holding.takes(robot):
+            label = held(self.holding.factory, robot)
             yield (*swept(low, high, u), self.holding.around(label, low, high))
         if self.holding.gives(robot):
             last = held(self.holding.factory, robot, at_last=True)
             yield (*swept(low, high, (-u[0], -u[1])), self.holding.around(last, low, high))
         else:
-            yield from super()._leaving(robot, label, kind, found, u)
+            yield from super()._leaving(robot, kind, found, u)
 
     def coming(
         self, robot: int, label: str, kind: Kind, found: Places, u: Way, t: Way

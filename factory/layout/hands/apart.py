@@ -1,0 +1,106 @@
+"""Hands that meet hands: those of robots that deliver to one carrier, and the carrier's own."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+
+import numpy as np
+
+from factory.control.mode import Truth
+from factory.geometry.meshes import Array
+from factory.layout.dimensions import FINGER, FINGER_TOP, MAST, PAYLOAD
+from factory.layout.hands.hand import BEAM, Hand, Kind
+from factory.layout.hands.holding import Holding
+from factory.layout.hands.places import Places
+from factory.layout.hands.reach import back, halves, reach
+from factory.layout.hands.surfaces import Way, swept
+from factory.problem.pag import NOPART
+
+Swept = tuple[Array, Array, Array]
+"""Boxes that hands sweep, from `low` to `high` (n, 3), and boxes (m, 2, 3) that could be in the
+way [m]."""
+
+BESIDE = 0.001
+"""How far a hand stays to its own side of the line of another [m]."""
+
+OVER, LEVEL = 0.01, 0.003
+"""How far above everything the beam of a hand above is, and how far those of robots that lie across
+each other are apart [m]."""
+
+UNDER = (PAYLOAD - FINGER_TOP) / 2
+"""How far a hand behind reaches down under the plane of payloads at the most, to the fingers of
+those below [m]."""
+
+
+class HandsApart:
+    """Hands of a factory's robots that could meet. `hand_of`: that of a carrier with a heading."""
+
+    def __init__(self, holding: Holding, hand_of: Callable[[int, Way], Hand]) -> None:
+        self.holding, self.hand_of = holding, hand_of
+
+    def over_fingers(self, kind: Kind, found: Places) -> Truth:
+        """Whether a hand behind stays over the fingers of those below (n,)."""
+        if kind != "behind":
+            return np.ones(len(found), bool)
+        least = self.holding.product.low[2] - UNDER
+        return np.asarray(found.at[:, 2] - halves(found.radius) >= least)
+
+    def own_side(self, robot: int, kind: Kind, found: Places, u: Way, t: Way) -> Truth:
+        """Whether a hand at a place stays on its own side: of the line of the carrier, where that
+        comes from below too, else of what another that comes from the opposite side holds."""
+        carrier, free = self.holding.on[robot], np.ones(len(found), bool)
+        if carrier < 0:
+            return free
+        axis, side = (0, u[0]) if u[0] else (1, u[1])
+        hand = self.hand_of(carrier, t)
+        if hand.kind == "below" and kind == "below":
+            half = max(FINGER / 2, hand.radius) + BESIDE
+            free &= (hand.places[0][axis] - found.at[:, axis]) * side >= found.radius + half
+        last = self.holding.last(robot)
+        brought = [label for label in last.before if label != NOPART]
+        if last.before[last.template.carrier - 1] == NOPART and len(brought) > 1:
+            boxes = [self.holding.box(label) for label in brought]
+            middle = float(np.mean([(box[0] + box[1])[axis] / 2 for box in boxes]))
+            free &= (middle - found.at[:, axis]) * side >= halves(found.radius) + BESIDE / 2
+        return free
+
+    def crossing(self, robot: int, found: Places, u: Way, t: Way) -> Array:
+        """How far a hand reaches over the line of a carrier whose tall mast comes along there (n,)
+        [m]."""
+        carrier = self.holding.on[robot]
+        if carrier < 0 or not self.hand_of(carrier, t).tall:
+            return np.zeros(len(found))
+        axis, side = (0, u[0]) if u[0] else (1, u[1])
+        over = (found.at[:, axis] - self.hand_of(carrier, t).places[0][axis]) * side
+        return np.maximum(0.0, over + halves(found.radius) + MAST / 2 + BESIDE)
+
+    def beam(self, robot: int, at: Places, frames: Sequence[tuple[Way, Way]]) -> float:
+        """How high the beam of a hand above at some places is at its lower edge [m]: over all that
+        its payload is joined to, and over the beam of its carrier where it reaches over the
+        carrier's line."""
+        height = self.holding.top(self.holding.last(robot)) + OVER
+        height += self.holding.axis[robot] * (BEAM + LEVEL)
+        for u, t in frames:
+            if self.crossing(robot, at, u, t).any():
+                carriers = self.hand_of(self.holding.on[robot], t)
+                if carriers.kind == "above":
+                    height = max(height, carriers.beam + BEAM + LEVEL)
+        return height
+
+    def carriers_hand(
+        self, robot: int, kind: Kind, found: Places, u: Way, t: Way
+    ) -> Iterator[Swept]:
+        """A hand with all that is behind it, and the tall hand of the carrier with all that is
+        behind that: both are there at once."""
+        carrier = self.holding.on[robot]
+        if carrier < 0 or not (hand := self.hand_of(carrier, t)).tall:
+            return
+        own = swept(*reach(self.holding.product, kind, found.at, found.radius, u), back(u))
+        at, radius = np.array(hand.places), np.full(len(hand.places), hand.radius)
+        low, high = reach(self.holding.product, hand.kind, at, radius, t)
+        if hand.kind == "above":
+            yield (*own, np.stack((low, high), axis=1))
+            half = max(FINGER, hand.width) / 2
+            low, high = at - half, at + half
+            low[:, 2], high[:, 2] = hand.beam, hand.beam + BEAM
+        yield (*own, np.stack(swept(low, high, back(t)), axis=1))

@@ -1,0 +1,41 @@
+"""The boxes of what a hand has among the payloads: pad and column, pad and stem, pad and bar."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from factory.geometry.meshes import Array
+from factory.geometry.solids import Product
+from factory.layout.hands.hand import AIR, BEAM, Kind, breadth
+from factory.layout.hands.surfaces import Way
+
+APART = 2e-4
+"""A hand is so far from all parts beside it [m]: they come and go with that play."""
+
+
+def reach(product: Product, kind: Kind, at: Array, radius: Array, u: Way) -> tuple[Array, Array]:
+    """The boxes (n, 3) [m] of pad and column, of pad and stem, or of pad and bar of hands that head
+    along u, with pads of some radii (n,) at places (n, 3); a play around them."""
+    half = halves(radius)[:, None] if kind == "behind" else radius[:, None]
+    low, high = at - half - APART, at + half + APART
+    if kind == "below":
+        low[:, 2], high[:, 2] = product.low[2] - 1.0, at[:, 2] - AIR
+    elif kind == "above":
+        low[:, 2], high[:, 2] = at[:, 2] + AIR, product.high[2] + 10.0
+    else:
+        low[:, 2] = np.minimum(low[:, 2], at[:, 2] - BEAM / 2)
+        high[:, 2] = np.maximum(high[:, 2], at[:, 2] + BEAM / 2)
+        axis, ahead = (0, u[0]) if u[0] else (1, u[1])
+        (high if ahead > 0 else low)[:, axis] = at[:, axis] - ahead * AIR
+    return low, high
+
+
+def halves(radius: Array) -> Array:
+    """How far to a side pads of some radii (n,), or what goes to them, reach (n,) [m]."""
+    widths = np.array([breadth(one) for one in radius.tolist()])
+    return np.maximum(radius, widths / 2)
+
+
+def back(way: Way) -> Way:
+    """The opposite direction."""
+    return -way[0], -way[1]
