@@ -13,6 +13,7 @@ import factory
 from factory.geometry.product import product_geometry
 from factory.layout.clearance import certify
 from factory.layout.embedding import lay_out
+from factory.layout.hands.bores import bores
 from factory.layout.hands.choosing import Hands
 from factory.layout.hands.hand import AIR
 from factory.layout.hands.holding import held
@@ -163,6 +164,21 @@ def test_a_hand_is_drawn_of_limbs_that_collide() -> None:
     drawn = [m.geom(i) for i in range(m.ngeom) if names.pad_of(m.geom(i).name).startswith("r")]
     assert len(drawn) == sum(hand is not None for hand in with_hands("lamp").hands)
     assert all(int(geom.contype[0]) and int(geom.conaffinity[0]) for geom in drawn)
+
+
+def test_bores_are_where_pins_hold() -> None:
+    layout = with_hands("truck")
+    found = list(bores(layout))
+    pinned = {
+        r.name for r in layout.factory.robots if (h := layout.hand(r.index)) and h.tip == "pin"
+    }
+    assert found and {bore.robot for bore in found} == pinned
+    boxes = Surfaces(layout.product)
+    for bore in found:
+        around = boxes.boxes(layout.factory.contents[bore.label])
+        near = (around[:, 0] - 1e-3 <= bore.at) & (around[:, 1] + 1e-3 >= bore.at)
+        assert near.all(axis=1).any() and 0 < bore.diameter <= 0.02
+    assert not list(bores(replace(layout, hands=())))
 
 
 def test_robots_do_not_go_back_from_home_to_where_they_would_wait() -> None:

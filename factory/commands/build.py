@@ -101,12 +101,13 @@ def _printed(project: Project, built: Built, spent: float, wip: int | None) -> d
     """What a build prints: the document of `--json`, the lines for people, the warnings."""
     from factory.layout.durations import Pace
     from factory.layout.gain import gain
+    from factory.layout.hands.bores import bores
     from factory.support.settings import AUTO
 
     layout, settings, model = project.layout, project.settings, built.model
     root, robots = layout.factory.pag.root, len(layout.factory.robots)
-    gained = gain(layout, Pace.of(settings))
-    document = {
+    gained, drilled = gain(layout, Pace.of(settings)), list(bores(layout))
+    document: dict[str, Any] = {
         "product": root,
         "mjcf": str(built.mjcf) if built.mjcf else None,
         "robots": robots,
@@ -134,6 +135,11 @@ def _printed(project: Project, built: Built, spent: float, wip: int | None) -> d
     ]
     if wip is None and model.wip is not None:
         lines.insert(1, f"parts for at most {model.wip} units inside at once: {POOL_BOUND}")
+    if layout.hands:
+        document["bores"] = [bore.as_json() for bore in drilled]
+    if drilled:
+        where = ", ".join(dict.fromkeys(bore.label for bore in drilled))
+        lines.append(f"hands hold by pins in bores of {where} (where: --json)")
     every, brief = (
         printed([*map(warning, told(project.warnings, all_))], "warnings") for all_ in (True, False)
     )
