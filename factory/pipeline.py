@@ -30,6 +30,7 @@ from factory.support.settings import Settings
 if TYPE_CHECKING:
     from factory.compiler.mating.findings import Matings
     from factory.geometry.solids import Product
+    from factory.layout.hands.choosing import Hands
     from factory.layout.hands.misses import NoGrip
     from factory.layout.layout import Layout
 
@@ -92,13 +93,23 @@ class Project:
         return (*product, *blocked, *(found.warning() for found in self.no_grips))
 
     @cached_property
+    def _hands(self) -> Hands | None:
+        """The hands to choose from, where they are chosen; None for a product of default boxes,
+        whose approaches are found with its layout."""
+        if not (self.settings.hands and is_shaped(self.pag)):
+            return None
+        from factory.layout.hands.choosing import Hands
+
+        return Hands(self.plain, self.product, self.settings.acceleration)
+
+    @cached_property
     def no_grips(self) -> tuple[NoGrip, ...]:
         """What no hand can hold, where hands are chosen; nothing for a product of default boxes."""
-        if not (self.settings.hands and is_shaped(self.pag)):
+        if self._hands is None:
             return ()
         from factory.layout.hands.nearest import no_grips
 
-        return no_grips(self.plain, self.product, self.settings.acceleration)
+        return no_grips(self._hands)
 
     @cached_property
     def plain(self) -> Factory:
@@ -116,7 +127,7 @@ class Project:
     def layout(self) -> Layout:
         """The factory laid out, with relays where its ground asks for them. Raises InputError,
         RunError (Layout) where there is no room."""
-        return self.ground.lay_out(self.plain, self.product, self.settings)
+        return self.ground.lay_out(self.plain, self.product, self.settings, self._hands)
 
     @property
     def factory(self) -> Factory:

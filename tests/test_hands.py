@@ -21,10 +21,12 @@ from factory.layout.hands.leaving import awaited_positions, leavings
 from factory.layout.hands.limbs import limbs
 from factory.layout.hands.surfaces import Surfaces, hit, retreat, swept
 from factory.layout.layout import Layout
+from factory.layout.request import Ground
 from factory.mjcf import names
 from factory.simulation.request import RunRequest
 from factory.simulation.simulation import Simulation
 from factory.study.fidelity.hidden import HiddenPenetrations
+from factory.support.settings import Settings
 
 EXAMPLES = Path(factory.__file__).parent.parent / "examples"
 AT_MOST_MM = 0.1
@@ -38,7 +40,7 @@ GRIP_MM = 0.5
 def with_hands(name: str) -> Layout:
     """An example laid out with hands."""
     plan = factory.compile(factory.load_pag(EXAMPLES / f"{name}.pag"))
-    return lay_out(plan, product_geometry(plan.pag), hands=True)
+    return Ground().lay_out(plan, product_geometry(plan.pag), Settings(hands=1))
 
 
 def looked_at(layout: Layout, units: int = 3) -> tuple[Simulation, HiddenPenetrations]:

@@ -16,11 +16,12 @@ from factory.layout.clearance import certify
 from factory.layout.dimensions import ARM_WIDTH, Clearance
 from factory.layout.durations import Pace, gear_times
 from factory.layout.embedding import certified
+from factory.layout.hands.choosing import Hands
 from factory.layout.hands.in_the_way import BESIDE
 from factory.layout.hands.limbs import cross_of
 from factory.layout.layout import Layout
 from factory.layout.relaying import relayed
-from factory.layout.relaying.relaying import _cuttable, _roomy
+from factory.layout.relaying.relaying import Room as RoomForLanes
 from factory.layout.relaying.splitting import split
 from factory.layout.relaying.ways import ways
 from factory.nets.verify import verify
@@ -85,8 +86,10 @@ def with_relays(seed: int) -> Layout:
 @cache
 def chained(seed: int, label: str, number: int) -> Layout:
     """A layout with so many relays, one after the other, on one way."""
-    wide = _cuttable(plain(sawn(seed)), SETTINGS, None)
-    layout = _roomy(plain(sawn(seed)), wide, SETTINGS, None)
+    found = plain(sawn(seed))
+    hands = Hands(found.factory, found.product, SETTINGS.acceleration)
+    room = RoomForLanes(found, Pace.of(SETTINGS), None, hands)
+    layout = room.layout(room.cuttable())
     way, templates = ways(layout)[label], templates_of(layout)
     found, _ = split(layout, {label: way}, {label: number}, templates, load_catalogue())
     return certified(found, None)

@@ -21,6 +21,7 @@ from factory.layout.hands.holding import Holding, held
 from factory.layout.hands.places import GRAVITY, centre_of
 from factory.layout.hands.tips import Tip, TipName, shares, tip
 from factory.layout.layout import Layout
+from factory.layout.request import Ground
 from factory.mjcf import names
 from factory.record.log import read_log
 from factory.record.monitor.record import verdict_on, watch_log
@@ -33,6 +34,7 @@ from factory.simulation.run import Run
 from factory.simulation.simulation import FALL, Simulation
 from factory.simulation.watched import watched
 from factory.support.engine import mujoco
+from factory.support.settings import Settings
 from tests.command_line import ROOT, Terminal
 from tests.live_sessions import Stopped
 
@@ -45,7 +47,7 @@ AGREES = 1.05
 def with_hands(name: str) -> Layout:
     """An example laid out with hands."""
     plan = factory.compile(factory.load_pag(EXAMPLES / f"{name}.pag"))
-    return lay_out(plan, product_geometry(plan.pag), hands=True)
+    return Ground().lay_out(plan, product_geometry(plan.pag), Settings(hands=1))
 
 
 def ready(name: str | Layout, **more: Any) -> Simulation:

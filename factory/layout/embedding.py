@@ -17,6 +17,7 @@ from factory.layout.clearance import certify
 from factory.layout.dimensions import Clearance
 from factory.layout.durations import Pace
 from factory.layout.guidepath import Point2
+from factory.layout.hands.choosing import Hands
 from factory.layout.layout import Layout
 from factory.layout.optimising import bounds, optimised
 from factory.plant.factory import Factory
@@ -29,10 +30,10 @@ def lay_out(
     clearance: float = 0.02,
     floor: Point2 | None = None,
     pace: Pace | None = None,
-    hands: bool = False,
+    hands: Hands | None = None,
 ) -> Layout:
     """The layout of a factory with its clearance certificate, the best found for robots of a
-    `pace`, with `hands` chosen from the geometry if so wanted. Raises RunError (Layout) where it
+    `pace`, with those of `hands` that suit it, if any. Raises RunError (Layout) where it
     does not fit a floor of the given width and depth, saying by how much and where, or where an
     operation's template asks for what cannot be kept clear."""
     known = judged(factory, product)

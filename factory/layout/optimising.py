@@ -64,19 +64,18 @@ def optimised(
     pace: Pace,
     floor: Point2 | None = None,
     wide: Collection[int] = (),
-    hands: bool = False,
+    hands: Hands | None = None,
 ) -> Layout:
     """The best layout found, of those that fit a floor if there are any. Never worse than the first
     feasible one, but for a factory that is LARGE. `wide`: robots whose ways have room for relays;
-    `hands`: with hands chosen from the geometry. Near linear, deterministic."""
+    `hands`: those to choose from. Near linear, deterministic."""
     payloads = payload_boxes(factory, product)
-    chosen = Hands(factory, product, pace.acceleration) if hands else None
     count = len(factory.robots)
-    task = Task(factory, c, pace, [1.0] * count, wide=wide, hands=chosen)
+    task = Task(factory, c, pace, [1.0] * count, wide=wide, hands=hands)
     if count > LARGE:
         sides = _first_sides(factory, payloads, c)
         return _packed(replace(task, width=1), product, payloads, sides)
-    best = first_feasible(factory, product, c, wide, chosen)
+    best = first_feasible(factory, product, c, wide, hands)
     times = gear_times(best, pace)
     least = _score(best, times, floor)
     for number, (corridor, breadth) in enumerate(WAYS[: max(1, EFFORT // count)]):

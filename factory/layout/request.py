@@ -10,6 +10,7 @@ from factory.support.settings import Settings
 
 if TYPE_CHECKING:
     from factory.geometry.solids import Product
+    from factory.layout.hands.choosing import Hands
     from factory.layout.layout import Layout
 
 
@@ -28,16 +29,27 @@ class Ground:
         """Whether relays are asked for: a cycle time asks for them too."""
         return self.relay or self.cycle is not None
 
-    def lay_out(self, factory: Factory, product: Product, settings: Settings) -> Layout:
-        """The layout of a compiled factory. Raises RunError (Layout) where there is no room."""
+    def lay_out(
+        self,
+        factory: Factory,
+        product: Product,
+        settings: Settings,
+        hands: Hands | None = None,
+    ) -> Layout:
+        """The layout of a compiled factory; `hands`: those to choose from, where they are known.
+        Raises RunError (Layout) where there is no room."""
+        from factory.compiler.mating.mating import judged
         from factory.layout.durations import Pace
         from factory.layout.embedding import lay_out
+        from factory.layout.hands.choosing import Hands
 
         pace = Pace.of(settings)
-        hands = bool(settings.hands)
+        factory = judged(factory, product)
+        if settings.hands and hands is None:
+            hands = Hands(factory, product, settings.acceleration)
         layout = lay_out(factory, product, settings.clearance, self.floor, pace, hands)
         if self.relays:
             from factory.layout.relaying import relayed
 
-            layout = relayed(layout, settings, self.cycle, self.floor)
+            layout = relayed(layout, settings, self.cycle, self.floor, hands)
         return replace(layout, ground=asdict(self))

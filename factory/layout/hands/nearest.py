@@ -9,17 +9,15 @@ import numpy as np
 
 from factory.control.mode import Index, Truth
 from factory.geometry.meshes import Array
-from factory.geometry.solids import Product
 from factory.layout.hands.apart import Swept
 from factory.layout.hands.choosing import Hands
 from factory.layout.hands.hand import Kind
 from factory.layout.hands.holding import held
 from factory.layout.hands.in_the_way import IN_THE_WAY
 from factory.layout.hands.misses import Miss, NoGrip, Obstacle
-from factory.layout.hands.places import PUSH, Places
+from factory.layout.hands.places import Places
 from factory.layout.hands.surfaces import Way, hit
 from factory.layout.hands.tips import STRONG
-from factory.plant.factory import Factory
 
 Frames = tuple[tuple[Way, Way], ...]
 """How a robot may lie: along u, to a carrier that lies along t."""
@@ -31,10 +29,9 @@ AS_WEAK = 1.5
 """Where no place is strong, those count that use no more than so many times the least share."""
 
 
-def no_grips(factory: Factory, product: Product, push: float = PUSH) -> tuple[NoGrip, ...]:
-    """Each sub-assembly that no hand of a robot with such an acceleration [m/s²] can hold, however
-    that robot lies."""
-    hands, found = Hands(factory, product, push), []
+def no_grips(hands: Hands) -> tuple[NoGrip, ...]:
+    """Each sub-assembly that no hand of a robot can hold, however that robot lies."""
+    factory, found = hands.holding.factory, []
     for robot in factory.robots:
         chosen = [hands.hand(robot.index, u, t) for u, t in hands.holding.frames(robot.index)]
         if chosen and all(hand is not None and hand.kind == "none" for hand in chosen):

@@ -8,7 +8,7 @@ be cut. What cannot be certified is not cut.
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 from factory.control.profile import SpeedProfile
 from factory.lang.template_reader import load_templates
@@ -16,6 +16,7 @@ from factory.layout.clearance import certify
 from factory.layout.dimensions import Clearance
 from factory.layout.durations import Pace, gear_times
 from factory.layout.embedding import certified
+from factory.layout.hands.choosing import Hands
 from factory.layout.layout import Layout, Point2
 from factory.layout.optimising import optimised
 from factory.layout.relaying.splitting import split
@@ -44,13 +45,17 @@ def relayed(
     settings: Settings,
     cycle: float | None = None,
     floor: Point2 | None = None,
+    hands: Hands | None = None,
 ) -> Layout:
     """A layout with relays, its own net and certificate, for a `cycle` time [s] if one is given, or
-    near the least there can be; `plain` itself where no relay makes it faster. Raises RunError
-    (Layout) where it does not fit the floor."""
-    search = _searched(plain, _cuttable(plain, settings, floor), settings, cycle, floor)
+    near the least there can be; `plain` itself where no relay makes it faster. `hands`: those to
+    choose from, where they are known. Raises RunError (Layout) where it does not fit the floor."""
+    if hands is None and settings.hands:
+        hands = Hands(plain.factory, plain.product, settings.acceleration)
+    room = Room(plain, Pace.of(settings), floor, hands)
+    search = _searched(room, room.cuttable(), settings, cycle)
     used = {way.robot for label, way in search.ways.items() if search.numbers[label]}
-    again = _searched(plain, used, settings, search.cycle, floor)
+    again = _searched(room, used, settings, search.cycle)
     if again.seconds(again.found) <= max(search.cycle, search.seconds(search.found)) + 1e-9:
         search = again
     if not search.seconds(search.found) < search.seconds(plain):
@@ -58,35 +63,37 @@ def relayed(
     return replace(certified(search.found, floor), plain=plain)
 
 
-def _cuttable(plain: Layout, settings: Settings, floor: Point2 | None) -> set[int]:
-    """The robots with a way that can be cut, where all of these have room for it."""
-    layout, wide = plain, set[int]()
-    for _ in range(WIDENED):
-        more = wide | {way.robot for way in ways(layout).values()}
-        if more == wide:
-            break
-        wide, layout = more, _roomy(plain, more, settings, floor)
-    return wide
+@dataclass(frozen=True, slots=True)
+class Room:
+    """Makes room for lanes in a `plain` layout."""
 
+    plain: Layout
+    pace: Pace
+    floor: Point2 | None
+    hands: Hands | None
 
-def _roomy(
-    plain: Layout, wide: Collection[int], settings: Settings, floor: Point2 | None
-) -> Layout:
-    """The layout with room for two lanes on the guidepaths of these robots."""
-    c, pace = Clearance(plain.clearance), Pace.of(settings)
-    return optimised(plain.factory, plain.product, c, pace, floor, wide, bool(settings.hands))
+    def layout(self, wide: Collection[int]) -> Layout:
+        """The layout with room for two lanes on the guidepaths of these robots."""
+        plain, c = self.plain, Clearance(self.plain.clearance)
+        return optimised(plain.factory, plain.product, c, self.pace, self.floor, wide, self.hands)
+
+    def cuttable(self) -> set[int]:
+        """The robots with a way that can be cut, where all of these have room for it."""
+        layout, wide = self.plain, set[int]()
+        for _ in range(WIDENED):
+            more = wide | {way.robot for way in ways(layout).values()}
+            if more == wide:
+                break
+            wide, layout = more, self.layout(more)
+        return wide
 
 
 def _searched(
-    plain: Layout,
-    wide: Collection[int],
-    settings: Settings,
-    cycle: float | None,
-    floor: Point2 | None,
+    room: Room, wide: Collection[int], settings: Settings, cycle: float | None
 ) -> _Search:
     """What was found with relays for these robots alone, such that it can be certified, and all
     that robots in line hold can be held."""
-    layout = _roomy(plain, wide, settings, floor)
+    plain, layout = room.plain, room.layout(wide)
     chosen = {label: way for label, way in ways(layout).items() if way.robot in wide}
     templates = {o.template.name: o.template for o in plain.factory.operations}
     templates = {**load_templates([templates_folder()]), **templates}
