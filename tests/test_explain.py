@@ -21,7 +21,8 @@ NOT_PROVOKED = {
     *("Assets", "Engine", "Internal", "Interrupted", "Killed", "Missing", "NoGL", "NoVideo"),
     *("Dropped", "Early", "Exchanged", "Frame", "Order", "Start", "Stuck", "TwoHolders"),
     *("CutOff", "NotProved", "Stalled", "Unstable"),
-    *("Contact", "EngineWarning", "HandOffGap", "Missed", "NotRefined", "Record"),
+    *("Contact", "EngineWarning", "GripGap", "HandOffGap", "Missed", "NotRefined"),
+    "Record",
 }
 """Codes that need a broken machine, run or factory, which other tests make."""
 

@@ -20,8 +20,8 @@ FAR = 10.0
 
 
 class Pads:
-    """The pads of a model: `of`, by body that holds parts, its pads (geoms); `solid`, by body of a
-    part or sub-assembly, the geoms that collide, those of its shells among them."""
+    """The pads of a model: `of`, by body that holds parts, its pads (geoms), none where those are
+    only drawn; `solid`, by body of a part or sub-assembly, the geoms that collide, those of its shells among them."""
 
     def __init__(self, m: mujoco.MjModel) -> None:
         self._m = m
@@ -34,7 +34,8 @@ class Pads:
             zip(bodies.tolist(), np.split(geoms, first[1:]), strict=True)
         )
         named: dict[str, list[int]] = {}
-        for geom in np.flatnonzero(~part).tolist():
+        solid = (m.geom_contype | m.geom_conaffinity) != 0
+        for geom in np.flatnonzero(solid & ~part).tolist():
             named.setdefault(names.pad_of(m.geom(geom).name), []).append(geom)
         holders = {int(b): named.get(names.holder(m.body(b).name)) for b in np.unique(m.eq_obj1id)}
         self.of = {body: np.array(pads) for body, pads in holders.items() if pads}

@@ -29,6 +29,7 @@ LIMITS = (
     FigureLimit("Contact", "unintended_contacts", 0, "{:g} unintended contacts"),
     FigureLimit("EngineWarning", "engine_warnings", 0, "{:g} engine warnings"),
     FigureLimit("HandOffGap", "handoff_gap_max_mm", 1.0, "a hand-off with a gap of {:.2f} mm"),
+    FigureLimit("GripGap", "grip_gap_max_mm", 0.5, "a pad {:.2f} mm from what it takes"),
 )
 """What is judged of the bodies, beside what the monitor finds."""
 

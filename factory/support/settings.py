@@ -80,7 +80,7 @@ class Settings:
     settle: float = 0.0
     outfeed: float = 1.0
     stage: int = 0
-    hands: int = 0
+    hands: int = 1
 
     @property
     def outfeed_acceleration(self) -> float:

@@ -187,18 +187,20 @@ _ALL = (
         "Deepest penetration between any two things that are drawn, with all of them solid, every "
         "20 ms: no contact is left out but between what is fixed to each other. Of parts that "
         "overlap in the finished product, what they are deeper than there.",
+        0.1,
     ),
     Quantity(
         "grip_gap_max_mm",
         "mm",
         "Largest distance between the pads of a robot, a feeder or the tray and the nearest of the "
         "bodies that it takes, when it takes what it holds first.",
+        0.5,
     ),
     Quantity(
         "grip_strength_share_max",
         "",
         "Largest share of the strength of a hand's tips that force and moment of its load about "
-        "them use, measured several times a second; none where hands are not chosen (--hands). "
+        "them use, measured several times a second; none where hands are not chosen (--no-hands). "
         "Above 1 the hand lets go (Dropped).",
         1,
     ),
