@@ -21,7 +21,8 @@ FAR = 10.0
 
 class Pads:
     """The pads of a model: `of`, by body that holds parts, its pads (geoms), none where those are
-    only drawn; `solid`, by body of a part or sub-assembly, the geoms that collide, those of its shells among them."""
+    only drawn; `solid`, by body of a part or sub-assembly, the geoms that collide, those of its
+    shells among them."""
 
     def __init__(self, m: mujoco.MjModel) -> None:
         self._m = m

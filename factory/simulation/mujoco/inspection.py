@@ -10,6 +10,7 @@ from factory.mjcf.model import Model
 from factory.mjcf.weld_frames import residuals
 from factory.plant.factory import Operation
 from factory.simulation.mujoco.contacts import ContactMasks
+from factory.simulation.mujoco.pressing import Pressing
 from factory.simulation.mujoco.product_error import ProductError
 from factory.simulation.mujoco.strength import StrengthUse
 from factory.simulation.mujoco.welds import Welds
@@ -30,6 +31,7 @@ class Inspection:
     ) -> None:
         self._m, self._d, self._model, self._masks = m, d, model, masks
         self._product = ProductError(model)
+        self._pressing = Pressing(m, model.factory)
         self._touching: frozenset[tuple[int, int]] = frozenset()
         self.joining: dict[int, int] = {}
         self.force: dict[str, float] = {}
@@ -49,11 +51,13 @@ class Inspection:
 
     def contacts(self) -> None:
         """Keep the forces between inputs that are being joined, and count the onsets of all other
-        contacts: nothing intends those."""
+        contacts but those of pads with what they hold: nothing intends those."""
         found = self._d.contact
         now = set()
         for number in np.flatnonzero(found.dist[: self._d.ncon] < 0).tolist():
             a, b = found.geom[number].tolist()
+            if self._pressing.meant(a, b, float(found.dist[number])):
+                continue
             label = self._joined(a, b)
             if label is None:
                 now.add((a, b))
