@@ -11,6 +11,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from factory.layout.request import Ground
 from factory.mjcf import model
 from factory.mjcf.model import (
     CARRIAGE_MASS,
@@ -25,7 +26,7 @@ from factory.simulation.mujoco.drives import Drives
 from factory.simulation.request import RunRequest
 from factory.simulation.simulation import Simulation
 from factory.support.engine import mujoco
-from factory.support.settings import RANGES, Settings
+from factory.support.settings import RANGES, TICK, Settings
 from tests.simulation_values import layout_of, read_by, ready
 
 MOST = 1.9
@@ -73,9 +74,12 @@ def test_with_short_timesteps_drives_are_as_stiff_as_ever() -> None:
 @pytest.mark.parametrize("name", ["paper", "20", "fence", "gearbox"])
 @pytest.mark.parametrize("timestep", [0.008, 0.02])
 def test_long_timesteps_do(name: str, timestep: float) -> None:
-    """Gaps stay below 0.3 mm and welds hold, with robots and drives that differ."""
-    settings = Settings(timestep=timestep, substeps=1)
-    run = ready(name, jitter=0.5, settings=settings).run()
+    """Gaps stay below 0.3 mm and welds hold, with robots and drives that differ. At 20 ms drives
+    may be further off than the 0.2 mm of air over a pad, so that is without hands."""
+    settings = Settings(timestep=timestep, substeps=1, hands=int(timestep <= TICK))
+    made = layout_of(name)
+    layout = made if settings.hands else Ground().lay_out(made.factory, made.product, settings)
+    run = ready(layout, jitter=0.5, settings=settings).run()
     figures: Any = run.physics
     assert run.trouble is None
     assert run.refines_net

@@ -18,7 +18,7 @@ from factory.layout.certificate import (
     Region,
 )
 from factory.layout.dimensions import BEHIND, SIDE, WALL, Clearance, up
-from factory.layout.guidepath import Box, Extent, Guidepath
+from factory.layout.guidepath import Box, Guidepath
 from factory.layout.layout import Layout, carriers
 from factory.layout.shapes import Shape, headings
 from factory.layout.stretching import Stretched
@@ -56,7 +56,7 @@ class LayoutDraft:
             guidepaths,
             tuple(self.stretched.stations),
             self.payloads,
-            _outfeed(guidepaths[0], self.shapes[0].last, self.clearance),
+            _outfeed(guidepaths[0], self.shapes[0], self.clearance),
             tuple(s.hand for s in self.shapes) if any(s.hand for s in self.shapes) else (),
         )
 
@@ -78,10 +78,11 @@ class LayoutDraft:
         return tuple(paths)
 
 
-def _outfeed(path: Guidepath, last: Extent, c: Clearance) -> Box:
+def _outfeed(path: Guidepath, shape: Shape, c: Clearance) -> Box:
     """The conveyor: under the product at A and ahead to the end of the shed. It is no wider than
     the product, so that what keeps clear of the one keeps clear of the other."""
-    ahead = 2 * last[1] - last[0] + c.c + WALL + BEHIND + SIDE
+    last, grip = shape.last, shape.grip or shape.last
+    ahead = 2 * last[1] - last[0] + up(max(0.0, grip[1] - last[1])) + c.c + WALL + BEHIND + SIDE
     return path.world((last[0] - c.c / 2, ahead, last[2], last[3]), path.a)
 
 

@@ -25,6 +25,7 @@ from factory.layout.dimensions import (
     TRAY,
     WALL,
     Clearance,
+    up,
 )
 from factory.layout.guidepath import Box, Extent, Feeder, Guidepath, Point2
 from factory.layout.hands.hand import BEAM, Hand
@@ -277,15 +278,21 @@ class Layout:
     @property
     def outfeed_way(self) -> float:
         """How far the outfeed takes a product until it is out of sight [m]."""
-        return self.product_length + self.clearance + WALL + BEHIND
+        return self.product_length + self.hand_ahead + self.clearance + WALL + BEHIND
+
+    @property
+    def hand_ahead(self) -> float:
+        """How far the hand of the output robot reaches ahead of the product [m]."""
+        grip, ahead = self.grip(0), self.payloads[self.factory.pag.root][1]
+        return 0.0 if grip is None else up(max(0.0, grip[1] - ahead))
 
     @property
     def shed(self) -> Box:
         """The shed that the outfeed takes products into, in the world: its shutter is a clearance
-        ahead of a product that is dropped off."""
+        ahead of a product that is dropped off, and of the hand that does so."""
         xlo, xhi, ylo, yhi = self.payloads[self.factory.pag.root]
         x, y = self.guidepaths[0].a
-        start = x + xhi + self.clearance
+        start = x + xhi + self.hand_ahead + self.clearance
         return start, start + WALL + BEHIND + xhi - xlo + SIDE, y + ylo - SIDE, y + yhi + SIDE
 
     @property
