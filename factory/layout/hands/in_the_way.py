@@ -71,7 +71,10 @@ class InTheWay:
         for u, t in frames:
             free["hands"] &= self.apart.own_side(robot, kind, found, u, t)
             going = self._going_on(robot, kind, found, u, t)
-            going[:, 0] = np.maximum(going[:, 0], self.apart.crossing(robot, found, u, t))
+            crossing = self.apart.crossing(robot, found, u, t)
+            if kind == "above" and robot in self.holding.factory.strokes:
+                free["hands"] &= crossing == 0  # it goes up before it goes back, so it stays there
+            going[:, 0] = np.maximum(going[:, 0], crossing)
             waits = np.maximum(waits, going)
             for ways in self.coming(robot, label, kind, found, u, t):
                 first |= hit(*ways)
