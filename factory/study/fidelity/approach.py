@@ -3,7 +3,9 @@
 Left out are pairs that are meant to be near: a part and what holds it, parts held by one body,
 parts whose robots are in one and the same active operation, robots on the floor, the output robot
 at the outfeed that it serves, bodies of one feeder or of the outfeed, sliders, which hand over, and
-spare copies."""
+spare copies. Hands, which reach between the parts, are also near those robots, feeders and parts
+that they meet in some operation, whenever that is: nothing but that they never touch is known of
+these, which `hidden_penetration_max_mm` measures."""
 
 from __future__ import annotations
 
@@ -21,6 +23,9 @@ from factory.study.fidelity.record import ClosestApproach
 
 ROBOT, PART, FEEDER, OUTFEED, NONE = range(5)
 KINDS = ("robot", "part", "feeder", "outfeed")
+
+LIMBS = ("finger", "column", "pad", "cross", "riser", "tower", "bar", "beam", "stem")
+"""The limbs of hands."""
 
 BEYOND = 2e-3
 """Distances are measured up to the clearance plus this [m]."""
@@ -55,6 +60,9 @@ class Approaches:
             ]
         )
         self.robot = _robots(words, [r.name for r in layout.factory.robots])
+        self.hand = np.array([_is_hand(m.geom(geom).name) for geom in range(m.ngeom)])
+        self.serves = _served(words, layout)
+        self.coupled = _coupled(layout)
         self.operation = np.full(len(layout.factory.robots) + 1, -1)
         self.operations = layout.factory.operations
         self.least = np.full((5, 5), np.inf)
@@ -68,7 +76,8 @@ class Approaches:
         d = self.shadow.d
         if not d.ncon:
             return
-        pairs, dist = self.trunk[self.m.geom_bodyid[d.contact.geom]], d.contact.dist
+        geoms = d.contact.geom
+        pairs, dist = self.trunk[self.m.geom_bodyid[geoms]], d.contact.dist
         kinds = self.kind[pairs]
         nearer = np.flatnonzero(dist < self.least[kinds[:, 0], kinds[:, 1]])
         if not len(nearer):
@@ -76,7 +85,8 @@ class Approaches:
         if active != self._coupled:
             self._couple(active)
         pairs, dist = pairs[nearer], dist[nearer]
-        kept = np.logical_not(self._meant(*pairs.T))
+        meant = self._meant(*pairs.T) | self.hand[geoms[nearer]].any(axis=1) & self._met(*pairs.T)
+        kept = np.logical_not(meant)
         if kept.any():
             self._keep(pairs[kept], dist[kept])
 
@@ -102,6 +112,15 @@ class Approaches:
         own = (root[a] == root[b]) | ((self.kind[a] == OUTFEED) & (self.kind[b] == OUTFEED))
         spare = (hold_a == 0) | (hold_b == 0)
         return np.asarray(held | together | joining | serving | own | spare)
+
+    def _met(self, a: Index, b: Index) -> Truth:
+        """Whether the robots of bodies (n,) and (n,), or of what holds them, or of the feeders that
+        do, have some operation in common."""
+        of_a, of_b = (
+            np.where(self.welds.holder[body] >= 0, self.serves[self.welds.holder[body]], own)
+            for body, own in ((a, self.serves[a]), (b, self.serves[b]))
+        )
+        return np.isin(of_a * len(self.operation) + of_b, self.coupled)
 
     def _keep(self, pairs: Index, dist: Array) -> None:
         for nearest in np.argsort(-dist):  # the nearest of a kind comes last, and is kept
@@ -130,6 +149,31 @@ class Approaches:
         """The least of the distances less those certified [m]."""
         found = np.minimum(self.least[:NONE, :NONE], self.shadow.reach) - self.certified
         return float(found[np.triu_indices(4)].min())
+
+
+def _is_hand(geom: str) -> bool:
+    """Whether a geom is a limb of a hand."""
+    return names.kind(geom) == "robot" and geom.rpartition("/")[2] in LIMBS
+
+
+def _served(bodies: list[str], layout: Layout) -> Index:
+    """The index of the robot of each body, or that a feeder or the tray serves; that after the last
+    for none."""
+    factory = layout.factory
+    stations = {names.feeder(leaf.label): leaf.carrier for leaf in factory.leaves}
+    stations[names.OUTFEED_TRAY] = 0
+    found = _robots(bodies, [robot.name for robot in factory.robots])
+    for number, body in enumerate(bodies):
+        found[number] = stations.get("/".join(body.split("/")[:2]), found[number])
+    return found
+
+
+def _coupled(layout: Layout) -> Index:
+    """The pairs of robots that are in one operation, a robot and itself too: the index of the one
+    times that after the last, and the other's."""
+    count = len(layout.factory.robots) + 1
+    together = (operation.robots for operation in layout.factory.operations)
+    return np.array(sorted({a * count + b for robots in together for a in robots for b in robots}))
 
 
 def _robots(bodies: list[str], robots: list[str]) -> Index:
