@@ -93,6 +93,15 @@ class Loads:
         masses, centres = zip(*(centre_of(product, parts) for parts in held), strict=True)
         return cls(np.array(masses), np.array(centres), push)
 
+    def about(self, at: Array) -> Array:
+        """Force [N] and moment [Nm] about places `at` (n, 3) of each load, at rest and as it is
+        accelerated to any side (n, 6, m)."""
+        pulls = np.array([0.0, 0.0, -GRAVITY]) + self.push * PUSHES
+        force = self.mass[:, None, None] * pulls
+        moment = np.cross((self.centre - at[:, None])[:, :, None], force)
+        load = np.concatenate([np.broadcast_to(force, moment.shape), moment], axis=-1)
+        return load.reshape(len(at), force.size // 3, 6).swapaxes(1, 2)
+
 
 def centre_of(product: Product, parts: Sequence[str]) -> tuple[float, Array]:
     """Mass [kg] and centre of mass (3,) of some parts."""
@@ -127,7 +136,8 @@ def places(
     outermost = np.lexsort((away, np.round(-way * face, 3)))[:TRIED]
     points = points[np.unique(np.concatenate([outermost, np.argsort(away)[:NEAR]]))]
     outward = -way * np.eye(3)[axis]
-    used = [strain(tip("suction"), outward, np.array(r), points, np.zeros(3), loads) for r in RADII]
+    alone, sizes = np.zeros(3), np.array(RADII)
+    used = strain(tip("suction"), outward, sizes[:, None], alone, loads.about(points))
     useful = [n for n, radius in enumerate(RADII) if radius <= LEAST or used[n].max() > EASY]
     largest = max(0, useful[0] - 1)  # larger pads are of no more use
     covered, plane = _covered(surfaces, parts, points, (axis, way), RADII[largest:])
@@ -146,9 +156,9 @@ def places(
         chosen = ((covered[number] > least) & (number > best)).nonzero()[0]
         found.append((chosen, np.full(len(chosen), number)))
     point, size = (np.concatenate(numbers) for numbers in zip(*found, strict=True))
-    at, radius, covers = points[point], np.array(RADII)[size], covered[size, point]
+    at, radius, covers = points[point], sizes[size], covered[size, point]
     at[:, axis] = plane[size, point]
-    held = outward, radius, at, np.zeros(3), loads
+    held = outward, radius, alone, loads.about(at)
     share, pinned = strain(tip("suction"), *held) / covers, strain(tip("pin"), *held)
     result = Places(at, radius, share, pinned, covers)
     return result.chosen(np.argsort(np.round(result.share, 2), kind="stable"))
@@ -246,12 +256,9 @@ def _covered(
     return np.asarray(reached.mean(axis=2)), way * most
 
 
-def strain(tip: Tip, outward: Array, radius: Array, at: Array, apart: Array, loads: Loads) -> Array:
-    """The largest share (n,) of the strength of tips about places `at` (n, 3) that any of some
-    loads uses, at rest and as it is accelerated. The rest as `Tip.used`."""
-    pulls = np.array([0.0, 0.0, -GRAVITY]) + loads.push * PUSHES
-    force = loads.mass[:, None, None, None] * pulls[:, None]
-    moment = np.cross(loads.centre[:, None, None] - at, force)
-    load = np.concatenate(np.broadcast_arrays(force, moment), axis=-1)
-    terms = tip.gauge(outward, radius, apart) @ load[..., None]
-    return np.asarray(np.maximum(shares(terms[..., 0]).max(axis=(0, 1)), 0.0))
+def strain(tip: Tip, outward: Array, radius: Array, apart: Array, held: Array) -> Array:
+    """The largest share (..., n) of the strength of tips that any of some loads uses, which are
+    given about the middles of the tips, `held` (n, 6, m); `radius` (..., n). The rest as
+    `Tip.used`."""
+    terms = tip.gauge(outward, radius, apart) @ held
+    return np.asarray(np.maximum(shares(terms.swapaxes(-1, -2)).max(axis=-1), 0.0))

@@ -85,17 +85,19 @@ direction, what bends rims, what tilts one tip against the other."""
 TERMS = 11
 """Of so many numbers the terms of a load are."""
 
-LENGTHS = np.repeat(np.eye(5), [1, 3, 1, 3, 3], axis=0)[:, 1:]
-"""Sums up the squares of the terms of what pulls beside, turns, bends and tilts."""
-
-
 def shares(terms: Array) -> Array:
     """The share (n,) of the strength of hands' tips that loads of such terms (n, 11) use, below 0
     where tips are pressed on; above 1 a hand lets go. Pressure is lost to what pulls off and tilts,
     and to what slips or bends: rim and friction have it one as well as the other."""
-    lengths = np.sqrt(terms * terms @ LENGTHS)
-    slips, bends, tilts = lengths[..., 0] + lengths[..., 1], lengths[..., 2], lengths[..., 3]
+    squares = terms * terms
+    slips = _length(squares[..., BESIDE]) + np.abs(terms[..., TURN])
+    bends, tilts = _length(squares[..., BENT]), _length(squares[..., TILTED])
     return np.asarray(terms[..., OFF] + tilts + np.maximum(slips, bends))
+
+
+def _length(squares: Array) -> Array:
+    """The length (n,) of what has such squares (n, 3)."""
+    return np.asarray(np.sqrt(squares.sum(axis=-1)))
 
 
 def _squared(direction: Array) -> Array:

@@ -11,7 +11,7 @@ from factory.control.mode import Truth
 from factory.geometry.meshes import Array
 from factory.layout.dimensions import CARRIAGE, FINGER, Clearance
 from factory.layout.hands.apart import BESIDE, HandsApart, Swept
-from factory.layout.hands.hand import Hand, Kind, breadth
+from factory.layout.hands.hand import Hand, Kind, widths
 from factory.layout.hands.holding import Holding, held
 from factory.layout.hands.in_the_way import InTheWay
 from factory.layout.hands.places import Places
@@ -100,7 +100,7 @@ class HandsApartInLanes(HandsApart):
             free &= found.radius <= max(known.radius, FINGER / 2) + SAME
             return free & super().own_side(robot, kind, found, u, t)
         lane, c = self.lanes[robot], self.holding.clearance
-        wide = np.array([breadth(radius) / 2 for radius in found.radius.tolist()])
+        wide = widths(found.radius) / 2
         away = (found.at[:, lane.across] - lane.line) * lane.side
         free = (away - wide >= c.c / 2) & (away - found.radius >= BESIDE)
         free &= away + wide <= c.spread + CARRIAGE / 2
