@@ -22,7 +22,7 @@ from factory.layout.hands.apart import BESIDE
 from factory.layout.hands.hand import Hand, Kind
 from factory.layout.hands.holding import Holding, held
 from factory.layout.hands.in_the_way import InTheWay
-from factory.layout.hands.places import PUSH, Places, centre_of, strain
+from factory.layout.hands.places import PUSH, Places, centre_of, strain_of_two
 from factory.layout.hands.surfaces import Way
 from factory.layout.hands.tips import STRONG, TipName, tip
 from factory.plant.factory import Factory
@@ -44,10 +44,6 @@ bore."""
 
 PAIRED = 8
 """Of so many places on either side of the centre of mass pairs are tried."""
-
-
-UP = np.array([0.0, 0.0, 1.0])
-"""From a tip below to its payload."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -215,9 +211,9 @@ class Hands:
         _, centre = centre_of(self.holding.product, self.holding.factory.contents[label])
         two = np.array(list(_in_line(found.at, along, float(centre[along]))), int).reshape(-1, 2)
         at, radius = found.at[two], found.radius[two].min(axis=1)
-        held = UP, radius, at[:, 1] - at[:, 0], self.holding.loads(label).about(at.mean(axis=1))
-        share = strain(tip("suction"), *held) / found.covered[two].min(axis=1)
-        paired = two, share, strain(tip("pin"), *held), served[two].max(axis=1)
+        held = radius, at[:, 1] - at[:, 0], self.holding.loads(label).about(at.mean(axis=1))
+        share = strain_of_two(tip("suction"), *held) / found.covered[two].min(axis=1)
+        paired = two, share, strain_of_two(tip("pin"), *held), served[two].max(axis=1)
         return TipPlaces(*(np.concatenate(both) for both in zip(alone, paired, strict=True)))
 
     def _clear(

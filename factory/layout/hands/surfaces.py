@@ -102,15 +102,16 @@ class Surfaces:
         """Where lines along an axis through points (n, 3) enter some parts for the first time and
         leave them for the last (n,) [m]."""
         first, last = np.full(len(points), np.inf), np.full(len(points), -np.inf)
-        across = [a for a in range(3) if a != axis]
-        for part in parts:
-            for body in self.bodies[part]:
-                at = points[:, across]
-                near = ((at >= body.low[across]) & (at <= body.high[across])).all(axis=1)
-                if near.any():
-                    low, high = body.crossed(points[near], axis)
-                    first[near] = np.minimum(first[near], low)
-                    last[near] = np.maximum(last[near], high)
+        one, other = (a for a in range(3) if a != axis)
+        x, y = points[:, one].copy(), points[:, other].copy()
+        for body in (body for part in parts for body in self.bodies[part]):
+            (low, high), beside = (body.low, body.high), (x >= body.low[one])
+            beside &= (x <= high[one]) & (y >= low[other]) & (y <= high[other])
+            near = np.flatnonzero(beside)
+            if len(near):
+                enter, leave = body.crossed(points[near], axis)
+                first[near] = np.minimum(first[near], enter)
+                last[near] = np.maximum(last[near], leave)
         return first, last
 
 

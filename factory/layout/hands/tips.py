@@ -46,6 +46,20 @@ class Tip:
         found = shares((self.gauge(outward, radius, apart) @ load[..., None])[..., 0])
         return np.maximum(found, 0.0)
 
+    def alone(self, side: tuple[int, int], radius: Array, force: Array, moment: Array) -> Array:
+        """As `used` (...,), for hands with one tip on a side of the payload, an axis and a way (+1,
+        -1) along it; below 0 where the tip is pressed on. `radius` (...,), `force` and `moment`
+        (3, ...)."""
+        axis, way = side
+        one, other = (a for a in range(3) if a != axis)
+        bears = self.pull * np.pi * radius**2
+        beside, bent = 1 / self.friction / bears, 2 / radius / bears
+        turn = TWIST / radius / self.friction / bears
+        slips = np.sqrt((beside * force[one]) ** 2 + (beside * force[other]) ** 2)
+        slips = slips + np.abs(turn * moment[axis])
+        bends = np.sqrt((bent * moment[one]) ** 2 + (bent * moment[other]) ** 2)
+        return np.asarray(-way / bears * force[axis] + np.maximum(slips, bends))
+
     def gauge(self, outward: Array, radius: Array, apart: Array) -> Array:
         """What of a load uses the strength of a hand's tips, as matrices (n, 11, 6): from a force
         [N] and a moment [Nm] about the middle of the tips to the terms of `shares`.
