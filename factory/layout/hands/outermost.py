@@ -11,7 +11,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from factory.geometry.meshes import Array
-from factory.layout.hands.surfaces import FLAT, Body
+from factory.layout.hands.surfaces import FLAT, Body, blocks
 
 SAME = 1e-6
 """What reaches no further out by this is not looked at [m]."""
@@ -36,8 +36,7 @@ def outermost(
             np.maximum(np.maximum(low[one] - x, x - high[one]), 0.0),
             np.maximum(np.maximum(low[other] - y, y - high[other]), 0.0),
         )
-        near = np.flatnonzero((beside < radii) & (found < out - SAME))
-        if len(near):
+        for near in blocks(np.flatnonzero((beside < radii) & (found < out - SAME))):
             reached = out if body.boxed else _within(body, points[near], radii[near], side)
             found[near] = np.maximum(found[near], reached)
     return found
@@ -68,16 +67,17 @@ def _within(body: Body, points: Array, radius: Array, side: tuple[int, int]) -> 
 def _on_edges(ends: Array, out: Array, at: Array, radius: Array) -> Array:
     """How far out edges reach within discs: their `ends` (e, 2, 2) in plan, how far `out` (e, 2)
     they are there."""
-    begin, way = ends[:, 0] - at[:, None], ends[:, 1] - ends[:, 0]
-    square, middle = (way**2).sum(axis=1), (begin * way).sum(axis=2)
-    apart = (begin**2).sum(axis=2) - radius[:, None] ** 2
-    upright = square < FLAT**2
-    room = middle**2 - square * apart
-    half = np.sqrt(np.maximum(room, 0.0))
-    square = np.where(upright, 1.0, square)
+    (x, y), (along, across) = ends[:, 0].T[:, None] - at.T[..., None], (ends[:, 1] - ends[:, 0]).T
+    square, middle = along**2 + across**2, x * along + y * across
+    apart = x**2 + y**2 - radius[:, None] ** 2
+    upright, room = square < FLAT**2, middle**2 - square * apart
+    disc, edge = np.nonzero(np.where(upright, apart <= 0, room > 0))
+    half, middle = np.sqrt(np.maximum(room[disc, edge], 0.0)), middle[disc, edge]
+    square, upright = np.where(upright, 1.0, square)[edge], upright[edge]
     low = np.where(upright, 0.0, np.clip((-middle - half) / square, 0.0, 1.0))
     high = np.where(upright, 1.0, np.clip((-middle + half) / square, 0.0, 1.0))
-    meets = np.where(upright, apart <= 0, (room > 0) & (low < high))
-    rise = out[:, 1] - out[:, 0]
-    most = out[:, 0] + np.maximum(low * rise, high * rise)
-    return np.asarray(np.where(meets, most, -np.inf).max(axis=1))
+    begin, rise = out[edge, 0], (out[:, 1] - out[:, 0])[edge]
+    most = begin + np.maximum(low * rise, high * rise)
+    found = np.full(len(at), -np.inf)
+    np.maximum.at(found, disc, np.where(low < high, most, -np.inf))
+    return found

@@ -6,7 +6,7 @@ be in the way of a hand is boxed, which is exact for boxes and on the safe side 
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import combinations
@@ -15,7 +15,7 @@ from itertools import product as pairs
 import numpy as np
 
 from factory.compiler.mating.depth import polytope
-from factory.control.mode import Truth
+from factory.control.mode import Index, Truth
 from factory.geometry.meshes import Array
 from factory.geometry.solids import Product
 
@@ -27,6 +27,11 @@ TOUCH = 1e-5
 
 FLAT = 1e-9
 """A face whose normal has a smaller share along a line is parallel to it."""
+
+
+BLOCK = 256
+"""Of so many points it is looked at together where they are on a body of many faces: what is worked
+out for each point and face stays in the processor's cache."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,14 +75,16 @@ class Body:
             count = len(points)  # of a box along the axes
             return np.full(count, self.low[axis]), np.full(count, self.high[axis])
         normals, offsets = self.faces
-        across = [a for a in range(3) if a != axis]
-        room = offsets - points[:, across] @ normals[:, across].T
-        along = normals[:, axis]
-        flat = np.abs(along) < FLAT
-        inside = (room[:, flat] >= -FLAT).all(axis=1)
-        ends = room / np.where(flat, 1.0, along)
-        first = np.where(along < -FLAT, ends, -np.inf).max(axis=1)
-        last = np.where(along > FLAT, ends, np.inf).min(axis=1)
+        across, along = [a for a in range(3) if a != axis], normals[:, axis]
+        at = points[:, across]
+
+        def rooms(faces: Truth) -> Array:
+            return np.asarray(offsets[faces] - at @ normals[faces][:, across].T)
+
+        flat, out, back = np.abs(along) < FLAT, along > FLAT, along < -FLAT
+        inside = (rooms(flat) >= -FLAT).all(axis=1)
+        first = (rooms(back) / along[back]).max(axis=1, initial=-np.inf)
+        last = (rooms(out) / along[out]).min(axis=1, initial=np.inf)
         inside &= first <= last
         return np.where(inside, first, np.inf), np.where(inside, last, -np.inf)
 
@@ -107,12 +114,17 @@ class Surfaces:
         for body in (body for part in parts for body in self.bodies[part]):
             (low, high), beside = (body.low, body.high), (x >= body.low[one])
             beside &= (x <= high[one]) & (y >= low[other]) & (y <= high[other])
-            near = np.flatnonzero(beside)
-            if len(near):
+            for near in blocks(np.flatnonzero(beside)):
                 enter, leave = body.crossed(points[near], axis)
                 first[near] = np.minimum(first[near], enter)
                 last[near] = np.maximum(last[near], leave)
         return first, last
+
+
+def blocks(numbers: Index) -> Iterator[Index]:
+    """Some numbers (n,), BLOCK at a time."""
+    for begin in range(0, len(numbers), BLOCK):
+        yield numbers[begin : begin + BLOCK]
 
 
 def swept(low: Array, high: Array, *ways: Way) -> tuple[Array, Array]:
