@@ -34,6 +34,20 @@ BLOCK = 256
 out for each point and face stays in the processor's cache."""
 
 
+@dataclass(frozen=True, eq=False, slots=True)
+class Faces:
+    """Some faces of a body as seen along an axis: their outward normals' shares `along` (f,) and
+    `across` (2, f) it, and how far they reach along those, `offsets` (f,) [m]."""
+
+    along: Array
+    across: Array
+    offsets: Array
+
+    def room(self, at: Array) -> Array:
+        """How far points (n, 2) across the axis, at its origin, are inside of each (n, f) [m]."""
+        return np.asarray(self.offsets - at @ self.across)
+
+
 @dataclass(frozen=True, eq=False)
 class Body:
     """A convex body: its box `low`, `high` (3,) and its `vertices` (n, 3) [m]."""
@@ -47,6 +61,19 @@ class Body:
         """The outward normals (f, 3) of its faces and how far they reach along them (f,) [m]."""
         found = polytope(self.vertices)
         return found.normals, found.reach
+
+    @cached_property
+    def facing(self) -> tuple[tuple[Faces, Faces, Faces], ...]:
+        """For each axis those of its faces that are parallel to it, face against it, and face along
+        it."""
+        normals, offsets = self.faces
+        found = []
+        for axis, along in enumerate(normals.T):
+            across = normals[:, [a for a in range(3) if a != axis]]
+            sides = np.abs(along) < FLAT, along < -FLAT, along > FLAT
+            one, two, three = (Faces(along[s], across[s].T, offsets[s]) for s in sides)
+            found.append((one, two, three))
+        return tuple(found)
 
     @cached_property
     def edges(self) -> Array:
@@ -74,17 +101,11 @@ class Body:
         if self.boxed:
             count = len(points)  # of a box along the axes
             return np.full(count, self.low[axis]), np.full(count, self.high[axis])
-        normals, offsets = self.faces
-        across, along = [a for a in range(3) if a != axis], normals[:, axis]
-        at = points[:, across]
-
-        def rooms(faces: Truth) -> Array:
-            return np.asarray(offsets[faces] - at @ normals[faces][:, across].T)
-
-        flat, out, back = np.abs(along) < FLAT, along > FLAT, along < -FLAT
-        inside = (rooms(flat) >= -FLAT).all(axis=1)
-        first = (rooms(back) / along[back]).max(axis=1, initial=-np.inf)
-        last = (rooms(out) / along[out]).min(axis=1, initial=np.inf)
+        beside, back, out = self.facing[axis]
+        at = points[:, [a for a in range(3) if a != axis]]
+        inside = (beside.room(at) >= -FLAT).all(axis=1)
+        first = (back.room(at) / back.along).max(axis=1, initial=-np.inf)
+        last = (out.room(at) / out.along).min(axis=1, initial=np.inf)
         inside &= first <= last
         return np.where(inside, first, np.inf), np.where(inside, last, -np.inf)
 
