@@ -75,18 +75,6 @@ class Holding:
         contents = dict.fromkeys(tuple(self.factory.contents[held]) for held in labels)
         return Loads.of(self.product, contents, self.push)
 
-    def around(self, label: str, low: Array, high: Array) -> Array:
-        """The boxes of a sub-assembly's bodies among which a hand could come."""
-        return self.beside(self.boxes(label), low, high)
-
-    @staticmethod
-    def beside(boxes: Array, low: Array, high: Array) -> Array:
-        """Those of some boxes that are as high as a hand."""
-        if not len(low):
-            return boxes[:0]
-        floor, top = float(low[:, 2].min()), float(high[:, 2].max()) + 10.0
-        return boxes[(boxes[:, 0, 2] < top) & (boxes[:, 1, 2] > floor)]
-
     def boxes(self, label: str) -> Array:
         """The boxes (n, 2, 3) of a sub-assembly's bodies."""
         if label not in self._boxes:

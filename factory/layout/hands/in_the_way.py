@@ -5,7 +5,8 @@ Parts are looked at by boxes, swept along every way that one goes past the other
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -36,12 +37,28 @@ ROD = 0.008
 """Radius of the pad by which a feeder holds a part, at most [m]."""
 
 
+@dataclass(frozen=True, eq=False, slots=True)
+class Passing:
+    """What a hand at each place (n,) meets of parts, whatever way its carrier goes: whether it has
+    to be there `first`, before what it takes; whether what it has delivered to and what is `lowered`
+    are in its way; and whether inputs are that are brought, `early` if it is there first, `later` in
+    any case."""
+
+    first: Truth
+    joined: Truth
+    lowered: Truth
+    early: Truth
+    later: Truth
+
+
 class InTheWay:
     """What is in the way of a factory's hands. `hand_of`: that of a carrier with a heading."""
 
     def __init__(self, holding: Holding, hand_of: Callable[[int, Way], Hand]) -> None:
         self.holding, self.apart = holding, HandsApart(holding, hand_of)
         self._checked: dict[tuple[object, ...], tuple[dict[str, Truth], Truth, Array]] = {}
+        self._passed: dict[tuple[object, ...], Passing] = {}
+        self._added: dict[int, list[Array]] = {}
 
     def on_side(self, label: str, kind: Kind, frames: Sequence[tuple[Way, Way]]) -> Places:
         """The places on the side of a sub-assembly that a kind of hand holds."""
@@ -67,27 +84,50 @@ class InTheWay:
     ) -> tuple[dict[str, Truth], Truth, Array]:
         free = {why: np.ones(len(found), bool) for why in IN_THE_WAY}
         free["weak"] &= found.pinned <= STRONG
-        first, waits = np.zeros(len(found), bool), np.zeros((len(found), 1))
+        waits = np.zeros((len(found), 1))
         for u, t in frames:
             free["hands"] &= self.apart.own_side(robot, kind, found, u, t)
             going = self._going_on(robot, kind, found, u, t)
             going[:, 0] = np.maximum(going[:, 0], self.apart.crossing(robot, found, u, t))
             waits = np.maximum(waits, going)
-            for ways in self.coming(robot, label, kind, found, u, t):
-                first |= hit(*ways)
-            for why, ways in self.met(robot, kind, found, u, t):
-                free[why] &= ~hit(*ways)
+            free["hands"] &= ~_any(self.apart.carriers_hand(robot, kind, found, u, t), found)
         free["hands"] &= self.apart.over_fingers(kind, found)
+        headings = dict.fromkeys((u, (abs(x), abs(y))) for u, (x, y) in frames)
+        passing = [self._passing(robot, label, kind, found, u, t) for u, t in headings]
+        first = np.logical_or.reduce([passed.first for passed in passing])
         if self.holding.is_fed(robot) and kind != "below":
             free["own"] &= ~first
         if self.holding.is_fed(robot) and kind == "above":
             free["feeder"] &= self._beside_rod(label, found, *frames[0])
         if kind == "behind" or (kind == "above" and not self.holding.is_fed(robot)):
             first |= True
-        for u, t in frames:
-            for later, joined in self.joined(robot, kind, found, u, t):
-                free["brought"] &= ~((first | later) & hit(*joined))
+        for passed in passing:
+            free["joined"] &= ~passed.joined
+            free["lowered"] &= ~passed.lowered
+            free["brought"] &= ~(passed.later | (first & passed.early))
         return free, first, waits
+
+    def _passing(
+        self, robot: int, label: str, kind: Kind, found: Places, u: Way, t: Way
+    ) -> Passing:
+        """What a hand of a robot that heads along u meets. Looked at once: whether its carrier goes
+        along t or against it is all the same."""
+        key = robot, kind, u, found.at.tobytes()
+        if key not in self._passed:
+            self._passed[key] = self._looked_past(robot, label, kind, found, u, t)
+        return self._passed[key]
+
+    def _looked_past(
+        self, robot: int, label: str, kind: Kind, found: Places, u: Way, t: Way
+    ) -> Passing:
+        joined = list(self.joined(robot, kind, found, u, t))
+        return Passing(
+            _any(self.coming(robot, label, kind, found, u, t), found),
+            _any(self._leaving(robot, kind, found, u), found),
+            _any(self._lowered(robot, kind, found, u), found),
+            _any((ways for later, ways in joined if not later), found),
+            _any((ways for later, ways in joined if later), found),
+        )
 
     def met(
         self, robot: int, kind: Kind, found: Places, u: Way, t: Way
@@ -124,7 +164,7 @@ class InTheWay:
         if last.index == self.holding.factory.dropoff.index:
             gone, whole = swept(low, high, back(u)), self._at_last(robot)
             if kind != "behind":
-                yield (*gone, self.holding.around(whole, *gone))
+                yield (*gone, self.holding.boxes(whole))
             return
         for boxes in self._from_above(last, robot, (u,)):
             yield (*swept(low, high, back(u)), boxes)
@@ -133,13 +173,13 @@ class InTheWay:
         if kind == "below":
             gone[1][:, 2] += self.holding.factory.strokes.get(robot, 0.0)
         if kind != "behind":
-            yield (*gone, self.holding.around(last.label, *gone))
+            yield (*gone, self.holding.boxes(last.label))
             return
         # its payload comes along the same way, or takes the bar down with it
         gone[1][:, 2] += 10.0 * lifted
         for other, guest in zip(last.before, last.robots, strict=True):
             if guest != robot and other != NOPART:
-                yield (*gone, self.holding.around(other, *gone))
+                yield (*gone, self.holding.boxes(other))
 
     def _going_on(self, robot: int, kind: Kind, found: Places, u: Way, t: Way) -> Array:
         """How far a hand has to go back (n, k) [m] until each of the next k operations of its
@@ -149,20 +189,23 @@ class InTheWay:
         low, high = self.reach(kind, found, u)
         ways = back(u), back(t)
         return np.stack(
-            [retreat(low, high, boxes, ways) for boxes in self._onward(robot, low, high)], axis=1
+            [retreat(low, high, boxes, ways) for boxes in self._onward(robot)], axis=1
         )
 
-    def _onward(self, robot: int, low: Array, high: Array) -> Iterator[Array]:
+    def _onward(self, robot: int) -> list[Array]:
         """The boxes of what a hand could meet in each of its carrier's next operations: all that is
         there by the end of the first, and what each later one adds."""
         factory, last = self.holding.factory, self.holding.last(robot)
-        made = [o for o in self.holding.made(last.carrier) if o.index != factory.dropoff.index]
-        labels = [o.label for o in made[made.index(last) + 1 :]] if last in made else []
-        there: set[str] = set()
-        for label in labels or [last.label]:
-            added = [part for part in factory.contents[label] if part not in there]
-            there.update(added)
-            yield self.holding.beside(self.holding.surfaces.boxes(added), low, high)
+        if last.index not in self._added:
+            made = [o for o in self.holding.made(last.carrier) if o.index != factory.dropoff.index]
+            labels = [o.label for o in made[made.index(last) + 1 :]] if last in made else []
+            there, found = set[str](), list[Array]()
+            for label in labels or [last.label]:
+                added = [part for part in factory.contents[label] if part not in there]
+                there.update(added)
+                found.append(self.holding.surfaces.boxes(added))
+            self._added[last.index] = found
+        return self._added[last.index]
 
     def _at_last(self, robot: int) -> str:
         """What a robot has in the end."""
@@ -174,14 +217,14 @@ class InTheWay:
         """The same of what it takes, which is there before it comes home against u: a part, or
         inputs that come from either side."""
         low, high = self.reach(kind, found, u)
-        own = self.holding.around(label, low, high)
+        own = self.holding.boxes(label)
         if not self.holding.is_fed(robot):
             for side in (t, back(t)):
                 yield (*swept(low, high, u, side), own)
         elif kind == "behind":
             # the part comes down along the pad
             low[:, 2] -= 10.0
-            yield low, high, self.holding.around(label, low, high)
+            yield low, high, own
         else:
             yield (*swept(low, high, u), own)
 
@@ -197,7 +240,7 @@ class InTheWay:
             later = operation.before[operation.template.carrier - 1] != NOPART
             for guest, label in zip(operation.robots, operation.before, strict=True):
                 if guest != robot and label != NOPART:
-                    parts = self.holding.around(label, low, high)
+                    parts = self.holding.boxes(label)
                     for side in (t, back(t)):
                         yield later, (*swept(low, high, side), parts)
 
@@ -225,3 +268,8 @@ class InTheWay:
         boxes[:, 0, 2] += self.holding.factory.strokes[operation.robots[slot]]
         for side in sides:
             yield np.stack(swept(boxes[:, 0], boxes[:, 1], side), axis=1)
+
+
+def _any(found: Iterable[Swept], places: Places) -> Truth:
+    """Whether anything of all that hands sweep is met, for each place (n,)."""
+    return np.logical_or.reduce([np.zeros(len(places), bool), *(hit(*ways) for ways in found)])

@@ -17,7 +17,7 @@ from factory.layout.hands.holding import held
 from factory.layout.hands.in_the_way import IN_THE_WAY
 from factory.layout.hands.misses import Miss, NoGrip, Obstacle
 from factory.layout.hands.places import PUSH, Places
-from factory.layout.hands.surfaces import Way, hit
+from factory.layout.hands.surfaces import Way, hit, near
 from factory.layout.hands.tips import STRONG
 from factory.plant.factory import Factory
 
@@ -135,7 +135,7 @@ class _Search:
         matter of boxes."""
         checks, _, _ = self.in_the_way.checks(self.robot, self.label, kind, found, frames)
         for why, late, (low, high, boxes) in self._ways(kind, found, frames):
-            for box in boxes:
+            for box in near(low, high, boxes):
                 met = late & hit(low, high, box[None])
                 if met.any():
                     part = "" if why == "hands" else self._part(box)

@@ -164,8 +164,7 @@ def swept(low: Array, high: Array, *ways: Way) -> tuple[Array, Array]:
 def hit(low: Array, high: Array, boxes: Array, spare: float = TOUCH) -> Truth:
     """Which boxes (n,) from `low` to `high` (n, 3) overlap any of `boxes` (m, 2, 3), by more than
     `spare` [m]."""
-    near = _near(low, high, boxes)
-    return np.asarray(_overlap(low, high, near, spare).any(axis=1))
+    return np.asarray(_overlap(low, high, near(low, high, boxes), spare).any(axis=1))
 
 
 def retreat(low: Array, high: Array, boxes: Array, ways: tuple[Way, Way]) -> Array:
@@ -173,16 +172,16 @@ def retreat(low: Array, high: Array, boxes: Array, ways: tuple[Way, Way]) -> Arr
     `boxes` (m, 2, 3) is in their way along the second (n,) [m]; 0 where nothing is."""
     wide, ((x, y), _) = swept(low, high, *ways), ways
     axis, side = (0, x) if x else (1, y)
-    near = _near(*wide, boxes)
+    there = near(*wide, boxes)
     if side < 0:
-        past = high[:, None, axis] - near[:, 0, axis]
+        past = high[:, None, axis] - there[:, 0, axis]
     else:
-        past = near[:, 1, axis] - low[:, None, axis]
-    met = _overlap(*wide, near, TOUCH)
+        past = there[:, 1, axis] - low[:, None, axis]
+    met = _overlap(*wide, there, TOUCH)
     return np.asarray(np.where(met, past, 0.0).max(axis=1, initial=0.0))
 
 
-def _near(low: Array, high: Array, boxes: Array) -> Array:
+def near(low: Array, high: Array, boxes: Array) -> Array:
     """Those of `boxes` (m, 2, 3) that meet the box round boxes from `low` to `high` (n, 3)."""
     if not len(low):
         return boxes[:0]

@@ -13,7 +13,7 @@ from factory.layout.dimensions import CARRIAGE, FINGER, Clearance
 from factory.layout.hands.apart import BESIDE, HandsApart, Swept
 from factory.layout.hands.hand import Hand, Kind, widths
 from factory.layout.hands.holding import Holding, held
-from factory.layout.hands.in_the_way import InTheWay
+from factory.layout.hands.in_the_way import InTheWay, Passing
 from factory.layout.hands.places import Places
 from factory.layout.hands.surfaces import Way, swept
 from factory.layout.layout import Layout
@@ -141,6 +141,11 @@ class InTheWayInLanes(InTheWay):
         """Looked at anew, since lanes and the hands that are settled change."""
         return self._looked_at(robot, label, kind, found, frames)
 
+    def _passing(
+        self, robot: int, label: str, kind: Kind, found: Places, u: Way, t: Way
+    ) -> Passing:
+        return self._looked_past(robot, label, kind, found, u, t)
+
     def _going_on(self, robot: int, kind: Kind, found: Places, u: Way, t: Way) -> Array:
         if self.holding.gives(robot):
             return np.zeros((len(found), 1))
@@ -151,10 +156,10 @@ class InTheWayInLanes(InTheWay):
         low, high = self.reach(kind, found, u)
         if self.holding.takes(robot):
             label = held(self.holding.factory, robot)
-            yield (*swept(low, high, u), self.holding.around(label, low, high))
+            yield (*swept(low, high, u), self.holding.boxes(label))
         if self.holding.gives(robot):
             last = held(self.holding.factory, robot, at_last=True)
-            yield (*swept(low, high, (-u[0], -u[1])), self.holding.around(last, low, high))
+            yield (*swept(low, high, (-u[0], -u[1])), self.holding.boxes(last))
         else:
             yield from super()._leaving(robot, kind, found, u)
 
