@@ -223,9 +223,10 @@ class Hands:
         be there before what it takes, and how far (n, k) it goes back until each of the
         carrier's next operations may start [m]."""
         found = self.in_the_way.on_side(label, kind, frames)
-        checks, first, waits = self.in_the_way.checks(robot, label, kind, found, frames)
+        checks, first = self.in_the_way.checks(robot, label, kind, found, frames)
         free = np.logical_and.reduce([*checks.values(), np.ones(len(found), bool)])
-        return found.chosen(free), first[free], waits[free]
+        clear = found.chosen(free)
+        return clear, first[free], self.in_the_way.waits(robot, kind, clear, frames)
 
 
 def _cost(hand: Hand) -> float:

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from factory.control.mode import Truth
+from factory.control.mode import Index, Truth
 from factory.geometry.meshes import Array
 from factory.layout.hands.apart import BESIDE, HandsApart, Swept
 from factory.layout.hands.hand import Hand, Kind
@@ -51,14 +51,24 @@ class Passing:
     later: Truth
 
 
+@dataclass(frozen=True, eq=False, slots=True)
+class Onward:
+    """The `boxes` (m, 2, 3) of what a hand could meet in its carrier's next operations, and the
+    numbers of those `operations` (m,), of which there are so many (`count`)."""
+
+    boxes: Array
+    operations: Index
+    count: int
+
+
 class InTheWay:
     """What is in the way of a factory's hands. `hand_of`: that of a carrier with a heading."""
 
     def __init__(self, holding: Holding, hand_of: Callable[[int, Way], Hand]) -> None:
         self.holding, self.apart = holding, HandsApart(holding, hand_of)
-        self._checked: dict[tuple[object, ...], tuple[dict[str, Truth], Truth, Array]] = {}
+        self._checked: dict[tuple[object, ...], tuple[dict[str, Truth], Truth]] = {}
         self._passed: dict[tuple[object, ...], Passing] = {}
-        self._added: dict[int, list[Array]] = {}
+        self._onward: dict[int, Onward] = {}
 
     def on_side(self, label: str, kind: Kind, frames: Sequence[tuple[Way, Way]]) -> Places:
         """The places on the side of a sub-assembly that a kind of hand holds."""
@@ -70,26 +80,33 @@ class InTheWay:
 
     def checks(
         self, robot: int, label: str, kind: Kind, found: Places, frames: Sequence[tuple[Way, Way]]
-    ) -> tuple[dict[str, Truth], Truth, Array]:
+    ) -> tuple[dict[str, Truth], Truth]:
         """Whether a hand at each place (n,) is clear in every frame, by what could be in its way;
-        whether it has to be there before what it takes; and how far it goes back until each of its
-        carrier's next operations may start [m]. Looked at once."""
+        and whether it has to be there before what it takes. Looked at once."""
         key = robot, kind, tuple(frames), found.at.tobytes()
         if key not in self._checked:
             self._checked[key] = self._looked_at(robot, label, kind, found, frames)
         return self._checked[key]
 
-    def _looked_at(
-        self, robot: int, label: str, kind: Kind, found: Places, frames: Sequence[tuple[Way, Way]]
-    ) -> tuple[dict[str, Truth], Truth, Array]:
-        free = {why: np.ones(len(found), bool) for why in IN_THE_WAY}
-        free["weak"] &= found.pinned <= STRONG
+    def waits(
+        self, robot: int, kind: Kind, found: Places, frames: Sequence[tuple[Way, Way]]
+    ) -> Array:
+        """How far a hand at each place (n, k) goes back, in any frame, until each of its carrier's
+        next operations may start [m]."""
         waits = np.zeros((len(found), 1))
-        for u, t in frames:
-            free["hands"] &= self.apart.own_side(robot, kind, found, u, t)
+        for u, t in frames if len(found) else ():
             going = self._going_on(robot, kind, found, u, t)
             going[:, 0] = np.maximum(going[:, 0], self.apart.crossing(robot, found, u, t))
             waits = np.maximum(waits, going)
+        return waits
+
+    def _looked_at(
+        self, robot: int, label: str, kind: Kind, found: Places, frames: Sequence[tuple[Way, Way]]
+    ) -> tuple[dict[str, Truth], Truth]:
+        free = {why: np.ones(len(found), bool) for why in IN_THE_WAY}
+        free["weak"] &= found.pinned <= STRONG
+        for u, t in frames:
+            free["hands"] &= self.apart.own_side(robot, kind, found, u, t)
             free["hands"] &= ~_any(self.apart.carriers_hand(robot, kind, found, u, t), found)
         free["hands"] &= self.apart.over_fingers(kind, found)
         headings = dict.fromkeys((u, (abs(x), abs(y))) for u, (x, y) in frames)
@@ -105,7 +122,7 @@ class InTheWay:
             free["joined"] &= ~passed.joined
             free["lowered"] &= ~passed.lowered
             free["brought"] &= ~(passed.later | (first & passed.early))
-        return free, first, waits
+        return free, first
 
     def _passing(
         self, robot: int, label: str, kind: Kind, found: Places, u: Way, t: Way
@@ -187,16 +204,18 @@ class InTheWay:
         if self.holding.last(robot).index == self.holding.factory.dropoff.index:
             return np.zeros((len(found), 1))
         low, high = self.reach(kind, found, u)
-        ways = back(u), back(t)
-        return np.stack(
-            [retreat(low, high, boxes, ways) for boxes in self._onward(robot)], axis=1
-        )
+        onward = self._met_onward(robot)
+        past = retreat(low, high, onward.boxes, (back(u), back(t)))
+        far = np.zeros((len(found), onward.count))
+        operations, begin = np.unique(onward.operations, return_index=True)
+        far[:, operations] = np.maximum.reduceat(past, begin, axis=1)
+        return far
 
-    def _onward(self, robot: int) -> list[Array]:
-        """The boxes of what a hand could meet in each of its carrier's next operations: all that is
-        there by the end of the first, and what each later one adds."""
+    def _met_onward(self, robot: int) -> Onward:
+        """What a hand could meet in its carrier's next operations: all that is there by the end of
+        the first, and what each later one adds."""
         factory, last = self.holding.factory, self.holding.last(robot)
-        if last.index not in self._added:
+        if last.index not in self._onward:
             made = [o for o in self.holding.made(last.carrier) if o.index != factory.dropoff.index]
             labels = [o.label for o in made[made.index(last) + 1 :]] if last in made else []
             there, found = set[str](), list[Array]()
@@ -204,8 +223,9 @@ class InTheWay:
                 added = [part for part in factory.contents[label] if part not in there]
                 there.update(added)
                 found.append(self.holding.surfaces.boxes(added))
-            self._added[last.index] = found
-        return self._added[last.index]
+            of = np.repeat(np.arange(len(found)), [len(boxes) for boxes in found])
+            self._onward[last.index] = Onward(np.concatenate(found), of, len(found))
+        return self._onward[last.index]
 
     def _at_last(self, robot: int) -> str:
         """What a robot has in the end."""

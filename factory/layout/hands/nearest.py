@@ -102,7 +102,7 @@ class _Search:
     def _why(self, kind: Kind, frames: Frames) -> str:
         """What is in the way of most places, in words."""
         found = self.in_the_way.on_side(self.label, kind, frames)
-        checks, _, _ = self.in_the_way.checks(self.robot, self.label, kind, found, frames)
+        checks, _ = self.in_the_way.checks(self.robot, self.label, kind, found, frames)
         why, free = min(checks.items(), key=lambda item: int(item[1].sum()))
         return f"{len(found) - int(free.sum())} of {len(found)} places: {IN_THE_WAY[why]}"
 
@@ -133,9 +133,9 @@ class _Search:
         """Why and which part, whether that is in the way of a hand at each place (n,), what the
         hand sweeps there (low and high), and the part's box (2, 3); None for both where it is no
         matter of boxes."""
-        checks, _, _ = self.in_the_way.checks(self.robot, self.label, kind, found, frames)
+        checks, _ = self.in_the_way.checks(self.robot, self.label, kind, found, frames)
         for why, late, (low, high, boxes) in self._ways(kind, found, frames):
-            for box in near(low, high, boxes):
+            for box in boxes[near(low, high, boxes)]:
                 met = late & hit(low, high, box[None])
                 if met.any():
                     part = "" if why == "hands" else self._part(box)
@@ -159,7 +159,7 @@ class _Search:
     ) -> Iterator[tuple[str, Truth, Swept]]:
         """What may be in the way and why, with the places (n,) where that matters."""
         robot, label, always = self.robot, self.label, np.ones(len(found), bool)
-        _, first, _ = self.in_the_way.checks(robot, label, kind, found, frames)
+        _, first = self.in_the_way.checks(robot, label, kind, found, frames)
         own = self.holding.is_fed(robot) and kind != "below"
         for u, t in frames:
             for why, ways in self.in_the_way.met(robot, kind, found, u, t):

@@ -164,29 +164,29 @@ def swept(low: Array, high: Array, *ways: Way) -> tuple[Array, Array]:
 def hit(low: Array, high: Array, boxes: Array, spare: float = TOUCH) -> Truth:
     """Which boxes (n,) from `low` to `high` (n, 3) overlap any of `boxes` (m, 2, 3), by more than
     `spare` [m]."""
-    return np.asarray(_overlap(low, high, near(low, high, boxes), spare).any(axis=1))
+    return np.asarray(_overlap(low, high, boxes[near(low, high, boxes)], spare).any(axis=1))
 
 
 def retreat(low: Array, high: Array, boxes: Array, ways: tuple[Way, Way]) -> Array:
-    """How far boxes from `low` to `high` (n, 3) have to go the first of two ways until nothing of
-    `boxes` (m, 2, 3) is in their way along the second (n,) [m]; 0 where nothing is."""
+    """How far boxes from `low` to `high` (n, 3) have to go the first of two ways until each of
+    `boxes` (m, 2, 3) is not in their way along the second (n, m) [m]; 0 where it is not."""
     wide, ((x, y), _) = swept(low, high, *ways), ways
+    found, kept = np.zeros((len(low), len(boxes))), near(*wide, boxes)
     axis, side = (0, x) if x else (1, y)
-    there = near(*wide, boxes)
     if side < 0:
-        past = high[:, None, axis] - there[:, 0, axis]
+        past = high[:, None, axis] - boxes[kept, 0, axis]
     else:
-        past = there[:, 1, axis] - low[:, None, axis]
-    met = _overlap(*wide, there, TOUCH)
-    return np.asarray(np.where(met, past, 0.0).max(axis=1, initial=0.0))
+        past = boxes[kept, 1, axis] - low[:, None, axis]
+    found[:, kept] = np.where(_overlap(*wide, boxes[kept], TOUCH), np.maximum(past, 0.0), 0.0)
+    return found
 
 
-def near(low: Array, high: Array, boxes: Array) -> Array:
-    """Those of `boxes` (m, 2, 3) that meet the box round boxes from `low` to `high` (n, 3)."""
+def near(low: Array, high: Array, boxes: Array) -> Truth:
+    """Which of `boxes` (m,) meet the box round boxes from `low` to `high` (n, 3)."""
     if not len(low):
-        return boxes[:0]
+        return np.zeros(len(boxes), bool)
     kept = (boxes[:, 1] > low.min(axis=0)) & (boxes[:, 0] < high.max(axis=0))
-    return np.asarray(boxes[kept.all(axis=1)])
+    return np.asarray(kept.all(axis=1))
 
 
 def _overlap(low: Array, high: Array, boxes: Array, spare: float) -> Truth:

@@ -137,7 +137,7 @@ class InTheWayInLanes(InTheWay):
 
     def checks(
         self, robot: int, label: str, kind: Kind, found: Places, frames: Sequence[tuple[Way, Way]]
-    ) -> tuple[dict[str, Truth], Truth, Array]:
+    ) -> tuple[dict[str, Truth], Truth]:
         """Looked at anew, since lanes and the hands that are settled change."""
         return self._looked_at(robot, label, kind, found, frames)
 
