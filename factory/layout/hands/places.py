@@ -100,10 +100,10 @@ class Loads:
         """Force (3, 1, m) [N] and moment (3, n, m) [Nm] about places `at` (n, 3) of each load, at
         rest and as it is accelerated to any side."""
         pulls = np.array([0.0, 0.0, -GRAVITY]) + self.push * PUSHES
-        force = np.moveaxis(self.mass[:, None, None] * pulls, -1, 0)[:, None]
-        arm = np.moveaxis(self.centre - at[:, None], -1, 0)[..., None]
-        moment = np.cross(arm, force, axis=0)
-        return force.reshape(3, 1, -1), moment.reshape(3, len(at), force[0].size)
+        fx, fy, fz = force = pulls.T[:, None] * self.mass[:, None]
+        x, y, z = (self.centre - at[:, None]).T.swapaxes(1, 2)[..., None]
+        moment = np.stack([y * fz - z * fy, z * fx - x * fz, x * fy - y * fx])
+        return force.reshape(3, 1, -1), moment.reshape(3, len(at), fx.size)
 
 
 def centre_of(product: Product, parts: Sequence[str]) -> tuple[float, Array]:
@@ -147,9 +147,10 @@ def places(
     blank = np.zeros((largest, len(points)))
     covered, plane = np.concatenate([blank, covered]), np.concatenate([blank, plane])
     best, share = np.full(len(points), -1), np.full(len(points), np.inf)
-    for number, radius in enumerate(RADII):
+    for number in range(largest, len(RADII)):
         better = (covered[number] == 1.0) & (
-            (share > EASY) & (used[number] < share) | (used[number] <= EASY) & (radius >= LEAST)
+            (share > EASY) & (used[number] < share)
+            | (used[number] <= EASY) & (RADII[number] >= LEAST)
         )
         best[better], share[better] = number, used[number][better]
     # smaller pads have room where large ones do not, and one that is not all covered holds less
@@ -241,14 +242,14 @@ def _covered(
     rim = np.stack([np.cos(turns), np.sin(turns)], axis=1)
     ring = np.zeros((2 * RAYS + 1, 3))
     ring[:-1, across] = np.concatenate([rim, rim / 2])
-    rims = points[None, :, None] + sizes[:, None, None, None] * ring
+    rims = points + sizes[:, None, None] * ring[:, None, None]
     found = _face(surfaces, parts, rims.reshape(-1, 3), axis, way).reshape(rims.shape[:3])
     out = np.where(np.isfinite(found), way * found, -np.inf)
     bodies = [body for part in parts for body in surfaces.bodies[part]]
     discs = np.tile(points, (len(sizes), 1)), np.repeat(sizes, len(points))
-    most = outermost(bodies, *discs, side, out.max(axis=2).ravel()).reshape(out.shape[:2])
-    reached = most[:, :, None] - out <= BELLOWS * sizes[:, None, None]
-    return np.asarray(reached.mean(axis=2)), way * most
+    most = outermost(bodies, *discs, side, out.max(axis=0).ravel()).reshape(out.shape[1:])
+    reached = most - out <= BELLOWS * sizes[:, None]
+    return np.asarray(reached.mean(axis=0)), way * most
 
 
 def strain(tip: Tip, side: tuple[int, int], radius: Array, load: tuple[Array, Array]) -> Array:

@@ -98,9 +98,6 @@ class Body:
     def crossed(self, points: Array, axis: int) -> tuple[Array, Array]:
         """From where to where lines along an axis through points (n, 3), which are within its box
         across it, are inside (n,); (inf, -inf) where a line passes it by."""
-        if self.boxed:
-            count = len(points)  # of a box along the axes
-            return np.full(count, self.low[axis]), np.full(count, self.high[axis])
         beside, back, out = self.facing[axis]
         at = points[:, [a for a in range(3) if a != axis]]
         inside = (beside.room(at) >= -FLAT).all(axis=1)
@@ -133,8 +130,12 @@ class Surfaces:
         one, other = (a for a in range(3) if a != axis)
         x, y = points[:, one].copy(), points[:, other].copy()
         for body in (body for part in parts for body in self.bodies[part]):
-            (low, high), beside = (body.low, body.high), (x >= body.low[one])
-            beside &= (x <= high[one]) & (y >= low[other]) & (y <= high[other])
+            low, high = body.low, body.high
+            beside = (x >= low[one]) & (x <= high[one]) & (y >= low[other]) & (y <= high[other])
+            if body.boxed:
+                np.minimum(first, low[axis], out=first, where=beside)
+                np.maximum(last, high[axis], out=last, where=beside)
+                continue
             for near in blocks(np.flatnonzero(beside)):
                 enter, leave = body.crossed(points[near], axis)
                 first[near] = np.minimum(first[near], enter)
