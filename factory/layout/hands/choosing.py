@@ -169,6 +169,8 @@ class Hands:
         self, robot: int, label: str, kind: Kind, frames: Sequence[tuple[Way, Way]]
     ) -> Hand | None:
         """The best hand of one kind; None where that is nowhere clear."""
+        if not self.in_the_way.possible(robot, label, kind, frames):
+            return None
         found, first, waits = self._clear(robot, label, kind, frames)
         if not len(found):
             return None

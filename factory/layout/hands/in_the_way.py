@@ -33,6 +33,9 @@ IN_THE_WAY = {
 }
 """What can be in the way of a hand."""
 
+PLAY = 1e-6
+"""Places are no further than this beside the box of a sub-assembly [m]."""
+
 ROD = 0.008
 """Radius of the pad by which a feeder holds a part, at most [m]."""
 
@@ -69,6 +72,16 @@ class InTheWay:
         self._checked: dict[tuple[object, ...], tuple[dict[str, Truth], Truth]] = {}
         self._passed: dict[tuple[object, ...], Passing] = {}
         self._onward: dict[int, Onward] = {}
+
+    def possible(
+        self, robot: int, label: str, kind: Kind, frames: Sequence[tuple[Way, Way]]
+    ) -> bool:
+        """Whether anything of a sub-assembly is on the side of its carrier's line on which a hand
+        stays, in every frame: where not, none of its places needs to be found."""
+        box, none = self.holding.box(label) + [[-PLAY], [PLAY]], np.zeros(2)
+        ends = Places(box, none, none, none, none)
+        sides = (self.apart.own_side(robot, kind, ends, u, t) for u, t in frames)
+        return all(bool(side.any()) for side in sides)
 
     def on_side(self, label: str, kind: Kind, frames: Sequence[tuple[Way, Way]]) -> Places:
         """The places on the side of a sub-assembly that a kind of hand holds."""

@@ -135,6 +135,12 @@ class InTheWayInLanes(InTheWay):
         super().__init__(holding, hand_of)
         self.apart = HandsApartInLanes(holding, lanes, hand_of)
 
+    def possible(
+        self, robot: int, label: str, kind: Kind, frames: Sequence[tuple[Way, Way]]
+    ) -> bool:
+        """Always: a lane has two ends."""
+        return True
+
     def checks(
         self, robot: int, label: str, kind: Kind, found: Places, frames: Sequence[tuple[Way, Way]]
     ) -> tuple[dict[str, Truth], Truth]:
