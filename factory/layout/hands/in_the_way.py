@@ -43,9 +43,9 @@ ROD = 0.008
 @dataclass(frozen=True, eq=False, slots=True)
 class Passing:
     """What a hand at each place (n,) meets of parts, whatever way its carrier goes: whether it has
-    to be there `first`, before what it takes; whether what it has delivered to and what is `lowered`
-    are in its way; and whether inputs are that are brought, `early` if it is there first, `later` in
-    any case."""
+    to be there `first`, before what it takes; whether what it has delivered to and what is
+    `lowered` are in its way; and whether inputs are that are brought, `early` if it is there first,
+    `later` in any case."""
 
     first: Truth
     joined: Truth
@@ -78,7 +78,7 @@ class InTheWay:
     ) -> bool:
         """Whether anything of a sub-assembly is on the side of its carrier's line on which a hand
         stays, in every frame: where not, none of its places needs to be found."""
-        box, none = self.holding.box(label) + [[-PLAY], [PLAY]], np.zeros(2)
+        box, none = self.holding.box(label) + np.array([[-PLAY], [PLAY]]), np.zeros(2)
         ends = Places(box, none, none, none, none)
         sides = (self.apart.own_side(robot, kind, ends, u, t) for u, t in frames)
         return all(bool(side.any()) for side in sides)
@@ -305,4 +305,5 @@ class InTheWay:
 
 def _any(found: Iterable[Swept], places: Places) -> Truth:
     """Whether anything of all that hands sweep is met, for each place (n,)."""
-    return np.logical_or.reduce([np.zeros(len(places), bool), *(hit(*ways) for ways in found)])
+    met = [np.zeros(len(places), bool), *(hit(*ways) for ways in found)]
+    return np.asarray(np.logical_or.reduce(met))

@@ -26,12 +26,11 @@ def outermost(
 ) -> Array:
     """How far bodies reach on a side, an axis and a way along it, within discs of some radii (n,)
     across it about points (n, 3), at least as far as is `known` (n,) [m]."""
-    (axis, way), found = side, known.copy()
-    one, other = (a for a in range(3) if a != axis)
+    found, (one, other) = known.copy(), (a for a in range(3) if a != side[0])
     x, y = points[:, one], points[:, other]
     radii = np.broadcast_to(radius, x.shape)
     for body in bodies:
-        out, low, high = way * (body.high if way > 0 else body.low)[axis], body.low, body.high
+        out, low, high = body.out(side), body.low, body.high
         beside = np.hypot(
             np.maximum(np.maximum(low[one] - x, x - high[one]), 0.0),
             np.maximum(np.maximum(low[other] - y, y - high[other]), 0.0),

@@ -13,7 +13,7 @@ from factory.geometry.meshes import Array
 from factory.geometry.solids import Product
 from factory.layout.hands.hand import Kind
 from factory.layout.hands.outermost import outermost
-from factory.layout.hands.surfaces import Body, Surfaces
+from factory.layout.hands.surfaces import Surfaces
 from factory.layout.hands.tips import Tip, shares, tip
 
 RADII = (0.02, 0.014, 0.01, 0.007, 0.005, 0.0035, 0.0025, 0.0016, 0.001)
@@ -132,13 +132,13 @@ def places(
     if kind == "below":
         points = np.concatenate([points, _lines(low, high, centre)])
     points = _rounded(points, float((high - low)[:, across].min()), product.middle)
-    face = _face(surfaces, parts, points, axis, way)
-    points, face = points[np.isfinite(face)], face[np.isfinite(face)]
-    points[:, axis] = face
+    out = surfaces.outermost(parts, points, side)
+    points, out = points[np.isfinite(out)], out[np.isfinite(out)]
+    points[:, axis] = way * out
     away = np.linalg.norm((points - centre)[:, across], axis=1)
     # the outermost, of which nothing is in the way, and those near the centre of mass
-    outermost = np.lexsort((away, np.round(-way * face, 3)))[:TRIED]
-    points = points[np.unique(np.concatenate([outermost, np.argsort(away)[:NEAR]]))]
+    first = np.lexsort((away, np.round(-out, 3)))[:TRIED]
+    points = points[np.unique(np.concatenate([first, np.argsort(away)[:NEAR]]))]
     sizes, load = np.array(RADII), loads.about(points)
     used = strain(tip("suction"), side, sizes[:, None], load)
     useful = [n for n, radius in enumerate(RADII) if radius <= LEAST or used[n].max() > EASY]
@@ -219,13 +219,6 @@ def _rounded(points: Array, least: float, middle: Array) -> Array:
     return np.asarray(ordered[np.append(True, new)])
 
 
-def _face(surfaces: Surfaces, parts: Sequence[str], points: Array, axis: int, way: int) -> Array:
-    """Where lines along an axis meet some parts first as seen from the side `way` (n,) [m]; inf for
-    nowhere."""
-    first, last = surfaces.met(parts, points, axis)
-    return np.asarray(np.where(np.isfinite(first), last if way > 0 else first, np.inf))
-
-
 def _covered(
     surfaces: Surfaces,
     parts: Sequence[str],
@@ -243,8 +236,7 @@ def _covered(
     ring = np.zeros((2 * RAYS + 1, 3))
     ring[:-1, across] = np.concatenate([rim, rim / 2])
     rims = points + sizes[:, None, None] * ring[:, None, None]
-    found = _face(surfaces, parts, rims.reshape(-1, 3), axis, way).reshape(rims.shape[:3])
-    out = np.where(np.isfinite(found), way * found, -np.inf)
+    out = surfaces.outermost(parts, rims.reshape(-1, 3), side).reshape(rims.shape[:3])
     bodies = [body for part in parts for body in surfaces.bodies[part]]
     discs = np.tile(points, (len(sizes), 1)), np.repeat(sizes, len(points))
     most = outermost(bodies, *discs, side, out.max(axis=0).ravel()).reshape(out.shape[1:])

@@ -95,6 +95,11 @@ class Body:
         corners = (self.vertices == self.low) | (self.vertices == self.high)
         return len(np.unique(self.vertices, axis=0)) == 8 and bool(corners.all())
 
+    def out(self, side: tuple[int, int]) -> float:
+        """How far out it is on a side, an axis and a way (+1, -1) along it [m]."""
+        axis, way = side
+        return way * float((self.high if way > 0 else self.low)[axis])
+
     def crossed(self, points: Array, axis: int) -> tuple[Array, Array]:
         """From where to where lines along an axis through points (n, 3), which are within its box
         across it, are inside (n,); (inf, -inf) where a line passes it by."""
@@ -123,24 +128,24 @@ class Surfaces:
         found = [(body.low, body.high) for part in parts for body in self.bodies[part]]
         return np.array(found).reshape(-1, 2, 3)
 
-    def met(self, parts: Sequence[str], points: Array, axis: int) -> tuple[Array, Array]:
-        """Where lines along an axis through points (n, 3) enter some parts for the first time and
-        leave them for the last (n,) [m]."""
-        first, last = np.full(len(points), np.inf), np.full(len(points), -np.inf)
+    def outermost(self, parts: Sequence[str], points: Array, side: tuple[int, int]) -> Array:
+        """How far out some parts are on a side, an axis and a way (+1, -1) along it, where lines
+        along the axis through points (n, 3) meet them (n,) [m]; -inf where nowhere."""
+        (axis, way), found = side, np.full(len(points), -np.inf)
         one, other = (a for a in range(3) if a != axis)
         x, y = points[:, one].copy(), points[:, other].copy()
-        for body in (body for part in parts for body in self.bodies[part]):
+        bodies = [(body.out(side), body) for part in parts for body in self.bodies[part]]
+        for out, body in sorted(bodies, key=lambda pair: -pair[0]):
             low, high = body.low, body.high
             beside = (x >= low[one]) & (x <= high[one]) & (y >= low[other]) & (y <= high[other])
             if body.boxed:
-                np.minimum(first, low[axis], out=first, where=beside)
-                np.maximum(last, high[axis], out=last, where=beside)
+                np.maximum(found, out, out=found, where=beside)
                 continue
-            for near in blocks(np.flatnonzero(beside)):
+            # what ends further in than what is known is not looked at
+            for near in blocks(np.flatnonzero(beside & (found < out + FLAT))):
                 enter, leave = body.crossed(points[near], axis)
-                first[near] = np.minimum(first[near], enter)
-                last[near] = np.maximum(last[near], leave)
-        return first, last
+                found[near] = np.maximum(found[near], leave if way > 0 else -enter)
+        return found
 
 
 def blocks(numbers: Index) -> Iterator[Index]:

@@ -99,6 +99,7 @@ direction, what bends rims, what tilts one tip against the other."""
 TERMS = 11
 """Of so many numbers the terms of a load are."""
 
+
 def shares(terms: Array) -> Array:
     """The share (n,) of the strength of hands' tips that loads of such terms (n, 11) use, below 0
     where tips are pressed on; above 1 a hand lets go. Pressure is lost to what pulls off and tilts,
