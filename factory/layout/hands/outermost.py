@@ -36,17 +36,23 @@ def outermost(
             np.maximum(np.maximum(low[other] - y, y - high[other]), 0.0),
         )
         for near in blocks(np.flatnonzero((beside < radii) & (found < out - SAME))):
-            reached = out if body.boxed else _within(body, points[near], radii[near], side)
+            reached = (
+                out
+                if body.boxed
+                else _within(body, points[near], radii[near], side, float(found[near].min()))
+            )
             found[near] = np.maximum(found[near], reached)
     return found
 
 
-def _within(body: Body, points: Array, radius: Array, side: tuple[int, int]) -> Array:
-    """How far out one body reaches within discs about points (n, 3); -inf for nowhere."""
+def _within(body: Body, points: Array, radius: Array, side: tuple[int, int], least: float) -> Array:
+    """How far out one body reaches within discs about points (n, 3), or less where that is no
+    further than `least`; -inf for nowhere."""
     axis, way = side
     across = [a for a in range(3) if a != axis]
     at = points[:, across]
-    on_edges = _on_edges(body.edges[:, :, across], way * body.edges[:, :, axis], at, radius)
+    edges = body.edges[(way * body.edges[:, :, axis]).max(axis=1) > least]
+    on_edges = _on_edges(edges[:, :, across], way * edges[:, :, axis], at, radius)
     normals, reach = body.faces
     facing = way * normals[:, axis] > FLAT
     if not facing.any():
