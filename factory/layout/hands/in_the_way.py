@@ -41,7 +41,7 @@ ROD = 0.008
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Passing:
+class Passed:
     """What a hand at each place (n,) meets of parts, whatever way its carrier goes: whether it has
     to be there `first`, before what it takes; whether what it has delivered to and what is
     `lowered` are in its way; and whether inputs are that are brought, `early` if it is there first,
@@ -70,7 +70,7 @@ class InTheWay:
     def __init__(self, holding: Holding, hand_of: Callable[[int, Way], Hand]) -> None:
         self.holding, self.apart = holding, HandsApart(holding, hand_of)
         self._checked: dict[tuple[object, ...], tuple[dict[str, Truth], Truth]] = {}
-        self._passed: dict[tuple[object, ...], Passing] = {}
+        self._passed: dict[tuple[object, ...], Passed] = {}
         self._onward: dict[int, Onward] = {}
 
     def possible(
@@ -137,9 +137,7 @@ class InTheWay:
             free["brought"] &= ~(passed.later | (first & passed.early))
         return free, first
 
-    def _passing(
-        self, robot: int, label: str, kind: Kind, found: Places, u: Way, t: Way
-    ) -> Passing:
+    def _passing(self, robot: int, label: str, kind: Kind, found: Places, u: Way, t: Way) -> Passed:
         """What a hand of a robot that heads along u meets. Looked at once: whether its carrier goes
         along t or against it is all the same."""
         key = robot, kind, u, found.at.tobytes()
@@ -149,9 +147,9 @@ class InTheWay:
 
     def _looked_past(
         self, robot: int, label: str, kind: Kind, found: Places, u: Way, t: Way
-    ) -> Passing:
+    ) -> Passed:
         joined = list(self.joined(robot, kind, found, u, t))
-        return Passing(
+        return Passed(
             _any(self.coming(robot, label, kind, found, u, t), found),
             _any(self._leaving(robot, kind, found, u), found),
             _any(self._lowered(robot, kind, found, u), found),

@@ -13,7 +13,7 @@ from factory.layout.dimensions import CARRIAGE, FINGER, Clearance
 from factory.layout.hands.apart import BESIDE, HandsApart, Swept
 from factory.layout.hands.hand import Hand, Kind, widths
 from factory.layout.hands.holding import Holding, held
-from factory.layout.hands.in_the_way import InTheWay, Passing
+from factory.layout.hands.in_the_way import InTheWay, Passed
 from factory.layout.hands.places import Places
 from factory.layout.hands.surfaces import Way, swept
 from factory.layout.layout import Layout
@@ -147,9 +147,7 @@ class InTheWayInLanes(InTheWay):
         """Looked at anew, since lanes and the hands that are settled change."""
         return self._looked_at(robot, label, kind, found, frames)
 
-    def _passing(
-        self, robot: int, label: str, kind: Kind, found: Places, u: Way, t: Way
-    ) -> Passing:
+    def _passing(self, robot: int, label: str, kind: Kind, found: Places, u: Way, t: Way) -> Passed:
         return self._looked_past(robot, label, kind, found, u, t)
 
     def _going_on(self, robot: int, kind: Kind, found: Places, u: Way, t: Way) -> Array:
