@@ -111,7 +111,7 @@ def test_pads_are_off_the_surface_by_the_air_between() -> None:
                 continue
             label = held(layout.factory, robot)
             parts = layout.factory.contents[label]
-            first, _ = surfaces.met(parts, np.array(hand.places), 2)
+            first = -surfaces.outermost(parts, np.array(hand.places), (2, -1))
             reach = hand.radius * 0.25
             assert np.all(first - np.array(hand.places)[:, 2] <= reach + 1e-9)
             pads = [limb for limb in limbs(layout, robot) if limb.name.endswith("pad")]

@@ -14,7 +14,7 @@ from itertools import product as pairs
 
 import numpy as np
 
-from factory.control.mode import Truth
+from factory.control.mode import Index, Truth
 from factory.geometry.meshes import Array
 from factory.geometry.solids import Product
 from factory.layout.dimensions import FINGER
@@ -22,7 +22,7 @@ from factory.layout.hands.apart import BESIDE
 from factory.layout.hands.hand import Hand, Kind
 from factory.layout.hands.holding import Holding, held
 from factory.layout.hands.in_the_way import InTheWay
-from factory.layout.hands.places import PUSH, Places, centre_of, strain
+from factory.layout.hands.places import PUSH, Places, centre_of, strain_of_two
 from factory.layout.hands.surfaces import Way
 from factory.layout.hands.tips import STRONG, TipName, tip
 from factory.plant.factory import Factory
@@ -46,29 +46,26 @@ PAIRED = 8
 """Of so many places on either side of the centre of mass pairs are tried."""
 
 
-UP = np.array([0.0, 0.0, 1.0])
-"""From a tip below to its payload."""
-
-
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, eq=False)
 class TipPlaces:
-    """Places (their numbers) that one hand could hold together, the share of the strength of its
-    tips that is used by suction and if they are `pinned`, and how badly those that deliver to it
-    would hold from below then."""
+    """Groups of places that one hand could hold together: the numbers of the two, or of one twice,
+    `chosen` (g, 2), the `share` (g,) of the strength of its tips that is used by suction and if
+    they are `pinned` (g,), and how badly those that deliver to it would hold from below then,
+    `served` (g,)."""
 
-    chosen: tuple[int, ...]
-    share: float
-    pinned: float
-    served: float
+    chosen: Index
+    share: Array
+    pinned: Array
+    served: Array
 
-    def rank(self, first: Truth, waits: Array) -> tuple[float, ...]:
-        """How good a hand is, the less the better: strong enough, in nobody's way, never waiting,
-        simple, strong. `first`, `waits` (n,) are those of the places."""
-        at = list(self.chosen)
-        bad = float(_bad(np.array(self.share), np.array(self.pinned))) + self.served
-        share = self.share if self.share <= ENOUGH else self.pinned
-        wait = float(waits[at, 0].max())
-        return bad + min(WAIT * wait, LONG), wait, float(first[at].any()), len(at), share
+    def best(self, first: Truth, waits: Array) -> int:
+        """Which group is best: strong enough, in nobody's way, never waiting, simple, strong.
+        `first`, `waits` (n, k) are those of the places."""
+        share = np.where(self.share <= ENOUGH, self.share, self.pinned)
+        wait = waits[self.chosen, 0].max(axis=1)
+        cost = _bad(self.share, self.pinned) + self.served + np.minimum(WAIT * wait, LONG)
+        two = self.chosen[:, 0] != self.chosen[:, 1]
+        return int(np.lexsort((share, two, first[self.chosen].any(axis=1), wait, cost))[0])
 
 
 class Hands:
@@ -172,13 +169,15 @@ class Hands:
         self, robot: int, label: str, kind: Kind, frames: Sequence[tuple[Way, Way]]
     ) -> Hand | None:
         """The best hand of one kind; None where that is nowhere clear."""
-        found, first, waits = self._clear(robot, label, kind, frames)
-        groups = list(self._groups(robot, label, kind, found))
-        if not groups:
+        if not self.in_the_way.possible(robot, label, kind, frames):
             return None
-        group = min(groups, key=lambda group: group.rank(first, waits))
-        chosen, holds_well = group.chosen, group.share <= ENOUGH
-        at = sorted(chosen, key=lambda n: tuple(found.at[n]))
+        found, first, waits = self._clear(robot, label, kind, frames)
+        if not len(found):
+            return None
+        groups = self._groups(robot, label, kind, found)
+        best = groups.best(first, waits)
+        holds_well = bool(groups.share[best] <= ENOUGH)
+        at = sorted({*groups.chosen[best].tolist()}, key=lambda n: tuple(found.at[n]))
         x, y, z = (found.at[at, axis].round(6).tolist() for axis in range(3))
         radius = float(found.radius[at].min())
         beam = 0.0
@@ -187,7 +186,7 @@ class Hands:
         early, late = bool(first[at].any()), waits[at].max(axis=0).round(6).tolist()
         while late and not late[-1]:
             late.pop()
-        share = group.share if holds_well else group.pinned
+        share = float((groups.share if holds_well else groups.pinned)[best])
         with_tip: TipName = "suction" if holds_well else "pin"
         return Hand(
             kind,
@@ -201,28 +200,23 @@ class Hands:
             covered=float(found.covered[at].min()) if holds_well else 1.0,
         )
 
-    def _groups(self, robot: int, label: str, kind: Kind, found: Places) -> Iterator[TipPlaces]:
+    def _groups(self, robot: int, label: str, kind: Kind, found: Places) -> TipPlaces:
         """Places that one hand could hold together: each alone, and under a payload two on one
         line."""
         carries = kind == "below" and self.holding.is_carrier(robot)
         served = self._served(robot, found) if carries else np.zeros(len(found))
-        rows = zip(found.share.tolist(), found.pinned.tolist(), served.tolist(), strict=True)
-        for number, row in enumerate(rows):
-            yield TipPlaces((number,), *row)
+        every = np.arange(len(found))
+        alone = np.stack([every, every], axis=1), found.share, found.pinned, served
         if kind != "below":
-            return
+            return TipPlaces(*alone)
         along = self.holding.axis[robot]
         _, centre = centre_of(self.holding.product, self.holding.factory.contents[label])
         two = np.array(list(_in_line(found.at, along, float(centre[along]))), int).reshape(-1, 2)
-        if not len(two):
-            return
         at, radius = found.at[two], found.radius[two].min(axis=1)
-        load = UP, radius, at.mean(axis=1), at[:, 1] - at[:, 0], self.holding.loads(label)
-        covered = found.covered[two].min(axis=1)
-        shares = strain(tip("suction"), *load) / covered, strain(tip("pin"), *load)
-        rows = np.column_stack([*shares, served[two].max(axis=1)]).tolist()
-        for pair, (share, pinned, bad) in zip(two.tolist(), rows, strict=True):
-            yield TipPlaces(tuple(pair), share, pinned, bad)
+        held = radius, at[:, 1] - at[:, 0], self.holding.loads(label).about(at.mean(axis=1))
+        share = strain_of_two(tip("suction"), *held) / found.covered[two].min(axis=1)
+        paired = two, share, strain_of_two(tip("pin"), *held), served[two].max(axis=1)
+        return TipPlaces(*(np.concatenate(both) for both in zip(alone, paired, strict=True)))
 
     def _clear(
         self, robot: int, label: str, kind: Kind, frames: Sequence[tuple[Way, Way]]
@@ -231,9 +225,10 @@ class Hands:
         be there before what it takes, and how far (n, k) it goes back until each of the
         carrier's next operations may start [m]."""
         found = self.in_the_way.on_side(label, kind, frames)
-        checks, first, waits = self.in_the_way.checks(robot, label, kind, found, frames)
+        checks, first = self.in_the_way.checks(robot, label, kind, found, frames)
         free = np.logical_and.reduce([*checks.values(), np.ones(len(found), bool)])
-        return found.chosen(free), first[free], waits[free]
+        clear = found.chosen(free)
+        return clear, first[free], self.in_the_way.waits(robot, kind, clear, frames)
 
 
 def _cost(hand: Hand) -> float:

@@ -11,6 +11,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
+import numpy as np
+
+from factory.geometry.meshes import Array
 from factory.layout.dimensions import FINGER
 from factory.layout.hands.tips import TipName
 
@@ -72,7 +75,7 @@ class Hand:
     @property
     def width(self) -> float:
         """Width of its finger, or of what goes across to its stem [m]."""
-        return breadth(self.radius)
+        return float(widths(np.array(self.radius)))
 
     @property
     def column(self) -> float:
@@ -80,6 +83,7 @@ class Hand:
         return min(2 * self.radius, max(STEM, min(self.radius, FINGER)))
 
 
-def breadth(radius: float) -> float:
-    """Width of the finger of a pad with a radius [m]: no wider than that, within bounds."""
-    return min(FINGER, max(2 * radius, SLENDER))
+def widths(radius: Array) -> Array:
+    """Widths (n,) of the fingers of pads with some radii (n,) [m]: no wider than those, within
+    bounds."""
+    return np.clip(2 * radius, SLENDER, FINGER)

@@ -31,6 +31,7 @@ class Holding:
                 self.axis[robot] = 1 - self.axis[carrier]
         self._places: dict[tuple[str, Kind, int, int], Places] = {}
         self._boxes: dict[str, Array] = {}
+        self._loads: dict[str, Loads] = {}
 
     def frames(self, robot: int) -> Iterator[tuple[Way, Way]]:
         """How a robot may lie on the floor."""
@@ -70,22 +71,12 @@ class Holding:
     def loads(self, label: str) -> Loads:
         """What the robot that takes a sub-assembly holds by it: that, and all that it becomes while
         others bring the rest."""
-        made = self.made(self.factory.by_label[label].carrier)
-        labels = [label, *(o.label for o in made if o.index != self.factory.dropoff.index)]
-        contents = dict.fromkeys(tuple(self.factory.contents[held]) for held in labels)
-        return Loads.of(self.product, contents, self.push)
-
-    def around(self, label: str, low: Array, high: Array) -> Array:
-        """The boxes of a sub-assembly's bodies among which a hand could come."""
-        return self.beside(self.boxes(label), low, high)
-
-    @staticmethod
-    def beside(boxes: Array, low: Array, high: Array) -> Array:
-        """Those of some boxes that are as high as a hand."""
-        if not len(low):
-            return boxes[:0]
-        floor, top = float(low[:, 2].min()), float(high[:, 2].max()) + 10.0
-        return boxes[(boxes[:, 0, 2] < top) & (boxes[:, 1, 2] > floor)]
+        if label not in self._loads:
+            made = self.made(self.factory.by_label[label].carrier)
+            labels = [label, *(o.label for o in made if o.index != self.factory.dropoff.index)]
+            contents = dict.fromkeys(tuple(self.factory.contents[held]) for held in labels)
+            self._loads[label] = Loads.of(self.product, contents, self.push)
+        return self._loads[label]
 
     def boxes(self, label: str) -> Array:
         """The boxes (n, 2, 3) of a sub-assembly's bodies."""

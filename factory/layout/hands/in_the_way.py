@@ -5,11 +5,12 @@ Parts are looked at by boxes, swept along every way that one goes past the other
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
-from factory.control.mode import Truth
+from factory.control.mode import Index, Truth
 from factory.geometry.meshes import Array
 from factory.layout.hands.apart import BESIDE, HandsApart, Swept
 from factory.layout.hands.hand import Hand, Kind
@@ -32,8 +33,35 @@ IN_THE_WAY = {
 }
 """What can be in the way of a hand."""
 
+PLAY = 1e-6
+"""Places are no further than this beside the box of a sub-assembly [m]."""
+
 ROD = 0.008
 """Radius of the pad by which a feeder holds a part, at most [m]."""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Passed:
+    """What a hand at each place (n,) meets of parts, whatever way its carrier goes: whether it has
+    to be there `first`, before what it takes; whether what it has delivered to and what is
+    `lowered` are in its way; and whether inputs are that are brought, `early` if it is there first,
+    `later` in any case."""
+
+    first: Truth
+    joined: Truth
+    lowered: Truth
+    early: Truth
+    later: Truth
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Onward:
+    """The `boxes` (m, 2, 3) of what a hand could meet in its carrier's next operations, and the
+    numbers of those `operations` (m,), of which there are so many (`count`)."""
+
+    boxes: Array
+    operations: Index
+    count: int
 
 
 class InTheWay:
@@ -41,7 +69,19 @@ class InTheWay:
 
     def __init__(self, holding: Holding, hand_of: Callable[[int, Way], Hand]) -> None:
         self.holding, self.apart = holding, HandsApart(holding, hand_of)
-        self._checked: dict[tuple[object, ...], tuple[dict[str, Truth], Truth, Array]] = {}
+        self._checked: dict[tuple[object, ...], tuple[dict[str, Truth], Truth]] = {}
+        self._passed: dict[tuple[object, ...], Passed] = {}
+        self._onward: dict[int, Onward] = {}
+
+    def possible(
+        self, robot: int, label: str, kind: Kind, frames: Sequence[tuple[Way, Way]]
+    ) -> bool:
+        """Whether anything of a sub-assembly is on the side of its carrier's line on which a hand
+        stays, in every frame: where not, none of its places needs to be found."""
+        box, none = self.holding.box(label) + np.array([[-PLAY], [PLAY]]), np.zeros(2)
+        ends = Places(box, none, none, none, none)
+        sides = (self.apart.own_side(robot, kind, ends, u, t) for u, t in frames)
+        return all(bool(side.any()) for side in sides)
 
     def on_side(self, label: str, kind: Kind, frames: Sequence[tuple[Way, Way]]) -> Places:
         """The places on the side of a sub-assembly that a kind of hand holds."""
@@ -53,44 +93,72 @@ class InTheWay:
 
     def checks(
         self, robot: int, label: str, kind: Kind, found: Places, frames: Sequence[tuple[Way, Way]]
-    ) -> tuple[dict[str, Truth], Truth, Array]:
+    ) -> tuple[dict[str, Truth], Truth]:
         """Whether a hand at each place (n,) is clear in every frame, by what could be in its way;
-        whether it has to be there before what it takes; and how far it goes back until each of its
-        carrier's next operations may start [m]. Looked at once."""
+        and whether it has to be there before what it takes. Looked at once."""
         key = robot, kind, tuple(frames), found.at.tobytes()
         if key not in self._checked:
             self._checked[key] = self._looked_at(robot, label, kind, found, frames)
         return self._checked[key]
 
-    def _looked_at(
-        self, robot: int, label: str, kind: Kind, found: Places, frames: Sequence[tuple[Way, Way]]
-    ) -> tuple[dict[str, Truth], Truth, Array]:
-        free = {why: np.ones(len(found), bool) for why in IN_THE_WAY}
-        free["weak"] &= found.pinned <= STRONG
-        first, waits = np.zeros(len(found), bool), np.zeros((len(found), 1))
-        for u, t in frames:
-            free["hands"] &= self.apart.own_side(robot, kind, found, u, t)
+    def waits(
+        self, robot: int, kind: Kind, found: Places, frames: Sequence[tuple[Way, Way]]
+    ) -> Array:
+        """How far a hand at each place (n, k) goes back, in any frame, until each of its carrier's
+        next operations may start [m]."""
+        waits = np.zeros((len(found), 1))
+        for u, t in frames if len(found) else ():
             going = self._going_on(robot, kind, found, u, t)
             crossing = self.apart.crossing(robot, found, u, t)
             if kind == "above" and robot in self.holding.factory.strokes:
                 free["hands"] &= crossing == 0  # it goes up before it goes back, so it stays there
             going[:, 0] = np.maximum(going[:, 0], crossing)
             waits = np.maximum(waits, going)
-            for ways in self.coming(robot, label, kind, found, u, t):
-                first |= hit(*ways)
-            for why, ways in self.met(robot, kind, found, u, t):
-                free[why] &= ~hit(*ways)
+        return waits
+
+    def _looked_at(
+        self, robot: int, label: str, kind: Kind, found: Places, frames: Sequence[tuple[Way, Way]]
+    ) -> tuple[dict[str, Truth], Truth]:
+        free = {why: np.ones(len(found), bool) for why in IN_THE_WAY}
+        free["weak"] &= found.pinned <= STRONG
+        for u, t in frames:
+            free["hands"] &= self.apart.own_side(robot, kind, found, u, t)
+            free["hands"] &= ~_any(self.apart.carriers_hand(robot, kind, found, u, t), found)
         free["hands"] &= self.apart.over_fingers(kind, found)
+        headings = dict.fromkeys((u, (abs(x), abs(y))) for u, (x, y) in frames)
+        passing = [self._passing(robot, label, kind, found, u, t) for u, t in headings]
+        first = np.logical_or.reduce([passed.first for passed in passing])
         if self.holding.is_fed(robot) and kind != "below":
             free["own"] &= ~first
         if self.holding.is_fed(robot) and kind == "above":
             free["feeder"] &= self._beside_rod(label, found, *frames[0])
         if kind == "behind" or (kind == "above" and not self.holding.is_fed(robot)):
             first |= True
-        for u, t in frames:
-            for later, joined in self.joined(robot, kind, found, u, t):
-                free["brought"] &= ~((first | later) & hit(*joined))
-        return free, first, waits
+        for passed in passing:
+            free["joined"] &= ~passed.joined
+            free["lowered"] &= ~passed.lowered
+            free["brought"] &= ~(passed.later | (first & passed.early))
+        return free, first
+
+    def _passing(self, robot: int, label: str, kind: Kind, found: Places, u: Way, t: Way) -> Passed:
+        """What a hand of a robot that heads along u meets. Looked at once: whether its carrier goes
+        along t or against it is all the same."""
+        key = robot, kind, u, found.at.tobytes()
+        if key not in self._passed:
+            self._passed[key] = self._looked_past(robot, label, kind, found, u, t)
+        return self._passed[key]
+
+    def _looked_past(
+        self, robot: int, label: str, kind: Kind, found: Places, u: Way, t: Way
+    ) -> Passed:
+        joined = list(self.joined(robot, kind, found, u, t))
+        return Passed(
+            _any(self.coming(robot, label, kind, found, u, t), found),
+            _any(self._leaving(robot, kind, found, u), found),
+            _any(self._lowered(robot, kind, found, u), found),
+            _any((ways for later, ways in joined if not later), found),
+            _any((ways for later, ways in joined if later), found),
+        )
 
     def met(
         self, robot: int, kind: Kind, found: Places, u: Way, t: Way
@@ -127,7 +195,7 @@ class InTheWay:
         if last.index == self.holding.factory.dropoff.index:
             gone, whole = swept(low, high, back(u)), self._at_last(robot)
             if kind != "behind":
-                yield (*gone, self.holding.around(whole, *gone))
+                yield (*gone, self.holding.boxes(whole))
             return
         for boxes in self._from_above(last, robot, (u,)):
             yield (*swept(low, high, back(u)), boxes)
@@ -136,13 +204,13 @@ class InTheWay:
         if kind == "below":
             gone[1][:, 2] += self.holding.factory.strokes.get(robot, 0.0)
         if kind != "behind":
-            yield (*gone, self.holding.around(last.label, *gone))
+            yield (*gone, self.holding.boxes(last.label))
             return
         # its payload comes along the same way, or takes the bar down with it
         gone[1][:, 2] += 10.0 * lifted
         for other, guest in zip(last.before, last.robots, strict=True):
             if guest != robot and other != NOPART:
-                yield (*gone, self.holding.around(other, *gone))
+                yield (*gone, self.holding.boxes(other))
 
     def _going_on(self, robot: int, kind: Kind, found: Places, u: Way, t: Way) -> Array:
         """How far a hand has to go back (n, k) [m] until each of the next k operations of its
@@ -150,22 +218,28 @@ class InTheWay:
         if self.holding.last(robot).index == self.holding.factory.dropoff.index:
             return np.zeros((len(found), 1))
         low, high = self.reach(kind, found, u)
-        ways = back(u), back(t)
-        return np.stack(
-            [retreat(low, high, boxes, ways) for boxes in self._onward(robot, low, high)], axis=1
-        )
+        onward = self._met_onward(robot)
+        past = retreat(low, high, onward.boxes, (back(u), back(t)))
+        far = np.zeros((len(found), onward.count))
+        operations, begin = np.unique(onward.operations, return_index=True)
+        far[:, operations] = np.maximum.reduceat(past, begin, axis=1)
+        return far
 
-    def _onward(self, robot: int, low: Array, high: Array) -> Iterator[Array]:
-        """The boxes of what a hand could meet in each of its carrier's next operations: all that is
-        there by the end of the first, and what each later one adds."""
+    def _met_onward(self, robot: int) -> Onward:
+        """What a hand could meet in its carrier's next operations: all that is there by the end of
+        the first, and what each later one adds."""
         factory, last = self.holding.factory, self.holding.last(robot)
-        made = [o for o in self.holding.made(last.carrier) if o.index != factory.dropoff.index]
-        labels = [o.label for o in made[made.index(last) + 1 :]] if last in made else []
-        there: set[str] = set()
-        for label in labels or [last.label]:
-            added = [part for part in factory.contents[label] if part not in there]
-            there.update(added)
-            yield self.holding.beside(self.holding.surfaces.boxes(added), low, high)
+        if last.index not in self._onward:
+            made = [o for o in self.holding.made(last.carrier) if o.index != factory.dropoff.index]
+            labels = [o.label for o in made[made.index(last) + 1 :]] if last in made else []
+            there, found = set[str](), list[Array]()
+            for label in labels or [last.label]:
+                added = [part for part in factory.contents[label] if part not in there]
+                there.update(added)
+                found.append(self.holding.surfaces.boxes(added))
+            of = np.repeat(np.arange(len(found)), [len(boxes) for boxes in found])
+            self._onward[last.index] = Onward(np.concatenate(found), of, len(found))
+        return self._onward[last.index]
 
     def _at_last(self, robot: int) -> str:
         """What a robot has in the end."""
@@ -177,14 +251,14 @@ class InTheWay:
         """The same of what it takes, which is there before it comes home against u: a part, or
         inputs that come from either side."""
         low, high = self.reach(kind, found, u)
-        own = self.holding.around(label, low, high)
+        own = self.holding.boxes(label)
         if not self.holding.is_fed(robot):
             for side in (t, back(t)):
                 yield (*swept(low, high, u, side), own)
         elif kind == "behind":
             # the part comes down along the pad
             low[:, 2] -= 10.0
-            yield low, high, self.holding.around(label, low, high)
+            yield low, high, own
         else:
             yield (*swept(low, high, u), own)
 
@@ -200,7 +274,7 @@ class InTheWay:
             later = operation.before[operation.template.carrier - 1] != NOPART
             for guest, label in zip(operation.robots, operation.before, strict=True):
                 if guest != robot and label != NOPART:
-                    parts = self.holding.around(label, low, high)
+                    parts = self.holding.boxes(label)
                     for side in (t, back(t)):
                         yield later, (*swept(low, high, side), parts)
 
@@ -228,3 +302,9 @@ class InTheWay:
         boxes[:, 0, 2] += self.holding.factory.strokes[operation.robots[slot]]
         for side in sides:
             yield np.stack(swept(boxes[:, 0], boxes[:, 1], side), axis=1)
+
+
+def _any(found: Iterable[Swept], places: Places) -> Truth:
+    """Whether anything of all that hands sweep is met, for each place (n,)."""
+    met = [np.zeros(len(places), bool), *(hit(*ways) for ways in found)]
+    return np.asarray(np.logical_or.reduce(met))

@@ -16,7 +16,7 @@ from factory.layout.hands.holding import held
 from factory.layout.hands.in_the_way import IN_THE_WAY
 from factory.layout.hands.misses import Miss, NoGrip, Obstacle
 from factory.layout.hands.places import Places
-from factory.layout.hands.surfaces import Way, hit
+from factory.layout.hands.surfaces import Way, hit, near
 from factory.layout.hands.tips import STRONG
 
 Frames = tuple[tuple[Way, Way], ...]
@@ -99,7 +99,7 @@ class _Search:
     def _why(self, kind: Kind, frames: Frames) -> str:
         """What is in the way of most places, in words."""
         found = self.in_the_way.on_side(self.label, kind, frames)
-        checks, _, _ = self.in_the_way.checks(self.robot, self.label, kind, found, frames)
+        checks, _ = self.in_the_way.checks(self.robot, self.label, kind, found, frames)
         why, free = min(checks.items(), key=lambda item: int(item[1].sum()))
         return f"{len(found) - int(free.sum())} of {len(found)} places: {IN_THE_WAY[why]}"
 
@@ -130,9 +130,9 @@ class _Search:
         """Why and which part, whether that is in the way of a hand at each place (n,), what the
         hand sweeps there (low and high), and the part's box (2, 3); None for both where it is no
         matter of boxes."""
-        checks, _, _ = self.in_the_way.checks(self.robot, self.label, kind, found, frames)
+        checks, _ = self.in_the_way.checks(self.robot, self.label, kind, found, frames)
         for why, late, (low, high, boxes) in self._ways(kind, found, frames):
-            for box in boxes:
+            for box in boxes[near(low, high, boxes)]:
                 met = late & hit(low, high, box[None])
                 if met.any():
                     part = "" if why == "hands" else self._part(box)
@@ -156,7 +156,7 @@ class _Search:
     ) -> Iterator[tuple[str, Truth, Swept]]:
         """What may be in the way and why, with the places (n,) where that matters."""
         robot, label, always = self.robot, self.label, np.ones(len(found), bool)
-        _, first, _ = self.in_the_way.checks(robot, label, kind, found, frames)
+        _, first = self.in_the_way.checks(robot, label, kind, found, frames)
         own = self.holding.is_fed(robot) and kind != "below"
         for u, t in frames:
             for why, ways in self.in_the_way.met(robot, kind, found, u, t):

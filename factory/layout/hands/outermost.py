@@ -11,66 +11,78 @@ from collections.abc import Sequence
 import numpy as np
 
 from factory.geometry.meshes import Array
-from factory.layout.hands.surfaces import FLAT, Body
+from factory.layout.hands.surfaces import FLAT, Body, blocks
 
 SAME = 1e-6
 """What reaches no further out by this is not looked at [m]."""
 
 
 def outermost(
-    bodies: Sequence[Body], points: Array, radius: float, side: tuple[int, int], known: Array
+    bodies: Sequence[Body],
+    points: Array,
+    radius: Array | float,
+    side: tuple[int, int],
+    known: Array,
 ) -> Array:
-    """How far bodies reach on a side, an axis and a way along it, within discs across it about
-    points (n, 3), at least as far as is `known` (n,) [m]."""
-    (axis, way), found = side, known.copy()
-    across = [a for a in range(3) if a != axis]
-    at = points[:, across]
+    """How far bodies reach on a side, an axis and a way along it, within discs of some radii (n,)
+    across it about points (n, 3), at least as far as is `known` (n,) [m]."""
+    found, (one, other) = known.copy(), (a for a in range(3) if a != side[0])
+    x, y = points[:, one], points[:, other]
+    radii = np.broadcast_to(radius, x.shape)
     for body in bodies:
-        out = way * float((body.high if way > 0 else body.low)[axis])
-        beside = np.maximum(np.maximum(body.low[across] - at, at - body.high[across]), 0.0)
-        near = (np.hypot(*beside.T) < radius) & (found < out - SAME)
-        if near.any():
-            if body.boxed:
-                found[near] = out
-            else:
-                found[near] = np.maximum(found[near], _within(body, at[near], radius, side))
+        out, low, high = body.out(side), body.low, body.high
+        beside = np.hypot(
+            np.maximum(np.maximum(low[one] - x, x - high[one]), 0.0),
+            np.maximum(np.maximum(low[other] - y, y - high[other]), 0.0),
+        )
+        for near in blocks(np.flatnonzero((beside < radii) & (found < out - SAME))):
+            reached = (
+                out
+                if body.boxed
+                else _within(body, points[near], radii[near], side, float(found[near].min()))
+            )
+            found[near] = np.maximum(found[near], reached)
     return found
 
 
-def _within(body: Body, at: Array, radius: float, side: tuple[int, int]) -> Array:
-    """How far out one body reaches within discs about points (n, 2); -inf for nowhere."""
+def _within(body: Body, points: Array, radius: Array, side: tuple[int, int], least: float) -> Array:
+    """How far out one body reaches within discs about points (n, 3), or less where that is no
+    further than `least`; -inf for nowhere."""
     axis, way = side
     across = [a for a in range(3) if a != axis]
-    on_edges = _on_edges(body.edges[:, :, across], way * body.edges[:, :, axis], at, radius)
+    at = points[:, across]
+    edges = body.edges[(way * body.edges[:, :, axis]).max(axis=1) > least]
+    on_edges = _on_edges(edges[:, :, across], way * edges[:, :, axis], at, radius)
     normals, reach = body.faces
     facing = way * normals[:, axis] > FLAT
     if not facing.any():
         return on_edges
     up, slopes = np.abs(normals[facing, axis]), normals[facing][:, across]
     steep = np.hypot(*slopes.T)
-    rises = (reach[facing] - at @ slopes.T + radius * steep) / up
+    rises = (reach[facing] - at @ slopes.T + radius[:, None] * steep) / up
     # the body is below all its faces, so it rises no higher than the one that rises least
     least = rises.argmin(axis=1)
     rim = np.zeros((len(at), 3))
-    rim[:, across] = at - radius * (slopes / np.maximum(steep, FLAT)[:, None])[least]
+    rim[:, across] = at - radius[:, None] * (slopes / np.maximum(steep, FLAT)[:, None])[least]
     first, last = body.crossed(rim, axis)
     out = np.where(first <= last, last if way > 0 else -first, -np.inf)
     return np.asarray(np.maximum(on_edges, out))
 
 
-def _on_edges(ends: Array, out: Array, at: Array, radius: float) -> Array:
+def _on_edges(ends: Array, out: Array, at: Array, radius: Array) -> Array:
     """How far out edges reach within discs: their `ends` (e, 2, 2) in plan, how far `out` (e, 2)
     they are there."""
-    begin, way = ends[:, 0] - at[:, None], ends[:, 1] - ends[:, 0]
-    square, middle = (way**2).sum(axis=1), (begin * way).sum(axis=2)
-    apart = (begin**2).sum(axis=2) - radius**2
-    upright = square < FLAT**2
-    room = middle**2 - square * apart
-    half = np.sqrt(np.maximum(room, 0.0))
-    square = np.where(upright, 1.0, square)
+    (x, y), (along, across) = ends[:, 0].T[:, None] - at.T[..., None], (ends[:, 1] - ends[:, 0]).T
+    square, middle = along**2 + across**2, x * along + y * across
+    apart = x**2 + y**2 - radius[:, None] ** 2
+    upright, room = square < FLAT**2, middle**2 - square * apart
+    disc, edge = np.nonzero(np.where(upright, apart <= 0, room > 0))
+    half, middle = np.sqrt(np.maximum(room[disc, edge], 0.0)), middle[disc, edge]
+    square, upright = np.where(upright, 1.0, square)[edge], upright[edge]
     low = np.where(upright, 0.0, np.clip((-middle - half) / square, 0.0, 1.0))
     high = np.where(upright, 1.0, np.clip((-middle + half) / square, 0.0, 1.0))
-    meets = np.where(upright, apart <= 0, (room > 0) & (low < high))
-    rise = out[:, 1] - out[:, 0]
-    most = out[:, 0] + np.maximum(low * rise, high * rise)
-    return np.asarray(np.where(meets, most, -np.inf).max(axis=1))
+    begin, rise = out[edge, 0], (out[:, 1] - out[:, 0])[edge]
+    most = begin + np.maximum(low * rise, high * rise)
+    found = np.full(len(at), -np.inf)
+    np.maximum.at(found, disc, np.where(low < high, most, -np.inf))
+    return found

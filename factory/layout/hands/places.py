@@ -13,7 +13,7 @@ from factory.geometry.meshes import Array
 from factory.geometry.solids import Product
 from factory.layout.hands.hand import Kind
 from factory.layout.hands.outermost import outermost
-from factory.layout.hands.surfaces import Body, Surfaces
+from factory.layout.hands.surfaces import Surfaces
 from factory.layout.hands.tips import Tip, shares, tip
 
 RADII = (0.02, 0.014, 0.01, 0.007, 0.005, 0.0035, 0.0025, 0.0016, 0.001)
@@ -49,6 +49,9 @@ LEAST = 0.0035
 
 PARTLY = 0.6
 """A pad that is not all covered is so at least to this share, but for the smallest."""
+
+UP = np.array([0.0, 0.0, 1.0])
+"""From a tip below to its payload."""
 
 RAYS = 6
 """In so many directions from its middle it is looked at what a pad covers."""
@@ -93,6 +96,15 @@ class Loads:
         masses, centres = zip(*(centre_of(product, parts) for parts in held), strict=True)
         return cls(np.array(masses), np.array(centres), push)
 
+    def about(self, at: Array) -> tuple[Array, Array]:
+        """Force (3, 1, m) [N] and moment (3, n, m) [Nm] about places `at` (n, 3) of each load, at
+        rest and as it is accelerated to any side."""
+        pulls = np.array([0.0, 0.0, -GRAVITY]) + self.push * PUSHES
+        fx, fy, fz = force = pulls.T[:, None] * self.mass[:, None]
+        x, y, z = (self.centre - at[:, None]).T.swapaxes(1, 2)[..., None]
+        moment = np.stack([y * fz - z * fy, z * fx - x * fz, x * fy - y * fx])
+        return force.reshape(3, 1, -1), moment.reshape(3, len(at), fx.size)
+
 
 def centre_of(product: Product, parts: Sequence[str]) -> tuple[float, Array]:
     """Mass [kg] and centre of mass (3,) of some parts."""
@@ -115,28 +127,30 @@ def places(
     _, centre = centre_of(product, parts)
     across = [a for a in range(3) if a != axis]
     bodies = [b for part in parts for b in surfaces.bodies[part]]
-    points = _tried(bodies, centre, axis, way)
+    low, high = np.array([b.low for b in bodies]), np.array([b.high for b in bodies])
+    points = _tried(low, high, centre, side)
     if kind == "below":
-        points = np.concatenate([points, _lines(bodies, centre)])
-    points = _rounded(points, bodies, across, product)
-    face = _face(surfaces, parts, points, axis, way)
-    points, face = points[np.isfinite(face)], face[np.isfinite(face)]
-    points[:, axis] = face
+        points = np.concatenate([points, _lines(low, high, centre)])
+    points = _rounded(points, float((high - low)[:, across].min()), product.middle)
+    out = surfaces.outermost(parts, points, side)
+    points, out = points[np.isfinite(out)], out[np.isfinite(out)]
+    points[:, axis] = way * out
     away = np.linalg.norm((points - centre)[:, across], axis=1)
     # the outermost, of which nothing is in the way, and those near the centre of mass
-    outermost = np.lexsort((away, np.round(-way * face, 3)))[:TRIED]
-    points = points[np.unique(np.concatenate([outermost, np.argsort(away)[:NEAR]]))]
-    outward = -way * np.eye(3)[axis]
-    used = [strain(tip("suction"), outward, np.array(r), points, np.zeros(3), loads) for r in RADII]
+    first = np.lexsort((away, np.round(-out, 3)))[:TRIED]
+    points = points[np.unique(np.concatenate([first, np.argsort(away)[:NEAR]]))]
+    sizes, load = np.array(RADII), loads.about(points)
+    used = strain(tip("suction"), side, sizes[:, None], load)
     useful = [n for n, radius in enumerate(RADII) if radius <= LEAST or used[n].max() > EASY]
     largest = max(0, useful[0] - 1)  # larger pads are of no more use
     covered, plane = _covered(surfaces, parts, points, (axis, way), RADII[largest:])
     blank = np.zeros((largest, len(points)))
     covered, plane = np.concatenate([blank, covered]), np.concatenate([blank, plane])
     best, share = np.full(len(points), -1), np.full(len(points), np.inf)
-    for number, radius in enumerate(RADII):
+    for number in range(largest, len(RADII)):
         better = (covered[number] == 1.0) & (
-            (share > EASY) & (used[number] < share) | (used[number] <= EASY) & (radius >= LEAST)
+            (share > EASY) & (used[number] < share)
+            | (used[number] <= EASY) & (RADII[number] >= LEAST)
         )
         best[better], share[better] = number, used[number][better]
     # smaller pads have room where large ones do not, and one that is not all covered holds less
@@ -146,74 +160,63 @@ def places(
         chosen = ((covered[number] > least) & (number > best)).nonzero()[0]
         found.append((chosen, np.full(len(chosen), number)))
     point, size = (np.concatenate(numbers) for numbers in zip(*found, strict=True))
-    at, radius, covers = points[point], np.array(RADII)[size], covered[size, point]
+    at, radius, covers = points[point], sizes[size], covered[size, point]
     at[:, axis] = plane[size, point]
-    held = outward, radius, at, np.zeros(3), loads
-    share, pinned = strain(tip("suction"), *held) / covers, strain(tip("pin"), *held)
+    load = loads.about(at)
+    share = strain(tip("suction"), side, radius, load) / covers
+    pinned = strain(tip("pin"), side, radius, load)
     result = Places(at, radius, share, pinned, covers)
     return result.chosen(np.argsort(np.round(result.share, 2), kind="stable"))
 
 
-def _tried(bodies: Sequence[Body], centre: Array, axis: int, way: int) -> Array:
-    """Points (n, 3) of lines to be tried: a grid over the bodies that are outermost or near the
-    centre of mass, and the centre itself."""
+def _tried(low: Array, high: Array, centre: Array, side: tuple[int, int]) -> Array:
+    """Points (n, 3) of lines to be tried: a grid over the bodies, of boxes from `low` to `high`
+    (b, 3), that are outermost or near the centre of mass, and the centre itself."""
+    axis, way = side
     across = [a for a in range(3) if a != axis]
-    outer = [-way * (body.high if way > 0 else body.low)[axis] for body in bodies]
-    near = [
-        float(np.linalg.norm(np.clip(centre, body.low, body.high)[across] - centre[across]))
-        for body in bodies
-    ]
-    ranked = sorted(range(len(bodies)), key=lambda n: (round(outer[n], 4), near[n]))
-    chosen = {*ranked[:BODIES], *sorted(range(len(bodies)), key=near.__getitem__)[: BODIES // 2]}
-    found = [centre]
-    for body in (bodies[number] for number in sorted(chosen)):
-        low, high = body.low[across], body.high[across]
-        shares = (np.arange(GRID) + 0.5) / GRID
-        one, other = np.meshgrid(*(low[:, None] + np.outer(high - low, shares)))
-        grid = np.zeros((one.size, 3))
-        grid[:, across] = np.stack([one.ravel(), other.ravel()], axis=1)
-        inner = np.zeros((1, 3))
-        inner[:, across] = np.clip(centre[across], low, high)
-        found += [*grid, *inner]
-    return np.array(found)
+    outer = (-way * (high if way > 0 else low)[:, axis]).tolist()
+    away = (np.clip(centre, low, high) - centre)[:, across]
+    near = np.sqrt(np.vecdot(away, away)).tolist()
+    ranked = sorted(range(len(low)), key=lambda n: (round(outer[n], 4), near[n]))
+    chosen = {*ranked[:BODIES], *sorted(range(len(low)), key=near.__getitem__)[: BODIES // 2]}
+    begin, end = (ends[sorted(chosen)][:, across] for ends in (low, high))
+    shares = (np.arange(GRID) + 0.5) / GRID
+    ticks = begin[:, None] + (end - begin)[:, None] * shares[:, None]
+    grid = np.empty((len(begin), GRID, GRID, 2))
+    grid[..., 0], grid[..., 1] = ticks[:, None, :, 0], ticks[:, :, None, 1]
+    found = np.zeros((len(begin) * (GRID**2 + 1) + 1, 3))
+    found[0] = centre
+    found[1:, across] = np.concatenate([grid.reshape(-1, 2), np.clip(centre[across], begin, end)])
+    return found
 
 
-def _lines(bodies: Sequence[Body], centre: Array) -> Array:
+def _lines(low: Array, high: Array, centre: Array) -> Array:
     """Points (n, 3) under a sub-assembly, several on one line along x or y: near the centre of
-    mass, and where it crosses bodies."""
-    low, high = np.array([b.low for b in bodies]), np.array([b.high for b in bodies])
-    found = [centre]
+    mass, and where it crosses bodies, of boxes from `low` to `high` (b, 3)."""
+    found, middle = [centre[None]], (low + high) / 2
     for along, across in ((0, 1), (1, 0)):
-        middles = (low + high)[:, across] / 2
-        tried = np.unique(np.round([centre[across], *middles], 3))
+        tried = np.unique(np.round([centre[across], *middle[:, across]], 3))
         for line in tried[np.argsort(abs(tried - centre[across]))][:LINES]:
             crossed = np.flatnonzero((low[:, across] < line) & (high[:, across] > line))
-            nearest = np.argsort(abs((low + high)[crossed, along] / 2 - centre[along]))
-            for body in crossed[nearest[: 2 * LINES]]:
-                ends = low[body, along], high[body, along]
-                for at in (*np.linspace(*ends, 7)[1:-1], np.clip(centre[along], *ends)):
-                    point = np.zeros(3)
-                    point[along], point[across] = at, line
-                    found.append(point)
-    return np.array(found)
+            nearest = np.argsort(abs(middle[crossed, along] - centre[along]))
+            body = crossed[nearest[: 2 * LINES], None]
+            begin, end = low[body, along], high[body, along]
+            inner = np.clip(centre[along], begin, end)
+            at = np.concatenate([np.arange(1, 6) * ((end - begin) / 6) + begin, inner], axis=1)
+            points = np.zeros((at.size, 3))
+            points[:, along], points[:, across] = at.ravel(), line
+            found.append(points)
+    return np.concatenate(found)
 
 
-def _rounded(
-    points: Array, bodies: Sequence[Body], across: Sequence[int], product: Product
-) -> Array:
-    """Points (n, 3) in whole millimetres from the product's middle, or in tenths if bodies are
-    small; each once."""
-    least = min(float((body.high - body.low)[list(across)].min()) for body in bodies)
+def _rounded(points: Array, least: float, middle: Array) -> Array:
+    """Points (n, 3) in whole millimetres from the product's middle, or in tenths if the `least`
+    width of a body is small; each once."""
     step = 1e-3 if least > 8e-3 else 1e-4
-    middle = product.middle
-    return np.unique(middle + np.round((points - middle) / step) * step, axis=0)
-
-
-def _face(surfaces: Surfaces, parts: Sequence[str], points: Array, axis: int, way: int) -> Array:
-    """Where lines along an axis meet some parts first as seen from the side `way` (n,) [m]; inf for
-    nowhere."""
-    first, last = surfaces.met(parts, points, axis)
-    return np.asarray(np.where(np.isfinite(first), last if way > 0 else first, np.inf))
+    rounded = middle + np.round((points - middle) / step) * step
+    ordered = rounded[np.lexsort(rounded.T[::-1])]
+    new = (ordered[1:] != ordered[:-1]).any(axis=1)
+    return np.asarray(ordered[np.append(True, new)])
 
 
 def _covered(
@@ -232,26 +235,24 @@ def _covered(
     rim = np.stack([np.cos(turns), np.sin(turns)], axis=1)
     ring = np.zeros((2 * RAYS + 1, 3))
     ring[:-1, across] = np.concatenate([rim, rim / 2])
-    rims = points[None, :, None] + sizes[:, None, None, None] * ring
-    found = _face(surfaces, parts, rims.reshape(-1, 3), axis, way).reshape(rims.shape[:3])
-    out = np.where(np.isfinite(found), way * found, -np.inf)
+    rims = points + sizes[:, None, None] * ring[:, None, None]
+    out = surfaces.outermost(parts, rims.reshape(-1, 3), side).reshape(rims.shape[:3])
     bodies = [body for part in parts for body in surfaces.bodies[part]]
-    most = np.array(
-        [
-            outermost(bodies, points, radius, side, reached)
-            for radius, reached in zip(radii, out.max(axis=2), strict=True)
-        ]
-    )
-    reached = most[:, :, None] - out <= BELLOWS * sizes[:, None, None]
-    return np.asarray(reached.mean(axis=2)), way * most
+    discs = np.tile(points, (len(sizes), 1)), np.repeat(sizes, len(points))
+    most = outermost(bodies, *discs, side, out.max(axis=0).ravel()).reshape(out.shape[1:])
+    reached = most - out <= BELLOWS * sizes[:, None]
+    return np.asarray(reached.mean(axis=0)), way * most
 
 
-def strain(tip: Tip, outward: Array, radius: Array, at: Array, apart: Array, loads: Loads) -> Array:
-    """The largest share (n,) of the strength of tips about places `at` (n, 3) that any of some
-    loads uses, at rest and as it is accelerated. The rest as `Tip.used`."""
-    pulls = np.array([0.0, 0.0, -GRAVITY]) + loads.push * PUSHES
-    force = loads.mass[:, None, None, None] * pulls[:, None]
-    moment = np.cross(loads.centre[:, None, None] - at, force)
-    load = np.concatenate(np.broadcast_arrays(force, moment), axis=-1)
-    terms = tip.gauge(outward, radius, apart) @ load[..., None]
-    return np.asarray(np.maximum(shares(terms[..., 0]).max(axis=(0, 1)), 0.0))
+def strain(tip: Tip, side: tuple[int, int], radius: Array, load: tuple[Array, Array]) -> Array:
+    """The largest share (..., n) of the strength of a tip with a `radius` (..., n) on a side that
+    any of some loads uses; `load`: as `Loads.about` the middles of the tips."""
+    shares = tip.alone(side, radius[..., None], *load)
+    return np.asarray(np.maximum(shares.max(axis=-1), 0.0))
+
+
+def strain_of_two(tip: Tip, radius: Array, apart: Array, load: tuple[Array, Array]) -> Array:
+    """The same (n,) of two tips below, `apart` (n, 3)."""
+    force, moment = np.broadcast_arrays(*load)
+    terms = tip.gauge(UP, radius, apart) @ np.concatenate([force, moment]).swapaxes(0, 1)
+    return np.asarray(np.maximum(shares(terms.swapaxes(1, 2)).max(axis=-1), 0.0))

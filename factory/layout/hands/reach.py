@@ -6,7 +6,7 @@ import numpy as np
 
 from factory.geometry.meshes import Array
 from factory.geometry.solids import Product
-from factory.layout.hands.hand import AIR, BEAM, Kind, breadth
+from factory.layout.hands.hand import AIR, BEAM, Kind, widths
 from factory.layout.hands.surfaces import Way
 
 APART = 2e-4
@@ -32,8 +32,7 @@ def reach(product: Product, kind: Kind, at: Array, radius: Array, u: Way) -> tup
 
 def halves(radius: Array) -> Array:
     """How far to a side pads of some radii (n,), or what goes to them, reach (n,) [m]."""
-    widths = np.array([breadth(one) for one in radius.tolist()])
-    return np.maximum(radius, widths / 2)
+    return np.maximum(radius, widths(radius) / 2)
 
 
 def back(way: Way) -> Way:

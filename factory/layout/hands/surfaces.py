@@ -6,7 +6,7 @@ be in the way of a hand is boxed, which is exact for boxes and on the safe side 
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import combinations
@@ -15,7 +15,7 @@ from itertools import product as pairs
 import numpy as np
 
 from factory.compiler.mating.depth import polytope
-from factory.control.mode import Truth
+from factory.control.mode import Index, Truth
 from factory.geometry.meshes import Array
 from factory.geometry.solids import Product
 
@@ -27,6 +27,25 @@ TOUCH = 1e-5
 
 FLAT = 1e-9
 """A face whose normal has a smaller share along a line is parallel to it."""
+
+
+BLOCK = 256
+"""Of so many points it is looked at together where they are on a body of many faces: what is worked
+out for each point and face stays in the processor's cache."""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Faces:
+    """Some faces of a body as seen along an axis: their outward normals' shares `along` (f,) and
+    `across` (2, f) it, and how far they reach along those, `offsets` (f,) [m]."""
+
+    along: Array
+    across: Array
+    offsets: Array
+
+    def room(self, at: Array) -> Array:
+        """How far points (n, 2) across the axis, at its origin, are inside of each (n, f) [m]."""
+        return np.asarray(self.offsets - at @ self.across)
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,6 +61,19 @@ class Body:
         """The outward normals (f, 3) of its faces and how far they reach along them (f,) [m]."""
         found = polytope(self.vertices)
         return found.normals, found.reach
+
+    @cached_property
+    def facing(self) -> tuple[tuple[Faces, Faces, Faces], ...]:
+        """For each axis those of its faces that are parallel to it, face against it, and face along
+        it."""
+        normals, offsets = self.faces
+        found = []
+        for axis, along in enumerate(normals.T):
+            across = normals[:, [a for a in range(3) if a != axis]]
+            sides = np.abs(along) < FLAT, along < -FLAT, along > FLAT
+            one, two, three = (Faces(along[s], across[s].T, offsets[s]) for s in sides)
+            found.append((one, two, three))
+        return tuple(found)
 
     @cached_property
     def edges(self) -> Array:
@@ -63,21 +95,19 @@ class Body:
         corners = (self.vertices == self.low) | (self.vertices == self.high)
         return len(np.unique(self.vertices, axis=0)) == 8 and bool(corners.all())
 
+    def out(self, side: tuple[int, int]) -> float:
+        """How far out it is on a side, an axis and a way (+1, -1) along it [m]."""
+        axis, way = side
+        return way * float((self.high if way > 0 else self.low)[axis])
+
     def crossed(self, points: Array, axis: int) -> tuple[Array, Array]:
         """From where to where lines along an axis through points (n, 3), which are within its box
         across it, are inside (n,); (inf, -inf) where a line passes it by."""
-        if self.boxed:
-            count = len(points)  # of a box along the axes
-            return np.full(count, self.low[axis]), np.full(count, self.high[axis])
-        normals, offsets = self.faces
-        across = [a for a in range(3) if a != axis]
-        room = offsets - points[:, across] @ normals[:, across].T
-        along = normals[:, axis]
-        flat = np.abs(along) < FLAT
-        inside = (room[:, flat] >= -FLAT).all(axis=1)
-        ends = room / np.where(flat, 1.0, along)
-        first = np.where(along < -FLAT, ends, -np.inf).max(axis=1)
-        last = np.where(along > FLAT, ends, np.inf).min(axis=1)
+        beside, back, out = self.facing[axis]
+        at = points[:, [a for a in range(3) if a != axis]]
+        inside = (beside.room(at) >= -FLAT).all(axis=1)
+        first = (back.room(at) / back.along).max(axis=1, initial=-np.inf)
+        last = (out.room(at) / out.along).min(axis=1, initial=np.inf)
         inside &= first <= last
         return np.where(inside, first, np.inf), np.where(inside, last, -np.inf)
 
@@ -98,20 +128,30 @@ class Surfaces:
         found = [(body.low, body.high) for part in parts for body in self.bodies[part]]
         return np.array(found).reshape(-1, 2, 3)
 
-    def met(self, parts: Sequence[str], points: Array, axis: int) -> tuple[Array, Array]:
-        """Where lines along an axis through points (n, 3) enter some parts for the first time and
-        leave them for the last (n,) [m]."""
-        first, last = np.full(len(points), np.inf), np.full(len(points), -np.inf)
-        across = [a for a in range(3) if a != axis]
-        for part in parts:
-            for body in self.bodies[part]:
-                at = points[:, across]
-                near = ((at >= body.low[across]) & (at <= body.high[across])).all(axis=1)
-                if near.any():
-                    low, high = body.crossed(points[near], axis)
-                    first[near] = np.minimum(first[near], low)
-                    last[near] = np.maximum(last[near], high)
-        return first, last
+    def outermost(self, parts: Sequence[str], points: Array, side: tuple[int, int]) -> Array:
+        """How far out some parts are on a side, an axis and a way (+1, -1) along it, where lines
+        along the axis through points (n, 3) meet them (n,) [m]; -inf where nowhere."""
+        (axis, way), found = side, np.full(len(points), -np.inf)
+        one, other = (a for a in range(3) if a != axis)
+        x, y = points[:, one].copy(), points[:, other].copy()
+        bodies = [(body.out(side), body) for part in parts for body in self.bodies[part]]
+        for out, body in sorted(bodies, key=lambda pair: -pair[0]):
+            low, high = body.low, body.high
+            beside = (x >= low[one]) & (x <= high[one]) & (y >= low[other]) & (y <= high[other])
+            if body.boxed:
+                np.maximum(found, out, out=found, where=beside)
+                continue
+            # what ends further in than what is known is not looked at
+            for near in blocks(np.flatnonzero(beside & (found < out + FLAT))):
+                enter, leave = body.crossed(points[near], axis)
+                found[near] = np.maximum(found[near], leave if way > 0 else -enter)
+        return found
+
+
+def blocks(numbers: Index) -> Iterator[Index]:
+    """Some numbers (n,), BLOCK at a time."""
+    for begin in range(0, len(numbers), BLOCK):
+        yield numbers[begin : begin + BLOCK]
 
 
 def swept(low: Array, high: Array, *ways: Way) -> tuple[Array, Array]:
@@ -130,30 +170,29 @@ def swept(low: Array, high: Array, *ways: Way) -> tuple[Array, Array]:
 def hit(low: Array, high: Array, boxes: Array, spare: float = TOUCH) -> Truth:
     """Which boxes (n,) from `low` to `high` (n, 3) overlap any of `boxes` (m, 2, 3), by more than
     `spare` [m]."""
-    near = _near(low, high, boxes)
-    return np.asarray(_overlap(low, high, near, spare).any(axis=1))
+    return np.asarray(_overlap(low, high, boxes[near(low, high, boxes)], spare).any(axis=1))
 
 
 def retreat(low: Array, high: Array, boxes: Array, ways: tuple[Way, Way]) -> Array:
-    """How far boxes from `low` to `high` (n, 3) have to go the first of two ways until nothing of
-    `boxes` (m, 2, 3) is in their way along the second (n,) [m]; 0 where nothing is."""
+    """How far boxes from `low` to `high` (n, 3) have to go the first of two ways until each of
+    `boxes` (m, 2, 3) is not in their way along the second (n, m) [m]; 0 where it is not."""
     wide, ((x, y), _) = swept(low, high, *ways), ways
+    found, kept = np.zeros((len(low), len(boxes))), near(*wide, boxes)
     axis, side = (0, x) if x else (1, y)
-    near = _near(*wide, boxes)
     if side < 0:
-        past = high[:, None, axis] - near[:, 0, axis]
+        past = high[:, None, axis] - boxes[kept, 0, axis]
     else:
-        past = near[:, 1, axis] - low[:, None, axis]
-    met = _overlap(*wide, near, TOUCH)
-    return np.asarray(np.where(met, past, 0.0).max(axis=1, initial=0.0))
+        past = boxes[kept, 1, axis] - low[:, None, axis]
+    found[:, kept] = np.where(_overlap(*wide, boxes[kept], TOUCH), np.maximum(past, 0.0), 0.0)
+    return found
 
 
-def _near(low: Array, high: Array, boxes: Array) -> Array:
-    """Those of `boxes` (m, 2, 3) that meet the box round boxes from `low` to `high` (n, 3)."""
+def near(low: Array, high: Array, boxes: Array) -> Truth:
+    """Which of `boxes` (m,) meet the box round boxes from `low` to `high` (n, 3)."""
     if not len(low):
-        return boxes[:0]
+        return np.zeros(len(boxes), bool)
     kept = (boxes[:, 1] > low.min(axis=0)) & (boxes[:, 0] < high.max(axis=0))
-    return np.asarray(boxes[kept.all(axis=1)])
+    return np.asarray(kept.all(axis=1))
 
 
 def _overlap(low: Array, high: Array, boxes: Array, spare: float) -> Truth:

@@ -46,6 +46,20 @@ class Tip:
         found = shares((self.gauge(outward, radius, apart) @ load[..., None])[..., 0])
         return np.maximum(found, 0.0)
 
+    def alone(self, side: tuple[int, int], radius: Array, force: Array, moment: Array) -> Array:
+        """As `used` (...,), for hands with one tip on a side of the payload, an axis and a way (+1,
+        -1) along it; below 0 where the tip is pressed on. `radius` (...,), `force` and `moment`
+        (3, ...)."""
+        axis, way = side
+        one, other = (a for a in range(3) if a != axis)
+        bears = self.pull * np.pi * radius**2
+        beside, bent = 1 / self.friction / bears, 2 / radius / bears
+        turn = TWIST / radius / self.friction / bears
+        slips = np.sqrt((beside * force[one]) ** 2 + (beside * force[other]) ** 2)
+        slips = slips + np.abs(turn * moment[axis])
+        bends = np.sqrt((bent * moment[one]) ** 2 + (bent * moment[other]) ** 2)
+        return np.asarray(-way / bears * force[axis] + np.maximum(slips, bends))
+
     def gauge(self, outward: Array, radius: Array, apart: Array) -> Array:
         """What of a load uses the strength of a hand's tips, as matrices (n, 11, 6): from a force
         [N] and a moment [Nm] about the middle of the tips to the terms of `shares`.
@@ -85,17 +99,20 @@ direction, what bends rims, what tilts one tip against the other."""
 TERMS = 11
 """Of so many numbers the terms of a load are."""
 
-LENGTHS = np.repeat(np.eye(5), [1, 3, 1, 3, 3], axis=0)[:, 1:]
-"""Sums up the squares of the terms of what pulls beside, turns, bends and tilts."""
-
 
 def shares(terms: Array) -> Array:
     """The share (n,) of the strength of hands' tips that loads of such terms (n, 11) use, below 0
     where tips are pressed on; above 1 a hand lets go. Pressure is lost to what pulls off and tilts,
     and to what slips or bends: rim and friction have it one as well as the other."""
-    lengths = np.sqrt(terms * terms @ LENGTHS)
-    slips, bends, tilts = lengths[..., 0] + lengths[..., 1], lengths[..., 2], lengths[..., 3]
+    squares = terms * terms
+    slips = _length(squares[..., BESIDE]) + np.abs(terms[..., TURN])
+    bends, tilts = _length(squares[..., BENT]), _length(squares[..., TILTED])
     return np.asarray(terms[..., OFF] + tilts + np.maximum(slips, bends))
+
+
+def _length(squares: Array) -> Array:
+    """The length (n,) of what has such squares (n, 3)."""
+    return np.asarray(np.sqrt(squares.sum(axis=-1)))
 
 
 def _squared(direction: Array) -> Array:

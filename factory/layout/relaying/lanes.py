@@ -11,9 +11,9 @@ from factory.control.mode import Truth
 from factory.geometry.meshes import Array
 from factory.layout.dimensions import CARRIAGE, FINGER, Clearance
 from factory.layout.hands.apart import BESIDE, HandsApart, Swept
-from factory.layout.hands.hand import Hand, Kind, breadth
+from factory.layout.hands.hand import Hand, Kind, widths
 from factory.layout.hands.holding import Holding, held
-from factory.layout.hands.in_the_way import InTheWay
+from factory.layout.hands.in_the_way import InTheWay, Passed
 from factory.layout.hands.places import Places
 from factory.layout.hands.surfaces import Way, swept
 from factory.layout.layout import Layout
@@ -100,7 +100,7 @@ class HandsApartInLanes(HandsApart):
             free &= found.radius <= max(known.radius, FINGER / 2) + SAME
             return free & super().own_side(robot, kind, found, u, t)
         lane, c = self.lanes[robot], self.holding.clearance
-        wide = np.array([breadth(radius) / 2 for radius in found.radius.tolist()])
+        wide = widths(found.radius) / 2
         away = (found.at[:, lane.across] - lane.line) * lane.side
         free = (away - wide >= c.c / 2) & (away - found.radius >= BESIDE)
         free &= away + wide <= c.spread + CARRIAGE / 2
@@ -135,11 +135,20 @@ class InTheWayInLanes(InTheWay):
         super().__init__(holding, hand_of)
         self.apart = HandsApartInLanes(holding, lanes, hand_of)
 
+    def possible(
+        self, robot: int, label: str, kind: Kind, frames: Sequence[tuple[Way, Way]]
+    ) -> bool:
+        """Always: a lane has two ends."""
+        return True
+
     def checks(
         self, robot: int, label: str, kind: Kind, found: Places, frames: Sequence[tuple[Way, Way]]
-    ) -> tuple[dict[str, Truth], Truth, Array]:
+    ) -> tuple[dict[str, Truth], Truth]:
         """Looked at anew, since lanes and the hands that are settled change."""
         return self._looked_at(robot, label, kind, found, frames)
+
+    def _passing(self, robot: int, label: str, kind: Kind, found: Places, u: Way, t: Way) -> Passed:
+        return self._looked_past(robot, label, kind, found, u, t)
 
     def _going_on(self, robot: int, kind: Kind, found: Places, u: Way, t: Way) -> Array:
         if self.holding.gives(robot):
@@ -151,10 +160,10 @@ class InTheWayInLanes(InTheWay):
         low, high = self.reach(kind, found, u)
         if self.holding.takes(robot):
             label = held(self.holding.factory, robot)
-            yield (*swept(low, high, u), self.holding.around(label, low, high))
+            yield (*swept(low, high, u), self.holding.boxes(label))
         if self.holding.gives(robot):
             last = held(self.holding.factory, robot, at_last=True)
-            yield (*swept(low, high, (-u[0], -u[1])), self.holding.around(last, low, high))
+            yield (*swept(low, high, (-u[0], -u[1])), self.holding.boxes(last))
         else:
             yield from super()._leaving(robot, kind, found, u)
 
