@@ -34,7 +34,7 @@ from tests.command_line import ROOT, Terminal
 from tests.test_hands import AT_MOST_MM, GRIP_MM, deepest, looked_at
 from tests.test_relay import templates_of
 
-SETTINGS = Settings(hands=1)
+SETTINGS = Settings()
 
 Room = tuple[tuple[float, float], ...]
 
@@ -179,12 +179,12 @@ def test_what_hands_cannot_relay_is_not_cut() -> None:
     layout = plain(cube(32))
     found = relayed(layout, SETTINGS)
     assert not hand_overs(found)
-    bare = relayed(replace(layout, hands=()), Settings())
+    bare = relayed(replace(layout, hands=()), Settings(hands=0))
     assert hand_overs(bare)
 
 
 def test_by_the_command_line(run: Terminal, tmp_path: Path) -> None:
-    words = ("--relay", "--hands", "--jitter", "0.3", "--units", "3", "--json")
+    words = ("--relay", "--jitter", "0.3", "--units", "3", "--json")
     truck = run("run", ROOT / "examples" / "truck.pag", *words)
     assert truck.status == 0 and truck.json["verdict"]["succeeded"]
     file = tmp_path / "slab.pag"
