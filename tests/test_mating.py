@@ -551,7 +551,8 @@ def test_run_and_build_tell_what_is_blocked_as_check_does(run: Terminal, closed:
     where = [(w["code"], w["line"], w["col"]) for w in found]
     assert where == [("Blocked", 2, 15), ("NoGrip", 10, 1)]
     assert lines.splitlines()[-3:] == blocked_lines(closed) and "no hand can hold 'b'" in lines
-    for words in (["run", closed], ["build", closed, "--mjcf", closed.with_suffix(".xml")]):
+    made = ["build", closed, "--mjcf", closed.with_suffix(".xml")]
+    for words in (["run", closed, "--world", "ideal"], made):
         for _ in range(2):  # a second build is left out
             assert run(*words).err == lines, words
         assert run(*words, "-q").err == ""

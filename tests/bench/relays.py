@@ -107,8 +107,8 @@ def section(results: dict[str, Any]) -> str:
         [
             "## Relays",
             "Balanced trees of boxes that fill a cube of 0.3 m and 3 kg together,"
-            " `--relay --no-hands`. The net of each was proved. The longest and the shortest cycle with relays differ by"
-            f" {spread:.0f} %. In MuJoCo the outfeed's tray has to be back first.",
+            " `--relay --no-hands`. The net of each was proved. The longest and the shortest cycle"
+            f" with relays differ by {spread:.0f} %. In MuJoCo the outfeed's tray has to be back first.",
             table(head, rows),
         ]
     )
