@@ -108,7 +108,8 @@ def section(results: dict[str, Any]) -> str:
             "## Relays",
             "Balanced trees of boxes that fill a cube of 0.3 m and 3 kg together,"
             " `--relay --no-hands`. The net of each was proved. The longest and the shortest cycle"
-            f" with relays differ by {spread:.0f} %. In MuJoCo the outfeed's tray has to be back first.",
+            f" with relays differ by {spread:.0f} %. In MuJoCo the outfeed's tray has to be back"
+            " first.",
             table(head, rows),
         ]
     )
