@@ -527,7 +527,7 @@ def closed(tmp_path: Path) -> Path:
 
 
 def test_check_tells_figures_and_names_what_is_blocked(run: Terminal, closed: Path) -> None:
-    done = run("check", closed)
+    done = run("check", closed, "--no-hands")
     out = done.out
     assert done.status == 0
     assert (
@@ -545,12 +545,16 @@ def blocked_lines(closed: Path) -> list[str]:
 
 
 def test_run_and_build_tell_what_is_blocked_as_check_does(run: Terminal, closed: Path) -> None:
-    """The same lines, and the same entry in the documents; nothing with -q."""
-    found = run("check", closed, "--json").json["warnings"]
-    assert [(w["code"], w["line"], w["col"]) for w in found] == [("Blocked", 2, 15)]
-    for words in (["run", closed], ["build", closed, "--mjcf", closed.with_suffix(".xml")]):
+    """The same lines, and the same entries in the documents; nothing with -q. No hand can hold
+    what is in a closed box either."""
+    found, lines = run("check", closed, "--json").json["warnings"], run("check", closed).err
+    where = [(w["code"], w["line"], w["col"]) for w in found]
+    assert where == [("Blocked", 2, 15), ("NoGrip", 10, 1)]
+    assert lines.splitlines()[-3:] == blocked_lines(closed) and "no hand can hold 'b'" in lines
+    made = ["build", closed, "--mjcf", closed.with_suffix(".xml")]
+    for words in (["run", closed, "--world", "ideal"], made):
         for _ in range(2):  # a second build is left out
-            assert run(*words).err.splitlines() == blocked_lines(closed), words
+            assert run(*words).err == lines, words
         assert run(*words, "-q").err == ""
         done = run(*words, "--json")
         assert done.json["warnings"] == found and done.err == "", words
@@ -575,13 +579,13 @@ def test_all_pairs_that_clash_in_one_operation_are_one_entry(run: Terminal, clos
     for name, x in (("b2", -0.0101), ("b3", 0.0101)):
         text += f"; {name} = atomic ( box = (0.008, 0.03, 0.02), pos = ({x}, 0, 0.022) )"
     closed.write_text(text)
-    document = run("check", closed, "--json").json
+    document = run("check", closed, "--no-hands", "--json").json
     (clashes,), (warning,) = document["clashes"], document["warnings"]
     pairs = [pair["parts"] for pair in clashes["pairs"]]
     assert (clashes["label"], clashes["line"]) == ("r", 2)
     assert sorted(pairs) == [["b1", "front"], ["b2", "front"], ["b3", "front"]]
     assert warning["message"].startswith("b cannot come to r: ")
-    assert len(run("check", closed).err.splitlines()) == 3
+    assert len(run("check", closed, "--no-hands").err.splitlines()) == 3
     tried = run("run", closed, "--json").json
     assert {*map(tuple, tried["excluded"])} == {*map(tuple, pairs)}, "those that check names"
 
@@ -629,8 +633,10 @@ def test_pictures_are_written_into_the_folder_alone(run: Terminal, tmp_path: Pat
     before = set(tmp_path.rglob("*"))
     assert run("check", file, "--clashes", folder).status == 0
     new = set(tmp_path.rglob("*")) - before - {folder, folder.parent}
-    assert [path.parent for path in new] == [folder]
-    text = new.pop().read_text()
+    assert {path.parent for path in new} == {folder}
+    blocked, grip = sorted(path.name for path in new)
+    assert grip.startswith("grip-")
+    text = (folder / blocked).read_text()
     root = ElementTree.fromstring(text)
     assert root.tag.endswith("svg") and "href" not in text and "url(" not in text
     words = "".join(root.itertext())

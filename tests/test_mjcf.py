@@ -203,7 +203,10 @@ def test_bodies_that_collide_have_no_geoms_that_are_only_shown(
     m = compiled(physical_model(paper, 1), tmp_path)
     collides = (m.geom_contype | m.geom_conaffinity) != 0
     boxed = ((m.body_contype | m.body_conaffinity) != 0)[m.geom_bodyid]
-    robots, feeders, outfeed = 3 * 6, (3 + 4 + 1) * 3, 3 + 6 + 2
+    hands = 3 * sum(hand is not None for hand in paper.hands)
+    robots, feeders = 3 * 6 + hands, (3 + 4 + 1) * 3
+    outfeed = 3 + 6 + 2 + 2 * 2  # a slot for the hand makes three of belt and tray
+    assert hands == 3 * 5
     assert collides.sum() == robots + feeders + outfeed + 1 + 3  # and the floor, and parts
     assert (boxed == collides).all()
 

@@ -134,9 +134,10 @@ def test_nothing_is_left_out_where_robots_collide() -> None:
 
 
 def test_much_of_a_factory_is_left_out() -> None:
-    simulation = ready("20", units=9)
+    """Where so many robots are that any is left out without being told to."""
+    simulation = ready("40", units=9)
     shares = []
-    for _ in range(800):
+    for _ in range(1600):
         simulation.supervisor.step()
         shares.append(looked_at(simulation))
     assert np.mean(shares[400:]) < 0.85 and min(shares) < 0.6

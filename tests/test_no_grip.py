@@ -39,7 +39,7 @@ def tub(tmp_path: Path) -> Path:
 
 
 def found(file: Path) -> tuple[NoGrip, ...]:
-    return read(file, (), Settings(hands=1)).no_grips
+    return read(file).no_grips
 
 
 @cache
@@ -48,14 +48,14 @@ def of_the_gearbox() -> tuple[NoGrip, ...]:
 
 
 def test_what_no_hand_can_hold_is_said(tub: Path) -> None:
-    asked = read(tub, (), Settings(hands=1))
-    (told,) = (warning for warning in asked.warnings if warning.code == "NoGrip")
+    (told,) = (warning for warning in read(tub).warnings if warning.code == "NoGrip")
     assert (
         "no hand can hold 'axle': above, 180 of 180 places: parts that are lowered" in told.message
     )
     assert "at the nearest miss, (0, 9, 50) mm, gear lowered onto it; behind, " in told.message
     assert told.position is not None and told.position.line == 1
-    assert not [w for w in read(tub).warnings if w.code == "NoGrip"]
+    bare = read(tub, (), Settings(hands=0))
+    assert not [w for w in bare.warnings if w.code == "NoGrip"]
     assert not found(ROOT / "examples" / "stool.pag")
 
 
@@ -94,7 +94,7 @@ def test_a_strong_place_is_nearer_than_a_weak_one(tub: Path) -> None:
 
 
 def test_check_lists_and_draws_it(run: Terminal, tub: Path, out: Path) -> None:
-    document = run("check", tub, "--hands", "--clashes", out, "--json").json
+    document = run("check", tub, "--clashes", out, "--json").json
     (listed,) = document["no_grips"]
     assert (listed["label"], listed["line"], listed["robot"]) == ("axle", 1, "r2")
     above, behind, below = listed["nearest_misses"]
@@ -112,14 +112,15 @@ def test_check_lists_and_draws_it(run: Terminal, tub: Path, out: Path) -> None:
     assert drawn.count("nearest") == 6 and drawn.count("hand") == 6 + 1
     tried = sum(miss["tried"] for miss in listed["nearest_misses"])
     assert drawn.count("tried") == tried + 1
-    again = run("check", tub, "--hands", "--clashes", out, "--json").json
+    again = run("check", tub, "--clashes", out, "--json").json
     assert again == document and file.read_text() == text
 
 
 def test_without_hands_nothing_is_listed_or_drawn(run: Terminal, tub: Path, out: Path) -> None:
-    assert "no_grips" not in run("check", tub, "--clashes", out, "--json").json
+    bare = run("check", tub, "--no-hands", "--clashes", out, "--json").json
+    assert "no_grips" not in bare and bare["warnings"] == []
     assert not list(out.iterdir())
-    stool = run("check", ROOT / "examples" / "stool.pag", "--hands", "--clashes", out, "--json")
+    stool = run("check", ROOT / "examples" / "stool.pag", "--clashes", out, "--json")
     assert stool.json["no_grips"] == [] and not list(out.iterdir())
 
 

@@ -34,7 +34,7 @@ def test_each_stage_is_computed_when_it_is_first_used() -> None:
 
 def test_the_factory_of_a_project_has_the_relays_of_its_layout(tmp_path: Path) -> None:
     (tmp_path / "cube.pag").write_text(cube(32))
-    project = read(tmp_path / "cube.pag", ground=Ground(relay=True))
+    project = read(tmp_path / "cube.pag", (), Settings(hands=0), Ground(relay=True))
     assert project.factory is project.layout.factory
     assert len(project.factory.robots) > len(project.plain.robots)
 

@@ -43,11 +43,21 @@ from tests.bench.factories import cube, laid_out
 from tests.command_line import Terminal
 
 EXAMPLES = Path(__file__).resolve().parent.parent / "examples"
-SETTINGS = Settings()
+SETTINGS = Settings(hands=0)
+"""Hands cannot relay cubes, which are heavy and narrow: relays with hands are tested for slabs, in
+`test_relay_hands`."""
+BARE = ("--no-hands",)
+"""The same in words."""
+
 PACE = Pace.of(SETTINGS)
 
 sizes, seeds = st.integers(2, 20), st.integers(0, 10_000)
 shapes, styles = st.sampled_from(SHAPES), st.sampled_from(STYLES)
+
+
+def bare(parts: int) -> Layout:
+    """A cube of so many parts, laid out without hands."""
+    return laid_out(cube(parts), SETTINGS)
 
 
 def cycle(layout: Layout) -> float:
@@ -121,7 +131,7 @@ def test_everything_goes_where_it_went(size: int, seed: int, shape: str, style: 
 
 
 def test_a_source_line_is_kept() -> None:
-    layout = laid_out(cube(32))
+    layout = bare(32)
     after = relayed(layout, SETTINGS)
     relays = [o for o in after.factory.operations if o.template.name == "relay"]
     assert relays
@@ -155,7 +165,7 @@ def test_labels_of_the_user_are_not_taken() -> None:
 @pytest.mark.parametrize("change", ["step", "lane"])
 def test_a_cut_in_the_wrong_place_is_caught(change: str) -> None:
     """Too near for what stands there, or in one lane with the robot that takes over."""
-    layout, found = cuttable(laid_out(cube(32)))
+    layout, found = cuttable(bare(32))
     label = max(found, key=lambda x: found[x].end - found[x].start)
     good = cut(layout, found, {label: 1})
     assert certify(good).holds
@@ -170,7 +180,7 @@ def test_a_cut_in_the_wrong_place_is_caught(change: str) -> None:
 
 def test_the_pace_does_not_depend_on_the_size() -> None:
     """Balanced trees of parts that fill one cube."""
-    plain = [laid_out(cube(parts)) for parts in (16, 64, 256)]
+    plain = [bare(parts) for parts in (16, 64, 256)]
     found = [relayed(layout, SETTINGS) for layout in plain]
     before, after = [cycle(layout) for layout in plain], [cycle(layout) for layout in found]
     assert max(before) > 2 * min(before)
@@ -183,7 +193,7 @@ def test_the_pace_does_not_depend_on_the_size() -> None:
 
 
 def test_a_slower_cycle_takes_fewer_relays() -> None:
-    plain = laid_out(cube(128))
+    plain = bare(128)
     fast, slow = (relayed(plain, SETTINGS, wanted) for wanted in (None, 4.0))
     assert cycle(fast) < cycle(slow) <= 4.0 < cycle(plain)
     assert len(plain.factory.robots) < len(slow.factory.robots) < len(fast.factory.robots)
@@ -197,10 +207,13 @@ def test_where_nothing_is_gained_nothing_is_changed() -> None:
 @pytest.mark.parametrize(("fuse", "distributed"), [(False, True), (True, False)])
 def test_relays_run(fuse: bool, distributed: bool) -> None:
     """In MuJoCo, at jitter, with the monitor beside."""
-    layout = relayed(laid_out(cube(32)), SETTINGS)
+    layout = relayed(bare(32), SETTINGS)
     assert layout.plain
     simulation = Simulation(
-        layout, RunRequest(units=2, seed=4, jitter=0.3, fuse=fuse, distributed=distributed)
+        layout,
+        RunRequest(
+            units=2, seed=4, jitter=0.3, settings=SETTINGS, fuse=fuse, distributed=distributed
+        ),
     )
     monitor = beside(simulation)
     run = simulation.run([monitor.observe])
@@ -218,7 +231,8 @@ def test_two_bodies_may_be_made_in_one_tick_of_what_is_alike() -> None:
     """One copy of a relayed sub-assembly goes into a larger one as the next copy is made."""
     layout = relayed(random_layout(9, 156, SHAPES[156 % len(SHAPES)]), SETTINGS, 0.5)
     simulation = Simulation(
-        layout, RunRequest(units=3, seed=156, jitter=0.3, fuse=True, distributed=True)
+        layout,
+        RunRequest(units=3, seed=156, jitter=0.3, settings=SETTINGS, fuse=True, distributed=True),
     )
     monitor = beside(simulation)
     run = simulation.run([monitor.observe])
@@ -241,23 +255,23 @@ def test_what_is_lowered_can_be_relayed() -> None:
 def test_by_the_command_line(run: Terminal, tmp_path: Path) -> None:
     file, log = tmp_path / "cube.pag", tmp_path / "run.log"
     file.write_text(cube(32))
-    plain = json.loads(run("check", file, "--json").out)
-    found = json.loads(run("check", file, "--relay", "--json").out)
+    plain = json.loads(run("check", file, *BARE, "--json").out)
+    found = json.loads(run("check", file, *BARE, "--relay", "--json").out)
     assert found["live"] and found["reversible"] and found["robots"] > plain["robots"]
     assert "relay" not in json.dumps(plain)
-    built = json.loads(run("build", file, "--relay", "--json").out)
+    built = json.loads(run("build", file, *BARE, "--relay", "--json").out)
     assert built["robots"] == found["robots"]
     relays = built["layout"]["relays"]
     assert relays["robots_added"] == found["robots"] - plain["robots"]
     assert relays["without"]["predicted_cycle_time_s"] > 4
     assert built["layout"]["predicted_cycle_time_s"] < 2.5
-    assert run("run", file, "--cycle", "2.4", "--log", log, "-q").status == 0
+    assert run("run", file, *BARE, "--cycle", "2.4", "--log", log, "-q").status == 0
     assert run("monitor", log).status == 0
     told = recording_of(log)
     assert told.layout and told.layout.plain, told.missing
     assert [r.name for r in told.layout.factory.robots] == told.log.header["robots"]
     assert run("report", log, "-o", tmp_path / "told.html", "--json").json["predicted"]
-    assert "relay" in run("programs", file, "--relay").out
+    assert "relay" in run("programs", file, *BARE, "--relay").out
 
 
 def test_a_net_has_no_guidepaths(run: Terminal, tmp_path: Path) -> None:
@@ -271,7 +285,7 @@ def test_a_net_has_no_guidepaths(run: Terminal, tmp_path: Path) -> None:
 def test_sweeps_and_exports_with_relays_are_those_of_a_run(run: Terminal, out: Path) -> None:
     file = out / "cube.pag"
     file.write_text(cube(32))
-    words = ("--relay", "--world", "ideal")
+    words = (*BARE, "--relay", "--world", "ideal")
     database = out / "r.db"
     swept = run("sweep", file, "--vary", "speed=0.3,0.6", *words, "-o", database, "--json")
     assert (swept.status, swept.json["done"]) == (0, 2)
@@ -281,11 +295,11 @@ def test_sweeps_and_exports_with_relays_are_those_of_a_run(run: Terminal, out: P
     for speed, row in kept.items():
         done = run("run", file, *words, "--units", 4, "--speed", speed, "--json").json
         assert row == (done["robots"], done["cycle_time_s"])
-        assert done["robots"] > run("check", file, "--json").json["robots"]
-    dot = run("export", file, "--relay", "--format", "dot").out
-    assert "relay" in run("export", file, "--cycle", "2.4", "--format", "dot").out
-    plan = run("build", file, "--relay", "--speed", 0.3, "-o", out / "all", "--json").json
-    assert "relay" in dot and "relay" not in run("export", file, "--format", "dot").out
+        assert done["robots"] > run("check", file, *BARE, "--json").json["robots"]
+    dot = run("export", file, *BARE, "--relay", "--format", "dot").out
+    assert "relay" in run("export", file, *BARE, "--cycle", "2.4", "--format", "dot").out
+    plan = run("build", file, *words[:2], "--speed", 0.3, "-o", out / "all", "--json").json
+    assert "relay" in dot and "relay" not in run("export", file, *BARE, "--format", "dot").out
     assert plan["robots"] == kept[0.3][0]
     for more in ((), ("--no-fuse",)):
         other = run("sweep", file, "--vary", "speed=0.3", *more, "-o", database, "--json")

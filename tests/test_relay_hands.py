@@ -4,6 +4,8 @@ own side of the line, and nothing meets anything on any way."""
 from __future__ import annotations
 
 import random
+import sqlite3
+from contextlib import closing
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -34,7 +36,7 @@ from tests.command_line import ROOT, Terminal
 from tests.test_hands import AT_MOST_MM, GRIP_MM, deepest, looked_at
 from tests.test_relay import templates_of
 
-SETTINGS = Settings(hands=1)
+SETTINGS = Settings()
 
 Room = tuple[tuple[float, float], ...]
 
@@ -117,6 +119,17 @@ def test_relays_with_hands_are_faster_and_go_through_nothing() -> None:
     runs_clean(after)
 
 
+def test_a_slower_cycle_takes_fewer_relays() -> None:
+    before, fast = plain(sawn(6)), with_relays(6)
+    slow, pace = relayed(before, SETTINGS, 4.5), Pace.of(SETTINGS)
+    assert 0 < len(hand_overs(slow)) < len(hand_overs(fast))
+    cycles = [max(gear_times(layout, pace)) for layout in (fast, slow, before)]
+    assert cycles[0] < cycles[1] <= 4.5 < cycles[2]
+    for relay in hand_overs(slow):
+        label = relay.label.partition(".")[0]
+        assert relay.position == slow.factory.by_label[label].position
+
+
 def test_a_chain_of_relays_goes_through_nothing() -> None:
     """Three one after the other: robots in the middle give and take."""
     layout = chained(4, "nb", 3)
@@ -179,12 +192,27 @@ def test_what_hands_cannot_relay_is_not_cut() -> None:
     layout = plain(cube(32))
     found = relayed(layout, SETTINGS)
     assert not hand_overs(found)
-    bare = relayed(replace(layout, hands=()), Settings())
+    bare = relayed(replace(layout, hands=()), Settings(hands=0))
     assert hand_overs(bare)
 
 
+def test_sweeps_and_exports_are_those_of_a_run(run: Terminal, out: Path) -> None:
+    file, words = out / "slab.pag", ("--relay", "--world", "ideal")
+    file.write_text(sawn(4))
+    swept = run("sweep", file, "--vary", "seed=1", *words, "-o", out / "r.db", "--json")
+    assert (swept.status, swept.json["done"]) == (0, 1)
+    with closing(sqlite3.connect(out / "r.db")) as opened:
+        (row,) = opened.execute("SELECT robots, cycle_time_s FROM runs")
+    done = run("run", file, *words, "--units", 4, "--seed", 1, "--json").json
+    assert row == (done["robots"], done["cycle_time_s"])
+    assert done["robots"] == len(with_relays(4).factory.robots)
+    for command in (("export", "--format", "dot"), ("programs",)):
+        assert "relay" in run(command[0], file, "--relay", *command[1:]).out
+        assert "relay" not in run(command[0], file, *command[1:]).out
+
+
 def test_by_the_command_line(run: Terminal, tmp_path: Path) -> None:
-    words = ("--relay", "--hands", "--jitter", "0.3", "--units", "3", "--json")
+    words = ("--relay", "--jitter", "0.3", "--units", "3", "--json")
     truck = run("run", ROOT / "examples" / "truck.pag", *words)
     assert truck.status == 0 and truck.json["verdict"]["succeeded"]
     file = tmp_path / "slab.pag"

@@ -117,11 +117,12 @@ def test_every_view_has_every_robot_label_transition_and_place(made: Page, recor
 
 
 def test_what_is_only_shown_is_drawn_and_linked_too(made: Page, recording) -> None:
-    """Fingers on the floor plan and in 3-D with their robots; feeders, their sliders and rods with
-    their parts."""
+    """Arms and hands on the floor plan and in 3-D with their robots; feeders, their sliders and
+    rods with their parts."""
     robots, leaves = recording.factory.robots, recording.factory.leaves
+    hands = sum(hand is not None for hand in recording.layout.hands)
     styles = [a.get("class") for tag, a in made.tags if tag == "polygon"]
-    assert styles.count("arm") == 2 * len(robots)
+    assert styles.count("arm") == len(robots) + hands == len(robots) + 5, "tools have none"
     assert styles.count("boom") == 2 * len(leaves) and styles.count("post") == len(leaves)
     things = made.data["scene"]["things"]
     seen = [t["robot"] for t in things if "robot" in t]

@@ -47,7 +47,7 @@ AGREES = 1.05
 def with_hands(name: str) -> Layout:
     """An example laid out with hands."""
     plan = factory.compile(factory.load_pag(EXAMPLES / f"{name}.pag"))
-    return Ground().lay_out(plan, product_geometry(plan.pag), Settings(hands=1))
+    return Ground().lay_out(plan, product_geometry(plan.pag), Settings())
 
 
 def ready(name: str | Layout, **more: Any) -> Simulation:
@@ -336,8 +336,8 @@ def test_a_run_says_what_was_dropped(
 ) -> None:
     weaken(monkeypatch, 0.1)
     log, page = tmp_path / "run.log", tmp_path / "run.html"
-    words = EXAMPLES / "paper.pag", "--hands"
-    done = run("run", *words, "--json", "--lenient", "--log", log)
+    paper = EXAMPLES / "paper.pag"
+    done = run("run", paper, "--json", "--lenient", "--log", log)
     assert done.status == 1
     assert [error["code"] for error in done.json["errors"]] == ["Dropped"]
     assert done.json["cut_off"]["code"] == "Dropped" and done.json["grip_strength_share_max"] > 1
@@ -348,18 +348,18 @@ def test_a_run_says_what_was_dropped(
     assert run("monitor", log).status == 1
     assert run("report", log, "-o", page).status == 1
     assert "Dropped" in page.read_text("utf-8")
-    again = run("run", *words)
+    again = run("run", paper)
     assert again.status == 1 and "drops 'sub1'" in again.err and "Dropped" in again.out
 
 
 def test_a_run_says_how_much_is_used(run: Terminal, tmp_path: Path) -> None:
     log, page = tmp_path / "run.log", tmp_path / "run.html"
-    done = run("run", EXAMPLES / "paper.pag", "--hands", "--units", 2, "--log", log)
+    done = run("run", EXAMPLES / "paper.pag", "--units", 2, "--log", log)
     assert done.status == 0 and "at most 31 % of the strength of a hand used: r3 with" in done.out
     figures = read_log(log).figures
     assert figures is not None
     assert figures["grip_strength_share_max"] == pytest.approx(0.306, abs=0.01)
     assert run("report", log, "-o", page).status == 0
     assert "strength share max" in page.read_text("utf-8")
-    words = "fidelity", EXAMPLES / "paper.pag", "--hands", "--seeds", 1, "--json"
+    words = "fidelity", EXAMPLES / "paper.pag", "--seeds", 1, "--json"
     assert "grip_strength_share_max" in str(run(*words).json)

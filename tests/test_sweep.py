@@ -23,7 +23,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import stats
 
-from factory.layout.embedding import lay_out
 from factory.pipeline import read
 from factory.simulation.request import RunRequest
 from factory.simulation.simulation import Simulation
@@ -176,8 +175,7 @@ def test_seeds_vary_fastest_and_settings_slowest() -> None:
 def test_runs_that_share_a_model_are_the_runs_alone() -> None:
     """A run writes into its model; no other run may see that."""
     runner = Runner(recipe_of(world="mujoco", jitter=0.3, units=2))
-    project = read(PAPER)
-    layout = lay_out(project.plain, project.product)
+    layout = read(PAPER).layout
     for seed in (3, 1, 3):
         shared = runner.run((("seed", seed),))
         alone = Simulation(layout, RunRequest("mujoco", units=2, seed=seed, jitter=0.3)).run()

@@ -19,7 +19,6 @@ from factory.support.progress import Waiting
 
 if TYPE_CHECKING:
     from factory.compiler.mating.findings import Matings
-    from factory.pipeline import Project
     from factory.study.checking import Checked
 
 SHOWN = 24
@@ -60,7 +59,7 @@ def check(
     writable(file, certificate)
     writable_folder(clashes)
     with Waiting("reading the shapes and proving", out.silent):
-        checked = check_net(file) if is_net(file) else check_project(project_of(given), wip)
+        checked = check_net(file) if is_net(file) else check_project(given.project(), wip)
     announced(checked.warnings, out)
     proved = None if against is None else _proved(against, checked)
     if clashes is not None:
@@ -114,15 +113,6 @@ def _pictures(checked: Checked, folder: Path) -> dict[Path, bytes]:
     if checked.no_grips:
         found |= grip_picture.pictures(folder, checked.no_grips, checked.product)
     return found
-
-
-def project_of(given: ProjectOptions) -> Project:
-    """The project of a command without options of motion. It reads settings only for relays, whose
-    number depends on the layout, and for hands. Raises InputError."""
-    from factory.pipeline import read
-
-    wanted = given.ground().relays or given.hands
-    return given.project() if wanted else read(given.file, given.folders)
 
 
 def _describe(checked: Checked, verbose: bool) -> None:

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import click
 
-from factory.commands.check import project_of
-from factory.commands.options import OUTPUT, RELAY, SOURCE
+from factory.commands.options import HANDS, OUTPUT, RELAY, SOURCE
 from factory.commands.requests import OutputOptions, ProjectOptions
 from factory.support.console import emit, say
 from factory.support.errors import Diagnostic, InputError, did_you_mean
@@ -15,12 +14,13 @@ from factory.support.errors import Diagnostic, InputError, did_you_mean
 @SOURCE
 @click.option("--robot", help="Only this robot, as r3.")
 @RELAY
+@HANDS
 @OUTPUT
 def programs(given: ProjectOptions, out: OutputOptions, robot: str | None) -> int:
     """Print each robot's program, in the paper's form."""
     from factory.plant.programs import program_of, write_program
 
-    factory = project_of(given).factory
+    factory = given.project().factory
     names = [r.name for r in factory.robots]
     if robot is not None and robot not in names:
         hint = did_you_mean(robot, names, "robots")

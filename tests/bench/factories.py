@@ -8,7 +8,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import factory
+from factory.geometry.product import product_geometry
 from factory.layout.layout import Layout
+from factory.layout.request import Ground
 from factory.simulation.mujoco.courses import Course
 from factory.simulation.request import RunRequest
 from factory.simulation.simulation import Simulation
@@ -71,12 +73,13 @@ def robots_at_least(robots: int) -> str:
     return balanced(robots // 2 + 1)
 
 
-def laid_out(text: str) -> Layout:
+def laid_out(text: str, settings: Settings = DEFAULT) -> Layout:
     """A PAG's factory on its floor."""
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "product.pag"
         file.write_text(text)
-        return factory.lay_out(factory.compile(factory.load_pag(file)))
+        plan = factory.compile(factory.load_pag(file))
+        return Ground().lay_out(plan, product_geometry(plan.pag), settings)
 
 
 @dataclass(frozen=True)

@@ -19,6 +19,9 @@ from factory.support.errors import Diagnostic
 
 SIGNS = {True: "✓", False: "✗", None: "?"}
 
+LISTED = 8
+"""The most failures that are listed whose codes have been listed already."""
+
 
 def ending(cut: CutOff | None) -> str:
     """The notice of a run that was cut off; nothing of a whole one."""
@@ -245,9 +248,14 @@ def _judged(found: RecordedFidelity, cut: CutOff | None) -> Iterator[str]:
 
 
 def _listed(failures: Sequence[Diagnostic]) -> Iterator[str]:
-    """What is wrong with the bodies of a run."""
+    """What is wrong with the bodies of a run: the first failures, the first of each code, and how
+    many more there are."""
     if failures:
-        words = (escape(str(failure)) for failure in failures[:8])
+        first = {failure.code: failure for failure in reversed(failures)}.values()
+        chosen = [f for n, f in enumerate(failures) if n < LISTED or f in first]
+        words = [escape(str(failure)) for failure in chosen]
+        if len(failures) > len(chosen):
+            words.append(f"and {len(failures) - len(chosen)} more")
         yield "<ul class='violations'>" + "".join(f"<li>{w}</li>" for w in words) + "</ul>"
 
 
