@@ -51,11 +51,6 @@ def looked_at(layout: Layout, units: int = 3) -> tuple[Simulation, HiddenPenetra
     return simulation, hidden
 
 
-def deepest(hidden: HiddenPenetrations) -> float:
-    """The greatest depth [mm] of anything, a carriage's shoe on its rail left out."""
-    return max((p.depth_mm for p in hidden.found() if "shoe" not in "".join(p.geoms)), default=0.0)
-
-
 @pytest.mark.parametrize(
     "name",
     [
@@ -73,7 +68,7 @@ def test_what_holds_touches_and_goes_through_nothing(name: str) -> None:
     assert simulation.world.delivered() == 3
     assert figures.unintended_contacts == 0
     assert figures.grip_gap_max_mm is not None and figures.grip_gap_max_mm < GRIP_MM
-    assert deepest(hidden) < AT_MOST_MM
+    assert hidden.deepest() < AT_MOST_MM
 
 
 def test_without_hands_pins_are_far_off_and_inside_other_things() -> None:
@@ -81,7 +76,7 @@ def test_without_hands_pins_are_far_off_and_inside_other_things() -> None:
     simulation, hidden = looked_at(lay_out(plan, product_geometry(plan.pag)))
     figures = simulation.physical.figures()
     assert figures.grip_gap_max_mm is not None and figures.grip_gap_max_mm > GRIP_MM
-    assert deepest(hidden) > 10
+    assert hidden.deepest() > 10
 
 
 @pytest.mark.parametrize("axis", [0, 1, 2])
@@ -99,7 +94,7 @@ def test_a_hand_moved_by_2_mm_is_seen(axis: int) -> None:
         return  # along the face it still touches
     gap = simulation.physical.figures().grip_gap_max_mm
     assert gap is not None
-    assert gap > GRIP_MM or deepest(hidden) > AT_MOST_MM
+    assert gap > GRIP_MM or hidden.deepest() > AT_MOST_MM
 
 
 def test_pads_are_off_the_surface_by_the_air_between() -> None:

@@ -109,10 +109,7 @@ class InTheWay:
         waits = np.zeros((len(found), 1))
         for u, t in frames if len(found) else ():
             going = self._going_on(robot, kind, found, u, t)
-            crossing = self.apart.crossing(robot, found, u, t)
-            if kind == "above" and robot in self.holding.factory.strokes:
-                free["hands"] &= crossing == 0  # it goes up before it goes back, so it stays there
-            going[:, 0] = np.maximum(going[:, 0], crossing)
+            going[:, 0] = np.maximum(going[:, 0], self.apart.crossing(robot, found, u, t))
             waits = np.maximum(waits, going)
         return waits
 
@@ -124,6 +121,9 @@ class InTheWay:
         for u, t in frames:
             free["hands"] &= self.apart.own_side(robot, kind, found, u, t)
             free["hands"] &= ~_any(self.apart.carriers_hand(robot, kind, found, u, t), found)
+            if kind == "above" and robot in self.holding.factory.strokes:
+                # it goes up before it goes back, so it may stay there
+                free["hands"] &= self.apart.crossing(robot, found, u, t) == 0
         free["hands"] &= self.apart.over_fingers(kind, found)
         headings = dict.fromkeys((u, (abs(x), abs(y))) for u, (x, y) in frames)
         passing = [self._passing(robot, label, kind, found, u, t) for u, t in headings]
