@@ -4,8 +4,8 @@ Left out are pairs that are meant to be near: a part and what holds it, parts he
 parts whose robots are in one and the same active operation, robots on the floor, the output robot
 at the outfeed that it serves, bodies of one feeder or of the outfeed, sliders, which hand over, and
 spare copies. Hands, which reach between the parts, are also near those robots, feeders and parts
-that they meet in some operation, whenever that is: nothing but that they never touch is known of
-these, which `hidden_penetration_max_mm` measures."""
+that they meet at their carrier, or that deliver to the same one, whenever that is: nothing but that
+they never touch is known of these, which `hidden_penetration_max_mm` measures."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ import numpy as np
 
 from factory.control.mode import Array, Index, Truth
 from factory.layout.clearance import certify
-from factory.layout.layout import Layout
+from factory.layout.layout import Layout, carriers
 from factory.mjcf import names
 from factory.mjcf.shells import trunks
 from factory.study.fidelity.readings import ActiveWelds, Shadow
@@ -62,7 +62,7 @@ class Approaches:
         self.robot = _robots(words, [r.name for r in layout.factory.robots])
         self.hand = np.array([_is_hand(m.geom(geom).name) for geom in range(m.ngeom)])
         self.serves = _served(words, layout)
-        self.coupled = _coupled(layout)
+        self.on = np.array([*carriers(layout.factory), -2])
         self.operation = np.full(len(layout.factory.robots) + 1, -1)
         self.operations = layout.factory.operations
         self.least = np.full((5, 5), np.inf)
@@ -115,12 +115,13 @@ class Approaches:
 
     def _met(self, a: Index, b: Index) -> Truth:
         """Whether the robots of bodies (n,) and (n,), or of what holds them, or of the feeders that
-        do, have some operation in common."""
+        do, are carrier and guest, or guests of one carrier."""
         of_a, of_b = (
             np.where(self.welds.holder[body] >= 0, self.serves[self.welds.holder[body]], own)
             for body, own in ((a, self.serves[a]), (b, self.serves[b]))
         )
-        return np.isin(of_a * len(self.operation) + of_b, self.coupled)
+        on_a, on_b = self.on[of_a], self.on[of_b]
+        return np.asarray((of_a == of_b) | (on_a == of_b) | (on_b == of_a) | (on_a == on_b))
 
     def _keep(self, pairs: Index, dist: Array) -> None:
         for nearest in np.argsort(-dist):  # the nearest of a kind comes last, and is kept
@@ -166,14 +167,6 @@ def _served(bodies: list[str], layout: Layout) -> Index:
     for number, body in enumerate(bodies):
         found[number] = stations.get("/".join(body.split("/")[:2]), found[number])
     return found
-
-
-def _coupled(layout: Layout) -> Index:
-    """The pairs of robots that are in one operation, a robot and itself too: the index of the one
-    times that after the last, and the other's."""
-    count = len(layout.factory.robots) + 1
-    together = (operation.robots for operation in layout.factory.operations)
-    return np.array(sorted({a * count + b for robots in together for a in robots for b in robots}))
 
 
 def _robots(bodies: list[str], robots: list[str]) -> Index:
