@@ -72,6 +72,19 @@ def test_what_holds_touches_and_goes_through_nothing(name: str) -> None:
     assert hidden.deepest() < AT_MOST_MM
 
 
+def test_a_large_ball_is_held_at_its_surface(tmp_path: Path) -> None:
+    """What collides of it is round; its polytope, 0.5 % further out, is not what pads are put to."""
+    file = tmp_path / "balls.pag"
+    file.write_text(
+        "root = two; two = mate(one, other);"
+        "one = atomic(sphere = 0.2); other = atomic(sphere = 0.2, pos = (0.45, 0, 0))"
+    )
+    simulation, hidden = looked_at(factory.lay_out(factory.compile(factory.load_pag(file))), 1)
+    figures = simulation.physical.figures()
+    assert figures.grip_gap_max_mm is not None and 0.0 < figures.grip_gap_max_mm < GRIP_MM
+    assert hidden.deepest() < AT_MOST_MM
+
+
 def test_without_hands_pins_are_inside_other_things() -> None:
     """And they hold nothing: no robot has a pad then whose gap is measured."""
     plan = factory.compile(factory.load_pag(EXAMPLES / "lamp.pag"))

@@ -49,6 +49,9 @@ def _within(body: Body, points: Array, radius: Array, side: tuple[int, int], lea
     """How far out one body reaches within discs about points (n, 3), or less where that is no
     further than `least`; -inf for nowhere."""
     axis, way = side
+    if body.ball:
+        half = body.dome(points, axis, radius)
+        return np.where(half < 0, -np.inf, way * (body.low + body.high)[axis] / 2 + half)
     across = [a for a in range(3) if a != axis]
     at = points[:, across]
     edges = body.edges[(way * body.edges[:, :, axis]).max(axis=1) > least]

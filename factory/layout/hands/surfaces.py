@@ -17,7 +17,7 @@ import numpy as np
 from factory.compiler.mating.depth import polytope
 from factory.control.mode import Index, Truth
 from factory.geometry.meshes import Array
-from factory.geometry.solids import Product
+from factory.geometry.solids import Product, Solid
 
 Way = tuple[float, float]
 """A direction of the world in the plane."""
@@ -50,11 +50,21 @@ class Faces:
 
 @dataclass(frozen=True, eq=False)
 class Body:
-    """A convex body: its box `low`, `high` (3,) and its `vertices` (n, 3) [m]."""
+    """A convex body: its box `low`, `high` (3,) and its `vertices` (n, 3) [m]; those of a `ball`
+    are of a polytope round it, and not looked at."""
 
     low: Array
     high: Array
     vertices: Array = field(repr=False)
+    ball: bool = False
+
+    @classmethod
+    def of(cls, solid: Solid) -> Iterator[Body]:
+        """Those that a solid is made of."""
+        ball = solid.kind == "sphere"
+        for piece in solid.pieces:
+            low, high = (solid.low, solid.high) if ball else (piece.min(axis=0), piece.max(axis=0))
+            yield cls(low, high, piece, ball)
 
     @cached_property
     def faces(self) -> tuple[Array, Array]:
@@ -100,9 +110,23 @@ class Body:
         axis, way = side
         return way * float((self.high if way > 0 else self.low)[axis])
 
+    def dome(self, points: Array, axis: int, near: Array | float = 0.0) -> Array:
+        """How far out of its middle a ball is along an axis, at the points (n,) of discs across
+        that about some (n, 3) that are nearest to it, of radii `near` (n,) [m]; -1 for nowhere."""
+        across = [a for a in range(3) if a != axis]
+        middle, radius = (self.low + self.high) / 2, float((self.high - self.low)[axis]) / 2
+        away = np.maximum(np.hypot(*(points - middle)[:, across].T) - near, 0.0)
+        return np.where(away > radius, -1.0, np.sqrt(np.maximum(radius**2 - away**2, 0.0)))
+
     def crossed(self, points: Array, axis: int) -> tuple[Array, Array]:
         """From where to where lines along an axis through points (n, 3), which are within its box
         across it, are inside (n,); (inf, -inf) where a line passes it by."""
+        if self.ball:
+            half = self.dome(points, axis)
+            middle = (self.low + self.high)[axis] / 2
+            return np.where(half < 0, np.inf, middle - half), np.where(
+                half < 0, -np.inf, middle + half
+            )
         beside, back, out = self.facing[axis]
         at = points[:, [a for a in range(3) if a != axis]]
         inside = (beside.room(at) >= -FLAT).all(axis=1)
@@ -116,12 +140,7 @@ class Surfaces:
     """The bodies of a product's parts, and what lines through them meet."""
 
     def __init__(self, product: Product) -> None:
-        self.bodies = {
-            label: tuple(
-                Body(piece.min(axis=0), piece.max(axis=0), piece) for piece in solid.pieces
-            )
-            for label, solid in product.solids.items()
-        }
+        self.bodies = {label: tuple(Body.of(solid)) for label, solid in product.solids.items()}
 
     def boxes(self, parts: Iterable[str]) -> Array:
         """The boxes (n, 2, 3) of the bodies of some parts."""
