@@ -26,11 +26,13 @@ from factory.layout.relaying import relayed
 from factory.layout.relaying.relaying import Room as RoomForLanes
 from factory.layout.relaying.splitting import split
 from factory.layout.relaying.ways import ways
+from factory.modes.modes import operation_modes, robot_limits
 from factory.nets.verify import verify
 from factory.pipeline import read
 from factory.plant.factory import Operation
 from factory.problem.robot_types import load_catalogue
 from factory.support.settings import Settings
+from factory.timing.prediction import operation_delays, predict
 from tests.bench.factories import cube
 from tests.command_line import ROOT, Terminal
 from tests.test_hands import AT_MOST_MM, GRIP_MM, deepest, looked_at
@@ -111,7 +113,7 @@ def runs_clean(layout: Layout) -> None:
 
 
 def test_relays_with_hands_are_faster_and_go_through_nothing() -> None:
-    before, after = plain(sawn(6)), with_relays(6)
+    before, after = plain(sawn(1)), with_relays(1)
     assert len(hand_overs(after)) == 2
     assert verify(after.factory.net).holds and certify(after).holds
     pace = Pace.of(SETTINGS)
@@ -120,14 +122,26 @@ def test_relays_with_hands_are_faster_and_go_through_nothing() -> None:
 
 
 def test_a_slower_cycle_takes_fewer_relays() -> None:
-    before, fast = plain(sawn(6)), with_relays(6)
-    slow, pace = relayed(before, SETTINGS, 4.5), Pace.of(SETTINGS)
+    before, fast = plain(sawn(0)), with_relays(0)
+    slow, pace = relayed(before, SETTINGS, 4.2), Pace.of(SETTINGS)
     assert 0 < len(hand_overs(slow)) < len(hand_overs(fast))
     cycles = [max(gear_times(layout, pace)) for layout in (fast, slow, before)]
-    assert cycles[0] < cycles[1] <= 4.5 < cycles[2]
+    assert cycles[0] < cycles[1] <= 4.2 < cycles[2]
     for relay in hand_overs(slow):
         label = relay.label.partition(".")[0]
         assert relay.position == slow.factory.by_label[label].position
+
+
+def test_no_more_relays_than_the_outfeed_has_use_for() -> None:
+    """A second relay would make the gears faster, but the outfeed takes as long as they do."""
+    layout = with_relays(6)
+    limits, _ = robot_limits(layout, SETTINGS, 0, 0.0)
+    modes = operation_modes(layout, SETTINGS.eps)
+    delays = operation_delays(layout, modes, limits, SETTINGS, "mujoco")
+    assert len(hand_overs(layout)) == 1
+    found = predict(layout, delays, SETTINGS, "mujoco")
+    assert found.bottleneck == "outfeed"
+    assert found.seconds == pytest.approx(max(gear_times(layout, Pace.of(SETTINGS))), rel=0.01)
 
 
 def test_a_chain_of_relays_goes_through_nothing() -> None:

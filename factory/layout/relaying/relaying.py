@@ -10,7 +10,6 @@ from __future__ import annotations
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, replace
 
-from factory.control.profile import SpeedProfile
 from factory.lang.template_reader import load_templates
 from factory.layout.clearance import certify
 from factory.layout.dimensions import Clearance
@@ -19,6 +18,7 @@ from factory.layout.embedding import certified
 from factory.layout.hands.choosing import Hands
 from factory.layout.layout import Layout, Point2
 from factory.layout.optimising import optimised
+from factory.layout.outfeed import away
 from factory.layout.relaying.splitting import split
 from factory.layout.relaying.ways import Way, ways
 from factory.plant.factory import Robot
@@ -127,12 +127,11 @@ class _Search:
     def times(self, layout: Layout) -> list[float]:
         """How long the gear of each robot takes [s]; of the output robot's, how long the outfeed
         does where that is longer."""
-        pace, settings = Pace.of(self.settings), self.settings
+        pace = Pace.of(self.settings)
         found = gear_times(layout, pace)
-        tray = SpeedProfile(settings.outfeed, settings.outfeed_acceleration)
         dropoff = layout.factory.dropoff.index
         way = layout.home(0, dropoff) - layout.goal(dropoff, 0)
-        outfeed = pace.rest(way) + pace.lost + 2 * (tray.rest(layout.outfeed_way) + settings.tick)
+        outfeed = pace.rest(way) + pace.lost + away(layout, self.settings)
         found[0] = max(found[0], outfeed)
         return found
 

@@ -12,13 +12,13 @@ import numpy as np
 from factory.control.mode import Array, Limits, Mode
 from factory.control.profile import SpeedProfile, World, mode_time
 from factory.layout.layout import Layout
+from factory.layout.outfeed import away, leaving
 from factory.modes.modes import operation_modes, operation_starts, robot_limits
 from factory.modes.staging import HeadStart, staged, stages_of
 from factory.plant.factory import Factory
 from factory.simulation.starting import start_positions
 from factory.support.settings import Settings
 from factory.timing.prediction import waits_for_hands, way_time
-from factory.timing.serving import away, leaving
 
 AT_ONCE = 1e6
 """A factor on a speed that leaves only the acceleration as a bound."""
