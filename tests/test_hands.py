@@ -73,7 +73,7 @@ def test_what_holds_touches_and_goes_through_nothing(name: str) -> None:
 
 
 def test_a_large_ball_is_held_at_its_surface(tmp_path: Path) -> None:
-    """What collides of it is round; its polytope, 0.5 % further out, is not what pads are put to."""
+    """What collides is round; its polytope, 0.5 % further out, is not what pads are put to."""
     file = tmp_path / "balls.pag"
     file.write_text(
         "root = two; two = mate(one, other);"
