@@ -101,6 +101,16 @@ def test_a_way_ends_at_the_distance_at_rest(d: float, v: float, a: float, part: 
     assert -1e-12 <= half <= d + 1e-9 and speed <= v + 1e-12
 
 
+@settings(max_examples=100, deadline=None)
+@given(st.floats(0.001, 5.0), st.floats(0.05, 2.0), st.floats(0.2, 9.0), st.floats(0.0, 1.0))
+def test_a_place_is_passed_where_a_robot_has_gone_so_far(
+    d: float, v: float, a: float, part: float
+) -> None:
+    profile = SpeedProfile(v, a)
+    way, _ = profile.gone(d, profile.passes(d, part * d))
+    assert way == pytest.approx(part * d, abs=1e-9)
+
+
 def test_waiting_takes_no_time_but_its_dwell() -> None:
     limits = Limits(np.ones(2), np.ones(2))
     assert mode_time(Mode.still(2), np.array([3.0, 4.0]), limits) == 0.0

@@ -14,7 +14,7 @@ from factory.layout.layout import Layout
 from factory.simulation.disturbance import Gain, Mass, Noise, Push, disturb
 from factory.simulation.disturbance.interventions import Interventions
 from factory.simulation.mujoco import outfeed
-from factory.simulation.mujoco.courses import Follower
+from factory.simulation.mujoco.courses import AHEAD, Follower
 from factory.simulation.mujoco.fast import neighbours, strides
 from factory.simulation.mujoco.world import MujocoWorld
 from factory.simulation.run import Event, PhysicsFigures
@@ -332,8 +332,8 @@ def test_what_forgets_something_does_not(
 
 @pytest.mark.parametrize("name", ["chest", "fence", "20"])
 def test_a_call_lasts_until_something_asks_for_the_supervisor(name: str) -> None:
-    """Something fires, a mode may have come to its goal, a stride is over, or the tray is under
-    way."""
+    """Something fires, a mode may have come to its goal, a stride is over, the tray is under way,
+    or a part or hand that is waited for may have come or gone."""
     simulation = ready(name)
     supervisor, world = simulation.supervisor, simulation.physical
     for_a_reason, tray = True, False
@@ -344,6 +344,21 @@ def test_a_call_lasts_until_something_asks_for_the_supervisor(name: str) -> None
         before, tray = tray, world.motion.outfeed.moves
         stride_is_over = not world.motion.robots.left
         for_a_reason = stride_is_over or supervisor.near or before or tray
+        for_a_reason |= world.supplied or _may_be_gone(world)
+
+
+def _may_be_gone(world: MujocoWorld) -> bool:
+    """Whether all hands that some operation waits for may be gone, as far as references say."""
+    at = world.motion.robots.x
+    held = world._away._held.values()
+    return any(all(at[one.axis] >= one.least - AHEAD for one in awaited) for awaited in held)
+
+
+def test_a_hand_that_goes_unseen_is_seen_late(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Planted fault: courses go on where a hand that is waited for may have gone."""
+    singly = traced(ready("chest"), 1)
+    monkeypatch.setattr(Follower, "until", lambda self, axis, least: self.left)
+    assert not traced(ready("chest"), MOST).agrees(singly)
 
 
 def test_a_tray_that_comes_unseen_is_seen_late(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -123,6 +123,23 @@ def test_firings_are_seen_to_a_tick(paper: Layout) -> None:
     assert report.time_s > 0
 
 
+def test_setpoints_are_a_tick_old_at_most_though_something_ends_in_every_tick(
+    paper: Layout,
+) -> None:
+    """Else a robot that ends its operation where it came to in these ticks would seem to be where
+    it was before them, and then to leave from there."""
+    simulation = Simulation(paper, RunRequest())
+    monitor, tick = beside(simulation), simulation.request.settings.tick
+    first, drives = monitor.view.look().kept(), monitor.anatomy.drive
+    for number in range(1, 9):
+        ctrl = first.ctrl.copy()
+        ctrl[drives] += 1e-3 * number
+        time = first.time + 0.9 * tick * number
+        monitor.motion.look(replace(first, time=time, ctrl=ctrl, at_end=True))
+        before = first.ctrl[drives] + 1e-3 * (number - 1)
+        assert monitor.motion.now.s == pytest.approx(before, abs=1e-12)
+
+
 def test_robots_that_lower_what_they_bring_are_explained() -> None:
     layout = factory.lay_out(read(ROOT / "examples" / "gearbox.pag").plain)
     lifts = [r for r in layout.factory.robots if r.type == "lift"]

@@ -5,10 +5,14 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
 import pytest
 
 from factory.control.mode import Array, Truth
 from factory.control.navigation import Bundle
+from factory.simulation.mujoco.feeders import Feeders
+from factory.simulation.mujoco.hands_away import HandsAway
+from factory.simulation.mujoco.world import MujocoWorld
 from factory.simulation.request import RunRequest
 from factory.simulation.simulation import Simulation
 from factory.support.settings import Settings
@@ -47,8 +51,19 @@ def test_no_question_need_be_asked_twice(name: str, given: dict[str, Any]) -> No
 
 
 @pytest.mark.parametrize(("name", "given"), RUNS)
-def test_nothing_is_asked_while_nothing_changes(name: str, given: dict[str, Any]) -> None:
-    """But when something has fired, or the outfeed's tray has gone or come home."""
+def test_nothing_is_asked_while_nothing_changes(
+    name: str, given: dict[str, Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """But when something has fired, the outfeed's tray has gone or come home, a part that is waited
+    for comes down or is about to be there, or a hand that is waited for has gone."""
+    changed, tend, gone = list[str](), Feeders.tend, HandsAway.gone
+
+    def told(what: str, change: bool) -> bool:
+        changed.extend([what] * change)
+        return change
+
+    monkeypatch.setattr(Feeders, "tend", lambda self: told("part", tend(self)))
+    monkeypatch.setattr(HandsAway, "gone", lambda self: told("hand", gone(self)))
     simulation = Simulation(layout_of(name), RunRequest(units=6, **given))
     supervisor, world = simulation.supervisor, simulation.world
     asked, ticks = set(), 0
@@ -59,11 +74,19 @@ def test_nothing_is_asked_while_nothing_changes(name: str, given: dict[str, Any]
 
     world.hooks.gates.append(gate)
     while world.delivered() < 4:
+        due = _due(world)
         supervisor.step()
         ticks += 1
+        told("there", due <= world.time + 1e-6)
         assert world.time < LONG
     changes = len({event.t for event in supervisor.events}) + 2 * world.delivered()
-    assert len(asked) <= changes + 1 < ticks / 2
+    assert len(asked) <= changes + len(changed) + 1 < ticks / 2
+    assert ("hand" in changed) is (name in ("chest", "truck"))
+
+
+def _due(world: Any) -> float:
+    """When a part that is waited for is about to be there [s]; never in the ideal world."""
+    return world.parts.feeders.due if isinstance(world, MujocoWorld) else np.inf
 
 
 @pytest.mark.parametrize("world", ["ideal", "mujoco"])

@@ -81,6 +81,17 @@ class SpeedProfile:
             return distance - a * left * left / 2, a * left
         return peak * (time - gaining / 2) + start * gaining / 2, peak
 
+    def passes(self, distance: float, way: float) -> float:
+        """The time [s] at which a robot passes `way` [m] on its way over `distance`, from rest to
+        rest."""
+        a, peak = self.acceleration, self._peak(distance, 0.0)
+        left, ramp = distance - way, peak * peak / (2 * a)
+        if way <= ramp:
+            return sqrt(2 * way / a)
+        if left <= ramp:
+            return self.rest(distance) - sqrt(2 * left / a)
+        return (way + ramp) / peak
+
     def _peak(self, distance: float, start: float) -> float:
         """The greatest speed on the way."""
         v, a = self.speed, self.acceleration

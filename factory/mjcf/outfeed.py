@@ -17,7 +17,7 @@ from factory.mjcf import names
 from factory.mjcf.elements import add, add_station
 from factory.mjcf.masks import masks_of, tray_code
 from factory.mjcf.robots import MOTOR, Drive, add_inertia
-from factory.mjcf.stops import shutter_stops, tray_stops
+from factory.mjcf.stops import robot_room, shutter_stops, tray_stops
 
 TRAY_MASS = 4.0
 """Mass of the empty tray [kg]."""
@@ -154,12 +154,14 @@ def _add_table(world: Element, layout: Layout) -> None:
 
 def _slot(layout: Layout) -> tuple[float, float, float] | None:
     """The slot through which the output robot's hand comes up to the product, about the product's
-    middle: how far it reaches, and its sides [m]; None where the hand is not below."""
+    middle: how far it reaches, as far as the robot can be pushed, and its sides [m]; None where the
+    hand is not below."""
     path, hand = layout.guidepaths[0], layout.hand(0)
     upright = [limb for limb in limbs(layout, 0) if limb.name.endswith(("column", "pad"))]
     if hand is None or hand.kind != "below":
         return None
     ends = max(limb.high[0] for limb in upright) - path.reach + SLOT
+    ends += robot_room(layout.clearance).stop
     low = min(limb.low[1] for limb in upright) + path.offset - SLOT
     return ends, low, max(limb.high[1] for limb in upright) + path.offset + SLOT
 

@@ -13,7 +13,7 @@ from types import MappingProxyType
 import numpy as np
 
 from factory.control.mode import Limits, Mode
-from factory.control.profile import World, mode_time
+from factory.control.profile import SpeedProfile, World, mode_time
 from factory.layout.hands.leaving import Leaving, going_on
 from factory.layout.layout import Layout
 from factory.modes.modes import operation_starts
@@ -61,31 +61,26 @@ def ways_ahead(
     }
 
 
-def waits_for_hands(
-    layout: Layout, delays: Sequence[float], limits: Limits, settings: Settings
-) -> dict[tuple[int, int], float]:
-    """The time [s] from the end of a carrier's operation to that of its next one, where that waits
-    for hands to be clear of what they have delivered, by the carrier and the operation to come.
-    They set out at once."""
-    found: dict[tuple[int, int], float] = {}
-    for robot in layout.factory.robots:
-        for number, leaving in going_on(layout, robot.index, later=False).items():
-            gone = max(_gone(layout, one, limits) for one in leaving) + 2 * settings.tick
-            found[robot.index, number] = gone + delays[number]
-    return found
+def waits_for_hands(layout: Layout, limits: Limits) -> dict[tuple[int, int], float]:
+    """The time [s] from the end of a carrier's operation to the start of its next one, where that
+    waits for hands to be clear of what they have delivered, by the carrier and the operation to
+    come. They set out at once; the tick after the end is that of the delay before."""
+    return {
+        (robot.index, number): max(_gone(layout, one, limits) for one in leaving)
+        for robot in layout.factory.robots
+        for number, leaving in going_on(layout, robot.index, later=False).items()
+    }
 
 
 def _gone(layout: Layout, leaving: Leaving, limits: Limits) -> float:
-    """How long an axis takes to be clear, from rest [s]: it goes on from there."""
-    own = limits.of((leaving.axis,))
-    speed, acceleration = float(own.speed[0]), float(own.acceleration[0])
-    way, rising = leaving.least, leaving.axis >= len(layout.factory.robots)
-    if not rising:
-        way -= layout.guidepaths[leaving.axis].reach
-    gaining = speed / acceleration
-    if way < speed * gaining / 2:
-        return float(np.sqrt(2 * way / acceleration))
-    return gaining + (way - speed * gaining / 2) / speed
+    """How long an axis takes to be clear, from rest [s]: a robot on its way home, a lift up."""
+    own, axis = limits.of((leaving.axis,)), leaving.axis
+    profile = SpeedProfile(float(own.speed[0]), float(own.acceleration[0]))
+    lift = axis - len(layout.factory.robots)
+    if lift >= 0:
+        return profile.passes(layout.factory.strokes[layout.lifts[lift]], leaving.least)
+    path = layout.guidepaths[axis]
+    return profile.passes(path.length - path.reach, leaving.least - path.reach)
 
 
 def all_ways(
@@ -99,8 +94,8 @@ def all_ways(
     """The ways ahead, and in MuJoCo the waits for hands, which the ideal world has not."""
     found = ways_ahead(stages, limits, settings, world)
     if world == "mujoco":
-        for key, seconds in waits_for_hands(layout, delays, limits, settings).items():
-            found[key] = max(seconds, found.get(key, 0.0))
+        for key, seconds in waits_for_hands(layout, limits).items():
+            found[key] = max(seconds + delays[key[1]], found.get(key, 0.0))
     return found
 
 

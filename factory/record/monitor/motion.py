@@ -47,19 +47,22 @@ class Tolerance:
 
 @dataclass(frozen=True, slots=True)
 class _State:
-    """Positions `x` [m], speeds `v` [m/s] and setpoints `s` [m] of all robots (R,) at time `t`."""
+    """Positions `x` [m], speeds `v` [m/s] and setpoints `s` [m] of all robots (R,) at time `t`;
+    `shown`: the setpoints that were seen then, where `s` are those of a tick before."""
 
     t: float
     x: Array = field(repr=False)
     v: Array = field(repr=False)
     s: Array = field(repr=False)
+    shown: Array = field(repr=False)
     at_end: bool = False
 
     @classmethod
     def of(cls, anatomy: Anatomy, seen: Observation) -> _State:
         """That in an observation."""
         x, v = seen.qpos[anatomy.slide], seen.qvel[anatomy.dof]
-        return cls(seen.time, x, v, seen.ctrl[anatomy.drive], seen.at_end)
+        s = seen.ctrl[anatomy.drive]
+        return cls(seen.time, x, v, s, s, seen.at_end)
 
 
 class _Setpoints:
@@ -102,7 +105,7 @@ class AxisMotion:
         self.before, self.now, t = self.now, _State.of(self.anatomy, seen), seen.time
         if seen.at_end and t - self.before.t <= self.rest.tick:
             # within a tick, a robot that runs its own program has its setpoints written ahead
-            self.now = replace(self.now, s=self.before.s)
+            self.now = replace(self.now, s=self.before.shown)
         else:
             off, before = np.abs(self.now.s - self.spot), np.abs(self.before.s - self.spot)
             self.setpoints.look(off > before, t)

@@ -113,6 +113,15 @@ class Follower:
         """Whether the course is over, near a goal."""
         return self.course is not None and self.over and self.course.near
 
+    def until(self, axis: int, least: float) -> int:
+        """How many ticks of the course are to come until the reference of an axis is so far [m] or
+        further; all that are left where it never is."""
+        if self.course is None or axis not in self.axes:
+            return self.left
+        slot = int(np.flatnonzero(self.axes == axis)[0])
+        there = self.course.x[self._at :, slot] >= least
+        return int(there.argmax()) if there.any() else self.left
+
     def begin(self, axes: Index, course: Course) -> None:
         """Let axes follow a course from now on."""
         self.axes, self.course, self._at = axes, course, 0

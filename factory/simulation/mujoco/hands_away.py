@@ -1,29 +1,51 @@
-"""Hands that operations wait for: whether they are clear of what is about to move."""
+"""Hands that operations wait for: whether they are clear of what is about to move, and how soon."""
 
 from __future__ import annotations
 
-import numpy as np
+from collections.abc import Iterable
 
 from factory.control.mode import Index
-from factory.layout.hands.leaving import leavings
+from factory.layout.hands.leaving import Leaving, leavings
 from factory.layout.layout import Layout
 from factory.plant.factory import Operation
+from factory.simulation.mujoco.courses import AHEAD, Follower
 from factory.support.engine import mujoco
 
 
 class HandsAway:
-    """The axes of robots, `qpos` (axes,) of their addresses, and what each operation waits for.
-
-    `waiting`: whether an operation has been held up since this was last asked.
-    """
+    """The axes of robots, `qpos` (axes,) of their addresses, and what each operation waits for."""
 
     def __init__(self, d: mujoco.MjData, layout: Layout, qpos: Index) -> None:
         self._d, self._qpos, self._leavings = d, qpos, leavings(layout)
-        self.waiting = False
+        self._held: dict[int, tuple[Leaving, ...]] = {}
 
     def hold_up(self, operation: Operation) -> bool:
         """Whether a hand is still in the way of what an operation moves."""
         awaited = self._leavings.get(operation.index, ())
-        waits = bool(np.any([self._d.qpos[self._qpos[a.axis]] < a.least for a in awaited]))
-        self.waiting |= waits
-        return waits
+        if not awaited:
+            return False
+        if left := self._in_the_way(awaited):
+            self._held[operation.index] = left
+        else:
+            self._held.pop(operation.index, None)
+        return bool(left)
+
+    def soonest(self, robots: Follower) -> int:
+        """How many ticks of their course are to come until one that was held up may go on; where
+        none of them may, all, and at least one. 0 where none was held up."""
+        waits = (
+            max(robots.until(one.axis, one.least - AHEAD) for one in awaited)
+            for awaited in self._held.values()
+        )
+        return max(min(waits), 1) if self._held else 0
+
+    def gone(self) -> bool:
+        """Whether one that was held up may go on: it is to be asked for again."""
+        over = [number for number, left in self._held.items() if not self._in_the_way(left)]
+        for number in over:
+            del self._held[number]
+        return bool(over)
+
+    def _in_the_way(self, awaited: Iterable[Leaving]) -> tuple[Leaving, ...]:
+        at = self._d.qpos
+        return tuple(one for one in awaited if at[self._qpos[one.axis]] < one.least)

@@ -94,10 +94,7 @@ class Motion:
         a course; gives how many."""
         ticks = min(ticks, self.stepping.at_once)
         if bundle is not None:
-            if not self.robots.left:
-                self._plan(bundle)
-                if self.outfeed.moves:  # its courses end with those of the robots
-                    self.outfeed.follower.course = None
+            self.plan_robots(bundle)
             ticks = min(ticks, self.robots.left)
         ticks = 1 if self.outfeed.loading else self.move_tray(ticks)
         self.outfeed.loading = False
@@ -127,6 +124,13 @@ class Motion:
         elif not outfeed.moves and follower.course is not None:
             follower.stop(outfeed.axes)
             self.sleep.may_sleep(outfeed.axes)
+
+    def plan_robots(self, bundle: Bundle) -> None:
+        """The next stride of the active modes begins where one is over."""
+        if not self.robots.left:
+            self._plan(bundle)
+            if self.outfeed.moves:  # its courses end with those of the robots
+                self.outfeed.follower.course = None
 
     def _plan(self, bundle: Bundle) -> None:
         """The next stride of the active modes. The load of each robot is that of its operation."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from factory.control.mode import Truth
+from factory.control.mode import STILL, Truth
 from factory.control.profile import SpeedProfile
 from factory.mjcf import names
 from factory.mjcf.model import Model
@@ -27,12 +27,11 @@ class Passing:
         factory, layout = model.factory, model.layout
         carriers = [leaf.carrier for leaf in factory.leaves]
         joints = [m.joint(names.slide(factory.robots[robot].name)).id for robot in carriers]
-        self._d, self._address = d, m.jnt_qposadr[joints]
+        self._d, self._address, self._dof = d, m.jnt_qposadr[joints], m.jnt_dofadr[joints]
         self._home = np.array([layout.guidepaths[robot].length for robot in carriers])
         self._clear = self._home - [layout.passing(leaf) for leaf in factory.leaves]
-        hands = (layout.hand(robot) for robot in carriers)
+        hands = [layout.hand(robot) for robot in carriers]
         self._kinds = ["none" if hand is None else hand.kind for hand in hands]
-        hands = (layout.hand(robot) for robot in carriers)
         self._first = np.array([hand is not None and hand.first for hand in hands], bool)
         settings = request.settings
         fastest = settings.speed * (1 + request.jitter)
@@ -48,9 +47,9 @@ class Passing:
 
     def clear(self) -> Truth:
         """Whether each robot (n,) is so far away with its part that the next can come down; or, if
-        its hand has to be there first, is at home without one."""
-        at = self._d.qpos[self._address]
-        home = ~self.holds & (at >= self._home - HOME)
+        its hand has to be there first, rests at home without one."""
+        at, still = self._d.qpos[self._address], np.abs(self._d.qvel[self._dof]) < STILL
+        home = ~self.holds & still & (at >= self._home - HOME)
         return np.asarray(np.where(self._first, home, ~self.holds | (at <= self._clear)))
 
     def soonest(self, number: int) -> float:

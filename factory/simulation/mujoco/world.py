@@ -99,7 +99,8 @@ class MujocoWorld:
         if not self.hooks.admit(operation, unit) or self._away.hold_up(operation):
             return False
         if operation.label in self.parts.feeders.welds:
-            return self.parts.feeders.presents(operation.label, unit, self.time)
+            now = self.time + ROUNDED * self.model.settings.tick
+            return self.parts.feeders.presents(operation.label, unit, now)
         if operation.index != self.model.factory.dropoff.index:
             return True
         outfeed = self.motion.outfeed
@@ -131,17 +132,22 @@ class MujocoWorld:
         as many as are asked for, but not past the end of a course. Whether any mode may have come
         to its goal: no robot is far ahead of its reference, nor at rest before that is."""
         motion = self.motion
-        if self._away.waiting:  # it is asked for again after every tick
-            self._away.waiting, self.supplied, ticks = False, True, 1
         if axes is not motion.active:
             motion.turn(axes)
             self._look()
         if bundle is None:
             ticks = min(ticks, self.model.settings.stride - self._unseen)
+        else:
+            motion.plan_robots(bundle)
+        if wait := self._away.soonest(motion.robots):
+            ticks = min(ticks, wait)
         left = (self.parts.feeders.due - self.time) / self.model.settings.tick
         if left < ticks:
             ticks = max(1, ceil(left - ROUNDED))
-        self._settle(motion.step(bundle, ticks))
+        passed = motion.step(bundle, ticks)
+        self._settle(passed)
+        if wait and passed == wait:
+            self.supplied |= self._away.gone()
         return motion.robots.near
 
     def move(self, axes: Index, x: Array, v: Array, a: Array) -> None:

@@ -119,6 +119,8 @@ def timed_net(timing: Timing, change: Change = AS_IT_IS, wip: int | None = None)
     ways = dict(zip(went, range(len(tokens), len(tokens) + len(went)), strict=True))
     seconds = [*timing.changed(change)]
     seconds += [*[0.0] * (len(tokens) - len(seconds)), *went.values()]
+    for waiting, gone in timing.waits(change).items():
+        seconds[waiting] = gone
     moving = with_ways(replace(subject, tokens=tuple(tokens)), factory, ways)
     tokens, places = list(moving.tokens), list(moving.net.places)
     back = [(f"station {factory.operations[n].label}", n, 0.0) for n in _alone(timing, change)]
@@ -157,7 +159,7 @@ def _gears(
         slowest = list(gear.places)
         for step, number in enumerate(robot.operations):
             way = ways.get((robot.index, number), number)
-            if seconds[way] > seconds[number]:
+            if way != number and seconds[way] > seconds[gear.places[2 * step]] + seconds[number]:
                 slowest[2 * step], slowest[2 * step + 1] = way, NONE
         places = tuple(p for p in slowest if p != NONE)
         found.append(

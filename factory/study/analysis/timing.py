@@ -84,19 +84,23 @@ class Timing:
         return staged(self.left, self.stages)
 
     def ways(self, change: Change = AS_IT_IS) -> dict[tuple[int, int], float]:
-        """The time [s] of a robot to go ahead to an operation, or of a carrier to wait for hands
-        and do it, by (robot, operation)."""
-        found = {
+        """The time [s] of a robot to go ahead to an operation, by (robot, operation)."""
+        return {
             (stage.robot, stage.operation): self._way(stage, stage.start, change)
             for stage in self.stages
         }
-        if self.world == "mujoco":
-            count = len(self.factory.robots)
-            robots = [*range(count), *self.layout.lifts]
-            limits = self._limits(range(len(robots)), robots, change)
-            waits = waits_for_hands(self.layout, self.changed(change), limits, self.settings)
-            for key, seconds in waits.items():
-                found[key] = max(seconds, found.get(key, 0.0))
+
+    def waits(self, change: Change = AS_IT_IS) -> dict[int, float]:
+        """How long a carrier waits at least, for hands that have delivered to it to be gone [s], by
+        the place in which it waits; nowhere in the ideal world, which has no hands."""
+        if self.world == "ideal":
+            return {}
+        robots = [*range(len(self.factory.robots)), *self.layout.lifts]
+        limits = self._limits(range(len(robots)), robots, change)
+        found = {}
+        for (robot, number), gone in waits_for_hands(self.layout, limits).items():
+            step = self.factory.robots[robot].operations.index(number)
+            found[self.factory.net.gears[robot].places[2 * step]] = gone
         return found
 
     @cached_property
