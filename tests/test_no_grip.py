@@ -120,6 +120,9 @@ def test_without_hands_nothing_is_listed_or_drawn(run: Terminal, tub: Path, out:
     bare = run("check", tub, "--no-hands", "--clashes", out, "--json").json
     assert "no_grips" not in bare and bare["warnings"] == []
     assert not list(out.iterdir())
+    tub.with_name("factory.toml").write_text("hands = 0\n")
+    assert "no_grips" not in run("check", tub, "--json").json
+    assert run("check", tub, "--hands", "--json").json["no_grips"]
     stool = run("check", ROOT / "examples" / "stool.pag", "--clashes", out, "--json")
     assert stool.json["no_grips"] == [] and not list(out.iterdir())
 
