@@ -26,7 +26,7 @@ from factory.support.settings import Settings
 class HeadStart:
     """The way of a robot ahead of one of its operations: the `mode` that moves one `axis` of it
     alone, its carriage or its lift, to the goal of its `slot` there, and where it `starts` in the
-    long run [m]."""
+    long run [m]; whether it `follows` another of the same operation, that of its lift."""
 
     robot: int
     operation: int
@@ -34,6 +34,7 @@ class HeadStart:
     mode: Mode = field(repr=False)
     start: float
     axis: int
+    follows: bool = False
 
     @property
     def goal(self) -> float:
@@ -58,7 +59,9 @@ def stages(layout: Layout, modes: Sequence[Mode]) -> tuple[HeadStart, ...]:
         clear = all(map(mode.clear_from, (start, homes)))
         for slot, robot in enumerate(operation.robots):
             if rises_first(layout, robot):
-                found += _rising(layout, operation, mode, robot)
+                found += _rising(
+                    layout, operation, mode, slot, float(start[slot]), awaited.get(robot)
+                )
                 continue
             goal, hand = float(mode.goals[slot]), layout.hand(robot)
             ahead = clear and operation.awaits_empty(slot) and mode.gate[slot] < 0
@@ -71,14 +74,20 @@ def stages(layout: Layout, modes: Sequence[Mode]) -> tuple[HeadStart, ...]:
     return tuple(found)
 
 
-def _rising(layout: Layout, operation: Operation, mode: Mode, robot: int) -> Iterator[HeadStart]:
-    """The way up of a lift before the first operation of its robot."""
-    if layout.factory.robots[robot].operations[0] == operation.index:
-        axis = len(layout.factory.robots) + layout.lifts.index(robot)
-        slot = layout.factory.axes[operation.index].index(axis)
-        goal = float(mode.goals[slot])
-        stage = _ahead(operation, mode, slot, goal, 0.0)
-        yield replace(stage, robot=robot, axis=axis)
+def _rising(
+    layout: Layout, operation: Operation, mode: Mode, slot: int, start: float, awaited: float | None
+) -> Iterator[HeadStart]:
+    """The way up of a lift before the first operation of its robot, and after that the way back
+    from its `start` to where the robot is `awaited`, if it is."""
+    robot = operation.robots[slot]
+    if layout.factory.robots[robot].operations[0] != operation.index:
+        return
+    axis = len(layout.factory.robots) + layout.lifts.index(robot)
+    raised = layout.factory.axes[operation.index].index(axis)
+    stage = _ahead(operation, mode, raised, float(mode.goals[raised]), 0.0)
+    yield replace(stage, robot=robot, axis=axis)
+    if awaited is not None and abs(start - awaited) > ROUNDING:
+        yield replace(_ahead(operation, mode, slot, awaited, start), follows=True)
 
 
 def _ahead(operation: Operation, mode: Mode, slot: int, goal: float, start: float) -> HeadStart:

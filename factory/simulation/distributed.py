@@ -119,7 +119,9 @@ class DistributedSupervisor:
     ) -> None:
         self.factory, self.world, self.timestep, self.ticks = factory, world, timestep, ticks
         count = len(factory.operations)
-        self.stages = {(s.robot, s.operation): (n, s) for n, s in enumerate(stages, start=count)}
+        self.stages: dict[tuple[int, int], list[tuple[int, HeadStart]]] = {}
+        for number, stage in enumerate(stages, start=count):
+            self.stages.setdefault((stage.robot, stage.operation), []).append((number, stage))
         axes_of = [*factory.axes, *((stage.axis,) for stage in stages)]
         self.bundles = Bundles([*modes, *(stage.mode for stage in stages)], axes_of, limits)
         self.random = np.random.default_rng([seed, 7])
@@ -199,13 +201,14 @@ class DistributedSupervisor:
 
     def _may_enter(self, process: Process, step: ProgramStep) -> bool:
         """Every other robot of the operation has finished all that it does before this, and shows
-        what it must bring; the world is prepared; all are in the domain."""
+        what it must bring; its carrier has begun, or it is the carrier, for which the world is
+        prepared; all are in the domain."""
         operation, link = step.operation, process.link
         if not all(link.waits(robot, label) for robot, label in step.until):
             return False
         if link.has_started():
             return True
-        if step.is_carrier and not self.world.prepared(operation, process.unit):
+        if not step.is_carrier or not self.world.prepared(operation, process.unit):
             return False
         return bool(self._bundle(operation).in_domain(link.state()[0])[0])
 
@@ -237,21 +240,18 @@ class DistributedSupervisor:
     def _go_ahead(self, process: Process, step: ProgramStep) -> None:
         """While it waits, a robot may go where it is needed next; it reads no other robot's state
         for that."""
-        found = self.stages.get((process.program.robot, step.operation.index))
-        if found is None:
-            return
-        number, stage = found
-        dt, mine = process.period * self.timestep, np.flatnonzero(process.axes == stage.axis)
-        at, speed = process.reference[mine], process.speed[mine]
-        there = abs(at[0] - stage.goal) < ROUNDING or stage.is_past(float(at[0]))
-        if there and abs(speed[0]) < ROUNDING:
-            if process.goes_ahead:
-                self._stop(process)
-                process.goes_ahead = False
-            return
-        process.goes_ahead = True
-        bundle, _ = self.bundles.of((number,))
-        self._drive(process, mine, bundle.field(at + speed * dt / 2, dt))
+        for number, stage in self.stages.get((process.program.robot, step.operation.index), ()):
+            dt, mine = process.period * self.timestep, np.flatnonzero(process.axes == stage.axis)
+            at, speed = process.reference[mine], process.speed[mine]
+            there = abs(at[0] - stage.goal) < stage.mode.eps or stage.is_past(float(at[0]))
+            if not there or abs(speed[0]) >= ROUNDING:
+                process.goes_ahead = True
+                bundle, _ = self.bundles.of((number,))
+                self._drive(process, mine, bundle.field(at + speed * dt / 2, dt))
+                return
+        if process.goes_ahead:
+            self._stop(process)
+            process.goes_ahead = False
 
     def _drive(self, process: Process, mine: Index, wanted: Array) -> None:
         """One tick of a robot's own axes towards the `wanted` speeds [m/s]."""

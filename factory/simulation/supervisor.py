@@ -37,28 +37,35 @@ class Active:
 
 class Ahead:
     """The stages of robots that go ahead while they wait, numbered after the operations: by the
-    operation that each is `of`, and by the one that it is `after`; `place`: where each is."""
+    operation that each is `of`, and by the one that it is `after`; `place`: where each is; `then`:
+    the one that follows another."""
 
     def __init__(self, factory: Factory, stages: Sequence[HeadStart]) -> None:
         count = len(factory.operations)
         self.of: list[list[int]] = [[] for _ in range(count)]
         self.after: list[list[int]] = [[] for _ in range(count)]
         self.place: dict[int, int] = {}
+        self.then: dict[int, int] = {}
         self._stages = dict(enumerate(stages, start=count))
         for number, stage in enumerate(stages, start=count):
             gear = factory.robots[stage.robot].operations
             step = gear.index(stage.operation)
             self.of[stage.operation].append(number)
-            self.after[gear[step - 1]].append(number)
+            if stage.follows:
+                self.then[number - 1] = number
+            else:
+                self.after[gear[step - 1]].append(number)
             self.place[number] = factory.net.gears[stage.robot].places[2 * step]
 
     def waiting(self, marked: bytearray, x: Array) -> list[int]:
         """Those of robots that wait where a run starts, with its axes at `x`, and have a way to
         go."""
+        past = {n: stage.is_past(float(x[stage.axis])) for n, stage in self._stages.items()}
         return [
             number
             for number, stage in self._stages.items()
-            if marked[self.place[number]] and not stage.is_past(float(x[stage.axis]))
+            if marked[self.place[number]] and not past[number]
+            if not stage.follows or past[number - 1]
         ]
 
 
@@ -197,8 +204,11 @@ class Supervisor:
     def _going_ahead(self, started: list[int], ended: list[int], over: list[int]) -> list[int]:
         """The stages under way from now on: those that were, and have neither come to their goal
         nor been overtaken by their operation, and those of robots that begin to wait."""
-        gone = {*over, *(number for o in started for number in self.ahead.of[o])}
+        overtaken = {number for o in started for number in self.ahead.of[o]}
+        gone = overtaken.union(over)
         going = [number for number in self.active.ahead if number not in gone]
+        then = (self.ahead.then[number] for number in over if number in self.ahead.then)
+        going += [number for number in then if number not in overtaken]
         return going + [number for o in ended for number in self.ahead.after[o]]
 
     def _activate(self, operations: Iterable[int], ahead: Iterable[int]) -> None:

@@ -7,14 +7,14 @@ the drives settle within eps besides.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from types import MappingProxyType
 
 import numpy as np
 
 from factory.control.mode import Limits, Mode
 from factory.control.profile import SpeedProfile, World, mode_time
-from factory.layout.hands.leaving import Leaving, going_on
+from factory.layout.hands.leaving import Leaving, going_on, raised, rises_first
 from factory.layout.layout import Layout
 from factory.modes.modes import operation_starts
 from factory.modes.staging import HeadStart, staged
@@ -53,12 +53,21 @@ def ways_ahead(
 ) -> dict[tuple[int, int], float]:
     """The time [s] from the end of a robot's operation until it is where it has gone ahead to, by
     the robot and the operation to come. It sets out at once."""
-    return {
-        (stage.robot, stage.operation): way_time(
-            stage, stage.start, limits.of((stage.axis,)), settings, world
-        )
+    return one_after_the_other(
+        (stage, way_time(stage, stage.start, limits.of((stage.axis,)), settings, world))
         for stage in ahead
-    }
+    )
+
+
+def one_after_the_other(
+    ways: Iterable[tuple[HeadStart, float]],
+) -> dict[tuple[int, int], float]:
+    """The times of ways ahead [s] by robot and operation: a robot goes back when its lift is up."""
+    found: dict[tuple[int, int], float] = {}
+    for stage, seconds in ways:
+        key = stage.robot, stage.operation
+        found[key] = found.get(key, 0.0) + seconds
+    return found
 
 
 def waits_for_hands(layout: Layout, limits: Limits) -> dict[tuple[int, int], float]:
@@ -79,8 +88,10 @@ def _gone(layout: Layout, leaving: Leaving, limits: Limits) -> float:
     lift = axis - len(layout.factory.robots)
     if lift >= 0:
         return profile.passes(layout.factory.strokes[layout.lifts[lift]], leaving.least)
-    path = layout.guidepaths[axis]
-    return profile.passes(path.length - path.reach, leaving.least - path.reach)
+    path, rises = layout.guidepaths[axis], 0.0
+    if rises_first(layout, axis):
+        rises = _gone(layout, raised(layout, axis), limits)
+    return rises + profile.passes(path.length - path.reach, leaving.least - path.reach)
 
 
 def all_ways(

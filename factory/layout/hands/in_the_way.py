@@ -121,9 +121,6 @@ class InTheWay:
         for u, t in frames:
             free["hands"] &= self.apart.own_side(robot, kind, found, u, t)
             free["hands"] &= ~_any(self.apart.carriers_hand(robot, kind, found, u, t), found)
-            if kind == "above" and robot in self.holding.factory.strokes:
-                # it goes up before it goes back, so it may stay there
-                free["hands"] &= self.apart.crossing(robot, found, u, t) == 0
         free["hands"] &= self.apart.over_fingers(kind, found)
         headings = dict.fromkeys((u, (abs(x), abs(y))) for u, (x, y) in frames)
         passing = [self._passing(robot, label, kind, found, u, t) for u, t in headings]

@@ -1,8 +1,9 @@
 """Hands that have to be gone before what they have delivered goes on.
 
 Most hands let go of a payload that can then leave at once. Where something of it would meet the
-hand on its way, its carrier waits for the hand to be clear. The hand's robot goes home, or raises
-its lift, as soon as it has let go, whatever comes next, so the wait ends.
+hand on its way, or another hand would that comes to the station, its carrier waits for the hand to
+be clear. The hand's robot raises its lift, or goes home as far as it has to, as soon as it has let
+go, whatever comes next, so the wait ends.
 """
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from factory.layout.hands.limbs import grip_box
+from factory.layout.hands.meeting import meetings
 from factory.layout.layout import Layout
 from factory.problem.pag import NOPART
 
@@ -40,7 +42,7 @@ def leavings(layout: Layout) -> dict[int, tuple[Leaving, ...]]:
             found.setdefault(number, []).extend(leaving)
         first = found.setdefault(robot.operations[0], [])
         if rises_first(layout, robot.index):
-            first.append(_up(layout, robot.index))
+            first.append(raised(layout, robot.index))
         hand = layout.hand(robot.index)
         if hand is not None and hand.tall:
             first += [
@@ -52,7 +54,7 @@ def leavings(layout: Layout) -> dict[int, tuple[Leaving, ...]]:
 
 def going_on(layout: Layout, carrier: int, later: bool = True) -> dict[int, tuple[Leaving, ...]]:
     """For each operation (index) of a carrier the hands that have delivered to it in the one
-    before, or `later` in any before, and must be clear of what is there."""
+    before, or `later` in any before, and must be clear of what is there or comes there."""
     found: dict[int, list[Leaving]] = {}
     gear = layout.factory.robots[carrier].operations
     for guest, _, onward in _delivering(layout, carrier):
@@ -62,6 +64,9 @@ def going_on(layout: Layout, carrier: int, later: bool = True) -> dict[int, tupl
             if back:
                 awaited = found.setdefault(gear[(step + number) % len(gear)], [])
                 awaited.append(_gone(layout, guest, back))
+    for number, guest, back in meetings(layout, carrier):
+        if later or _follows(layout, carrier, guest) == number:
+            found.setdefault(number, []).append(_back(layout, guest, back))
     return {number: tuple(leaving) for number, leaving in found.items()}
 
 
@@ -79,20 +84,32 @@ def _delivering(layout: Layout, carrier: int) -> Iterator[tuple[int, str, int]]:
                 yield guest, operation.label, gear[(step + 1) % len(gear)]
 
 
+def _follows(layout: Layout, carrier: int, guest: int) -> int:
+    """The operation (index) of a carrier after that in which a robot delivers to it."""
+    gear = layout.factory.robots[carrier].operations
+    delivers = layout.factory.robots[guest].operations[-1]
+    return gear[(gear.index(delivers) + 1) % len(gear)]
+
+
 def awaited_positions(layout: Layout) -> dict[int, float]:
     """Where robots go as soon as they have let go, since what they have delivered waits for that:
     clear of it; and home those whose hands have to be there before what they take, unless others
     could be where a tall hand comes to."""
     found: dict[int, float] = {}
-    factory = layout.factory
+    factory, backs = layout.factory, [0.0] * len(layout.factory.robots)
+    for carrier in factory.robots if layout.hands else ():
+        for _, guest, back in meetings(layout, carrier.index):
+            backs[guest] = max(backs[guest], back)
     for robot, hand in enumerate(layout.hands):
         if hand is None or hand.kind == "none":
             continue
         first = factory.operations[factory.robots[robot].operations[0]]
         if hand.first and not (first.inputs and hand.tall):
             found[robot] = layout.guidepaths[robot].length
-        elif hand.waits and not rises_first(layout, robot):
-            clear = _gone(layout, robot, hand.clear).least + ON
+            continue
+        back = max(backs[robot], 0.0 if rises_first(layout, robot) else hand.clear)
+        if back:
+            clear = _back(layout, robot, back).least + ON
             found[robot] = min(clear, layout.guidepaths[robot].length)
     return found
 
@@ -110,7 +127,7 @@ def rises_first(layout: Layout, robot: int) -> bool:
     return hand is not None and hand.kind == "above" and robot in layout.factory.strokes
 
 
-def _up(layout: Layout, robot: int) -> Leaving:
+def raised(layout: Layout, robot: int) -> Leaving:
     """When a robot's lift is up."""
     axis = len(layout.factory.robots) + list(layout.lifts).index(robot)
     return Leaving(axis, layout.factory.strokes[robot] - SPARE)
@@ -119,8 +136,11 @@ def _up(layout: Layout, robot: int) -> Leaving:
 def _gone(layout: Layout, robot: int, back: float) -> Leaving:
     """When a robot's hand is clear of what it has to go back from by so much [m], or its lift is
     up."""
-    if rises_first(layout, robot):
-        return _up(layout, robot)
+    return raised(layout, robot) if rises_first(layout, robot) else _back(layout, robot, back)
+
+
+def _back(layout: Layout, robot: int, back: float) -> Leaving:
+    """When a robot has gone back by so much [m]."""
     path = layout.guidepaths[robot]
     return Leaving(robot, min(path.reach + back + SPARE, path.length - SPARE))
 
@@ -129,5 +149,4 @@ def _gone_behind(layout: Layout, robot: int, label: str) -> Leaving:
     """When all of a robot's hand has gone back behind a sub-assembly."""
     path, grip = layout.guidepaths[robot], grip_box(layout, robot)
     assert grip is not None
-    back = max(0.0, grip[1] - path.frame(layout.payloads[label])[0])
-    return Leaving(robot, min(path.reach + back + SPARE, path.length - SPARE))
+    return _back(layout, robot, max(0.0, grip[1] - path.frame(layout.payloads[label])[0]))

@@ -18,7 +18,7 @@ from factory.modes.staging import HeadStart, staged, stages_of
 from factory.plant.factory import Factory
 from factory.simulation.starting import start_positions
 from factory.support.settings import Settings
-from factory.timing.prediction import waits_for_hands, way_time
+from factory.timing.prediction import one_after_the_other, waits_for_hands, way_time
 
 AT_ONCE = 1e6
 """A factor on a speed that leaves only the acceleration as a bound."""
@@ -85,10 +85,9 @@ class Timing:
 
     def ways(self, change: Change = AS_IT_IS) -> dict[tuple[int, int], float]:
         """The time [s] of a robot to go ahead to an operation, by (robot, operation)."""
-        return {
-            (stage.robot, stage.operation): self._way(stage, stage.start, change)
-            for stage in self.stages
-        }
+        return one_after_the_other(
+            (stage, self._way(stage, stage.start, change)) for stage in self.stages
+        )
 
     def waits(self, change: Change = AS_IT_IS) -> dict[int, float]:
         """How long a carrier waits at least, for hands that have delivered to it to be gone [s], by
@@ -107,18 +106,17 @@ class Timing:
     def first_ways(self) -> Mapping[tuple[int, int], float]:
         """The same from where robots stand at the beginning, for those that set out then [s]."""
         positions = start_positions(self.layout, self.factory.net.initial_marking)
-        return MappingProxyType(
-            {
-                (stage.robot, stage.operation): self._way(stage, positions[stage.robot], AS_IT_IS)
-                for stage in self.stages
-                if self.factory.robots[stage.robot].operations[0] == stage.operation
-            }
+        ways = (
+            (stage, self._way(stage, positions[stage.axis], AS_IT_IS))
+            for stage in self.stages
+            if self.factory.robots[stage.robot].operations[0] == stage.operation
         )
+        return MappingProxyType(one_after_the_other(ways))
 
     def _way(self, stage: HeadStart, start: float, change: Change) -> float:
         start = stage.goal + (start - stage.goal) * change.way.get(stage.robot, 1.0)
-        own = (stage.robot,)
-        return way_time(stage, start, self._limits(own, own, change), self.settings, self.world)
+        limits = self._limits((stage.axis,), (stage.robot,), change)
+        return way_time(stage, start, limits, self.settings, self.world)
 
     def _limits(self, axes: Sequence[int], robots: Sequence[int], change: Change) -> Limits:
         """The limits of axes, which are those of robots, with a change."""

@@ -1,0 +1,140 @@
+"""Hands that would meet at a station, where robots come to one carrier from either side, one after
+the other: how far the one goes back before the other comes.
+
+What robots that come at once have to do with each other is settled where hands are chosen
+(`apart.py`), and so is what a hand without a lift has to do with the parts that come later. One
+that is lifted goes up, and stays there over the station, unless something here makes it go back.
+"""
+
+from __future__ import annotations
+
+from bisect import bisect_left, bisect_right
+from collections.abc import Iterator
+
+import numpy as np
+
+from factory.geometry.meshes import Array
+from factory.layout.dimensions import PAYLOAD
+from factory.layout.hands.apart import BESIDE
+from factory.layout.hands.limbs import limbs
+from factory.layout.layout import Layout
+from factory.plant.factory import Operation
+from factory.problem.pag import NOPART
+
+FAR = 100.0
+"""As far as anything comes from [m]."""
+
+
+def meetings(layout: Layout, carrier: int) -> Iterator[tuple[int, int, float]]:
+    """The robots that have to go back after they have delivered to a carrier: an operation (index)
+    that has to wait for that, the robot, and how far it goes [m]."""
+    axis = 0 if layout.guidepaths[carrier].heading[0] else 1
+    gear = layout.factory.robots[carrier].operations
+    guests = [
+        (layout.guidepaths[robot].a[axis], operation, robot)
+        for operation, robot in _guests(layout, carrier)
+        if layout.hand(robot) is not None
+    ]
+    guests.sort(key=lambda guest: guest[0])
+    places, boxes = [at for at, _, _ in guests], [_boxes(layout, robot) for _, _, robot in guests]
+    beside = max((_breadth(layout, robot, axis) for _, _, robot in guests), default=0.0)
+    for (at, operation, robot), own in zip(guests, boxes, strict=True):
+        heading, lifted = layout.guidepaths[robot].heading, _is_lifted(layout, robot)
+        near = slice(bisect_left(places, at - beside), bisect_right(places, at + beside))
+        for _, later, other in guests[near]:
+            if later is not operation and layout.guidepaths[other].heading != heading:
+                coming = _coming(layout, other, carrier if lifted else -1)
+                if back := _back(own, coming, heading):
+                    yield later.index, robot, back
+        if lifted and (back := _back(own, _going(layout, carrier, operation), heading)):
+            yield gear[(gear.index(operation.index) + 1) % len(gear)], robot, back
+
+
+def _guests(layout: Layout, carrier: int) -> Iterator[tuple[Operation, int]]:
+    """The robots that deliver to a carrier, each with the operation in which it does."""
+    for number in layout.factory.robots[carrier].operations:
+        operation = layout.factory.operations[number]
+        if operation.carrier == carrier:
+            for robot, label in zip(operation.robots, operation.before, strict=True):
+                if robot != carrier and label != NOPART:
+                    yield operation, robot
+
+
+def _breadth(layout: Layout, robot: int, axis: int) -> float:
+    """How broad a robot's hand and payload are together along an axis across its way [m]."""
+    box = layout.payloads[layout.factory.delivered(robot)]
+    hand = _boxes(layout, robot)[:, :, axis] - layout.guidepaths[robot].a[axis]
+    return 2 * float(max(abs(hand).max(initial=0.0), -box[2 * axis], box[2 * axis + 1]))
+
+
+def _is_lifted(layout: Layout, robot: int) -> bool:
+    hand = layout.hand(robot)
+    return hand is not None and hand.kind == "above" and robot in layout.factory.strokes
+
+
+def _boxes(layout: Layout, robot: int, at: float | None = None, up: float | None = None) -> Array:
+    """The boxes (n, 2, 3) of a robot's hand in the world, where it delivers or `at` an arc length
+    [m], and with its lift `up`, all the way if that is not said."""
+    path = layout.guidepaths[robot]
+    (x, y), (u, v) = path.carriage(path.reach if at is None else at), path.heading
+    stroke = layout.factory.strokes.get(robot, 0.0) if up is None else up
+    found = []
+    for limb in limbs(layout, robot):
+        ends = np.array([limb.low, limb.high])
+        rise = stroke * limb.lifted
+        plan = np.array([x, y]) + ends[:, :1] * [u, v] + ends[:, 1:2] * [-v, u]
+        low, high = plan.min(axis=0), plan.max(axis=0)
+        found.append([[*low, ends[0, 2] + rise], [*high, ends[1, 2] + rise]])
+    return np.array(found).reshape(-1, 2, 3)
+
+
+def _coming(layout: Layout, robot: int, carrier: int = -1) -> Array:
+    """What the hand of a robot sweeps as it comes to its station, up or down; and what it brings,
+    where that is to be added on a `carrier`."""
+    down, raised = _boxes(layout, robot, up=0.0), _boxes(layout, robot)
+    found = [np.stack([down[:, 0], raised[:, 1]], axis=1)]
+    path, product = layout.guidepaths[robot], layout.product
+    if carrier >= 0:
+        label = layout.factory.delivered(robot)
+        parts = [product.solids[part] for part in layout.factory.contents[label]]
+        boxes = np.array([[part.low, part.high] for part in parts]) - product.middle
+        boxes[:, :, :2] += path.a
+        over = PAYLOAD + layout.elevations[carrier] + product.middle[2] - product.low[2]
+        boxes[:, :, 2] += over
+        boxes[:, 1, 2] += layout.factory.strokes.get(robot, 0.0)
+        found.append(boxes)
+    swept = np.concatenate(found)
+    return _onward(swept, (-path.heading[0], -path.heading[1]))
+
+
+def _going(layout: Layout, carrier: int, operation: Operation) -> Array:
+    """What the tall hand of a carrier sweeps as it goes on from an operation."""
+    hand = layout.hand(carrier)
+    if hand is None or not hand.tall:
+        return np.zeros((0, 2, 3))
+    at = layout.goal(operation.index, operation.robots.index(carrier))
+    down, raised = (_boxes(layout, carrier, at, up) for up in (0.0, None))
+    swept = np.stack([down[:, 0], raised[:, 1]], axis=1)
+    return _onward(swept, layout.guidepaths[carrier].heading)
+
+
+def _onward(boxes: Array, way: tuple[float, float]) -> Array:
+    """Boxes, drawn out along a way of the world."""
+    found = boxes.copy()
+    for axis, along in enumerate(way):
+        if along:
+            found[:, 1 if along > 0 else 0, axis] += FAR * along
+    return found
+
+
+def _back(own: Array, others: Array, heading: tuple[float, float]) -> float:
+    """How far boxes (n, 2, 3) go back against a heading until they meet no others (m, 2, 3) [m]."""
+    axis = 0 if heading[0] else 1
+    beside = [a for a in range(3) if a != axis]
+    low = np.maximum(own[:, None, 0], others[None, :, 0])
+    high = np.minimum(own[:, None, 1], others[None, :, 1])
+    meets = (high - low > -BESIDE)[:, :, beside].all(axis=2) & (high - low > 0)[:, :, axis]
+    front = own[:, 1, axis] if heading[axis] > 0 else -own[:, 0, axis]
+    near = others[:, 0, axis] if heading[axis] > 0 else -others[:, 1, axis]
+    ways = np.where(meets, front[:, None] - near[None] + BESIDE, 0.0)
+    return round(float(ways.max(initial=0.0)), 6)
