@@ -35,7 +35,7 @@ from factory.support.settings import Settings
 from factory.timing.prediction import operation_delays, predict
 from tests.bench.factories import cube
 from tests.command_line import ROOT, Terminal
-from tests.test_hands import AT_MOST_MM, GRIP_MM, deepest, looked_at
+from tests.test_hands import AT_MOST_MM, GRIP_MM, looked_at
 from tests.test_relay import templates_of
 
 SETTINGS = Settings()
@@ -109,7 +109,7 @@ def runs_clean(layout: Layout) -> None:
     assert simulation.world.delivered() == 3
     assert figures.unintended_contacts == 0
     assert figures.grip_gap_max_mm is not None and figures.grip_gap_max_mm < GRIP_MM
-    assert deepest(hidden) < AT_MOST_MM
+    assert hidden.deepest() < AT_MOST_MM
 
 
 def test_relays_with_hands_are_faster_and_go_through_nothing() -> None:
@@ -187,7 +187,7 @@ def test_one_place_for_both_is_caught_by_certificate_and_run() -> None:
     assert any(names <= set(fault.robots) for fault in faults)
     simulation, hidden = looked_at(wrong, units=1)
     assert simulation.physical.figures().unintended_contacts
-    assert deepest(hidden) > AT_MOST_MM
+    assert hidden.deepest() > AT_MOST_MM
 
 
 def test_the_certificate_knows_what_goes_across() -> None:

@@ -13,6 +13,7 @@ from factory.layout.dimensions import BELT_GAP, FINGER_TOP, PAYLOAD, PLAY, TRAY,
 from factory.layout.guidepath import Box
 from factory.layout.hands.limbs import limbs
 from factory.layout.layout import Layout, Point2
+from factory.layout.standing import dip
 from factory.mjcf import names
 from factory.mjcf.elements import add, add_station
 from factory.mjcf.masks import masks_of, tray_code
@@ -59,7 +60,8 @@ def add_outfeed(
 
 
 def _add_tray(world: Element, actuator: Element, layout: Layout, drive: Drive) -> None:
-    """It touches the product that it holds by design, so it is masked as what it holds."""
+    """It touches the product that it holds by design, so it is masked as what it holds. It is as
+    much higher as a round bottom dips into its slot."""
     x, y = layout.guidepaths[0].a
     xlo, xhi, ylo, yhi = layout.payloads[layout.factory.pag.root]
     body = add(world, "body", name=names.OUTFEED_TRAY, pos=(x, y, 0), sleep="allowed")
@@ -68,16 +70,17 @@ def _add_tray(world: Element, actuator: Element, layout: Layout, drive: Drive) -
     add_inertia(joint, drive)
     tray_stops(layout).limit(joint)
     contype, conaffinity = masks_of(tray_code(layout.factory))
-    plate = xlo, xhi, ylo, yhi
-    for number, (at, half) in enumerate(_slotted(plate, _slot(layout)), 1):
+    plate, slot = (xlo, xhi, ylo, yhi), _slot(layout)
+    low, high = PAYLOAD - BELT_GAP - TRAY + 1e-4, PAYLOAD - BELT_GAP - 1e-4 + _dip(layout, slot)
+    for number, (at, half) in enumerate(_slotted(plate, slot), 1):
         add(
             body,
             "geom",
             name=names.OUTFEED_TRAY + (f"/{number}" if number > 1 else ""),
             type="box",
             mass=TRAY_MASS if number == 1 else 0,
-            pos=(*at, PAYLOAD - BELT_GAP - TRAY / 2),
-            size=(*_plate(*half), TRAY / 2 - 1e-4),
+            pos=(*at, (low + high) / 2),
+            size=(*_plate(*half), (high - low) / 2),
             contype=contype,
             conaffinity=conaffinity,
             material="tray",
@@ -164,6 +167,17 @@ def _slot(layout: Layout) -> tuple[float, float, float] | None:
     ends += robot_room(layout.clearance).stop
     low = min(limb.low[1] for limb in upright) + path.offset - SLOT
     return ends, low, max(limb.high[1] for limb in upright) + path.offset + SLOT
+
+
+def _dip(layout: Layout, slot: tuple[float, float, float] | None) -> float:
+    """How far the product dips into the tray's slot [m]."""
+    if slot is None:
+        return 0.0
+    (_, xhi, ylo, yhi), (end, low, high) = layout.payloads[layout.factory.pag.root], slot
+    x, y = layout.product.middle[:2].tolist()
+    beside = (1, y + low, -1, low - ylo), (1, y + high, 1, yhi - high), (0, x + end, 1, xhi - end)
+    plates = [(axis, at, way) for axis, at, way, room in beside if room > SLOT]
+    return dip(layout.product, plates)
 
 
 def _slotted(plate: Box, slot: tuple[float, float, float] | None) -> list[tuple[Point2, Point2]]:

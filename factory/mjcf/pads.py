@@ -26,6 +26,7 @@ class Pads:
 
     def __init__(self, m: mujoco.MjModel) -> None:
         self._m = m
+        self._receded = m.geom_user[:, 0] if m.nuser_geom else np.zeros(m.ngeom)
         trunk = trunks(m)[m.geom_bodyid]
         part = m.body_dofnum[trunk] == FREE
         geoms = np.flatnonzero(part & (m.geom_group != 1))
@@ -58,15 +59,18 @@ class Pads:
         return np.concatenate([self.solid[body] for body in bodies])
 
     def apart(self, d: mujoco.MjData, holder: int, geoms: Index) -> float:
-        """The least distance [m] of a holder's pads from some geoms, 0 where one is in the other.
+        """The least distance [m] of a holder's pads from what some geoms are of, whose faces may
+        have receded for an overlap (their number in the model is how far); 0 where one is in it.
         The nearest are tried first: spheres round geoms bound how near the others are."""
         m, least = self._m, FAR
         for pad in self.of[holder].tolist():
             far = np.linalg.norm(d.geom_xpos[geoms] - d.geom_xpos[pad], axis=1)
-            bound = far - m.geom_rbound[geoms] - m.geom_rbound[pad]
+            receded = self._receded[geoms]
+            bound = far - m.geom_rbound[geoms] - m.geom_rbound[pad] - receded
             for k in np.argsort(bound).tolist():
                 if max(bound[k], 0.0) >= least:
                     break
-                apart = mujoco.mj_geomDistance(m, d, pad, int(geoms[k]), least, None)
-                least = max(0.0, min(least, apart))
+                away = float(receded[k])
+                apart = mujoco.mj_geomDistance(m, d, pad, int(geoms[k]), least + away, None)
+                least = max(0.0, min(least, apart - away))
         return least

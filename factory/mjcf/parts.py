@@ -144,6 +144,7 @@ def _add_geoms(
             mesh=f"mesh/{inset_name(solid.mesh, n, depth)}" if solid.mesh else None,
             size=None if solid.mesh else tuple(half - depth for half in solid.size),
             group=3,
+            user=depth or None,
             **place,
             **masks,
         )

@@ -20,6 +20,7 @@ from factory.mjcf import names
 from factory.mjcf.shells import trunks
 from factory.study.fidelity.readings import ActiveWelds, Shadow
 from factory.study.fidelity.record import ClosestApproach
+from factory.support.engine import mujoco
 
 ROBOT, PART, FEEDER, OUTFEED, NONE = range(5)
 KINDS = ("robot", "part", "feeder", "outfeed")
@@ -43,12 +44,32 @@ def certified(layout: Layout) -> Array:
     return np.asarray(np.minimum(found, found.T))
 
 
+class Reaching:
+    """Hands that reach to what is at their carrier."""
+
+    def __init__(self, m: mujoco.MjModel, layout: Layout, welds: ActiveWelds) -> None:
+        self.welds = welds
+        self.hand = np.array([_is_hand(m.geom(geom).name) for geom in range(m.ngeom)])
+        self.serves = _served([m.body(body).name for body in range(m.nbody)], layout)
+        self.on = np.array([*carriers(layout.factory), -2])
+
+    def meant(self, geoms: Index, bodies: Index) -> Truth:
+        """Whether of pairs of geoms (n, 2), with their bodies (n, 2), one is of a hand, and their
+        robots, or those of what holds the bodies, or of the feeders that do, are carrier and guest,
+        or guests of one carrier."""
+        holder = self.welds.holder[bodies]
+        of = np.where(holder >= 0, self.serves[holder], self.serves[bodies])
+        (a, b), (on_a, on_b) = of.T, self.on[of].T
+        met = (a == b) | (on_a == b) | (on_b == a) | (on_a == on_b)
+        return np.asarray(self.hand[geoms].any(axis=1) & met)
+
+
 class Approaches:
     """The least distance for each pair of kinds, with the names of the two bodies."""
 
     def __init__(self, world: Any, layout: Layout, welds: ActiveWelds, shadow: Shadow) -> None:
         m = world.m
-        self.m, self.welds, self.shadow = m, welds, shadow
+        self.welds, self.shadow = welds, shadow
         self.certified, self.trunk = certified(layout), trunks(m)
         words = [m.body(i).name for i in range(m.nbody)]
         kinds = [names.kind(word) for word in words]
@@ -60,9 +81,7 @@ class Approaches:
             ]
         )
         self.robot = _robots(words, [r.name for r in layout.factory.robots])
-        self.hand = np.array([_is_hand(m.geom(geom).name) for geom in range(m.ngeom)])
-        self.serves = _served(words, layout)
-        self.on = np.array([*carriers(layout.factory), -2])
+        self.reaching = Reaching(m, layout, welds)
         self.operation = np.full(len(layout.factory.robots) + 1, -1)
         self.operations = layout.factory.operations
         self.least = np.full((5, 5), np.inf)
@@ -77,7 +96,7 @@ class Approaches:
         if not d.ncon:
             return
         geoms = d.contact.geom
-        pairs, dist = self.trunk[self.m.geom_bodyid[geoms]], d.contact.dist
+        pairs, dist = self.trunk[self.shadow.run_m.geom_bodyid[geoms]], d.contact.dist
         kinds = self.kind[pairs]
         nearer = np.flatnonzero(dist < self.least[kinds[:, 0], kinds[:, 1]])
         if not len(nearer):
@@ -85,8 +104,7 @@ class Approaches:
         if active != self._coupled:
             self._couple(active)
         pairs, dist = pairs[nearer], dist[nearer]
-        meant = self._meant(*pairs.T) | self.hand[geoms[nearer]].any(axis=1) & self._met(*pairs.T)
-        kept = np.logical_not(meant)
+        kept = ~(self._meant(*pairs.T) | self.reaching.meant(geoms[nearer], pairs))
         if kept.any():
             self._keep(pairs[kept], dist[kept])
 
@@ -99,7 +117,7 @@ class Approaches:
 
     def _meant(self, a: Index, b: Index) -> Truth:
         """Whether bodies (n,) and (n,) are meant to be near each other."""
-        root = self.m.body_rootid
+        root = self.shadow.run_m.body_rootid
         hold_a, hold_b = self.welds.holder[a], self.welds.holder[b]
         held = (hold_a >= 0) & (root[hold_a] == root[b]) | (hold_b >= 0) & (root[hold_b] == root[a])
         both = (hold_a >= 0) & (hold_b >= 0)
@@ -113,22 +131,15 @@ class Approaches:
         spare = (hold_a == 0) | (hold_b == 0)
         return np.asarray(held | together | joining | serving | own | spare)
 
-    def _met(self, a: Index, b: Index) -> Truth:
-        """Whether the robots of bodies (n,) and (n,), or of what holds them, or of the feeders that
-        do, are carrier and guest, or guests of one carrier."""
-        of_a, of_b = (
-            np.where(self.welds.holder[body] >= 0, self.serves[self.welds.holder[body]], own)
-            for body, own in ((a, self.serves[a]), (b, self.serves[b]))
-        )
-        on_a, on_b = self.on[of_a], self.on[of_b]
-        return np.asarray((of_a == of_b) | (on_a == of_b) | (on_b == of_a) | (on_a == on_b))
-
     def _keep(self, pairs: Index, dist: Array) -> None:
         for nearest in np.argsort(-dist):  # the nearest of a kind comes last, and is kept
             a, b = sorted(pairs[nearest], key=lambda body: int(self.kind[body]))
             i, j = int(self.kind[a]), int(self.kind[b])
             self.least[i, j] = self.least[j, i] = dist[nearest]
-            self.bodies[i, j] = (self.m.body(int(a)).name, self.m.body(int(b)).name)
+            self.bodies[i, j] = (
+                self.shadow.run_m.body(int(a)).name,
+                self.shadow.run_m.body(int(b)).name,
+            )
 
     def found(self) -> tuple[ClosestApproach, ...]:
         """The kinds of pairs that have come within the detection distance."""
