@@ -3,6 +3,7 @@ follow their setpoints."""
 
 from __future__ import annotations
 
+from collections import deque
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -24,6 +25,9 @@ LAG = 0.01
 
 LATENCY = 0.02
 """More than the time constant of a drive's position loop, 1/70 s [s]."""
+
+TINY = 1e-9
+"""Times no further apart are one [s]."""
 
 LATE = 0.2
 """A robot that lags for so long is stuck [s]: to brake from full speed takes as long."""
@@ -47,22 +51,19 @@ class Tolerance:
 
 @dataclass(frozen=True, slots=True)
 class _State:
-    """Positions `x` [m], speeds `v` [m/s] and setpoints `s` [m] of all robots (R,) at time `t`;
-    `shown`: the setpoints that were seen then, where `s` are those of a tick before."""
+    """Positions `x` [m], speeds `v` [m/s] and setpoints `s` [m] of all robots (R,) at time `t`."""
 
     t: float
     x: Array = field(repr=False)
     v: Array = field(repr=False)
     s: Array = field(repr=False)
-    shown: Array = field(repr=False)
     at_end: bool = False
 
     @classmethod
     def of(cls, anatomy: Anatomy, seen: Observation) -> _State:
         """That in an observation."""
         x, v = seen.qpos[anatomy.slide], seen.qvel[anatomy.dof]
-        s = seen.ctrl[anatomy.drive]
-        return cls(seen.time, x, v, s, s, seen.at_end)
+        return cls(seen.time, x, v, seen.ctrl[anatomy.drive], seen.at_end)
 
 
 class _Setpoints:
@@ -85,7 +86,8 @@ class AxisMotion:
     `spot`: where a robot stands, or goes to, arc lengths [m]; `way`: the direction in which it goes
     there, 0 where it stands; `ball`: how near to a spot it is there; `inside`: whether it is at
     rest there; `came` (2, R): between which times [s] it came to rest there, in its last stay;
-    `ended`: when its operation was seen to end [s]. `radius`: each robot's largest goal ball [m].
+    `ended`: when its operation was seen to end [s]; `written`: setpoints that were seen within a
+    tick, with the time, not counted yet. `radius`: each robot's largest goal ball [m].
     """
 
     def __init__(
@@ -99,14 +101,17 @@ class AxisMotion:
         self.came = np.full((2, len(radius)), first.time)
         self.ended = np.full(len(radius), -np.inf)
         self.setpoints = _Setpoints(len(radius), first.time)
+        self.written: deque[tuple[float, Array]] = deque()
 
     def look(self, seen: Observation) -> tuple[Index, Index, Index]:
         """The robots that now leave, that arrive, and that pass their target without stopping."""
         self.before, self.now, t = self.now, _State.of(self.anatomy, seen), seen.time
         if seen.at_end and t - self.before.t <= self.rest.tick:
             # within a tick, a robot that runs its own program has its setpoints written ahead
-            self.now = replace(self.now, s=self.before.shown)
+            self.written.append((t, self.now.s))
+            self.now = replace(self.now, s=self._tick_old(t))
         else:
+            self.written.clear()
             off, before = np.abs(self.now.s - self.spot), np.abs(self.before.s - self.spot)
             self.setpoints.look(off > before, t)
         now, gone = self.now, self.way != 0.0
@@ -127,6 +132,13 @@ class AxisMotion:
         passed = (self.way * away > self.ball).nonzero()[0]
         self.way[arrived] = 0.0
         return left.nonzero()[0], arrived, passed
+
+    def _tick_old(self, t: float) -> Array:
+        """The setpoints that were seen last a tick ago or before."""
+        found = self.before.s
+        while self.written[0][0] <= t - self.rest.tick + TINY:
+            found = self.written.popleft()[1]
+        return found
 
     def stand(self, robot: int, goal: float) -> None:
         """A robot has ended an operation: it stands at its goal, or where its setpoint is now."""
