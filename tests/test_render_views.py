@@ -12,7 +12,7 @@ from factory.mjcf import names
 from factory.mjcf.replica import Replica
 from factory.problem.pag import NOPART
 from factory.record.log import Log, LogWriter, read_log
-from factory.render.action import Action, action_of
+from factory.render.action import Action, action_of, shape_of
 from factory.render.camera import Framing, View, fit, orbit, overview, towards
 from factory.render.camerawork import Take
 from factory.render.fading import FAINT, Fading
@@ -24,6 +24,7 @@ from factory.render.subject import placed
 from factory.simulation.request import RunRequest
 from factory.simulation.simulation import Simulation
 from factory.support.engine import mujoco
+from tests.pag_texts import laid_out
 
 EXAMPLES = Path(__file__).parent.parent / "examples"
 
@@ -105,6 +106,18 @@ def test_lifts_are_seen_up_and_down(replica, action) -> None:
         pytest.skip("this factory has no lift")
     loads = action.robots[:, :, 2]
     assert np.ptp(loads, axis=1).max() > max(strokes)
+
+
+def test_a_fused_body_may_be_made_of_shells_alone() -> None:
+    """All its parts overlap what comes later, so each has a body of its own in it."""
+    layout = laid_out(
+        "root = all; all = mate(both, c); both = mate(a, b);"
+        "a = atomic(); b = atomic(pos = (0.05, 0, 0)); c = atomic(pos = (0.025, 0.02, 0))"
+    )
+    m = Simulation(layout, RunRequest(fuse=True)).physical.m
+    body = m.body(names.part("both", 1)).id
+    assert m.body_geomnum[body] == 0
+    assert np.ptp(shape_of(m, body), axis=0)[0] > 0.04
 
 
 def test_an_orbit_is_as_near_as_it_can_be_and_calm() -> None:

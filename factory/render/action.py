@@ -80,9 +80,9 @@ def _loads(m: mujoco.MjModel, d: mujoco.MjData) -> Iterator[tuple[Own, Array]]:
 
 
 def shape_of(m: mujoco.MjModel, body: int) -> Array:
-    """The corners of a body's box in its own frame."""
-    first = int(m.body_geomadr[body])
-    geoms = range(first, first + int(m.body_geomnum[body]))
+    """The corners of a body's box in its own frame, with its shells."""
+    of = m.geom_bodyid
+    geoms = np.flatnonzero((of == body) | (m.body_parentid[of] == body)).tolist()
     return box_of(
         np.concatenate([corners(m, g) @ rotation(m.geom_quat[g]).T + m.geom_pos[g] for g in geoms])
     )
