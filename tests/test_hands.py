@@ -21,13 +21,12 @@ from factory.layout.hands.leaving import awaited_positions, leavings
 from factory.layout.hands.limbs import limbs
 from factory.layout.hands.surfaces import Surfaces, hit, retreat, swept
 from factory.layout.layout import Layout
-from factory.layout.request import Ground
 from factory.mjcf import names
 from factory.mjcf.pads import Pads
 from factory.simulation.request import RunRequest
 from factory.simulation.simulation import Simulation
+from factory.simulation.watched import watched
 from factory.study.fidelity.hidden import HiddenPenetrations
-from factory.support.settings import Settings
 
 EXAMPLES = Path(factory.__file__).parent.parent / "examples"
 AT_MOST_MM = 0.1
@@ -41,7 +40,7 @@ GRIP_MM = 0.5
 def with_hands(name: str) -> Layout:
     """An example laid out with hands."""
     plan = factory.compile(factory.load_pag(EXAMPLES / f"{name}.pag"))
-    return Ground().lay_out(plan, product_geometry(plan.pag), Settings(hands=1))
+    return factory.lay_out(plan)
 
 
 def looked_at(layout: Layout, units: int = 3) -> tuple[Simulation, HiddenPenetrations]:
@@ -112,6 +111,21 @@ def test_a_hand_moved_by_2_mm_is_seen(axis: int) -> None:
     gap = simulation.physical.figures().grip_gap_max_mm
     assert gap is not None
     assert gap > GRIP_MM or hidden.deepest() > AT_MOST_MM
+
+
+@pytest.mark.parametrize("way", [-2e-3, 2e-3])
+def test_a_run_fails_by_the_name_of_what_a_moved_hand_does(way: float) -> None:
+    """Each hand of the paper's example in turn: away from what it holds, and into it."""
+    layout = with_hands("paper")
+    for robot, hand in enumerate(layout.hands):
+        if hand is None:
+            continue
+        moved = replace(hand, places=tuple((x, y, z + way) for x, y, z in hand.places))
+        hands = tuple(moved if r == robot else h for r, h in enumerate(layout.hands))
+        simulation = Simulation(replace(layout, hands=hands), RunRequest(jitter=0.3, shown=False))
+        run = watched(simulation, (), 60.0)
+        codes = {failure.code for failure in run.verdict.failures}
+        assert codes & ({"GripGap"} if way < 0 else {"Contact", "Dropped"}), (robot, codes)
 
 
 def test_pads_are_off_the_surface_by_the_air_between() -> None:

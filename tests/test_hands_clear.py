@@ -10,10 +10,11 @@ import pytest
 from scipy.spatial import ConvexHull
 
 from factory.layout.dimensions import FINGER_TOP, PAYLOAD
+from factory.layout.hands import leaving
 from factory.layout.hands.apart import LEVEL, HandsApart
 from factory.layout.hands.hand import BEAM, Hand
 from factory.layout.hands.holding import Holding
-from factory.layout.hands.limbs import grip_box, limbs
+from factory.layout.hands.limbs import limbs
 from factory.layout.hands.outermost import outermost
 from factory.layout.hands.places import Places
 from factory.layout.hands.surfaces import Body
@@ -21,8 +22,8 @@ from factory.layout.layout import Layout
 from factory.pipeline import read
 from factory.simulation.request import RunRequest
 from factory.simulation.simulation import Simulation
+from factory.simulation.watched import watched
 from factory.study.fidelity.hidden import HiddenPenetrations
-from factory.support.settings import Settings
 
 AT_MOST_MM = 0.1
 
@@ -101,11 +102,22 @@ p8 = atomic ( cylinder = ( 0.005, 0.06 ), pos = ( -0.009, 0.014, 0.0715 ) );
 """What is brought beside a hand has 3 mm less way than it would have to wait behind a mast."""
 
 
+BOX = """root = r; r = mate ( a, b ); a = mate ( low, left, right, front, rear, lid );
+low = atomic ( box = (0.06, 0.06, 0.01), pos = (0, 0, 0.005) );
+left = atomic ( box = (0.01, 0.06, 0.03), pos = (-0.025, 0, 0.025) );
+right = atomic ( box = (0.01, 0.06, 0.03), pos = (0.025, 0, 0.025) );
+front = atomic ( box = (0.0398, 0.01, 0.03), pos = (0, -0.025, 0.025) );
+rear = atomic ( box = (0.0398, 0.01, 0.03), pos = (0, 0.025, 0.025) );
+lid = atomic ( box = (0.06, 0.06, 0.01), pos = (0, 0, 0.045) );
+b = atomic ( box = (0.03, 0.03, 0.02), pos = (0.06, 0, 0.01) )"""
+"""Walls that are lowered one after the other, by robots from either side."""
+
+
 def laid_out(text: str, folder: Path) -> Layout:
     """A product laid out with hands."""
     file = folder / "product.pag"
     file.write_text(text)
-    return read(file, (), Settings(hands=1)).layout
+    return read(file).layout
 
 
 @pytest.mark.parametrize("what", sorted(PARTS))
@@ -119,13 +131,27 @@ def test_hands_meet_nothing(what: str, tmp_path: Path) -> None:
     assert max(deep, default=0.0) < AT_MOST_MM
 
 
+@pytest.mark.parametrize("distributed", [False, True])
+def test_hands_from_either_side_wait_for_each_other(distributed: bool, tmp_path: Path) -> None:
+    asked = RunRequest(units=3, jitter=0.3, seed=1, distributed=distributed)
+    run = watched(Simulation(laid_out(BOX, tmp_path), asked), (), 60.0)
+    assert run.succeeded, run.verdict.failures
+    assert run.products == 3
+
+
+def test_if_they_did_not_they_would_meet(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(leaving, "meetings", lambda *_: ())
+    run = watched(Simulation(laid_out(BOX, tmp_path), RunRequest(units=1)), (), 60.0)
+    assert {"Contact", "Dropped"} <= {failure.code for failure in run.verdict.failures}
+
+
 @pytest.mark.parametrize("text", [ASKEW, CROSSED, PARTS["a beam under what is lowered"]])
 def test_layout_and_certificate_see_the_same_limbs(text: str, tmp_path: Path) -> None:
     layout = laid_out(text, tmp_path)
     assert layout.certificate is not None
     assert layout.certificate.holds
     for robot, hand in enumerate(layout.hands):
-        grip = grip_box(layout, robot)
+        grip = layout.grip(robot)
         found = limbs(layout, robot)
         assert (grip is None) == (hand is None or hand.kind == "none") == (not found)
         for operation in layout.factory.operations[:-1]:
@@ -144,7 +170,7 @@ def test_the_post_of_a_feeder_stands_behind_its_hand(tmp_path: Path) -> None:
     moved = replace(hand, kind="below", places=((float(x), float(y), hand.places[0][2]),))
     hands = tuple(moved if r == leaf.carrier else h for r, h in enumerate(layout.hands))
     there = replace(layout, hands=hands)
-    grip, feeder = grip_box(there, leaf.carrier), there.feeder("p0")
+    grip, feeder = there.grip(leaf.carrier), there.feeder("p0")
     assert grip is not None
     assert grip[0] <= rear
     assert grip[0] - (feeder.back + 0.015) >= layout.clearance - 1e-9

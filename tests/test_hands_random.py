@@ -12,7 +12,6 @@ from factory.simulation.request import RunRequest
 from factory.simulation.simulation import Simulation
 from factory.simulation.watched import watched
 from factory.study.fidelity.hidden import HiddenPenetrations
-from factory.support.settings import Settings
 
 AT_MOST_MM, GRIP_MM = 0.1, 0.5
 """How deep anything that is drawn may be in anything, and how far a grip may be."""
@@ -88,7 +87,7 @@ def _apart(one: Extent, other: Extent) -> bool:
 def test_hands_hold_and_meet_nothing(seed: int, tmp_path: Path) -> None:
     file = tmp_path / "product.pag"
     file.write_text(random_blocks(seed))
-    layout = read(file, (), Settings(hands=1)).layout
+    layout = read(file).layout
     simulation = Simulation(layout, RunRequest(units=3, jitter=0.3))
     hidden = HiddenPenetrations.of(simulation)
     run = watched(simulation, [lambda world, _: hidden.look(world.d.qpos, world.time)], 150.0)

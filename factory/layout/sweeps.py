@@ -44,7 +44,7 @@ from factory.layout.dimensions import (
 )
 from factory.layout.guidepath import Box, Extent, hull
 from factory.layout.hands.hand import ROOT
-from factory.layout.hands.limbs import cross_of, grip_box
+from factory.layout.hands.limbs import cross_of
 from factory.layout.layout import Layout
 from factory.plant.factory import Factory
 from factory.problem.pag import NOPART
@@ -117,7 +117,7 @@ def _payloads(layout: Layout, robot: int, found: Mapping[str, Pile]) -> Iterator
     """Each pile, with the hand that holds it, from where it is taken or made to where the next
     operation has its goal."""
     path, operations = layout.guidepaths[robot], layout.factory.operations
-    grip = grip_box(layout, robot)
+    grip = layout.grip(robot)
     gear, stops = layout.factory.robots[robot].operations, layout.stops(robot)
     for step, number in enumerate(gear):
         operation = operations[number]

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from xml.etree.ElementTree import Element
 
 from factory.layout.hands.hand import Hand
-from factory.layout.hands.limbs import held_at, limbs
+from factory.layout.hands.limbs import limbs
 from factory.layout.layout import Layout
 from factory.mjcf.hands import Styles, load_hand
 from factory.mjcf.robots import Drive, Held, Hoist, RobotModel, instantiate, load_robot_model
@@ -59,7 +59,7 @@ def _low(layout: Layout, robot: int) -> float:
     parts = factory.contents[carried] if carried else ()
     ground = float(product.low[2])
     low = min((float(product.solids[part].low[2]) for part in parts), default=ground)
-    return low - ground + held_at(layout, robot)
+    return low - ground + layout.held_at(robot)
 
 
 def _style(hand: Hand | None, loaded: dict[str, Styles]) -> Styles:

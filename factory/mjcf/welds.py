@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from xml.etree.ElementTree import Element
 
-from factory.layout.hands.limbs import held_at
 from factory.layout.layout import Layout
 from factory.mjcf import names
 from factory.mjcf.elements import add, numbers
@@ -70,7 +69,7 @@ def grip_position(
     at = path.middle(0.0)
     foot = path.carriage(0.0)
     middle = (at[0] - foot[0], at[1] - foot[1])
-    x, y, z = place_in(layout.product, bodies.centre[label], middle, held_at(layout, robot))
+    x, y, z = place_in(layout.product, bodies.centre[label], middle, layout.held_at(robot))
     return _turned((x, y, z), path.heading)
 
 

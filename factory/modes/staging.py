@@ -15,7 +15,8 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from factory.control.mode import ROUNDING, Array, Mode
-from factory.layout.hands.leaving import awaited_positions, rises_first
+from factory.layout.hands.leaving import awaited_positions
+from factory.layout.hands.limbs import rises_first
 from factory.layout.layout import Layout
 from factory.modes.modes import operation_starts
 from factory.plant.factory import Operation

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from factory.layout.hands.leaving import rises_first
+from factory.layout.hands.limbs import rises_first
 from factory.layout.layout import Layout
 from factory.nets.petri import Marking
 

@@ -14,7 +14,8 @@ import numpy as np
 
 from factory.control.mode import Limits, Mode
 from factory.control.profile import SpeedProfile, World, mode_time
-from factory.layout.hands.leaving import Leaving, going_on, raised, rises_first
+from factory.layout.hands.leaving import Leaving, going_on, raised
+from factory.layout.hands.limbs import rises_first
 from factory.layout.layout import Layout
 from factory.modes.modes import operation_starts
 from factory.modes.staging import HeadStart, staged

@@ -11,10 +11,11 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from factory.layout.hands.limbs import grip_box
-from factory.layout.hands.meeting import meetings
+from factory.layout.hands.hand import Hand
+from factory.layout.hands.limbs import rises_first
+from factory.layout.hands.meeting import following, guests, meetings
 from factory.layout.layout import Layout
-from factory.problem.pag import NOPART
+from factory.plant.factory import Operation
 
 SPARE = 0.001
 """A hand is clear that is so far from all that it has delivered to [m]."""
@@ -46,8 +47,8 @@ def leavings(layout: Layout) -> dict[int, tuple[Leaving, ...]]:
         hand = layout.hand(robot.index)
         if hand is not None and hand.tall:
             first += [
-                _gone_behind(layout, guest, label)
-                for guest, label, _ in _delivering(layout, robot.index)
+                _gone_behind(layout, guest, operation.label)
+                for operation, guest, _ in _delivering(layout, robot.index)
             ]
     return {number: tuple(dict.fromkeys(leaving)) for number, leaving in found.items() if leaving}
 
@@ -57,38 +58,26 @@ def going_on(layout: Layout, carrier: int, later: bool = True) -> dict[int, tupl
     before, or `later` in any before, and must be clear of what is there or comes there."""
     found: dict[int, list[Leaving]] = {}
     gear = layout.factory.robots[carrier].operations
-    for guest, _, onward in _delivering(layout, carrier):
-        hand, step = layout.hand(guest), gear.index(onward)
-        assert hand is not None
+    for operation, guest, hand in _delivering(layout, carrier):
+        step = gear.index(operation.index) + 1
         for number, back in enumerate(hand.waits if later else hand.waits[:1]):
             if back:
                 awaited = found.setdefault(gear[(step + number) % len(gear)], [])
                 awaited.append(_gone(layout, guest, back))
     for number, guest, back in meetings(layout, carrier):
-        if later or _follows(layout, carrier, guest) == number:
+        delivers = layout.factory.robots[guest].operations[-1]
+        if later or following(layout, carrier, delivers) == number:
             found.setdefault(number, []).append(_back(layout, guest, back))
     return {number: tuple(leaving) for number, leaving in found.items()}
 
 
-def _delivering(layout: Layout, carrier: int) -> Iterator[tuple[int, str, int]]:
-    """The robots with hands that deliver to a carrier, each with the label that this makes, and the
-    carrier's next operation (index)."""
-    gear = layout.factory.robots[carrier].operations
-    for step, number in enumerate(gear):
-        operation = layout.factory.operations[number]
-        if operation.carrier != carrier:
-            continue
-        for guest, label in zip(operation.robots, operation.before, strict=True):
-            hand = layout.hand(guest)
-            if guest != carrier and label != NOPART and hand is not None and hand.kind != "none":
-                yield guest, operation.label, gear[(step + 1) % len(gear)]
-
-
-def _follows(layout: Layout, carrier: int, guest: int) -> int:
-    """The operation (index) of a carrier after that in which a robot delivers to it."""
-    gear = layout.factory.robots[carrier].operations
-    delivers = layout.factory.robots[guest].operations[-1]
-    return gear[(gear.index(delivers) + 1) % len(gear)]
+def _delivering(layout: Layout, carrier: int) -> Iterator[tuple[Operation, int, Hand]]:
+    """The robots with hands that deliver to a carrier, each with its hand, and the operation in
+    which it does."""
+    for operation, guest in guests(layout, carrier):
+        hand = layout.hand(guest)
+        if hand is not None and hand.kind != "none":
+            yield operation, guest, hand
 
 
 def awaited_positions(layout: Layout) -> dict[int, float]:
@@ -120,13 +109,6 @@ def goes_early(layout: Layout) -> list[tuple[int, int]]:
     return [(robots[r].operations[0], r) for r in awaited_positions(layout) if r < count]
 
 
-def rises_first(layout: Layout, robot: int) -> bool:
-    """Whether a robot's lift has to be up before it goes home: its hand is above what it has let
-    go."""
-    hand = layout.hand(robot)
-    return hand is not None and hand.kind == "above" and robot in layout.factory.strokes
-
-
 def raised(layout: Layout, robot: int) -> Leaving:
     """When a robot's lift is up."""
     axis = len(layout.factory.robots) + list(layout.lifts).index(robot)
@@ -147,6 +129,6 @@ def _back(layout: Layout, robot: int, back: float) -> Leaving:
 
 def _gone_behind(layout: Layout, robot: int, label: str) -> Leaving:
     """When all of a robot's hand has gone back behind a sub-assembly."""
-    path, grip = layout.guidepaths[robot], grip_box(layout, robot)
+    path, grip = layout.guidepaths[robot], layout.grip(robot)
     assert grip is not None
     return _back(layout, robot, max(0.0, grip[1] - path.frame(layout.payloads[label])[0]))

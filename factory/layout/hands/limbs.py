@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from factory.layout.dimensions import FINGER
-from factory.layout.guidepath import Extent
 from factory.layout.hands.mounted import Limb, limbs_of
 from factory.layout.layout import Layout
 
@@ -14,10 +13,11 @@ def limbs(layout: Layout, robot: int) -> tuple[Limb, ...]:
     return limbs_of(hand, layout.mount(robot)) if hand is not None else ()
 
 
-def grip_box(layout: Layout, robot: int) -> Extent | None:
-    """The box about the product's middle, in the robot's frame (u, t), of what its hand and mast
-    take among the payloads; None for nothing."""
-    return layout.grip(robot)
+def rises_first(layout: Layout, robot: int) -> bool:
+    """Whether a robot's lift has to be up before it goes home: its hand is above what it has let
+    go."""
+    hand = layout.hand(robot)
+    return hand is not None and hand.kind == "above" and robot in layout.factory.strokes
 
 
 def cross_of(layout: Layout, robot: int) -> tuple[float, float]:
@@ -30,9 +30,4 @@ def cross_of(layout: Layout, robot: int) -> tuple[float, float]:
     return (min(0.0, aside - half), max(0.0, aside + half)) if abs(aside) > FINGER / 2 else (0, 0)
 
 
-def held_at(layout: Layout, robot: int) -> float:
-    """How far above its place in the product a robot holds its payload with its lift down [m]."""
-    return layout.held_at(robot)
-
-
-__all__ = ["Limb", "cross_of", "grip_box", "held_at", "limbs"]
+__all__ = ["Limb", "cross_of", "limbs", "rises_first"]

@@ -16,7 +16,7 @@ import numpy as np
 from factory.geometry.meshes import Array
 from factory.layout.dimensions import PAYLOAD
 from factory.layout.hands.apart import BESIDE
-from factory.layout.hands.limbs import limbs
+from factory.layout.hands.limbs import limbs, rises_first
 from factory.layout.layout import Layout
 from factory.plant.factory import Operation
 from factory.problem.pag import NOPART
@@ -29,28 +29,34 @@ def meetings(layout: Layout, carrier: int) -> Iterator[tuple[int, int, float]]:
     """The robots that have to go back after they have delivered to a carrier: an operation (index)
     that has to wait for that, the robot, and how far it goes [m]."""
     axis = 0 if layout.guidepaths[carrier].heading[0] else 1
-    gear = layout.factory.robots[carrier].operations
-    guests = [
-        (layout.guidepaths[robot].a[axis], operation, robot)
-        for operation, robot in _guests(layout, carrier)
+    coming_here = [
+        (layout.guidepaths[robot].a[axis], operation, robot, _boxes(layout, robot))
+        for operation, robot in guests(layout, carrier)
         if layout.hand(robot) is not None
     ]
-    guests.sort(key=lambda guest: guest[0])
-    places, boxes = [at for at, _, _ in guests], [_boxes(layout, robot) for _, _, robot in guests]
-    beside = max((_breadth(layout, robot, axis) for _, _, robot in guests), default=0.0)
-    for (at, operation, robot), own in zip(guests, boxes, strict=True):
-        heading, lifted = layout.guidepaths[robot].heading, _is_lifted(layout, robot)
+    coming_here.sort(key=lambda guest: guest[0])
+    places = [at for at, _, _, _ in coming_here]
+    breadths = (_breadth(layout, robot, own, axis) for _, _, robot, own in coming_here)
+    beside = max(breadths, default=0.0)
+    for at, operation, robot, own in coming_here:
+        heading, lifted = layout.guidepaths[robot].heading, rises_first(layout, robot)
         near = slice(bisect_left(places, at - beside), bisect_right(places, at + beside))
-        for _, later, other in guests[near]:
+        for _, later, other, _ in coming_here[near]:
             if later is not operation and layout.guidepaths[other].heading != heading:
                 coming = _coming(layout, other, carrier if lifted else -1)
                 if back := _back(own, coming, heading):
                     yield later.index, robot, back
         if lifted and (back := _back(own, _going(layout, carrier, operation), heading)):
-            yield gear[(gear.index(operation.index) + 1) % len(gear)], robot, back
+            yield following(layout, carrier, operation.index), robot, back
 
 
-def _guests(layout: Layout, carrier: int) -> Iterator[tuple[Operation, int]]:
+def following(layout: Layout, robot: int, operation: int) -> int:
+    """The operation (index) of a robot after one of its own."""
+    gear = layout.factory.robots[robot].operations
+    return gear[(gear.index(operation) + 1) % len(gear)]
+
+
+def guests(layout: Layout, carrier: int) -> Iterator[tuple[Operation, int]]:
     """The robots that deliver to a carrier, each with the operation in which it does."""
     for number in layout.factory.robots[carrier].operations:
         operation = layout.factory.operations[number]
@@ -60,16 +66,12 @@ def _guests(layout: Layout, carrier: int) -> Iterator[tuple[Operation, int]]:
                     yield operation, robot
 
 
-def _breadth(layout: Layout, robot: int, axis: int) -> float:
-    """How broad a robot's hand and payload are together along an axis across its way [m]."""
+def _breadth(layout: Layout, robot: int, boxes: Array, axis: int) -> float:
+    """How broad a robot's hand, in `boxes` (n, 2, 3), and payload are together along an axis across
+    its way [m]."""
     box = layout.payloads[layout.factory.delivered(robot)]
-    hand = _boxes(layout, robot)[:, :, axis] - layout.guidepaths[robot].a[axis]
+    hand = boxes[:, :, axis] - layout.guidepaths[robot].a[axis]
     return 2 * float(max(abs(hand).max(initial=0.0), -box[2 * axis], box[2 * axis + 1]))
-
-
-def _is_lifted(layout: Layout, robot: int) -> bool:
-    hand = layout.hand(robot)
-    return hand is not None and hand.kind == "above" and robot in layout.factory.strokes
 
 
 def _boxes(layout: Layout, robot: int, at: float | None = None, up: float | None = None) -> Array:

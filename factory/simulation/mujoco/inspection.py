@@ -56,13 +56,11 @@ class Inspection:
         now = set()
         for number in np.flatnonzero(found.dist[: self._d.ncon] < 0).tolist():
             a, b = found.geom[number].tolist()
-            if self._pressing.meant(a, b, float(found.dist[number])):
-                continue
             label = self._joined(a, b)
-            if label is None:
-                now.add((a, b))
-            else:
+            if label is not None:
                 self._press(label, number)
+            elif not self._pressing.meant(a, b, float(found.dist[number])):
+                now.add((a, b))
         for a, b in sorted(now - self._touching):
             self.unintended.append((self._m.geom(a).name, self._m.geom(b).name))
         self._touching = frozenset(now)

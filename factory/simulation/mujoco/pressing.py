@@ -12,17 +12,12 @@ PRESSED = 1e-4
 
 
 class Pressing:
-    """The pads (geoms) of robots and feeders, each with the parts that it is to hold."""
+    """What the pads of robots and feeders are to hold."""
 
     def __init__(self, m: mujoco.MjModel, factory: Factory) -> None:
         self._m, self._contents = m, factory.contents
         ever = {r.name: held(factory, r.index, at_last=True) for r in factory.robots}
-        ever |= {names.feeder(leaf.label): leaf.label for leaf in factory.leaves}
-        self._parts = {
-            geom: frozenset(factory.contents[label])
-            for geom in range(m.ngeom)
-            if (label := ever.get(names.pad_of(m.geom(geom).name)))
-        }
+        self._holds = ever | {names.feeder(leaf.label): leaf.label for leaf in factory.leaves}
 
     def meant(self, one: int, other: int, apart: float) -> bool:
         """Whether of two geoms, so far `apart` [m], one is a pad and the other what that is to
@@ -32,7 +27,6 @@ class Pressing:
         return self._bears(one, other) or self._bears(other, one)
 
     def _bears(self, pad: int, geom: int) -> bool:
-        if pad not in self._parts:
-            return False
+        held = self._contents.get(self._holds.get(names.pad_of(self._m.geom(pad).name), ""), ())
         label = names.label_of(self._m.body(self._m.geom_bodyid[geom]).name)
-        return not self._parts[pad].isdisjoint(self._contents.get(label, ()))
+        return not set(held).isdisjoint(self._contents.get(label, ()))
