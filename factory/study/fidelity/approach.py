@@ -4,8 +4,8 @@ Left out are pairs that are meant to be near: a part and what holds it, parts he
 parts whose robots are in one and the same active operation, robots on the floor, the output robot
 at the outfeed that it serves, bodies of one feeder or of the outfeed, sliders, which hand over, and
 spare copies. Hands, which reach between the parts, are also near those robots, feeders and parts
-that they meet at their carrier, or that deliver to the same one, whenever that is: nothing but that
-they never touch is known of these, which `hidden_penetration_max_mm` measures."""
+that they meet at their carrier, or that deliver to the same one, whenever that is. No distance is
+certified for these; that they do not touch is measured by `hidden_penetration_max_mm`."""
 
 from __future__ import annotations
 
