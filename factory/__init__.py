@@ -64,11 +64,18 @@ def load_pag(path: str | PathLike[str], templates: Sequence[Path] = ()) -> PAG:
     return read(path, templates).pag
 
 
-def compile(pag: PAG, templates: Sequence[Path] = ()) -> Factory:
-    """The factory (R, ~, N) that makes a product (paper, section 5). Raises InputError."""
+def compile(
+    pag: PAG,
+    templates: Sequence[Path] = (),
+    robots: int | Literal["least"] | None = None,
+    cycle: float | None = None,
+) -> Factory:
+    """The factory (R, ~, N) that makes a product (paper, section 5); with at most so many `robots`,
+    or with few for a `cycle` time [s], where these are given. Raises InputError."""
     from factory.pipeline import Project, all_templates
+    from factory.study.allocation.search import Aim, allocated
 
-    return Project(pag, all_templates(templates)).plain
+    return allocated(Project(pag, all_templates(templates)), Aim(robots, cycle)).plain
 
 
 def verify(plan: Factory) -> Verdict:

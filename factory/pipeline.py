@@ -7,7 +7,7 @@ checked.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from os import PathLike
 from pathlib import Path
@@ -46,6 +46,14 @@ class Project:
     catalogue: Catalogue = field(default_factory=load_catalogue, repr=False)
     settings: Settings = field(default_factory=Settings)
     ground: Ground = field(default_factory=Ground)
+
+    def with_pag(self, pag: PAG, ground: Ground) -> Project:
+        """The same product by another tree, or on another ground; what is known of its parts is
+        kept."""
+        found = replace(self, pag=pag, ground=ground)
+        known = {"product"} if pag is not self.pag else {"product", "matings", "plain", "_hands"}
+        found.__dict__.update({name: self.__dict__[name] for name in known & set(self.__dict__)})
+        return found
 
     @property
     def file(self) -> Path:

@@ -158,6 +158,7 @@ def templates(draw: st.DrawFn) -> Template:
         draw(st.sampled_from(dwells)),
     )
     classes = st.lists(_points(k), min_size=2, max_size=4).map(tuple)
+    spare = sum(brings) == 2 and not brings[j - 1]
     return Template(
         draw(labels),
         tuple(draw(st.lists(labels, min_size=k, max_size=k))),
@@ -167,6 +168,7 @@ def templates(draw: st.DrawFn) -> Template:
         tuple(result if i == j else "nopart" for i in range(1, k + 1)),
         law,
         draw(st.sampled_from(["", "insert"])) if any(brings) else "",
+        draw(st.sampled_from(["", "insert"])) if spare else "",
         tuple(defaults.items()),
         geometry,
     )

@@ -146,7 +146,7 @@ def test_what_is_shipped() -> None:
         "weld",
     ]
     assert TEMPLATES["dropoff"].result == "nopart"
-    assert TEMPLATES["mate"].further == "insert"
+    assert TEMPLATES["mate"].further == TEMPLATES["mate"].instead == "insert"
     assert TEMPLATES["insert"].inputs == ("LAB1", "LAB2")
     dwells = {name: dict(t.parameters)["dwell"] for name, t in TEMPLATES.items() if t.parameters}
     assert dwells == {"glue": 2.0, "inspect": 0.5, "press": 1.5, "weld": 1.0}
@@ -232,6 +232,28 @@ def test_further_inputs_need_a_template_that_takes_them(
     assert hint in found.hint
 
 
+@pytest.mark.parametrize(
+    ("instead", "more", "hint"),
+    [
+        ("inser", "", "did you mean 'insert'"),
+        ("weld", "", "as insert does"),
+        ("mate", "", "as insert does"),
+        ("insert", "parameters = ( dwell = 1 );", "the same parameters"),
+    ],
+)
+def test_one_robot_fewer_needs_a_template_that_does_the_same(
+    tmp_path: Path, instead: str, more: str, hint: str
+) -> None:
+    text = MATE.replace("further = insert;", f"instead = {instead}; {more}")
+    put(tmp_path, "a.op", text)
+    with pytest.raises(InputError) as caught:
+        load_templates([tmp_path, SHIPPED])
+    (found,) = caught.value.diagnostics
+    assert found.code == "BadTemplate"
+    assert str(found.position).endswith("a.op:7:13")
+    assert hint in found.hint
+
+
 # What is refused
 
 
@@ -271,6 +293,11 @@ def test_broken_files(path: Path, golden: Callable[[str, str], None]) -> None:
 def test_one_mistake_gives_one_error(old: str, new: str, wanted: list[str]) -> None:
     assert old in MATE
     assert codes(MATE.replace(old, new)) == wanted
+
+
+def test_a_carrier_that_brings_one_input_has_no_robot_to_spare() -> None:
+    text = (SHIPPED / "insert.op").read_text()
+    assert codes(f"{text} instead = insert;") == ["BadTemplate"]
 
 
 def test_dropoff_alone_may_leave_nothing() -> None:

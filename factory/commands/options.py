@@ -16,7 +16,7 @@ from click.shell_completion import CompletionItem
 
 from factory.commands.requests import OutputOptions, PictureOptions, ProjectOptions, RunOptions
 from factory.support.errors import Diagnostic, FactoryError, InputError
-from factory.support.settings import LONGEST
+from factory.support.settings import LEAST, LONGEST
 
 if TYPE_CHECKING:
     from factory.problem.pag import PAG
@@ -156,6 +156,15 @@ class Timestep(click.ParamType[float | str]):
         return value if is_auto("timestep", value) else click.FLOAT.convert(value, param, ctx)
 
 
+class RobotCount(click.ParamType[int | str]):
+    """A number of robots, or `least`."""
+
+    name = "number|least"
+
+    def convert(self, value: Any, param: Any, ctx: Any) -> Any:
+        return value if value == LEAST else click.IntRange(1).convert(value, param, ctx)
+
+
 HANDS = click.option(
     "--hands/--no-hands",
     default=None,
@@ -198,8 +207,14 @@ RELAY = options(
     click.option(
         "--cycle",
         type=SECONDS,
-        help="The cycle time that relays are to reach [s]; as short as they can by default.",
+        help="The cycle time to be reached [s], with few robots; with relays where it takes them.",
     ),
+    click.option(
+        "--robots",
+        type=RobotCount(),
+        help="At most so many robots, tools included, as fast as found; or as few as found: least.",
+    ),
+    click.option("--seconds", type=SECONDS, help="To look for few robots [s]; 60 by default."),
 )
 WIP = click.option(
     "--wip", type=click.IntRange(1, 10**9), help="Copies of each part let in at once."

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 from factory.support.errors import Diagnostic, InputError
 
@@ -51,6 +51,8 @@ class ProjectOptions:
     floor: str | None = None
     relay: bool = False
     cycle: float | None = None
+    robots: int | Literal["least"] | None = None
+    seconds: float | None = None
 
     def settings(self) -> Settings:
         """Options before the environment, that before the `factory.toml` beside the PAG or in the
@@ -73,11 +75,16 @@ class ProjectOptions:
         return Ground(floor, self.relay, self.cycle)
 
     def project(self) -> Project:
-        """The project that the options describe. Raises InputError."""
+        """The project that the options describe, with the forms that they ask for. Raises
+        InputError."""
         from factory.pipeline import read
 
-        settings = self.settings()
-        return read(self.file, self.folders, settings, self.ground())
+        project = read(self.file, self.folders, self.settings(), self.ground())
+        if self.robots is None and self.cycle is None:
+            return project
+        from factory.study.allocation.search import SECONDS, Aim, allocated
+
+        return allocated(project, Aim(self.robots, self.cycle, self.seconds or SECONDS))
 
 
 @dataclass(frozen=True, slots=True)

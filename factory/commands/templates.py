@@ -33,6 +33,7 @@ def templates(folders: tuple[Path, ...], out: OutputOptions) -> int:
                         "carrier": t.carrier,
                         "inputs": len(t.inputs),
                         "further": t.further or None,
+                        "instead": t.instead or None,
                         "parameters": dict(t.parameters),
                         "geometry": t.geometry,
                         "text": write_template(t),

@@ -41,11 +41,13 @@ class TemplateMaker:
         parameters = self._parameters(given)
         law = self._law(contents.get("F"), count, parameters)
         further: Token | None = contents.get("further")
+        instead: Token | None = contents.get("instead")
         if name is not None:
             self._check_name(name)
         if labels is not None:
             self._check_labels(labels, count, carrier)
             self._check_kind(labels, given.geometry, further)
+            self._check_instead(labels, carrier, instead)
         if name is None or robots is None or carrier is None or labels is None or law is None:
             return None
         at = self.findings.source.at
@@ -58,10 +60,12 @@ class TemplateMaker:
             tuple(map(str, labels.after)),
             law,
             str(further or ""),
+            str(instead or ""),
             tuple(parameters.items()),
             given.geometry,
             at(name),
             at(further) if further else None,
+            at(instead) if instead else None,
             tuple(map(at, robots)),
         )
 
@@ -196,6 +200,15 @@ class TemplateMaker:
             message = f"{self.draft.name} cannot pass further inputs on"
             hint = "leave this clause out: it is for operations that take and make something"
             self._bad(message, further, hint)
+
+    def _check_instead(self, labels: Labels, carrier: int | None, instead: Token | None) -> None:
+        """One robot fewer will do only where two robots bring what a third one takes."""
+        brought = [label for label in labels.before if label != NOPART]
+        held = carrier is not None and labels.before[carrier - 1 : carrier] != (NOPART,)
+        if instead is not None and (len(brought) != 2 or held):
+            message = f"{self.draft.name} has no robot to spare"
+            hint = "leave this clause out: it is for carriers that take what two others bring"
+            self._bad(message, instead, hint)
 
     def _check_labels(self, labels: Labels, count: int | None, carrier: int | None) -> None:
         """The conditions on <a; b>, each with its code."""

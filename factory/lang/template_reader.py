@@ -24,7 +24,7 @@ Folder = str | os.PathLike[str]
 
 def read_template(text: str, file: str = "<text>") -> Template:
     """The template of a text. Raises InputError with every error of the text. `load_templates`
-    checks that the template named by `further` exists."""
+    checks the templates named by `further` and `instead`."""
     findings = Findings(source_of(text, file))
     template = TemplateMaker(read_clauses(findings), findings).make()
     findings.raise_if_any()
@@ -49,7 +49,7 @@ def load_templates(folders: Sequence[Folder]) -> Mapping[str, Template]:
             found.setdefault(template.name, template)
         merged |= {name: t for name, t in found.items() if name not in merged}
     if not diagnostics:
-        diagnostics.extend(_check_further(merged))
+        diagnostics.extend(_check_others(merged))
     if diagnostics:
         raise InputError(diagnostics)
     return MappingProxyType(merged)
@@ -78,18 +78,36 @@ def _twice(second: Template, first: Template) -> Diagnostic:
     return Diagnostic("BadTemplate", message, second.position, "rename one of the two")
 
 
-def _check_further(templates: Mapping[str, Template]) -> Iterator[Diagnostic]:
-    """What is wrong with the templates that others pass their further inputs on to."""
+def _check_others(templates: Mapping[str, Template]) -> Iterator[Diagnostic]:
+    """What is wrong with the templates that others name: those that take their further inputs, and
+    those that do the same with one robot fewer."""
     for template in templates.values():
-        at = template.further_position or template.position
-        if not template.further:
-            continue
-        other = templates.get(template.further)
-        if other is None:
-            hint = did_you_mean(template.further, list(templates), "templates")
-            message = f"there is no template {quoted(template.further)}"
-            yield Diagnostic("BadTemplate", message, at, hint)
-        elif len(other.inputs) != 2 or other.before[other.carrier - 1] == NOPART:
-            message = f"{quoted(other.name)} cannot take further inputs one by one"
-            hint = "that takes two inputs, one of which its carrier brings, as insert does"
-            yield Diagnostic("BadTemplate", message, at, hint)
+        if template.further:
+            at = template.further_position or template.position
+            why = "cannot take further inputs one by one"
+            yield from _check_other(template.further, at, why, templates)
+        if template.instead:
+            at = template.instead_position or template.position
+            why = f"cannot stand for {quoted(template.name)}"
+            yield from _check_other(template.instead, at, why, templates)
+            other = templates.get(template.instead)
+            lacking = {name for name, _ in template.parameters}
+            lacking -= {name for name, _ in other.parameters} if other else lacking
+            if other is not None and lacking:
+                message = f"{quoted(other.name)} {why}: it has no {', '.join(sorted(lacking))}"
+                hint = "give it the same parameters, with their defaults"
+                yield Diagnostic("BadTemplate", message, at, hint)
+
+
+def _check_other(
+    name: str, at: Position | None, why: str, templates: Mapping[str, Template]
+) -> Iterator[Diagnostic]:
+    """What is wrong with a template that takes one input more than its carrier holds."""
+    other = templates.get(name)
+    if other is None:
+        hint = did_you_mean(name, list(templates), "templates")
+        yield Diagnostic("BadTemplate", f"there is no template {quoted(name)}", at, hint)
+    elif len(other.inputs) != 2 or other.before[other.carrier - 1] == NOPART:
+        message = f"{quoted(name)} {why}"
+        hint = "that takes two inputs, one of which its carrier brings, as insert does"
+        yield Diagnostic("BadTemplate", message, at, hint)

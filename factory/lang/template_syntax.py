@@ -28,6 +28,7 @@ FORMS: Mapping[str, str] = MappingProxyType(
         "<a; b>": "<a; b> = < LAB1, LAB2, nopart; nopart, nopart, LAB3 >;",
         "F": "F = navigation on W to ( A1 + 2r, A2 + 2r, B3 ) within eps;",
         "further": "further = insert;",
+        "instead": "instead = insert;",
         "parameters": "parameters = ( dwell = 1.0 );",
     }
 )
@@ -83,7 +84,7 @@ class _Builder(Transformer[Token, Any]):
     def header(self, content: Any) -> Any:
         return content
 
-    robots = carrier = further = parameters = identifications = header
+    robots = carrier = further = instead = parameters = identifications = header
 
     def names(self, *items: Any) -> tuple[Any, ...]:
         return items
@@ -189,7 +190,7 @@ def _parse(piece: list[Token], start: str, form: str, findings: Findings) -> Any
 def _names(expected: frozenset[str]) -> str:
     """Kinds of tokens in words: signs and keywords in quotes, any name as `a name`."""
     signs = [_lark().get_terminal(kind) for kind in expected - {"WORD", "STRING", END}]
-    names = {"R", "j", "F", "W", "a", "b", "further", "parameters", "geometry"}
+    names = {"R", "j", "F", "W", "a", "b", "further", "instead", "parameters", "geometry"}
     if "WORD" not in expected:
         names = set()
     shown = sorted(f"'{sign.pattern.value}'" for sign in signs if sign.pattern.value not in names)

@@ -48,6 +48,7 @@ def write_template(template: Template) -> str:
         f"<a; b> = < {', '.join(template.before)}; {', '.join(template.after)} >",
         f"F = {_law(template.law)}",
         *([f"further = {template.further}"] if template.further else []),
+        *([f"instead = {template.instead}"] if template.instead else []),
         *_parameters(template),
     ]
     lines = [f"{template.name} = (R, j, ~, <a; b>, F) where", *(f"  {c};" for c in clauses)]

@@ -52,6 +52,8 @@ class Template:
     `robots` R: the type of each robot; `carrier` j, from 1; `identifications` ~: classes of points
     that are one; `before` a and `after` b: the label each robot carries, NOPART or a variable such
     as LAB1; `law` F; `further`: the template that takes inputs beyond those in a, "" if none does;
+    `instead`: the one that does the same with one robot fewer, where the robot of one input keeps
+    what is joined, "" if none does;
     `parameters`: keyword arguments and their defaults; `geometry`: True where the operation makes a
     part and takes mesh, pos, box and so on.
     """
@@ -64,10 +66,12 @@ class Template:
     after: tuple[str, ...]
     law: Law
     further: str = ""
+    instead: str = ""
     parameters: tuple[tuple[str, Value], ...] = ()
     geometry: bool = False
     position: Position | None = field(default=None, compare=False)
     further_position: Position | None = field(default=None, compare=False)
+    instead_position: Position | None = field(default=None, compare=False)
     robot_positions: tuple[Position, ...] = field(default=(), compare=False)
 
     @property

@@ -32,6 +32,9 @@ LONGEST = 1e9
 DWELL = 86_400.0
 """Upper bound on the dwell of an operation [s]: a day."""
 
+LEAST: Literal["least"] = "least"
+"""As few robots as found."""
+
 AUTO: Literal["auto"] = "auto"
 """The timestep of settings that leave it to the factory."""
 

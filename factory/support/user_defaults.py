@@ -25,6 +25,8 @@ OPTIONS: Mapping[str, object] = {
     "jitter": 0.3,
     "wip": 2,
     "floor": "4x3",
+    "robots": 12,
+    "cycle": 4.0,
     "templates": ["mine"],
     "size": "1280x720",
     "fps": 30,

@@ -81,14 +81,14 @@ class _Judge:
     def slide(self, axis: int, overlaps: Overlaps) -> None:
         """Takes note of what happens along x or y."""
         at = self.meetings.axes == axis
-        levels, clashing = _levels(overlaps, len(at))
+        levels, clashing = levels_of(overlaps, len(at))
         self.slides[at], self.clashing[at] = levels[at], clashing[at]
         self.overlaps[axis] = overlaps
 
     def lower(self, overlaps: Overlaps, tried: NDArray[np.bool_]) -> None:
         """Takes note of what happens along z: column 0, the first is lowered, 1, the last."""
         either = np.array([m.either for m in self.meetings.all])
-        self.lowers[tried] = _levels(overlaps, len(tried))[0][tried]
+        self.lowers[tried] = levels_of(overlaps, len(tried))[0][tried]
         self.lowers[~either, 0] = BLOCKED
         self.overlaps[UPRIGHT] = overlaps
 
@@ -211,7 +211,7 @@ def _deeper(overlaps: Overlaps) -> NDArray[np.bool_]:
     return np.asarray(depths.path > depths.finished[:, None] + TOLERANCE)
 
 
-def _levels(overlaps: Overlaps, count: int) -> tuple[Ints, Ints]:
+def levels_of(overlaps: Overlaps, count: int) -> tuple[Ints, Ints]:
     """The level of each meeting from each side (count, 2), and how many pairs clash there."""
     clashing, deeper, faulty = (
         np.stack(

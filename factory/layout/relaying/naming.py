@@ -46,9 +46,9 @@ def named(factory: Factory, numbers: Mapping[str, int]) -> Named:
         for operation in operations:
             label = operation.label
             written = relayed and label not in factory.pag.by_label
-            made[label] = _free(label.replace("/", "."), taken) if written else label
+            made[label] = free_label(label.replace("/", "."), taken) if written else label
             wanted = (f"{made[label]}.relay{n + 1}" for n in range(numbers.get(label, 0)))
-            relays[label] = tuple(_free(name, taken) for name in wanted)
+            relays[label] = tuple(free_label(name, taken) for name in wanted)
     found = Named(factory.pag, made, relays)
     nodes = tuple(
         statement
@@ -59,7 +59,8 @@ def named(factory: Factory, numbers: Mapping[str, int]) -> Named:
     return replace(found, pag=pag)
 
 
-def _free(name: str, taken: set[str]) -> str:
+def free_label(name: str, taken: set[str]) -> str:
+    """The name, with a stroke below for each time that it is `taken`; it is then."""
     while name in taken:
         name += "_"
     taken.add(name)

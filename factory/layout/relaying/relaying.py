@@ -63,6 +63,18 @@ def relayed(
     return replace(certified(search.found, floor), plain=plain)
 
 
+def robot_times(layout: Layout, settings: Settings) -> list[float]:
+    """How long the gear of each robot takes [s]; of the output robot's, how long the outfeed does
+    where that is longer."""
+    pace = Pace.of(settings)
+    found = gear_times(layout, pace)
+    dropoff = layout.factory.dropoff.index
+    way = layout.home(0, dropoff) - layout.goal(dropoff, 0)
+    outfeed = pace.rest(way) + pace.lost + away(layout, settings)
+    found[0] = max(found[0], outfeed)
+    return found
+
+
 @dataclass(frozen=True, slots=True)
 class Room:
     """Makes room for lanes in a `plain` layout."""
@@ -124,20 +136,9 @@ class _Search:
         self.origins: Mapping[str, str] = {}
         self.cycle = 0.0
 
-    def times(self, layout: Layout) -> list[float]:
-        """How long the gear of each robot takes [s]; of the output robot's, how long the outfeed
-        does where that is longer."""
-        pace = Pace.of(self.settings)
-        found = gear_times(layout, pace)
-        dropoff = layout.factory.dropoff.index
-        way = layout.home(0, dropoff) - layout.goal(dropoff, 0)
-        outfeed = pace.rest(way) + pace.lost + away(layout, self.settings)
-        found[0] = max(found[0], outfeed)
-        return found
-
     def seconds(self, layout: Layout) -> float:
         """The cycle time [s]."""
-        return max(self.times(layout))
+        return max(robot_times(layout, self.settings))
 
     def look(self, cycle: float | None) -> None:
         """For few relays that make it as fast as wanted, or as can be."""
@@ -145,7 +146,7 @@ class _Search:
         if cycle is None:
             most, _ = self._split({label: way.most for label, way in self.ways.items()})
             cycle = max(WITHIN * max(gear_times(most, pace)), self.seconds(most))
-        times = self.times(self.layout)
+        times = robot_times(self.layout, self.settings)
         late = {label: way for label, way in self.ways.items() if times[way.robot] > cycle}
         self.cycle, self.numbers = cycle, dict.fromkeys(self.ways, 0)
         self.numbers |= {label: self._guess(way, GUESS * cycle) for label, way in late.items()}
@@ -187,7 +188,7 @@ class _Search:
         """The ways to cut once more: of each robot that takes too long the longest that it waits
         for, or goes itself."""
         found = set[str]()
-        times, numbers = self.times(self.found), self.numbers
+        times, numbers = robot_times(self.found, self.settings), self.numbers
         for robot in self.found.factory.robots:
             if times[robot.index] > self.cycle + 1e-9:
                 labels = map(self._way, _carried(self.found, robot))

@@ -1,0 +1,1 @@
+"""Which robot does what: forms of operations, chosen for few robots and a cycle time."""

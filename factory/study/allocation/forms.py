@@ -1,0 +1,279 @@
+"""Forms of operations: a third robot takes what two bring, or the robot of one of them keeps it.
+
+A template names with `instead` the one that does the same with one robot fewer. Each operation in
+that form saves a robot; the robot that keeps the pile has a longer cycle. A form also turns what is
+below it: what a robot holds is made on its own way, so the inputs of that come along the other axis
+than they would to a robot that brings it to a third.
+
+Of all forms those are chosen that have the fewest blocked operations, then no cycle estimated above
+a bound, then the fewest robots: exact for what it goes by. Cycles are estimated from the sizes of
+sub-assemblies; layouts decide (`study/allocation/search.py`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from math import inf
+
+from factory.compiler.compiler import Node, expand
+from factory.compiler.mating.admitting import Admitted
+from factory.compiler.mating.findings import BLOCKED, NO_DEEPER
+from factory.layout.durations import Pace
+from factory.layout.guidepath import Box
+from factory.layout.relaying.naming import free_label
+from factory.problem.pag import NOPART, PAG, Assembly
+from factory.problem.template import Template, variable_number
+from factory.support.errors import Position
+
+APART = 0.06
+"""What lies on a guidepath beside a sub-assembly, from one station to the next [m]."""
+
+GRAIN = 0.1
+"""By how much estimated cycles above the bound are told apart [s]."""
+
+THIRD = -1
+"""The pile of an operation that a third robot takes; else the number of the input that is kept."""
+
+
+@dataclass(frozen=True, slots=True)
+class Option:
+    """One way to make a sub-assembly: how many operations are `blocked`, and `loose`; how far [s]
+    estimated cycles are `over` the bound in all; how many `robots` have finished theirs; the `time`
+    [s] that the robot which holds it takes up to here, with the way back; which input is the
+    `pile`, and how the inputs are made."""
+
+    blocked: int
+    loose: int
+    over: float
+    robots: int
+    time: float
+    pile: int = THIRD
+    inputs: tuple[Option, ...] = ()
+
+    @property
+    def rank(self) -> tuple[float, ...]:
+        """What is better is less."""
+        return self.blocked, self.loose, self.over, self.robots, self.time
+
+
+@dataclass(frozen=True)
+class FormsTask:
+    """A product whose forms are to be chosen: its operations in postorder (`expand`), what they
+    `admitted` along either axis, nothing for a product of default boxes, the boxes of its
+    sub-assemblies (`payloads`), the `pace` of robots, and forms that are `refused`: joins, and the
+    pile of each, which count as blocked."""
+
+    pag: PAG
+    templates: Mapping[str, Template]
+    nodes: Mapping[str, Node]
+    admitted: Mapping[str, Admitted]
+    payloads: Mapping[str, Box]
+    pace: Pace
+    refused: frozenset[tuple[str, int]] = frozenset()
+
+    def size(self, label: str) -> float:
+        """How long a sub-assembly is at most on the floor [m]."""
+        xlo, xhi, ylo, yhi = self.payloads[label]
+        return max(xhi - xlo, yhi - ylo)
+
+    @cached_property
+    def free(self) -> Mapping[str, Template]:
+        """The joins that may have either form, by their labels: the template of each with a third
+        robot. All joins of a statement are, whose template has one with a robot fewer."""
+        found: dict[str, Template] = {}
+        for node in self.pag.nodes:
+            template = self.templates[node.operation]
+            if template.instead:
+                found |= dict.fromkeys(joins(node), template)
+        return found
+
+
+def joins(node: Assembly) -> Iterator[str]:
+    """The labels of what a statement of two inputs or more makes one after the other (`expand`)."""
+    for number in range(2, len(node.inputs)):
+        yield f"{node.label}/{number}"
+    yield node.label
+
+
+def best_forms(task: FormsTask, bound: float = inf) -> tuple[dict[str, int], float]:
+    """For each operation that can have a robot fewer which input is the pile, or THIRD; and how far
+    estimated cycles are above a `bound` in all [s]. Near linear."""
+    found: dict[tuple[str, int], list[Option]] = {}
+    for label, node in task.nodes.items():
+        for axis in (0, 1):
+            known = [(found[x, axis], found[x, 1 - axis]) for x in node.inputs]
+            found[label, axis] = _best(_options(task, node, axis, known, bound))
+    chosen: dict[str, int] = {}
+    root = task.pag.root
+    last = min((_finished(task, root, o, bound) for o in found[root, 1]), key=lambda o: o.rank)
+    stack = [(root, last)]
+    while stack:
+        label, option = stack.pop()
+        node = task.nodes[label]
+        if label in task.free:
+            chosen[label] = option.pile
+        stack.extend(zip(node.inputs, option.inputs, strict=True))
+    return chosen, last.over
+
+
+def written_forms(task: FormsTask) -> dict[str, int]:
+    """The forms of a product as it is written: the first two inputs of a statement go to a third
+    robot, each further one to the pile."""
+    return {
+        label: THIRD if task.nodes[label].template == template else 0
+        for label, template in task.free.items()
+    }
+
+
+def _options(
+    task: FormsTask,
+    node: Node,
+    axis: int,
+    known: Sequence[tuple[list[Option], list[Option]]],
+    bound: float,
+) -> Iterator[Option]:
+    """The ways to make a node whose inputs come along an axis; `known`: those to make each input if
+    its own come along the same axis, or the other one."""
+    if not node.inputs:
+        yield Option(0, 0, 0.0, 0, task.pace.lost)
+        return
+    for pile in (THIRD, 0, 1) if node.label in task.free else (_held(node),):
+        faults = _faults(task, node, axis, pile)
+        for inputs in _combined([known[n][n != pile] for n in range(len(known))]):
+            yield _joined(task, node, pile, inputs, bound, faults)
+
+
+def _combined(each: Sequence[list[Option]]) -> Iterator[tuple[Option, ...]]:
+    if not each:
+        yield ()
+        return
+    for rest in _combined(each[1:]):
+        for first in each[0]:
+            yield (first, *rest)
+
+
+def _joined(
+    task: FormsTask,
+    node: Node,
+    pile: int,
+    inputs: tuple[Option, ...],
+    bound: float,
+    faults: tuple[int, int],
+) -> Option:
+    """The inputs joined on the robot of the `pile`, or on a third; the cycles of others end."""
+    blocked, loose = faults
+    over, robots, time = 0.0, 0, 0.0
+    for number, (label, option) in enumerate(zip(node.inputs, inputs, strict=True)):
+        blocked, loose = blocked + option.blocked, loose + option.loose
+        over, robots = over + option.over, robots + option.robots
+        if number == pile:
+            time = option.time
+        else:
+            robots += 1
+            over += _over(task, label, option, bound)
+    come = [task.size(x) for n, x in enumerate(node.inputs) if n != pile]
+    step = max(come, default=0.0) + APART
+    time += task.pace.rest(step) + node.dwell + task.pace.lost
+    time += 0.0 if pile == THIRD else step / task.pace.speed
+    return Option(blocked, loose, over, robots, time, pile, inputs)
+
+
+def _over(task: FormsTask, label: str, option: Option, bound: float) -> float:
+    """How far the estimated cycle of the robot that delivers a label is above the bound [s]."""
+    leg = task.size(label) + APART
+    cycle = option.time + 2 * task.pace.rest(leg) + task.pace.lost
+    return max(0.0, round((cycle - bound) / GRAIN) * GRAIN) if bound < inf else 0.0
+
+
+def _finished(task: FormsTask, label: str, option: Option, bound: float) -> Option:
+    """A way to make a label, with the cycle of the robot that delivers it."""
+    return replace(option, over=option.over + _over(task, label, option, bound))
+
+
+def _best(options: Iterator[Option]) -> list[Option]:
+    """Those that no other is as good as in everything and in time."""
+    found: list[Option] = []
+    for option in sorted(options, key=lambda o: o.rank):
+        if not found or option.time < found[-1].time - 1e-9:
+            found.append(option)
+    return found
+
+
+def _faults(task: FormsTask, node: Node, axis: int, pile: int) -> tuple[int, int]:
+    """Whether a node is blocked or refused, or at least not clean on the way, as its inputs come
+    along an axis to the pile."""
+    if (node.label, pile) in task.refused:
+        return 1, 1
+    if len(node.inputs) < 2 or node.label not in task.admitted:
+        return 0, 0
+    admits = task.admitted[node.label]
+    lowers = [level for n, level in enumerate(admits.lowers) if n != pile]
+    if len(node.inputs) > 2:
+        lowers = lowers[-1:]
+    level = max(admits.slides[axis], *lowers)
+    return int(level == BLOCKED), int(level < NO_DEEPER)
+
+
+def _held(node: Node) -> int:
+    """The number of the input that the carrier holds before the operation, -1 for none."""
+    variable = node.template.before[node.template.carrier - 1]
+    if variable == NOPART or not node.inputs:
+        return -1
+    return sorted(node.template.inputs, key=variable_number).index(variable)
+
+
+def reformed(pag: PAG, templates: Mapping[str, Template], forms: Mapping[str, int]) -> PAG:
+    """The same product with these forms (`best_forms`). A statement of many inputs is written as
+    several where its pile goes from one robot to another."""
+    taken, nodes = set(pag.by_label), list[Assembly]()
+    for node in pag.nodes:
+        template = templates[node.operation]
+        if template.instead and len(node.inputs) > 1:
+            nodes += _statements(node, template, forms, taken)
+        else:
+            nodes.append(node)
+    return replace(pag, nodes=tuple(nodes), count=None)
+
+
+def _statements(
+    node: Assembly, template: Template, forms: Mapping[str, int], taken: set[str]
+) -> list[Assembly]:
+    """A statement with its forms, what is taken first last."""
+    at = node.input_positions or (None,) * len(node.inputs)
+    first, *rest = zip(node.inputs, at, strict=True)
+    found, pile = list[Assembly](), [first]
+    operation = before = ""
+    for label, come in zip(joins(node), rest, strict=True):
+        form = forms[label]
+        last, before = before, label
+        if operation and form == 0:
+            pile.append(come)
+            continue
+        if operation:
+            made = free_label(last.replace("/", "."), taken)
+            found.append(_statement(node, made, operation, pile))
+            pile = [(made, come[1])]
+        operation = template.name if form == THIRD else template.instead
+        pile = [come, *pile] if form == 1 else [*pile, come]
+    return [_statement(node, node.label, operation, pile), *reversed(found)]
+
+
+def _statement(
+    node: Assembly, label: str, operation: str, inputs: Sequence[tuple[str, Position | None]]
+) -> Assembly:
+    names, at = zip(*inputs, strict=True)
+    known = tuple(position for position in at if position is not None)
+    return replace(node, label=label, operation=operation, inputs=names, input_positions=known)
+
+
+def forms_task(
+    pag: PAG,
+    templates: Mapping[str, Template],
+    admits: Mapping[str, Admitted],
+    payloads: Mapping[str, Box],
+    pace: Pace,
+) -> FormsTask:
+    """The task of choosing the forms of a product."""
+    return FormsTask(pag, templates, expand(pag, templates), admits, payloads, pace)

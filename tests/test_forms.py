@@ -1,0 +1,226 @@
+"""Forms: a third robot takes what two bring, or the robot of one of them keeps it. The product is
+the same, the net is proved as before, and the choice is the best for what it goes by."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from itertools import product
+from math import inf
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from layout_values import table_pag
+from pag_values import SHAPES, random_pag
+from pag_values import TEMPLATES as OWN
+
+import factory
+from factory.compiler.compiler import compile_pag
+from factory.compiler.mating.admitting import Admitted, admitted
+from factory.lang import read_pag, write_pag
+from factory.lang.template_reader import load_templates
+from factory.layout.durations import Pace
+from factory.nets.verify import verify
+from factory.pipeline import Project, read
+from factory.problem.pag import PAG
+from factory.problem.robot_types import load_catalogue
+from factory.problem.template import Template
+from factory.study.allocation.forms import (
+    THIRD,
+    FormsTask,
+    Option,
+    _finished,
+    _joined,
+    best_forms,
+    forms_task,
+    joins,
+    reformed,
+    written_forms,
+)
+from factory.study.allocation.search import Aim, Candidate, Search, allocated
+from factory.support.resources import templates_folder
+from factory.support.settings import Settings
+from tests.command_line import Terminal
+
+EXAMPLES = Path(__file__).resolve().parent.parent / "examples"
+TEMPLATES = {**OWN, **load_templates([templates_folder()])}
+"""The shipped ones, and those that random PAGs use beside them."""
+
+sizes, seeds, shapes = st.integers(2, 24), st.integers(0, 10_000), st.sampled_from(SHAPES)
+
+
+def task_of(pag: PAG, admits: dict[str, Admitted] | None = None) -> FormsTask:
+    """With sub-assemblies of many sizes, that follow from their labels."""
+    plain = compile_pag(pag, TEMPLATES, load_catalogue())
+    boxes = {
+        label: (0.0, 0.05 + sum(map(ord, label)) % 7 / 20, 0.0, 0.1) for label in plain.contents
+    }
+    return forms_task(pag, TEMPLATES, admits or {}, boxes, Pace())
+
+
+def parts_made(pag: PAG) -> set[frozenset[str]]:
+    """The parts of all that is joined."""
+    plain = compile_pag(pag, TEMPLATES, load_catalogue())
+    return {frozenset(plain.contents[o.label]) for o in plain.operations[:-1] if len(o.inputs) > 1}
+
+
+@given(sizes, seeds, shapes, st.sampled_from([0.5, 1.0, 2.0, 4.0, inf]))
+def test_the_same_is_joined_with_the_robots_that_are_counted(
+    size: int, seed: int, shape: str, bound: float
+) -> None:
+    pag = random_pag(size, seed, shape)
+    forms, _ = best_forms(task_of(pag), bound)
+    again = reformed(pag, TEMPLATES, forms)
+    assert parts_made(again) == parts_made(pag)
+    read_again = read_pag(write_pag(again), TEMPLATES)
+    assert write_pag(read_again) == write_pag(again), "it is a PAG that can be written down"
+    made = compile_pag(again, TEMPLATES, load_catalogue())
+    assert verify(made.net).holds
+    parts = len(made.leaves)
+    tools = sum(robot.type == "tool" for robot in made.robots)
+    thirds = sum(form == THIRD for form in forms.values())
+    assert len(made.robots) - tools == parts + thirds
+    if bound == inf:
+        assert thirds == 0, "without a bound no robot is spent on taking over"
+
+
+def every_way(task: FormsTask, label: str, axis: int, bound: float) -> Iterator[Option]:
+    """All ways to make a label, none left out."""
+    node = task.nodes[label]
+    if not node.inputs:
+        yield Option(0, 0, 0.0, 0, task.pace.lost)
+        return
+    for pile in (THIRD, 0, 1) if label in task.free else (0,):
+        ways = [
+            [*every_way(task, x, axis if n == pile else 1 - axis, bound)]
+            for n, x in enumerate(node.inputs)
+        ]
+        fault = int(len(ways) > 1 and label in task.admitted and _blocked(task, label, axis, pile))
+        for inputs in product(*ways):
+            yield _joined(task, node, pile, inputs, bound, (fault, fault))
+
+
+def _blocked(task: FormsTask, label: str, axis: int, pile: int) -> bool:
+    return (label, pile) in task.refused or task.admitted[label].slides[axis] == 0
+
+
+@given(st.integers(3, 9), seeds, st.sampled_from(["any", "chain", "balanced"]), st.data())
+def test_no_other_forms_are_better(size: int, seed: int, shape: str, data: st.DataObject) -> None:
+    pag = random_pag(size, seed, shape, arity=3)
+    sliding = st.sampled_from([(3, 3), (3, 0), (0, 3), (0, 0)])
+    labels = [label for node in pag.nodes if len(node.inputs) > 1 for label in joins(node)]
+    admits = {label: Admitted(data.draw(sliding), (0, 0)) for label in labels}
+    task, bound = task_of(pag, admits), data.draw(st.sampled_from([0.8, 1.5, 3.0]))
+    best = min(
+        _finished(task, pag.root, option, bound).rank
+        for option in every_way(task, pag.root, 1, bound)
+    )
+    forms, _ = best_forms(task, bound)
+    chosen = [
+        _finished(task, pag.root, option, bound).rank
+        for option in every_way(task, pag.root, 1, bound)
+        if _forms(task, option) == forms
+    ]
+    assert min(chosen) == pytest.approx(best)
+
+
+def _forms(task: FormsTask, option: Option) -> dict[str, int]:
+    found, stack = {}, [(task.pag.root, option)]
+    while stack:
+        label, one = stack.pop()
+        if label in task.free:
+            found[label] = one.pile
+        stack += zip(task.nodes[label].inputs, one.inputs, strict=True)
+    return found
+
+
+def test_a_statement_of_many_inputs_is_cut_where_its_pile_changes_hands() -> None:
+    pag = table_pag("s", ("s", "mate", "a b c d e", {}), *((x, "atomic", "", {}) for x in "abcde"))
+    forms = {"s/2": 1, "s/3": 0, "s/4": THIRD, "s": 1}
+    text = write_pag(reformed(pag, TEMPLATES, forms))
+    assert "s = insert ( e, s.4 );" in text
+    assert "s.4 = mate ( s.3, d );" in text
+    assert "s.3 = insert ( b, a, c );" in text
+
+
+@given(sizes, seeds, shapes)
+def test_forms_as_they_are_written_change_nothing(size: int, seed: int, shape: str) -> None:
+    pag = random_pag(size, seed, shape)
+    again = reformed(pag, TEMPLATES, written_forms(task_of(pag)))
+    assert again.nodes == pag.nodes
+
+
+def test_a_form_that_is_refused_is_not_chosen() -> None:
+    pag = table_pag("s", ("s", "mate", "a b", {}), *((x, "atomic", "", {}) for x in "ab"))
+    task = task_of(pag, {})
+    assert best_forms(task)[0]["s"] != THIRD
+    refused = frozenset({("s", 0), ("s", 1)})
+    assert best_forms(replace(task, refused=refused))[0] == {"s": THIRD}
+
+
+def test_both_axes_are_looked_at_as_matings_does() -> None:
+    project = read(EXAMPLES / "truck.pag")
+    found = admitted(project.pag, project.templates, project.product)
+    assert project.matings is not None
+    for mating in project.matings.all:
+        assert found[mating.label].slides[mating.approach.axis] == mating.slide
+
+
+def test_a_template_without_a_robot_to_spare_is_never_changed(
+    templates: dict[str, Template],
+) -> None:
+    bare = Project(read(EXAMPLES / "paper.pag").pag, templates)
+    seen = looked_at(bare, Aim(robots="least"))
+    assert len(seen) == 1
+
+
+def looked_at(project: Project, aim: Aim) -> list[Candidate]:
+    """All candidates of a search."""
+    seen: list[Candidate] = []
+    Search(project, aim).look(seen.append)
+    return seen
+
+
+@pytest.fixture
+def templates() -> dict[str, Template]:
+    """Those of the package, but mate as it was."""
+    return {name: replace(t, instead="") for name, t in TEMPLATES.items()}
+
+
+def test_forms_leave_no_robot_without_a_hand() -> None:
+    project = read(EXAMPLES / "truck.pag")
+    assert not project.no_grips
+    found = allocated(project, Aim(robots=20, seconds=8))
+    assert not found.no_grips
+    assert len(found.plain.robots) <= 20
+    certificate = found.layout.certificate
+    assert certificate is not None
+    assert certificate.holds
+
+
+def test_few_robots_do_it_in_the_time_that_is_predicted(run: Terminal) -> None:
+    paper = EXAMPLES / "paper.pag"
+    done = run("run", paper, "--robots", "4", "--units", "4", "--json")
+    assert done.status == 0, done.err
+    assert done.json["robots"] == 4
+    assert done.json["cycle_time_s"] == pytest.approx(done.json["predicted_cycle_time_s"], rel=0.02)
+    assert run("check", paper, "--robots", "3", "--json").codes == ["TooFewRobots"]
+    least = run("check", paper, "--robots", "least", "--json").json
+    assert least["robots"] == 4
+    assert least["live"]
+
+
+def test_a_cycle_time_takes_as_few_robots_as_found(run: Terminal) -> None:
+    counts = [
+        run("check", EXAMPLES / "paper.pag", "--cycle", cycle, "--json").json["robots"]
+        for cycle in ("4", "2.8", "2.6")
+    ]
+    assert counts == [4, 5, 6]
+
+
+def test_from_python() -> None:
+    pag = factory.load_pag(EXAMPLES / "paper.pag")
+    assert [len(factory.compile(pag, robots=n).robots) for n in (4, 5, 6, None)] == [4, 5, 6, 6]
+    assert factory.compile(pag) == read(EXAMPLES / "paper.pag", settings=Settings()).plain
