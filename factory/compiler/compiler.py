@@ -288,7 +288,7 @@ def gear_net(robots: tuple[Robot, ...], operations: tuple[Operation, ...]) -> Ge
             wait = len(places)
             places.append(
                 Place(
-                    f"{robot.name}:{label}",
+                    _wait_name(robot, label, operation, operations),
                     (done,),
                     (begun,),
                     "hold" if stays else "wait",
@@ -306,3 +306,16 @@ def gear_net(robots: tuple[Robot, ...], operations: tuple[Operation, ...]) -> Ge
     redistribution: tuple[Redistribution, ...] = tuple(tuple(sorted(p)) for p in pairs)
     net = ThreadedNet(PetriNet(transitions, tuple(places)), redistribution)
     return GearNet(net, tuple(gears), tuple(g.places[0] for g in gears), tuple(slots))
+
+
+def _wait_name(
+    robot: Robot, label: str, onward: Operation, operations: tuple[Operation, ...]
+) -> str:
+    """What the place is called where a robot waits for an operation `onward`: `r2:part1`. One that
+    comes home several times in its gear waits with nothing for each of its tours, `r2:nopart/part3`."""
+    if label != NOPART:
+        return f"{robot.name}:{label}"
+    slots = (operations[number].robots.index(robot.index) for number in robot.operations)
+    befores = (operations[n].before[s] for n, s in zip(robot.operations, slots, strict=True))
+    several = sum(before == NOPART for before in befores) > 1
+    return f"{robot.name}:{label}/{onward.label}" if several else f"{robot.name}:{label}"

@@ -65,7 +65,7 @@ class _Bound:
         for robot, carrier in list(enumerate(self.on))[1:]:
             self.axis[robot] = 1 - self.axis[carrier]
         self.tail = sqrt(2 * pace.eps / pace.acceleration)
-        self.legs = [self._leg(robot.index) for robot in factory.robots]
+        self.legs = [self._legs(robot.index) for robot in factory.robots]
         self.spans = [self._span(robot.index) for robot in factory.robots]
         self.moving = [self._moving(operation) for operation in factory.operations]
         self.waiting = [self._waiting(operation) for operation in factory.operations]
@@ -74,6 +74,8 @@ class _Bound:
         """The least sum of delays [s] along the gear of a robot."""
         gear = self.factory.robots[robot].operations
         fixed = sum(self.factory.operations[number].dwell + self.pace.lost for number in gear)
+        if len(self.factory.tours[robot]) > 1:
+            return fixed + sum(self.moving[number] for number in gear)
         first = self.moving[gear[0]]
         if len(gear) == 1:
             return fixed + first
@@ -90,23 +92,27 @@ class _Bound:
         box = self.payloads[label]
         return _Interval(box[2 * axis], box[2 * axis + 1])
 
-    def _leg(self, robot: int) -> float:
-        """The least way to where a robot delivers, 0 for a tool."""
+    def _legs(self, robot: int) -> dict[int, float]:
+        """The least way to where a robot delivers, by the operation in which it does; 0 for a
+        tool."""
         if robot == 0:
             product = self._box(self.factory.pag.root, 0)
-            return product.high - product.low + 1.5 * self.c
-        label = self.factory.delivered(robot)
-        if not label:
-            return 0.0
-        axis = self.axis[robot]
-        made = self.factory.operations[self.factory.robots[robot].operations[-1]].label
-        return self._box(label, axis).past(self._box(made, axis)) + self.c
+            return {self.factory.dropoff.index: product.high - product.low + 1.5 * self.c}
+        axis, legs = self.axis[robot], dict[int, float]()
+        for tour in self.factory.tours[robot]:
+            last = self.factory.operations[tour[-1]]
+            label, legs[last.index] = last.before[last.robots.index(robot)], 0.0
+            if label != NOPART:
+                past = self._box(label, axis).past(self._box(last.label, axis))
+                legs[last.index] = past + self.c
+        return legs
 
     def _span(self, robot: int) -> float:
         """The least way from a robot's first station to its last."""
         operations = [self.factory.operations[number] for number in carried(self.factory, robot)]
         guests = [g for o in operations for g in o.robots if g != robot]
-        if not guests or any(ahead_of(o, 1.0) for o in operations):
+        several = len(self.factory.tours[robot]) > 1 or len(set(guests)) < len(guests)
+        if not guests or several or any(ahead_of(o, 1.0) for o in operations):
             return 0.0
         lanes = [self._lane(guest, self.axis[robot]) for guest in guests]
         apart = max(lanes) - min(lanes) + ROUNDED
@@ -120,19 +126,20 @@ class _Bound:
 
     def _back(self, robot: int) -> float:
         """The least time of the way back of a robot."""
-        return self.pace.rest(self.spans[robot] + self.legs[robot])
+        return self.pace.rest(self.spans[robot] + min(self.legs[robot].values()))
 
     def _moving(self, operation: Operation) -> float:
         """The least time of an operation by the legs that end in it, and by the way back of a robot
         that begins its gear with it, unless it goes ahead."""
         pace, found = self.pace, [0.0]
         for slot, robot in enumerate(operation.robots):
-            gear = self.factory.robots[robot].operations
-            begins = len(gear) > 1 and gear[0] == operation.index
+            tour = self.factory.tour_of(robot, operation.index)
+            begins = len(tour) > 1 and tour[0] == operation.index
             if begins and not pace.goes_ahead(operation, slot):
                 found.append(self._back(robot))
-            if len(gear) > 1 and gear[-1] == operation.index:
-                found.append(pace.rest(self.legs[robot]) + self._lowering(operation, slot))
+            if len(tour) > 1 and tour[-1] == operation.index:
+                leg = self.legs[robot][operation.index]
+                found.append(pace.rest(leg) + self._lowering(operation, slot))
         return max(*found, self._waiting(operation))
 
     def _waiting(self, operation: Operation) -> float:

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from factory.layout.certificate import Fault, fault
 from factory.layout.guidepath import Point2
 from factory.layout.layout import Layout, carriers
+from factory.plant.factory import Operation
 from factory.problem.pag import NOPART
 
 Index = NDArray[np.intp]
@@ -68,8 +69,15 @@ def _junction(layout: Layout, robot: int, carrier: int) -> Iterator[Fault]:
         return
     if carrier < 0:
         return
-    on, number = layout.guidepaths[carrier], factory.robots[robot].operations[-1]
-    operation, other = factory.operations[number], factory.robots[carrier].name
+    for tour in factory.tours[robot]:
+        yield from _ends_at(layout, robot, factory.operations[tour[-1]])
+
+
+def _ends_at(layout: Layout, robot: int, operation: Operation) -> Iterator[Fault]:
+    """What a robot's guidepath lacks where it delivers in an operation."""
+    path, factory, number = layout.guidepaths[robot], layout.factory, operation.index
+    carrier, name, (u, t) = operation.carrier, factory.robots[robot].name, (path.heading, path.side)
+    on, other = layout.guidepaths[carrier], factory.robots[carrier].name
     in_line = len(operation.robots) == 2 and len(operation.inputs) == 1 and t == on.side
     if t != on.heading and not (in_line and u == on.heading):
         message = f"{name}: its side {t} is not {other}'s heading {on.heading}: it is mirrored"

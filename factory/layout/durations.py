@@ -90,7 +90,7 @@ def _operation_time(
         stroke = layout.factory.strokes[operation.robots[lowered]]
         longest = max(longest, pace.entered(rested[lowered]) + pace.rest(stroke))
     for robot in operation.robots:
-        first = layout.factory.robots[robot].operations[0] == operation.index
-        if first and robot in layout.factory.strokes:
+        lifted = robot in layout.factory.strokes
+        if lifted and layout.factory.begins(robot, operation.index):
             longest = max(longest, pace.rest(layout.factory.strokes[robot]))
     return longest + operation.dwell + pace.lost

@@ -111,8 +111,8 @@ class Layout:
         chosen = self.factory.operations[operation]
         if slot >= len(chosen.robots):
             robot = self.lifts[self.factory.axes[operation][slot] - len(self.guidepaths)]
-            last = self.factory.robots[robot].operations[-1]
-            return 0.0 if operation == last else self.factory.strokes[robot]
+            lowers = self.factory.delivers(robot, operation)
+            return 0.0 if lowers else self.factory.strokes[robot]
         path = self.guidepaths[chosen.robots[slot]]
         point = chosen.template.law.goals[slot]
         if slot != chosen.template.carrier - 1 or point.end == "A":
@@ -191,7 +191,7 @@ class Layout:
     def home(self, robot: int, operation: int) -> float:
         """Arc length at which a robot waits before an operation: the goal of the one before, or B
         where it waits with no part at the beginning of its cycle."""
-        if self.factory.robots[robot].operations[0] == operation:
+        if self.factory.begins(robot, operation):
             return self.guidepaths[robot].length
         return self.legs[operation, robot][0]
 

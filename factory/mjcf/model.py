@@ -268,7 +268,8 @@ def _hoists(layout: Layout, masses: Mapping[str, float], settings: Settings) -> 
     """The lifts, for the heaviest load of each: what it delivers."""
     factory, found = layout.factory, {}
     for robot, stroke in factory.strokes.items():
-        load, most = masses[factory.delivered(robot)], settings.acceleration + GRAVITY
+        load = max(masses[label] for label in factory.deliveries(robot))
+        most = settings.acceleration + GRAVITY
         drive = drive_for(HOIST_MASS, load, most, settings, HOIST_STIFFNESS)
         found[robot] = Hoist(stroke, drive, lift_stops(stroke, layout.clearance))
     return found

@@ -55,8 +55,7 @@ def add_robots(
 def _low(layout: Layout, robot: int) -> float:
     """How far above z0 the lowest point of a robot's payload is carried, with its lift down [m]."""
     factory, product = layout.factory, layout.product
-    carried = factory.delivered(robot)
-    parts = factory.contents[carried] if carried else ()
+    parts = [part for label in factory.deliveries(robot) for part in factory.contents[label]]
     ground = float(product.low[2])
     low = min((float(product.solids[part].low[2]) for part in parts), default=ground)
     return low - ground + layout.held_at(robot)
@@ -76,7 +75,7 @@ def role_of(factory: Factory, robot: int) -> str:
     """What a robot does, for its paint."""
     if robot == 0:
         return "output"
-    if not factory.delivered(robot):
+    if not factory.deliveries(robot):
         return "tool"
     first = factory.operations[factory.robots[robot].operations[0]]
     return "carrier" if first.inputs else "fed"

@@ -150,7 +150,8 @@ def _axes(settings: Settings, layout: Layout, jitter: float) -> Iterator[DrivenA
         masses[operation.label] = sum(inputs) if inputs else solids[operation.label].mass
     for load in sorted({heaviest(factory, robot, masses) for robot in factory.robots}):
         yield DrivenAxis.loaded(CARRIAGE_MASS, load, a, gain=1 - jitter, room=room)
-    for load in sorted({masses[factory.delivered(robot)] for robot in factory.strokes}):
+    lifted = [[masses[x] for x in factory.deliveries(robot)] for robot in factory.strokes]
+    for load in sorted({max(loads) for loads in lifted}):
         held = 2 * FRICTION + SLACK * (HEAD_MASS + load) * GRAVITY
         push, stiff = a + GRAVITY, HOIST_STIFFNESS
         yield DrivenAxis(HOIST_MASS, load, a, push, stiff, 1 - jitter, held=held, room=room)

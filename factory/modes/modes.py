@@ -76,9 +76,9 @@ def operation_starts(layout: Layout) -> list[Array]:
     factory = layout.factory
     left = {leg: start for leg, (start, _) in layout.legs.items()}
     for axis, lift in enumerate(layout.lifts, start=len(factory.robots)):
-        gear, stroke = factory.robots[lift].operations, factory.strokes[lift]
-        left[gear[0], axis] = 0.0
-        left[gear[-1], axis] = stroke
+        for tour in factory.tours[lift]:
+            left[tour[0], axis] = 0.0
+            left[tour[-1], axis] = factory.strokes[lift]
     return [np.array([left[o.index, a] for a in factory.axes[o.index]]) for o in factory.operations]
 
 

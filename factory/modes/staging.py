@@ -81,7 +81,7 @@ def _rising(
     """The way up of a lift before the first operation of its robot, and after that the way back
     from its `start` to where the robot is `awaited`, if it is."""
     robot = operation.robots[slot]
-    if layout.factory.robots[robot].operations[0] != operation.index:
+    if not layout.factory.begins(robot, operation.index):
         return
     axis = len(layout.factory.robots) + layout.lifts.index(robot)
     raised = layout.factory.axes[operation.index].index(axis)

@@ -125,33 +125,69 @@ class Factory:
         return self.operations[-1]
 
     @cached_property
+    def tours(self) -> tuple[tuple[tuple[int, ...], ...], ...]:
+        """For each robot the operations of its tours, in the order of its gear: a tour leads from
+        empty hands to empty hands. A robot that serves one label has one, one on a line several."""
+        found = []
+        for robot in self.robots:
+            tours, tour = list[tuple[int, ...]](), list[int]()
+            for number in robot.operations:
+                operation = self.operations[number]
+                tour.append(number)
+                if operation.after[operation.robots.index(robot.index)] == NOPART:
+                    tours.append(tuple(tour))
+                    tour = []
+            found.append(tuple(tours))
+        return tuple(found)
+
+    @cached_property
+    def folded(self) -> bool:
+        """Whether some robot has more than one tour."""
+        return any(len(tours) > 1 for tours in self.tours)
+
+    @cached_property
     def strokes(self) -> Mapping[int, float]:
-        """How far [m] each robot (index) with a lift lowers what it delivers, robot by robot."""
-        found = {
-            o.robots[o.lowered]: o.approach.stroke
-            for o in self.operations
-            if o.approach is not None and o.lowered >= 0
-        }
+        """How far [m] each robot (index) with a lift lowers what it delivers, robot by robot: one
+        with several tours the farthest that one of them asks for."""
+        found: dict[int, float] = {}
+        for o in self.operations:
+            if o.approach is not None and o.lowered >= 0:
+                robot = o.robots[o.lowered]
+                found[robot] = max(found.get(robot, 0.0), o.approach.stroke)
         return MappingProxyType(dict(sorted(found.items())))
 
     @cached_property
     def axes(self) -> tuple[tuple[int, ...], ...]:
         """For each operation the axes that its mode moves: the carriages of its robots, which have
         their robots' numbers, and the lifts that are raised or lowered in it, numbered from R on in
-        the order of `strokes`. A lift is up but for the operation that it delivers to."""
+        the order of `strokes`. A lift is up but for the operations that it delivers to."""
         lift = {robot: len(self.robots) + n for n, robot in enumerate(self.strokes)}
         found = [list(operation.robots) for operation in self.operations]
         for robot, axis in lift.items():
-            gear = self.robots[robot].operations
-            for number in dict.fromkeys((gear[0], gear[-1])):
-                found[number].append(axis)
+            for tour in self.tours[robot]:
+                for number in dict.fromkeys((tour[0], tour[-1])):
+                    found[number].append(axis)
         return tuple(map(tuple, found))
 
-    def delivered(self, robot: int) -> str:
-        """The label a robot (index) carries to its A end, "" for a tool."""
-        operation = self.operations[self.robots[robot].operations[-1]]
-        label = operation.before[operation.robots.index(robot)]
-        return "" if label == NOPART else label
+    def begins(self, robot: int, operation: int) -> bool:
+        """Whether a robot (index) begins a tour with an operation (index)."""
+        return any(tour[0] == operation for tour in self.tours[robot])
+
+    def delivers(self, robot: int, operation: int) -> bool:
+        """Whether a robot (index) ends a tour with an operation (index)."""
+        return any(tour[-1] == operation for tour in self.tours[robot])
+
+    def tour_of(self, robot: int, operation: int) -> tuple[int, ...]:
+        """The tour of a robot (index) that an operation (index) is in."""
+        return next(tour for tour in self.tours[robot] if operation in tour)
+
+    def deliveries(self, robot: int) -> tuple[str, ...]:
+        """The labels a robot (index) carries to its A end, tour by tour; none for a tool."""
+        found = []
+        for tour in self.tours[robot]:
+            operation = self.operations[tour[-1]]
+            found.append(operation.before[operation.robots.index(robot)])
+        return tuple(label for label in found if label != NOPART)
 
     @cached_property
     def contents(self) -> Mapping[str, tuple[str, ...]]:

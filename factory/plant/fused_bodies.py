@@ -65,7 +65,8 @@ class FusedBodies:
     def handled(self, factory: Factory, robot: int) -> tuple[str, ...]:
         """The bodies that a robot (index) ever holds: what it delivers, and what it is made of."""
         if not self.wholes:
-            return self.carried.get(factory.delivered(robot), ())
+            labels = factory.deliveries(robot)
+            return tuple(body for label in labels for body in self.carried[label])
         found: dict[str, None] = {}
         for number in factory.robots[robot].operations:
             operation = factory.operations[number]

@@ -121,7 +121,8 @@ class Followed:
         self.kinds = [m.equality(e).name for e in range(m.neq)]
         factory, contents = subject.factory, subject.factory.contents
         carried = {
-            robot.name: contents.get(factory.delivered(robot.index), ()) for robot in factory.robots
+            robot.name: [x for label in factory.deliveries(robot.index) for x in contents[label]]
+            for robot in factory.robots
         }
         handled = [label for parts in carried.values() for label in parts]
         self.label = part or max(dict.fromkeys(handled), key=handled.count)

@@ -16,6 +16,7 @@ import numpy as np
 from factory.geometry.meshes import Array
 from factory.layout.dimensions import PAYLOAD
 from factory.layout.hands.apart import BESIDE
+from factory.layout.guidepath import hull
 from factory.layout.hands.limbs import limbs, rises_first
 from factory.layout.layout import Layout
 from factory.plant.factory import Operation
@@ -69,7 +70,7 @@ def guests(layout: Layout, carrier: int) -> Iterator[tuple[Operation, int]]:
 def _breadth(layout: Layout, robot: int, boxes: Array, axis: int) -> float:
     """How broad a robot's hand, in `boxes` (n, 2, 3), and payload are together along an axis across
     its way [m]."""
-    box = layout.payloads[layout.factory.delivered(robot)]
+    box = hull([layout.payloads[label] for label in layout.factory.deliveries(robot)])
     hand = boxes[:, :, axis] - layout.guidepaths[robot].a[axis]
     return 2 * float(max(abs(hand).max(initial=0.0), -box[2 * axis], box[2 * axis + 1]))
 
@@ -97,8 +98,8 @@ def _coming(layout: Layout, robot: int, carrier: int = -1) -> Array:
     found = [np.stack([down[:, 0], raised[:, 1]], axis=1)]
     path, product = layout.guidepaths[robot], layout.product
     if carrier >= 0:
-        label = layout.factory.delivered(robot)
-        parts = [product.solids[part] for part in layout.factory.contents[label]]
+        contents, labels = layout.factory.contents, layout.factory.deliveries(robot)
+        parts = [product.solids[part] for label in labels for part in contents[label]]
         boxes = np.array([[part.low, part.high] for part in parts]) - product.middle
         boxes[:, :, :2] += path.a
         over = PAYLOAD + layout.elevations[carrier] + product.middle[2] - product.low[2]

@@ -97,7 +97,8 @@ def _beyond(layout: Layout, robot: int) -> float:
     outfeed. A payload at a cut, and a carriage and arm there, are clear of it [m]."""
     path, factory, c = layout.guidepaths[robot], layout.factory, layout.clearance
     operation = factory.operations[factory.robots[robot].operations[-1]]
-    beside = path.frame(layout.payloads[factory.delivered(operation.carrier)])[0]
+    (delivered,) = factory.deliveries(operation.carrier)
+    beside = path.frame(layout.payloads[delivered])[0]
     if operation.index != factory.dropoff.index:
         return beside
     front = path.frame(layout.payloads[factory.pag.root])[1]

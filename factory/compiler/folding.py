@@ -1,0 +1,203 @@
+"""Folds: robots of a factory that come to the same place from the same side become one robot, on
+one *line*.
+
+In a factory as Compile makes it each robot has one *tour*, from empty hands to empty hands. The
+tours form a tree: a *kid* of a tour is one that delivers to it. A fold assigns tours to lines: the
+output robot's tour to a line of its own, kids of tours of one line to lines that deliver to it, the
+inputs of one operation to different lines. One robot serves a line.
+
+A fold has exactly one live choice of programs: each robot does its tours in the order in which the
+program of the robot that it delivers to asks for them. That order is live, for below a pile that
+is held only lines below are used, so the product can be made once, operation by operation, in
+postorder with the pile first; in any other two deliveries and two tours in the reverse order close
+a circuit without a token. `nets.train` proves the former of each net anew.
+
+Guarantees: the net is a gear train, live, safe and reversible. What is no fold is refused (BadLine).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import replace
+
+from factory.compiler.compiler import gear_net
+from factory.plant.factory import Factory, Operation, Robot
+from factory.problem.pag import NOPART
+from factory.problem.robot_types import Catalogue
+from factory.support.errors import Diagnostic, InputError, did_you_mean
+
+Line = tuple[int, ...]
+"""The tours of a line, as the robots of the factory that is folded."""
+
+
+def fold(factory: Factory, lines: Iterable[Line], catalogue: Catalogue) -> Factory:
+    """The factory with one robot for each of the `lines`, and for each robot that is in none of
+    them. Raises InputError (BadLine) with everything that makes this no fold."""
+    shared = [line for line in lines if len(line) > 1]
+    faults = [fault for line in shared for fault in _faults(factory, line, shared, catalogue)]
+    if faults:
+        raise InputError(faults)
+    on = line_of(len(factory.robots), shared)
+    heads = sorted(set(on))
+    number = {head: n for n, head in enumerate(heads)}
+    operations = tuple(
+        replace(o, robots=tuple(number[on[robot]] for robot in o.robots))
+        for o in factory.operations
+    )
+    tours: list[list[int]] = [[] for _ in heads]
+    for robot in factory.robots:
+        tours[number[on[robot.index]]].append(robot.index)
+    programs: list[list[int]] = [[] for _ in heads]
+    for head, line in zip(heads, tours, strict=True):
+        asked = sorted(line, key=_asked(factory, programs, number, on))
+        programs[number[head]] = [n for robot in asked for n in factory.robots[robot].operations]
+    robots = tuple(
+        Robot(
+            n,
+            f"r{n + 1}",
+            _type(factory, line, catalogue),
+            tuple(program),
+            factory.robots[head].position,
+        )
+        for n, (head, line, program) in enumerate(zip(heads, tours, programs, strict=True))
+    )
+    return replace(
+        factory, robots=robots, operations=operations, net=gear_net(robots, operations)
+    )
+
+
+def line_of(count: int, lines: Iterable[Line]) -> list[int]:
+    """For each of so many robots the first robot of its line, itself where it is in none."""
+    on = list(range(count))
+    for line in lines:
+        for robot in line:
+            on[robot] = min(line)
+    return on
+
+
+def lines_of_labels(factory: Factory, sides: Iterable[Sequence[str]]) -> tuple[Line, ...]:
+    """Lines given by the labels that their robots bring. Raises InputError (BadLine) where a label
+    is brought by no robot, or is on two lines."""
+    brings = {
+        label: robot
+        for o in factory.operations[:-1]
+        for robot, label in zip(o.robots, o.before, strict=True)
+        if label != NOPART and robot != o.carrier
+    }
+    faults, lines, seen = list[Diagnostic](), list[Line](), set[str]()
+    for labels in sides:
+        for label in labels:
+            if label not in brings:
+                message = f"no robot brings '{label}' to another"
+                faults.append(_fault(message, hint=did_you_mean(label, list(brings), "labels")))
+            elif label in seen:
+                message = f"'{label}' is on two lines"
+                faults.append(_fault(message, hint="name each label once"))
+            seen.add(label)
+        lines.append(tuple(sorted({brings[label] for label in labels if label in brings})))
+    if faults:
+        raise InputError(faults)
+    return tuple(lines)
+
+
+def delivery(factory: Factory, robot: int) -> Operation:
+    """The last operation of a tour, given by its robot."""
+    return factory.operations[factory.robots[robot].operations[-1]]
+
+
+def _asked(
+    factory: Factory, programs: Sequence[Sequence[int]], number: dict[int, int], on: Sequence[int]
+):  # type: ignore[no-untyped-def]
+    """A sort key of tours: when the robot that they deliver to asks for them in its program."""
+    places: dict[int, dict[int, int]] = {}
+
+    def key(robot: int) -> int:
+        last = delivery(factory, robot)
+        if last.carrier == robot:
+            return 0
+        carrier = number[on[last.carrier]]
+        if carrier not in places:
+            places[carrier] = {n: step for step, n in enumerate(programs[carrier])}
+        return places[carrier][last.index]
+
+    return key
+
+
+def _type(factory: Factory, line: Sequence[int], catalogue: Catalogue) -> str:
+    """The type of robot that fits all tours of a line."""
+    found = factory.robots[line[0]].type
+    for robot in line[1:]:
+        found = catalogue.meet(found, factory.robots[robot].type) or found
+    return found
+
+
+def _faults(
+    factory: Factory, line: Line, lines: Sequence[Line], catalogue: Catalogue
+) -> Iterator[Diagnostic]:
+    """What makes a line no line, pair by pair with its first tour."""
+    on = line_of(len(factory.robots), lines)
+    first, *others = line
+    for other in others:
+        message = mismatch(factory, first, other, on, catalogue)
+        if message:
+            names = f"{_named(factory, first)} and {_named(factory, other)} cannot share a robot"
+            position = factory.robots[other].position
+            yield _fault(f"{names}: {message}", position=position)
+    deliveries = [delivery(factory, robot).index for robot in line]
+    if len(set(deliveries)) < len(deliveries):
+        both = next(n for n in deliveries if deliveries.count(n) > 1)
+        message = f"'{factory.operations[both].label}' needs two inputs of one robot at once"
+        yield _fault(message, position=factory.operations[both].position)
+
+
+def mismatch(
+    factory: Factory, one: int, other: int, on: Sequence[int], catalogue: Catalogue
+) -> str:
+    """Why two tours, given by their robots, cannot be on one line if the tours that they deliver to
+    are on the lines `on`; "" where they can."""
+    ends = delivery(factory, one), delivery(factory, other)
+    if 0 in (one, other):
+        return "the output robot has a line of its own"
+    if on[ends[0].carrier] != on[ends[1].carrier]:
+        return "they deliver to different robots"
+    if catalogue.meet(factory.robots[one].type, factory.robots[other].type) is None:
+        return "no type of robot is fit for both"
+    if _kind(factory, one) != _kind(factory, other):
+        return "they begin or end in different ways"
+    if not _sides(ends[0], one) & _sides(ends[1], other):
+        return "they cannot come from the same side"
+    return ""
+
+
+def _kind(factory: Factory, robot: int) -> tuple[object, ...]:
+    """What tours on one line have in common: that a feeder begins them, that they end at a station
+    of a carrier that holds something, that they lower what they bring; tools, what they do."""
+    first = factory.operations[factory.robots[robot].operations[0]]
+    last = delivery(factory, robot)
+    slot = last.robots.index(robot)
+    if last.before[slot] == NOPART:
+        return "tool", last.template.name
+    fed, inserted = len(first.robots) == 1, last.before[last.template.carrier - 1] != NOPART
+    if not (fed and inserted):
+        return "alone", robot
+    return "fed", last.lowered == slot
+
+
+def _sides(last: Operation, robot: int) -> set[int]:
+    """From which sides of the axis of its approach a robot may come with what it delivers."""
+    approach = last.approach
+    if approach is None or last.before[last.robots.index(robot)] == NOPART:
+        return {-1, +1}
+    turned = 1 if last.robots.index(robot) == last.last else -1
+    return {turned * side for side in approach.sides}
+
+
+def _named(factory: Factory, robot: int) -> str:
+    last = delivery(factory, robot)
+    label = last.before[last.robots.index(robot)]
+    return f"the tool of '{last.label}'" if label == NOPART else f"'{label}'"
+
+
+def _fault(message: str, position: object = None, hint: str = "") -> Diagnostic:
+    hint = hint or "a line has labels that come to one carrier, from one side, by one kind of robot"
+    return Diagnostic("BadLine", message, position, hint)  # type: ignore[arg-type]
