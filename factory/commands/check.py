@@ -84,17 +84,19 @@ def check(
 def _proved(certificate: Path, checked: Checked) -> dict[str, bool | None]:
     """What a certificate of the net that was checked proves (True), or refutes, by property. Raises
     InputError, and RunError where it is refuted itself."""
-    from factory.export.certificate.listing import CLAIMS
+    from factory.export.certificate.listing import CLAIMS, TRAIN
     from factory.export.certificate.proof_file import check_against
 
     document = check_against(certificate, checked.net, checked.verdict)
-    return {claim: document[claim]["holds"] for claim in CLAIMS}
+    claims = (*CLAIMS, TRAIN) if TRAIN in document else CLAIMS
+    return {claim: document[claim]["holds"] for claim in claims}
 
 
 def _claims(proved: dict[str, bool | None]) -> str:
     """For people: what a certificate shows."""
     words = {True: "proves", False: "refutes", None: "leaves open"}
-    said = {how: [c.replace("_", " ") for c, v in proved.items() if v is how] for how in words}
+    told = {c: v for c, v in proved.items() if c != "gear_net" or not proved.get("gear_train")}
+    said = {how: [c.replace("_", " ") for c, v in told.items() if v is how] for how in words}
     return "; ".join(
         f"it {words[how]} {', '.join(claims)}" for how, claims in said.items() if claims
     )
@@ -137,9 +139,9 @@ def _describe(checked: Checked, verbose: bool) -> None:
         f" largest mode {document['largest_mode']}"
     )
     words = {True: "yes", False: "NO", None: "undecided"}
-    names = ("gear_net", "live", "safe", "reversible", "legal")
+    names = checked.verdict.properties
     say(", ".join(f"{name.replace('_', ' ')}: {words[document[name]]}" for name in names))
-    for witness in checked.verdict.witness:
+    for witness in checked.verdict.faults:
         say(f"  {witness}")
     if checked.pool:
         most = sorted(checked.pool.items(), key=lambda item: -item[1])[:POOLED]

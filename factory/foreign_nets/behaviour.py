@@ -15,7 +15,7 @@ import networkx as nx
 
 from factory.foreign_nets.explore import LIMIT, Exploration, explore
 from factory.nets.composition import cover
-from factory.nets.marked import NONE, MarkedNet, dead_ends, token_free
+from factory.nets.marked import NONE, MarkedNet, dead_ends, stuck_circuit, token_free
 from factory.nets.verdict import Defect, listing
 
 WORK = 5_000_000
@@ -65,21 +65,6 @@ def _dying(net: MarkedNet, stuck: tuple[int, ...]) -> Iterable[Defect]:
     for p in dead_ends(net)[:1]:
         text = f"nothing marks place {names[p].name} again once its tokens are gone"
         yield Defect("live", "missing producer", text, (), (p,), (net.right[p],))
-
-
-def stuck_circuit(net: MarkedNet, stuck: Iterable[int]) -> tuple[int, ...]:
-    """The places of a circuit that never carries a token, where transitions are stuck: free of
-    tokens, or one place that its transition both needs and gives back, or alone one that has
-    neither token nor producer."""
-    never, waits = frozenset(stuck), nx.DiGraph()
-    for event in sorted(never):
-        for place in net.net.preset[event]:
-            before = net.left[place]
-            if before == event or (before == NONE and not net.tokens[place]):
-                return (place,)
-            if before in never and not net.tokens[place]:
-                waits.add_edge(before, event, place=place)
-    return tuple(waits.edges[edge]["place"] for edge in nx.find_cycle(waits))
 
 
 def _unsafe(net: MarkedNet, closed: Sequence[bool], stuck: frozenset[int]) -> Iterable[Defect]:

@@ -11,7 +11,7 @@ from factory.nets.composition import compose
 from factory.nets.gears import GearNet
 from factory.nets.marked import MarkedNet, marked
 from factory.nets.verdict import Defect, Verdict, testify
-from factory.nets.verify import gear_net_defects, legality_defects
+from factory.nets.verify import gear_net_defects, gear_train_defects, legality_defects
 from factory.support.collector import collector_paused
 from factory.support.errors import Position
 
@@ -24,11 +24,13 @@ def analyse(
 ) -> Verdict:
     """The verdict on a net that may come from elsewhere.
 
-    Where it claims gears, these are checked as `verify` does; else they are discovered. Without
-    gears there is no legal marking to speak of: `legal` is None. Linear in the net; only a net with
+    Where it claims gears, these are checked as `verify` does; else those of a gear net are
+    discovered. Without gears there is no legal marking to speak of: `legal` and `gear_train` are
+    None. Linear in the net; only a net with
     choice is explored, up to `limit` markings. `sources`: as for `verify`.
     """
     against: tuple[Defect, ...] = ()
+    train: bool | None = None
     if isinstance(net, MarkedNet) and not net.gears:
         gears, against = discover(net)
         net = net.with_gears(gears) if gears else net
@@ -40,12 +42,15 @@ def analyse(
     else:
         composition = compose(subject)
         against = gear_net_defects(net, composition)
+        untrained = gear_train_defects(net, subject, composition)
+        train = not untrained
+        against += tuple(defect for defect in untrained if defect.property == "gear_train")
         found = behaviour(subject, composition.closed, limit)
         illegal = legality_defects(net, subject)
         legal = not illegal
     witness = testify(subject, (*against, *found.defects, *illegal), sources)
     return Verdict(
-        not against,
+        not any(defect.property == "gear_net" for defect in against),
         found.live,
         found.safe,
         found.reversible,
@@ -53,4 +58,5 @@ def analyse(
         witness,
         subject.gears,
         found.method,
+        train,
     )

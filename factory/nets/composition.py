@@ -45,12 +45,15 @@ class Joint:
 class Composition:
     """The gears in the order in which they compose the net, or the defects that forbid it.
 
-    `closed`: for each gear whether it is a cycle of the net.
+    `closed`: for each gear whether it is a cycle of the net; `fitting`: whether all are, cover the
+    net, and share one place at each transition where they meet, so that no more than a tree is
+    missing (`train`).
     """
 
     joints: tuple[Joint, ...]
     defects: tuple[Defect, ...]
     closed: tuple[bool, ...]
+    fitting: bool
 
 
 def compose(net: MarkedNet) -> Composition:
@@ -68,9 +71,10 @@ def compose(net: MarkedNet) -> Composition:
     joints: tuple[Joint, ...] = ()
     if not found:
         found += islice(_shared(net, passing), MOST)
-    if not found:
+    fitting = not found
+    if fitting:
         joints, found = _tree(net)
-    return Composition(joints, tuple(found), closed)
+    return Composition(joints, tuple(found), closed, fitting)
 
 
 def cover(net: MarkedNet, closed: Iterable[bool]) -> list[int]:

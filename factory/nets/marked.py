@@ -9,6 +9,7 @@ in both its preset and its postset never fires (a 1-gear is dead by Definition 3
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -125,6 +126,23 @@ def token_free(net: MarkedNet) -> TokenFree:
                 if not waits[after]:
                     order.append(after)
     return TokenFree(tuple(order), tuple(e for e, count in enumerate(waits) if count))
+
+
+def stuck_circuit(net: MarkedNet, stuck: Iterable[int]) -> tuple[int, ...]:
+    """The places of a circuit that never carries a token, where transitions are stuck: free of
+    tokens, or one place that its transition both needs and gives back, or alone one that has
+    neither token nor producer."""
+    import networkx as nx  # only a net that is stuck pays for it
+
+    never, waits = frozenset(stuck), nx.DiGraph()
+    for event in sorted(never):
+        for place in net.net.preset[event]:
+            before = net.left[place]
+            if before == event or (before == NONE and not net.tokens[place]):
+                return (place,)
+            if before in never and not net.tokens[place]:
+                waits.add_edge(before, event, place=place)
+    return tuple(waits.edges[edge]["place"] for edge in nx.find_cycle(waits))
 
 
 def dead_ends(net: MarkedNet) -> tuple[int, ...]:

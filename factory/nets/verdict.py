@@ -11,7 +11,8 @@ from factory.nets.marked import MarkedNet
 from factory.problem.pag import NOPART
 from factory.support.errors import Position
 
-PROPERTIES = ("gear_net", "live", "safe", "reversible", "legal")
+BEHAVIOUR = ("live", "safe", "reversible", "legal")
+PROPERTIES = ("gear_net", *BEHAVIOUR)
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,8 +67,9 @@ class Witness:
 class Verdict:
     """Which properties a net has: True, False, or None where that is undecided.
 
-    For each that is not True there is a witness. `gears` are the gears it was judged by, claimed or
-    discovered; `method` says how the behaviour was found: `structure` or `exploration`.
+    For each that is not True there is a witness; what speaks against a gear train may be told of
+    the gear net. `gears` are the gears it was judged by, claimed or discovered; `method` says how
+    the behaviour was found: `structure` or `exploration`. A gear net is a `gear_train`, too.
     """
 
     gear_net: bool | None
@@ -78,15 +80,30 @@ class Verdict:
     witness: tuple[Witness, ...] = ()
     gears: tuple[Gear, ...] = field(default=(), repr=False)
     method: str = "structure"
+    gear_train: bool | None = None
+
+    @property
+    def properties(self) -> tuple[str, ...]:
+        """What a factory's net has to have: it is a gear net, or else a gear train, and behaves."""
+        train = self.gear_train and not self.gear_net
+        return ("gear_train" if train else "gear_net", *BEHAVIOUR)
 
     @property
     def holds(self) -> bool:
-        """Whether every property is proved."""
-        return all(getattr(self, name) is True for name in PROPERTIES)
+        """Whether every property that a factory's net has to have is proved."""
+        return all(getattr(self, name) is True for name in self.properties)
+
+    @property
+    def faults(self) -> tuple[Witness, ...]:
+        """The witnesses against these properties: all, less that against a gear net where it is a
+        gear train."""
+        train = "gear_train" in self.properties
+        return tuple(w for w in self.witness if not (train and w.property == "gear_net"))
 
     def as_json(self) -> dict[str, object]:
         """The verdict's keys of the `--json` document."""
-        found: dict[str, object] = {name: getattr(self, name) for name in PROPERTIES}
+        names = (*PROPERTIES, "gear_train")
+        found: dict[str, object] = {name: getattr(self, name) for name in names}
         return {**found, "method": self.method, "witness": [w.as_json() for w in self.witness]}
 
 

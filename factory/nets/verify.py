@@ -1,11 +1,13 @@
-"""The proof that a net is a gear net, live, safe, reversible and legally marked, in linear time.
+"""The proof that a net is a gear net or a gear train, live, safe, reversible and legally marked, in
+linear time.
 
-Definitions 3.5 and 3.6 are checked gear by gear (`composition`). Then every place lies on a gear,
-which is a circuit, and a legal marking gives each gear one token: so the net is safe. It is live
-where the places without token can be put in an order, each after those it waits for (Commoner et
-al. 1971, Theorem 1), and a live marked graph that consists of circuits is reversible (Murata 1989,
-Theorem 21). Theorems 3.1 and 3.2 are not used, but tested. Of a net that is not composed so, no
-more is said here: `factory.foreign_nets` decides what any net does.
+Definitions 3.5 and 3.6 are checked gear by gear (`composition`), and 3.6' for a gear train
+(`train`). Then every place lies on a gear, which is a circuit, and a legal marking gives each gear
+one token: so the net is safe. It is live where the places without token can be put in an order,
+each after those it waits for (Commoner et al. 1971, Theorem 1), and a live marked graph that
+consists of circuits is reversible (Murata 1989, Theorem 21). Theorems 3.1 and 3.2 are not used, but
+tested. Of a net that is not composed so, no more is said here: `factory.foreign_nets` decides what
+any net does.
 """
 
 from __future__ import annotations
@@ -16,6 +18,7 @@ from itertools import islice
 from factory.nets.composition import MOST, Composition, compose, named
 from factory.nets.gears import GearNet
 from factory.nets.marked import MarkedNet, marked, token_free
+from factory.nets.train import dead_train_defects, train_defects
 from factory.nets.verdict import Defect, Verdict, listing, testify
 from factory.support.collector import collector_paused
 from factory.support.errors import Diagnostic, Position, RunError
@@ -28,7 +31,7 @@ def proved(net: GearNet) -> Verdict:
     if not verdict.holds:
         raise RunError(
             Diagnostic("NotProved", str(witness), None, "see factory check")
-            for witness in verdict.witness
+            for witness in verdict.faults
         )
     return verdict
 
@@ -43,19 +46,27 @@ def verify(net: GearNet | MarkedNet, sources: Mapping[str, Position] | None = No
     subject = marked(net)
     composition = compose(subject)
     against = gear_net_defects(net, composition)
+    untrained = gear_train_defects(net, subject, composition)
     illegal = legality_defects(net, subject)
-    holds = True if not against + illegal and not token_free(subject).stuck else None
     text = "undecided: it is proved of gear nets with a legal marking only"
-    behaviour = ("live", "safe", "reversible") if holds is None else ()
-    undecided = [Defect(name, "undecided", text) for name in behaviour]
+    decided: dict[str, bool | None] = dict.fromkeys(("live", "safe", "reversible"), True)
+    defects = [Defect(name, "undecided", text) for name in decided]
+    if untrained or illegal:
+        decided = dict.fromkeys(decided, None)
+    else:
+        stuck = token_free(subject).stuck
+        defects = list(dead_train_defects(subject, stuck)) if stuck else []
+        decided |= {defect.property: False for defect in defects}
+    more = [defect for defect in untrained if defect.property == "gear_train"]
     return Verdict(
         not against,
-        holds,
-        holds,
-        holds,
+        decided["live"],
+        decided["safe"],
+        decided["reversible"],
         not illegal,
-        testify(subject, (*against, *undecided, *illegal), sources),
+        testify(subject, (*against, *more, *defects, *illegal), sources),
         subject.gears,
+        gear_train=not untrained,
     )
 
 
@@ -63,6 +74,15 @@ def gear_net_defects(net: GearNet | MarkedNet, composition: Composition) -> tupl
     """What speaks against a gear net: its composition, and slots that change their robot."""
     moved = _changed_slots(net) if isinstance(net, GearNet) else ()
     return *composition.defects, *islice(moved, MOST)
+
+
+def gear_train_defects(
+    net: GearNet | MarkedNet, subject: MarkedNet, composition: Composition
+) -> tuple[Defect, ...]:
+    """What speaks against a gear train, of a net and of the same as a marked net; some of it speaks
+    against a gear net, too (`gear_net_defects`)."""
+    moved = _changed_slots(net) if isinstance(net, GearNet) else ()
+    return *train_defects(subject, composition), *islice(moved, MOST)
 
 
 def legality_defects(net: GearNet | MarkedNet, subject: MarkedNet) -> tuple[Defect, ...]:

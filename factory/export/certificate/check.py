@@ -12,6 +12,7 @@ from typing import Any
 from factory.export.certificate.listing import (
     CLAIMS,
     SCHEMA,
+    TRAIN,
     Net,
     Rows,
     Section,
@@ -45,7 +46,7 @@ def _check(document: Any) -> Iterator[str]:
     faults = list(net.faults())
     yield from faults
     if not faults:
-        for claim in CLAIMS:
+        for claim in (*CLAIMS, TRAIN) if TRAIN in document else CLAIMS:
             yield from _told(claim, _claim(net, claim, document))
 
 
@@ -107,6 +108,70 @@ def _added(net: Net, step: Section, at_place: Rows, passing: list[int]) -> Itera
             yield f"gear_net: (b) is demanded of {name}"
     elif step["c"] != c or passing[c] or net.edge(before) != (c, a) or step["exempt"] is not None:
         yield f"gear_net: (b) fails for {name}: c is not new, or [c; a] not its place"
+
+
+def _prove_gear_train(net: Net, section: Section, document: Section) -> Iterator[str]:
+    """Definition 3.6', and Theorem 1: an order in which every gear ascends from its token on."""
+    if not net.robots or not all(map(net.closed, net.robots)):
+        yield "gear_train: some robot's gear is no cycle (Definition 3.5)"
+        return
+    at_place: Rows = [[] for _ in net.names]
+    passing: Rows = [[] for _ in net.events]
+    for index, robot in enumerate(net.robots):
+        for p, e in zip(robot.places, robot.turns, strict=True):
+            at_place[p].append(index)
+            passing[e].append(index)
+    if not all(at_place) or not all(passing):
+        yield "gear_train: some place or transition is in no gear"
+    if not all(net.fits(p, own) for p, own in enumerate(at_place)):
+        yield "gear_train: the slots of some place are not its gears'"
+    shared = {p for p, own in enumerate(at_place) if len(own) > 1}
+    for robot in net.robots:
+        steps = zip(robot.places[-1:] + robot.places[:-1], robot.places, strict=True)
+        if any({p, q} <= shared for p, q in steps):
+            yield f"gear_train: {robot.name} has no wait of its own before each operation"
+    for event, gears in enumerate(passing):
+        around = shared & {*net.preset[event], *net.postset[event]}
+        if len(gears) > 1 and [at_place[p] for p in around] != [gears]:
+            yield f"gear_train: the gears at {net.events[event]} share more or less than a place"
+    if _apart(net, at_place):
+        yield "gear_train: some gear is apart from the rest"
+    yield from (fault.replace("gear_net", "gear_train", 1) for fault in net.wrong_moves())
+    yield from _ascending(net, section, document)
+
+
+def _apart(net: Net, at_place: Rows) -> bool:
+    """Whether some gear shares no operation with the first, directly or not."""
+    seen, queue = {0}, [0]
+    for index in queue:
+        met = {other for p in net.robots[index].places for other in at_place[p]} - seen
+        seen |= met
+        queue += met
+    return len(seen) < len(net.robots)
+
+
+def _ascending(net: Net, section: Section, document: Section) -> Iterator[str]:
+    """Whether every robot's transitions, from its one token on, ascend in the order."""
+    if section["order"] is None:
+        if document["live"]["holds"] is True:
+            yield "gear_train: a live train has an order"
+        return
+    rank = {str(name): step for step, name in enumerate(section["order"])}
+    if sorted(section["order"]) != sorted(net.events):
+        yield "gear_train: the order does not name every transition once"
+        return
+    for robot in net.robots:
+        on = [step for step, p in enumerate(robot.places) if net.tokens[p]]
+        if len(on) != 1 or net.tokens[robot.places[on[0]]] != 1:
+            yield f"gear_train: {robot.name} does not carry one token"
+            continue
+        turns = robot.turns[on[0] + 1 :] + robot.turns[: on[0] + 1]
+        ranks = [rank[net.events[e]] for e in turns]
+        for step, (one, other) in enumerate(zip(ranks, ranks[1:], strict=False)):
+            if one >= other:
+                names = f"{net.events[turns[step + 1]]} before {net.events[turns[step]]}"
+                yield f"gear_train: the order has {names}, which {robot.name} does after it"
+                break
 
 
 def _prove_safe(net: Net, section: Section, document: Section) -> Iterator[str]:
@@ -190,6 +255,7 @@ def _prove_legal(net: Net, section: Section, document: Section) -> Iterator[str]
 
 _PROOFS: dict[str, Callable[[Net, Section, Section], Iterator[str]]] = {
     "gear_net": _prove_gear_net,
+    TRAIN: _prove_gear_train,
     "safe": _prove_safe,
     "live": _prove_live,
     "reversible": _prove_reversible,

@@ -12,6 +12,8 @@ Rows = list[list[int]]
 
 SCHEMA = 1
 CLAIMS = ("gear_net", "safe", "live", "reversible", "legal")
+TRAIN = "gear_train"
+"""The claim that a certificate makes of a gear train, besides."""
 
 
 def digest(document: Section) -> str:

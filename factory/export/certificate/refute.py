@@ -162,10 +162,16 @@ def play(net: Net, firing: list[int]) -> list[int] | None:
     return tokens
 
 
+def _never(net: Net, section: Section) -> bool:
+    """That a net is no gear train is shown as that it is no gear net."""
+    return False
+
+
 _REFUTATIONS: dict[str, Callable[[Net, Section], bool]] = {
     "gear_net": _not_gear_net,
     "safe": _not_safe,
     "live": _not_live,
     "reversible": _not_reversible,
     "legal": _not_legal,
+    "gear_train": _never,
 }

@@ -14,7 +14,9 @@ property with `holds`:
 * `live`: an `order` of the places without token in which each comes after those it waits for;
 * `reversible`: trees of ways from a `root` to every transition, `there` and `back`; `root` is null
   where the net falls into parts, each of which is live or never moves;
-* `legal`: the marked place of each robot, whose slots are those of the robots that start there.
+* `legal`: the marked place of each robot, whose slots are those of the robots that start there;
+* `gear_train`, of a net that is one and no gear net: an `order` of the transitions, by name, in
+  which the gear of every robot, from its token on, ascends; null where the net is not live.
 
 A section that does not hold has a `reason` and what shows it (a firing sequence, a circuit). One
 that holds by exploration only has `holds` null, with the reason: it is not certified. `digest` is
@@ -26,7 +28,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from factory.export.certificate.listing import CLAIMS, SCHEMA, digest
+from factory.export.certificate.listing import CLAIMS, SCHEMA, TRAIN, digest
 from factory.nets.composition import Composition, compose, cover
 from factory.nets.gears import GearNet
 from factory.nets.marked import NONE, MarkedNet, marked, token_free
@@ -53,6 +55,7 @@ def certificate(net: GearNet | MarkedNet, verdict: Verdict) -> Json:
         "net": _listing(net, subject),
         "robots": _robots(net, subject),
         **{claim: _section(claim, subject, composition, verdict) for claim in CLAIMS},
+        **({TRAIN: _gear_train(subject, verdict)} if TRAIN in verdict.properties else {}),
     }
     return {**document, "digest": digest(document)}
 
@@ -138,6 +141,14 @@ def _gear_net(net: MarkedNet, composition: Composition) -> Json:
         for place in net.gears[joint.gear].places:
             present[place].append(joint.gear)
     return {"order": order}
+
+
+def _gear_train(net: MarkedNet, verdict: Verdict) -> Json:
+    """Of a live train the order; of any other that it is one."""
+    events = net.net.transitions
+    proved = verdict.live and verdict.legal
+    order = [events[e].name for e in token_free(net).order] if proved else None
+    return {"holds": True, "order": order}
 
 
 def _safe(net: MarkedNet, composition: Composition) -> Json | None:

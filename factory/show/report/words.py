@@ -8,12 +8,13 @@ from typing import Any
 
 from factory.export.certificate.check import check_certificate
 from factory.export.certificate.writer import certificate
-from factory.nets.verdict import PROPERTIES, Verdict, listing
+from factory.nets.verdict import Verdict, listing
 from factory.nets.verify import verify
 from factory.plant.factory import Factory
 
 NAMES = {
     "gear_net": "Gear net",
+    "gear_train": "Gear train",
     "live": "Live",
     "safe": "Safe",
     "reversible": "Reversible",
@@ -21,6 +22,8 @@ NAMES = {
 }
 MEANS = {
     "gear_net": "every robot goes round in a cycle of its own, and robots meet in operations only",
+    "gear_train": "every robot goes round in a cycle of its own, with a wait of its own before each"
+    " operation; robots meet in operations only",
     "live": "whatever has happened, every operation can happen again: it never stops",
     "safe": "no place ever holds two tokens: no robot is asked to be twice at once",
     "reversible": "the factory can always come back to where it started",
@@ -59,7 +62,7 @@ def proof(factory: Factory) -> Proof:
     verdict = verify(factory.net)
     document = certificate(factory.net, verdict)
     faults = tuple(str(fault) for fault in check_certificate(document))
-    claims = tuple(_claim(name, factory, verdict, document) for name in PROPERTIES)
+    claims = tuple(_claim(name, factory, verdict, document) for name in verdict.properties)
     return Proof(claims, str(document["digest"]), faults, document)
 
 
@@ -77,6 +80,13 @@ def _gear_net(factory: Factory, section: dict[str, Any]) -> Iterator[str]:
     names = [factory.robots[joint["gear"]].name for joint in order]
     yield f"The net is put together from {len(order)} gears, one for each robot, in the order"
     yield f"{listing(names, 8)}; each new one meets those before it in one operation."
+
+
+def _gear_train(factory: Factory, section: dict[str, Any]) -> Iterator[str]:
+    order = section.get("order") or []
+    yield f"The {len(order)} transitions stand in an order in which the program of each of the"
+    yield f"{len(factory.robots)} robots, from its token on, ascends: so one product can be made"
+    yield "alone, and again."
 
 
 def _safe(factory: Factory, section: dict[str, Any]) -> Iterator[str]:
@@ -107,6 +117,7 @@ def _legal(factory: Factory, section: dict[str, Any]) -> Iterator[str]:
 
 _WHY = {
     "gear_net": _gear_net,
+    "gear_train": _gear_train,
     "safe": _safe,
     "live": _live,
     "reversible": _reversible,
