@@ -1,11 +1,18 @@
-"""Legal markings of a gear net other than the initial one: by name, and the firings to them."""
+"""Legal markings of a factory's net other than the initial one: by name, and the firings to them.
+
+A legal marking m of a live marked graph is reached from m_0 if and only if m - m_0 = C n has a
+solution n, which says how often each transition fires: no circuit gains or loses tokens (Murata
+1989, Theorem 21). In a gear net every legal marking is, since its simple circuits are its gears; in
+a gear train some are not, and may be dead.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 from factory.nets.gears import GearNet
 from factory.nets.petri import Marking
+from factory.nets.verdict import listing
 from factory.support.errors import Diagnostic, InputError, Position, did_you_mean
 
 
@@ -15,7 +22,7 @@ def firings(net: GearNet, marking: Marking) -> dict[int, int]:
     Along each gear a place has as many tokens more as its producer fires oftener than its consumer,
     which fixes all counts up to a constant; the least is 0. Such counts can be fired, since no
     circuit is free of tokens. Linear. Raises ValueError where the marking does not mark each gear
-    exactly once, or the gears hang together in no tree.
+    exactly once, where no counts lead to it, or where the gears do not hang together.
     """
     through: dict[int, list[int]] = {}
     for number, gear in enumerate(net.gears):
@@ -57,7 +64,7 @@ def legal_marking(net: GearNet, names: str) -> Marking:
 
     An operation place is named by the label that it makes, and takes all its robots; a wait place
     by robot and label, `r3:sub1`. Raises InputError (BadMarking) with every fault found: an unknown
-    place, or a robot marked twice.
+    place, a robot marked twice, or places at which the robots never are together (`unreached`).
     """
     faults: list[Diagnostic] = []
     at: dict[int, int] = {}
@@ -75,7 +82,77 @@ def legal_marking(net: GearNet, names: str) -> Marking:
         raise InputError(faults)
     for robot, place in enumerate(net.initial):
         at.setdefault(robot, place)
-    return _whole(net, at, names)
+    marking = _whole(net, at, names)
+    circuit = () if net.is_tree else unreached(net, marking)
+    if circuit:
+        raise InputError(_never(net, circuit, marking, names))
+    return marking
+
+
+def unreached(net: GearNet, marking: Marking) -> tuple[int, ...]:
+    """A circuit of a net of gears that has not as many tokens in a marking as in m_0, by its places
+    in order; () where there is none. Linear."""
+    places, initial = net.threaded.places, net.initial_marking
+    left, right = [place.left[0] for place in places], [place.right[0] for place in places]
+    gain = [(p in marking) - (p in initial) for p in range(len(places))]
+    there = _tree(net.threaded.net.postset, right)
+    back = _tree(net.threaded.net.preset, left)
+    level = {0: 0}
+    for event, place in there.items():
+        level[event] = level[left[place]] + gain[place]
+    for place, (a, b) in enumerate(zip(left, right, strict=True)):
+        if level[a] + gain[place] != level[b]:
+            home = [*_walk(back, b, right)]
+            way = [*reversed([*_walk(there, a, left)]), place, *home]
+            other = [*reversed([*_walk(there, b, left)]), *home]
+            found = (c for walk in (way, other) for c in _circuits(walk, left, right))
+            return next(circuit for circuit in found if sum(gain[p] for p in circuit))
+    return ()
+
+
+def _tree(beside: Sequence[Sequence[int]], onward: Sequence[int]) -> dict[int, int]:
+    """By which place each transition but the first is reached from that, in breadth-first order."""
+    found, seen, queue = dict[int, int](), {0}, [0]
+    for event in queue:
+        for place in beside[event]:
+            if onward[place] not in seen:
+                seen.add(onward[place])
+                found[onward[place]] = place
+                queue.append(onward[place])
+    return found
+
+
+def _walk(tree: Mapping[int, int], event: int, toward: Sequence[int]) -> Iterator[int]:
+    """The places of a tree between a transition and the first one."""
+    while event:
+        yield tree[event]
+        event = toward[tree[event]]
+
+
+def _circuits(
+    walk: Iterable[int], left: Sequence[int], right: Sequence[int]
+) -> Iterator[tuple[int, ...]]:
+    """The simple circuits that a closed walk along places falls into."""
+    way: list[int] = []
+    for place in walk:
+        way.append(place)
+        starts = [step for step, p in enumerate(way) if left[p] == right[place]]
+        if starts:
+            yield tuple(way[starts[0] :])
+            del way[starts[0] :]
+
+
+def _never(net: GearNet, circuit: tuple[int, ...], marking: Marking, names: str) -> Diagnostic:
+    """That a circuit has other tokens than it always has."""
+    here, always = (sum(p in m for p in circuit) for m in (marking, net.initial_marking))
+    shown = listing(net.threaded.places[p].name for p in circuit)
+    message = (
+        f"the robots are never there together: the circuit through {shown} would have"
+        f" {here or 'no'} token{'' if here == 1 else 's'}, and always has {always}"
+    )
+    own = dict.fromkeys(robot for p in circuit for robot in net.slots[p])
+    robots = listing(net.gears[robot].robot for robot in own)
+    return _bad(message, Position("--from", 1, 1, names), f"say where each of {robots} is")
 
 
 def _items(names: str) -> Iterable[tuple[str, Position]]:
