@@ -11,6 +11,7 @@ from math import sqrt
 
 from factory.control.profile import SpeedProfile
 from factory.layout.layout import Layout
+from factory.nets.ways import train_ratio
 from factory.plant.factory import Operation
 from factory.problem.pag import NOPART
 from factory.support.settings import Settings
@@ -42,8 +43,8 @@ class Pace(SpeedProfile):
 
 
 def gear_times(layout: Layout, pace: Pace) -> list[float]:
-    """For each robot the summed delays [s] of its gear: the greatest is the cycle time. Where a
-    robot goes ahead while it waits, it takes the longer of that and the operation."""
+    """For each robot the summed delays [s] of its gear: the greatest is the cycle time, where every
+    robot has one tour. Where a robot goes ahead while it waits, it takes the longer of that and the operation."""
     ways, operations = _ways(layout), layout.factory.operations
     delays = operation_times(layout, pace)
 
@@ -54,6 +55,32 @@ def gear_times(layout: Layout, pace: Pace) -> list[float]:
         return max(delays[number], pace.rest(ways[number, robot]) + pace.ahead)
 
     return [sum(taken(n, robot.index) for n in robot.operations) for robot in layout.factory.robots]
+
+
+def cycle_of(layout: Layout, pace: Pace) -> float:
+    """The cycle time of a layout [s]: the greatest gear time, where every robot has one tour; else
+    the maximum cycle ratio of its gear train."""
+    return slowest(layout, pace)[0]
+
+
+def slowest(layout: Layout, pace: Pace) -> tuple[float, int]:
+    """The cycle time of a layout [s], and the robot that allows no less; in a gear train the first
+    that spends most of the critical circuit."""
+    net = layout.factory.net
+    if net.is_tree:
+        times = gear_times(layout, pace)
+        robot = max(range(len(times)), key=times.__getitem__)
+        return times[robot], robot
+    delays, legs = operation_times(layout, pace), _ways(layout)
+    ahead = {
+        (robot, o.place): pace.rest(legs[o.index, robot]) + (pace.ahead or 0.0)
+        for o in layout.factory.operations
+        for slot, robot in enumerate(o.robots)
+        if pace.goes_ahead(o, slot)
+    }
+    waits = len(net.threaded.places) - len(delays)
+    ratio, robot = train_ratio(net, [*delays, *[0.0] * waits], ahead)
+    return ratio.seconds, robot
 
 
 def operation_times(layout: Layout, pace: Pace) -> list[float]:

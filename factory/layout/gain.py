@@ -6,7 +6,7 @@ from dataclasses import asdict, dataclass
 
 from factory.layout.bounds import cycle_time_bound
 from factory.layout.dimensions import Clearance
-from factory.layout.durations import Pace, gear_times
+from factory.layout.durations import Pace, cycle_of, slowest
 from factory.layout.layout import Layout
 from factory.layout.optimising import first_feasible, floor_of
 
@@ -65,12 +65,11 @@ def gain(layout: Layout, pace: Pace) -> LayoutGain:
     """Compare a layout for robots of a pace."""
     plain = layout.plain or layout
     factory, product, c = plain.factory, layout.product, layout.clearance
-    times = gear_times(layout, pace)
-    slowest = max(range(len(times)), key=times.__getitem__)
+    _, bottleneck = slowest(layout, pace)
     return LayoutGain(
         _figures(layout, pace),
         _figures(first_feasible(factory, product, Clearance(c)), pace),
-        layout.factory.robots[slowest].name,
+        layout.factory.robots[bottleneck].name,
         cycle_time_bound(factory, product, c, pace),
         _figures(plain, pace) if layout.plain else None,
         len(layout.factory.robots) - len(factory.robots),
@@ -79,6 +78,6 @@ def gain(layout: Layout, pace: Pace) -> LayoutGain:
 
 def _figures(layout: Layout, pace: Pace) -> Figures:
     xlo, xhi, ylo, yhi = floor_of(layout)
-    cycle = max(gear_times(layout, pace))
+    cycle = cycle_of(layout, pace)
     area = (xhi - xlo) * (yhi - ylo)
     return Figures(round(cycle, 6), round(layout.guidepath_length, 6), round(area, 6))

@@ -16,7 +16,7 @@ from factory.layout.arranging import arrange, shape_of
 from factory.layout.certificate import Region
 from factory.layout.dimensions import Clearance
 from factory.layout.drafting import LayoutDraft
-from factory.layout.durations import Pace, gear_times
+from factory.layout.durations import Pace, cycle_of, gear_times
 from factory.layout.guidepath import Box, Point2, hull
 from factory.layout.hands.choosing import Hands
 from factory.layout.layout import Layout, carriers
@@ -77,13 +77,13 @@ def optimised(
         return _packed(replace(task, width=1), product, payloads, sides)
     best = first_feasible(factory, product, c, wide, hands)
     times = gear_times(best, pace)
-    least = _score(best, times, floor)
+    least = _score(best, cycle_of(best, pace), floor)
     for number, (corridor, breadth) in enumerate(WAYS[: max(1, EFFORT // count)]):
         weights = task.weights if number < UNWEIGHTED else _weights(times)
         way = replace(task, corridor=corridor, breadth=breadth, weights=weights)
         layout = _packed(way, product, payloads)
         found = gear_times(layout, pace)
-        score = _score(layout, found, floor)
+        score = _score(layout, cycle_of(layout, pace), floor)
         if score < least:
             best, times, least = layout, found, score
     return best
@@ -101,8 +101,8 @@ def bounds(found: Sequence[Region], clearance: float) -> Box:
     return box[0] - half, box[1] + half, box[2] - half, box[3] + half
 
 
-def _score(layout: Layout, times: Sequence[float], floor: Point2 | None) -> tuple[float, ...]:
-    """What a layout is judged by, the less the better: how much the floor is too small [m], cycle
+def _score(layout: Layout, cycle: float, floor: Point2 | None) -> tuple[float, ...]:
+    """What a layout is judged by, the less the better: how much the floor is too small [m], `cycle`
     time [s], guidepaths [m], and the floor [m²] on which they lie."""
     excess = 0.0
     if floor is not None:
@@ -111,7 +111,7 @@ def _score(layout: Layout, times: Sequence[float], floor: Point2 | None) -> tupl
     ends = [p for g in layout.guidepaths for p in (g.carriage(0.0), g.carriage(g.length))]
     x, y = zip(*ends, strict=True)
     area = (max(x) - min(x)) * (max(y) - min(y))
-    found = excess, max(times), layout.guidepath_length, area
+    found = excess, cycle, layout.guidepath_length, area
     return tuple(round(value, 6) for value in found)
 
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
+from itertools import pairwise
 from types import MappingProxyType
 
 from factory.nets.gears import GearNet
@@ -144,6 +145,28 @@ class Factory:
     def folded(self) -> bool:
         """Whether some robot has more than one tour."""
         return any(len(tours) > 1 for tours in self.tours)
+
+    @cached_property
+    def order(self) -> tuple[int, ...]:
+        """The operations in an order in which every robot's program ascends, dropoff last: so one
+        unit can be made. Raises ValueError where there is none: then the net is not live."""
+        if not self.folded:
+            return (*reversed(range(len(self.operations) - 1)), len(self.operations) - 1)
+        waits = [len(operation.robots) for operation in self.operations]
+        onward: list[list[int]] = [[] for _ in self.operations]
+        for robot in self.robots:
+            waits[robot.operations[0]] -= 1
+            for before, number in pairwise(robot.operations):
+                onward[before].append(number)
+        found = [number for number, count in enumerate(waits) if not count]
+        for number in found:
+            for after in onward[number]:
+                waits[after] -= 1
+                if not waits[after]:
+                    found.append(after)
+        if len(found) < len(self.operations):
+            raise ValueError("the robots' programs wait for each other: the net is not live")
+        return tuple(found)
 
     @cached_property
     def strokes(self) -> Mapping[int, float]:

@@ -1,15 +1,16 @@
-"""Cycle times: of a gear net by its gears, of any live marked graph by its critical circuit."""
+"""Cycle times: of a gear net by its gears, of a gear train, and of any live marked graph, by its
+critical circuit."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
 
 from factory.nets.cycle_ratio import CycleRatio, max_cycle_ratio
 from factory.nets.gears import GearNet
 from factory.nets.marked import MarkedNet, marked
-from factory.nets.petri import PetriNet, Place
+from factory.nets.ways import train_ratio
 from factory.plant.factory import Factory
 from factory.support.errors import did_you_mean
 
@@ -31,14 +32,19 @@ def cycle_time(
     delays: Delays,
     ways: Mapping[tuple[int, int], float] = MappingProxyType({}),
 ) -> CycleTime:
-    """The maximum over robots of the summed delays of its gear, which carries one token. `ways`:
-    what a robot (index) takes to a place [s] while it waits for it (`with_ways`).
+    """The maximum over robots of the summed delays of its gear, which carries one token; of a gear
+    train the maximum cycle ratio. `ways`: what a robot (index) takes to a place [s] while it waits
+    for it (`with_ways`).
 
     Holds since the simple circuits of a gear net are its gears. The first robot that attains it is
-    the bottleneck. Raises ValueError where a delay is negative or names no place.
+    the bottleneck; in a gear train the first that spends most of the critical circuit. Raises
+    ValueError where a delay is negative or names no place, or a gear train is not live.
     """
     net = subject.net if isinstance(subject, Factory) else subject
     seconds = _seconds(marked(net), delays)
+    if not net.is_tree:
+        ratio, robot = train_ratio(net, seconds, ways)
+        return CycleTime(ratio.seconds, net.gears[robot].robot)
     sums = [
         sum(max(seconds[p], ways.get((robot, p), 0.0)) for p in gear.places)
         for robot, gear in enumerate(net.gears)
@@ -72,23 +78,3 @@ def marked_graph_cycle_time(net: GearNet | MarkedNet, delays: Delays) -> CycleRa
     """
     subject = marked(net)
     return max_cycle_ratio(subject, _seconds(subject, delays))
-
-
-def with_ways(net: MarkedNet, factory: Factory, ways: Iterable[tuple[int, int]]) -> MarkedNet:
-    """`net`, whose first places are the factory's, with a place [Y_e; X_e] for each way: of a robot
-    that goes from where Y has left it to where X, its next operation, needs it (`modes.staging`).
-
-    It is beside the robot's own places from Y_e to X_e, and has as many tokens as its wait for X.
-    So the simple circuits of a gear net still lie in one gear each: one that took a way of a gear
-    and left that gear before X_e would come by X_e a second time. A gear takes the longer of the
-    two at each operation.
-    """
-    places, tokens = list(net.net.places), list(net.tokens)
-    for robot, number in ways:
-        gear, operation = factory.robots[robot], factory.operations[number]
-        step = gear.operations.index(number)
-        before = factory.operations[gear.operations[step - 1]]
-        name = f"way:{gear.name}:{operation.label}"
-        places.append(Place(name, (before.end,), (operation.end,), "way", operation.label))
-        tokens.append(net.tokens[factory.net.gears[robot].places[2 * step]])
-    return MarkedNet(PetriNet(net.net.transitions, tuple(places)), tuple(tokens))

@@ -19,12 +19,12 @@ from factory.layout.hands.limbs import rises_first
 from factory.layout.layout import Layout
 from factory.modes.modes import operation_starts
 from factory.modes.staging import HeadStart, staged
+from factory.nets.ways import with_ways
 from factory.support.settings import Settings
 from factory.timing.cycle_time import (
     CycleTime,
     cycle_time,
     marked_graph_cycle_time,
-    with_ways,
 )
 from factory.timing.pool import with_wip
 from factory.timing.serving import serving
@@ -124,7 +124,8 @@ def duration(layout: Layout, delays: Sequence[float], cycle: float, units: int) 
     the slowest chain of operations from a part to dropoff, a `cycle` for each that follows."""
     factory = layout.factory
     ready = [0.0] * len(factory.robots)
-    for operation in reversed(factory.operations[:-1]):
+    for number in factory.order[:-1]:
+        operation = factory.operations[number]
         done = max(ready[robot] for robot in operation.robots) + delays[operation.index]
         for robot in operation.robots:
             ready[robot] = done
@@ -140,8 +141,8 @@ def predict(
     ways: Mapping[tuple[int, int], float] = MappingProxyType({}),
 ) -> CycleTime:
     """The cycle time of the compiled net and its bottleneck: the greatest sum along a gear of the
-    operations' `delays`, or of the `ways` that robots go ahead of them where those are longer.
-    Others may allow no less and be it: in MuJoCo the outfeed, whose tray must be back before the
+    operations' `delays`, or of the `ways` that robots go ahead of them where those are longer; of a
+    gear train the critical circuit's. Others may allow no less and be it: in MuJoCo the outfeed, whose tray must be back before the
     next dropoff, and a feeder whose part comes later than its robot; the bound `wip` on what is
     inside."""
     factory = layout.factory
@@ -152,6 +153,6 @@ def predict(
         most = min(wip, len(factory.robots))  # no more are inside without a bound
         bounded = with_wip(factory, most)
         seconds = [*delays, *[0.0] * (len(bounded.tokens) - len(delays)), *ways.values()]
-        bound = marked_graph_cycle_time(with_ways(bounded, factory, ways), seconds).seconds
+        bound = marked_graph_cycle_time(with_ways(bounded, factory.net, ways), seconds).seconds
         found.append(CycleTime(bound * (1 - 1e-9), f"wip {wip}"))
     return max(found, key=lambda time: time.seconds)

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 from factory.lang.template_reader import load_templates
 from factory.layout.clearance import certify
 from factory.layout.dimensions import Clearance
-from factory.layout.durations import Pace, gear_times
+from factory.layout.durations import Pace, cycle_of, gear_times
 from factory.layout.embedding import certified
 from factory.layout.hands.choosing import Hands
 from factory.layout.layout import Layout, Point2
@@ -138,14 +138,15 @@ class _Search:
 
     def seconds(self, layout: Layout) -> float:
         """The cycle time [s]."""
-        return max(robot_times(layout, self.settings))
+        pace = Pace.of(self.settings)
+        return max(cycle_of(layout, pace), *robot_times(layout, self.settings))
 
     def look(self, cycle: float | None) -> None:
         """For few relays that make it as fast as wanted, or as can be."""
         pace = Pace.of(self.settings)
         if cycle is None:
             most, _ = self._split({label: way.most for label, way in self.ways.items()})
-            cycle = max(WITHIN * max(gear_times(most, pace)), self.seconds(most))
+            cycle = max(WITHIN * cycle_of(most, pace), self.seconds(most))
         times = robot_times(self.layout, self.settings)
         late = {label: way for label, way in self.ways.items() if times[way.robot] > cycle}
         self.cycle, self.numbers = cycle, dict.fromkeys(self.ways, 0)

@@ -80,7 +80,7 @@ def operation_slacks(timing: Timing, net: TimedNet) -> tuple[float, ...]:
     """How much longer each operation may take before it sets the pace [s]: the slack of the
     tightest circuit through it."""
     operations = timing.factory.operations
-    if net.bounds:
+    if not net.is_plain:
         found = slacks(net.ratio, (o.place for o in operations))
         return tuple(found[o.place].seconds for o in operations)
     least = [inf] * len(operations)

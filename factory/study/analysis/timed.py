@@ -8,12 +8,13 @@ from functools import cached_property
 from math import lcm
 
 from factory.nets.cycle_ratio import CycleRatio, max_cycle_ratio
+from factory.nets.gears import GearNet
 from factory.nets.marked import NONE, MarkedNet, marked
 from factory.nets.petri import PetriNet, Place
+from factory.nets.ways import busiest, with_ways
 from factory.study.analysis.firing import Firings, settled_firings
 from factory.study.analysis.slack import Slack, circuits
 from factory.study.analysis.timing import AS_IT_IS, Change, Timing
-from factory.timing.cycle_time import with_ways
 from factory.timing.pool import with_wip
 from factory.timing.serving import serving
 
@@ -25,8 +26,9 @@ LONGEST_PERIOD = 60
 
 @dataclass(frozen=True, slots=True)
 class Circuit:
-    """A circuit of the timed net: its name (a robot, `outfeed`, `station part1`, `wip part1`), its
-    time [s], its tokens, and its places in order."""
+    """A circuit of the timed net: its name (a robot, `outfeed`, `station part1`, `wip part1`, of
+    several robots `r3 with r5`, that first which spends most of it), its time [s], its tokens, and
+    its places in order."""
 
     name: str
     seconds: float
@@ -43,12 +45,13 @@ class Circuit:
 class TimedNet:
     """A net with the time of each place, and those of its circuits that have a name.
 
-    Without a bound `wip` these are all its simple circuits: robots' gears, and places that go back
+    Of a gear net without a bound `wip` these are all its simple circuits: robots' gears, and places that go back
     over one operation alone. With copies of a robot its gear has so many tokens, and an operation
     that it does alone, which has one place on the floor, a place of one token back over it: one at
     a time. The outfeed's place goes back over dropoff. Where robots go ahead while they wait, a
     gear's slowest circuit goes by those of its `ways` (places by robot and operation) that take
-    longer than the operation. `first`: what a place takes for the first time [s], and `ready`: when
+    longer than the operation. `train`: the gears of a gear train, whose critical circuit may lie in
+    several of them; None for a gear net. `first`: what a place takes for the first time [s], and `ready`: when
     robots have gone ahead that set out at the beginning, where those are other times.
     """
 
@@ -59,6 +62,12 @@ class TimedNet:
     ways: Mapping[tuple[int, int], int] = field(default_factory=dict, repr=False)
     first: Mapping[int, float] = field(default_factory=dict, repr=False)
     ready: Mapping[int, float] = field(default_factory=dict, repr=False)
+    train: GearNet | None = field(default=None, repr=False)
+
+    @property
+    def is_plain(self) -> bool:
+        """Whether all simple circuits have a name."""
+        return not self.bounds and self.train is None
 
     @cached_property
     def ratio(self) -> CycleRatio:
@@ -68,13 +77,16 @@ class TimedNet:
     @cached_property
     def pace(self) -> float:
         """The cycle time in the long run [s]."""
-        return self.ratio.seconds if self.bounds else max(c.pace for c in self.named)
+        return max(c.pace for c in self.named) if self.is_plain else self.ratio.seconds
 
     @cached_property
     def circuits(self) -> tuple[Circuit, ...]:
-        """Those with a name and the tightest through each bound, the slowest first."""
+        """Those with a name, the tightest through each bound, and in a gear train the critical one,
+        the slowest first."""
         tightest = circuits(self.ratio, self.bounds) if self.bounds else ()
         found = [self._bounded(slack) for slack in tightest]
+        if self.train is not None:
+            found += self._meeting(self.train, [*self.named, *found])
         return tuple(sorted((*self.named, *found), key=lambda c: -c.pace))
 
     @cached_property
@@ -87,6 +99,22 @@ class TimedNet:
         names = [self.net.net.places[p].name for p in slack.circuit if p in self.bounds]
         seconds = sum(self.seconds[p] for p in slack.circuit)
         return Circuit(" ".join(names).replace(":", " "), seconds, tokens, slack.circuit)
+
+    def _meeting(self, gears: GearNet, known: Sequence[Circuit]) -> list[Circuit]:
+        """The critical circuit of a gear train, where none of those `known` is as slow."""
+        if max(circuit.pace for circuit in known) >= self.pace * (1 - SAME):
+            return []
+        places = self.ratio.circuit
+        first, *others = busiest(gears, self.ways, places, self.seconds)
+        names = ", ".join(gears.gears[robot].robot for robot in others)
+        return [
+            Circuit(
+                f"{gears.gears[first].robot} with {names}",
+                sum(self.seconds[p] for p in places),
+                sum(self.net.tokens[p] for p in places),
+                places,
+            )
+        ]
 
     def slack(self, circuit: Circuit) -> float:
         """How much longer a circuit may take before it sets the pace [s]; for a robot's gear, how
@@ -121,7 +149,7 @@ def timed_net(timing: Timing, change: Change = AS_IT_IS, wip: int | None = None)
     seconds += [*[0.0] * (len(tokens) - len(seconds)), *went.values()]
     for waiting, gone in timing.waits(change).items():
         seconds[waiting] = gone
-    moving = with_ways(replace(subject, tokens=tuple(tokens)), factory, ways)
+    moving = with_ways(replace(subject, tokens=tuple(tokens)), factory.net, ways)
     tokens, places = list(moving.tokens), list(moving.net.places)
     back = [(f"station {factory.operations[n].label}", n, 0.0) for n in _alone(timing, change)]
     if timing.outfeed:
@@ -144,7 +172,8 @@ def timed_net(timing: Timing, change: Change = AS_IT_IS, wip: int | None = None)
         slots=(),
     )
     ready = {ways[key]: taken for key, taken in timing.first_ways.items()}
-    return TimedNet(net, tuple(seconds), tuple(named), bounds, ways, timing.first, ready)
+    train = None if factory.net.is_tree else factory.net
+    return TimedNet(net, tuple(seconds), tuple(named), bounds, ways, timing.first, ready, train)
 
 
 def _gears(

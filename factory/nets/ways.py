@@ -1,0 +1,58 @@
+"""Ways that robots go ahead while they wait, in a timed net, and the cycle time with them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+
+from factory.nets.cycle_ratio import CycleRatio, max_cycle_ratio
+from factory.nets.gears import GearNet
+from factory.nets.marked import MarkedNet, marked
+from factory.nets.petri import PetriNet, Place
+
+Way = tuple[int, int]
+"""A robot, and the place of the operation that it goes ahead to, by index."""
+
+
+def with_ways(net: MarkedNet, gears: GearNet, ways: Iterable[Way]) -> MarkedNet:
+    """`net`, whose first places are those of `gears`, with a place [Y_e; X_e] for each way: of a
+    robot that goes from where Y has left it to where X, its next operation, needs it.
+
+    It is beside the robot's own places from Y_e to X_e, and has as many tokens as its wait for X.
+    So the simple circuits of a gear net still lie in one gear each: one that took a way of a gear
+    and left that gear before X_e would come by X_e a second time. A gear takes the longer of the
+    two at each operation.
+    """
+    places, tokens = list(net.net.places), list(net.tokens)
+    for robot, number in ways:
+        gear, operation = gears.gears[robot], places[number]
+        wait = gear.places[gear.places.index(number) - 1]
+        name = f"way:{gear.robot}:{operation.name}"
+        ends = places[wait].left, operation.right
+        places.append(Place(name, *ends, "way", operation.name))
+        tokens.append(net.tokens[wait])
+    return MarkedNet(PetriNet(net.net.transitions, tuple(places)), tuple(tokens))
+
+
+def train_ratio(
+    gears: GearNet, seconds: Sequence[float], ways: Mapping[Way, float]
+) -> tuple[CycleRatio, int]:
+    """The maximum cycle ratio of a live gear train, with the seconds of each of its places and the
+    `ways` that robots go ahead, and the robot that spends most of the critical circuit; the first
+    of several. Raises ValueError where it is not live."""
+    every = [*seconds, *ways.values()]
+    found = max_cycle_ratio(with_ways(marked(gears), gears, ways), every)
+    numbered = {key: len(seconds) + number for number, key in enumerate(ways)}
+    return found, busiest(gears, numbered, found.circuit, every)[0]
+
+
+def busiest(
+    gears: GearNet, ways: Mapping[Way, int], circuit: Iterable[int], seconds: Sequence[float]
+) -> list[int]:
+    """The robots on a circuit, those first that spend most seconds on it. All robots of an
+    operation do. `ways`: their places, beyond those of the gears; others are of no robot."""
+    robots = dict(enumerate(gears.slots)) | {place: key[:1] for key, place in ways.items()}
+    spent: dict[int, float] = {}
+    for place in circuit:
+        for robot in robots.get(place, ()):
+            spent[robot] = spent.get(robot, 0.0) + seconds[place]
+    return sorted(spent, key=lambda robot: (-spent[robot], robot))
