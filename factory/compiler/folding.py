@@ -24,7 +24,7 @@ from factory.compiler.compiler import gear_net
 from factory.plant.factory import Factory, Operation, Robot
 from factory.problem.pag import NOPART
 from factory.problem.robot_types import Catalogue
-from factory.support.errors import Diagnostic, InputError, did_you_mean
+from factory.support.errors import Diagnostic, InputError, Position, did_you_mean
 
 Line = tuple[int, ...]
 """The tours of a line, as the robots of the factory that is folded."""
@@ -37,7 +37,13 @@ def fold(factory: Factory, lines: Iterable[Line], catalogue: Catalogue) -> Facto
     faults = [fault for line in shared for fault in _faults(factory, line, shared, catalogue)]
     if faults:
         raise InputError(faults)
-    on = line_of(len(factory.robots), shared)
+    return folded(factory, shared, catalogue)
+
+
+def folded(factory: Factory, lines: Iterable[Line], catalogue: Catalogue) -> Factory:
+    """The factory with one robot for each of the `lines` of a fold, which is not checked, and for
+    each robot that is in none of them."""
+    on = line_of(len(factory.robots), lines)
     heads = sorted(set(on))
     number = {head: n for n, head in enumerate(heads)}
     operations = tuple(
@@ -47,10 +53,13 @@ def fold(factory: Factory, lines: Iterable[Line], catalogue: Catalogue) -> Facto
     tours: list[list[int]] = [[] for _ in heads]
     for robot in factory.robots:
         tours[number[on[robot.index]]].append(robot.index)
-    programs: list[list[int]] = [[] for _ in heads]
-    for head, line in zip(heads, tours, strict=True):
-        asked = sorted(line, key=_asked(factory, programs, number, on))
-        programs[number[head]] = [n for robot in asked for n in factory.robots[robot].operations]
+    programs: list[dict[int, int]] = []  # carriers' first; when each operation comes in them
+    for line in tours:
+        last = [delivery(factory, robot) for robot in line]
+        asked = [programs[number[on[o.carrier]]][o.index] if programs else 0 for o in last]
+        turns = sorted(zip(asked, line, strict=True))
+        program = (n for _, robot in turns for n in factory.robots[robot].operations)
+        programs.append({n: step for step, n in enumerate(program)})
     robots = tuple(
         Robot(
             n,
@@ -103,24 +112,6 @@ def lines_of_labels(factory: Factory, sides: Iterable[Sequence[str]]) -> tuple[L
 def delivery(factory: Factory, robot: int) -> Operation:
     """The last operation of a tour, given by its robot."""
     return factory.operations[factory.robots[robot].operations[-1]]
-
-
-def _asked(
-    factory: Factory, programs: Sequence[Sequence[int]], number: dict[int, int], on: Sequence[int]
-):  # type: ignore[no-untyped-def]
-    """A sort key of tours: when the robot that they deliver to asks for them in its program."""
-    places: dict[int, dict[int, int]] = {}
-
-    def key(robot: int) -> int:
-        last = delivery(factory, robot)
-        if last.carrier == robot:
-            return 0
-        carrier = number[on[last.carrier]]
-        if carrier not in places:
-            places[carrier] = {n: step for step, n in enumerate(programs[carrier])}
-        return places[carrier][last.index]
-
-    return key
 
 
 def _type(factory: Factory, line: Sequence[int], catalogue: Catalogue) -> str:
@@ -198,6 +189,6 @@ def _named(factory: Factory, robot: int) -> str:
     return f"the tool of '{last.label}'" if label == NOPART else f"'{label}'"
 
 
-def _fault(message: str, position: object = None, hint: str = "") -> Diagnostic:
+def _fault(message: str, position: Position | None = None, hint: str = "") -> Diagnostic:
     hint = hint or "a line has labels that come to one carrier, from one side, by one kind of robot"
-    return Diagnostic("BadLine", message, position, hint)  # type: ignore[arg-type]
+    return Diagnostic("BadLine", message, position, hint)

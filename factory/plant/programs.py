@@ -2,7 +2,8 @@
 carries.
 
 A step waits until the other robots of its operation show what they must bring, then runs its
-component of the operation's field until the labels have changed.
+component of the operation's field until the labels have changed. A robot with several tours shows
+besides, while it has nothing, which one is next: the label of the tour's first operation.
 """
 
 from __future__ import annotations
@@ -16,13 +17,20 @@ from factory.problem.pag import NOPART
 @dataclass(frozen=True, slots=True)
 class ProgramStep:
     """One `If` of a program: what the robot carries, the mode it waits in, the cells it waits for
-    (robot, label), its operation and its component there, from 0."""
+    (robot, label), its operation and its component there, from 0.
+
+    `next`: the robots (index) that must show that this operation is next, since they have several
+    tours and one of them begins here; `then`: which one is next when this operation has ended a
+    tour of this robot, "" where it has not, or there is one tour only.
+    """
 
     label: str
     wait: str
     until: tuple[tuple[int, str], ...]
     operation: Operation
     slot: int
+    next: tuple[int, ...] = ()
+    then: str = ""
 
     @property
     def is_carrier(self) -> bool:
@@ -43,6 +51,9 @@ def program_of(factory: Factory, robot: int) -> Program:
     """The program of a robot (index), read off its gear."""
     net = factory.net
     gear = net.gears[robot]
+    tours = factory.tours
+    begun = [factory.operations[tour[0]].label for tour in tours[robot]]
+    onward = dict(zip((tour[-1] for tour in tours[robot]), begun[1:] + begun[:1], strict=True))
     steps = []
     for position, number in enumerate(factory.robots[robot].operations):
         operation = factory.operations[number]
@@ -53,7 +64,10 @@ def program_of(factory: Factory, robot: int) -> Program:
             if other != robot
         )
         slot = operation.robots.index(robot)
-        steps.append(ProgramStep(wait.label, wait.mode, others, operation, slot))
+        pairs = zip(operation.robots, operation.before, strict=True)
+        turns = tuple(r for r, label in pairs if label == NOPART and len(tours[r]) > 1)
+        then = onward.get(number, "") if len(begun) > 1 else ""
+        steps.append(ProgramStep(wait.label, wait.mode, others, operation, slot, turns, then))
     return Program(robot, factory.robots[robot].name, tuple(steps))
 
 
@@ -63,18 +77,27 @@ def write_program(program: Program) -> str:
     lines = [f"// {program.name}", "Loop:"]
     for step in program.steps:
         lines += [
-            f"  If state_{me} = {step.label}",
+            f"  If {_state(step, program.robot, step.label)}",
             f"    Run ẋ_{me} = {step.wait} Until {_condition(step)}",
             f"    Run ẋ_{me} = {_field(step)} Until {_exit(step, me)}",
+            *([f"    next_{me} := {step.then}"] if step.then else []),
             "    Break",
         ]
     return "\n".join([*lines, "End Loop"])
 
 
+def _state(step: ProgramStep, robot: int, label: str) -> str:
+    """That a robot (index) shows a label, and where it has several tours, which one is next."""
+    shown = f"state_{robot + 1} = {label}"
+    if robot in step.next:
+        shown = f"{shown} ∧ next_{robot + 1} = {step.operation.label}"
+    return shown
+
+
 def _condition(step: ProgramStep) -> str:
     """What it waits for: other robots, or where there are none, what the world must provide."""
     if step.until:
-        return " ∧ ".join(f"state_{robot + 1} = {label}" for robot, label in step.until)
+        return " ∧ ".join(_state(step, robot, label) for robot, label in step.until)
     return "a part is at the feeder" if step.label == NOPART else "the outfeed is free"
 
 
