@@ -312,7 +312,8 @@ def _wait_name(
     robot: Robot, label: str, onward: Operation, operations: tuple[Operation, ...]
 ) -> str:
     """What the place is called where a robot waits for an operation `onward`: `r2:part1`. One that
-    comes home several times in its gear waits with nothing for each of its tours, `r2:nopart/part3`."""
+    comes home several times in its gear waits with nothing for each of its tours:
+    `r2:nopart/part3`."""
     if label != NOPART:
         return f"{robot.name}:{label}"
     slots = (operations[number].robots.index(robot.index) for number in robot.operations)

@@ -12,7 +12,8 @@ is held only lines below are used, so the product can be made once, operation by
 postorder with the pile first; in any other two deliveries and two tours in the reverse order close
 a circuit without a token. `nets.train` proves the former of each net anew.
 
-Guarantees: the net is a gear train, live, safe and reversible. What is no fold is refused (BadLine).
+Guarantees: the net is a gear train, live, safe and reversible. What is no fold is refused
+(BadLine).
 """
 
 from __future__ import annotations
@@ -70,9 +71,7 @@ def folded(factory: Factory, lines: Iterable[Line], catalogue: Catalogue) -> Fac
         )
         for n, (head, line, program) in enumerate(zip(heads, tours, programs, strict=True))
     )
-    return replace(
-        factory, robots=robots, operations=operations, net=gear_net(robots, operations)
-    )
+    return replace(factory, robots=robots, operations=operations, net=gear_net(robots, operations))
 
 
 def line_of(count: int, lines: Iterable[Line]) -> list[int]:

@@ -44,7 +44,8 @@ class Pace(SpeedProfile):
 
 def gear_times(layout: Layout, pace: Pace) -> list[float]:
     """For each robot the summed delays [s] of its gear: the greatest is the cycle time, where every
-    robot has one tour. Where a robot goes ahead while it waits, it takes the longer of that and the operation."""
+    robot has one tour. Where a robot goes ahead while it waits, it takes the longer of that and the
+    operation."""
     ways, operations = _ways(layout), layout.factory.operations
     delays = operation_times(layout, pace)
 

@@ -38,11 +38,21 @@ def train_ratio(
 ) -> tuple[CycleRatio, int]:
     """The maximum cycle ratio of a live gear train, with the seconds of each of its places and the
     `ways` that robots go ahead, and the robot that spends most of the critical circuit; the first
-    of several. Raises ValueError where it is not live."""
-    every = [*seconds, *ways.values()]
-    found = max_cycle_ratio(with_ways(marked(gears), gears, ways), every)
-    numbered = {key: len(seconds) + number for number, key in enumerate(ways)}
-    return found, busiest(gears, numbered, found.circuit, every)[0]
+    of several. Raises ValueError where it is not live.
+
+    A way in a gear of one operation leads back to where it begins; its wait takes longer instead.
+    """
+    delays, apart = list(seconds), dict[Way, float]()
+    for (robot, number), taken in ways.items():
+        wait, *others = (p for p in gears.gears[robot].places if p != number)
+        if others:
+            apart[robot, number] = taken
+        else:
+            delays[wait] = max(delays[wait], taken - delays[number])
+    delays += apart.values()
+    found = max_cycle_ratio(with_ways(marked(gears), gears, apart), delays)
+    numbered = {key: len(seconds) + number for number, key in enumerate(apart)}
+    return found, busiest(gears, numbered, found.circuit, delays)[0]
 
 
 def busiest(

@@ -142,9 +142,9 @@ def predict(
 ) -> CycleTime:
     """The cycle time of the compiled net and its bottleneck: the greatest sum along a gear of the
     operations' `delays`, or of the `ways` that robots go ahead of them where those are longer; of a
-    gear train the critical circuit's. Others may allow no less and be it: in MuJoCo the outfeed, whose tray must be back before the
-    next dropoff, and a feeder whose part comes later than its robot; the bound `wip` on what is
-    inside."""
+    gear train the critical circuit's. Others may allow no less and be it: in MuJoCo the outfeed,
+    whose tray must be back before the next dropoff, and a feeder whose part comes later than its
+    robot; the bound `wip` on what is inside."""
     factory = layout.factory
     found = [cycle_time(factory, delays, ways)]
     if world == "mujoco":

@@ -7,6 +7,7 @@ certificate that claims a failure must show it, too.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from itertools import pairwise
 from typing import Any
 
 from factory.export.certificate.listing import (
@@ -167,7 +168,7 @@ def _ascending(net: Net, section: Section, document: Section) -> Iterator[str]:
             continue
         turns = robot.turns[on[0] + 1 :] + robot.turns[: on[0] + 1]
         ranks = [rank[net.events[e]] for e in turns]
-        for step, (one, other) in enumerate(zip(ranks, ranks[1:], strict=False)):
+        for step, (one, other) in enumerate(pairwise(ranks)):
             if one >= other:
                 names = f"{net.events[turns[step + 1]]} before {net.events[turns[step]]}"
                 yield f"gear_train: the order has {names}, which {robot.name} does after it"

@@ -45,14 +45,14 @@ class Circuit:
 class TimedNet:
     """A net with the time of each place, and those of its circuits that have a name.
 
-    Of a gear net without a bound `wip` these are all its simple circuits: robots' gears, and places that go back
-    over one operation alone. With copies of a robot its gear has so many tokens, and an operation
-    that it does alone, which has one place on the floor, a place of one token back over it: one at
-    a time. The outfeed's place goes back over dropoff. Where robots go ahead while they wait, a
-    gear's slowest circuit goes by those of its `ways` (places by robot and operation) that take
-    longer than the operation. `train`: the gears of a gear train, whose critical circuit may lie in
-    several of them; None for a gear net. `first`: what a place takes for the first time [s], and `ready`: when
-    robots have gone ahead that set out at the beginning, where those are other times.
+    Of a gear net without a bound `wip` these are all its simple circuits: robots' gears, and places
+    that go back over one operation alone. With copies of a robot its gear has so many tokens, and
+    an operation that it does alone, which has one place on the floor, a place of one token back
+    over it: one at a time. The outfeed's place goes back over dropoff. Where robots go ahead while
+    they wait, a gear's slowest circuit goes by those of its `ways` (places by robot and operation)
+    that take longer than the operation. `train`: the gears of a gear train, whose critical circuit
+    may lie in several of them; None for a gear net. `first`: what a place takes for the first time [s], and
+    `ready`: when robots have gone ahead that set out at the beginning, where those are other times.
     """
 
     net: MarkedNet

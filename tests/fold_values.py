@@ -1,0 +1,135 @@
+"""Random folds as values, and what is wrong with others, for tests."""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Iterator
+from dataclasses import replace
+from itertools import combinations
+
+from factory.compiler.compiler import compile_pag, gear_net
+from factory.compiler.folding import Line, delivery, folded
+from factory.nets.gears import GearNet
+from factory.nets.marked import MarkedNet, marked
+from factory.plant.factory import Factory
+from factory.problem.pag import PAG
+from tests.pag_values import SHAPES, TEMPLATES, catalogue, paper, random_pag
+
+INSERTING = {**TEMPLATES, "insert": replace(TEMPLATES["insert"], further="insert")}
+"""Templates by which all inputs but the first are inserted."""
+
+
+def inserted(pag: PAG, share: float = 1.0, seed: int = 0) -> PAG:
+    """The PAG with so great a share of its mates as inserts."""
+    rng = random.Random(seed)
+    nodes = (
+        replace(node, operation="insert")
+        if node.operation == "mate" and rng.random() < share
+        else node
+        for node in pag.nodes
+    )
+    return replace(pag, nodes=tuple(nodes))
+
+
+def plain(pag: PAG) -> Factory:
+    """The factory with one tour a robot."""
+    return compile_pag(pag, INSERTING, catalogue())
+
+
+def three_robots() -> Factory:
+    """The paper's example with inserts; one robot brings part2 and part3."""
+    factory = plain(inserted(paper()))
+    lines = ((robot_of(factory, "part2"), robot_of(factory, "part3")),)
+    return folded(factory, lines, catalogue())
+
+
+def robot_of(factory: Factory, label: str) -> int:
+    """The robot that brings a label to another."""
+    brings = (
+        robot
+        for o in factory.operations
+        for robot, brought in zip(o.robots, o.before, strict=True)
+        if brought == label and robot != o.carrier
+    )
+    return next(brings)
+
+
+def random_lines(factory: Factory, rng: random.Random) -> list[Line]:
+    """A random fold: the definition, from the output robot's line on. Tours on one line deliver to
+    one line, in different operations, and one type of robot is fit for them."""
+    kids: dict[int, list[int]] = {robot.index: [] for robot in factory.robots}
+    for robot in factory.robots[1:]:
+        kids[delivery(factory, robot.index).carrier].append(robot.index)
+    lines: list[Line] = [(0,)]
+    apart = rng.choice((0.0, 0.1, 0.4))
+    for line in lines:
+        groups: list[list[int]] = []
+        below = [kid for tour in line for kid in kids[tour]]
+        rng.shuffle(below)
+        for kid in below:
+            fitting = [group for group in groups if _fits(factory, group, kid)]
+            if fitting and rng.random() >= apart:
+                rng.choice(fitting).append(kid)
+            else:
+                groups.append([kid])
+        lines += [tuple(sorted(group)) for group in groups]
+    return lines
+
+
+def _fits(factory: Factory, group: list[int], kid: int) -> bool:
+    robots = factory.robots
+    return all(
+        catalogue().meet(robots[other].type, robots[kid].type) is not None
+        and delivery(factory, other).index != delivery(factory, kid).index
+        for other in group
+    )
+
+
+def random_fold(seed: int, size: int = 30) -> Factory:
+    """A random fold of a random PAG of up to so many labels, always the same."""
+    rng = random.Random(seed)
+    shape, count = rng.choice(SHAPES), rng.randint(1, size)
+    pag = random_pag(count, seed, shape, rng.randint(2, 5))
+    factory = plain(inserted(pag, rng.choice((0.0, 0.5, 1.0)), seed))
+    return folded(factory, random_lines(factory, rng), catalogue())
+
+
+def swapped(factory: Factory, robot: int, one: int, other: int) -> GearNet:
+    """The net with two tours of a robot exchanged."""
+    tours = list(factory.tours[robot])
+    tours[one], tours[other] = tours[other], tours[one]
+    robots = list(factory.robots)
+    robots[robot] = replace(robots[robot], operations=tuple(n for tour in tours for n in tour))
+    return gear_net(tuple(robots), factory.operations)
+
+
+def pairs_of_tours(factory: Factory) -> Iterator[tuple[int, int, int]]:
+    """Every robot with every two of its tours."""
+    for robot, tours in enumerate(factory.tours):
+        for one, other in combinations(range(len(tours)), 2):
+            yield robot, one, other
+
+
+def dates(net: MarkedNet, seconds: list[float], rounds: int) -> list[list[float]]:
+    """When each transition of a marked graph fires, for so many times, all as soon as they can: a
+    token game in which each token says when it is ready, which begins with what is enabled."""
+    here: list[list[float]] = [[0.0] * count for count in net.tokens]
+    fired: list[list[float]] = [[] for _ in net.net.transitions]
+    ready = list(range(len(fired)))
+    while ready:
+        event = ready.pop()
+        needs = net.net.preset[event]
+        while len(fired[event]) < rounds and all(here[p] for p in needs):
+            now = max(here[p].pop(0) for p in needs)
+            fired[event].append(now)
+            for place in net.net.postset[event]:
+                here[place].append(now + seconds[place])
+                ready += net.net.places[place].right
+    return fired
+
+
+def simulated_cycle(net: GearNet, seconds: list[float], rounds: int = 60) -> float:
+    """The mean time between two products in the long run, by the token game. Exact where the number
+    of rounds is a multiple of the period."""
+    fired = dates(marked(net), seconds, 3 * rounds)
+    return max(row[-1] - row[-1 - rounds] for row in fired) / rounds
