@@ -51,8 +51,9 @@ class TimedNet:
     over it: one at a time. The outfeed's place goes back over dropoff. Where robots go ahead while
     they wait, a gear's slowest circuit goes by those of its `ways` (places by robot and operation)
     that take longer than the operation. `train`: the gears of a gear train, whose critical circuit
-    may lie in several of them; None for a gear net. `first`: what a place takes for the first time [s], and
-    `ready`: when robots have gone ahead that set out at the beginning, where those are other times.
+    may lie in several of them; None for a gear net. `first`: what a place takes for the first time
+    [s], and `ready`: when robots have gone ahead that set out at the beginning, where those are
+    other times.
     """
 
     net: MarkedNet
