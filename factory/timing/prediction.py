@@ -27,7 +27,7 @@ from factory.timing.cycle_time import (
     marked_graph_cycle_time,
 )
 from factory.timing.pool import with_wip
-from factory.timing.serving import serving
+from factory.timing.serving import longer, serving, turn_ways
 
 
 def operation_delays(
@@ -146,6 +146,8 @@ def predict(
     whose tray must be back before the next dropoff, and a feeder whose part comes later than its
     robot; the bound `wip` on what is inside."""
     factory = layout.factory
+    if world == "mujoco" and factory.folded:
+        ways = longer(ways, turn_ways(layout, settings))
     found = [cycle_time(factory, delays, ways)]
     if world == "mujoco":
         found += serving(layout, delays, settings)

@@ -1,16 +1,18 @@
 """What feeders and the outfeed allow: machines beside the net, which robots may have to wait for.
 
 A feeder's slider goes up when its part has been taken, and comes down with the next when the robot
-is out of the way.
+is out of the way. The feeders of a robot with several tours take turns: the next part comes down
+when the robot is out of the way of that.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 from factory.control.profile import SpeedProfile
 from factory.layout.layout import Layout
 from factory.layout.outfeed import away
+from factory.nets.ways import Way
 from factory.plant.factory import Operation
 from factory.support.settings import Settings
 from factory.timing.cycle_time import CycleTime
@@ -21,10 +23,12 @@ CALM = 3
 
 def serving(layout: Layout, delays: Sequence[float], settings: Settings) -> Iterator[CycleTime]:
     """The least cycle times that the outfeed, and feeders for which robots wait, allow, with the
-    operations' delays [s]."""
+    operations' delays [s]; `turn_ways` has those of robots with several tours."""
     yield CycleTime(delays[layout.factory.dropoff.index] + away(layout, settings), "outfeed")
     for leaf in layout.factory.leaves:
         robot = layout.factory.robots[leaf.carrier]
+        if len(layout.factory.tours[leaf.carrier]) > 1:
+            continue
         fed = _fed(layout, leaf, delays, settings)
         if fed > sum(delays[number] for number in robot.operations):
             yield CycleTime(fed, f"feeder {leaf.label}")
@@ -32,11 +36,40 @@ def serving(layout: Layout, delays: Sequence[float], settings: Settings) -> Iter
 
 def _fed(layout: Layout, leaf: Operation, delays: Sequence[float], settings: Settings) -> float:
     """The cycle time of a feeder, and of its robot where that waits for it [s]."""
-    down = SpeedProfile(*settings.feeder_limits).rest(layout.feeder(leaf.label).stroke)
     gear = layout.factory.robots[leaf.carrier].operations
     busy = sum(delays[number] for number in gear) - delays[leaf.index]
+    down, rest = _down(layout, leaf, settings), (CALM + 1) * settings.tick
+    return max(busy + _late(layout, leaf, gear[-1], settings) + rest, 2 * (down + rest))
+
+
+def turn_ways(layout: Layout, settings: Settings) -> dict[Way, float]:
+    """How long after the end of a tour the next part can be taken at the earliest [s], for robots
+    with several tours, by the robot and the operation that takes the part."""
+    factory = layout.factory
+    found: dict[Way, float] = {}
+    for robot, tours in enumerate(factory.tours):
+        for step, tour in enumerate(tours if len(tours) > 1 else ()):
+            leaf, before = factory.operations[tour[0]], tours[step - 1][-1]
+            if not leaf.inputs:
+                late = _late(layout, leaf, before, settings)
+                found[robot, leaf.index] = late + (CALM + 1) * settings.tick
+    return found
+
+
+def _down(layout: Layout, leaf: Operation, settings: Settings) -> float:
+    """How long a slider takes for its stroke [s]."""
+    return SpeedProfile(*settings.feeder_limits).rest(layout.feeder(leaf.label).stroke)
+
+
+def _late(layout: Layout, leaf: Operation, before: int, settings: Settings) -> float:
+    """How long a part comes down after its robot could be home from the operation before [s]."""
     path, way = layout.guidepaths[leaf.carrier], layout.passing(leaf)
-    beyond = path.length - layout.legs[gear[-1], leaf.carrier][1] - way
+    beyond = path.length - layout.legs[before, leaf.carrier][1] - way
     early = SpeedProfile(settings.speed, settings.acceleration).landing(max(beyond, 0.0))
-    rest = (CALM + 1) * settings.tick
-    return max(busy + max(down - early, 0.0) + rest, 2 * (down + rest))
+    return max(_down(layout, leaf, settings) - early, 0.0)
+
+
+def longer(one: Mapping[Way, float], other: Mapping[Way, float]) -> dict[Way, float]:
+    """The longer of two times of each way [s]."""
+    keys = dict.fromkeys([*one, *other])
+    return {key: max(one.get(key, 0.0), other.get(key, 0.0)) for key in keys}

@@ -16,7 +16,7 @@ from factory.study.analysis.firing import Firings, settled_firings
 from factory.study.analysis.slack import Slack, circuits
 from factory.study.analysis.timing import AS_IT_IS, Change, Timing
 from factory.timing.pool import with_wip
-from factory.timing.serving import serving
+from factory.timing.serving import longer, serving, turn_ways
 
 SAME = 1e-9
 """Relative difference up to which times are equal."""
@@ -145,6 +145,8 @@ def timed_net(timing: Timing, change: Change = AS_IT_IS, wip: int | None = None)
     for robot, copies in change.copies.items():
         tokens[factory.net.initial[robot]] += copies - 1
     went = timing.ways(change)
+    if timing.outfeed and factory.folded:
+        went = longer(went, turn_ways(timing.layout, timing.settings))
     ways = dict(zip(went, range(len(tokens), len(tokens) + len(went)), strict=True))
     seconds = [*timing.changed(change)]
     seconds += [*[0.0] * (len(tokens) - len(seconds)), *went.values()]
