@@ -51,7 +51,9 @@ class Project:
         """The same product by another tree, or on another ground; what is known of its parts is
         kept."""
         found = replace(self, pag=pag, ground=ground)
-        known = {"product"} if pag is not self.pag else {"product", "matings", "plain", "_hands"}
+        known = {"product"} if pag is not self.pag else {"product", "matings", "compiled"}
+        if pag is self.pag and ground.lines == self.ground.lines:
+            known |= {"plain", "_hands"}
         found.__dict__.update({name: self.__dict__[name] for name in known & set(self.__dict__)})
         return found
 
@@ -121,7 +123,21 @@ class Project:
 
     @cached_property
     def plain(self) -> Factory:
-        """Compile(P), without relays. Raises InputError where there is no such factory."""
+        """Compile(P), folded where the ground has lines, without relays. Raises InputError where
+        there is no such factory."""
+        lines = self.ground.lines
+        if not lines:
+            return self.compiled
+        from factory.compiler.folding import fold, lines_of_labels
+        from factory.compiler.mating.mating import judged
+
+        factory = judged(self.compiled, self.product)
+        return fold(factory, lines_of_labels(factory, lines), self.catalogue)
+
+    @cached_property
+    def compiled(self) -> Factory:
+        """Compile(P): a robot for each label, neither folded nor relayed. Raises InputError where
+        there is no such factory."""
         factory = compile_pag(self.pag, self.templates, self.catalogue, self.approaches)
         own = {name for name, template in self.templates.items() if not _is_shipped(template)}
         tried = own and own & {operation.template.name for operation in factory.operations}

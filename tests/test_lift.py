@@ -49,7 +49,7 @@ ball = atomic(sphere = 0.012, pos = (0, 0, 0.0329))"""
 
 def lifts(factory: Factory) -> dict[str, str]:
     """What each robot with a lift lowers."""
-    return {factory.robots[r].name: factory.delivered(r) for r in factory.strokes}
+    return {factory.robots[r].name: factory.deliveries(r)[0] for r in factory.strokes}
 
 
 @pytest.mark.parametrize(

@@ -170,7 +170,7 @@ def _analyze_pag(
         if log is None
         else conditions(log.header)
     )
-    project = read(given.file, given.folders, made.settings, given.ground())
+    project = given.project(made.settings)
     layout = project.layout
     proved(layout.factory.net)
     warnings = announced(layout.product.warnings, out)

@@ -83,11 +83,10 @@ def export(
 def _source(given: ProjectOptions, chosen: Exporter, silent: bool) -> Source:
     """What an exporter makes a file of. Raises InputError, of code Usage where the exporter does
     not take such a file."""
-    from factory.pipeline import read
     from factory.record.log import is_log
     from factory.support.files import is_net
 
-    file, settings, ground = given.file, given.settings(), given.ground()
+    file = given.file
     kind = "a log" if is_log(file) else "a net in PNML" if is_net(file) else "a PAG"
     wanted = TAKEN[chosen.takes]
     if kind not in wanted:
@@ -99,7 +98,7 @@ def _source(given: ProjectOptions, chosen: Exporter, silent: bool) -> Source:
     if kind == "a log":
         return read_partly(file, silent)
     if kind == "a PAG":
-        return read(file, given.folders, settings, ground)
+        return given.project()
     from factory.foreign_nets.pnml_reader import load_net
 
     return load_net(file)

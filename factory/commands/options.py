@@ -214,7 +214,9 @@ RELAY = options(
         type=RobotCount(),
         help="At most so many robots, tools included, as fast as found; or as few as found: least.",
     ),
-    click.option("--seconds", type=SECONDS, help="To look for few robots [s]; 60 by default."),
+    click.option(
+        "--seconds", "effort", type=SECONDS, help="To look for few robots [s]; 60 by default."
+    ),
 )
 WIP = click.option(
     "--wip", type=click.IntRange(1, 10**9), help="Copies of each part let in at once."

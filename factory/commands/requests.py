@@ -52,7 +52,7 @@ class ProjectOptions:
     relay: bool = False
     cycle: float | None = None
     robots: int | Literal["least"] | None = None
-    seconds: float | None = None
+    effort: float | None = None
 
     def settings(self) -> Settings:
         """Options before the environment, that before the `factory.toml` beside the PAG or in the
@@ -70,21 +70,22 @@ class ProjectOptions:
     def ground(self) -> Ground:
         """What FLOOR and RELAY ask for. Raises InputError (BadValue)."""
         from factory.layout.request import Ground
+        from factory.support.user_defaults import defaults_for
 
         floor = None if self.floor is None else pair(self.floor, "--floor", "4x3", float, WIDEST)
-        return Ground(floor, self.relay, self.cycle)
+        return Ground(floor, self.relay, self.cycle, defaults_for(self.file).lines())
 
-    def project(self) -> Project:
-        """The project that the options describe, with the forms that they ask for. Raises
-        InputError."""
+    def project(self, settings: Settings | None = None) -> Project:
+        """The project that the options describe, with the forms and lines that they ask for, for
+        these `settings` if any are given. Raises InputError."""
         from factory.pipeline import read
 
-        project = read(self.file, self.folders, self.settings(), self.ground())
+        project = read(self.file, self.folders, settings or self.settings(), self.ground())
         if self.robots is None and self.cycle is None:
             return project
         from factory.study.allocation.search import SECONDS, Aim, allocated
 
-        return allocated(project, Aim(self.robots, self.cycle, self.seconds or SECONDS))
+        return allocated(project, Aim(self.robots, self.cycle, self.effort or SECONDS))
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,5 +1,5 @@
 """Folds: robots of a factory that come to the same place from the same side become one robot, on
-one *line*.
+one *line*. Tools of one kind that come to one line become one, too.
 
 In a factory as Compile makes it each robot has one *tour*, from empty hands to empty hands. The
 tours form a tree: a *kid* of a tour is one that delivers to it. A fold assigns tours to lines: the
@@ -38,6 +38,8 @@ def fold(factory: Factory, lines: Iterable[Line], catalogue: Catalogue) -> Facto
     faults = [fault for line in shared for fault in _faults(factory, line, shared, catalogue)]
     if faults:
         raise InputError(faults)
+    if shared:
+        shared += _tool_lines(factory, shared)
     return folded(factory, shared, catalogue)
 
 
@@ -72,6 +74,19 @@ def folded(factory: Factory, lines: Iterable[Line], catalogue: Catalogue) -> Fac
         for n, (head, line, program) in enumerate(zip(heads, tours, programs, strict=True))
     )
     return replace(factory, robots=robots, operations=operations, net=gear_net(robots, operations))
+
+
+def _tool_lines(factory: Factory, lines: Sequence[Line]) -> list[Line]:
+    """The tools that share a robot: those of one kind that come to one line."""
+    on = line_of(len(factory.robots), lines)
+    found: dict[tuple[int, object], list[int]] = {}
+    for robot in factory.robots[1:]:
+        kind = kind_of(factory, robot.index)
+        if kind[0] == "tool":
+            found.setdefault((on[delivery(factory, robot.index).carrier], kind), []).append(
+                robot.index
+            )
+    return [tuple(tools) for tools in found.values() if len(tools) > 1]
 
 
 def line_of(count: int, lines: Iterable[Line]) -> list[int]:
@@ -152,29 +167,31 @@ def mismatch(
         return "they deliver to different robots"
     if catalogue.meet(factory.robots[one].type, factory.robots[other].type) is None:
         return "no type of robot is fit for both"
-    if _kind(factory, one) != _kind(factory, other):
+    if kind_of(factory, one) != kind_of(factory, other):
         return "they begin or end in different ways"
-    if not _sides(ends[0], one) & _sides(ends[1], other):
+    if not sides_of(factory, one) & sides_of(factory, other):
         return "they cannot come from the same side"
     return ""
 
 
-def _kind(factory: Factory, robot: int) -> tuple[object, ...]:
+def kind_of(factory: Factory, robot: int) -> tuple[object, ...]:
     """What tours on one line have in common: that a feeder begins them, that they end at a station
-    of a carrier that holds something, that they lower what they bring; tools, what they do."""
+    of a carrier that holds something, that they lower what they bring; tools, what they do, and in
+    which of the template's roles."""
     first = factory.operations[factory.robots[robot].operations[0]]
     last = delivery(factory, robot)
     slot = last.robots.index(robot)
     if last.before[slot] == NOPART:
-        return "tool", last.template.name
+        return "tool", last.template.name, slot
     fed, inserted = len(first.robots) == 1, last.before[last.template.carrier - 1] != NOPART
     if not (fed and inserted):
         return "alone", robot
     return "fed", last.lowered == slot
 
 
-def _sides(last: Operation, robot: int) -> set[int]:
+def sides_of(factory: Factory, robot: int) -> set[int]:
     """From which sides of the axis of its approach a robot may come with what it delivers."""
+    last = delivery(factory, robot)
     approach = last.approach
     if approach is None or last.before[last.robots.index(robot)] == NOPART:
         return {-1, +1}

@@ -14,7 +14,7 @@ from itertools import accumulate
 from math import inf
 
 from factory.layout.dimensions import CARRIAGE, MAST, PAYLOADS, POST, SIDE, Clearance, up
-from factory.layout.guidepath import Extent
+from factory.layout.guidepath import Extent, hull
 from factory.layout.shapes import Shape
 from factory.plant.factory import Factory, Operation
 from factory.support.errors import Diagnostic, InputError
@@ -29,18 +29,55 @@ Strip = tuple[float, float, float]
 """How far to one side a path takes the floor, by layer [m]; -inf for not at all."""
 
 
+@dataclass(frozen=True, slots=True)
+class Stop:
+    """Where a robot stands for one operation or, on a line, for several: those to which the same
+    robots deliver."""
+
+    operations: tuple[Operation, ...]
+
+    @property
+    def first(self) -> Operation:
+        """The operation that is first in the robot's program."""
+        return self.operations[0]
+
+    @property
+    def guests(self) -> list[int]:
+        """The robots that deliver there. Raises InputError (Layout) as `guests_of`."""
+        return guests_of(self.first)
+
+    @property
+    def joins(self) -> bool:
+        """Whether something is added there to what the robot holds."""
+        return any(len(operation.inputs) > 1 for operation in self.operations)
+
+
 @dataclass(frozen=True)
 class Footprint:
     """The footprint of a robot with a `shape`.
 
-    `operations`: those after which it carries something; the first may be a feeder's. `corridor`:
-    whether its way ahead is kept free for its last pile.
+    `stops`: where it stands for the operations after which it carries something, in the order in
+    which it comes there first; the first may be at a feeder. `corridor`: whether its way ahead is
+    kept free for its last pile.
     """
 
     shape: Shape
     clearance: Clearance
-    operations: tuple[Operation, ...]
+    stops: tuple[Stop, ...]
     corridor: bool = False
+
+    @cached_property
+    def returns(self) -> bool:
+        """Whether it comes to some stop more than once: then all that it ever holds may be
+        anywhere from the first of them on."""
+        return any(len(stop.operations) > 1 for stop in self.stops)
+
+    def pile(self, stop: Stop) -> Extent:
+        """The box of all that the robot may hold at a stop."""
+        piles = self.shape.piles
+        if self.returns and not (self.fed and stop is self.stops[0]):
+            return hull(list(piles.values()))
+        return hull([piles[operation.index] for operation in stop.operations])
 
     @cached_property
     def half(self) -> float:
@@ -50,14 +87,14 @@ class Footprint:
     @cached_property
     def fed(self) -> bool:
         """Whether a feeder presents the first pile."""
-        return bool(self.operations) and len(self.operations[0].robots) == 1
+        return bool(self.stops) and len(self.stops[0].first.robots) == 1
 
     @cached_property
     def housing(self) -> Extent:
         """The housing of the feeder about the product's middle, nowhere without one [m]."""
         if not self.fed:
             return inf, -inf, inf, -inf
-        rear, front, low, high = self.shape.piles[self.operations[0].index]
+        rear, front, low, high = self.pile(self.stops[0])
         return rear - SIDE, front + SIDE, low - SIDE, high + SIDE
 
     @cached_property
@@ -102,7 +139,7 @@ class Footprint:
         ends = [at + pile[1] + half for at, pile in piles]
         taken.append((min(starts, default=inf), max(ends, default=-inf)))
         if self.fed:
-            rear = shape.laden(shape.piles[self.operations[0].index])[0]
+            rear = shape.laden(self.pile(self.stops[0]))[0]
             post, room = -self.clearance.post(shape.reach, rear), POST / 2 + half
             taken = [(min(low, post - room), max(high, post + room)) for low, high in taken]
             taken[PAYLOADS] = taken[PAYLOADS][0], max(taken[PAYLOADS][1], self.housing[1] + half)
@@ -113,26 +150,31 @@ class Footprint:
         spans = zip(self.along(piles), self.strips[-1], self.strips[+1], strict=True)
         return [((*span, -low, high),) if span[0] <= span[1] else () for span, low, high in spans]
 
-    def least(self, operation: Operation, station: float) -> float:
-        """The least station of an operation after another station [m]: what joins the part of a
-        feeder is clear of the housing."""
-        if not self.fed or len(operation.inputs) < 2:
+    def least(self, stop: Stop, station: float) -> float:
+        """The least station of a stop after another station [m]: what joins the part of a feeder is
+        clear of the housing."""
+        if not self.fed or not stop.joins:
             return station
-        pile = self.shape.piles[operation.index]
-        return max(station, up(self.housing[1] + self.clearance.c - pile[0]))
+        return max(station, up(self.housing[1] + self.clearance.c - self.pile(stop)[0]))
 
-    def placed(self, operation: Operation, station: float) -> Placed:
-        """The pile that an operation at a station makes."""
-        pile = self.shape.laden(self.shape.piles[operation.index])
-        return station + ahead_of(operation, self.shape.reach), pile
+    def placed(self, stop: Stop, station: float) -> Placed:
+        """The pile that is there at a stop at a station."""
+        pile = self.shape.laden(self.pile(stop))
+        return station + ahead_of(stop.first, self.shape.reach), pile
 
 
 def footprint(
     factory: Factory, robot: int, shape: Shape, clearance: Clearance, corridor: bool = False
 ) -> Footprint:
     """The footprint of a robot with a shape of its own."""
-    operations = tuple(factory.operations[number] for number in shape.piles)
-    return Footprint(shape, clearance, operations, corridor)
+    found: dict[frozenset[int] | int, list[Operation]] = {}
+    for number in shape.piles:
+        operation = factory.operations[number]
+        guests = frozenset(operation.robots) - {robot}
+        alone = -1 if not operation.inputs else number
+        found.setdefault(guests or alone, []).append(operation)
+    stops = tuple(Stop(tuple(operations)) for operations in found.values())
+    return Footprint(shape, clearance, stops, corridor)
 
 
 def extent_to(pile: Extent, side: int) -> float:

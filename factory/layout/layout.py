@@ -27,7 +27,7 @@ from factory.layout.dimensions import (
     Clearance,
     up,
 )
-from factory.layout.guidepath import Box, Extent, Feeder, Guidepath, Point2
+from factory.layout.guidepath import Box, Extent, Feeder, Guidepath, Point2, hull
 from factory.layout.hands.hand import BEAM, Hand
 from factory.layout.hands.mounted import Mount, grip_of
 from factory.plant.approaches import Overlap
@@ -197,11 +197,15 @@ class Layout:
 
     def feeder(self, label: str) -> Feeder:
         """The feeder of a part: a housing over the place where it is presented, and the post that
-        carries it, behind the rear stop of the robot that it serves."""
+        carries it, behind the rear stop of the robot that it serves. Parts of one line have one
+        housing, in which they hang with their tops at one height."""
         operation, room = self.factory.by_label[label], Clearance(self.clearance).room
         path, solid = self.guidepaths[operation.carrier], self.product.solids[label]
-        middle = self.meeting(operation)
-        rear, front, near, far = path.frame(self.payloads[label])
+        middle, shown = self.meeting(operation), self.magazine(operation.carrier)
+        solids = [self.product.solids[part] for part in shown]
+        highest = max(float(solid.high[2]) for solid in solids)
+        tallest = max(float(solid.high[2] - solid.low[2]) for solid in solids)
+        rear, front, near, far = path.frame(hull([self.payloads[part] for part in shown]))
         inside = rear - PLAY, front + PLAY, near - PLAY, far + PLAY
         housing = rear - SIDE, front + SIDE, near - SIDE, far + SIDE
         across, half = path.offset + path.aside, POST / 2
@@ -209,13 +213,13 @@ class Layout:
         back = -Clearance(self.clearance).post(path.reach, min(rear, grip[0]) if grip else rear)
         if hand is not None and hand.tall:
             top = max(hand.beam + BEAM, hand.places[0][2] + max(hand.radius, FINGER / 2))
-            room = max(room, round(top - float(solid.high[2]) + self.clearance, 6))
+            room = max(room, round(top - highest + self.clearance, 6))
             if hand.kind == "above":
                 across = round((near + far) / 2, 3)
         over = PAYLOAD + self.elevations[operation.carrier] - self.product.low[2]
-        low = float(over + solid.high[2]) + room
+        low = float(over + highest) + room
         high_up = RISE * hypot(inside[1] - inside[0], inside[3] - inside[2])
-        stroke = room + high_up + float(solid.high[2] - solid.low[2])
+        stroke = room + high_up + tallest
         return Feeder(
             back,
             across,
@@ -225,11 +229,16 @@ class Layout:
             path.world(housing, middle),
             low,
             max(low - room + stroke + PAD + SIDE, low + BOOM_HEIGHT),
-            stroke,
+            stroke + (highest - float(solid.high[2])),
         )
 
+    def magazine(self, robot: int) -> tuple[str, ...]:
+        """The parts that the feeder of a robot shows, in the order of its program; none without."""
+        firsts = (self.factory.operations[tour[0]] for tour in self.factory.tours[robot])
+        return tuple(operation.label for operation in firsts if not operation.inputs)
+
     def passing(self, leaf: Operation) -> float:
-        """How far the robot of a feeder goes until all that it ever carries is clear of the part
+        """How far the robot of a feeder goes until all that it ever carries is clear of any part
         that comes down next [m]."""
         path, operations = self.guidepaths[leaf.carrier], self.factory.operations
         carried = (
@@ -238,7 +247,9 @@ class Layout:
             if operations[number].carrier == leaf.carrier and number != self.factory.dropoff.index
         )
         rear = min(path.frame(self.payloads[label])[0] for label in carried)
-        return path.frame(self.payloads[leaf.label])[1] - rear + self.clearance
+        shown = self.magazine(leaf.carrier)
+        front = max(path.frame(self.payloads[label])[1] for label in shown)
+        return front - rear + self.clearance
 
     def standoff(self, operation: Operation, slot: int) -> float:
         """How far short of the meeting point the robot in `slot` waits until the carrier stands

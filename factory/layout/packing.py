@@ -1,8 +1,8 @@
 """Pack one robot: stations, sides and travels of all that deliver to it, for the least time.
 
-Guarantees what `factory.layout.stretching` does, with contours in place of boxes. Operations are
-placed from the B end forward; of all the ways to place the ones so far the best few are kept (a
-beam), since where a station is best depends on the next.
+Guarantees what `factory.layout.stretching` does, with contours in place of boxes. Stops are placed
+from the B end forward; of all the ways to place the ones so far the best few are kept (a beam),
+since where a station is best depends on the next.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from math import inf
 
 from factory.layout.dimensions import PAYLOADS, Clearance, up
 from factory.layout.durations import Pace
-from factory.layout.footprint import Placed, extent_to, footprint, guests_of
+from factory.layout.footprint import Placed, Stop, extent_to, footprint
 from factory.layout.guidepath import Extent
 from factory.layout.hands.choosing import Hands
 from factory.layout.layout import BESIDE
@@ -102,35 +102,36 @@ class Packing:
     def _outlines(self, nested: bool) -> list[tuple[float, Outline]]:
         empty = dict.fromkeys((-1, +1), Skyline.behind(self.own.frontier, nested))
         ways = [_Way(0.0, empty)]
-        for operation in self.own.operations:
-            found = [longer for way in ways for longer in self._placed(way, operation)]
+        for stop in self.own.stops:
+            found = [longer for way in ways for longer in self._placed(way, stop)]
             ways = sorted(found, key=lambda way: way.cost)[: self.task.width]
         return [pair for way in ways if (pair := self._finished(way, empty)) is not None]
 
-    def _placed(self, way: _Way, operation: Operation) -> Iterator[_Way]:
-        """The ways to place one more operation."""
-        robots, least = guests_of(operation), self.own.least(operation, way.station)
+    def _placed(self, way: _Way, stop: Stop) -> Iterator[_Way]:
+        """The ways to place one more stop."""
+        robots, least = stop.guests, self.own.least(stop, way.station)
         if not robots:
-            yield self._added(way, operation, least, ())
+            yield self._added(way, stop, least, ())
             return
-        for sides in self._options(operation, robots):
+        for sides in self._options(stop, robots):
             alternatives = (self._guests(way, r, side) for r, side in sides.items())
             for guests in product(*alternatives):
                 if not way.piles:
-                    yield self._added(way, operation, 0.0, guests)
+                    yield self._added(way, stop, 0.0, guests)
                 else:
-                    yield from self._stations(way, operation, guests, least)
+                    yield from self._stations(way, stop, guests, least)
 
-    def _options(self, operation: Operation, robots: Sequence[int]) -> list[Sides]:
+    def _options(self, stop: Stop, robots: Sequence[int]) -> list[Sides]:
         """From which sides they may come: two from opposite ones."""
         both = [dict(zip(robots, sides, strict=False)) for sides in ((-1, +1), (+1, -1))]
-        return [sides for sides in both if self.admits(operation, sides)] or both
+        admitted = [all(self.admits(o, sides) for o in stop.operations) for sides in both]
+        return [sides for sides, can in zip(both, admitted, strict=True) if can] or both
 
     def _later(self, way: _Way, count: int) -> Iterator[tuple[int, Outline]]:
         """From which side which outline may come in so many operations after the next."""
-        for operation in self.own.operations[len(way.piles) + 1 :][:count]:
-            robots = [robot for robot in operation.robots if robot != self.robot]
-            for sides in self._options(operation, robots):
+        for stop in self.own.stops[len(way.piles) + 1 :][:count]:
+            robots = [robot for robot in stop.first.robots if robot != self.robot]
+            for sides in self._options(stop, robots):
                 for robot, side in sides.items():
                     yield side, self.outline(robot, side)
 
@@ -150,7 +151,7 @@ class Packing:
         return [near] if out <= near.travel else [near, replace(near, travel=out, wanted=out)]
 
     def _stations(
-        self, way: _Way, operation: Operation, guests: Sequence[Guest], least: float
+        self, way: _Way, stop: Stop, guests: Sequence[Guest], least: float
     ) -> Iterator[_Way]:
         """The stations at which something comes clear, as long as the way there is worth it."""
         tried = {least, *self._next(way, least)}
@@ -164,36 +165,33 @@ class Packing:
                 break
             placed = [_came(way.beside, guest, station, guest.travel) for guest in guests]
             if max(guest.travel for guest in placed) < inf:
-                found = self._added(way, operation, station, placed)
+                found = self._added(way, stop, station, placed)
                 best = min(best, found.cost)
                 yield found
 
     def _next(self, way: _Way, least: float) -> Iterator[float]:
-        """Where the next operation could be if this one were not: to stop there once saves time."""
+        """Where the next stop could be if this one were not: to stop there once saves time."""
         for side, outline in self._later(way, 1):
             starts = way.beside[side].starts(outline, least)
             yield from (start for start in starts if start < least + ALIGN)
 
-    def _added(
-        self, way: _Way, operation: Operation, station: float, guests: Sequence[Guest]
-    ) -> _Way:
-        time = self._time(way, operation, station, guests)
+    def _added(self, way: _Way, stop: Stop, station: float, guests: Sequence[Guest]) -> _Way:
+        time = self._time(way, stop, station, guests)
         return _Way(
             station,
             _taken(way.beside, guests),
             (*way.guests, *guests),
             (*way.stations, station),
-            (*way.piles, self.own.placed(operation, station)),
+            (*way.piles, self.own.placed(stop, station)),
             way.time + time,
             way.cost + self._cost(way, time, station, guests),
         )
 
-    def _time(
-        self, way: _Way, operation: Operation, station: float, guests: Sequence[Guest]
-    ) -> float:
-        """How long an operation takes [s]; its carrier goes further, but for the first one, which
-        it goes back for."""
-        pace = self.task.pace
+    def _time(self, way: _Way, stop: Stop, station: float, guests: Sequence[Guest]) -> float:
+        """How long the operations at a stop take [s]. The carrier goes further for the first of
+        them, but at the first stop, which it goes back for; for each other it stands there while
+        robots come again."""
+        pace, operation = self.task.pace, stop.first
         longest = rested = pace.rest(station - way.station)
         for guest in guests:
             if guest.outline.shape.tool:
@@ -203,7 +201,9 @@ class Packing:
                 continue
             standoff = self._standoff(operation, way.piles[-1][1], guest)
             longest = max(longest, pace.staged(guest.travel, standoff, pace.entered(rested)))
-        return longest + operation.dwell + pace.lost
+        again = max((2 * pace.rest(guest.travel) for guest in guests), default=0.0)
+        others = sum(o.dwell + pace.lost + again for o in stop.operations[1:])
+        return longest + operation.dwell + pace.lost + others
 
     def _standoff(self, operation: Operation, pile: Extent, guest: Guest) -> float:
         if operation.robots.index(guest.robot) == operation.lowered:
@@ -234,11 +234,11 @@ class Packing:
             if guests[-1].travel == inf:
                 return None
             beside = _taken(beside, guests[-1:])
-        numbers = (operation.index for operation in self.own.operations)
+        stops = zip(self.own.stops, way.stations, strict=True)
         choice = Choice(
             {guest.robot: guest.side for guest in guests},
             {guest.robot: guest.travel for guest in guests},
-            dict(zip(numbers, way.stations, strict=True)),
+            {o.index: station for stop, station in stops for o in stop.operations},
         )
         outline = outlined(self.own, way.piles, guests, choice)
         return self._worth(way, outline), outline

@@ -18,11 +18,15 @@ if TYPE_CHECKING:
 class Ground:
     """What a layout is made for, beside settings: width and depth of the floor [m], None for as
     much as it takes; whether guidepaths are shared among `relay` robots, or the `cycle` time [s]
-    that those are to reach, None for the shortest."""
+    that those are to reach, None for the shortest; `lines`: labels that share a robot, line by
+    line; whether the forms of operations were chosen, so that the PAG is not as it was written
+    (`formed`)."""
 
     floor: tuple[float, float] | None = None
     relay: bool = False
     cycle: float | None = None
+    lines: tuple[tuple[str, ...], ...] = ()
+    formed: bool = False
 
     @property
     def relays(self) -> bool:

@@ -85,7 +85,8 @@ def symmetric_shapes(factory: Factory, payloads: Mapping[str, Box], c: Clearance
         }
         boxes = {number: (-half, half, -half, half) for number, half in halves.items()}
         tool = is_tool(factory, robot)
-        found.append(Shape(boxes, _last(boxes), 0.0, c.rim, c.reach(c.rim), 0.0, tool))
+        last = _last(factory, robot, boxes)
+        found.append(Shape(boxes, last, 0.0, c.rim, c.reach(c.rim), 0.0, tool))
     return found
 
 
@@ -106,13 +107,14 @@ def oriented_shape(
         return project(payloads[factory.operations[number].label], *frame)
 
     boxes = {number: lies(number) for number in carried(factory, robot)}
-    last, tool = _last(boxes), is_tool(factory, robot)
+    last, tool = _last(factory, robot, boxes), is_tool(factory, robot)
     lane, belt = 0.0, c.c - last[0]
     if carrier >= 0:
-        along = lies(factory.robots[carrier].operations[-2])
+        delivered = (payloads[label] for label in factory.deliveries(carrier))
+        along = hull([project(box, *frame) for box in delivered])
         lane, belt = -round((along[0] + along[1]) / 2, 3), 0.0
         lane += c.spread if carrier in wide else 0.0
-    held = lies(factory.robots[robot].operations[0]) if tool else last
+    held = hull([lies(number) for number in factory.robots[robot].operations]) if tool else last
     arm = up(max(c.rim, c.rim + lane, belt))
     offset, nest = round((held[2] + held[3]) / 2, 3), round((held[0] + held[1]) / 2, 3)
     spread = c.spread if robot in wide else 0.0
@@ -145,7 +147,7 @@ def held_shape(
 
     operations = factory.operations
     boxes = {n: lies(operations[n].label) for n in carried(factory, robot)}
-    last, hand = _last(boxes), hands.hand(robot, u, t)
+    last, hand = _last(factory, robot, boxes), hands.hand(robot, u, t)
     final = operations[factory.robots[robot].operations[-1]]
     lane, belt = 0.0, c.c - last[0]
     if carrier >= 0:
@@ -155,7 +157,7 @@ def held_shape(
     reach = up(c.reach(arm, lane))
     spread = c.spread if robot in wide else 0.0
     if hand is None:
-        held = lies(operations[factory.robots[robot].operations[0]].label)
+        held = hull([lies(operations[n].label) for n in factory.robots[robot].operations])
         offset = round((held[2] + held[3]) / 2, 3)
         return Shape(
             boxes, last, offset, arm, reach, round((held[0] + held[1]) / 2, 3), True, spread
@@ -188,11 +190,11 @@ def carried(factory: Factory, robot: int) -> list[int]:
 
 
 def is_tool(factory: Factory, robot: int) -> bool:
-    """Whether a robot never carries anything: a tool of one operation."""
-    numbers = factory.robots[robot].operations
-    operation = factory.operations[numbers[0]]
-    return len(numbers) == 1 and operation.before[operation.robots.index(robot)] == NOPART
+    """Whether a robot never carries anything: a tool."""
+    return robot > 0 and not factory.deliveries(robot)
 
 
-def _last(boxes: Mapping[int, Extent]) -> Extent:
-    return list(boxes.values())[-1] if boxes else NOWHERE
+def _last(factory: Factory, robot: int, boxes: Mapping[int, Extent]) -> Extent:
+    """The box of all that a robot delivers."""
+    ends = [n for tour in factory.tours[robot] for n in [m for m in tour if m in boxes][-1:]]
+    return hull([boxes[number] for number in ends]) if ends else NOWHERE

@@ -14,10 +14,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from factory.layout.dimensions import LAYERS, PAYLOADS, Clearance, up
-from factory.layout.footprint import Footprint, Placed, footprint, guests_of
+from factory.layout.footprint import Footprint, Placed, Stop, footprint
 from factory.layout.outline import Choice, Guest, Outline, outlined
 from factory.layout.shapes import Shape, Sides
-from factory.plant.factory import Factory, Operation
+from factory.plant.factory import Factory
 
 
 @dataclass(frozen=True)
@@ -43,8 +43,10 @@ def stretch(
     for robot in reversed(range(len(factory.robots))):
         own = footprint(factory, robot, shapes[robot], clearance)
         builder = _Builder(own, outlines, chosen, sides is None)
-        for operation in own.operations:
-            stations[operation.index] = builder.add(operation)
+        for stop in own.stops:
+            station = builder.add(stop)
+            for operation in stop.operations:
+                stations[operation.index] = station
         guests = builder.attached()
         for guest in guests:
             travel[guest.robot] = guest.travel
@@ -59,7 +61,7 @@ def outgoing(outline: Outline, clearance: Clearance) -> float:
 
 
 class _Builder:
-    """Adds the operations of one robot from its B end forward."""
+    """Adds the stops of one robot from its B end forward."""
 
     def __init__(
         self, own: Footprint, outlines: Mapping[int, Outline], sides: Sides, choose: bool
@@ -70,20 +72,20 @@ class _Builder:
         self.piles: list[Placed] = []
         self.guests: list[tuple[int, float]] = []
 
-    def add(self, operation: Operation) -> float:
-        """Places one operation; the distance of its station from B [m]."""
-        guests = guests_of(operation)
+    def add(self, stop: Stop) -> float:
+        """Places one stop; the distance of its station from B [m]."""
+        guests = stop.guests
         if self.choose:
             self.sides |= self._later(guests) if self.piles else self._mates(guests)
         if self.piles:
             free = (self._free(guest, self.sides[guest]) for guest in guests)
-            self.station = up(max(self.own.least(operation, self.station), *free))
+            self.station = up(max(self.own.least(stop, self.station), *free))
         for guest in guests:
             frontier, high = self.frontier[self.sides[guest]], self.outlines[guest].high
             for layer in LAYERS:
                 frontier[layer] = max(frontier[layer], self.station + high[layer])
             self.guests.append((guest, self.station))
-        self.piles.append(self.own.placed(operation, self.station))
+        self.piles.append(self.own.placed(stop, self.station))
         return self.station
 
     def attached(self) -> list[Guest]:

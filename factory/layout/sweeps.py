@@ -87,7 +87,8 @@ def regions(layout: Layout, found: Mapping[str, Pile]) -> list[Region]:
         result.extend(_bodies(layout, robot))
         result.extend(_payloads(layout, robot, found))
     for leaf in layout.factory.leaves:
-        result.extend(_feeder(layout, leaf.label, leaf.carrier))
+        if leaf.label == layout.magazine(leaf.carrier)[0]:
+            result.extend(_feeder(layout, leaf.label, leaf.carrier))
     top = max(pile.z[1] for pile in found.values())
     result.extend(_upright(0, OUTFEED, layout.outfeed, top, ""))
     result.extend(_upright(0, SHED, layout.shed, top + layout.shutter_stroke + 2 * SIDE, ""))

@@ -87,7 +87,8 @@ class FeederPads:
 def add_feeders(
     world: Element, actuator: Element, layout: Layout, drives: Mapping[str, Drive]
 ) -> None:
-    """The feeders of a layout, each slider with the drive of its label."""
+    """The feeders of a layout, each slider with the drive of its label. Sliders of one line share
+    the housing of its first part."""
     pads, codes = FeederPads(layout), feeder_codes(layout.factory)
     for operation in layout.factory.leaves:
         label, found = operation.label, layout.feeder(operation.label)
@@ -100,7 +101,8 @@ def add_feeders(
             pos=(x, y, 0.0),
             quat=heading_quaternion(path),
         )
-        _add_housing(body, names.feeder(label), found, path.left)
+        if label == layout.magazine(operation.carrier)[0]:
+            _add_housing(body, names.feeder(label), found, path.left)
         place = pads.of(label)
         foot = PAYLOAD + layout.elevations[operation.carrier]
         at = PadPlace(place.at + np.array([0.0, 0.0, foot]), place.radius)

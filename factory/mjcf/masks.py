@@ -33,6 +33,8 @@ def tray_code(factory: Factory) -> int:
 
 
 def feeder_codes(factory: Factory) -> dict[str, int]:
-    """The code of each feeder, by its label."""
+    """The code of each feeder, by its labels: those of one line have one feeder."""
     first = tray_code(factory) + 1
-    return {leaf.label: first + n for n, leaf in enumerate(factory.leaves)}
+    fed = dict.fromkeys(leaf.carrier for leaf in factory.leaves)
+    codes = {robot: first + n for n, robot in enumerate(fed)}
+    return {leaf.label: codes[leaf.carrier] for leaf in factory.leaves}

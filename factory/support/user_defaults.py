@@ -33,7 +33,11 @@ OPTIONS: Mapping[str, object] = {
     "camera": "overview",
     "lenient": True,
 }
-"""The keys that are options of commands, each with an example; the others are those of Settings."""
+"""The keys that are options of commands, each with an example; the others are those of Settings,
+and LINES."""
+
+LINES = "lines"
+"""A table of lists of labels: those of one list share a robot."""
 
 _KINDS = {
     str: "a text in quotes",
@@ -65,6 +69,10 @@ class Defaults:
         if "templates" in found:
             found["templates"] = tuple(self.path.parent / folder for folder in found["templates"])
         return found
+
+    def lines(self) -> tuple[tuple[str, ...], ...]:
+        """The labels that share a robot, line by line."""
+        return tuple(map(tuple, self.values.get(LINES, {}).values()))
 
     def at(self, key: str) -> Position:
         """The place of a key."""
@@ -100,8 +108,10 @@ def _fault(key: str, value: object) -> Diagnostic | None:
     """What is wrong with a key and its value."""
     if key in RANGES:
         return wrong_type(key, value)
+    if key == LINES:
+        return _fault_of_lines(value)
     if key not in OPTIONS:
-        hint = did_you_mean(key, [*RANGES, *OPTIONS], "keys")
+        hint = did_you_mean(key, [*RANGES, *OPTIONS, LINES], "keys")
         return Diagnostic("UnknownParameter", f"unknown key '{key}'", None, hint)
     kind = type(OPTIONS[key])
     right = isinstance(value, int | float if kind is float else kind)
@@ -112,6 +122,16 @@ def _fault(key: str, value: object) -> Diagnostic | None:
     example = repr(OPTIONS[key]).replace("'", '"').replace("True", "true")
     message = f"{key} must be {_KINDS[kind]}"
     return Diagnostic("BadValue", message, None, f"for example {key} = {example}")
+
+
+def _fault_of_lines(value: object) -> Diagnostic | None:
+    """What is wrong with the table of lines."""
+    rows = [*value.values()] if isinstance(value, dict) else [None]
+    if all(isinstance(row, list) and all(isinstance(x, str) for x in row) for row in rows):
+        return None
+    message = f"{LINES} must be a table of lists of labels"
+    hint = f'for example a line [{LINES}], and below it side = ["part2", "part3"]'
+    return Diagnostic("BadValue", message, None, hint)
 
 
 def key_position(path: Path, text: str, key: str) -> Position:

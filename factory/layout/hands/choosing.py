@@ -84,6 +84,8 @@ class Hands:
         label = held(self.holding.factory, robot)
         if not label:
             return None
+        if len(self.holding.factory.tours[robot]) > 1:
+            return self._nowhere(label)
         if self.holding.is_carrier(robot):
             return self._carrier(robot, u)
         found = self._fed.get((robot, u, t))
@@ -151,8 +153,10 @@ class Hands:
                 best = hand
             if best is not None and not _cost(best):
                 break
-        if best is not None:
-            return best
+        return self._nowhere(label) if best is None else best
+
+    def _nowhere(self, label: str) -> Hand:
+        """No hand, at the centre of mass of what is to be held."""
         x, y, z = centre_of(self.holding.product, self.holding.factory.contents[label])[1].tolist()
         return Hand("none", ((float(x), float(y), float(z)),))
 

@@ -7,6 +7,7 @@ from contextlib import contextmanager
 from typing import Any
 
 from factory.compiler.compiler import compile_pag
+from factory.compiler.folding import fold, lines_of_labels
 from factory.lang import read_pag, read_template
 from factory.nets.history import firings
 from factory.plant.factory import Factory
@@ -36,7 +37,10 @@ def factory_of(header: Mapping[str, Any]) -> Factory:
     """
     templates = {name: read_template(text, name) for name, text in header["templates"].items()}
     pag = read_pag(header["pag"]["text"], templates, header["pag"]["file"], None)
-    factory = compile_pag(pag, templates, load_catalogue())
+    catalogue = load_catalogue()
+    factory = compile_pag(pag, templates, catalogue)
+    if lines := header.get("ground", {}).get("lines"):
+        factory = fold(factory, lines_of_labels(factory, lines), catalogue)
     net = factory.net.threaded
     made = [[x.name for x in found] for found in (net.transitions, net.places, factory.robots)]
     if made != [header["transitions"], header["places"], header["robots"]]:

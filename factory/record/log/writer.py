@@ -224,7 +224,8 @@ def _header(
     factory, plain = layout.factory, layout.plain or layout
     given = plain.factory.pag if pag is None else pag
     file = Path(given.file)
-    said = file.read_text("utf-8", errors="replace") if file.is_file() else write_pag(given)
+    written = file.is_file() and not layout.ground.get("formed")
+    said = file.read_text("utf-8", errors="replace") if written else write_pag(given)
     text = said if layout.plain is None else write_pag(factory.pag)
     templates = {o.template.name: o.template for o in factory.operations}
     return {

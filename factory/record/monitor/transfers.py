@@ -162,7 +162,7 @@ class Transfers:
         if after[0] == GRIP and before and before[0] == FEED:
             found = factory.by_label[label]
         elif before and before[0] == GRIP and after[0] in (GRIP, HOLD):
-            found = factory.operations[factory.robots[before[1]].operations[-1]]
+            found = self._delivery(before[1], label)
         takes = found is not None and (
             after == (GRIP, found.carrier)
             if found.index != factory.dropoff.index
@@ -175,6 +175,14 @@ class Transfers:
             self.blame("Exchanged", robot, label, f"{words}, as no operation does")
             return None
         return found
+
+    def _delivery(self, robot: int, label: str) -> Operation:
+        """The operation in which a robot delivers a body of some label."""
+        factory = self.subject.factory
+        part = factory.contents[label][0]
+        ends = [factory.operations[tour[-1]] for tour in factory.tours[robot]]
+        of = (o for o in ends if part in factory.contents[o.before[o.robots.index(robot)]])
+        return next(of) if len(ends) > 1 else ends[0]
 
     def _put(self, copy: int, holder: Holder) -> None:
         before = self.at[copy]

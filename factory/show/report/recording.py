@@ -123,7 +123,8 @@ def _laid_out(log: Log, beside: Path) -> Layout:
     templates = {word: read_template(text, word) for word, text in header["templates"].items()}
     pag, kept = _pag(header["pag"], templates, beside), header.get("ground", {})
     floor = kept.get("floor") and tuple(map(float, kept["floor"]))
-    ground = Ground(**{**kept, "floor": floor})
+    lines = tuple(map(tuple, kept.get("lines", ())))
+    ground = Ground(**{**kept, "floor": floor, "lines": lines})
     layout = Project(pag, templates, settings=made.settings, ground=ground).layout
     goals = subject_of(layout, made.settings, made.jitter, None, made.wip).as_json()["goals"]
     if goals != header["monitor"]["goals"]:

@@ -1,7 +1,8 @@
 """Feeders: each presents the next part of its label, the n-th for unit n.
 
 A copy gets into a housing while the slider is up, where nothing of it can be seen. It comes down
-when the robot that has taken the last one is out of the way.
+when the robot that has taken the last one is out of the way. Feeders of one line take turns, in the
+order of their robot's program: no part comes down before all their sliders are at rest.
 """
 
 from __future__ import annotations
@@ -20,6 +21,7 @@ from factory.plant.factory import Operation
 from factory.simulation.mujoco.copies import Copies
 from factory.simulation.mujoco.passing import Passing
 from factory.simulation.mujoco.sliders import NEVER, Sliders
+from factory.simulation.mujoco.turns import Turns
 from factory.simulation.mujoco.welds import Place, Welds
 from factory.simulation.request import RunRequest
 from factory.support.engine import mujoco
@@ -85,8 +87,8 @@ class Feeders:
         self._shown: dict[str, int] = {}
         self._asked: set[int] = set()
         self.due = NEVER
-        count = len(self._stations)
-        self._vacant = np.ones(count, bool)
+        self._turns = Turns(model.layout, supply.next)
+        self._vacant = self._turns.now.copy()
 
     @property
     def trees(self) -> dict[int, int]:
@@ -101,7 +103,7 @@ class Feeders:
     def begin(self) -> None:
         """Where the run starts, each feeder presents a part if it can and its robot is not yet
         under way with another."""
-        down = self._load(np.flatnonzero(~self._passing.holds), down=True)
+        down = self._load(np.flatnonzero(self._turns.now & ~self._passing.holds), down=True)
         self._sliders.begin(np.setdiff1d(np.arange(len(self._stations)), down))
 
     def presents(self, label: str, unit: int, now: float) -> bool:
@@ -124,7 +126,8 @@ class Feeders:
         number = self._number[label]
         del self._shown[label]
         self._welds.loose([self._stations[number].weld])
-        self._passing.holds[number] = self._vacant[number] = True
+        self._passing.took(self._turns.lines[number])
+        self._vacant[self._turns.taken(number)] = True
 
     def end(self, operations: Sequence[Operation]) -> None:
         """These operations have ended: sliders whose parts have been taken go up."""
@@ -137,14 +140,16 @@ class Feeders:
         """Put bodies of a unit out of sight; their feeders may be empty."""
         for label in labels:
             self._copies.put_back(label, unit)
-            if label in self._number and label not in self._shown:
-                self._vacant[self._number[label]] = True
+            number = self._number.get(label, -1)
+            if number >= 0 and label not in self._shown and self._turns.now[number]:
+                self._vacant[number] = True
 
     def tend(self) -> bool:
         """Let the next parts come down from housings whose sliders have come up, where the robots
         are out of the way. Whether one comes that a robot has asked for."""
         self._sliders.settle()
-        free = self._vacant & (self._sliders.ends == NEVER) & self._passing.clear()
+        busy = self._turns.any_of(self._sliders.ends < NEVER)
+        free = self._vacant & ~busy & self._passing.clear()
         if not np.count_nonzero(free):
             return False
         loaded = self._load(free.nonzero()[0])

@@ -155,7 +155,7 @@ class Parts:
                     holder = operation
                     operation = factory.operations[factory.parents[operation.index]]
                 if holder.carrier == leaf.carrier:
-                    passing.holds[number] = True
+                    passing.took([number])
                 for label in self.model.carried.carried[holder.label]:
                     if (label, unit) not in self.copies:
                         yield label, unit, holder.carrier

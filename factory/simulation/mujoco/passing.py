@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from factory.control.mode import STILL, Truth
@@ -36,7 +38,9 @@ class Passing:
         settings = request.settings
         fastest = settings.speed * (1 + request.jitter)
         self._fastest = SpeedProfile(fastest, settings.acceleration)
-        self._fed = {robot: n for n, robot in enumerate(carriers)}
+        self._fed: dict[int, list[int]] = {}
+        for number, robot in enumerate(carriers):
+            self._fed.setdefault(robot, []).append(number)
         self.holds = np.zeros(len(carriers), bool)
 
     def end(self, operation: Operation) -> None:
@@ -44,6 +48,10 @@ class Passing:
         for robot, label in zip(operation.robots, operation.after, strict=True):
             if robot in self._fed and label == NOPART:
                 self.holds[self._fed[robot]] = False
+
+    def took(self, numbers: Sequence[int]) -> None:
+        """The robot of these feeders has taken a part."""
+        self.holds[numbers] = True
 
     def clear(self) -> Truth:
         """Whether each robot (n,) is so far away with its part that the next can come down; or, if

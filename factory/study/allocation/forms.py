@@ -42,7 +42,8 @@ class Option:
     """One way to make a sub-assembly: how many operations are `blocked`, and `loose`; how far [s]
     estimated cycles are `over` the bound in all; how many `robots` have finished theirs; the `time`
     [s] that the robot which holds it takes up to here, with the way back; which input is the
-    `pile`, and how the inputs are made."""
+    `pile`, and how the inputs are made; how many `lines` hold it if as many robots as can be share
+    one."""
 
     blocked: int
     loose: int
@@ -51,19 +52,25 @@ class Option:
     time: float
     pile: int = THIRD
     inputs: tuple[Option, ...] = ()
+    lines: int = 1
+    folds: bool = False
 
     @property
     def rank(self) -> tuple[float, ...]:
         """What is better is less."""
-        return self.blocked, self.loose, self.over, self.robots, self.time
+        few = (self.lines, self.robots) if self.folds else (self.robots,)
+        import os
+        if os.environ.get("LF"):
+            return self.over, self.lines, self.blocked, self.loose, self.robots, self.time
+        return self.blocked, self.loose, self.over, *few, self.time
 
 
 @dataclass(frozen=True)
 class FormsTask:
     """A product whose forms are to be chosen: its operations in postorder (`expand`), what they
     `admitted` along either axis, nothing for a product of default boxes, the boxes of its
-    sub-assemblies (`payloads`), the `pace` of robots, and forms that are `refused`: joins, and the
-    pile of each, which count as blocked."""
+    sub-assemblies (`payloads`), the `pace` of robots, forms that are `refused`: joins, and the
+    pile of each, which count as blocked; and whether robots may share lines (`folds`)."""
 
     pag: PAG
     templates: Mapping[str, Template]
@@ -72,6 +79,7 @@ class FormsTask:
     payloads: Mapping[str, Box]
     pace: Pace
     refused: frozenset[tuple[str, int]] = frozenset()
+    folds: bool = False
 
     def size(self, label: str) -> float:
         """How long a sub-assembly is at most on the floor [m]."""
@@ -137,7 +145,7 @@ def _options(
     """The ways to make a node whose inputs come along an axis; `known`: those to make each input if
     its own come along the same axis, or the other one."""
     if not node.inputs:
-        yield Option(0, 0, 0.0, 0, task.pace.lost)
+        yield Option(0, 0, 0.0, 0, task.pace.lost, folds=task.folds)
         return
     for pile in (THIRD, 0, 1) if node.label in task.free else (_held(node),):
         faults = _faults(task, node, axis, pile)
@@ -177,7 +185,18 @@ def _joined(
     step = max(come, default=0.0) + APART
     time += task.pace.rest(step) + node.dwell + task.pace.lost
     time += 0.0 if pile == THIRD else step / task.pace.speed
-    return Option(blocked, loose, over, robots, time, pile, inputs)
+    lines = _lines(node, pile, inputs)
+    return Option(blocked, loose, over, robots, time, pile, inputs, lines, task.folds)
+
+
+def _lines(node: Node, pile: int, inputs: tuple[Option, ...]) -> int:
+    """How many lines hold what is joined: a third robot has two lines beside its own, that of a
+    pile one, which those that come one after the other share."""
+    if len(node.inputs) < 2:
+        return inputs[0].lines
+    if pile == THIRD:
+        return 1 + sum(option.lines for option in inputs)
+    return max(o.lines if n == pile else o.lines + 1 for n, o in enumerate(inputs))
 
 
 def _over(task: FormsTask, label: str, option: Option, bound: float) -> float:

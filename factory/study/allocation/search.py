@@ -128,7 +128,8 @@ def allocated(project: Project, aim: Aim) -> Project:
         hint = f"--robots {best.robots}"
         raise InputError(Diagnostic("TooFewRobots", message, None, hint))
     if aim.robots is None and aim.cycle is not None and best.seconds > aim.cycle:
-        relayed = replace(best, project=best.project.with_pag(best.project.pag, project.ground))
+        ground = replace(project.ground, formed=best.project.ground.formed)
+        relayed = replace(best, project=best.project.with_pag(best.project.pag, ground))
         best = min(best, relayed, key=aim.rank)
     return best.project
 
@@ -179,7 +180,8 @@ class Search:
 
     def _candidate(self, forms: Mapping[str, int]) -> Candidate:
         pag = reformed(self.project.pag, self.project.templates, forms)
-        return Candidate(self.project.with_pag(pag, self.project.ground), forms)
+        ground = replace(self.project.ground, formed=True)
+        return Candidate(self.project.with_pag(pag, ground), forms)
 
     def _judge(self, one: Candidate) -> bool:
         """Whether it is better than the best so far; then it is the best."""

@@ -55,6 +55,7 @@ class Recipe:
             "floor": list(self.ground.floor) if self.ground.floor else None,
             "relay": self.ground.relay,
             "cycle": self.ground.cycle,
+            "lines": [list(line) for line in self.ground.lines],
             "fuse": self.fuse,
             **fixed,
         }

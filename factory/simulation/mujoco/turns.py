@@ -1,0 +1,43 @@
+"""Turns: feeders whose parts one robot takes show them one after the other, as its program asks."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from factory.control.mode import Truth
+from factory.layout.layout import Layout
+
+
+class Turns:
+    """The turns of feeders (n,), in the order of their labels, when so many parts of each label
+    have been taken (`counts`). `now` (n,): whether it is the turn of each; that of a feeder which
+    shares its robot with no other always is. `lines`: the numbers of all that share its robot, by
+    number, in the order of the robot's program."""
+
+    def __init__(self, layout: Layout, counts: Mapping[str, int]) -> None:
+        leaves = layout.factory.leaves
+        numbers = {leaf.label: n for n, leaf in enumerate(leaves)}
+        shown = [layout.magazine(leaf.carrier) for leaf in leaves]
+        self.lines = [[numbers[label] for label in line] for line in shown]
+        self.now = np.zeros(len(leaves), bool)
+        for leaf, line in zip(leaves, shown, strict=True):
+            fewest = min(counts[label] for label in line)
+            due = next(label for label in line if counts[label] == fewest)
+            self.now[numbers[leaf.label]] = leaf.label == due
+        self._line = np.array([line[0] for line in self.lines], np.intp)
+
+    def taken(self, number: int) -> int:
+        """The part of a feeder has been taken; gives the one whose turn it is then."""
+        line = self.lines[number]
+        then = line[(line.index(number) + 1) % len(line)]
+        self.now[number] = False
+        self.now[then] = True
+        return then
+
+    def any_of(self, chosen: Truth) -> Truth:
+        """Whether one of those that share its robot is chosen, for each (n,)."""
+        marked = np.zeros(len(self.now), bool)
+        marked[self._line[chosen]] = True
+        return np.asarray(marked[self._line])

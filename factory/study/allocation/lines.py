@@ -1,0 +1,145 @@
+"""Lines: which robots of a factory become one, for few robots and a cycle time.
+
+Lines are filled from the output robot's down. Those that deliver to one line are dealt out, in the
+order in which it asks for them, to as few lines as have time for them: each to the one that has had
+the least to do, so that one comes while another goes for its next part. What robots wait for is not
+counted while lines are filled; the cycle time of the net that comes out is exact for the delays,
+which are estimated from sizes.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from math import ceil
+
+from factory.compiler.folding import Line, delivery, fold, kind_of, sides_of
+from factory.layout.durations import Pace
+from factory.layout.guidepath import Box
+from factory.nets.cycle_ratio import max_cycle_ratio
+from factory.nets.marked import marked
+from factory.plant.factory import Factory
+from factory.problem.pag import NOPART
+from factory.problem.robot_types import Catalogue
+
+BETWEEN = 0.08
+"""What lies between two sub-assemblies at the ends of a guidepath, beside themselves [m]."""
+
+TOOL_WAY = 0.12
+"""How far a tool comes [m]."""
+
+
+@dataclass(frozen=True)
+class Shift:
+    """A factory with a robot for each label, and what its lines are chosen by: the estimated
+    `delays` of its operations [s], and how much each robot has to do in a cycle, `work` [s]."""
+
+    factory: Factory
+    catalogue: Catalogue
+    delays: tuple[float, ...]
+    work: tuple[float, ...]
+
+    @classmethod
+    def of(
+        cls, factory: Factory, catalogue: Catalogue, boxes: Mapping[str, Box], pace: Pace
+    ) -> Shift:
+        """That of a factory whose sub-assemblies have some boxes."""
+        delays = tuple(estimated_delays(factory, boxes, pace))
+        work = tuple(sum(delays[n] for n in robot.operations) for robot in factory.robots)
+        return cls(factory, catalogue, delays, work)
+
+    def folded(self, lines: Sequence[Line]) -> tuple[int, float]:
+        """How many robots there are with these lines, and the estimated cycle time [s]."""
+        made = fold(self.factory, lines, self.catalogue) if lines else self.factory
+        net = marked(made.net)
+        idle = [0.0] * (len(net.tokens) - len(self.delays))
+        return len(made.robots), max_cycle_ratio(net, [*self.delays, *idle]).seconds
+
+    def lines(self, target: float) -> tuple[Line, ...]:
+        """As few lines as have time for their robots' work within a `target` [s]."""
+        found: list[Line] = []
+        queue: deque[Line] = deque([(0,)])
+        while queue:
+            line = queue.popleft()
+            for group in _groups(self.factory, line):
+                dealt = self._dealt(group, target)
+                queue.extend(dealt)
+                found += [one for one in dealt if len(one) > 1]
+        return tuple(found)
+
+    def _dealt(self, group: Sequence[int], target: float) -> list[Line]:
+        """The robots of a group on lines, in turns."""
+        total = sum(self.work[robot] for robot in group)
+        count = min(len(group), max(1, ceil(total / target - 1e-9)))
+        loads, dealt = [0.0] * count, [list[int]() for _ in range(count)]
+        for robot in group:
+            least = min(range(count), key=lambda n: (round(loads[n], 6), n))
+            loads[least] += self.work[robot]
+            dealt[least].append(robot)
+        return [tuple(line) for line in dealt if line]
+
+
+def _groups(factory: Factory, line: Line) -> Iterator[list[int]]:
+    """The robots that deliver to a line, tools apart, in the order in which it asks for them: those
+    of each group can all share a robot."""
+    kids = [
+        guest
+        for robot in line
+        for number in factory.robots[robot].operations
+        if factory.operations[number].carrier == robot
+        for guest in factory.operations[number].robots
+        if guest != robot
+    ]
+    kinds: dict[tuple[object, ...], list[int]] = {}
+    for kid in kids:
+        kind = kind_of(factory, kid)
+        if kind[0] != "tool":
+            kinds.setdefault(kind, []).append(kid)
+    for group in kinds.values():
+        yield from _one_sided(factory, group)
+
+
+def _one_sided(factory: Factory, group: Sequence[int]) -> Iterator[list[int]]:
+    """The robots of a group by the side from which they can come: those that can come from either
+    go with the more of the others."""
+    sides = {robot: sides_of(factory, robot) for robot in group}
+    only = {side: [r for r in group if sides[r] == {side}] for side in (-1, +1)}
+    most = max((-1, +1), key=lambda side: len(only[side]))
+    none = [[robot] for robot in group if not sides[robot]]
+    first = [r for r in group if r not in only[-most] and sides[r]]
+    yield from (part for part in (first, only[-most], *none) if part)
+
+
+def estimated_delays(
+    factory: Factory, boxes: Mapping[str, Box], pace: Pace
+) -> Iterator[float]:
+    """How long each operation of a factory with a robot for each label takes [s], from the sizes of
+    sub-assemblies: the longest way of one of its robots."""
+
+    def size(label: str) -> float:
+        xlo, xhi, ylo, yhi = boxes[label]
+        return max(xhi - xlo, yhi - ylo)
+
+    def way(robot: int) -> float:
+        last = delivery(factory, robot)
+        label = last.before[last.robots.index(robot)]
+        if label == NOPART:
+            return TOOL_WAY
+        made = label if last.index == factory.dropoff.index else last.label
+        return (size(label) + size(made)) / 2 + BETWEEN
+
+    for operation in factory.operations:
+        guests = [robot for robot in operation.robots if robot != operation.carrier]
+        longest = max(map(way, guests or [operation.carrier]))
+        stroke = operation.approach.stroke if operation.approach and operation.lowered >= 0 else 0.0
+        yield pace.rest(longest) + pace.rest(stroke) + operation.dwell + pace.lost
+
+
+def labels_on(factory: Factory, lines: Sequence[Line]) -> tuple[tuple[str, ...], ...]:
+    """Lines by the labels that their robots bring."""
+    found = []
+    for line in lines:
+        ends = ((delivery(factory, robot), robot) for robot in line)
+        found.append(tuple(last.before[last.robots.index(robot)] for last, robot in ends))
+    return tuple(found)
