@@ -3,16 +3,22 @@
 from __future__ import annotations
 
 import random
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from itertools import combinations
 
 from factory.compiler.compiler import compile_pag, gear_net
-from factory.compiler.folding import Line, delivery, folded
+from factory.compiler.folding import Line, delivery, fold, folded, line_of, mismatch
+from factory.layout.durations import Pace
+from factory.layout.embedding import lay_out
+from factory.layout.layout import Layout
 from factory.nets.gears import GearNet
 from factory.nets.marked import MarkedNet, marked
+from factory.pipeline import Project, all_templates
 from factory.plant.factory import Factory
 from factory.problem.pag import PAG
+from factory.problem.robot_types import Catalogue, load_catalogue
+from factory.support.settings import Settings
 from tests.pag_values import SHAPES, TEMPLATES, catalogue, paper, random_pag
 
 INSERTING = {**TEMPLATES, "insert": replace(TEMPLATES["insert"], further="insert")}
@@ -92,6 +98,49 @@ def random_fold(seed: int, size: int = 30) -> Factory:
     pag = random_pag(count, seed, shape, rng.randint(2, 5))
     factory = plain(inserted(pag, rng.choice((0.0, 0.5, 1.0)), seed))
     return folded(factory, random_lines(factory, rng), catalogue())
+
+
+def table_of(table: Sequence[tuple[str, str, tuple[str, ...]]]) -> PAG:
+    """A PAG of labels with their operations and inputs, the product first."""
+    node = paper().nodes[0]
+    nodes = (replace(node, label=x, operation=o, inputs=i) for x, o, i in table)
+    return replace(paper(), root=table[0][0], nodes=tuple(nodes))
+
+
+def fold_layout(seed: int, settings: Settings) -> Layout:
+    """A layout of a random PAG with inserts, many of whose robots share lines."""
+    rng = random.Random(seed)
+    shape = rng.choice(("any", "chain", "balanced", "unary"))
+    pag = inserted(random_pag(rng.randint(5, 14), seed, shape, 3))
+    nodes = (replace(n, operation="weld") if n.operation == "clamp" else n for n in pag.nodes)
+    pag = replace(pag, nodes=tuple(nodes))
+    project = Project(pag, all_templates(), load_catalogue(), settings)
+    factory, known = project.compiled, project.catalogue
+    lines: list[Line] = [(0,)]
+    for line in lines:
+        groups: list[list[int]] = []
+        below = (r.index for r in factory.robots[1:] if delivery(factory, r.index).carrier in line)
+        for kid in below:
+            on = line_of(len(factory.robots), lines)
+            fitting = (group for group in groups if _shares(factory, group, kid, on, known))
+            group = next(fitting, None)
+            if group is None or rng.random() < 0.2:
+                groups.append([kid])
+            else:
+                group.append(kid)
+        lines += [tuple(sorted(group)) for group in groups]
+    made = fold(factory, lines, known)
+    return lay_out(made, project.product, pace=Pace.of(settings))
+
+
+def _shares(
+    factory: Factory, group: list[int], kid: int, on: Sequence[int], known: Catalogue
+) -> bool:
+    return all(
+        not mismatch(factory, other, kid, on, known)
+        and delivery(factory, other).index != delivery(factory, kid).index
+        for other in group
+    )
 
 
 def swapped(factory: Factory, robot: int, one: int, other: int) -> GearNet:

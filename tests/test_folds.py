@@ -7,7 +7,6 @@ import json
 import random
 import re
 from collections.abc import Callable
-from dataclasses import replace
 from typing import Any
 
 import pytest
@@ -19,15 +18,24 @@ from factory.export.certificate.writer import certificate
 from factory.foreign_nets.behaviour import play
 from factory.foreign_nets.explore import explore
 from factory.foreign_nets.general import analyse
+from factory.layout.durations import Pace, cycle_of
+from factory.nets.cycle_ratio import max_cycle_ratio
 from factory.nets.gears import Gear, GearNet
 from factory.nets.history import firings, legal_marking, unreached
 from factory.nets.marked import MarkedNet, marked
 from factory.nets.petri import Marking
 from factory.nets.verify import proved, verify
 from factory.plant.programs import program_of, write_program
+from factory.simulation.request import RunRequest
+from factory.simulation.simulation import Simulation
+from factory.study.analysis.analysing import operation_slacks
+from factory.study.analysis.timed import timed_net
+from factory.study.analysis.timing import Timing
 from factory.support.errors import InputError, RunError
+from factory.support.settings import Settings
 from factory.timing.cycle_time import CycleTime, cycle_time
 from tests.fold_values import (
+    fold_layout,
     inserted,
     pairs_of_tours,
     plain,
@@ -36,6 +44,7 @@ from tests.fold_values import (
     robot_of,
     simulated_cycle,
     swapped,
+    table_of,
     three_robots,
 )
 from tests.net_values import legal_markings, lost_token, net_from, random_legal_marking
@@ -151,8 +160,7 @@ def test_tools_on_a_line_follow_their_line() -> None:
     table = [("x", "insert", ("u", "w")), ("u", "insert", ("p", "v"))]
     table += [("v", "weld", ("a",)), ("w", "weld", ("b",))]
     table += [(part, "atomic", ()) for part in "pab"]
-    nodes = tuple(replace(paper().nodes[0], label=x, operation=o, inputs=i) for x, o, i in table)
-    factory = plain(replace(paper(), root="x", nodes=nodes))
+    factory = plain(table_of(table))
     tools = [robot.index for robot in factory.robots if robot.type == "tool"]
     lines = [(robot_of(factory, "v"), robot_of(factory, "w")), tuple(tools)]
     made = folded(factory, lines, catalogue())
@@ -160,6 +168,16 @@ def test_tools_on_a_line_follow_their_line() -> None:
     assert [made.operations[n].label for n in tool.operations] == ["v", "w"]
     assert verify(made.net).holds
     assert verify(swapped(made, tool.index, 0, 1)).live is False
+
+
+def test_two_tools_of_one_operation_stay_two() -> None:
+    table = [("z", "clamp", ("y",)), ("y", "clamp", ("x",)), ("x", "insert", ("u", "c"))]
+    table += [("u", "insert", ("a", "b"))] + [(part, "atomic", ()) for part in "abc"]
+    factory = plain(table_of(table))
+    made = fold(factory, lines_of_labels(factory, [("b", "c")]), catalogue())
+    does = [[made.operations[n].label for n in robot.operations] for robot in made.robots[1:]]
+    assert sorted(does) == [["b", "u", "c", "x"], ["y", "z"], ["y", "z"]]
+    assert verify(made.net).holds
 
 
 def test_a_dead_train_is_refused() -> None:
@@ -416,6 +434,42 @@ def test_a_bottleneck_of_two_robots() -> None:
 def test_a_dead_train_has_no_cycle_time() -> None:
     with pytest.raises(ValueError, match="live"):
         cycle_time(_dead(), {})
+
+
+@pytest.mark.parametrize("seed", [2, 5, 6, 9, 19, 33, 37, 51, 53, 56])
+def test_the_ideal_world_has_the_predicted_cycle_time(seed: int) -> None:
+    """Within the tick that each operation of the critical circuit may wait for; and prediction,
+    analysis and layout are one."""
+    settings = Settings().with_options({"hands": 0, "stage": seed % 2})
+    layout = fold_layout(seed, settings)
+    simulation = Simulation(layout, RunRequest("ideal", 24, settings=settings))
+    simulation.run()
+    left = simulation.world.dropoffs
+    measured, predicted = (left[-1] - left[-13]) / 12, simulation.cycle.seconds
+    net = timed_net(Timing(layout, settings, "ideal"))
+    assert net.pace == pytest.approx(predicted)
+    ticks = len(net.critical[0].places) * settings.tick
+    assert predicted - 1e-6 <= measured <= predicted + ticks
+    assert left[-1] <= simulation.duration + 24 * ticks
+    engine = timed_net(Timing(layout, settings, "mujoco"))
+    assert cycle_of(layout, Pace.of(settings)) == pytest.approx(engine.pace)
+
+
+@pytest.mark.parametrize("seed", [6, 33, 51, 53])
+def test_the_slack_of_an_operation_on_a_fold(seed: int) -> None:
+    """So much longer it may take, and no longer, until the cycle is longer."""
+    settings = Settings().with_options({"hands": 0})
+    timing = Timing(fold_layout(seed, settings), settings, "ideal")
+    net = timed_net(timing)
+    assert net.train is not None and " with " in net.critical[0].name
+    slacks = operation_slacks(timing, net)
+    assert min(slacks) == 0.0 < max(slacks)
+    for number, slack in enumerate(slacks):
+        for more, longer in ((slack, False), (slack + 0.02, True)):
+            seconds = list(net.seconds)
+            seconds[number] += more
+            pace = max_cycle_ratio(net.net, seconds).seconds
+            assert (pace > net.pace + 1e-6) is longer
 
 
 # --- what is no fold, and programs ---------------------------------------------------------------
