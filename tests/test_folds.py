@@ -7,6 +7,7 @@ import json
 import random
 import re
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -15,15 +16,19 @@ from factory.compiler.folding import fold, folded, lines_of_labels
 from factory.export.certificate.check import check_certificate
 from factory.export.certificate.listing import digest
 from factory.export.certificate.writer import certificate
+from factory.export.pnml import write_pnml
 from factory.foreign_nets.behaviour import play
 from factory.foreign_nets.explore import explore
 from factory.foreign_nets.general import analyse
+from factory.foreign_nets.pnml_reader import read_pnml
+from factory.lang import write_pag
 from factory.layout.durations import Pace, cycle_of
 from factory.nets.cycle_ratio import max_cycle_ratio
 from factory.nets.gears import Gear, GearNet
 from factory.nets.history import firings, legal_marking, unreached
 from factory.nets.marked import MarkedNet, marked
 from factory.nets.petri import Marking
+from factory.nets.verdict import BEHAVIOUR
 from factory.nets.verify import proved, verify
 from factory.plant.programs import program_of, write_program
 from factory.simulation.request import RunRequest
@@ -34,6 +39,7 @@ from factory.study.analysis.timing import Timing
 from factory.support.errors import InputError, RunError
 from factory.support.settings import Settings
 from factory.timing.cycle_time import CycleTime, cycle_time
+from tests.command_line import Terminal
 from tests.fold_values import (
     fold_layout,
     inserted,
@@ -589,6 +595,34 @@ def test_programs_of_a_robot_with_two_tours() -> None:
 
 def test_nets_from_elsewhere_that_are_trains() -> None:
     """A train that names its gears is known as one, by its structure."""
-    verdict = analyse(three_robots().net)
-    assert verdict.holds and verdict.gear_train and verdict.gear_net is False
-    assert verdict.method == "structure"
+    net = three_robots().net
+    for subject in (net, read_pnml(write_pnml(net))):
+        verdict = analyse(subject)
+        assert verdict.holds and verdict.gear_train and verdict.gear_net is False
+        assert verdict.method == "structure"
+
+
+def test_the_commands(run: Terminal, tmp_path: Path) -> None:
+    file, proof = tmp_path / "example.pag", tmp_path / "proof.json"
+    file.write_text(write_pag(inserted(paper())))
+    (tmp_path / "factory.toml").write_text('[lines]\nside = ["part2", "part3"]\n')
+    said = run("check", file, "--certificate", proof)
+    assert said.status == 0
+    verdict = "gear train: yes, live: yes, safe: yes, reversible: yes, legal: yes\n"
+    assert verdict in said.out and "not gear net" not in said.out
+    done = run("check", file, "--against", proof, "--json")
+    assert (done.json["gear_net"], done.json["gear_train"]) == (False, True)
+    claims = {"gear_net": False, **dict.fromkeys((*BEHAVIOUR, "gear_train"), True)}
+    assert done.json["certificate"] == {"file": str(proof), **claims}
+    said = run("check", file, "--against", proof)
+    assert said.out.endswith("it proves safe, live, reversible, legal, gear train\n")
+    document = json.loads(proof.read_text())
+    document["gear_train"]["order"].reverse()
+    proof.write_text(json.dumps(seal(document)))
+    done = run("check", file, "--against", proof, "--json")
+    assert done.status == 1 and set(done.codes) == {"BadProof"}
+    assert "the order has" in done.json["errors"][0]["message"]
+    done = run("run", file, "--world", "ideal", "--from", "r1:sub1", "--json")
+    assert set(done.codes) == {"BadMarking"}
+    start = "r1:sub1, r2:nopart/part3"
+    assert run("run", file, "--world", "ideal", "--from", start, "--units", "3").status == 0
