@@ -89,6 +89,13 @@ def _tool_lines(factory: Factory, lines: Sequence[Line]) -> list[Line]:
     return [tuple(tools) for tools in found.values() if len(tools) > 1]
 
 
+def count_of(factory: Factory, lines: Sequence[Line]) -> int:
+    """How many robots a factory has that is folded so."""
+    found = [line for line in lines if len(line) > 1]
+    found += _tool_lines(factory, found) if found else []
+    return len(factory.robots) - sum(len(line) - 1 for line in found)
+
+
 def line_of(count: int, lines: Iterable[Line]) -> list[int]:
     """For each of so many robots the first robot of its line, itself where it is in none."""
     on = list(range(count))

@@ -64,14 +64,14 @@ def cycle_of(layout: Layout, pace: Pace) -> float:
     return slowest(layout, pace)[0]
 
 
-def slowest(layout: Layout, pace: Pace) -> tuple[float, int]:
-    """The cycle time of a layout [s], and the robot that allows no less; in a gear train the first
-    that spends most of the critical circuit."""
+def slowest(layout: Layout, pace: Pace) -> tuple[float, list[int]]:
+    """The cycle time of a layout [s], and the robots that allow no less: the slowest, in a gear
+    train those on the critical circuit, first those that spend most of it."""
     net = layout.factory.net
     if net.is_tree:
         times = gear_times(layout, pace)
         robot = max(range(len(times)), key=times.__getitem__)
-        return times[robot], robot
+        return times[robot], [robot]
     delays, legs = operation_times(layout, pace), _ways(layout)
     ahead = {
         (robot, o.place): pace.rest(legs[o.index, robot]) + (pace.ahead or 0.0)
@@ -80,8 +80,8 @@ def slowest(layout: Layout, pace: Pace) -> tuple[float, int]:
         if pace.goes_ahead(o, slot)
     }
     waits = len(net.threaded.places) - len(delays)
-    ratio, robot = train_ratio(net, [*delays, *[0.0] * waits], ahead)
-    return ratio.seconds, robot
+    ratio, robots = train_ratio(net, [*delays, *[0.0] * waits], ahead)
+    return ratio.seconds, robots
 
 
 def operation_times(layout: Layout, pace: Pace) -> list[float]:

@@ -32,9 +32,10 @@ Strip = tuple[float, float, float]
 @dataclass(frozen=True, slots=True)
 class Stop:
     """Where a robot stands for one operation or, on a line, for several: those to which the same
-    robots deliver."""
+    robots deliver. `visits`: how often it comes there from another stop, in a cycle."""
 
     operations: tuple[Operation, ...]
+    visits: int = 1
 
     @property
     def first(self) -> Operation:
@@ -168,12 +169,16 @@ def footprint(
 ) -> Footprint:
     """The footprint of a robot with a shape of its own."""
     found: dict[frozenset[int] | int, list[Operation]] = {}
+    visits: dict[frozenset[int] | int, int] = {}
+    before: frozenset[int] | int = -2
     for number in shape.piles:
         operation = factory.operations[number]
         guests = frozenset(operation.robots) - {robot}
-        alone = -1 if not operation.inputs else number
-        found.setdefault(guests or alone, []).append(operation)
-    stops = tuple(Stop(tuple(operations)) for operations in found.values())
+        stop = guests or (number if operation.inputs else -1)
+        found.setdefault(stop, []).append(operation)
+        visits[stop] = visits.get(stop, 0) + (stop != before)
+        before = stop
+    stops = tuple(Stop(tuple(operations), visits[stop]) for stop, operations in found.items())
     return Footprint(shape, clearance, stops, corridor)
 
 

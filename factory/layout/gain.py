@@ -65,7 +65,7 @@ def gain(layout: Layout, pace: Pace) -> LayoutGain:
     """Compare a layout for robots of a pace."""
     plain = layout.plain or layout
     factory, product, c = plain.factory, layout.product, layout.clearance
-    _, bottleneck = slowest(layout, pace)
+    _, (bottleneck, *_) = slowest(layout, pace)
     return LayoutGain(
         _figures(layout, pace),
         _figures(first_feasible(factory, product, Clearance(c)), pace),

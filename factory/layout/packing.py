@@ -184,7 +184,7 @@ class Packing:
             (*way.stations, station),
             (*way.piles, self.own.placed(stop, station)),
             way.time + time,
-            way.cost + self._cost(way, time, station, guests),
+            way.cost + self._cost(way, time, station, guests, len(stop.operations)),
         )
 
     def _time(self, way: _Way, stop: Stop, station: float, guests: Sequence[Guest]) -> float:
@@ -203,6 +203,8 @@ class Packing:
             longest = max(longest, pace.staged(guest.travel, standoff, pace.entered(rested)))
         again = max((2 * pace.rest(guest.travel) for guest in guests), default=0.0)
         others = sum(o.dwell + pace.lost + again for o in stop.operations[1:])
+        if len(way.piles) > 1:  # it comes from the stop before, or goes on to one that is further
+            others += 2 * (stop.visits - 1) * pace.rest(station - way.station)
         return longest + operation.dwell + pace.lost + others
 
     def _standoff(self, operation: Operation, pile: Extent, guest: Guest) -> float:
@@ -211,16 +213,18 @@ class Packing:
         towards = extent_to(pile, guest.side)
         return max(0.0, guest.outline.shape.last[1] + towards + self.task.clearance.c)
 
-    def _cost(self, way: _Way, time: float, station: float, guests: Sequence[Guest]) -> float:
-        """Of one more operation: its time, the way back from there, and what those that deliver
-        go."""
+    def _cost(
+        self, way: _Way, time: float, station: float, guests: Sequence[Guest], tours: int
+    ) -> float:
+        """Of one more stop: its time, the way back from there, and what those that deliver go, in
+        so many tours."""
         pace, weights = self.task.pace, self.task.weights
         cost = weights[self.robot] * (time + (station - way.station) / pace.speed)
         if not way.piles and guests:
             ahead = max(max(guest.outline.high) for guest in guests)
             cost += weights[self.robot] * 2 * ahead / pace.speed
         for guest in guests:
-            cost += weights[guest.robot] * pace.rest(guest.travel)
+            cost += tours * weights[guest.robot] * pace.rest(guest.travel)
             cost += PATH * guest.travel / pace.speed
         return cost
 

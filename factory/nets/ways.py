@@ -35,10 +35,10 @@ def with_ways(net: MarkedNet, gears: GearNet, ways: Iterable[Way]) -> MarkedNet:
 
 def train_ratio(
     gears: GearNet, seconds: Sequence[float], ways: Mapping[Way, float]
-) -> tuple[CycleRatio, int]:
+) -> tuple[CycleRatio, list[int]]:
     """The maximum cycle ratio of a live gear train, with the seconds of each of its places and the
-    `ways` that robots go ahead, and the robot that spends most of the critical circuit; the first
-    of several. Raises ValueError where it is not live.
+    `ways` that robots go ahead, and the robots on the critical circuit (`busiest`). Raises
+    ValueError where it is not live.
 
     A way in a gear of one operation leads back to where it begins; its wait takes longer instead.
     """
@@ -52,7 +52,7 @@ def train_ratio(
     delays += apart.values()
     found = max_cycle_ratio(with_ways(marked(gears), gears, apart), delays)
     numbered = {key: len(seconds) + number for number, key in enumerate(apart)}
-    return found, busiest(gears, numbered, found.circuit, delays)[0]
+    return found, busiest(gears, numbered, found.circuit, delays)
 
 
 def busiest(

@@ -43,7 +43,7 @@ def cycle_time(
     net = subject.net if isinstance(subject, Factory) else subject
     seconds = _seconds(marked(net), delays)
     if not net.is_tree:
-        ratio, robot = train_ratio(net, seconds, ways)
+        ratio, (robot, *_) = train_ratio(net, seconds, ways)
         return CycleTime(ratio.seconds, net.gears[robot].robot)
     sums = [
         sum(max(seconds[p], ways.get((robot, p), 0.0)) for p in gear.places)

@@ -110,7 +110,8 @@ class Miss:
 @dataclass(frozen=True, slots=True)
 class NoGrip:
     """A sub-assembly that no hand can hold: its `robot`, its `parts`, those `beside` them once it
-    is delivered, and the nearest miss of each kind that was tried."""
+    is delivered, and the nearest miss of each kind that was tried; all `labels` of the robot, where
+    it brings several."""
 
     label: str
     robot: str
@@ -118,9 +119,21 @@ class NoGrip:
     beside: tuple[str, ...]
     misses: tuple[Miss, ...]
     position: Position | None = field(default=None, compare=False)
+    labels: tuple[str, ...] = ()
+
+    @property
+    def shared(self) -> bool:
+        """Whether its robot brings several labels."""
+        return len(self.labels) > 1
 
     def warning(self) -> Diagnostic:
         """What is told of it."""
+        if self.shared:
+            names = ", ".join(f"'{label}'" for label in self.labels[:NAMED])
+            more = len(self.labels) - NAMED
+            names += f" and {more} more" if more > 0 else ""
+            message = f"no hand can hold all that {self.robot} brings: {names}"
+            return Diagnostic("NoGrip", message, self.position, "they are held without one")
         words = "; ".join(miss.words for miss in self.misses)
         hint = "it is held without one; join it in another order, or by a relay from above"
         return Diagnostic(
@@ -135,6 +148,7 @@ class NoGrip:
         return {
             "label": self.label,
             "robot": self.robot,
+            **({"labels": list(self.labels)} if self.shared else {}),
             "file": self.position.file if self.position else None,
             "line": self.position.line if self.position else None,
             "col": self.position.column if self.position else None,

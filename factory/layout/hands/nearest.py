@@ -33,6 +33,11 @@ def no_grips(hands: Hands) -> tuple[NoGrip, ...]:
     """Each sub-assembly that no hand of a robot can hold, however that robot lies."""
     factory, found = hands.holding.factory, []
     for robot in factory.robots:
+        labels = factory.deliveries(robot.index)
+        if len(labels) > 1:
+            position, parts = factory.by_label[labels[0]].position, factory.contents[labels[0]]
+            found.append(NoGrip(labels[0], robot.name, parts, (), (), position, labels))
+            continue
         chosen = [hands.hand(robot.index, u, t) for u, t in hands.holding.frames(robot.index)]
         if chosen and all(hand is not None and hand.kind == "none" for hand in chosen):
             search = _Search(hands, robot.index, held(factory, robot.index))

@@ -5,9 +5,10 @@ that form saves a robot; the robot that keeps the pile has a longer cycle. A for
 below it: what a robot holds is made on its own way, so the inputs of that come along the other axis
 than they would to a robot that brings it to a third.
 
-Of all forms those are chosen that have the fewest blocked operations, then no cycle estimated above
-a bound, then the fewest robots: exact for what it goes by. Cycles are estimated from the sizes of
-sub-assemblies; layouts decide (`study/allocation/search.py`).
+Of all forms those are chosen that are best in an order, for instance those with the fewest blocked
+operations, then no cycle estimated above a bound, then the fewest robots: exact for what it goes
+by. Cycles are estimated from the sizes of sub-assemblies; layouts decide
+(`study/allocation/search.py`).
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from math import inf
+from typing import Literal
 
 from factory.compiler.compiler import Node, expand
 from factory.compiler.mating.admitting import Admitted
@@ -36,6 +38,10 @@ GRAIN = 0.1
 THIRD = -1
 """The pile of an operation that a third robot takes; else the number of the input that is kept."""
 
+Order = Literal["robots", "lines", "fewest"]
+"""What forms are chosen by: few robots that serve one label each, few lines, or few lines even where
+more operations are blocked for it."""
+
 
 @dataclass(frozen=True, slots=True)
 class Option:
@@ -43,7 +49,7 @@ class Option:
     estimated cycles are `over` the bound in all; how many `robots` have finished theirs; the `time`
     [s] that the robot which holds it takes up to here, with the way back; which input is the
     `pile`, and how the inputs are made; how many `lines` hold it if as many robots as can be share
-    one."""
+    one; the `order` in which options are compared."""
 
     blocked: int
     loose: int
@@ -53,16 +59,17 @@ class Option:
     pile: int = THIRD
     inputs: tuple[Option, ...] = ()
     lines: int = 1
-    folds: bool = False
+    order: Order = "robots"
 
     @property
     def rank(self) -> tuple[float, ...]:
         """What is better is less."""
-        few = (self.lines, self.robots) if self.folds else (self.robots,)
-        import os
-        if os.environ.get("LF"):
-            return self.over, self.lines, self.blocked, self.loose, self.robots, self.time
-        return self.blocked, self.loose, self.over, *few, self.time
+        clean, few = (self.blocked, self.loose), (self.robots, self.time)
+        if self.order == "robots":
+            return *clean, self.over, *few
+        if self.order == "lines":
+            return *clean, self.over, self.lines, *few
+        return self.over, self.lines, *clean, *few
 
 
 @dataclass(frozen=True)
@@ -70,7 +77,7 @@ class FormsTask:
     """A product whose forms are to be chosen: its operations in postorder (`expand`), what they
     `admitted` along either axis, nothing for a product of default boxes, the boxes of its
     sub-assemblies (`payloads`), the `pace` of robots, forms that are `refused`: joins, and the
-    pile of each, which count as blocked; and whether robots may share lines (`folds`)."""
+    pile of each, which count as blocked; and the `order` in which ways are compared."""
 
     pag: PAG
     templates: Mapping[str, Template]
@@ -79,7 +86,7 @@ class FormsTask:
     payloads: Mapping[str, Box]
     pace: Pace
     refused: frozenset[tuple[str, int]] = frozenset()
-    folds: bool = False
+    order: Order = "robots"
 
     def size(self, label: str) -> float:
         """How long a sub-assembly is at most on the floor [m]."""
@@ -145,7 +152,7 @@ def _options(
     """The ways to make a node whose inputs come along an axis; `known`: those to make each input if
     its own come along the same axis, or the other one."""
     if not node.inputs:
-        yield Option(0, 0, 0.0, 0, task.pace.lost, folds=task.folds)
+        yield Option(0, 0, 0.0, 0, task.pace.lost, order=task.order)
         return
     for pile in (THIRD, 0, 1) if node.label in task.free else (_held(node),):
         faults = _faults(task, node, axis, pile)
@@ -186,7 +193,7 @@ def _joined(
     time += task.pace.rest(step) + node.dwell + task.pace.lost
     time += 0.0 if pile == THIRD else step / task.pace.speed
     lines = _lines(node, pile, inputs)
-    return Option(blocked, loose, over, robots, time, pile, inputs, lines, task.folds)
+    return Option(blocked, loose, over, robots, time, pile, inputs, lines, task.order)
 
 
 def _lines(node: Node, pile: int, inputs: tuple[Option, ...]) -> int:

@@ -14,7 +14,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from math import ceil
 
-from factory.compiler.folding import Line, delivery, fold, kind_of, sides_of
+from factory.compiler.folding import Line, count_of, delivery, fold, kind_of, sides_of
 from factory.layout.durations import Pace
 from factory.layout.guidepath import Box
 from factory.nets.cycle_ratio import max_cycle_ratio
@@ -32,12 +32,13 @@ TOOL_WAY = 0.12
 
 @dataclass(frozen=True)
 class Shift:
-    """A factory with a robot for each label, and what its lines are chosen by: the estimated
-    `delays` of its operations [s], and how much each robot has to do in a cycle, `work` [s]."""
+    """A factory with a robot for each label, and what its lines are chosen by: the `pace` of robots,
+    how far each has to go, its `ways` [m], and what it has to do in a cycle, its `work` [s]."""
 
     factory: Factory
     catalogue: Catalogue
-    delays: tuple[float, ...]
+    pace: Pace
+    ways: tuple[float, ...]
     work: tuple[float, ...]
 
     @classmethod
@@ -45,16 +46,37 @@ class Shift:
         cls, factory: Factory, catalogue: Catalogue, boxes: Mapping[str, Box], pace: Pace
     ) -> Shift:
         """That of a factory whose sub-assemblies have some boxes."""
-        delays = tuple(estimated_delays(factory, boxes, pace))
+        ways = tuple(estimated_ways(factory, boxes))
+        delays = [*estimated_delays(factory, ways, pace)]
         work = tuple(sum(delays[n] for n in robot.operations) for robot in factory.robots)
-        return cls(factory, catalogue, delays, work)
+        return cls(factory, catalogue, pace, ways, work)
 
-    def folded(self, lines: Sequence[Line]) -> tuple[int, float]:
-        """How many robots there are with these lines, and the estimated cycle time [s]."""
-        made = fold(self.factory, lines, self.catalogue) if lines else self.factory
-        net = marked(made.net)
-        idle = [0.0] * (len(net.tokens) - len(self.delays))
-        return len(made.robots), max_cycle_ratio(net, [*self.delays, *idle]).seconds
+    def seconds(self, lines: Sequence[Line]) -> float:
+        """The cycle time with these lines, by estimated delays [s]. Where robots share a line, all
+        go as far as the one that has to go farthest."""
+        if not lines:
+            return max(self.work)
+        ways = list(self.ways)
+        for line in lines:
+            farthest = max(self.ways[robot] for robot in line)
+            for robot in line:
+                ways[robot] = farthest
+        delays = [*estimated_delays(self.factory, ways, self.pace)]
+        net = marked(fold(self.factory, lines, self.catalogue).net)
+        idle = [0.0] * (len(net.tokens) - len(delays))
+        return max_cycle_ratio(net, [*delays, *idle]).seconds
+
+    def count(self, lines: Sequence[Line]) -> int:
+        """How many robots there are with these lines, tools included."""
+        return count_of(self.factory, lines)
+
+    def targets(self, step: float) -> Iterator[float]:
+        """What lines may be filled for [s]: from the longest work of one robot until nothing more
+        can share a robot, each so many times the one before."""
+        target, most = max(self.work), sum(self.work)
+        while target < most * step:
+            yield target
+            target *= step
 
     def lines(self, target: float) -> tuple[Line, ...]:
         """As few lines as have time for their robots' work within a `target` [s]."""
@@ -70,12 +92,14 @@ class Shift:
 
     def _dealt(self, group: Sequence[int], target: float) -> list[Line]:
         """The robots of a group on lines, in turns."""
-        total = sum(self.work[robot] for robot in group)
+        farthest = self.pace.rest(max(self.ways[robot] for robot in group))
+        further = {r: 2 * (farthest - self.pace.rest(self.ways[r])) for r in group}
+        total = sum(self.work[robot] + further[robot] for robot in group)
         count = min(len(group), max(1, ceil(total / target - 1e-9)))
         loads, dealt = [0.0] * count, [list[int]() for _ in range(count)]
         for robot in group:
             least = min(range(count), key=lambda n: (round(loads[n], 6), n))
-            loads[least] += self.work[robot]
+            loads[least] += self.work[robot] + further[robot]
             dealt[least].append(robot)
         return [tuple(line) for line in dealt if line]
 
@@ -111,27 +135,30 @@ def _one_sided(factory: Factory, group: Sequence[int]) -> Iterator[list[int]]:
     yield from (part for part in (first, only[-most], *none) if part)
 
 
-def estimated_delays(
-    factory: Factory, boxes: Mapping[str, Box], pace: Pace
-) -> Iterator[float]:
-    """How long each operation of a factory with a robot for each label takes [s], from the sizes of
-    sub-assemblies: the longest way of one of its robots."""
+def estimated_ways(factory: Factory, boxes: Mapping[str, Box]) -> Iterator[float]:
+    """How far each robot of a factory with one for each label has to go to where it delivers, from
+    the sizes of sub-assemblies [m]."""
 
     def size(label: str) -> float:
         xlo, xhi, ylo, yhi = boxes[label]
         return max(xhi - xlo, yhi - ylo)
 
-    def way(robot: int) -> float:
-        last = delivery(factory, robot)
-        label = last.before[last.robots.index(robot)]
+    for robot in factory.robots:
+        last = delivery(factory, robot.index)
+        label = last.before[last.robots.index(robot.index)]
         if label == NOPART:
-            return TOOL_WAY
+            yield TOOL_WAY
+            continue
         made = label if last.index == factory.dropoff.index else last.label
-        return (size(label) + size(made)) / 2 + BETWEEN
+        yield (size(label) + size(made)) / 2 + BETWEEN
 
+
+def estimated_delays(factory: Factory, ways: Sequence[float], pace: Pace) -> Iterator[float]:
+    """How long each operation takes [s] if its robots (of a factory with one for each label) have
+    to go so far [m]: as long as the one that goes farthest."""
     for operation in factory.operations:
         guests = [robot for robot in operation.robots if robot != operation.carrier]
-        longest = max(map(way, guests or [operation.carrier]))
+        longest = max(ways[robot] for robot in guests or [operation.carrier])
         stroke = operation.approach.stroke if operation.approach and operation.lowered >= 0 else 0.0
         yield pace.rest(longest) + pace.rest(stroke) + operation.dwell + pace.lost
 

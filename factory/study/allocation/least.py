@@ -1,0 +1,63 @@
+"""The least number of robots that can make a product, tools apart: a lower bound, with its proof.
+
+A part needs one robot. What is joined of two inputs needs max(S1, S2 + 1), where S1 >= S2 are what
+the inputs need: whichever is made first is held while the other is made. Where a third robot takes
+both, it needs three at least. This is the Sethi-Ullman number of the tree. No program, folded or
+not, does with fewer, since each part and sub-assembly is in some robot's hands until it is joined.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from factory.compiler.compiler import Node, expand
+from factory.problem.pag import NOPART, PAG
+from factory.problem.template import Template
+
+
+@dataclass(frozen=True, slots=True)
+class Least:
+    """The least `robots` that can hold a product while it is made, the kinds of `tools` that it
+    takes besides, and the labels on the way from the product down to where so many are needed, with
+    what each needs (`path`)."""
+
+    robots: int
+    tools: int
+    path: tuple[tuple[str, int], ...]
+
+    @property
+    def total(self) -> int:
+        """Robots and tools."""
+        return self.robots + self.tools
+
+    def __str__(self) -> str:
+        steps = [self.path[0], *(b for a, b in zip(self.path, self.path[1:]) if a[1] != b[1])]  # noqa: B905
+        words = ", ".join(f"'{label}' by fewer than {needs}" for label, needs in steps[:6])
+        return f"nothing can hold {words}{', ...' if len(steps) > 6 else ''}"
+
+
+def least_robots(pag: PAG, templates: Mapping[str, Template]) -> Least:
+    """The bound for a product. Linear."""
+    nodes = expand(pag, templates)
+    needs: dict[str, int] = {}
+    for label, node in nodes.items():
+        needs[label] = _needed(node, templates, sorted((needs[x] for x in node.inputs)))
+    tools = {
+        (node.template.name, slot) for node in nodes.values() for slot in node.template.tools()
+    }
+    path, label = [(pag.root, needs[pag.root])], pag.root
+    while nodes[label].inputs and needs[label] > 1:
+        label = max(nodes[label].inputs, key=lambda x: needs[x])
+        path.append((label, needs[label]))
+    return Least(needs[pag.root], len(tools), tuple(path))
+
+
+def _needed(node: Node, templates: Mapping[str, Template], inputs: list[int]) -> int:
+    """How many robots it takes to hold what a node makes, while it is made."""
+    if not inputs:
+        return 1
+    needed = max(count + n for n, count in enumerate(reversed(inputs)))
+    template = node.template
+    takes_over = template.before[template.carrier - 1] == NOPART and not template.instead
+    return max(needed, len(inputs) + 1) if takes_over else needed
