@@ -73,7 +73,8 @@ def compile(
     """The factory (R, ~, N) that makes a product (paper, section 5); with at most so many `robots`,
     or with few for a `cycle` time [s], where these are given. Raises InputError."""
     from factory.pipeline import Project, all_templates
-    from factory.study.allocation.search import Aim, allocated
+    from factory.study.allocation.aim import Aim
+    from factory.study.allocation.search import allocated
 
     return allocated(Project(pag, all_templates(templates)), Aim(robots, cycle)).plain
 

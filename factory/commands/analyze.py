@@ -155,7 +155,6 @@ def _analyze_pag(
     out: OutputOptions,
 ) -> int:
     from factory.nets.verify import proved
-    from factory.pipeline import read
     from factory.study.analysis import Timing, analyse
     from factory.study.analysis.document import document
     from factory.study.analysis.picture import check_picture, picture

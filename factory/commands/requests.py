@@ -83,7 +83,8 @@ class ProjectOptions:
         project = read(self.file, self.folders, settings or self.settings(), self.ground())
         if self.robots is None and self.cycle is None:
             return project
-        from factory.study.allocation.search import SECONDS, Aim, allocated
+        from factory.study.allocation.aim import SECONDS, Aim
+        from factory.study.allocation.search import allocated
 
         return allocated(project, Aim(self.robots, self.cycle, self.effort or SECONDS))
 

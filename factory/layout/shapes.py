@@ -15,7 +15,6 @@ from factory.layout.hands.mounted import Mount, grip_of
 from factory.layout.layout import carriers
 from factory.layout.sweeps import piles
 from factory.plant.factory import Factory
-from factory.problem.pag import NOPART
 
 Frame = tuple[Point2, Point2]
 """(u, t): how a robot lies on the floor."""

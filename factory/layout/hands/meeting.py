@@ -15,8 +15,8 @@ import numpy as np
 
 from factory.geometry.meshes import Array
 from factory.layout.dimensions import PAYLOAD
-from factory.layout.hands.apart import BESIDE
 from factory.layout.guidepath import hull
+from factory.layout.hands.apart import BESIDE
 from factory.layout.hands.limbs import limbs, rises_first
 from factory.layout.layout import Layout
 from factory.plant.factory import Operation

@@ -88,7 +88,6 @@ class Feeders:
         self._asked: set[int] = set()
         self.due = NEVER
         self._turns = Turns(model.layout, supply.next)
-        self._vacant = self._turns.now.copy()
 
     @property
     def trees(self) -> dict[int, int]:
@@ -127,7 +126,7 @@ class Feeders:
         del self._shown[label]
         self._welds.loose([self._stations[number].weld])
         self._passing.took(self._turns.lines[number])
-        self._vacant[self._turns.taken(number)] = True
+        self._turns.vacant[self._turns.taken(number)] = True
 
     def end(self, operations: Sequence[Operation]) -> None:
         """These operations have ended: sliders whose parts have been taken go up."""
@@ -142,14 +141,14 @@ class Feeders:
             self._copies.put_back(label, unit)
             number = self._number.get(label, -1)
             if number >= 0 and label not in self._shown and self._turns.now[number]:
-                self._vacant[number] = True
+                self._turns.vacant[number] = True
 
     def tend(self) -> bool:
         """Let the next parts come down from housings whose sliders have come up, where the robots
         are out of the way. Whether one comes that a robot has asked for."""
         self._sliders.settle()
         busy = self._turns.any_of(self._sliders.ends < NEVER)
-        free = self._vacant & ~busy & self._passing.clear()
+        free = self._turns.vacant & ~busy & self._passing.clear()
         if not np.count_nonzero(free):
             return False
         loaded = self._load(free.nonzero()[0])
@@ -166,7 +165,7 @@ class Feeders:
     def _load(self, numbers: Index, down: bool = False) -> Index:
         """Put the next copies into feeders, where there are some to spare and units that need
         them; where not, they are looked for again when one has become free. Gives which."""
-        self._vacant[numbers] = False
+        self._turns.vacant[numbers] = False
         loaded = [n for n in numbers.tolist() if self._supplied(self._stations[n].label)]
         for number in loaded:
             station, supply = self._stations[number], self.supply

@@ -13,8 +13,9 @@ from factory.layout.layout import Layout
 class Turns:
     """The turns of feeders (n,), in the order of their labels, when so many parts of each label
     have been taken (`counts`). `now` (n,): whether it is the turn of each; that of a feeder which
-    shares its robot with no other always is. `lines`: the numbers of all that share its robot, by
-    number, in the order of the robot's program."""
+    shares its robot with no other always is. `vacant` (n,): whether it has nothing to show on its
+    turn. `lines`: the numbers of all that share its robot, by number, in the order of the robot's
+    program."""
 
     def __init__(self, layout: Layout, counts: Mapping[str, int]) -> None:
         leaves = layout.factory.leaves
@@ -26,6 +27,7 @@ class Turns:
             fewest = min(counts[label] for label in line)
             due = next(label for label in line if counts[label] == fewest)
             self.now[numbers[leaf.label]] = leaf.label == due
+        self.vacant = self.now.copy()
         self._line = np.array([line[0] for line in self.lines], np.intp)
 
     def taken(self, number: int) -> int:

@@ -39,8 +39,8 @@ THIRD = -1
 """The pile of an operation that a third robot takes; else the number of the input that is kept."""
 
 Order = Literal["robots", "lines", "fewest"]
-"""What forms are chosen by: few robots that serve one label each, few lines, or few lines even where
-more operations are blocked for it."""
+"""What forms are chosen by: few robots that serve one label each, few lines, or few lines even
+where more operations are blocked for it."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -42,7 +42,7 @@ def least_robots(pag: PAG, templates: Mapping[str, Template]) -> Least:
     nodes = expand(pag, templates)
     needs: dict[str, int] = {}
     for label, node in nodes.items():
-        needs[label] = _needed(node, templates, sorted((needs[x] for x in node.inputs)))
+        needs[label] = _needed(node, templates, sorted(needs[x] for x in node.inputs))
     tools = {
         (node.template.name, slot) for node in nodes.values() for slot in node.template.tools()
     }

@@ -32,8 +32,9 @@ TOOL_WAY = 0.12
 
 @dataclass(frozen=True)
 class Shift:
-    """A factory with a robot for each label, and what its lines are chosen by: the `pace` of robots,
-    how far each has to go, its `ways` [m], and what it has to do in a cycle, its `work` [s]."""
+    """A factory with a robot for each label, and what its lines are chosen by: the `pace` of its
+    robots, how far each has to go, its `ways` [m], and what it has to do in a cycle, its `work`
+    [s]."""
 
     factory: Factory
     catalogue: Catalogue
@@ -135,22 +136,29 @@ def _one_sided(factory: Factory, group: Sequence[int]) -> Iterator[list[int]]:
     yield from (part for part in (first, only[-most], *none) if part)
 
 
-def estimated_ways(factory: Factory, boxes: Mapping[str, Box]) -> Iterator[float]:
+def estimated_ways(factory: Factory, boxes: Mapping[str, Box]) -> list[float]:
     """How far each robot of a factory with one for each label has to go to where it delivers, from
-    the sizes of sub-assemblies [m]."""
+    the sizes of sub-assemblies [m]: past what is joined there, and as far as it takes for what
+    delivers to those that deliver to it, which lies along its own way."""
 
     def size(label: str) -> float:
         xlo, xhi, ylo, yhi = boxes[label]
         return max(xhi - xlo, yhi - ylo)
 
-    for robot in factory.robots:
-        last = delivery(factory, robot.index)
-        label = last.before[last.robots.index(robot.index)]
-        if label == NOPART:
-            yield TOOL_WAY
-            continue
-        made = label if last.index == factory.dropoff.index else last.label
-        yield (size(label) + size(made)) / 2 + BETWEEN
+    ways = [TOOL_WAY] * len(factory.robots)
+    beside = [0.0] * len(factory.robots)
+    before = [0.0] * len(factory.robots)
+    for robot in reversed(range(len(factory.robots))):
+        last = delivery(factory, robot)
+        label = last.before[last.robots.index(robot)]
+        if label != NOPART:
+            made = label if last.index == factory.dropoff.index else last.label
+            past = (size(label) + size(made)) / 2 + BETWEEN
+            ways[robot] = max(past, before[robot] + size(made) / 2)
+        carrier = last.carrier
+        beside[carrier] = max(beside[carrier], ways[robot] + BETWEEN)
+        before[carrier] = max(before[carrier], beside[robot])
+    return ways
 
 
 def estimated_delays(factory: Factory, ways: Sequence[float], pace: Pace) -> Iterator[float]:

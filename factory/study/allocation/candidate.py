@@ -1,0 +1,51 @@
+"""A choice of forms and lines, as a project that can be laid out and judged."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+
+from factory.modes.modes import operation_modes, robot_limits
+from factory.modes.staging import stages_of
+from factory.pipeline import Project
+from factory.timing.cycle_time import CycleTime
+from factory.timing.prediction import all_ways, operation_delays, predict
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """A product with `forms` chosen, by the joins of the product as it is written, and with lines
+    that are filled for a `target` [s], None for a robot for each label, as a `project`."""
+
+    project: Project
+    forms: Mapping[str, int]
+    target: float | None = None
+
+    @property
+    def robots(self) -> int:
+        """How many robots its factory has, tools included."""
+        return len(self.project.factory.robots)
+
+    @property
+    def seconds(self) -> float:
+        """The cycle time that is predicted for its layout [s]."""
+        return self.pace.seconds
+
+    @cached_property
+    def pace(self) -> CycleTime:
+        """The same, and what allows no less."""
+        layout, settings = self.project.layout, self.project.settings
+        modes, (limits, _) = operation_modes(layout, settings.eps), robot_limits(layout, settings)
+        stages = stages_of(layout, modes, settings)
+        delays = operation_delays(layout, modes, limits, settings, "mujoco", stages)
+        ways = all_ways(layout, stages, delays, limits, settings, "mujoco")
+        return predict(layout, delays, settings, "mujoco", None, ways)
+
+    @cached_property
+    def troubles(self) -> int:
+        """How many of its operations are blocked, or have what no hand of a robot for one label can
+        hold."""
+        found = self.project.matings
+        blocked = len(found.of_kind("blocked")) if found else 0
+        return blocked + sum(not grip.shared for grip in self.project.no_grips)

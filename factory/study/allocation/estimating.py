@@ -1,0 +1,150 @@
+"""Estimates of what forms and lines give, before anything is laid out."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+from math import inf
+
+from factory.compiler.mating.admitting import admitted
+from factory.compiler.mating.mating import judged
+from factory.layout.durations import Pace
+from factory.layout.shapes import payload_boxes
+from factory.pipeline import Project
+from factory.problem.shapes import is_shaped
+from factory.study.allocation.aim import STEP
+from factory.study.allocation.candidate import Candidate
+from factory.study.allocation.forms import (
+    FormsTask,
+    Order,
+    best_forms,
+    forms_task,
+    reformed,
+    written_forms,
+)
+from factory.study.allocation.lines import Shift, labels_on
+
+WIDE = 1.6
+"""The bounds on estimated cycles that are tried for LARGE products, and what their lines are filled
+for: each so many times the one before, or a part of it."""
+
+LARGE = 400
+"""So many labels make a product large."""
+
+FILLED = 1.12
+"""What lines are filled for is each time so much more."""
+
+
+@dataclass(frozen=True, slots=True)
+class Estimate:
+    """What is estimated of forms and lines: `robots`, tools included, and cycle time [s]; the
+    `forms`, and what the lines are filled for, `target` [s]."""
+
+    robots: int
+    seconds: float
+    forms: Mapping[str, int]
+    target: float
+
+    def beats(self, other: Estimate) -> bool:
+        """Whether it is as good as another in everything."""
+        return self.robots <= other.robots and self.seconds <= other.seconds
+
+
+@dataclass(frozen=True)
+class Estimator:
+    """Estimates for the product of a `project` that has a robot for each label, and no relays."""
+
+    project: Project
+
+    @cached_property
+    def task(self) -> FormsTask:
+        """What forms are estimated by."""
+        project = self.project
+        pag, templates, product = project.pag, project.templates, project.product
+        admits = admitted(pag, templates, product) if is_shaped(pag) else {}
+        boxes = payload_boxes(project.compiled, product)
+        return forms_task(pag, templates, admits, boxes, Pace.of(project.settings))
+
+    @cached_property
+    def written(self) -> Mapping[str, int]:
+        """The forms of the product as it is written."""
+        return written_forms(self.task)
+
+    def candidate(self, forms: Mapping[str, int], target: float | None = None) -> Candidate:
+        """The product with these forms, and with lines that are filled for a target if one is
+        given."""
+        project = self._reformed(forms)
+        if target is not None:
+            shift = self._shift(project)
+            lines = labels_on(shift.factory, shift.lines(target))
+            project = project.with_pag(project.pag, replace(project.ground, lines=lines))
+        return Candidate(project, forms, target)
+
+    def front(
+        self, robots: float = inf, late: Callable[[], bool] = lambda: False
+    ) -> list[Estimate]:
+        """The estimates of which no other is as good in everything, with at most so many `robots`,
+        and no more operations blocked than as the product is written; as many as are found until it
+        is `late`."""
+        found: list[Estimate] = []
+        most, tried = _blocked(self._reformed(self.written)), set[tuple[int, ...]]()
+        for task in self._tasks():
+            for bound in self.bounds(task):
+                if late():
+                    return found
+                forms, _ = best_forms(task, bound)
+                key = tuple(forms.values())
+                if key in tried:
+                    continue
+                tried.add(key)
+                project = self._reformed(forms)
+                if _blocked(project) <= most:
+                    for one in self._filled(project, forms, robots):
+                        if not any(other.beats(one) for other in found):
+                            found = [other for other in found if not one.beats(other)] + [one]
+        return found
+
+    def _tasks(self) -> Iterator[FormsTask]:
+        orders: tuple[Order, ...] = ("lines", "fewest", "robots")
+        for order in orders if self.task.free else orders[:1]:
+            yield replace(self.task, order=order)
+
+    def bounds(self, task: FormsTask) -> Iterator[float]:
+        """No bound on estimated cycles, and those that can be kept, the longest first."""
+        yield inf
+        bound = sum(task.pace.rest(task.size(label)) + task.pace.lost for label in task.nodes)
+        step = STEP if len(task.nodes) < LARGE else WIDE
+        while best_forms(task, bound)[1] == 0.0:
+            yield bound
+            bound /= step
+
+    def _filled(
+        self, project: Project, forms: Mapping[str, int], robots: float
+    ) -> Iterator[Estimate]:
+        """The estimates of forms with lines for all that they may be filled for."""
+        shift, before = self._shift(project), -1
+        for target in shift.targets(FILLED if len(self.task.nodes) < LARGE else WIDE):
+            lines = shift.lines(target)
+            count = shift.count(lines)
+            if lines and count != before and count <= robots:
+                before = count
+                yield Estimate(count, shift.seconds(lines), forms, target)
+
+    def _shift(self, project: Project) -> Shift:
+        factory = judged(project.compiled, project.product)
+        boxes = payload_boxes(factory, project.product)
+        return Shift.of(factory, project.catalogue, boxes, self.task.pace)
+
+    def _reformed(self, forms: Mapping[str, int]) -> Project:
+        """The product with these forms, a robot for each label."""
+        ground = replace(self.project.ground, formed=forms != self.written, lines=())
+        if not ground.formed:
+            return self.project.with_pag(self.project.pag, ground)
+        pag = reformed(self.project.pag, self.project.templates, forms)
+        return self.project.with_pag(pag, ground)
+
+
+def _blocked(project: Project) -> int:
+    """How many operations of a project are blocked."""
+    return len(project.matings.of_kind("blocked")) if project.matings else 0
