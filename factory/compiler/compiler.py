@@ -314,8 +314,7 @@ def gear_net(robots: tuple[Robot, ...], operations: tuple[Operation, ...]) -> Ge
 
 def _wait_name(robot: Robot, label: str, onward: Operation, several: bool) -> str:
     """What the place is called where a robot waits for an operation `onward`: `r2:part1`. One that
-    comes home several times in its gear waits with nothing for each of its tours, `r2:nopart/part3`.
-    """
+    comes home several times in its gear waits with nothing for each tour, `r2:nopart/part3`."""
     if label == NOPART and several:
         return f"{robot.name}:{label}/{onward.label}"
     return f"{robot.name}:{label}"

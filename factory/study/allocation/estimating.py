@@ -42,7 +42,7 @@ FEWER = 0.7
 SHARED = 8.0
 """So many times its share of the work a tour may last, where few robots are asked for."""
 
-NEAR = 1.15
+NEAR = 1.3
 """An estimate is kept unless another is as good with so many times its cycle time: layouts differ
 more."""
 

@@ -29,7 +29,7 @@ ROUNDS = 8
 CHANGES = 60
 """So many changes are tried in a row, none of which is better, before the search ends."""
 
-LOOKED_AT = 40
+LOOKED_AT = 60
 """So many of the most promising estimates are laid out."""
 
 SINGLE, ESTIMATED, SHARED = 0.3, 0.5, 0.8
