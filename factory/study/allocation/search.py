@@ -14,6 +14,8 @@ from dataclasses import replace
 from math import inf
 from time import monotonic
 
+from factory.compiler.folding import kept_apart, lines_of_labels
+from factory.compiler.mating.mating import judged
 from factory.pipeline import Project
 from factory.study.allocation.aim import Aim
 from factory.study.allocation.blame import blamed, joins_of
@@ -56,7 +58,7 @@ def allocated(project: Project, aim: Aim, seen: Seen = lambda _: None) -> Projec
     search.look(seen)
     best = search.best
     if isinstance(aim.robots, int) and best.robots > aim.robots:
-        message = f"{aim.robots} robots are too few: found with {best.robots}"
+        message = f"{aim.robots} robots are too few: found with {best.robots}{search.why()}"
         hint = f"--robots {best.robots}; with more --seconds fewer may be found"
         raise InputError(Diagnostic("TooFewRobots", message, None, hint))
     if aim.robots is None and aim.cycle is not None and best.seconds > aim.cycle:
@@ -96,6 +98,14 @@ class Search:
         while self._better(self._changed(), seen):
             pass
 
+    def why(self) -> str:
+        """What keeps two lines of the best apart, in words; "" where nothing is known to."""
+        best = self.best.project
+        compiled = judged(best.compiled, best.product)
+        lines = lines_of_labels(compiled, best.ground.lines)
+        words = next(kept_apart(compiled, lines, best.catalogue), "")
+        return f"; {words}" if words else ""
+
     def _singles(self) -> Iterator[Candidate]:
         """The candidates by estimate with a robot for each label, each forms once, under bounds
         from long to short. Forms that leave a robot without a hand are refused from then on."""
@@ -119,6 +129,8 @@ class Search:
         aim, most = self.aim, self.aim.robots
         robots = most if isinstance(most, int) else inf
         front = self.estimator.front(robots, lambda: self.late(ESTIMATED))
+        if not front:
+            front = self.estimator.front(inf, lambda: self.late(ESTIMATED))
         front.sort(key=lambda one: aim.rank(one.robots, one.seconds))
         for one in front[:LOOKED_AT]:
             if self.late(SHARED):
