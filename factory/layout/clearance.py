@@ -241,7 +241,7 @@ def _way(layout: Layout, found: Mapping[str, Pile], operation: Operation, slot: 
     """What a robot's payload sweeps in a mode before its gate opens."""
     robot = operation.robots[slot]
     label = operation.before[slot]
-    pile = found[label].raised(layout.elevations[robot])
+    pile = found[label].raised(layout.elevations[robot]).moved(layout.shift(robot, operation.index))
     start, end = layout.legs[operation.index, robot]
     end += layout.standoff(operation, slot)
     box = layout.guidepaths[robot].sweep(pile.box, max(start, end), end)

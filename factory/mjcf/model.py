@@ -18,6 +18,7 @@ from xml.etree.ElementTree import Element
 from xml.sax.saxutils import quoteattr
 
 from factory.control.profile import SpeedProfile
+from factory.layout.feeding import feeder_of
 from factory.layout.layout import Layout
 from factory.mjcf import names
 from factory.mjcf.elements import add, fill
@@ -292,7 +293,7 @@ def _sliders(layout: Layout, masses: Mapping[str, float], settings: Settings) ->
 def stroke_ticks(layout: Layout, settings: Settings) -> int:
     """No stroke of a feeder's slider takes more ticks."""
     profile = SpeedProfile(*settings.feeder_limits)
-    strokes = (layout.feeder(leaf.label).stroke for leaf in layout.factory.leaves)
+    strokes = (feeder_of(layout, leaf.label).stroke for leaf in layout.factory.leaves)
     return ceil(profile.rest(max(strokes)) / settings.tick) + 4
 
 

@@ -68,7 +68,8 @@ def grip_position(
     path = layout.guidepaths[robot]
     at = path.middle(0.0)
     foot = path.carriage(0.0)
-    middle = (at[0] - foot[0], at[1] - foot[1])
+    more = layout.shift(robot, bodies.tour(layout.factory, robot, label)[0])
+    middle = (at[0] + more[0] - foot[0], at[1] + more[1] - foot[1])
     x, y, z = place_in(layout.product, bodies.centre[label], middle, layout.held_at(robot))
     return _turned((x, y, z), path.heading)
 

@@ -121,7 +121,7 @@ def operation_mode(layout: Layout, operation: Operation, eps: float) -> Mode:
         for slot, path in enumerate(paths)
     ]
     setting = Setting(
-        lower=np.zeros(len(paths)),
+        lower=np.array([layout.apart(operation.index, s)[0] for s in range(len(paths))]),
         upper=np.array([path.length for path in paths]),
         r=r,
         eps=eps,

@@ -181,6 +181,19 @@ class Factory:
         """The tour of a robot (index) that an operation (index) is in."""
         return next(tour for tour in self.tours[robot] if operation in tour)
 
+    @cached_property
+    def turns(self) -> Mapping[tuple[int, int], int]:
+        """Which of the tours of a robot (index) an operation (index) is in, by (operation,
+        robot)."""
+        return MappingProxyType(
+            {
+                (operation, robot): number
+                for robot, tours in enumerate(self.tours)
+                for number, tour in enumerate(tours)
+                for operation in tour
+            }
+        )
+
     def deliveries(self, robot: int) -> tuple[str, ...]:
         """The labels a robot (index) carries to its A end, tour by tour; none for a tool."""
         found = []

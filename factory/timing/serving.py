@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 from factory.control.profile import SpeedProfile
+from factory.layout.feeding import feeder_of, passing
 from factory.layout.layout import Layout
 from factory.layout.outfeed import away
 from factory.plant.factory import Operation
@@ -32,10 +33,10 @@ def serving(layout: Layout, delays: Sequence[float], settings: Settings) -> Iter
 
 def _fed(layout: Layout, leaf: Operation, delays: Sequence[float], settings: Settings) -> float:
     """The cycle time of a feeder, and of its robot where that waits for it [s]."""
-    down = SpeedProfile(*settings.feeder_limits).rest(layout.feeder(leaf.label).stroke)
+    down = SpeedProfile(*settings.feeder_limits).rest(feeder_of(layout, leaf.label).stroke)
     gear = layout.factory.robots[leaf.carrier].operations
     busy = sum(delays[number] for number in gear) - delays[leaf.index]
-    path, way = layout.guidepaths[leaf.carrier], layout.passing(leaf)
+    path, way = layout.guidepaths[leaf.carrier], passing(layout, leaf)
     beyond = path.length - layout.legs[gear[-1], leaf.carrier][1] - way
     early = SpeedProfile(settings.speed, settings.acceleration).landing(max(beyond, 0.0))
     rest = (CALM + 1) * settings.tick

@@ -22,9 +22,11 @@ from factory.layout.hands.apart import BESIDE
 from factory.layout.hands.hand import Hand, Kind
 from factory.layout.hands.holding import Holding, held
 from factory.layout.hands.in_the_way import InTheWay
+from factory.layout.hands.lines import LineHands
 from factory.layout.hands.places import PUSH, Places, centre_of, strain_of_two
 from factory.layout.hands.surfaces import Way
 from factory.layout.hands.tips import STRONG, TipName, tip
+from factory.layout.hands.tours import Tours
 from factory.plant.factory import Factory
 from factory.problem.pag import NOPART
 
@@ -73,35 +75,78 @@ class Hands:
     that deliver to it depend on its line; that of another on its frame."""
 
     def __init__(self, factory: Factory, product: Product, push: float = PUSH) -> None:
-        self.holding = Holding(factory, product, push)
+        self.factory, self.tours = factory, Tours.apart(factory)
+        self.holding = Holding(self.tours.factory, product, push)
         self.in_the_way = InTheWay(self.holding, self._carrier)
+        self.line_hands = LineHands(self.in_the_way, self.kinds, self._bad)
         self._fed: dict[tuple[int, Way, Way], Hand] = {}
         self._carriers: dict[tuple[int, Way], Hand] = {}
+        self._lines: dict[tuple[tuple[int, ...], object], tuple[Hand, ...]] = {}
+        self._on = {tour: of for of in self.tours.of for tour in of}
 
     def hand(self, robot: int, u: Way, t: Way) -> Hand | None:
         """The hand of a robot that heads along u, to a carrier that heads along t; None for a
-        tool."""
-        label = held(self.holding.factory, robot)
+        tool. That of a robot with several tours is in its place on the label of the first."""
+        tour, *others = tours = self.tours.of[robot]
+        label = held(self.holding.factory, tour)
         if not label:
             return None
-        if len(self.holding.factory.tours[robot]) > 1:
-            return self._nowhere(label)
-        if self.holding.is_carrier(robot):
-            return self._carrier(robot, u)
-        found = self._fed.get((robot, u, t))
+        if others:
+            return self._on_line(tours, u, t)[0]
+        if self.holding.is_carrier(tour):
+            return self._carrier(tour, u)
+        found = self._fed.get((tour, u, t))
         if found is None:
-            found = self._fed[robot, u, t] = self._chosen(robot, label, [(u, t)])
+            found = self._fed[tour, u, t] = self._chosen(tour, label, [(u, t)])
         return found
+
+    def shifts(self, robot: int, u: Way, t: Way | None = None) -> tuple[Way, ...]:
+        """For each tour of a robot how far the product's middle is from where it is on the first,
+        in the robot's frame of the world [m], so that the hand stays where it is; nothing for one
+        tour. `t` does not matter for a carrier."""
+        tours = self.tours.of[robot]
+        if len(tours) == 1 or not held(self.holding.factory, tours[0]):
+            return ()
+        places = [hand.places[0] for hand in self._on_line(tours, u, t)]
+        (x, y, _), *_ = places
+        return tuple((round(x - a, 6) + 0.0, round(y - b, 6) + 0.0) for a, b, _ in places)
+
+    def carries(self, robot: int) -> bool:
+        """Whether others come to a robot, with something or to work on what it holds."""
+        return any(self.holding.is_carrier(tour) for tour in self.tours.of[robot])
+
+    def is_fed(self, robot: int) -> bool:
+        """Whether a feeder presents what a robot takes."""
+        return self.holding.is_fed(self.tours.of[robot][0])
 
     def line(self, robot: int, u: Way) -> float:
         """Where the line of a robot's hand that heads along u is across its heading, in the frame
         of the product [m]."""
         across = 1 if u[0] else 0
-        if self.holding.is_carrier(robot):
-            return self._carrier(robot, u).places[0][across]
+        if self.carries(robot):
+            return self._carrier(self.tours.of[robot][0], u).places[0][across]
         return float(self.holding.product.middle[across])
 
+    def _on_line(self, tours: tuple[int, ...], u: Way, t: Way | None) -> tuple[Hand, ...]:
+        """The hand of a line in its place on the label of each of its tours, where that can be."""
+        carries = any(map(self.holding.is_carrier, tours))
+        if carries or t is None:
+            frames, key = self._sides(tours[0], u), (u,)
+        else:
+            frames, key = ((u, t),), (u, t)
+        found = self._lines.get((tours, key))
+        if found is None:
+            found = self.line_hands.chosen(tours, frames)
+            if not found:
+                none = self._nowhere(held(self.holding.factory, tours[0]))
+                found = (none,) * len(tours)
+            self._lines[tours, key] = found
+        return found
+
     def _carrier(self, robot: int, u: Way) -> Hand:
+        tours = self._on[robot]
+        if len(tours) > 1:
+            return self._on_line(tours, u, None)[tours.index(robot)]
         found = self._carriers.get((robot, u))
         if found is None:
             frames = self._sides(robot, u)
@@ -203,6 +248,14 @@ class Hands:
             (*late,),
             covered=float(found.covered[at].min()) if holds_well else 1.0,
         )
+
+    def _bad(self, robot: int, kind: Kind, found: Places, waits: Array) -> Array:
+        """How bad (2, n) places are by suction and by a pin, inf where that is too weak."""
+        wait = np.minimum(WAIT * waits[:, 0], LONG)
+        if kind == "below" and self.holding.is_carrier(robot):
+            wait = wait + self._served(robot, found)
+        suction = np.where(found.share <= ENOUGH, wait, np.inf)
+        return np.stack([suction, np.where(found.pinned <= STRONG, wait + PINNED, np.inf)])
 
     def _groups(self, robot: int, label: str, kind: Kind, found: Places) -> TipPlaces:
         """Places that one hand could hold together: each alone, and under a payload two on one

@@ -8,6 +8,7 @@ import numpy as np
 
 from factory.control.mode import STILL, Truth
 from factory.control.profile import SpeedProfile
+from factory.layout.feeding import passing
 from factory.mjcf import names
 from factory.mjcf.model import Model
 from factory.plant.factory import Operation
@@ -31,7 +32,7 @@ class Passing:
         joints = [m.joint(names.slide(factory.robots[robot].name)).id for robot in carriers]
         self._d, self._address, self._dof = d, m.jnt_qposadr[joints], m.jnt_dofadr[joints]
         self._home = np.array([layout.guidepaths[robot].length for robot in carriers])
-        self._clear = self._home - [layout.passing(leaf) for leaf in factory.leaves]
+        self._clear = self._home - [passing(layout, leaf) for leaf in factory.leaves]
         hands = [layout.hand(robot) for robot in carriers]
         self._kinds = ["none" if hand is None else hand.kind for hand in hands]
         self._first = np.array([hand is not None and hand.first for hand in hands], bool)
