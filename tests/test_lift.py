@@ -97,7 +97,7 @@ def test_what_a_lift_serves_is_made_at_its_height() -> None:
     layout = laid_out_with_lifts(NESTED)
     factory = layout.factory
     robot = {label: factory.by_label[label].carrier for label in ("n", "inside", "bowl", "f2")}
-    up = layout.elevations
+    up = [layout.elevation(robot.index, robot.operations[0]) for robot in factory.robots]
     inside, ball = robot["inside"], factory.by_label["ball"].carrier
     assert up[robot["n"]] == 0.0
     assert up[inside] == factory.strokes[inside] > 0

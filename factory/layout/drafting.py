@@ -18,7 +18,8 @@ from factory.layout.certificate import (
     Region,
 )
 from factory.layout.dimensions import BEHIND, SIDE, WALL, Clearance, up
-from factory.layout.guidepath import Box, Guidepath, Point2
+from factory.layout.guidepath import Box, Guidepath
+from factory.layout.hands.hand import Point3
 from factory.layout.layout import Layout, carriers
 from factory.layout.shapes import Shape, headings
 from factory.layout.stretching import Stretched
@@ -61,7 +62,7 @@ class LayoutDraft:
             self._shifts() if any(s.shifts for s in self.shapes) else (),
         )
 
-    def _shifts(self) -> tuple[tuple[Point2, ...], ...]:
+    def _shifts(self) -> tuple[tuple[Point3, ...], ...]:
         """For each robot those of its tours."""
         tours = self.factory.tours
         return tuple(

@@ -27,12 +27,16 @@ def feeder_of(layout: Layout, label: str) -> Feeder:
     carries it, behind the rear stop of the robot that it serves. Parts of one line have one
     housing, in which they hang with their tops at one height."""
     operation, room = layout.factory.by_label[label], Clearance(layout.clearance).room
-    robot = operation.carrier
-    path, solid = layout.guidepaths[robot], layout.product.solids[label]
-    shown = layout.magazine(robot)
+    robot, by_label = operation.carrier, layout.factory.by_label
+    path, shown = layout.guidepaths[robot], layout.magazine(robot)
     middle = path.middle(layout.goal(operation.index, operation.template.carrier - 1))
     solids = [layout.product.solids[part] for part in shown]
-    highest = max(float(solid.high[2]) for solid in solids)
+    first, rises = layout.factory.robots[robot].operations[0], layout.strokes.get(robot, 0.0)
+    elevation = layout.elevation(robot, operation.index)
+    highest = max(
+        float(solid.high[2]) + (layout.elevation(robot, by_label[part].index) - elevation)
+        for part, solid in zip(shown, solids, strict=True)
+    )
     tallest = max(float(solid.high[2] - solid.low[2]) for solid in solids)
     rear, front, near, far = _shown(layout, robot)
     inside = rear - PLAY, front + PLAY, near - PLAY, far + PLAY
@@ -42,10 +46,11 @@ def feeder_of(layout: Layout, label: str) -> Feeder:
     back = -Clearance(layout.clearance).post(path.reach, min(rear, grip[0]) if grip else rear)
     if hand is not None and hand.tall:
         top = max(hand.beam + BEAM, hand.places[0][2] + max(hand.radius, FINGER / 2))
+        top += layout.held_at(robot, first) + rises - elevation
         room = max(room, round(top - highest + layout.clearance, 6))
         if hand.kind == "above":
             across = round((near + far) / 2, 3)
-    over = PAYLOAD + layout.elevations[robot] - layout.product.low[2]
+    over = PAYLOAD + elevation - layout.product.low[2]
     low = float(over + highest) + room
     high_up = RISE * hypot(inside[1] - inside[0], inside[3] - inside[2])
     stroke = room + high_up + tallest
@@ -60,7 +65,7 @@ def feeder_of(layout: Layout, label: str) -> Feeder:
         path.world(housing, middle),
         low,
         max(low - room + stroke + PAD + SIDE, low + BOOM_HEIGHT),
-        stroke + (highest - float(solid.high[2])),
+        stroke + (highest - float(layout.product.solids[label].high[2])),
     )
 
 

@@ -20,7 +20,7 @@ from factory.layout.dimensions import (
     up,
 )
 from factory.layout.guidepath import Box, Extent, Feeder, Guidepath, Point2, moved
-from factory.layout.hands.hand import Hand
+from factory.layout.hands.hand import Hand, Point3
 from factory.layout.hands.mounted import Mount, grip_of
 from factory.plant.approaches import Overlap
 from factory.plant.factory import Factory, Operation
@@ -28,6 +28,21 @@ from factory.problem.pag import NOPART
 
 BESIDE = 0.005
 """What is to be lowered stays this far short of its meeting point until the others stand [m]."""
+
+
+LEAST = 0.001
+"""A lift goes up by so much at least [m]."""
+
+
+@dataclass(frozen=True, slots=True)
+class Level:
+    """How high a robot holds what it brings on one of its tours [m]: how far up its lift is where
+    it delivers (`down`), and before that (`up`), and how far above its place in the product it
+    carries that (`elevation`)."""
+
+    down: float
+    up: float
+    elevation: float
 
 
 @dataclass(frozen=True)
@@ -38,8 +53,9 @@ class Layout:
     `stations[i]`: distance [m] of operation i from its carrier's B end; `payloads[label]`: the box
     of a sub-assembly about the product's middle; `outfeed`: the box of the conveyor in the world;
     `hands`: those of the robots, None for tools, nothing where they are not chosen; `shifts`: for
-    each robot and each of its tours how far the product's middle is, in the robot's frame (u, t),
-    from where its guidepath has that [m], nothing for no shifts (docs/decisions/hands.md, Lines);
+    each robot and each of its tours how far the product's middle is, in the robot's frame (u, t)
+    and upwards, from where it is on the first of them [m], nothing for no shifts
+    (docs/decisions/hands.md, Lines);
     `plain`: the layout without relays, None where this is one; `ground`: what it was made for, by
     the names that `request.Ground` has.
     """
@@ -52,7 +68,7 @@ class Layout:
     payloads: Mapping[str, Box] = field(repr=False)
     outfeed: Box = (0.0, 0.0, 0.0, 0.0)
     hands: tuple[Hand | None, ...] = field(default=(), repr=False)
-    shifts: tuple[tuple[Point2, ...], ...] = field(default=(), repr=False)
+    shifts: tuple[tuple[Point3, ...], ...] = field(default=(), repr=False)
     floor: Box = (0.0, 0.0, 0.0, 0.0)
     certificate: Certificate | None = field(default=None, repr=False, compare=False)
     plain: Layout | None = field(default=None, repr=False, compare=False)
@@ -71,7 +87,7 @@ class Layout:
         the robot's tour that an operation (index) is in."""
         if not self.shifts:
             return 0.0, 0.0
-        ahead, aside = self.shifts[robot][self.factory.turns[operation, robot]]
+        ahead, aside, _ = self.shifts[robot][self.factory.turns[operation, robot]]
         (u, v), (s, t) = self.guidepaths[robot].heading, self.guidepaths[robot].side
         return u * ahead + s * aside, v * ahead + t * aside
 
@@ -94,17 +110,19 @@ class Layout:
         ahead, aside = (x - a) * u + (y - b) * v, (x - a) * s + (y - b) * t
         return round(ahead, 6), round(aside, 6)
 
-    def held_at(self, robot: int) -> float:
-        """How far above its place in the product a robot holds its payload with its lift down
-        [m]."""
-        return self.elevations[robot] - self.factory.strokes.get(robot, 0.0)
+    def held_at(self, robot: int, operation: int) -> float:
+        """How far above its place in the product a robot holds its payload with its lift down, on
+        the tour that an operation (index) is in [m]."""
+        level = self.level(robot, operation)
+        return level.elevation - level.up
 
     def mount(self, robot: int) -> Mount:
         """Where a robot's hand is mounted."""
         path, (x, y, _) = self.guidepaths[robot], self.product.middle.tolist()
-        over = PAYLOAD - float(self.product.low[2]) + self.held_at(robot)
+        first = self.factory.robots[robot].operations[0]
+        over = PAYLOAD - float(self.product.low[2]) + self.held_at(robot, first)
         lies = path.heading, path.side, path.reach, path.arm, path.offset
-        stroke = self.factory.strokes.get(robot)
+        stroke = self.strokes.get(robot)
         return Mount(*lies, (x, y), over, stroke or 0.0, stroke is not None)
 
     def grip(self, robot: int) -> Extent | None:
@@ -134,8 +152,8 @@ class Layout:
         chosen = self.factory.operations[operation]
         if slot >= len(chosen.robots):
             robot = self.lifts[self.factory.axes[operation][slot] - len(self.guidepaths)]
-            lowers = self.factory.delivers(robot, operation)
-            return 0.0 if lowers else self.factory.strokes[robot]
+            level = self.level(robot, operation)
+            return level.down if self.factory.delivers(robot, operation) else level.up
         path = self.guidepaths[chosen.robots[slot]]
         point = chosen.template.law.goals[slot]
         if slot != chosen.template.carrier - 1 or point.end == "A":
@@ -181,17 +199,41 @@ class Layout:
         return tuple(self.factory.strokes)
 
     @cached_property
-    def elevations(self) -> tuple[float, ...]:
-        """How far above its place in the product each robot carries what it brings [m]: the stroke
-        of its own lift over the height at which the robot it delivers to carries it."""
-        strokes, operations = self.factory.strokes, self.factory.operations
-        found: list[float] = []
-        for robot in self.factory.robots:
-            below = 0.0
-            if robot.index:
-                below = found[operations[robot.operations[-1]].carrier]
-            found.append(below + strokes.get(robot.index, 0.0))
-        return tuple(found)
+    def _levels(self) -> list[list[Level]]:
+        """For each robot those of its tours."""
+        factory, found = self.factory, list[list[Level]]()
+        for robot, tours in enumerate(factory.tours):
+            ends = [factory.operations[tour[-1]] for tour in tours]
+            below = [0.0] * len(ends)
+            if robot:
+                turns = ((o.carrier, factory.turns[o.index, o.carrier]) for o in ends)
+                below = [found[carrier][turn].elevation for carrier, turn in turns]
+            stroke, downs = factory.strokes.get(robot, 0.0), [0.0] * len(ends)
+            if robot in factory.strokes and len(ends) > 1 and self.shifts:
+                over = [d - z for d, (_, _, z) in zip(below, self.shifts[robot], strict=True)]
+                downs = [round(at - min(over), 6) for at in over]
+                own = (o.approach.stroke if o.approach else 0.0 for o in ends)
+                stroke = max(at + far for at, far in zip(downs, own, strict=True))
+            ups = downs if robot in factory.adjusted else [stroke] * len(ends)
+            levels = zip(downs, ups, below, strict=True)
+            found.append([Level(down, up, d + (up - down)) for down, up, d in levels])
+        return found
+
+    def level(self, robot: int, operation: int) -> Level:
+        """How high a robot holds what it brings, on the tour that an operation (index) is in."""
+        return self._levels[robot][self.factory.turns[operation, robot]]
+
+    @cached_property
+    def strokes(self) -> Mapping[int, float]:
+        """How far up the lift of each robot that has one goes (index) [m]."""
+        highest = {robot: max(level.up for level in self._levels[robot]) for robot in self.lifts}
+        return MappingProxyType({robot: max(up, LEAST) for robot, up in highest.items()})
+
+    def elevation(self, robot: int, operation: int) -> float:
+        """How far above its place in the product a robot carries what it brings, on the tour that
+        an operation (index) is in [m]: what its own lift has to lower it, over the height at which
+        the robot that it delivers to carries it."""
+        return self.level(robot, operation).elevation
 
     def side(self, operation: Operation) -> int:
         """From which side, +1 or -1, of the axis of its approach the last input of an operation

@@ -10,7 +10,7 @@ from factory.geometry.solids import Product
 from factory.layout.dimensions import FINGER, MAST, PAYLOAD, Clearance, up
 from factory.layout.guidepath import Box, Extent, Point2, hull, moved, project
 from factory.layout.hands.choosing import Hands
-from factory.layout.hands.hand import Hand
+from factory.layout.hands.hand import Hand, Point3
 from factory.layout.hands.mounted import Mount, grip_of
 from factory.layout.layout import carriers
 from factory.layout.sweeps import piles
@@ -25,6 +25,8 @@ OUTPUT: Frame = ((1.0, 0.0), (0.0, 1.0))
 Sides = dict[int, int]
 """For each robot but the first: +1 where it stands on the side t of its carrier's path, else -1."""
 
+NONE: Point3 = (0.0, 0.0, 0.0)
+
 NOWHERE: Extent = (0.0, 0.0, 0.0, 0.0)
 
 
@@ -35,9 +37,9 @@ class Shape:
     ends and its carriage is (`reach`, 2r), how far ahead its finger goes (`nest`), how far its lane
     reaches to either side for relays (`spread`), and its `least` travel [m]; its `hand`, None
     where none is chosen, and the box `grip` of what of that is among the payloads; how far to the
-    side the `post` of its feeder stands [m]; by operation how far the product's middle is ahead and
-    to the side of where the robot's guidepath has it (`shifts`), nothing where it never is: boxes
-    are about the latter."""
+    side the `post` of its feeder stands [m]; by operation how far the product's middle is ahead, to
+    the side and above where the robot has it on its first tour (`shifts`), nothing where it is
+    always there: boxes are about the latter."""
 
     piles: Mapping[int, Extent]
     last: Extent
@@ -51,12 +53,12 @@ class Shape:
     grip: Extent | None = None
     post: float = 0.0
     least: float = 0.0
-    shifts: Mapping[int, Point2] = field(default_factory=dict)
+    shifts: Mapping[int, Point3] = field(default_factory=dict)
 
-    def shift(self, operation: int) -> Point2:
-        """How far the product's middle is ahead and to the side of where the guidepath has it, on
-        the tour that an operation (index) is in [m]."""
-        return self.shifts.get(operation, (0.0, 0.0))
+    def shift(self, operation: int) -> Point3:
+        """How far the product's middle is ahead and to the side of where the guidepath has it, and
+        above, on the tour that an operation (index) is in [m]."""
+        return self.shifts.get(operation, NONE)
 
     def laden(self, pile: Extent) -> Extent:
         """The box of a pile with the hand that holds it."""
@@ -146,7 +148,7 @@ def held_shape(
     operations, shifts = factory.operations, moves[0]
 
     def lies(label: str, number: int) -> Extent:
-        return moved(project(payloads[label], *frame), shifts.get(number, (0.0, 0.0)))
+        return moved(project(payloads[label], *frame), shifts.get(number, NONE)[:2])
 
     def line(robot: int, heading: Point2, side: Point2) -> float:
         across = 0 if side[0] else 1
@@ -178,7 +180,7 @@ def held_shape(
         reach = arm = up(max(reach, c.c + MAST / 2 - rear))
         if hand.kind == "above" and hands.is_fed(robot):
             post, offset = round((last[2] + last[3]) / 2, 3), round(last[2] - c.c - MAST / 2, 3)
-            if hand.waits and robot not in factory.strokes:
+            if hand.waits and not factory.lowers(robot):
                 thick = 2 * max(hand.radius, FINGER / 2)
                 least = last[1] + max(ahead) - min(ahead) + thick - rear + 2 * c.c
     over = PAYLOAD - float(hands.holding.product.low[2])
@@ -188,7 +190,7 @@ def held_shape(
     )
 
 
-def _moves(hands: Hands, robot: int, carrier: int, frame: Frame) -> tuple[dict[int, Point2], float]:
+def _moves(hands: Hands, robot: int, carrier: int, frame: Frame) -> tuple[dict[int, Point3], float]:
     """By operation how far the product's middle is ahead of and beside where a robot's guidepath
     has it; and how much further behind it has to stay, since it delivers further ahead than that
     where its carrier's line is [m]."""
@@ -197,13 +199,13 @@ def _moves(hands: Hands, robot: int, carrier: int, frame: Frame) -> tuple[dict[i
     carriers = hands.shifts(carrier, t) if carrier >= 0 else ()
     if not any(map(any, (*own, *carriers))):
         return {}, 0.0
-    found, back = dict[int, Point2](), 0.0
+    found, back = dict[int, Point3](), 0.0
     for number, tour in enumerate(factory.tours[robot]):
-        x, y = own[number] if own else (0.0, 0.0)
+        x, y, z = own[number] if own else NONE
         ahead = round(x * u[0] + y * u[1], 6)
-        found |= dict.fromkeys(tour, (ahead, round(x * t[0] + y * t[1], 6)))
+        found |= dict.fromkeys(tour, (ahead, round(x * t[0] + y * t[1], 6), z))
         if carriers:
-            x, y = carriers[factory.turns[tour[-1], carrier]]
+            x, y, _ = carriers[factory.turns[tour[-1], carrier]]
             ahead -= x * u[0] + y * u[1]
         back = max(back, -ahead)
     return found, up(back)

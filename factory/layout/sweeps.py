@@ -130,7 +130,7 @@ def _payloads(layout: Layout, robot: int, found: Mapping[str, Pile]) -> Iterator
         label = operation.after[operation.robots.index(robot)]
         if label == NOPART:
             continue
-        pile, at = found[label].raised(layout.elevations[robot]), stops[step]
+        pile, at = found[label].raised(layout.elevation(robot, number)), stops[step]
         pile = pile.moved(layout.shift(robot, number))
         step = (step + 1) % len(gear)
         onward = operations[gear[step]]

@@ -106,7 +106,7 @@ def add_feeders(
         if label == layout.magazine(operation.carrier)[0]:
             _add_housing(body, names.feeder(label), found, path.left)
         place = pads.of(label)
-        foot = PAYLOAD + layout.elevations[operation.carrier]
+        foot = PAYLOAD + layout.elevation(operation.carrier, operation.index)
         at = PadPlace(place.at + np.array([0.0, 0.0, foot]), place.radius)
         _add_slider(body, label, found, at, codes[label], drives[label], layout.clearance)
         gains = drives[label].attributes()

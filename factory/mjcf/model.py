@@ -268,7 +268,7 @@ def drive_for(
 def _hoists(layout: Layout, masses: Mapping[str, float], settings: Settings) -> dict[int, Hoist]:
     """The lifts, for the heaviest load of each: what it delivers."""
     factory, found = layout.factory, {}
-    for robot, stroke in factory.strokes.items():
+    for robot, stroke in layout.strokes.items():
         load = max(masses[label] for label in factory.deliveries(robot))
         most = settings.acceleration + GRAVITY
         drive = drive_for(HOIST_MASS, load, most, settings, HOIST_STIFFNESS)

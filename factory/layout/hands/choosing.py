@@ -19,7 +19,7 @@ from factory.geometry.meshes import Array
 from factory.geometry.solids import Product
 from factory.layout.dimensions import FINGER
 from factory.layout.hands.apart import BESIDE
-from factory.layout.hands.hand import Hand, Kind
+from factory.layout.hands.hand import Hand, Kind, Point3
 from factory.layout.hands.holding import Holding, held
 from factory.layout.hands.in_the_way import InTheWay
 from factory.layout.hands.lines import LineHands
@@ -78,7 +78,8 @@ class Hands:
         self.factory, self.tours = factory, Tours.apart(factory)
         self.holding = Holding(self.tours.factory, product, push)
         self.in_the_way = InTheWay(self.holding, self._carrier)
-        self.line_hands = LineHands(self.in_the_way, self.kinds, self._bad)
+        adjusted = frozenset(tour for r in factory.adjusted for tour in self.tours.of[r])
+        self.line_hands = LineHands(self.in_the_way, self.kinds, self._bad, adjusted)
         self._fed: dict[tuple[int, Way, Way], Hand] = {}
         self._carriers: dict[tuple[int, Way], Hand] = {}
         self._lines: dict[tuple[tuple[int, ...], object], tuple[Hand, ...]] = {}
@@ -100,16 +101,16 @@ class Hands:
             found = self._fed[tour, u, t] = self._chosen(tour, label, [(u, t)])
         return found
 
-    def shifts(self, robot: int, u: Way, t: Way | None = None) -> tuple[Way, ...]:
-        """For each tour of a robot how far the product's middle is from where it is on the first,
-        in the robot's frame of the world [m], so that the hand stays where it is; nothing for one
-        tour. `t` does not matter for a carrier."""
+    def shifts(self, robot: int, u: Way, t: Way | None = None) -> tuple[Point3, ...]:
+        """For each tour of a robot how far the product is from where it is on the first, as seen
+        from the robot [m], so that the hand stays where it is; nothing for one tour. `t` does not
+        matter for a carrier."""
         tours = self.tours.of[robot]
         if len(tours) == 1 or not held(self.holding.factory, tours[0]):
             return ()
         places = [hand.places[0] for hand in self._on_line(tours, u, t)]
-        (x, y, _), *_ = places
-        return tuple((round(x - a, 6) + 0.0, round(y - b, 6) + 0.0) for a, b, _ in places)
+        found = np.round(np.array(places[:1]) - places, 6) + 0.0
+        return tuple((x, y, z) for x, y, z in found.tolist())
 
     def carries(self, robot: int) -> bool:
         """Whether others come to a robot, with something or to work on what it holds."""

@@ -115,7 +115,7 @@ def goes_early(layout: Layout) -> list[tuple[int, int]]:
 def raised(layout: Layout, robot: int) -> Leaving:
     """When a robot's lift is up."""
     axis = len(layout.factory.robots) + list(layout.lifts).index(robot)
-    return Leaving(axis, layout.factory.strokes[robot] - SPARE)
+    return Leaving(axis, layout.strokes[robot] - SPARE)
 
 
 def _gone(layout: Layout, robot: int, back: float) -> Leaving:

@@ -54,11 +54,12 @@ class Options:
 class LineHands:
     """Looks for one hand for several tours, each given by its robot in a factory with a robot a
     tour. `kinds`: those that are tried for one; `bad`: how bad places are, by suction and by a pin
-    (2, n), given waits."""
+    (2, n), given waits; `adjusted`: tours of robots with a lift that is set for each."""
 
     in_the_way: InTheWay
     kinds: Callable[[int], tuple[Kind, ...]]
     bad: Callable[[int, Kind, Places, Array], Array]
+    adjusted: frozenset[int] = frozenset()
 
     def common(self, tours: Sequence[int]) -> list[Kind]:
         """The kinds that are tried for all tours, the first of them first."""
@@ -80,7 +81,10 @@ class LineHands:
         self, kind: Kind, tours: Sequence[int], frames: Frames
     ) -> Iterator[tuple[float, tuple[Hand, ...]]]:
         """Hands of one kind and how bad they are, with the largest tips first."""
-        if not all(self._possible(kind, tour, frames) for tour in tours):
+        lifted = tours[0] in self.in_the_way.holding.factory.strokes
+        lifted |= kind == "behind" and tours[0] in self.adjusted
+        possible = all(self._possible(kind, tour, frames) for tour in tours)
+        if not possible or not (lifted or self._level(tours)):
             return
         places = [self.in_the_way.on_side(self._label(tour), kind, frames) for tour in tours]
         if not all(len(found) for found in places):
@@ -90,7 +94,7 @@ class LineHands:
             options = [self._options(kind, tour, frames, radius) for tour in tours]
             if not all(len(option.found) for option in options):
                 continue
-            cost, chosen = _level(options, *frames[0])
+            cost, chosen = _level(options, *frames[0], lifted)
             if cost < np.inf:
                 yield cost, self._hands(kind, tours, frames, chosen)
             if not cost:
@@ -98,6 +102,18 @@ class LineHands:
 
     def _possible(self, kind: Kind, tour: int, frames: Frames) -> bool:
         return self.in_the_way.possible(tour, self._label(tour), kind, frames)
+
+    def _level(self, tours: Sequence[int]) -> bool:
+        """Whether what tours deliver to is always at one height: it is one thing, or no robot that
+        carries it has a lift."""
+        holding = self.in_the_way.holding
+        carriers = {holding.on[tour] for tour in tours}
+        above = set[int]()
+        for carrier in carriers if len(carriers) > 1 else ():
+            while carrier >= 0 and carrier not in above:
+                above.add(carrier)
+                carrier = holding.on[carrier]
+        return above.isdisjoint(holding.factory.strokes)
 
     def _label(self, tour: int) -> str:
         return held(self.in_the_way.holding.factory, tour)
@@ -128,11 +144,12 @@ class LineHands:
         while most and not most[-1]:
             most.pop()
         found = [option.found for option in options]
-        beam = 0.0
+        points = [at.at[0].round(6).tolist() for at in found]
+        stem = 0.0
         if kind == "above":
-            beam = max(
-                self.in_the_way.apart.beam(tour, at, frames)
-                for tour, at in zip(tours, found, strict=True)
+            stem = max(
+                self.in_the_way.apart.beam(tour, at, frames) - z
+                for tour, at, (_, _, z) in zip(tours, found, points, strict=True)
             )
         suction = tip == "suction"
         shares = [(at.share if suction else at.pinned)[0] for at in found]
@@ -140,25 +157,27 @@ class LineHands:
             kind,
             (),
             float(found[0].radius[0]),
-            beam,
+            0.0,
             float(max(shares)),
             tip,
             any(bool(option.first[0]) for option in options),
             (*most,),
             float(min(at.covered[0] for at in found)) if suction else 1.0,
         )
-        points = (at.at[0].round(6).tolist() for at in found)
-        return tuple(replace(hand, places=((x, y, z),)) for x, y, z in points)
+        return tuple(
+            replace(hand, places=((x, y, z),), beam=z + stem if stem else 0.0) for x, y, z in points
+        )
 
 
 def _level(
-    options: Sequence[Options], u: Way, t: Way
+    options: Sequence[Options], u: Way, t: Way, lifted: bool
 ) -> tuple[float, tuple[TipName, list[Options]]]:
-    """Of places that are at one height for all labels the least bad, and how bad they are together;
-    inf where there is no such height."""
+    """Of places that are at one height for all labels, or at any for a robot that is `lifted`, the
+    least bad, and how bad they are together; inf where there is no such height."""
     best: tuple[float, tuple[TipName, list[Options]]] = np.inf, ("suction", [])
-    for height in np.unique(np.round(options[0].found.at[:, 2], 5)).tolist():
-        level = [o.among(np.abs(o.found.at[:, 2] - height) <= LEVEL) for o in options]
+    heights = np.unique(np.round(options[0].found.at[:, 2], 5)).tolist()
+    for height in heights[:1] if lifted else heights:
+        level = [o.among((np.abs(o.found.at[:, 2] - height) <= LEVEL) | lifted) for o in options]
         if not all(len(option.found) for option in level):
             continue
         tips: tuple[TipName, ...] = "suction", "pin"

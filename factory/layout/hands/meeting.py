@@ -99,7 +99,7 @@ def _boxes(layout: Layout, robot: int, at: float | None = None, up: float | None
     [m], and with its lift `up`, all the way if that is not said."""
     path = layout.guidepaths[robot]
     (x, y), (u, v) = path.carriage(path.reach if at is None else at), path.heading
-    stroke = layout.factory.strokes.get(robot, 0.0) if up is None else up
+    stroke = layout.strokes.get(robot, 0.0) if up is None else up
     found = []
     for limb in limbs(layout, robot):
         ends = np.array([limb.low, limb.high])
@@ -123,9 +123,9 @@ def _coming(layout: Layout, robot: int, carrier: int = -1) -> Array:
         boxes = np.array([[part.low, part.high] for part, _ in parts]) - product.middle
         boxes[:, :, :2] += path.a
         boxes[:, :, :2] += np.array([layout.shift(robot, last) for _, last in parts])[:, None]
-        over = PAYLOAD + layout.elevations[carrier] + product.middle[2] - product.low[2]
-        boxes[:, :, 2] += over
-        boxes[:, 1, 2] += layout.factory.strokes.get(robot, 0.0)
+        over = [layout.elevation(carrier, last) for _, last in parts]
+        boxes[:, :, 2] += PAYLOAD + np.array(over)[:, None] + product.middle[2] - product.low[2]
+        boxes[:, 1, 2] += layout.strokes.get(robot, 0.0)
         found.append(boxes)
     swept = np.concatenate(found)
     return _onward(swept, (-path.heading[0], -path.heading[1]))

@@ -35,5 +35,5 @@ class Tours:
             replace(o, robots=tuple(of[r][factory.turns[o.index, r]] for r in o.robots))
             for o in factory.operations
         )
-        made = replace(factory, robots=tuple(robots), operations=operations)
+        made = replace(factory, robots=tuple(robots), operations=operations, adjusted=frozenset())
         return cls(made, tuple(of))

@@ -16,6 +16,9 @@ from factory.problem.pag import NOPART
 from factory.simulation.request import RunRequest
 from factory.support.engine import mujoco
 
+LEVEL = 5e-4
+"""A lift is where it is to be for a part within this [m]."""
+
 HOME = 1e-3
 """A robot is at home within this [m]."""
 
@@ -39,6 +42,12 @@ class Passing:
         settings = request.settings
         fastest = settings.speed * (1 + request.jitter)
         self._fastest = SpeedProfile(fastest, settings.acceleration)
+        lifts = [(n, robot) for n, robot in enumerate(carriers) if robot in factory.adjusted]
+        self._adjusted = np.array([n for n, _ in lifts], np.intp)
+        joints = [m.joint(names.lift(factory.robots[robot].name)).id for _, robot in lifts]
+        self._lift = m.jnt_qposadr[joints] if joints else np.zeros(0, np.intp)
+        at = [layout.level(robot, factory.leaves[n].index).up for n, robot in lifts]
+        self._level = np.array(at)
         self._fed: dict[int, list[int]] = {}
         for number, robot in enumerate(carriers):
             self._fed.setdefault(robot, []).append(number)
@@ -59,6 +68,8 @@ class Passing:
         its hand has to be there first, rests at home without one."""
         at, still = self._d.qpos[self._address], np.abs(self._d.qvel[self._dof]) < STILL
         home = ~self.holds & still & (at >= self._home - HOME)
+        level = np.abs(self._d.qpos[self._lift] - self._level) < LEVEL
+        home[self._adjusted] &= level
         return np.asarray(np.where(self._first, home, ~self.holds | (at <= self._clear)))
 
     def soonest(self, number: int) -> float:
