@@ -22,8 +22,9 @@ from factory.layout.hands.apart import BESIDE
 from factory.layout.hands.hand import Hand, Kind, Point3
 from factory.layout.hands.holding import Holding, held
 from factory.layout.hands.in_the_way import InTheWay
-from factory.layout.hands.lines import LineHands
+from factory.layout.hands.lines import Fit, LineHands
 from factory.layout.hands.places import PUSH, Places, centre_of, strain_of_two
+from factory.layout.hands.reach import back
 from factory.layout.hands.surfaces import Way
 from factory.layout.hands.tips import STRONG, TipName, tip
 from factory.layout.hands.tours import Tours
@@ -76,13 +77,14 @@ class Hands:
 
     def __init__(self, factory: Factory, product: Product, push: float = PUSH) -> None:
         self.factory, self.tours = factory, Tours.apart(factory)
-        self.holding = Holding(self.tours.factory, product, push)
+        self.holding = Holding(self.tours.factory, product, push, self.tours.turning)
         self.in_the_way = InTheWay(self.holding, self._carrier)
         adjusted = frozenset(tour for r in factory.adjusted for tour in self.tours.of[r])
         self.line_hands = LineHands(self.in_the_way, self.kinds, self._bad, adjusted)
         self._fed: dict[tuple[int, Way, Way], Hand] = {}
         self._carriers: dict[tuple[int, Way], Hand] = {}
         self._lines: dict[tuple[tuple[int, ...], object], tuple[Hand, ...]] = {}
+        self._fits: dict[int, frozenset[Fit]] = {}
         self._on = {tour: of for of in self.tours.of for tour in of}
 
     def hand(self, robot: int, u: Way, t: Way) -> Hand | None:
@@ -111,6 +113,21 @@ class Hands:
         places = [hand.places[0] for hand in self._on_line(tours, u, t)]
         found = np.round(np.array(places[:1]) - places, 6) + 0.0
         return tuple((x, y, z) for x, y, z in found.tolist())
+
+    def together(self, robots: Sequence[int]) -> bool:
+        """Whether robots with one tour each could share a hand, by estimate: in some way to lie a
+        hand of one kind holds what each of them brings. It does not know of the size of tips, nor
+        of the hands of others that are on lines."""
+        tours = [tour for robot in robots for tour in self.tours.of[robot]]
+        if any(not held(self.holding.factory, tour) for tour in tours):
+            return True
+        for tour in tours:
+            if tour not in self._fits:
+                self._fits[tour] = self.line_hands.fits(tour)
+        common = frozenset.intersection(*(self._fits[tour] for tour in tours))
+        if not any(map(self.holding.is_carrier, tours)):
+            return bool(common)
+        return any((u, back(t), kind, z) in common for u, t, kind, z in common)
 
     def carries(self, robot: int) -> bool:
         """Whether others come to a robot, with something or to work on what it holds."""

@@ -19,10 +19,16 @@ from factory.plant.factory import Factory, Operation
 class Holding:
     """The robots of a factory and the surfaces of what they hold. `on`: the carrier that each
     delivers to, -1 for none; `axis`: along which each lies, 0 for x; `push`: their acceleration
-    [m/s²]."""
+    [m/s²]; `turning`: robots that go on either way after what is delivered to them."""
 
-    def __init__(self, factory: Factory, product: Product, push: float = PUSH) -> None:
-        self.factory, self.product, self.push = factory, product, push
+    def __init__(
+        self,
+        factory: Factory,
+        product: Product,
+        push: float = PUSH,
+        turning: frozenset[int] = frozenset(),
+    ) -> None:
+        self.factory, self.product, self.push, self.turning = factory, product, push, turning
         self.surfaces = Surfaces(product)
         self.on = carriers(factory)
         self.axis = [0] * len(factory.robots)

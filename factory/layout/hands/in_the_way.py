@@ -214,12 +214,14 @@ class InTheWay:
 
     def _going_on(self, robot: int, kind: Kind, found: Places, u: Way, t: Way) -> Array:
         """How far a hand has to go back (n, k) [m] until each of the next k operations of its
-        carrier may start, which leaves along t."""
+        carrier may start, which leaves along t, or either way where it turns."""
         if self.holding.last(robot).index == self.holding.factory.dropoff.index:
             return np.zeros((len(found), 1))
         low, high = self.reach(kind, found, u)
         onward = self._met_onward(robot)
         past = retreat(low, high, onward.boxes, (back(u), back(t)))
+        if self.holding.on[robot] in self.holding.turning:
+            past = np.maximum(past, retreat(low, high, onward.boxes, (back(u), t)))
         far = np.zeros((len(found), onward.count))
         operations, begin = np.unique(onward.operations, return_index=True)
         far[:, operations] = np.maximum.reduceat(past, begin, axis=1)

@@ -32,6 +32,10 @@ Frames = Sequence[tuple[Way, Way]]
 """How a robot may lie: along u, to a carrier that lies along t."""
 
 
+Fit = tuple[Way, Way, Kind, float]
+"""A way to hold a label: u, t, the kind of hand, and the height of its tip."""
+
+
 @dataclass(frozen=True, eq=False, slots=True)
 class Options:
     """The places (n,) at which one label can be held by a tip of one size, clear of everything; if
@@ -64,6 +68,24 @@ class LineHands:
     def common(self, tours: Sequence[int]) -> list[Kind]:
         """The kinds that are tried for all tours, the first of them first."""
         return [k for k in self.kinds(tours[0]) if all(k in self.kinds(t) for t in tours)]
+
+    def fits(self, tour: int) -> frozenset[Fit]:
+        """In which ways a hand of a line could hold the label of a tour: how its robot lies, of
+        what kind it is, and at which height, for one that a lift would take anywhere 0 [m]."""
+        holding, found, label = self.in_the_way.holding, set[Fit](), self._label(tour)
+        by_heading: dict[Way, list[tuple[Way, Way]]] = {}
+        for u, t in holding.frames(tour):
+            by_heading.setdefault(u if holding.is_carrier(tour) else (*u, *t), []).append((u, t))
+        for frames in by_heading.values():
+            for kind in self.kinds(tour):
+                if self.in_the_way.possible(tour, label, kind, frames):
+                    at = self.in_the_way.on_side(label, kind, frames)
+                    checks, _ = self.in_the_way.checks(tour, label, kind, at, frames)
+                    free = np.logical_and.reduce([*checks.values(), np.ones(len(at), bool)])
+                    lifted = tour in holding.factory.strokes or kind == "behind"
+                    heights = np.unique(np.round(at.at[free, 2], 4)) * (not lifted)
+                    found |= {(u, t, kind, z) for u, t in frames for z in heights.tolist()}
+        return frozenset(found)
 
     def chosen(self, tours: Sequence[int], frames: Frames) -> tuple[Hand, ...]:
         """The hand in its place on the label of each tour, the best of the first kind for which

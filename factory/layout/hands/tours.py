@@ -14,10 +14,12 @@ from factory.plant.factory import Factory, Robot
 @dataclass(frozen=True, slots=True)
 class Tours:
     """A `factory` with a robot for each tour of another; `of`: for each robot of that the robots
-    of its tours."""
+    of its tours; `turning`: those of robots that go back to where they have been before, since one
+    that delivers there comes again."""
 
     factory: Factory
     of: tuple[tuple[int, ...], ...]
+    turning: frozenset[int] = frozenset()
 
     @classmethod
     def apart(cls, factory: Factory) -> Tours:
@@ -36,4 +38,15 @@ class Tours:
             for o in factory.operations
         )
         made = replace(factory, robots=tuple(robots), operations=operations, adjusted=frozenset())
-        return cls(made, tuple(of))
+        turning = (
+            tour for robot in factory.robots if _turns(factory, robot) for tour in of[robot.index]
+        )
+        return cls(made, tuple(of), frozenset(turning))
+
+
+def _turns(factory: Factory, robot: Robot) -> bool:
+    """Whether some robot delivers to a robot more than once, or works on what it holds."""
+    operations = (factory.operations[number] for number in robot.operations)
+    guests = [g for o in operations if o.carrier == robot.index for g in o.robots]
+    others = [guest for guest in guests if guest != robot.index]
+    return len(set(others)) < len(others)
