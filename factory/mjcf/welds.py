@@ -68,7 +68,7 @@ def grip_position(
     path = layout.guidepaths[robot]
     at = path.middle(0.0)
     foot = path.carriage(0.0)
-    (begins, *_) = bodies.tour(layout.factory, robot, label)
+    begins, *_ = layout.factory.tours[robot][layout.factory.tour_with(robot, label)]
     more = layout.shift(robot, begins)
     middle = (at[0] + more[0] - foot[0], at[1] + more[1] - foot[1])
     x, y, z = place_in(layout.product, bodies.centre[label], middle, layout.held_at(robot, begins))

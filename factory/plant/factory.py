@@ -211,6 +211,14 @@ class Factory:
             found.append(operation.before[operation.robots.index(robot)])
         return tuple(label for label in found if label != NOPART)
 
+    def tour_with(self, robot: int, label: str) -> int:
+        """Which of its tours a robot (index) holds a part on, or what it makes of parts."""
+        if len(self.tours[robot]) == 1:
+            return 0
+        parts = {*self.contents.get(label, (label,))}
+        brought = [{*self.contents[label]} for label in self.deliveries(robot)]
+        return next(number for number, inside in enumerate(brought) if parts <= inside)
+
     @cached_property
     def contents(self) -> Mapping[str, tuple[str, ...]]:
         """For each label that is carried: the labels of its parts. Quadratic in a chain; only for

@@ -75,15 +75,6 @@ class FusedBodies:
                     found.update(dict.fromkeys(self.carried[label]))
         return tuple(found)
 
-    def tour(self, factory: Factory, robot: int, body: str) -> tuple[int, ...]:
-        """The operations of the tour on which a robot (index) holds a body."""
-        parts = {*self.parts(body)}
-        for tour in factory.tours[robot][:-1]:
-            last = factory.operations[tour[-1]]
-            if parts <= {*factory.contents[last.before[last.robots.index(robot)]]}:
-                return tour
-        return factory.tours[robot][-1]
-
     def meeting(self, factory: Factory, pair: tuple[str, str]) -> tuple[Inside, Inside]:
         """Two parts, each with the body that it belongs to just before the operation that joins
         them."""

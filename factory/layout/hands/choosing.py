@@ -148,17 +148,14 @@ class Hands:
     def _on_line(self, tours: tuple[int, ...], u: Way, t: Way | None) -> tuple[Hand, ...]:
         """The hand of a line in its place on the label of each of its tours, where that can be."""
         carries = any(map(self.holding.is_carrier, tours))
-        if carries or t is None:
-            frames, key = self._sides(tours[0], u), (u,)
-        else:
-            frames, key = ((u, t),), (u, t)
-        found = self._lines.get((tours, key))
+        frames = self._sides(tours[0], u) if carries or t is None else ((u, t),)
+        found = self._lines.get((tours, frames))
         if found is None:
             found = self.line_hands.chosen(tours, frames)
             if not found:
                 none = self._nowhere(held(self.holding.factory, tours[0]))
                 found = (none,) * len(tours)
-            self._lines[tours, key] = found
+            self._lines[tours, frames] = found
         return found
 
     def _carrier(self, robot: int, u: Way) -> Hand:

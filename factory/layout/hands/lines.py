@@ -37,7 +37,7 @@ Fit = tuple[Way, Way, Kind, float]
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Options:
+class Candidates:
     """The places (n,) at which one label can be held by a tip of one size, clear of everything; if
     the hand has to be there `first` (n,), how far it `waits` (n, k) for each later operation [m],
     and how `bad` each is by suction and by a pin (2, n), inf where it is too weak."""
@@ -47,9 +47,9 @@ class Options:
     waits: Array
     bad: Array
 
-    def among(self, chosen: Index | Truth) -> Options:
+    def among(self, chosen: Index | Truth) -> Candidates:
         """Some of them."""
-        return Options(
+        return Candidates(
             self.found.chosen(chosen), self.first[chosen], self.waits[chosen], self.bad[:, chosen]
         )
 
@@ -73,7 +73,7 @@ class LineHands:
         """In which ways a hand of a line could hold the label of a tour: how its robot lies, of
         what kind it is, and at which height, for one that a lift would take anywhere 0 [m]."""
         holding, found, label = self.in_the_way.holding, set[Fit](), self._label(tour)
-        by_heading: dict[Way, list[tuple[Way, Way]]] = {}
+        by_heading: dict[tuple[float, ...], list[tuple[Way, Way]]] = {}
         for u, t in holding.frames(tour):
             by_heading.setdefault(u if holding.is_carrier(tour) else (*u, *t), []).append((u, t))
         for frames in by_heading.values():
@@ -90,7 +90,7 @@ class LineHands:
     def chosen(self, tours: Sequence[int], frames: Frames) -> tuple[Hand, ...]:
         """The hand in its place on the label of each tour, the best of the first kind for which
         there is one that is not bad at all, or that is least bad; nothing where there is none."""
-        best, least = (), np.inf
+        best, least = tuple[Hand, ...](), np.inf
         for kind in self.common(tours):
             for cost, hands in self._of_kind(kind, tours, frames):
                 if cost < least:
@@ -140,7 +140,7 @@ class LineHands:
     def _label(self, tour: int) -> str:
         return held(self.in_the_way.holding.factory, tour)
 
-    def _options(self, kind: Kind, tour: int, frames: Frames, radius: float) -> Options:
+    def _options(self, kind: Kind, tour: int, frames: Frames, radius: float) -> Candidates:
         """The places at which a tip of some radius holds the label of a tour, and is clear."""
         label = self._label(tour)
         found = self.in_the_way.on_side(label, kind, frames, radius)
@@ -148,14 +148,14 @@ class LineHands:
         free = np.logical_and.reduce([*checks.values(), np.ones(len(found), bool)])
         clear = found.chosen(free)
         waits = self.in_the_way.waits(tour, kind, clear, frames)
-        return Options(clear, first[free], waits, self.bad(tour, kind, clear, waits))
+        return Candidates(clear, first[free], waits, self.bad(tour, kind, clear, waits))
 
     def _hands(
         self,
         kind: Kind,
         tours: Sequence[int],
         frames: Frames,
-        chosen: tuple[TipName, Sequence[Options]],
+        chosen: tuple[TipName, Sequence[Candidates]],
     ) -> tuple[Hand, ...]:
         """One hand, in its place on each label."""
         tip, options = chosen
@@ -192,11 +192,11 @@ class LineHands:
 
 
 def _level(
-    options: Sequence[Options], u: Way, t: Way, lifted: bool
-) -> tuple[float, tuple[TipName, list[Options]]]:
+    options: Sequence[Candidates], u: Way, t: Way, lifted: bool
+) -> tuple[float, tuple[TipName, list[Candidates]]]:
     """Of places that are at one height for all labels, or at any for a robot that is `lifted`, the
     least bad, and how bad they are together; inf where there is no such height."""
-    best: tuple[float, tuple[TipName, list[Options]]] = np.inf, ("suction", [])
+    best: tuple[float, tuple[TipName, list[Candidates]]] = np.inf, ("suction", [])
     heights = np.unique(np.round(options[0].found.at[:, 2], 5)).tolist()
     for height in heights[:1] if lifted else heights:
         level = [o.among((np.abs(o.found.at[:, 2] - height) <= LEVEL) | lifted) for o in options]
@@ -214,7 +214,7 @@ def _level(
     return best
 
 
-def _together(options: Sequence[Options], u: Way, t: Way) -> list[Options]:
+def _together(options: Sequence[Candidates], u: Way, t: Way) -> list[Candidates]:
     """For each label one of its places: such that the carrier stands in one place for all of them
     if that can be, and then in the middle of the label."""
     across = [option.found.at[:, :2] @ np.array(t) for option in options]

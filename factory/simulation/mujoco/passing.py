@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
-from factory.control.mode import STILL, Truth
+from factory.control.mode import STILL, Array, Index, Truth
 from factory.control.profile import SpeedProfile
 from factory.layout.feeding import passing
 from factory.mjcf import names
@@ -21,6 +22,30 @@ LEVEL = 5e-4
 
 HOME = 1e-3
 """A robot is at home within this [m]."""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class _Lifts:
+    """The lifts that are set for each label: the `numbers` (k,) of those labels, the `address` (k,)
+    of each lift's position, and where it is to be (`level`) [m]."""
+
+    numbers: Index
+    address: Index
+    level: Array
+
+    @classmethod
+    def of(cls, m: mujoco.MjModel, model: Model) -> _Lifts:
+        """Those of a model."""
+        factory, layout = model.factory, model.layout
+        leaves = [(n, o) for n, o in enumerate(factory.leaves) if o.carrier in factory.adjusted]
+        lifts = [m.joint(names.lift(factory.robots[o.carrier].name)).id for _, o in leaves]
+        level = [layout.level(o.carrier, o.index).up for _, o in leaves]
+        numbers = np.array([n for n, _ in leaves], np.intp)
+        return cls(numbers, m.jnt_qposadr[np.array(lifts, np.intp)], np.array(level))
+
+    def narrow(self, home: Truth, d: mujoco.MjData) -> None:
+        """Robots are at home for a label (n,) only where their lifts are at its height."""
+        home[self.numbers] &= np.abs(d.qpos[self.address] - self.level) < LEVEL
 
 
 class Passing:
@@ -42,12 +67,7 @@ class Passing:
         settings = request.settings
         fastest = settings.speed * (1 + request.jitter)
         self._fastest = SpeedProfile(fastest, settings.acceleration)
-        lifts = [(n, robot) for n, robot in enumerate(carriers) if robot in factory.adjusted]
-        self._adjusted = np.array([n for n, _ in lifts], np.intp)
-        joints = [m.joint(names.lift(factory.robots[robot].name)).id for _, robot in lifts]
-        self._lift = m.jnt_qposadr[joints] if joints else np.zeros(0, np.intp)
-        at = [layout.level(robot, factory.leaves[n].index).up for n, robot in lifts]
-        self._level = np.array(at)
+        self._lifts = _Lifts.of(m, model)
         self._fed: dict[int, list[int]] = {}
         for number, robot in enumerate(carriers):
             self._fed.setdefault(robot, []).append(number)
@@ -68,8 +88,7 @@ class Passing:
         its hand has to be there first, rests at home without one."""
         at, still = self._d.qpos[self._address], np.abs(self._d.qvel[self._dof]) < STILL
         home = ~self.holds & still & (at >= self._home - HOME)
-        level = np.abs(self._d.qpos[self._lift] - self._level) < LEVEL
-        home[self._adjusted] &= level
+        self._lifts.narrow(home, self._d)
         return np.asarray(np.where(self._first, home, ~self.holds | (at <= self._clear)))
 
     def soonest(self, number: int) -> float:
