@@ -153,6 +153,19 @@ def test_it_makes_units_and_touches_nothing_else(name: str, distributed: bool) -
     assert all(p.depth_mm < AT_MOST_MM for p in deep), deep
 
 
+def test_without_hands_front_ends_are_in_one_place() -> None:
+    layout = project("shelf", hands=0).layout
+    assert not layout.hands and certify(layout).holds
+    robot = next(r for r, tours in enumerate(layout.factory.tours) if tours[1:])
+    path, fronts = layout.guidepaths[robot], set[float]()
+    for tour, label in zip(layout.factory.tours[robot], layout.magazine(robot), strict=True):
+        fronts.add(round(path.frame(layout.held(robot, tour[0], label))[1], 6))
+    assert len(fronts) == 1
+    run = run_of(layout)
+    assert run.succeeded, run.verdict.failures
+    assert run.physics is not None and run.physics.unintended_contacts == 0
+
+
 def test_the_carrier_stands_where_each_label_comes() -> None:
     layout = project("blocks").layout
     robot, _ = of_line(layout)

@@ -116,6 +116,8 @@ def oriented_shape(
         return project(payloads[factory.operations[number].label], *frame)
 
     boxes = {number: lies(number) for number in carried(factory, robot)}
+    shifts = _fronts(factory, robot, boxes)
+    boxes = {number: moved(box, shifts.get(number, NONE)[:2]) for number, box in boxes.items()}
     last, tool = _last(factory, robot, boxes), is_tool(factory, robot)
     lane, belt = 0.0, c.c - last[0]
     if carrier >= 0:
@@ -128,7 +130,21 @@ def oriented_shape(
     offset, nest = round((held[2] + held[3]) / 2, 3), round((held[0] + held[1]) / 2, 3)
     spread = c.spread if robot in wide else 0.0
     reach = up(c.reach(arm, lane))
-    return Shape(boxes, last, offset, arm, reach, nest, tool, spread, post=offset)
+    return Shape(
+        boxes, last, offset, arm, reach, nest, tool, spread, post=offset, shifts=shifts
+    )
+
+
+def _fronts(factory: Factory, robot: int, boxes: Mapping[int, Extent]) -> dict[int, Point3]:
+    """By operation how far ahead a robot that brings several parts, one by one, and has no hand
+    holds them: their front ends are in one place, so that it goes no further for one than it has
+    to; nothing for others."""
+    tours = factory.tours[robot]
+    if len(tours) == 1 or any(len(tour) != 2 for tour in tours) or is_tool(factory, robot):
+        return {}
+    front = max(boxes[tour[0]][1] for tour in tours)
+    ahead = {tour: round(front - boxes[tour[0]][1], 6) for tour in tours}
+    return {number: (ahead[tour], 0.0, 0.0) for tour in tours for number in tour}
 
 
 def held_shape(
