@@ -130,9 +130,7 @@ def oriented_shape(
     offset, nest = round((held[2] + held[3]) / 2, 3), round((held[0] + held[1]) / 2, 3)
     spread = c.spread if robot in wide else 0.0
     reach = up(c.reach(arm, lane))
-    return Shape(
-        boxes, last, offset, arm, reach, nest, tool, spread, post=offset, shifts=shifts
-    )
+    return Shape(boxes, last, offset, arm, reach, nest, tool, spread, post=offset, shifts=shifts)
 
 
 def _fronts(factory: Factory, robot: int, boxes: Mapping[int, Extent]) -> dict[int, Point3]:
