@@ -132,7 +132,12 @@ class Project:
         from factory.compiler.mating.mating import judged
 
         factory = judged(self.compiled, self.product)
-        return fold(factory, lines_of_labels(factory, lines), self.catalogue)
+        factory = fold(factory, lines_of_labels(factory, lines), self.catalogue)
+        if not self.settings.hands:
+            return factory
+        from factory.layout.hands.adjusting import with_lifts
+
+        return with_lifts(factory, self.product, self.catalogue, self.settings.acceleration)
 
     @cached_property
     def compiled(self) -> Factory:

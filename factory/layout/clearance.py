@@ -222,11 +222,12 @@ def _raised(layout: Layout, found: Mapping[str, Pile]) -> Iterator[Fault]:
         if operation.lowered < 0:
             continue
         guest = operation.robots[operation.lowered]
-        low = found[operation.before[operation.lowered]].z[0] + layout.elevations[guest]
+        low = found[operation.before[operation.lowered]].z[0]
+        low += layout.elevation(guest, operation.index)
         for robot, label in zip(operation.robots, operation.before, strict=True):
             if robot == guest or label == NOPART:
                 continue
-            over = low - found[label].z[1] - layout.elevations[operation.carrier]
+            over = low - found[label].z[1] - layout.elevation(operation.carrier, operation.index)
             if over < MARGIN - TOLERANCE:
                 name = layout.factory.robots[guest].name
                 message = (
@@ -241,7 +242,8 @@ def _way(layout: Layout, found: Mapping[str, Pile], operation: Operation, slot: 
     """What a robot's payload sweeps in a mode before its gate opens."""
     robot = operation.robots[slot]
     label = operation.before[slot]
-    pile = found[label].raised(layout.elevations[robot])
+    pile = found[label].raised(layout.elevation(robot, operation.index))
+    pile = pile.moved(layout.shift(robot, operation.index))
     start, end = layout.legs[operation.index, robot]
     end += layout.standoff(operation, slot)
     box = layout.guidepaths[robot].sweep(pile.box, max(start, end), end)

@@ -70,7 +70,7 @@ class Checked:
         }
 
     def _allocation(self) -> dict[str, Any]:
-        """Which robots serve several labels, how few could do, and a live order of the operations."""
+        """Which robots serve several labels, how few could do, and a live order."""
         if self.factory is None or self.least is None:
             return {}
         factory = self.factory

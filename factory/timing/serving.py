@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 
 from factory.control.profile import SpeedProfile
+from factory.layout.feeding import feeder_of, passing
 from factory.layout.layout import Layout
 from factory.layout.outfeed import away
 from factory.nets.ways import Way
@@ -58,12 +59,12 @@ def turn_ways(layout: Layout, settings: Settings) -> dict[Way, float]:
 
 def _down(layout: Layout, leaf: Operation, settings: Settings) -> float:
     """How long a slider takes for its stroke [s]."""
-    return SpeedProfile(*settings.feeder_limits).rest(layout.feeder(leaf.label).stroke)
+    return SpeedProfile(*settings.feeder_limits).rest(feeder_of(layout, leaf.label).stroke)
 
 
 def _late(layout: Layout, leaf: Operation, before: int, settings: Settings) -> float:
     """How long a part comes down after its robot could be home from the operation before [s]."""
-    path, way = layout.guidepaths[leaf.carrier], layout.passing(leaf)
+    path, way = layout.guidepaths[leaf.carrier], passing(layout, leaf)
     beyond = path.length - layout.legs[before, leaf.carrier][1] - way
     early = SpeedProfile(settings.speed, settings.acceleration).landing(max(beyond, 0.0))
     return max(_down(layout, leaf, settings) - early, 0.0)
