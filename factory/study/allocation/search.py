@@ -36,10 +36,11 @@ SINGLE, ESTIMATED, SHARED = 0.3, 0.5, 0.8
 """Shares of the time after which nothing more is tried with a robot for each label, nothing more is
 estimated, and no more estimates are laid out."""
 
-Seen = Callable[[Candidate], None]
+Seen = Callable[[Candidate, Candidate], None]
+"""Told of each candidate, and of the best so far."""
 
 
-def allocated(project: Project, aim: Aim, seen: Seen = lambda _: None) -> Project:
+def allocated(project: Project, aim: Aim, seen: Seen = lambda *_: None) -> Project:
     """The project with forms and lines chosen for an aim: as few robots as found for a cycle time,
     or the shortest cycle time found with so many robots; `project` itself where it asks for
     neither. Where nothing found is fast enough, with relays. Each candidate is `seen`. Raises
@@ -85,14 +86,14 @@ class Search:
         troubles = max(0, one.troubles - self.written.troubles)
         return self.aim.rank(one.robots, one.seconds, troubles)
 
-    def look(self, seen: Seen = lambda _: None) -> None:
+    def look(self, seen: Seen = lambda *_: None) -> None:
         """For forms and lines, as long as there is time and something better may be found. Each
         candidate is `seen`."""
-        seen(self.written)
+        seen(self.written, self.best)
         for found in (self._singles(), self._shared()):
             for one in found:
-                seen(one)
                 self._judge(one)
+                seen(one, self.best)
         while self._better(self._changed(), seen):
             pass
 
@@ -141,8 +142,9 @@ class Search:
             one = next(changed, None)
             if one is None or self.late():
                 return False
-            seen(one)
-            if self._judge(one):
+            better = self._judge(one)
+            seen(one, self.best)
+            if better:
                 return True
         return False
 
