@@ -14,7 +14,7 @@ from factory.commands.outputs import writable_folder
 from factory.commands.requests import OutputOptions, ProjectOptions
 from factory.commands.warnings import announced
 from factory.support.console import emit, say, table
-from factory.support.errors import Diagnostic, StoppedError
+from factory.support.errors import Diagnostic, InputError, StoppedError
 
 if TYPE_CHECKING:
     from factory.pipeline import Project
@@ -64,10 +64,13 @@ def pareto(
     point that was run fails, or is further than 3 % from its prediction."""
     from factory.study.pareto import Effort
 
+    if trials and not layouts:
+        message = "without layouts there is nothing to run"
+        raise InputError(Diagnostic("Usage", message, None, "leave out --validate or --no-layouts"))
     writable_folder(output)
     project = given.project(out.silent)
     warnings = announced(project.warnings, out)
-    front, stopped = _found(project, Effort(layouts, given.effort), trials if layouts else 0, out)
+    front, stopped = _found(project, Effort(layouts, given.effort), trials, out)
     commands, files = _written(front, project, output)
     if out.as_json:
         points = zip(front.points, commands, strict=True)

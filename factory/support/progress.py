@@ -129,8 +129,7 @@ class Steps(Waiting):
         if self.bar is not None:
             if self.bar.tasks[0].description != what:
                 self.bar.reset(self.task, total=total)
-            fields = {"description": what, "total": total, "completed": done, "words": words}
-            self.bar.update(self.task, **fields)
+            self.bar.update(self.task, total=total, completed=done, description=what, words=words)
         self.what = f"{what}: {words}"
 
 

@@ -16,7 +16,7 @@ from factory.study.pareto.point_files import point_name
 from factory.support.canvas import Canvas, Point
 
 PAGE = (0.0, 640.0, 0.0, 400.0)
-FIELD = (52.0, 622.0, 16.0, 356.0)
+FIELD = (52.0, 622.0, 26.0, 356.0)
 """Where the points are on the page."""
 
 LETTERS = 12.0
@@ -110,6 +110,8 @@ class _Chart:
             self.canvas.circle(self._at(written), DOT + 3, "written", title=told)
         for number, point in enumerate(self.front.points):
             self._point(point_name(number), point)
+        for number, point in enumerate(self.front.points):
+            self.canvas.place(self._at(point), point_name(number), LETTERS, DOT + 1, "label")
         return self.canvas.embedded("chart", PAGE, aria_label=f"{self.name} against robots")
 
     def _at(self, point: FrontPoint) -> Point:
@@ -130,13 +132,12 @@ class _Chart:
                 self.canvas.line("grid", (left, before), (right, before))
                 self.canvas.text((left - 7, before), f"{value:g}", LETTERS, "mark", "end")
         self.canvas.text((right, bottom + 32), "robots, tools included", LETTERS, "axis", "end")
-        self.canvas.text((left + 6, top + 2), self.name, LETTERS, "axis")
+        self.canvas.text((left, top - 14), self.name, LETTERS, "axis")
 
     def _bound(self, work: float) -> None:
         """The part of the line work / robots that is on the page."""
-        first, last = (
-            min(max(work / y, self.x.low), self.x.high) for y in (self.y.high, self.y.low)
-        )
+        ends_at = work / self.y.high, work / self.y.low
+        first, last = (min(max(robots, self.x.low), self.x.high) for robots in ends_at)
         if first < last:
             ends = [(self.x.at(robots), self.y.at(work / robots)) for robots in (first, last)]
             self.canvas.line("bound", *ends)
@@ -159,7 +160,6 @@ class _Chart:
         with _link(self.canvas, f"#{name}"):
             self.canvas.circle(at, DOT, style, title=f"{name}: {point}")
         self.canvas.block((at[0] - DOT, at[0] + DOT, at[1] - DOT, at[1] + DOT))
-        self.canvas.place(at, name, LETTERS, DOT + 1, "label")
 
 
 @contextmanager

@@ -136,7 +136,7 @@ def _row(name: str, point: FrontPoint) -> str:
         _figure(point.seconds, "s"),
         _figure(point.bound, "s"),
         _figure(point.area, "m²"),
-        _figure(trial and trial.measured, "s"),
+        _figure(trial.measured if trial else None, "s"),
         _figure(trial.predicted if trial else None, "s"),
         "" if trial is None else "failed" if trial.error is None else f"{100 * trial.error:+.1f} %",
     )

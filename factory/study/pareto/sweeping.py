@@ -1,10 +1,11 @@
 """Look for the front of a product: robots, cycle time, floor.
 
-What is swept: forms that are best by estimate under bounds of cycles from long to short, a robot for
-each label, lines filled for cycles from short to long, and the product as it is written. The
-forms of the best are estimated with one changed, too. The estimates that no other is as good as are
-laid out, then those next to them, since estimates are off by up to half; the fastest with a robot
-for each label also with relays. What is on the front is then decided by certified layouts.
+What is swept: forms that are best by estimate under bounds of cycles from long to short, and those
+of the product as it is written; for each a robot for each label, and lines filled for cycles from
+short to long. The forms of the best are estimated with one changed, too. The estimates that no
+other is as good as are laid out, then those next to them, since estimates are off by up to half;
+the fastest with a robot for each label also with relays. What is on the front is then decided by
+certified layouts.
 """
 
 from __future__ import annotations
@@ -49,8 +50,9 @@ NEXT = 1.5
 EACH = 3
 """So many estimates with one number of robots are laid out."""
 
-RELAYED = 4
-"""So many of the fastest factories with a robot for each label are tried with relays."""
+RELAYED = 6
+"""So many of the fastest factories with a robot for each label, each with other robots, are tried
+with relays."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,7 +86,7 @@ Seen = Callable[[Step], None]
 def pareto(
     project: Project,
     effort: Effort = Effort(),
-    seen: Seen = lambda _: None,  # noqa: B008 (frozen)
+    seen: Seen = lambda _: None,
 ) -> ParetoFront:
     """The front that is found of a project's product, with its settings. Each step is `seen`.
     Raises InputError, RunError where the product as it is written has neither factory nor
@@ -201,9 +203,11 @@ class FrontSweep:
     def _relay(self) -> bool:
         """Lay out the fastest with a robot for each label anew, with relays; whether there was time
         for all of it."""
-        plain = [one for one in self.estimates if one.target is None]
-        fast = sorted(plain[1:], key=lambda one: one.seconds)[:RELAYED]
-        every = [self._candidate(one) for one in (*plain[:1], *fast)]
+        plain = sorted(
+            (one for one in self.estimates if one.target is None), key=lambda one: -one.seconds
+        )
+        fast = {one.robots: one for one in plain}.values()  # of those with as many robots the best
+        every = [*map(self._candidate, sorted(fast, key=lambda one: one.seconds)[:RELAYED])]
         for number, one in enumerate(every):
             if self.late():
                 return False
