@@ -17,14 +17,14 @@ from hypothesis import strategies as st
 
 from factory.pipeline import Project, read
 from factory.show.pareto import floor_plans, front_page
-from factory.show.pareto.chart import Axis, cycle_chart
+from factory.show.pareto.chart import ChartAxis, cycle_chart
 from factory.study.allocation.least import least_robots
 from factory.study.pareto import Effort, FrontPoint, FrontSweep, ParetoFront, pareto, sweeping
 from factory.study.pareto.front import undominated
 from factory.study.pareto.point_files import commands_of, point_files
 from factory.study.pareto.trial import Trial, tried
 from factory.support import progress
-from factory.support.progress import Steps
+from factory.support.progress import StepBar
 from factory.support.settings import Settings
 from tests.command_line import PAPER, ROOT, Terminal, files_in
 from tests.report_values import EVIL
@@ -234,7 +234,7 @@ def test_a_page_without_layouts(front: ParetoFront, tmp_path: Path) -> None:
 
 def test_axes_have_enough_marks(front: ParetoFront) -> None:
     for values in ([3, 6], [3, 57], [2.5, 3.6], [0.2, 40.0], [7, 7], [1, 1000]):
-        axis = Axis.over(values, 0, 100)
+        axis = ChartAxis.over(values, 0, 100)
         marks = axis.marks()
         assert marks == sorted(marks)
         assert all(0 <= axis.at(mark) <= 100 for mark in marks)
@@ -290,11 +290,11 @@ def test_without_layouts_there_is_nothing_to_run(run: Terminal) -> None:
 def test_a_search_that_is_stopped_keeps_what_it_has(
     run: Terminal, out: Path, monkeypatch: pytest.MonkeyPatch, after: str
 ) -> None:
-    def stop(_: Steps, what: str, done: int, *words: object) -> None:
+    def stop(_: StepBar, what: str, done: int, *words: object) -> None:
         if what == after and (done > 1 or "running" in what):
             raise KeyboardInterrupt
 
-    monkeypatch.setattr(Steps, "show", stop)
+    monkeypatch.setattr(StepBar, "show", stop)
     words = "pareto", PAPER, "--no-hands", "--validate", 1, "-o", out / "front", "--json"
     done = run(*words)
     assert done.status == 130, done.err
@@ -331,7 +331,7 @@ class Screen(io.StringIO):
 def test_a_search_shows_how_far_it_is(run: Terminal, monkeypatch: pytest.MonkeyPatch) -> None:
     screen = Screen()
     monkeypatch.setattr(sys, "stderr", screen)
-    with Steps("looking") as steps:
+    with StepBar("looking") as steps:
         steps.show("laying out", 3, 12, "5 points")
         steps.show("running", 1, None)
         time.sleep(0.2)
@@ -339,7 +339,7 @@ def test_a_search_shows_how_far_it_is(run: Terminal, monkeypatch: pytest.MonkeyP
     lines = io.StringIO()
     monkeypatch.setattr(sys, "stderr", lines)
     monkeypatch.setattr(progress, "LINES", 0.01)
-    with Steps("looking") as steps:
+    with StepBar("looking") as steps:
         steps.show("laying out", 3, 12, "5 points")
         time.sleep(0.1)
     assert "laying out: 3 of 12, 5 points, " in lines.getvalue()
@@ -349,7 +349,7 @@ def test_a_search_for_few_robots_shows_the_best(
     run: Terminal, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     told: list[str] = []
-    monkeypatch.setattr(Steps, "show", lambda _, what, *words: told.append(f"{what} {words}"))
+    monkeypatch.setattr(StepBar, "show", lambda _, what, *words: told.append(f"{what} {words}"))
     assert run("check", PAPER, "--robots", "least", "--no-hands").status == 0
     assert "looking for few robots" in told[-1]
     assert re.search(r"best: 3 robots, \d\.\d\d s", told[-1])
@@ -359,7 +359,7 @@ def test_a_search_for_few_robots_can_be_stopped(run: Terminal, monkeypatch) -> N
     def stop(*_: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(Steps, "show", stop)
+    monkeypatch.setattr(StepBar, "show", stop)
     done = run("check", PAPER, "--robots", "least", "--json")
     assert done.status == 130
     assert done.codes == ["Interrupted"]

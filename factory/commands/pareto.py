@@ -95,10 +95,10 @@ def _found(
     after a point had been found."""
     from factory.study.pareto import FrontSweep
     from factory.study.pareto.trial import tried
-    from factory.support.progress import Steps
+    from factory.support.progress import StepBar
 
     front = None
-    with Steps("looking for the front", out.silent) as bar:
+    with StepBar("looking for the front", out.silent) as bar:
 
         def seen(step: Step) -> None:
             bar.show(step.what, step.done, step.total, f"{step.points} points" * bool(step.points))

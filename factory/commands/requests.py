@@ -88,10 +88,10 @@ class ProjectOptions:
             return project
         from factory.study.allocation.aim import SECONDS, Aim
         from factory.study.allocation.search import allocated
-        from factory.support.progress import Steps
+        from factory.support.progress import StepBar
 
         aim, looked_at = Aim(self.robots, self.cycle, self.effort or SECONDS), count(1)
-        with Steps(f"looking for few robots, {aim.seconds:g} s at most", silent) as steps:
+        with StepBar(f"looking for few robots, {aim.seconds:g} s at most", silent) as steps:
 
             def seen(_: Candidate, best: Candidate) -> None:
                 steps.show("looking for few robots", next(looked_at), None, f"best: {best}")

@@ -104,7 +104,7 @@ class Waiting(ProgressBar):
             print(f"{self.what}, {perf_counter() - self.begin:.0f} s so far", file=sys.stderr)
 
 
-class Steps(Waiting):
+class StepBar(Waiting):
     """Waiting in steps: says what goes on, how many of how many are done, and the time left."""
 
     def drawn(self) -> tuple[Bar, TaskID]:

@@ -38,7 +38,7 @@ MARKS = 4
 
 
 @dataclass(frozen=True, slots=True)
-class Axis:
+class ChartAxis:
     """A logarithmic axis from `low` to `high`, drawn from `start` to `end`."""
 
     low: float
@@ -47,7 +47,7 @@ class Axis:
     end: float
 
     @classmethod
-    def over(cls, values: Sequence[float], start: float, end: float) -> Axis:
+    def over(cls, values: Sequence[float], start: float, end: float) -> ChartAxis:
         """One with room for values."""
         return cls(min(values) / ROOM, max(values) * ROOM, start, end)
 
@@ -93,9 +93,9 @@ class _Chart:
         self.canvas = Canvas()
         shown = [*front.points, *([front.written] if front.written else [])]
         left, right, top, bottom = FIELD
-        self.x = Axis.over([point.robots for point in shown], left, right)
+        self.x = ChartAxis.over([point.robots for point in shown], left, right)
         bounds = [] if work is None else [work / point.robots for point in shown]
-        self.y = Axis.over([*map(figure, shown), *bounds], bottom, top)
+        self.y = ChartAxis.over([*map(figure, shown), *bounds], bottom, top)
         self.work = work
 
     def text(self) -> str:
