@@ -71,10 +71,10 @@ def allocated(project: Project, aim: Aim, seen: Seen = lambda *_: None) -> Proje
 class Search:
     """Looks for the best forms and lines for an aim; `best`: what was found."""
 
-    def __init__(self, project: Project, aim: Aim) -> None:
+    def __init__(self, project: Project, aim: Aim, estimator: Estimator | None = None) -> None:
         self.aim, self.begun = aim, monotonic()
         bare = replace(project.ground, relay=False, cycle=None)
-        self.estimator = Estimator(project.with_pag(project.pag, bare))
+        self.estimator = estimator or Estimator(project.with_pag(project.pag, bare))
         self.written = self.best = self.estimator.candidate(self.estimator.written)
 
     def late(self, share: float = 1.0) -> bool:
@@ -90,14 +90,14 @@ class Search:
         """For forms and lines, as long as there is time and something better may be found. Each
         candidate is `seen`."""
         seen(self.written, self.best)
-        for found in (self._singles(), self._shared()):
+        for found in (self.singles(), self._shared()):
             for one in found:
                 self._judge(one)
                 seen(one, self.best)
         while self._better(self._changed(), seen):
             pass
 
-    def _singles(self) -> Iterator[Candidate]:
+    def singles(self) -> Iterator[Candidate]:
         """The candidates by estimate with a robot for each label, each forms once, under bounds
         from long to short. Forms that leave a robot without a hand are refused from then on."""
         estimator, before = self.estimator, dict[str, int]()

@@ -86,9 +86,10 @@ class FrontPoint:
 
     @property
     def figures(self) -> tuple[float, ...]:
-        """What it is judged by, the less the better: robots, cycle time to 1 ms, floor to 1 cm²."""
-        area = () if self.area is None else (round(self.area, 4),)
-        return self.robots, round(self.seconds, 3), *area
+        """What it is judged by, the less the better: robots, cycle time to 10 ms, floor to 1 dm²,
+        as they are printed."""
+        area = () if self.area is None else (round(self.area, 2),)
+        return self.robots, round(self.seconds, 2), *area
 
     def beats(self, other: FrontPoint) -> bool:
         """Whether it is as good as another in everything."""

@@ -20,10 +20,12 @@ from time import monotonic
 from factory.pipeline import Project
 from factory.problem.pag import Assembly
 from factory.problem.shapes import SHAPED
+from factory.study.allocation.aim import Aim
 from factory.study.allocation.candidate import Candidate
 from factory.study.allocation.estimating import Estimate, Estimator
 from factory.study.allocation.forms import THIRD
 from factory.study.allocation.least import least_robots
+from factory.study.allocation.search import SINGLE, Search
 from factory.study.pareto.front import (
     FrontPoint,
     ParetoFront,
@@ -43,6 +45,9 @@ ESTIMATED = 0.4
 
 CHANGED = 0.15
 """The same for forms of the best with one changed."""
+
+HELD = 0.15
+"""The share of the time for forms that leave no robot without a hand."""
 
 NEXT = 1.5
 """Estimates up to so many times the cycle of the front's are laid out."""
@@ -141,7 +146,11 @@ class FrontSweep:
             if self.written is None:
                 self.project.layout  # noqa: B018 (says why there is none)
         whole = self._estimate(ESTIMATED if layouts else 1.0)
-        self.complete = (not layouts or (self._lay_out() and self._relay())) and whole
+        if layouts:
+            if self.project.settings.hands:
+                self._hold()
+            whole = self._lay_out() and self._relay() and whole
+        self.complete = whole
 
     def _estimate(self, share: float) -> bool:
         """Estimate what is swept until a share of the time is over; whether there was time for all
@@ -179,6 +188,14 @@ class FrontSweep:
         made = [self._candidate(one) for one in shares]
         found = [FrontPoint.of_estimate(*pair) for pair in zip(made, shares, strict=True)]
         self.points = undominated(found)
+
+    def _hold(self) -> None:
+        """Lay out those with a robot for each label in which each robot has a hand."""
+        aim = Aim(seconds=HELD * self.effort.limit / SINGLE)
+        search = Search(self.project, aim, self.estimator)
+        for number, one in enumerate(search.singles()):
+            self._say("fitting hands", number, None)
+            self._added(one)
 
     def _lay_out(self) -> bool:
         """Lay out what is promising; whether there was time for all of it."""
