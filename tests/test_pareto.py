@@ -267,6 +267,16 @@ def test_the_command_tells_its_points(run: Terminal, out: Path) -> None:
     assert "pareto.html" in told.out
 
 
+def test_what_fits_a_floor_is_found_where_the_product_as_written_does_not(run: Terminal) -> None:
+    done = run("pareto", PAPER, "--no-hands", "--floor", "0.7x0.39", "--json")
+    assert done.status == 0, done.err
+    assert done.json["written"] is None
+    assert {p["robots"] for p in done.json["points"]} == {5}
+    none = run("pareto", PAPER, "--no-hands", "--floor", "0.1x0.1", "--json")
+    assert none.status == 1
+    assert none.codes == ["Layout"]
+
+
 def test_a_failed_run_is_told(run: Terminal, monkeypatch: pytest.MonkeyPatch) -> None:
     failed = Trial(4, 1.0, 1.0, 1.0, ("mujoco: Contact: r1 meets r2",))
     monkeypatch.setattr("factory.study.pareto.trial.tried", lambda _: failed)

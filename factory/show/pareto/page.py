@@ -157,7 +157,7 @@ def _point(name: str, point: FrontPoint, command: str, plan: bytes | None) -> st
         picture = f'<img class="plan" alt="{alt}" src="data:image/svg+xml;base64,{data}">'
     return (
         f'<section class="panel" id="{name}" aria-labelledby="h-{name}"><div class="bar">'
-        f'<h2 id="h-{name}">{name}</h2><span class="legend">{told}</span></div>{picture}'
+        f'<h2 id="h-{name}">{name}</h2><span class="note">{told}</span></div>{picture}'
         f'<div class="text"><pre class="command">{escape(command)}</pre>'
         f"{_lines(point)}{_trial(point)}</div></section>"
     )

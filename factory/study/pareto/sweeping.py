@@ -94,8 +94,7 @@ def pareto(
     seen: Seen = lambda _: None,
 ) -> ParetoFront:
     """The front that is found of a project's product, with its settings. Each step is `seen`.
-    Raises InputError, RunError where the product as it is written has neither factory nor
-    layout."""
+    Raises InputError, RunError where no factory has a layout."""
     sweep = FrontSweep(project, effort, seen)
     sweep.look()
     return sweep.front()
@@ -143,13 +142,13 @@ class FrontSweep:
         layouts = self.effort.layouts
         if layouts:
             self.written = self._added(Candidate(self.project, self.estimator.written))
-            if self.written is None:
-                self.project.layout  # noqa: B018 (says why there is none)
         whole = self._estimate(ESTIMATED if layouts else 1.0)
         if layouts:
             if self.project.settings.hands:
                 self._hold()
             whole = self._lay_out() and self._relay() and whole
+            if not self.points:
+                self.project.layout  # noqa: B018 (says why there is none)
         self.complete = whole
 
     def _estimate(self, share: float) -> bool:
