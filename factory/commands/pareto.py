@@ -98,7 +98,7 @@ def _found(
     from factory.support.progress import StepBar
 
     front = None
-    with StepBar("looking for the front", out.silent) as bar:
+    with StepBar("looking for the front", out.silent, effort.limit) as bar:
 
         def seen(step: Step) -> None:
             bar.show(step.what, step.done, step.total, f"{step.points} points" * bool(step.points))

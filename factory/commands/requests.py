@@ -91,7 +91,7 @@ class ProjectOptions:
         from factory.support.progress import StepBar
 
         aim, looked_at = Aim(self.robots, self.cycle, self.effort or SECONDS), count(1)
-        with StepBar(f"looking for few robots, {aim.seconds:g} s at most", silent) as steps:
+        with StepBar("looking for few robots", silent, aim.seconds) as steps:
 
             def seen(_: Candidate, best: Candidate) -> None:
                 steps.show("looking for few robots", next(looked_at), None, f"best: {best}")

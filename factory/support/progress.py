@@ -105,7 +105,12 @@ class Waiting(ProgressBar):
 
 
 class StepBar(Waiting):
-    """Waiting in steps: says what goes on, how many of how many are done, and the time left."""
+    """Waiting in steps: says what goes on, how many of how many are done, and the time left; of a
+    step with an unknown end that until a `limit` [s]."""
+
+    def __init__(self, what: str, quiet: bool = False, limit: float | None = None) -> None:
+        super().__init__(what, quiet)
+        self.limit = limit
 
     def drawn(self) -> tuple[Bar, TaskID]:
         """What goes on before the bar, words behind, the time gone by and the time left."""
@@ -127,9 +132,12 @@ class StepBar(Waiting):
         count = f"{done}" if total is None else f"{done} of {total}"
         words = f"{count}, {words}" if words else count
         if self.bar is not None:
+            part, whole = float(done), total if total is None else float(total)
+            if whole is None and self.limit is not None:
+                part, whole = min(perf_counter() - self.begin, self.limit), self.limit
             if self.bar.tasks[0].description != what:
-                self.bar.reset(self.task, total=total)
-            self.bar.update(self.task, total=total, completed=done, description=what, words=words)
+                self.bar.reset(self.task, total=whole)
+            self.bar.update(self.task, total=whole, completed=part, description=what, words=words)
         self.what = f"{what}: {words}"
 
 
