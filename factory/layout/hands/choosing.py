@@ -104,8 +104,9 @@ class Hands:
     def _carrier(self, robot: int, u: Way) -> Hand:
         found = self._carriers.get((robot, u))
         if found is None:
-            frames = self._sides(robot, u)
-            found = self._chosen(robot, held(self.holding.factory, robot), frames)
+            frames, label = self._sides(robot, u), held(self.holding.factory, robot)
+            several = len(self.holding.factory.tours[robot]) > 1
+            found = self._nowhere(label) if several else self._chosen(robot, label, frames)
             self._carriers[robot, u] = found
         return found
 
