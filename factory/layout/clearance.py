@@ -150,7 +150,7 @@ class _Search:
 
     def _serves(self, region: Region) -> bool:
         """Whether the outfeed takes a region in: itself, the robot under it, the product let go."""
-        return region.kind not in LOADS or region.mode == self.layout.factory.dropoff.index
+        return region.kind not in LOADS or self.layout.factory.drops(region.mode)
 
     def _joined(self, one: Region, other: Region) -> bool:
         """Whether one is coupled in a mode of the other's robot."""
@@ -195,7 +195,7 @@ class _Search:
 def _standoffs(layout: Layout, found: Mapping[str, Pile]) -> Iterator[Fault]:
     """Where a carrier brings a pile itself: what is brought to it is clear of the pile's way as
     long as it waits at its standoff, and waits no farther away than where it comes from."""
-    for operation in layout.factory.operations[:-1]:
+    for operation in layout.factory.making:
         carrier = operation.template.carrier - 1
         if operation.before[carrier] == NOPART or len(operation.inputs) == 1:
             continue
@@ -219,7 +219,7 @@ def _standoffs(layout: Layout, found: Mapping[str, Pile]) -> Iterator[Fault]:
 
 def _raised(layout: Layout, found: Mapping[str, Pile]) -> Iterator[Fault]:
     """What is to be lowered comes above all that the others bring."""
-    for operation in layout.factory.operations[:-1]:
+    for operation in layout.factory.making:
         if operation.lowered < 0:
             continue
         guest = operation.robots[operation.lowered]

@@ -182,7 +182,7 @@ class Layout:
         """The parts that overlap or scrape as their operations join them from the sides chosen, or
         overlap in the finished product."""
         found: list[Overlap] = []
-        for operation in self.factory.operations[:-1]:
+        for operation in self.factory.making:
             approach = operation.approach
             if approach is not None and any(approach.overlaps):
                 found += approach.overlaps[approach.sides.index(self.side(operation))]
@@ -244,7 +244,7 @@ class Layout:
         carried = (
             operations[number].label
             for number in self.factory.robots[leaf.carrier].operations
-            if operations[number].carrier == leaf.carrier and number != self.factory.dropoff.index
+            if operations[number].carrier == leaf.carrier and not self.factory.drops(number)
         )
         rear = min(path.frame(self.payloads[label])[0] for label in carried)
         shown = self.magazine(leaf.carrier)

@@ -167,7 +167,7 @@ def held_shape(
     offset = post = round(pads[0][0] * t[0] + pads[0][1] * t[1], 3)
     least = 0.0
     if hand.tall:
-        joined = last if final.index == factory.dropoff.index else lies(final.label)
+        joined = last if factory.drops(final.index) else lies(final.label)
         reach = arm = up(max(reach, c.c + MAST / 2 - joined[0]))
         if hand.kind == "above" and hands.holding.is_fed(robot):
             post, offset = round((last[2] + last[3]) / 2, 3), round(last[2] - c.c - MAST / 2, 3)
@@ -184,7 +184,7 @@ def carried(factory: Factory, robot: int) -> list[int]:
     return [
         number
         for number in factory.robots[robot].operations
-        if factory.operations[number].carrier == robot and number != factory.dropoff.index
+        if factory.operations[number].carrier == robot and not factory.drops(number)
     ]
 
 
