@@ -25,12 +25,10 @@ from factory.plant.approaches import Approach, Overlap
 from factory.plant.factory import Factory, Operation, Robot, in_turn
 from factory.problem.pag import NOPART
 from factory.support.errors import Diagnostic, InputError, Position, did_you_mean
+from factory.support.settings import MOST_BRANCHES
 
 Branches = Sequence[tuple[str, int]]
 """Labels, and how often the branch that brings each is to be there."""
-
-MOST = 60
-"""The most units of a period."""
 
 
 def in_parallel(factory: Factory, branches: Branches) -> Factory:
@@ -45,9 +43,9 @@ def in_parallel(factory: Factory, branches: Branches) -> Factory:
         above = lines[delivery(factory, robot.index).carrier] if lines else 1
         lines.append(above * times.get(robot.index, 1))
     period = lcm(*lines)
-    if period > MOST:
+    if period > MOST_BRANCHES:
         names = ", ".join(f"{label} = {k}" for label, k in branches)
-        message = f"{names} would make {period} units in one period; {MOST} are the most"
+        message = f"{names} would make {period} units in one period; {MOST_BRANCHES} are the most"
         raise InputError(_fault(message, None, "take numbers with a small common multiple"))
     return _unrolled(factory, lines, period) if period > 1 else factory
 

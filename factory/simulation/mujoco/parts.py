@@ -151,7 +151,7 @@ class Parts:
         """The bodies that are in robots' hands in a marking: label, unit, and the robot (index) of
         the last operation on its way that has ended for its unit."""
         factory = self.model.factory
-        for number, leaf in enumerate(factory.leaves):
+        for leaf in factory.leaves:
             gone = counts.get(factory.dropoffs[leaf.turn].end, 0)
             for count in range(gone, counts.get(leaf.end, 0)):
                 unit, holder = factory.unit(leaf, count), leaf
@@ -160,7 +160,7 @@ class Parts:
                     holder = operation
                     operation = factory.operations[factory.parents[operation.index]]
                 if holder.carrier == leaf.carrier:
-                    passing.took([number])
+                    passing.holding(leaf.carrier)
                 for label in self.model.carried.carried[holder.label]:
                     if (label, unit) not in self.copies:
                         yield label, unit, holder.carrier
