@@ -35,7 +35,7 @@ ROUNDED = 1e-3
 def cycle_time_bound(factory: Factory, product: Product, clearance: float, pace: Pace) -> float:
     """No certified layout with this clearance [m] has a shorter cycle time [s]. Linear."""
     bound = _Bound(factory, product, clearance - TOLERANCE, pace)
-    return max(bound.gear(robot.index) for robot in factory.robots)
+    return max(bound.gear(robot.index) for robot in factory.robots) / factory.period
 
 
 @dataclass(frozen=True, slots=True)
