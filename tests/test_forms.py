@@ -144,7 +144,8 @@ def test_a_statement_of_many_inputs_is_cut_where_its_pile_changes_hands() -> Non
     text = write_pag(reformed(pag, TEMPLATES, forms))
     assert "s = insert ( e, s.4 );" in text
     assert "s.4 = mate ( s.3, d );" in text
-    assert "s.3 = insert ( b, a, c );" in text
+    assert "s.3 = insert ( s.2, c );" in text
+    assert "s.2 = insert ( b, a );" in text
 
 
 @given(sizes, seeds, shapes)

@@ -279,6 +279,10 @@ def gear_net(robots: tuple[Robot, ...], operations: tuple[Operation, ...]) -> Ge
     gears = []
     for robot in robots:
         gear_places, gear_events = [], []
+        several = (
+            sum(operations[n].before[slot_of[n][robot.index]] == NOPART for n in robot.operations)
+            > 1
+        )
         for step, number in enumerate(robot.operations):
             before, operation = operations[robot.operations[step - 1]], operations[number]
             done, begun = before.end, operation.start
@@ -288,7 +292,7 @@ def gear_net(robots: tuple[Robot, ...], operations: tuple[Operation, ...]) -> Ge
             wait = len(places)
             places.append(
                 Place(
-                    _wait_name(robot, label, operation, operations),
+                    _wait_name(robot, label, operation, several),
                     (done,),
                     (begun,),
                     "hold" if stays else "wait",
@@ -308,15 +312,9 @@ def gear_net(robots: tuple[Robot, ...], operations: tuple[Operation, ...]) -> Ge
     return GearNet(net, tuple(gears), tuple(g.places[0] for g in gears), tuple(slots))
 
 
-def _wait_name(
-    robot: Robot, label: str, onward: Operation, operations: tuple[Operation, ...]
-) -> str:
+def _wait_name(robot: Robot, label: str, onward: Operation, several: bool) -> str:
     """What the place is called where a robot waits for an operation `onward`: `r2:part1`. One that
-    comes home several times in its gear waits with nothing for each of its tours:
-    `r2:nopart/part3`."""
-    if label != NOPART:
-        return f"{robot.name}:{label}"
-    slots = (operations[number].robots.index(robot.index) for number in robot.operations)
-    befores = (operations[n].before[s] for n, s in zip(robot.operations, slots, strict=True))
-    several = sum(before == NOPART for before in befores) > 1
-    return f"{robot.name}:{label}/{onward.label}" if several else f"{robot.name}:{label}"
+    comes home several times in its gear waits with nothing for each tour, `r2:nopart/part3`."""
+    if label == NOPART and several:
+        return f"{robot.name}:{label}/{onward.label}"
+    return f"{robot.name}:{label}"

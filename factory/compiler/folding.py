@@ -156,6 +156,13 @@ def _faults(
             position = factory.robots[other].position
             yield _fault(f"{names}: {message}", position=position)
     deliveries = [delivery(factory, robot).index for robot in line]
+    if not set.intersection(*(sides_of(factory, robot) for robot in line)):
+        message = f"{_named(factory, first)} and others cannot all come from one side"
+        yield _fault(message, position=factory.robots[first].position)
+    begun = {frozenset(on[guest] for guest in begun_by(factory, robot)) for robot in line}
+    if len(begun) > 1:
+        message = f"what {_named(factory, first)} and others begin with comes on different lines"
+        yield _fault(message, position=factory.robots[first].position)
     if len(set(deliveries)) < len(deliveries):
         both = next(n for n in deliveries if deliveries.count(n) > 1)
         message = f"'{factory.operations[both].label}' needs two inputs of one robot at once"
@@ -176,24 +183,29 @@ def mismatch(
         return "no type of robot is fit for both"
     if kind_of(factory, one) != kind_of(factory, other):
         return "they begin or end in different ways"
-    if not sides_of(factory, one) & sides_of(factory, other):
-        return "they cannot come from the same side"
     return ""
 
 
 def kind_of(factory: Factory, robot: int) -> tuple[object, ...]:
-    """What tours on one line have in common: that a feeder begins them, that they end at a station
-    of a carrier that holds something, that they lower what they bring; tools, what they do, and in
-    which of the template's roles."""
+    """What tours on one line have in common: whether a feeder begins them or two others that bring
+    something; whether they end at a station of a carrier that holds something, or one that takes
+    what they bring; whether they lower it. Tools, what they do, and in which of the template's
+    roles."""
     first = factory.operations[factory.robots[robot].operations[0]]
     last = delivery(factory, robot)
     slot = last.robots.index(robot)
     if last.before[slot] == NOPART:
         return "tool", last.template.name, slot
     fed, inserted = len(first.robots) == 1, last.before[last.template.carrier - 1] != NOPART
-    if not (fed and inserted):
+    if not fed and len(first.inputs) < 2:
         return "alone", robot
-    return "fed", last.lowered == slot
+    return "fed" if fed else "taking", "inserted" if inserted else "taken", last.lowered == slot
+
+
+def begun_by(factory: Factory, robot: int) -> list[int]:
+    """The robots that bring what a tour begins with, two where its robot takes what they bring."""
+    first = factory.operations[factory.robots[robot].operations[0]]
+    return [other for other in first.robots if other != robot] if first.carrier == robot else []
 
 
 def sides_of(factory: Factory, robot: int) -> set[int]:

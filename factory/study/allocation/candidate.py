@@ -9,6 +9,7 @@ from functools import cached_property
 from factory.modes.modes import operation_modes, robot_limits
 from factory.modes.staging import stages_of
 from factory.pipeline import Project
+from factory.study.allocation.bundles import Filling
 from factory.timing.cycle_time import CycleTime
 from factory.timing.prediction import all_ways, operation_delays, predict
 
@@ -16,11 +17,11 @@ from factory.timing.prediction import all_ways, operation_delays, predict
 @dataclass(frozen=True)
 class Candidate:
     """A product with `forms` chosen, by the joins of the product as it is written, and with lines
-    that are filled for a `target` [s], None for a robot for each label, as a `project`."""
+    that are filled for something (`filling`), None for a robot for each label, as a `project`."""
 
     project: Project
     forms: Mapping[str, int]
-    target: float | None = None
+    filling: Filling | None = None
 
     @property
     def robots(self) -> int:

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from math import inf
 
+from factory.compiler.folding import Line
 from factory.compiler.mating.admitting import admitted
 from factory.compiler.mating.mating import judged
 from factory.layout.durations import Pace
@@ -14,6 +15,7 @@ from factory.layout.shapes import payload_boxes
 from factory.pipeline import Project
 from factory.problem.shapes import is_shaped
 from factory.study.allocation.aim import STEP
+from factory.study.allocation.bundles import Filling
 from factory.study.allocation.candidate import Candidate
 from factory.study.allocation.forms import (
     FormsTask,
@@ -23,11 +25,10 @@ from factory.study.allocation.forms import (
     reformed,
     written_forms,
 )
-from factory.study.allocation.lines import Shift, labels_on
+from factory.study.allocation.lines import SLACKS, Shift, labels_on
 
-WIDE = 1.6
-"""The bounds on estimated cycles that are tried for LARGE products, and what their lines are filled
-for: each so many times the one before, or a part of it."""
+WIDE = 1.3
+"""The same for LARGE products."""
 
 LARGE = 400
 """So many labels make a product large."""
@@ -35,20 +36,32 @@ LARGE = 400
 FILLED = 1.12
 """What lines are filled for is each time so much more."""
 
+FEWER = 0.7
+"""Where so many robots are asked for, no fewer than such a share of them are estimated."""
+
+SHARED = 8.0
+"""So many times its share of the work a tour may last, where few robots are asked for."""
+
+NEAR = 1.3
+"""An estimate is kept unless another is as good with so many times its cycle time: layouts differ
+more."""
+
 
 @dataclass(frozen=True, slots=True)
 class Estimate:
     """What is estimated of forms and lines: `robots`, tools included, and cycle time [s]; the
-    `forms`, and what the lines are filled for, `target` [s]."""
+    `forms`, and what lines are filled for."""
 
     robots: int
     seconds: float
     forms: Mapping[str, int]
-    target: float
+    filling: Filling
 
     def beats(self, other: Estimate) -> bool:
-        """Whether it is as good as another in everything."""
-        return self.robots <= other.robots and self.seconds <= other.seconds
+        """Whether it has no more robots than another, and is clearly faster, or is the same."""
+        faster = self.seconds * NEAR <= other.seconds
+        same = self.robots == other.robots and abs(self.seconds - other.seconds) < 1e-9
+        return same or (self.robots <= other.robots and faster)
 
 
 @dataclass(frozen=True)
@@ -71,26 +84,26 @@ class Estimator:
         """The forms of the product as it is written."""
         return written_forms(self.task)
 
-    def candidate(self, forms: Mapping[str, int], target: float | None = None) -> Candidate:
-        """The product with these forms, and with lines that are filled for a target if one is
-        given."""
+    def candidate(self, forms: Mapping[str, int], filling: Filling | None = None) -> Candidate:
+        """The product with these forms, and with lines that are filled if that is
+        said."""
         project = self._reformed(forms)
-        if target is not None:
+        if filling is not None:
             shift = self._shift(project)
-            lines = labels_on(shift.factory, shift.lines(target))
+            lines = labels_on(shift.factory, shift.lines(filling))
             project = project.with_pag(project.pag, replace(project.ground, lines=lines))
-        return Candidate(project, forms, target)
+        return Candidate(project, forms, filling)
 
     def front(
         self, robots: float = inf, late: Callable[[], bool] = lambda: False
     ) -> list[Estimate]:
-        """The estimates of which no other is as good in everything, with at most so many `robots`,
-        and no more operations blocked than as the product is written; as many as are found until it
-        is `late`."""
+        """The estimates of which no other is clearly better, with at most so many `robots`, and no
+        more operations blocked than as the product is written; as many as are found until it is
+        `late`."""
         found: list[Estimate] = []
         most, tried = _blocked(self._reformed(self.written)), set[tuple[int, ...]]()
         for task in self._tasks():
-            for bound in self.bounds(task):
+            for bound in self.bounds(task, robots):
                 if late():
                     return found
                 forms, _ = best_forms(task, bound)
@@ -110,10 +123,12 @@ class Estimator:
         for order in orders if self.task.free else orders[:1]:
             yield replace(self.task, order=order)
 
-    def bounds(self, task: FormsTask) -> Iterator[float]:
-        """No bound on estimated cycles, and those that can be kept, the longest first."""
+    def bounds(self, task: FormsTask, robots: float = inf) -> Iterator[float]:
+        """No bound on estimated cycles, and those that can be kept, the longest first. Where so
+        many `robots` are asked for, they begin at SHARED times what each has to do."""
         yield inf
         bound = sum(task.pace.rest(task.size(label)) + task.pace.lost for label in task.nodes)
+        bound = min(bound, SHARED * 2 * bound / robots) if robots < inf else bound
         step = STEP if len(task.nodes) < LARGE else WIDE
         while best_forms(task, bound)[1] == 0.0:
             yield bound
@@ -123,13 +138,15 @@ class Estimator:
         self, project: Project, forms: Mapping[str, int], robots: float
     ) -> Iterator[Estimate]:
         """The estimates of forms with lines for all that they may be filled for."""
-        shift, before = self._shift(project), -1
-        for target in shift.targets(FILLED if len(self.task.nodes) < LARGE else WIDE):
-            lines = shift.lines(target)
+        shift, tried = self._shift(project), set[tuple[Line, ...]]()
+        large = len(self.task.nodes) >= LARGE
+        for filling in shift.fillings(FILLED, SLACKS[:1] if large else SLACKS):
+            lines = shift.lines(filling)
             count = shift.count(lines)
-            if lines and count != before and count <= robots:
-                before = count
-                yield Estimate(count, shift.seconds(lines), forms, target)
+            wanted = robots == inf or FEWER * robots <= count <= robots
+            if lines and lines not in tried and wanted:
+                tried.add(lines)
+                yield Estimate(count, shift.seconds(lines), forms, filling)
 
     def _shift(self, project: Project) -> Shift:
         factory = judged(project.compiled, project.product)

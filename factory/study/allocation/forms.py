@@ -257,16 +257,17 @@ def reformed(pag: PAG, templates: Mapping[str, Template], forms: Mapping[str, in
     for node in pag.nodes:
         template = templates[node.operation]
         if template.instead and len(node.inputs) > 1:
-            nodes += _statements(node, template, forms, taken)
+            nodes += _statements(node, templates, forms, taken)
         else:
             nodes.append(node)
     return replace(pag, nodes=tuple(nodes), count=None)
 
 
 def _statements(
-    node: Assembly, template: Template, forms: Mapping[str, int], taken: set[str]
+    node: Assembly, templates: Mapping[str, Template], forms: Mapping[str, int], taken: set[str]
 ) -> list[Assembly]:
     """A statement with its forms, what is taken first last."""
+    template = templates[node.operation]
     at = node.input_positions or (None,) * len(node.inputs)
     first, *rest = zip(node.inputs, at, strict=True)
     found, pile = list[Assembly](), [first]
@@ -274,7 +275,7 @@ def _statements(
     for label, come in zip(joins(node), rest, strict=True):
         form = forms[label]
         last, before = before, label
-        if operation and form == 0:
+        if operation and form == 0 and templates[operation].further:
             pile.append(come)
             continue
         if operation:

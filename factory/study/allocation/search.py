@@ -29,7 +29,7 @@ ROUNDS = 8
 CHANGES = 60
 """So many changes are tried in a row, none of which is better, before the search ends."""
 
-LOOKED_AT = 40
+LOOKED_AT = 60
 """So many of the most promising estimates are laid out."""
 
 SINGLE, ESTIMATED, SHARED = 0.3, 0.5, 0.8
@@ -60,7 +60,7 @@ def allocated(project: Project, aim: Aim, seen: Seen = lambda _: None) -> Projec
         hint = f"--robots {best.robots}; with more --seconds fewer may be found"
         raise InputError(Diagnostic("TooFewRobots", message, None, hint))
     if aim.robots is None and aim.cycle is not None and best.seconds > aim.cycle:
-        plain = best if best.target is None else search.written
+        plain = best if best.filling is None else search.written
         ground = replace(project.ground, formed=plain.project.ground.formed)
         relayed = replace(plain, project=plain.project.with_pag(plain.project.pag, ground))
         best = min(best, relayed, key=search.rank)
@@ -123,7 +123,7 @@ class Search:
         for one in front[:LOOKED_AT]:
             if self.late(SHARED):
                 return
-            yield self.estimator.candidate(one.forms, one.target)
+            yield self.estimator.candidate(one.forms, one.filling)
 
     def _judge(self, one: Candidate) -> bool:
         """Whether it is better than the best so far; then it is the best."""
@@ -157,4 +157,4 @@ class Search:
         for label in order:
             for form in (THIRD, 0, 1):
                 if form != best.forms[label]:
-                    yield self.estimator.candidate({**best.forms, label: form}, best.target)
+                    yield self.estimator.candidate({**best.forms, label: form}, best.filling)

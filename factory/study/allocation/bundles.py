@@ -1,0 +1,237 @@
+"""Bundles: tours on one line, with the bundles of the lines that deliver to it.
+
+A bundle is made for each tour, those that deliver to it first. Its *load* is how long its tours
+last, waits included: a robot that holds a pile while others bring the rest is not free for anything
+else. Two bundles become one where one robot can do the tours of both, within a limit of load, and
+the lines below them are laid over each other. All of them go as far then as the one that has to go
+farthest.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from math import inf
+
+from factory.compiler.folding import Line, begun_by, delivery, kind_of, sides_of
+from factory.layout.durations import Pace
+from factory.layout.guidepath import Box
+from factory.plant.factory import Factory
+from factory.problem.pag import NOPART
+
+BETWEEN = 0.08
+"""What lies between two sub-assemblies at the ends of a guidepath, beside themselves [m]."""
+
+LANE = 0.08
+"""What one that delivers takes of the path of another [m]."""
+
+TOOL_WAY = 0.12
+"""How far a tool comes [m]."""
+
+ABREAST = 2
+"""So many lines can come to one station, from either side."""
+
+
+@dataclass(frozen=True, slots=True)
+class Filling:
+    """What lines are filled for: a `limit` of each line's load [s]; by what share of its own work a
+    tour may be longer since it waits for those that share a line (`slack`); whether robots go
+    `onward` from station to station on each tour, or back as well."""
+
+    limit: float
+    slack: float = inf
+    onward: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Timing:
+    """How long operations of a factory take, from the `sizes` of its sub-assemblies [m] and the
+    `pace` of its robots."""
+
+    factory: Factory
+    sizes: Mapping[str, float]
+    pace: Pace
+
+    @classmethod
+    def of(cls, factory: Factory, boxes: Mapping[str, Box], pace: Pace) -> Timing:
+        """That of a factory whose sub-assemblies have some boxes."""
+        return cls(factory, {n: max(b[1] - b[0], b[3] - b[2]) for n, b in boxes.items()}, pace)
+
+    def past(self, robot: int, tour: Sequence[int]) -> float:
+        """How far a robot has to go on a tour, past what it delivers to [m]."""
+        last = self.factory.operations[tour[-1]]
+        label = last.before[last.robots.index(robot)]
+        if label == NOPART:
+            return TOOL_WAY
+        return (self.sizes[label] + self.sizes.get(last.label, self.sizes[label])) / 2 + BETWEEN
+
+    def takes(self, number: int, way: float) -> float:
+        """How long an operation takes in which the farthest way is so long [s]."""
+        operation, pace = self.factory.operations[number], self.pace
+        stroke = operation.approach.stroke if operation.approach and operation.lowered >= 0 else 0.0
+        return pace.rest(way) + pace.rest(stroke) + operation.dwell + pace.lost
+
+
+@dataclass(frozen=True, slots=True)
+class Bundle:
+    """`tours` on one line, by their robots; how long they last without the way out and back, `busy`
+    [s]; their `kind`, and the `sides` from which all of them can come; the bundles `below` that are
+    inserted, in the order of their stations, and those `first` that bring what each tour begins
+    with, two or none; how far the robot has to go past others, `past` [m]. Derived: how far it goes
+    `out`, how far what delivers to it reaches to either side, `beside` [m]; its `load` [s]."""
+
+    tours: tuple[int, ...]
+    busy: float
+    kind: tuple[object, ...]
+    sides: frozenset[int]
+    below: tuple[Bundle, ...]
+    first: tuple[Bundle, ...]
+    past: float
+    pace: Pace
+    out: float = 0.0
+    beside: float = 0.0
+    load: float = 0.0
+
+    def __post_init__(self) -> None:
+        lines = (*self.first, *self.below)
+        taken = sum(max(LANE, 2 * line.beside) for line in lines) / 2
+        out = max(self.past, BETWEEN + taken)
+        object.__setattr__(self, "out", out)
+        beside = max((line.out + BETWEEN for line in lines), default=0.0)
+        object.__setattr__(self, "beside", beside)
+        trips = 2 * len(self.tours) * (self.pace.rest(out) + self.pace.lost)
+        object.__setattr__(self, "load", self.busy + trips)
+
+    def merged(self, other: Bundle, filling: Filling) -> Bundle | None:
+        """Both as one bundle, none of whose lines has too much load; None where that cannot be."""
+        sides = self.sides & other.sides
+        if self.kind != other.kind or not sides or self.load + other.load > filling.limit:
+            return None
+        first = self._first(other, filling) if self.first else ()
+        if first is None:
+            return None
+        below = _laid_over(self.below, other.below, filling)
+        tours, busy = self.tours + other.tours, self.busy + other.busy
+        past = max(self.past, other.past)
+        found = Bundle(tours, busy, self.kind, sides, below, first, past, self.pace)
+        return found if found.load <= filling.limit else None
+
+    def _first(self, other: Bundle, filling: Filling) -> tuple[Bundle, ...] | None:
+        """The two that bring what tours begin with, each of one with one of the other."""
+        for pair in (other.first, other.first[::-1]):
+            both = [mine.merged(its, filling) for mine, its in zip(self.first, pair, strict=True)]
+            if None not in both:
+                return tuple(bundle for bundle in both if bundle)
+        return None
+
+    def lines(self) -> Iterator[Line]:
+        """The lines with more than one tour, from this one down."""
+        stack = [self]
+        while stack:
+            bundle = stack.pop()
+            if len(bundle.tours) > 1:
+                yield tuple(sorted(bundle.tours))
+            stack += [*bundle.below, *bundle.first]
+
+
+def _laid_over(
+    ones: tuple[Bundle, ...], others: tuple[Bundle, ...], filling: Filling
+) -> tuple[Bundle, ...]:
+    """Bundles in the order of their stations, with others: each of these becomes one with the first
+    that it can, or if its robot goes `onward` with the next, else it is one more there."""
+    below, at = list(ones), 0
+    for bundle in others:
+        for number in range(at, len(below)):
+            merged = below[number].merged(bundle, filling)
+            if merged is not None:
+                below[number] = merged
+                at = number + 1 if filling.onward else 0
+                break
+        else:
+            below.insert(at if filling.onward else len(below), bundle)
+            at += filling.onward
+    return tuple(below)
+
+
+@dataclass(slots=True)
+class _Local:
+    """A line that delivers in one tour: its bundle, and when it last did [s]."""
+
+    bundle: Bundle
+    at: float
+
+
+def bundled(timing: Timing, filling: Filling) -> Bundle:
+    """The bundle of the output robot of a factory with a robot for each label."""
+    factory, made = timing.factory, dict[int, Bundle]()
+    for robot in reversed(range(len(factory.robots))):
+        if robot == 0 or kind_of(factory, robot)[0] != "tool":
+            made[robot] = _Tour(timing, filling, made).bundle(robot)
+    return made[0]
+
+
+@dataclass(frozen=True, slots=True)
+class _Tour:
+    """Makes bundles of single tours; `made`: those of the tours that deliver to them."""
+
+    timing: Timing
+    filling: Filling
+    made: dict[int, Bundle]
+
+    def bundle(self, robot: int) -> Bundle:
+        """That of one tour. Those that deliver to it are dealt to the line that it waits for the
+        least, to one more where it would wait too long; where it only goes onward, of the last two
+        lines: two can come to one station."""
+        factory, timing = self.timing.factory, self.timing
+        numbers = factory.robots[robot].operations
+        kids = [kid for number in numbers for kid in self._inserted(robot, number)]
+        work = sum(timing.takes(delivery(factory, k).index, self.made[k].out) for k in kids)
+        spare = min(self.filling.slack * work, max(self.filling.limit - work, 0.0))
+        now, waited, locals_ = 0.0, 0.0, list[_Local]()
+        for number in numbers[1:-1] if robot else numbers[1:]:
+            inserted = self._inserted(robot, number)
+            for kid in inserted:
+                lines = locals_[-ABREAST:] if self.filling.onward else locals_
+                wait, merged, line = self._least(lines, self.made[kid], now)
+                if line is None or merged is None or waited + wait > spare + 1e-9:
+                    now += timing.takes(number, self.made[kid].out)
+                    locals_.append(_Local(self.made[kid], now))
+                    continue
+                waited, now = waited + wait, now + wait + timing.takes(number, merged.out)
+                line.bundle, line.at = merged, now
+            if not inserted:
+                now += timing.takes(number, TOOL_WAY)
+        first = tuple(self.made[kid] for kid in self._begins(robot))
+        return Bundle(
+            (robot,),
+            now,
+            kind_of(factory, robot) if robot else ("output",),
+            frozenset(sides_of(factory, robot)) if robot else frozenset({1}),
+            tuple(line.bundle for line in locals_),
+            first,
+            timing.past(robot, numbers),
+            timing.pace,
+        )
+
+    def _least(
+        self, lines: Sequence[_Local], kid: Bundle, now: float
+    ) -> tuple[float, Bundle | None, _Local | None]:
+        """How long a tour has to wait for a kid at the least [s], on which line, and what that is
+        then; None where it can be on none of them."""
+        best: tuple[float, Bundle | None, _Local | None] = inf, None, None
+        for line in lines:
+            wait = max(0.0, line.at + kid.load - kid.pace.rest(kid.out) - now)
+            if wait < best[0] and (merged := line.bundle.merged(kid, self.filling)) is not None:
+                best = wait, merged, line
+        return best
+
+    def _inserted(self, robot: int, number: int) -> list[int]:
+        """The robots that bring something to what a robot holds already."""
+        operation = self.timing.factory.operations[number]
+        if operation.carrier != robot or operation.before[operation.template.carrier - 1] == NOPART:
+            return []
+        pairs = zip(operation.robots, operation.before, strict=True)
+        return [guest for guest, label in pairs if guest != robot and label != NOPART]
+
+    def _begins(self, robot: int) -> list[int]:
+        return [guest for guest in begun_by(self.timing.factory, robot) if guest in self.made]
