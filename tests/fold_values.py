@@ -114,7 +114,9 @@ def fold_layout(seed: int, settings: Settings) -> Layout:
     pag = inserted(random_pag(rng.randint(5, 14), seed, shape, 3))
     nodes = (replace(n, operation="weld") if n.operation == "clamp" else n for n in pag.nodes)
     pag = replace(pag, nodes=tuple(nodes))
-    project = Project(pag, all_templates(), load_catalogue(), settings)
+    shipped = all_templates()
+    templates = {**shipped, "insert": replace(shipped["insert"], further="insert")}
+    project = Project(pag, templates, load_catalogue(), settings)
     factory, known = project.compiled, project.catalogue
     lines: list[Line] = [(0,)]
     for line in lines:
