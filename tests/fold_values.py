@@ -8,7 +8,16 @@ from dataclasses import replace
 from itertools import combinations
 
 from factory.compiler.compiler import compile_pag, gear_net
-from factory.compiler.folding import Line, delivery, fold, folded, line_of, mismatch
+from factory.compiler.folding import (
+    Line,
+    delivery,
+    fold,
+    folded,
+    line_of,
+    mismatch,
+    sides_of,
+)
+from factory.compiler.mating.mating import judged
 from factory.layout.durations import Pace
 from factory.layout.embedding import lay_out
 from factory.layout.layout import Layout
@@ -117,7 +126,7 @@ def fold_layout(seed: int, settings: Settings) -> Layout:
     shipped = all_templates()
     templates = {**shipped, "insert": replace(shipped["insert"], further="insert")}
     project = Project(pag, templates, load_catalogue(), settings)
-    factory, known = project.compiled, project.catalogue
+    factory, known = judged(project.compiled, project.product), project.catalogue
     lines: list[Line] = [(0,)]
     for line in lines:
         groups: list[list[int]] = []
@@ -138,7 +147,8 @@ def fold_layout(seed: int, settings: Settings) -> Layout:
 def _shares(
     factory: Factory, group: list[int], kid: int, on: Sequence[int], known: Catalogue
 ) -> bool:
-    return all(
+    sides = (sides_of(factory, robot) for robot in (*group, kid))
+    return bool(set.intersection(*sides)) and all(
         not mismatch(factory, other, kid, on, known)
         and delivery(factory, other).index != delivery(factory, kid).index
         for other in group
