@@ -52,7 +52,7 @@ class Project:
         kept."""
         found = replace(self, pag=pag, ground=ground)
         known = {"product"} if pag is not self.pag else {"product", "matings", "compiled"}
-        if pag is self.pag and ground.lines == self.ground.lines:
+        if pag is self.pag and _program(ground) == _program(self.ground):
             known |= {"plain", "_hands"}
         found.__dict__.update({name: self.__dict__[name] for name in known & set(self.__dict__)})
         return found
@@ -109,8 +109,10 @@ class Project:
         if not (self.settings.hands and is_shaped(self.pag)):
             return None
         from factory.layout.hands.choosing import Hands
+        from factory.layout.repeated import repeated
 
-        return Hands(self.plain, self.product, self.settings.acceleration)
+        product = repeated(self.product, self.plain)
+        return Hands(self.plain, product, self.settings.acceleration)
 
     @cached_property
     def no_grips(self) -> tuple[NoGrip, ...]:
@@ -123,21 +125,26 @@ class Project:
 
     @cached_property
     def plain(self) -> Factory:
-        """Compile(P), folded where the ground has lines, without relays. Raises InputError where
-        there is no such factory."""
-        lines = self.ground.lines
-        if not lines:
+        """Compile(P), folded where the ground has lines, unrolled where it has parallel branches,
+        without relays. Raises InputError where there is no such factory."""
+        lines, branches = self.ground.lines, self.ground.parallel
+        if not (lines or branches):
             return self.compiled
         from factory.compiler.folding import fold, lines_of_labels
         from factory.compiler.mating.mating import judged
+        from factory.compiler.parallel import in_parallel
 
         factory = judged(self.compiled, self.product)
-        factory = fold(factory, lines_of_labels(factory, lines), self.catalogue)
+        if lines:
+            factory = fold(factory, lines_of_labels(factory, lines), self.catalogue)
+        factory = in_parallel(factory, branches)
         if not self.settings.hands:
             return factory
         from factory.layout.hands.adjusting import with_lifts
+        from factory.layout.repeated import repeated
 
-        return with_lifts(factory, self.product, self.catalogue, self.settings.acceleration)
+        product = repeated(self.product, factory)
+        return with_lifts(factory, product, self.catalogue, self.settings.acceleration)
 
     @cached_property
     def compiled(self) -> Factory:
@@ -163,6 +170,11 @@ class Project:
         """The factory with the relays of its layout if its ground asks for them, else the plain
         one. Raises as these do."""
         return self.layout.factory if self.ground.relays else self.plain
+
+
+def _program(ground: Ground) -> object:
+    """What of a ground the plain factory depends on."""
+    return ground.lines, ground.parallel
 
 
 def _is_shipped(template: Template) -> bool:

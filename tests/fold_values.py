@@ -8,7 +8,16 @@ from dataclasses import replace
 from itertools import combinations
 
 from factory.compiler.compiler import compile_pag, gear_net
-from factory.compiler.folding import Line, delivery, fold, folded, line_of, mismatch
+from factory.compiler.folding import (
+    Line,
+    delivery,
+    fold,
+    folded,
+    line_of,
+    mismatch,
+    sides_of,
+)
+from factory.compiler.mating.mating import judged
 from factory.layout.durations import Pace
 from factory.layout.embedding import lay_out
 from factory.layout.layout import Layout
@@ -114,8 +123,10 @@ def fold_layout(seed: int, settings: Settings) -> Layout:
     pag = inserted(random_pag(rng.randint(5, 14), seed, shape, 3))
     nodes = (replace(n, operation="weld") if n.operation == "clamp" else n for n in pag.nodes)
     pag = replace(pag, nodes=tuple(nodes))
-    project = Project(pag, all_templates(), load_catalogue(), settings)
-    factory, known = project.compiled, project.catalogue
+    shipped = all_templates()
+    templates = {**shipped, "insert": replace(shipped["insert"], further="insert")}
+    project = Project(pag, templates, load_catalogue(), settings)
+    factory, known = judged(project.compiled, project.product), project.catalogue
     lines: list[Line] = [(0,)]
     for line in lines:
         groups: list[list[int]] = []
@@ -136,7 +147,8 @@ def fold_layout(seed: int, settings: Settings) -> Layout:
 def _shares(
     factory: Factory, group: list[int], kid: int, on: Sequence[int], known: Catalogue
 ) -> bool:
-    return all(
+    sides = (sides_of(factory, robot) for robot in (*group, kid))
+    return bool(set.intersection(*sides)) and all(
         not mismatch(factory, other, kid, on, known)
         and delivery(factory, other).index != delivery(factory, kid).index
         for other in group

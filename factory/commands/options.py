@@ -16,7 +16,7 @@ from click.shell_completion import CompletionItem
 
 from factory.commands.requests import OutputOptions, PictureOptions, ProjectOptions, RunOptions
 from factory.support.errors import Diagnostic, FactoryError, InputError
-from factory.support.settings import LEAST, LONGEST
+from factory.support.settings import LEAST, LONGEST, MOST_BRANCHES
 
 if TYPE_CHECKING:
     from factory.problem.pag import PAG
@@ -156,6 +156,20 @@ class Timestep(click.ParamType[float | str]):
         return value if is_auto("timestep", value) else click.FLOAT.convert(value, param, ctx)
 
 
+class Branch(click.ParamType[tuple[str, int]]):
+    """A label, and how often the branch that brings it is to be there: `sub2=3`."""
+
+    name = "label=number"
+
+    def convert(self, value: Any, param: Any, ctx: Any) -> Any:
+        if isinstance(value, tuple):
+            return value
+        label, equals, number = value.rpartition("=")
+        if not equals or not label.strip():
+            self.fail(f"'{value}' is no label with a number, as sub2=3.", param, ctx)
+        return label.strip(), click.IntRange(1, MOST_BRANCHES).convert(number, param, ctx)
+
+
 class RobotCount(click.ParamType[int | str]):
     """A number of robots, or `least`."""
 
@@ -213,6 +227,12 @@ RELAY = options(
         "--robots",
         type=RobotCount(),
         help="At most so many robots, tools included, as fast as found; or as few as found: least.",
+    ),
+    click.option(
+        "--parallel",
+        type=Branch(),
+        multiple=True,
+        help="So many branches make and bring a label in turn, as sub2=3 (repeatable).",
     ),
     click.option(
         "--seconds", "effort", type=SECONDS, help="To look for few robots [s]; 60 by default."

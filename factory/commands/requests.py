@@ -55,6 +55,7 @@ class ProjectOptions:
     cycle: float | None = None
     robots: int | Literal["least"] | None = None
     effort: float | None = None
+    parallel: tuple[tuple[str, int], ...] = ()
 
     def settings(self) -> Settings:
         """Options before the environment, that before the `factory.toml` beside the PAG or in the
@@ -75,7 +76,21 @@ class ProjectOptions:
         from factory.support.user_defaults import defaults_for
 
         floor = None if self.floor is None else pair(self.floor, "--floor", "4x3", float, WIDEST)
-        return Ground(floor, self.relay, self.cycle, defaults_for(self.file).lines())
+        kept = defaults_for(self.file)
+        branches = {**kept.parallel(), **dict(self.parallel)}
+        several = tuple((label, k) for label, k in branches.items() if k > 1)
+        if several:
+            self._alone()
+        return Ground(floor, self.relay, self.cycle, kept.lines(), parallel=several)
+
+    def _alone(self) -> None:
+        """Raises InputError (BadValue) for options that parallel branches do not go with."""
+        given = {"--relay": self.relay, "--cycle": self.cycle, "--robots": self.robots}
+        for option, value in given.items():
+            if value:
+                message = f"{option} does not go with parallel branches"
+                hint = "leave it out, or leave out --parallel and [parallel] in factory.toml"
+                raise InputError(Diagnostic("BadValue", message, None, hint))
 
     def project(self, silent: bool = True, settings: Settings | None = None) -> Project:
         """The project that the options describe, with the forms and lines that they ask for, for

@@ -35,7 +35,7 @@ ROUNDED = 1e-3
 def cycle_time_bound(factory: Factory, product: Product, clearance: float, pace: Pace) -> float:
     """No certified layout with this clearance [m] has a shorter cycle time [s]. Linear."""
     bound = _Bound(factory, product, clearance - TOLERANCE, pace)
-    return max(bound.gear(robot.index) for robot in factory.robots)
+    return max(bound.gear(robot.index) for robot in factory.robots) / factory.period
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,7 +97,8 @@ class _Bound:
         tool."""
         if robot == 0:
             product = self._box(self.factory.pag.root, 0)
-            return {self.factory.dropoff.index: product.high - product.low + 1.5 * self.c}
+            way = product.high - product.low + 1.5 * self.c
+            return {dropoff.index: way for dropoff in self.factory.dropoffs}
         axis, legs = self.axis[robot], dict[int, float]()
         for tour in self.factory.tours[robot]:
             last = self.factory.operations[tour[-1]]

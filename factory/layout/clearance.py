@@ -43,6 +43,7 @@ from factory.layout.dimensions import (
     PAYLOAD,
     PAYLOADS,
 )
+from factory.layout.feeding import passing
 from factory.layout.guidepath import Box
 from factory.layout.layout import Layout
 from factory.layout.sweeps import Pile, piles, regions
@@ -68,6 +69,7 @@ def certify(layout: Layout) -> Certificate:
         *islice(search.faults(), MOST),
         *islice(_standoffs(layout, found), MOST),
         *islice(_raised(layout, found), MOST),
+        *islice(_back_at_feeders(layout, found), MOST),
     ]
     top = max(region.z[1] for region in swept)
     return Certificate(
@@ -149,7 +151,7 @@ class _Search:
 
     def _serves(self, region: Region) -> bool:
         """Whether the outfeed takes a region in: itself, the robot under it, the product let go."""
-        return region.kind not in LOADS or region.mode == self.layout.factory.dropoff.index
+        return region.kind not in LOADS or self.layout.factory.drops(region.mode)
 
     def _joined(self, one: Region, other: Region) -> bool:
         """Whether one is coupled in a mode of the other's robot."""
@@ -194,7 +196,7 @@ class _Search:
 def _standoffs(layout: Layout, found: Mapping[str, Pile]) -> Iterator[Fault]:
     """Where a carrier brings a pile itself: what is brought to it is clear of the pile's way as
     long as it waits at its standoff, and waits no farther away than where it comes from."""
-    for operation in layout.factory.operations[:-1]:
+    for operation in layout.factory.making:
         carrier = operation.template.carrier - 1
         if operation.before[carrier] == NOPART or len(operation.inputs) == 1:
             continue
@@ -218,7 +220,7 @@ def _standoffs(layout: Layout, found: Mapping[str, Pile]) -> Iterator[Fault]:
 
 def _raised(layout: Layout, found: Mapping[str, Pile]) -> Iterator[Fault]:
     """What is to be lowered comes above all that the others bring."""
-    for operation in layout.factory.operations[:-1]:
+    for operation in layout.factory.making:
         if operation.lowered < 0:
             continue
         guest = operation.robots[operation.lowered]
@@ -236,6 +238,30 @@ def _raised(layout: Layout, found: Mapping[str, Pile]) -> Iterator[Fault]:
                 )
                 here = Region(guest, PAYLOADS, PAYLOAD_BODY, found[label].box, found[label].z)
                 yield fault(layout.factory, message, here, lacking=MARGIN - over)
+
+
+def _back_at_feeders(layout: Layout, found: Mapping[str, Pile]) -> Iterator[Fault]:
+    """A robot that has gone so far that the next part comes down does not come back with what it
+    holds: it would meet that part."""
+    operations = layout.factory.operations
+    for leaf in layout.factory.leaves:
+        robot = leaf.carrier
+        tour, way = layout.factory.tour_of(robot, leaf.index), passing(layout, leaf)
+        gone = dict(zip(layout.factory.robots[robot].operations, layout.stops(robot), strict=True))
+        past = False
+        for number in tour:
+            before = way - (layout.guidepaths[robot].length - gone[number])
+            if past and before > TOLERANCE:
+                name, label = layout.factory.robots[robot].name, operations[number].label
+                message = (
+                    f"{name} comes back to its feeder for '{label}', {before * 1000:.1f} mm nearer"
+                    " than it has to be when the next part comes down"
+                )
+                brought = operations[number].before[operations[number].robots.index(robot)]
+                pile = found[brought]
+                here = Region(robot, PAYLOADS, PAYLOAD_BODY, pile.box, pile.z, brought)
+                yield fault(layout.factory, message, here, lacking=before)
+            past = past or before <= TOLERANCE
 
 
 def _way(layout: Layout, found: Mapping[str, Pile], operation: Operation, slot: int) -> Region:

@@ -43,9 +43,9 @@ class Pace(SpeedProfile):
 
 
 def gear_times(layout: Layout, pace: Pace) -> list[float]:
-    """For each robot the summed delays [s] of its gear: the greatest is the cycle time, where every
-    robot has one tour. Where a robot goes ahead while it waits, it takes the longer of that and the
-    operation."""
+    """For each robot the summed delays [s] of its gear, a unit: the greatest is the cycle time,
+    where every robot has one tour. Where a robot goes ahead while it waits, it takes the longer of
+    that and the operation."""
     ways, operations = _ways(layout), layout.factory.operations
     delays = operation_times(layout, pace)
 
@@ -55,7 +55,11 @@ def gear_times(layout: Layout, pace: Pace) -> list[float]:
             return delays[number]
         return max(delays[number], pace.rest(ways[number, robot]) + pace.ahead)
 
-    return [sum(taken(n, robot.index) for n in robot.operations) for robot in layout.factory.robots]
+    units = layout.factory.period
+    return [
+        sum(taken(n, robot.index) for n in robot.operations) / units
+        for robot in layout.factory.robots
+    ]
 
 
 def cycle_of(layout: Layout, pace: Pace) -> float:
@@ -81,7 +85,7 @@ def slowest(layout: Layout, pace: Pace) -> tuple[float, list[int]]:
     }
     waits = len(net.threaded.places) - len(delays)
     ratio, robots = train_ratio(net, [*delays, *[0.0] * waits], ahead)
-    return ratio.seconds, robots
+    return ratio.seconds / layout.factory.period, robots
 
 
 def operation_times(layout: Layout, pace: Pace) -> list[float]:

@@ -77,7 +77,7 @@ def passing(layout: Layout, leaf: Operation) -> float:
     rear = min(
         path.frame(layout.held(robot, number, factory.operations[number].label))[0]
         for number in factory.robots[robot].operations
-        if factory.operations[number].carrier == robot and number != factory.dropoff.index
+        if factory.operations[number].carrier == robot and not factory.drops(number)
     )
     return _shown(layout, robot)[1] - rear + layout.clearance
 

@@ -153,8 +153,8 @@ class Footprint:
 
     def least(self, stop: Stop, station: float) -> float:
         """The least station of a stop after another station [m]: what joins the part of a feeder is
-        clear of the housing."""
-        if not self.fed or not stop.joins:
+        clear of the housing, and so is what comes back, with the next part in it."""
+        if not self.fed or stop is self.stops[0] or not (stop.joins or stop.visits > 1):
             return station
         return max(station, up(self.housing[1] + self.clearance.c - self.pile(stop)[0]))
 

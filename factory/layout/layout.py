@@ -251,7 +251,7 @@ class Layout:
         """The parts that overlap or scrape as their operations join them from the sides chosen, or
         overlap in the finished product."""
         found: list[Overlap] = []
-        for operation in self.factory.operations[:-1]:
+        for operation in self.factory.making:
             approach = operation.approach
             if approach is not None and any(approach.overlaps):
                 found += approach.overlaps[approach.sides.index(self.side(operation))]
@@ -341,10 +341,8 @@ class Layout:
 
 def carriers(factory: Factory) -> list[int]:
     """For each robot the carrier it delivers to; -1 for the output robot."""
-    return [
-        -1 if robot.index == 0 else factory.operations[robot.operations[-1]].carrier
-        for robot in factory.robots
-    ]
+    last = [robot.operations[-1] for robot in factory.robots]
+    return [-1 if factory.drops(n) else factory.operations[n].carrier for n in last]
 
 
 __all__ = ["BESIDE", "Box", "Extent", "Feeder", "Guidepath", "Layout", "Point2", "carriers"]

@@ -20,13 +20,14 @@ class Ground:
     much as it takes; whether guidepaths are shared among `relay` robots, or the `cycle` time [s]
     that those are to reach, None for the shortest; `lines`: labels that share a robot, line by
     line; whether the forms of operations were chosen, so that the PAG is not as it was written
-    (`formed`)."""
+    (`formed`); `parallel`: labels, and how often the branch that brings each is there."""
 
     floor: tuple[float, float] | None = None
     relay: bool = False
     cycle: float | None = None
     lines: tuple[tuple[str, ...], ...] = ()
     formed: bool = False
+    parallel: tuple[tuple[str, int], ...] = ()
 
     @property
     def relays(self) -> bool:
@@ -46,9 +47,10 @@ class Ground:
         from factory.layout.durations import Pace
         from factory.layout.embedding import lay_out
         from factory.layout.hands.choosing import Hands
+        from factory.layout.repeated import repeated
 
         pace = Pace.of(settings)
-        factory = judged(factory, product)
+        factory, product = judged(factory, product), repeated(product, factory)
         if settings.hands and hands is None:
             hands = Hands(factory, product, settings.acceleration)
         layout = lay_out(factory, product, settings.clearance, self.floor, pace, hands)
@@ -56,4 +58,11 @@ class Ground:
             from factory.layout.relaying import relayed
 
             layout = relayed(layout, settings, self.cycle, self.floor, hands)
-        return replace(layout, ground=asdict(self))
+        return replace(layout, ground=self.kept())
+
+    def kept(self) -> dict[str, object]:
+        """What a log keeps: by name, without branches where there are none."""
+        found = asdict(self)
+        if not self.parallel:
+            del found["parallel"]
+        return found

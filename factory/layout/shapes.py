@@ -189,7 +189,7 @@ def held_shape(
     least = 0.0
     if hand.tall:
         ends = [tour[-1] for tour in factory.tours[robot]]
-        final = [last if n == factory.dropoff.index else lies(operations[n].label, n) for n in ends]
+        final = [last if factory.drops(n) else lies(operations[n].label, n) for n in ends]
         rear = min(joined[0] for joined in final)
         reach = arm = up(max(reach, c.c + MAST / 2 - rear))
         if hand.kind == "above" and hands.is_fed(robot):
@@ -230,7 +230,7 @@ def carried(factory: Factory, robot: int) -> list[int]:
     return [
         number
         for number in factory.robots[robot].operations
-        if factory.operations[number].carrier == robot and number != factory.dropoff.index
+        if factory.operations[number].carrier == robot and not factory.drops(number)
     ]
 
 

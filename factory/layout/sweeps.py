@@ -72,7 +72,7 @@ def piles(factory: Factory, product: Product) -> dict[str, Pile]:
     x, y, _ = product.middle
     ground = float(product.low[2]) - PAYLOAD
     found: dict[str, Pile] = {}
-    for operation in reversed(factory.operations[:-1]):
+    for operation in reversed(factory.making):
         inputs = [found[label] for label in operation.inputs]
         if not inputs:
             solid = product.solids[operation.label]

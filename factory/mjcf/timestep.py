@@ -145,7 +145,7 @@ def _axes(settings: Settings, layout: Layout, jitter: float) -> Iterator[DrivenA
     room, far = robot_room(layout.clearance).c, tray_room(layout.clearance).c
     factory, solids, a = layout.factory, layout.product.solids, settings.acceleration
     masses: dict[str, float] = {}
-    for operation in reversed(factory.operations[:-1]):
+    for operation in reversed(factory.making):
         inputs = [masses[label] for label in operation.inputs]
         masses[operation.label] = sum(inputs) if inputs else solids[operation.label].mass
     for load in sorted({heaviest(factory, robot, masses) for robot in factory.robots}):

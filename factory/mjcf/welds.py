@@ -36,7 +36,7 @@ def add_welds(
         _park(equality, layout, label, copies[label], 1)
     for label in bodies.wholes:
         _park(equality, layout, label, copies[label], 0)
-    for label in bodies.carried[factory.pag.root]:
+    for label in (body for product in factory.products for body in bodies.carried[product]):
         pose = (*place_in(layout.product, bodies.centre[label], (0.0, 0.0)), 1, 0, 0, 0)
         _weld(equality, names.hold(label), names.OUTFEED_TRAY, names.part(label, 1), pose)
 

@@ -136,7 +136,7 @@ def operation_mode(layout: Layout, operation: Operation, eps: float) -> Mode:
     if template.before[carrier] != NOPART:
         template = _inside(template)
     mode = law_of(template)(template, setting)
-    if operation.inputs and operation.index != layout.factory.dropoff.index:
+    if operation.inputs and not layout.factory.drops(operation.index):
         guests = np.arange(len(paths)) != carrier
         mode = replace(mode, lower=np.where(guests, mode.goals, mode.lower))
     return _with_lifts(mode, layout, operation)

@@ -19,6 +19,12 @@ from factory.problem.template import Template, variable_number
 from factory.support.errors import Position
 
 
+def in_turn(label: str, turn: int) -> str:
+    """What a label is called for a unit of a period, counted from 0: `x` for the first, `x@2` for
+    the next."""
+    return f"{label}@{turn + 1}" if turn else label
+
+
 @dataclass(frozen=True, slots=True)
 class Operation:
     """A template instantiated: O(r_1, ..., r_k) (section 4.3).
@@ -26,7 +32,7 @@ class Operation:
     `label` is that of the result, `dropoff` for the last. `robots` are indices into
     `Factory.robots`, in the template's order; `before` and `after` the labels each carries when it
     starts and ends (NOPART for none); `dwell` [s]; `approach`: how its inputs come together, None
-    where that is free.
+    where that is free; `turn`: for which unit of a period it is, from 0.
     """
 
     index: int
@@ -38,6 +44,12 @@ class Operation:
     dwell: float = 0.0
     position: Position | None = field(default=None, compare=False)
     approach: Approach | None = field(default=None, repr=False)
+    turn: int = 0
+
+    @property
+    def written(self) -> str:
+        """The label without its turn: as the PAG has it, or one pile of such a label."""
+        return self.label.removesuffix(in_turn("", self.turn))
 
     @property
     def carrier(self) -> int:
@@ -102,7 +114,9 @@ class Factory:
 
     ~ is the union of the templates' identifications over `operations`. `parents[i]` is the
     operation that takes the result of operation i (dropoff has none, -1). `adjusted`: robots with a
-    lift that is set for each of their tours, to where the one hand holds what they bring.
+    lift that is set for each of their tours, to where the one hand holds what they bring. `period`:
+    how many units are made in one cycle of the net, with operations of their own; the last so many
+    operations are their dropoffs, in that order.
     """
 
     pag: PAG
@@ -111,6 +125,7 @@ class Factory:
     net: GearNet
     parents: tuple[int, ...] = field(repr=False)
     adjusted: frozenset[int] = frozenset()
+    period: int = 1
 
     @cached_property
     def by_label(self) -> Mapping[str, Operation]:
@@ -120,12 +135,39 @@ class Factory:
     @cached_property
     def leaves(self) -> tuple[Operation, ...]:
         """The operations that make a part out of nothing, in the order of their numbers."""
-        return tuple(o for o in self.operations if not o.inputs and o.index != self.dropoff.index)
+        return tuple(operation for operation in self.making if not operation.inputs)
+
+    @property
+    def making(self) -> tuple[Operation, ...]:
+        """All operations but dropoff."""
+        return self.operations[: -self.period]
+
+    @property
+    def dropoffs(self) -> tuple[Operation, ...]:
+        """The dropoff of each unit of a period."""
+        return self.operations[-self.period :]
 
     @property
     def dropoff(self) -> Operation:
-        """The output robot's last operation."""
-        return self.operations[-1]
+        """The output robot's last operation, for the first unit of a period."""
+        return self.operations[-self.period]
+
+    def drops(self, operation: int) -> bool:
+        """Whether an operation (index) is a dropoff."""
+        return operation >= len(self.operations) - self.period
+
+    @property
+    def products(self) -> tuple[str, ...]:
+        """The label of the finished product, for each unit of a period."""
+        return tuple(dropoff.inputs[0] for dropoff in self.dropoffs)
+
+    def unit(self, operation: Operation, count: int) -> int:
+        """For which unit an operation is that has been started, or ended, so often before."""
+        return count * self.period + operation.turn
+
+    def units(self, counts: Mapping[int, int]) -> int:
+        """How many products have been dropped off, by how often each transition has fired."""
+        return sum(counts.get(dropoff.end, 0) for dropoff in self.dropoffs)
 
     @cached_property
     def tours(self) -> tuple[tuple[tuple[int, ...], ...], ...]:
@@ -247,7 +289,7 @@ class Factory:
         """For each label that is carried: the labels of its parts. Quadratic in a chain; only for
         factories that are built in the engine."""
         found: dict[str, tuple[str, ...]] = {}
-        for operation in reversed(self.operations[:-1]):
+        for operation in reversed(self.making):
             joined = tuple(part for label in operation.inputs for part in found[label])
             found[operation.label] = joined or (operation.label,)
         return MappingProxyType(found)

@@ -99,7 +99,7 @@ def bodies_of(factory: Factory, product: Product, fuse: bool = False) -> FusedBo
     inertia = {label: solid.inertia for label, solid in solids.items()}
     carried: dict[str, tuple[str, ...]] = {}
     wholes: dict[str, Whole] = {}
-    for operation in reversed(factory.operations[:-1]):
+    for operation in reversed(factory.making):
         label, inputs = operation.label, [carried[i][0] for i in operation.inputs]
         if len(inputs) < 2:
             carried[label] = (inputs[0] if inputs else label,)
@@ -122,7 +122,7 @@ def bodies_of(factory: Factory, product: Product, fuse: bool = False) -> FusedBo
 def fusing_pays(factory: Factory, product: Product) -> bool:
     """Whether one body for each sub-assembly makes a run faster, as measured."""
     pieces = {o.label: len(product.solids[o.label].pieces) for o in factory.leaves}
-    wholes = [factory.contents[o.label] for o in factory.operations[:-1] if len(o.inputs) > 1]
+    wholes = [factory.contents[o.label] for o in factory.making if len(o.inputs) > 1]
     geoms = sum(pieces[part] for parts in wholes for part in parts)
     return len(factory.robots) >= FUSE_FROM and geoms <= GEOMS * len(factory.leaves)
 
@@ -132,9 +132,9 @@ def fused_copies(bodies: FusedBodies, factory: Factory, units: int | None) -> di
     robot, or not yet fused; of a sub-assembly one with its robot; of the product a further one on
     the outfeed's tray; of what is relayed a further one with each further robot."""
     copies = {operation.label: 2 for operation in factory.leaves}
-    (root,) = bodies.carried[factory.pag.root]
-    copies |= {label: 2 if label == root else 1 for label in bodies.wholes}
-    for operation in factory.operations[:-1]:
+    roots = {body for label in factory.products for body in bodies.carried[label]}
+    copies |= {label: 2 if label in roots else 1 for label in bodies.wholes}
+    for operation in factory.making:
         carrier = operation.template.carrier - 1
         if len(operation.inputs) == 1 and operation.before[carrier] == NOPART:
             copies[bodies.carried[operation.label][0]] += 1

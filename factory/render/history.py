@@ -138,8 +138,8 @@ class OperationProgress:
 def followed(factory: Factory, counts: Mapping[int, int]) -> Operation:
     """The operation nearest to the end in which the product furthest on its way is, or was
     last."""
-    unit = counts.get(factory.dropoff.end, 0)
-    begun = [o for o in factory.operations if counts.get(o.start, 0) > unit]
+    over = [counts.get(dropoff.end, 0) for dropoff in factory.dropoffs]
+    begun = [o for o in factory.operations if counts.get(o.start, 0) > over[o.turn]]
     depth = depths(factory)
     return min(begun or factory.leaves, key=lambda o: (depth[o.index], o.index))
 
@@ -147,7 +147,7 @@ def followed(factory: Factory, counts: Mapping[int, int]) -> Operation:
 def depths(factory: Factory) -> tuple[int, ...]:
     """For each operation how many come after it up to the dropoff."""
     found = [0] * len(factory.operations)
-    for operation in (factory.dropoff, *factory.operations[:-1]):
+    for operation in (*factory.dropoffs, *factory.making):
         parent = factory.parents[operation.index]
         found[operation.index] = 0 if parent < 0 else found[parent] + 1
     return tuple(found)

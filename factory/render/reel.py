@@ -67,15 +67,15 @@ class Poster:
         self.take, self.path = take, path
         self.moment: Moment | None = None
         factory, m = take.subject.factory, take.m
-        root = factory.by_label[factory.dropoff.inputs[0]]
-        self.end, self.seen, self.whole, self.most = root.end, 0, False, -1
+        self.ends = {factory.by_label[product].end for product in factory.products}
+        self.seen, self.whole, self.most = 0, False, -1
         self.parked = {e for e in range(m.neq) if m.equality(e).name.startswith("park/")}
 
     def see(self, moment: Moment) -> None:
         """A moment of the film; the history is as far."""
         fired = self.take.history.events[self.seen :]
         self.seen += len(fired)
-        if self.end in fired:
+        if not self.ends.isdisjoint(fired):
             shown = len(self.parked.difference(moment.shown.active.tolist()))
             if shown >= self.most:
                 self.most, self.moment = shown, moment

@@ -25,7 +25,7 @@ from factory.simulation.bundles import Bundles
 from factory.simulation.cells import Cells, Link
 from factory.simulation.run import Event
 from factory.simulation.supervisor import Active
-from factory.simulation.world import World
+from factory.simulation.world import Job, World
 
 PERIODS = (0.006, 0.02)
 """Control periods are drawn from so long to so long [s], in whole timesteps, one at least."""
@@ -56,7 +56,8 @@ class Process:
 
     @property
     def unit(self) -> int:
-        """Which time round its loop a robot is: the number of the unit it works on."""
+        """Which time round its loop a robot is: the number of the unit it works on, or of the
+        period of units."""
         return self.turns // len(self.program.steps)
 
     def go_on(self) -> None:
@@ -208,7 +209,7 @@ class DistributedSupervisor:
             return False
         if link.has_started():
             return True
-        if not step.is_carrier or not self.world.prepared(operation, process.unit):
+        if not step.is_carrier or not self.world.prepared(*self._job(process, operation)):
             return False
         return bool(self._bundle(operation).in_domain(link.state()[0])[0])
 
@@ -223,7 +224,7 @@ class DistributedSupervisor:
         elif self._at_goal(process, step):
             self._stop(process)
             self.record.end(operation, self.world.time)
-            self.world.apply([], [(operation, process.unit)])
+            self.world.apply([], [self._job(process, operation)])
             link.finish(operation.after[step.slot])
             process.stage = "leave"
             return
@@ -284,12 +285,16 @@ class DistributedSupervisor:
         """Whether all other robots have left the operation."""
         return all(process.link.has_left(other) for other, _ in step.until)
 
+    def _job(self, process: Process, operation: Operation) -> Job:
+        """An operation of a process, with the unit that it is for."""
+        return operation, self.factory.unit(operation, process.unit)
+
     def _bundle(self, operation: Operation) -> Bundle:
         return self.bundles.of((operation.index,))[0]
 
     def _enter(self, process: Process, operation: Operation) -> None:
         """The first robot that enters starts the operation."""
         if not process.link.has_started():
-            self.world.apply([(operation, process.unit)], [])
+            self.world.apply([self._job(process, operation)], [])
             self.record.start(operation, self.world.time)
         process.link.enter()

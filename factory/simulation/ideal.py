@@ -26,8 +26,8 @@ class IdealWorld:
         self.time, self.supplied, self.physics_time, self.hooks = 0.0, True, 0.0, Hooks()
         self.x = np.array(start, float)
         self.v = np.zeros_like(self.x)
-        self._dropoff, self._request = layout.factory.dropoff, request
-        self._before = counts.get(self._dropoff.end, 0)
+        self._factory, self._request = layout.factory, request
+        self._before = layout.factory.units(counts)
         self._plan = np.zeros((len(self.x), 4))
         self._plan[:, 1] = self.x
         self.dropoffs: list[float] = []
@@ -49,7 +49,7 @@ class IdealWorld:
     def apply(self, started: Sequence[Job], ended: Sequence[Job]) -> None:
         """Parts follow labels; only finished products are counted."""
         for operation, _ in ended:
-            if operation.index == self._dropoff.index:
+            if self._factory.drops(operation.index):
                 self.supplied = True
                 self.dropoffs.append(self.time)
 

@@ -26,13 +26,15 @@ STEADY = 4
 """Number of products from which on a cycle time is measured: the last half has two intervals."""
 
 
-def mean_interval(left: Sequence[float]) -> float | None:
-    """The mean interval [s] over the last half of the products that left at these times; None for
-    fewer than STEADY."""
+def mean_interval(left: Sequence[float], period: int = 1) -> float | None:
+    """The mean interval [s] over the last half of the products that left at these times, or over so
+    much of it as is whole periods of units, if any; None for fewer than STEADY."""
     if len(left) < STEADY:
         return None
     tail = left[len(left) // 2 - 1 :]
-    return (tail[-1] - tail[0]) / (len(tail) - 1)
+    count = len(tail) - 1
+    count -= count % period if count >= period else 0
+    return (tail[-1] - tail[-1 - count]) / count
 
 
 def busy_times(factory: Factory, events: Iterable[Event]) -> tuple[float, ...]:
@@ -103,7 +105,8 @@ class PhysicsFigures:
 class Run:
     """The record of a run: figures and events. `replays`: an independent replay of the events is a
     run of the net; `trouble` is None for a run that reached its end; `monitor` is what a monitor
-    reports that watched it, if one did. `lenient`: what is wrong with the bodies does not count."""
+    reports that watched it, if one did. `lenient`: what is wrong with the bodies does not count;
+    `period`: how many units come in a cycle of the net."""
 
     world: str
     units: int
@@ -125,6 +128,7 @@ class Run:
     trouble: Diagnostic | None = None
     monitor: Report | None = None
     lenient: bool = False
+    period: int = 1
 
     @property
     def refines_net(self) -> bool:
@@ -158,7 +162,7 @@ class Run:
     @property
     def cycle_time_s(self) -> float | None:
         """Mean interval between dropoffs over the last half of the units; None below 4."""
-        return mean_interval(self.dropoffs)
+        return mean_interval(self.dropoffs, self.period)
 
     @property
     def utilisation(self) -> tuple[float, ...]:

@@ -174,8 +174,8 @@ class Simulation:
         """How many copies of each part are in the factory in the marking where the run starts,
         those included that are being taken."""
         factory, counts = self.layout.factory, self.counts
-        gone = counts.get(factory.dropoff.end, 0)
-        return {o.label: counts.get(o.start, 0) - gone for o in factory.leaves}
+        gone = [counts.get(dropoff.end, 0) for dropoff in factory.dropoffs]
+        return {o.label: counts.get(o.start, 0) - gone[o.turn] for o in factory.leaves}
 
     def run(
         self,
@@ -258,6 +258,7 @@ class Simulation:
             request.seed,
             request.jitter,
             trouble,
+            period=factory.period,
         )
 
     def _trouble(self, code: str, what: str, hint: str) -> Diagnostic:

@@ -163,8 +163,8 @@ class Supervisor:
         asked again where there was none and nothing has changed."""
         if not (self.enabled or self.world.supplied):
             return ()
-        prepared, fired = self.world.prepared, self.fired
-        found = tuple(o.index for o in self.awaited() if prepared(o, fired[o.start]))
+        prepared, fired, unit = self.world.prepared, self.fired, self.factory.unit
+        found = tuple(o.index for o in self.awaited() if prepared(o, unit(o, fired[o.start])))
         self.enabled, self.world.supplied = bool(found), False
         return found
 
@@ -191,8 +191,9 @@ class Supervisor:
 
     def _fire(self, started: list[int], ended: list[int]) -> None:
         operations, now, fired = self.factory.operations, self.world.time, self.fired
-        starts = [(operations[o], fired[operations[o].start]) for o in started]
-        ends = [(operations[o], fired[operations[o].end]) for o in ended]
+        unit = self.factory.unit
+        starts = [(o, unit(o, fired[o.start])) for o in (operations[n] for n in started)]
+        ends = [(o, unit(o, fired[o.end])) for o in (operations[n] for n in ended)]
         events = (*(o.start for o, _ in starts), *(o.end for o, _ in ends))
         self.enabled |= self.threads.fire(events)
         transitions = self.factory.net.threaded.transitions

@@ -32,6 +32,9 @@ LONGEST = 1e9
 DWELL = 86_400.0
 """Upper bound on the dwell of an operation [s]: a day."""
 
+MOST_BRANCHES = 60
+"""The most branches that serve in turn, and the most units of a period."""
+
 LEAST: Literal["least"] = "least"
 """As few robots as found."""
 

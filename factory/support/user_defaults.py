@@ -14,7 +14,7 @@ from typing import Any
 
 from factory.support.errors import Diagnostic, InputError, Position, did_you_mean
 from factory.support.files import TABLE, read_bytes
-from factory.support.settings import RANGES, WHOLE, Settings, is_auto, wrong_type
+from factory.support.settings import MOST_BRANCHES, RANGES, WHOLE, Settings, is_auto, wrong_type
 
 NAME = "factory.toml"
 
@@ -34,10 +34,13 @@ OPTIONS: Mapping[str, object] = {
     "lenient": True,
 }
 """The keys that are options of commands, each with an example; the others are those of Settings,
-and LINES."""
+LINES and PARALLEL."""
 
 LINES = "lines"
 """A table of lists of labels: those of one list share a robot."""
+
+PARALLEL = "parallel"
+"""A table of labels, each with how often the branch that brings it is there."""
 
 _KINDS = {
     str: "a text in quotes",
@@ -73,6 +76,10 @@ class Defaults:
     def lines(self) -> tuple[tuple[str, ...], ...]:
         """The labels that share a robot, line by line."""
         return tuple(map(tuple, self.values.get(LINES, {}).values()))
+
+    def parallel(self) -> dict[str, int]:
+        """How often the branch that brings a label is there, by the label."""
+        return dict(self.values.get(PARALLEL, {}))
 
     def at(self, key: str) -> Position:
         """The place of a key."""
@@ -110,8 +117,10 @@ def _fault(key: str, value: object) -> Diagnostic | None:
         return wrong_type(key, value)
     if key == LINES:
         return _fault_of_lines(value)
+    if key == PARALLEL:
+        return _fault_of_branches(value)
     if key not in OPTIONS:
-        hint = did_you_mean(key, [*RANGES, *OPTIONS, LINES], "keys")
+        hint = did_you_mean(key, [*RANGES, *OPTIONS, LINES, PARALLEL], "keys")
         return Diagnostic("UnknownParameter", f"unknown key '{key}'", None, hint)
     kind = type(OPTIONS[key])
     right = isinstance(value, int | float if kind is float else kind)
@@ -131,6 +140,16 @@ def _fault_of_lines(value: object) -> Diagnostic | None:
         return None
     message = f"{LINES} must be a table of lists of labels"
     hint = f'for example a line [{LINES}], and below it side = ["part2", "part3"]'
+    return Diagnostic("BadValue", message, None, hint)
+
+
+def _fault_of_branches(value: object) -> Diagnostic | None:
+    """What is wrong with the table of parallel branches."""
+    numbers = [*value.values()] if isinstance(value, dict) else [None]
+    if all(type(k) is int and 1 <= k <= MOST_BRANCHES for k in numbers):
+        return None
+    message = f"{PARALLEL} must be a table of labels with whole numbers from 1 to {MOST_BRANCHES}"
+    hint = f"for example a line [{PARALLEL}], and below it sub2 = 3"
     return Diagnostic("BadValue", message, None, hint)
 
 

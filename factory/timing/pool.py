@@ -17,16 +17,17 @@ def part_pool(factory: Factory, wip: int | None = None) -> Mapping[str, int]:
 
     That is the least number of initial tokens on a path from dropoff_e to part_s, for part_s can
     fire no oftener than that beyond dropoff_e. With `wip`, in the net extended by `with_wip`. One
-    search for all parts. Raises InputError (BadValue) where `wip` is below 1.
+    search for all parts of a unit of a period. Raises InputError (BadValue) where `wip` is below 1.
     """
     net = marked(factory.net) if wip is None else with_wip(factory, wip)
-    found = least_tokens(net, factory.dropoff.end)
-    pool = {part.label: found[part.start] for part in factory.leaves}
+    found = [least_tokens(net, dropoff.end) for dropoff in factory.dropoffs]
+    pool = {part.label: found[part.turn][part.start] for part in factory.leaves}
     return MappingProxyType({label: n for label, n in pool.items() if n is not None})
 
 
 def with_wip(factory: Factory, wip: int) -> MarkedNet:
-    """The net with a place [dropoff_e; part_s] of `wip` tokens for each part.
+    """The net with a place [dropoff_e; part_s] of `wip` tokens for each part; in a period of
+    several units from the dropoff of the unit that comes so many before.
 
     A marked graph in which every new circuit carries tokens, hence still live; not a gear net, so a
     `MarkedNet` without gears, for proofs only. Raises InputError (BadValue) where `wip` is below 1.
@@ -35,10 +36,11 @@ def with_wip(factory: Factory, wip: int) -> MarkedNet:
         hint = "at least one copy of each part must be let in: --wip 1"
         raise InputError(Diagnostic("BadValue", f"work in process bounded by {wip}", None, hint))
     net = factory.net.threaded.net
-    end = (factory.dropoff.end,)
+    ends = [dropoff.end for dropoff in factory.dropoffs]
+    before = [divmod(part.turn - wip, factory.period) for part in factory.leaves]
     extra = tuple(
-        Place(f"wip:{part.label}", end, (part.start,), "wip", part.label, 0, part.position)
-        for part in factory.leaves
+        Place(f"wip:{o.label}", (ends[turn],), (o.start,), "wip", o.label, 0, o.position)
+        for o, (_, turn) in zip(factory.leaves, before, strict=True)
     )
-    tokens = marked(factory.net).tokens + (wip,) * len(extra)
+    tokens = marked(factory.net).tokens + tuple(-periods for periods, _ in before)
     return MarkedNet(PetriNet(net.transitions, net.places + extra), tokens)

@@ -121,15 +121,18 @@ def way_time(
 
 def duration(layout: Layout, delays: Sequence[float], cycle: float, units: int) -> float:
     """At most how long it takes to make so many `units` from the empty factory [s]: the first by
-    the slowest chain of operations from a part to dropoff, a `cycle` for each that follows."""
+    the slowest chain of operations from a part to dropoff, a `cycle` for each that follows, and for
+    each further one of a period."""
     factory = layout.factory
     ready = [0.0] * len(factory.robots)
-    for number in factory.order[:-1]:
+    for number in factory.order:
         operation = factory.operations[number]
+        if factory.drops(number) or operation.turn:
+            continue
         done = max(ready[robot] for robot in operation.robots) + delays[operation.index]
         for robot in operation.robots:
             ready[robot] = done
-    return max(ready) + delays[-1] + (units - 1) * cycle
+    return max(ready) + delays[-1] + (units + factory.period - 2) * cycle
 
 
 def predict(
@@ -156,5 +159,5 @@ def predict(
         bounded = with_wip(factory, most)
         seconds = [*delays, *[0.0] * (len(bounded.tokens) - len(delays)), *ways.values()]
         bound = marked_graph_cycle_time(with_ways(bounded, factory.net, ways), seconds).seconds
-        found.append(CycleTime(bound * (1 - 1e-9), f"wip {wip}"))
+        found.append(CycleTime(bound / factory.period * (1 - 1e-9), f"wip {wip}"))
     return max(found, key=lambda time: time.seconds)

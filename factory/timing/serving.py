@@ -32,7 +32,7 @@ def serving(layout: Layout, delays: Sequence[float], settings: Settings) -> Iter
             continue
         fed = _fed(layout, leaf, delays, settings)
         if fed > sum(delays[number] for number in robot.operations):
-            yield CycleTime(fed, f"feeder {leaf.label}")
+            yield CycleTime(fed / layout.factory.period, f"feeder {leaf.label}")
 
 
 def _fed(layout: Layout, leaf: Operation, delays: Sequence[float], settings: Settings) -> float:

@@ -164,15 +164,16 @@ class Hands:
             return self._on_line(tours, u, None)[tours.index(robot)]
         found = self._carriers.get((robot, u))
         if found is None:
-            frames = self._sides(robot, u)
-            found = self._chosen(robot, held(self.holding.factory, robot), frames)
+            frames, label = self._sides(robot, u), held(self.holding.factory, robot)
+            several = len(self.holding.factory.tours[robot]) > 1
+            found = self._nowhere(label) if several else self._chosen(robot, label, frames)
             self._carriers[robot, u] = found
         return found
 
-    @staticmethod
-    def _sides(robot: int, u: Way) -> tuple[tuple[Way, Way], ...]:
+    def _sides(self, robot: int, u: Way) -> tuple[tuple[Way, Way], ...]:
         """How a carrier that heads along u may lie."""
-        sides = ((u[1], u[0]), (-u[1], -u[0])) if robot else ((0.0, 1.0),)
+        delivers = self.holding.on[robot] >= 0
+        sides = ((u[1], u[0]), (-u[1], -u[0])) if delivers else ((0.0, 1.0),)
         return tuple((u, (x + 0.0, y + 0.0)) for x, y in sides)
 
     def all_frames(self, robot: int) -> list[tuple[tuple[Way, Way], ...]]:

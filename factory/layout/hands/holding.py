@@ -85,7 +85,7 @@ class Holding:
         others bring the rest."""
         if label not in self._loads:
             made = self.made(self.factory.by_label[label].carrier)
-            labels = [label, *(o.label for o in made if o.index != self.factory.dropoff.index)]
+            labels = [label, *(o.label for o in made if not self.factory.drops(o.index))]
             contents = dict.fromkeys(tuple(self.factory.contents[held]) for held in labels)
             self._loads[label] = Loads.of(self.product, contents, self.push)
         return self._loads[label]
@@ -114,6 +114,6 @@ def held(factory: Factory, robot: int, at_last: bool = False) -> str:
     "" for a tool."""
     for number in factory.robots[robot].operations[:: -1 if at_last else 1]:
         operation = factory.operations[number]
-        if operation.carrier == robot and operation.index != factory.dropoff.index:
+        if operation.carrier == robot and not factory.drops(number):
             return operation.label
     return ""

@@ -192,7 +192,7 @@ class InTheWay:
         as it comes there and leaves: along its heading, and where it lowers its payload from above.
         """
         last, (low, high) = self.holding.last(robot), self.reach(kind, found, u)
-        if last.index == self.holding.factory.dropoff.index:
+        if self.holding.factory.drops(last.index):
             gone, whole = swept(low, high, back(u)), self._at_last(robot)
             if kind != "behind":
                 yield (*gone, self.holding.boxes(whole))
@@ -215,7 +215,7 @@ class InTheWay:
     def _going_on(self, robot: int, kind: Kind, found: Places, u: Way, t: Way) -> Array:
         """How far a hand has to go back (n, k) [m] until each of the next k operations of its
         carrier may start, which leaves along t, or either way where it turns."""
-        if self.holding.last(robot).index == self.holding.factory.dropoff.index:
+        if self.holding.factory.drops(self.holding.last(robot).index):
             return np.zeros((len(found), 1))
         low, high = self.reach(kind, found, u)
         onward = self._met_onward(robot)
@@ -232,7 +232,7 @@ class InTheWay:
         the first, and what each later one adds."""
         factory, last = self.holding.factory, self.holding.last(robot)
         if last.index not in self._onward:
-            made = [o for o in self.holding.made(last.carrier) if o.index != factory.dropoff.index]
+            made = [o for o in self.holding.made(last.carrier) if not factory.drops(o.index)]
             labels = [o.label for o in made[made.index(last) + 1 :]] if last in made else []
             there, found = set[str](), list[Array]()
             for label in labels or [last.label]:

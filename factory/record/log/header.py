@@ -83,6 +83,16 @@ def is_positive(value: Any) -> bool:
 is_table, is_text, is_count = of(dict), of(str), whole(0, LARGE)
 
 
+def is_branch(value: Any) -> bool:
+    """Whether a value is a label with how often its branch is there."""
+    return (
+        isinstance(value, list)
+        and len(value) == 2
+        and is_text(value[0])
+        and whole(1, LARGE)(value[1])
+    )
+
+
 def listed(test: Test, length: int | None = None) -> Test:
     """A list of such values, of so many if a length is given."""
     return lambda v: isinstance(v, list) and length in (None, len(v)) and all(map(test, v))
@@ -122,6 +132,7 @@ KEYS = (
     Key("ground.relay", "true or false", of(bool), later=True),
     Key("ground.cycle", "a time in s, or null", maybe(is_positive), later=True),
     Key("ground.lines", "lists of labels", listed(listed(is_text)), later=True),
+    Key("ground.parallel", "pairs of a label and a number", listed(is_branch), later=True),
     Key("ground.formed", "true or false", of(bool), later=True),
     Key("monitor", "a table", is_table, later=True),
     Key("monitor.goals", "lists of numbers", listed(listed(is_number)), later=True),

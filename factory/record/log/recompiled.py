@@ -8,6 +8,7 @@ from typing import Any
 
 from factory.compiler.compiler import compile_pag
 from factory.compiler.folding import fold, lines_of_labels
+from factory.compiler.parallel import in_parallel
 from factory.lang import read_pag, read_template
 from factory.nets.history import firings
 from factory.plant.factory import Factory
@@ -39,8 +40,11 @@ def factory_of(header: Mapping[str, Any]) -> Factory:
     pag = read_pag(header["pag"]["text"], templates, header["pag"]["file"], None)
     catalogue = load_catalogue()
     factory = compile_pag(pag, templates, catalogue)
-    if lines := header.get("ground", {}).get("lines"):
+    ground = header.get("ground", {})
+    if lines := ground.get("lines"):
         factory = fold(factory, lines_of_labels(factory, lines), catalogue)
+    if branches := ground.get("parallel"):
+        factory = in_parallel(factory, branches)
     net = factory.net.threaded
     made = [[x.name for x in found] for found in (net.transitions, net.places, factory.robots)]
     if made != [header["transitions"], header["places"], header["robots"]]:

@@ -63,7 +63,7 @@ class MonitorSubject:
         than its carrier brings one, or it drops the product off."""
         return tuple(
             not o.inputs
-            or o.index == self.factory.dropoff.index
+            or self.factory.drops(o.index)
             or any(
                 label in self.factory.contents and robot != o.carrier
                 for robot, label in zip(o.robots, o.before, strict=True)

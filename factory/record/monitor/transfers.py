@@ -164,9 +164,7 @@ class Transfers:
         elif before and before[0] == GRIP and after[0] in (GRIP, HOLD):
             found = self._delivery(before[1], label)
         takes = found is not None and (
-            after == (GRIP, found.carrier)
-            if found.index != factory.dropoff.index
-            else after[0] == HOLD
+            after == (GRIP, found.carrier) if not factory.drops(found.index) else after[0] == HOLD
         )
         if found is None or not takes:
             robot = after[1] if after[1] >= 0 else before[1] if before else -1
@@ -204,9 +202,9 @@ class Transfers:
         operation = self.subject.factory.operations[number]
         unit = self.ended[number]
         self.ended[number] += 1
-        last = number == self.subject.factory.dropoff.index
+        last = self.subject.factory.drops(number)
         holder = (HOLD, -1) if last else (GRIP, operation.carrier)
-        label = self.subject.factory.pag.root if last else operation.label
+        label = operation.before[0] if last else operation.label
         load = self.load.get(holder, set())
         self._complete(operation.carrier, label, load, "Exchanged")
         others = [copy for copy in {*load, *copies} if self.unit[copy] != unit]
@@ -247,7 +245,7 @@ class Transfers:
         gear = [factory.operations[o] for o in factory.robots[robot].operations]
         done = sum(counts.get(o.end, 0) for o in gear)
         last = gear[done % len(gear) - 1]
-        carries = last.carrier == robot and last.index != factory.dropoff.index
+        carries = last.carrier == robot and not factory.drops(last.index)
         return last if done and carries and last.after[last.robots.index(robot)] != NOPART else None
 
     def _named(self, holder: Holder | None) -> str:

@@ -46,7 +46,7 @@ def measured(recording: Recording) -> MeasuredPace:
     total = recording.end or 1.0
     return MeasuredPace(
         dropoffs,
-        mean_interval(dropoffs),
+        mean_interval(dropoffs, factory.period),
         tuple(durations),
         tuple(busy / total for busy in robot_times(factory, spent)),
         tuple(gears),

@@ -124,7 +124,8 @@ def _laid_out(log: Log, beside: Path) -> Layout:
     pag, kept = _pag(header["pag"], templates, beside), header.get("ground", {})
     floor = kept.get("floor") and tuple(map(float, kept["floor"]))
     lines = tuple(map(tuple, kept.get("lines", ())))
-    ground = Ground(**{**kept, "floor": floor, "lines": lines})
+    branches = tuple((str(label), int(k)) for label, k in kept.get("parallel", ()))
+    ground = Ground(**{**kept, "floor": floor, "lines": lines, "parallel": branches})
     layout = Project(pag, templates, settings=made.settings, ground=ground).layout
     goals = subject_of(layout, made.settings, made.jitter, None, made.wip).as_json()["goals"]
     if goals != header["monitor"]["goals"]:

@@ -42,14 +42,20 @@ class Station:
 
 class Supply:
     """Which units need a part of each label: as many as are requested beside those that have been
-    `released` to the outfeed, or were begun where the run starts, at most `wip` at once."""
+    `released` to the outfeed, or were begun where the run starts, at most `wip` at once. The `next`
+    unit that needs one comes a `period` of units after the one before."""
 
     def __init__(self, model: Model, request: RunRequest, counts: Mapping[int, int]) -> None:
-        leaves = model.factory.leaves
-        self.next = {o.label: counts.get(o.end, 0) for o in leaves}
-        self._begun = {o.label: counts.get(o.start, 0) for o in leaves}
-        self.released = counts.get(model.factory.dropoff.end, 0)
+        factory, leaves = model.factory, model.factory.leaves
+        self.period = factory.period
+        self.next = {o.label: factory.unit(o, counts.get(o.end, 0)) for o in leaves}
+        self._begun = {o.label: factory.unit(o, counts.get(o.start, 0) - 1) + 1 for o in leaves}
+        self.released = factory.units(counts)
         self._units, self._wip = self.released + request.units, request.wip
+
+    def rounds(self) -> dict[str, int]:
+        """How many parts of each label have been taken."""
+        return {label: unit // self.period for label, unit in self.next.items()}
 
     def wants(self, label: str) -> bool:
         """Whether some unit has yet to get its part."""
@@ -88,7 +94,7 @@ class Feeders:
         self._shown: dict[str, int] = {}
         self._asked: set[int] = set()
         self.due = NEVER
-        self._turns = Turns(model.layout, supply.next)
+        self._turns = Turns(model.layout, supply.rounds())
 
     @property
     def trees(self) -> dict[int, int]:
@@ -171,7 +177,7 @@ class Feeders:
         for number in loaded:
             station, supply = self._stations[number], self.supply
             unit = self._shown[station.label] = supply.next[station.label]
-            supply.next[station.label] += 1
+            supply.next[station.label] += supply.period
             body = self._copies.take(station.label, unit)
             self._welds.place(body, station.down if down else station.up)
             self._welds.hold([body], station.code)

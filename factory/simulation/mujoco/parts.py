@@ -31,8 +31,8 @@ class Parts:
     """Copies, feeders, hands and the tray's hold, switched together.
 
     A weld is aimed at the copy it holds by writing its body at run time; its nominal frame is the
-    same for all copies. `labels`: the bodies that a finished product consists of; `on_tray`: the
-    unit on the outfeed's tray; `strength`: how much of that of robots' hands is used.
+    same for all copies. `on_tray`: the unit on the outfeed's tray; `strength`: how much of that of
+    robots' hands is used.
     """
 
     def __init__(
@@ -46,14 +46,15 @@ class Parts:
     ) -> None:
         factory, body = model.factory, copies_of(m, model)
         self.model, self._d = model, d
-        self.labels = model.carried.carried[factory.pag.root]
+        self._labels = [model.carried.carried[product] for product in factory.products]
+        every = [label for labels in self._labels for label in labels]
         self.on_tray: int | None = None
         self.masks = ContactMasks(m, body, model.apart)
         radii = np.zeros(m.nbody)
         for label, ids in body.items():
             radii[ids] = model.carried.radius[label]
         self.welds = Welds(m, d, self.masks, motion.sleep, radii)
-        self.hold = {label: m.equality(names.hold(label)).id for label in self.labels}
+        self.hold = {label: m.equality(names.hold(label)).id for label in every}
         self.copies = Copies(m, model, body, self.welds)
         passing, supply = Passing(m, d, model, request), Supply(model, request, counts)
         self.feeders = Feeders(m, model, self.copies, self.welds, motion.sliders, passing, supply)
@@ -89,7 +90,7 @@ class Parts:
         """Switch the grips that the ends of operations ask for, each with the number of its unit: a
         feeder's too, and at dropoff all of the output robot's against those of the tray."""
         for operation, unit in ended:
-            if operation.index == self.model.factory.dropoff.index:
+            if self.model.factory.drops(operation.index):
                 self._release(operation, unit)
             elif operation.inputs:
                 self._pass_on(operation, unit)
@@ -120,14 +121,18 @@ class Parts:
         assert unit is not None
         self.joining.misfit.pop(unit, None)
         self.welds.loose(self.hold.values())
-        self.feeders.retire(self.labels, unit)
+        self.feeders.retire(self.labels(unit), unit)
         self.welds.write()
 
     def finished(self, unit: int) -> tuple[np.ndarray, float]:
-        """The bodies of a finished product, in the order of `labels`, and how far off [m] its parts
-        were when they became one body."""
-        bodies = [self.copies[label, unit] for label in self.labels]
+        """The bodies of a finished product, in the order of its `labels`, and how far off [m] its
+        parts were when they became one body."""
+        bodies = [self.copies[label, unit] for label in self.labels(unit)]
         return np.array(bodies), self.joining.misfit.get(unit, 0.0)
+
+    def labels(self, unit: int) -> tuple[str, ...]:
+        """The labels of the bodies that a finished product consists of."""
+        return self._labels[unit % len(self._labels)]
 
     @property
     def tray(self) -> int:
@@ -146,16 +151,16 @@ class Parts:
         """The bodies that are in robots' hands in a marking: label, unit, and the robot (index) of
         the last operation on its way that has ended for its unit."""
         factory = self.model.factory
-        for number, leaf in enumerate(factory.leaves):
-            for unit in range(self.feeders.supply.released, counts.get(leaf.end, 0)):
-                holder = operation = leaf
-                while (
-                    operation.index != factory.dropoff.index and counts.get(operation.end, 0) > unit
-                ):
+        for leaf in factory.leaves:
+            gone = counts.get(factory.dropoffs[leaf.turn].end, 0)
+            for count in range(gone, counts.get(leaf.end, 0)):
+                unit, holder = factory.unit(leaf, count), leaf
+                operation = leaf
+                while not factory.drops(operation.index) and counts.get(operation.end, 0) > count:
                     holder = operation
                     operation = factory.operations[factory.parents[operation.index]]
                 if holder.carrier == leaf.carrier:
-                    passing.took([number])
+                    passing.holding(leaf.carrier)
                 for label in self.model.carried.carried[holder.label]:
                     if (label, unit) not in self.copies:
                         yield label, unit, holder.carrier

@@ -83,6 +83,10 @@ class Passing:
         """The robot of these feeders has taken a part."""
         self.holds[numbers] = True
 
+    def holding(self, robot: int) -> None:
+        """A robot (index) has taken a part from one of its feeders."""
+        self.took(self._fed[robot])
+
     def clear(self) -> Truth:
         """Whether each robot (n,) is so far away with its part that the next can come down; or, if
         its hand has to be there first, rests at home without one."""

@@ -61,7 +61,7 @@ class MujocoWorld:
         self.m = load(model) if loaded is None else copy(loaded)
         self.d = mujoco.MjData(self.m)
         self.dropoffs: list[float] = []
-        self._before = counts.get(model.factory.dropoff.end, 0)
+        self._before = model.factory.units(counts)
         self._unseen = 0
         self.motion = Motion(self.m, self.d, model, start, gains)
         self._away = HandsAway(self.d, model.layout, self.motion.axes.qpos)
@@ -70,7 +70,7 @@ class MujocoWorld:
         for operation in model.factory.operations:
             begun, over = (counts.get(t, 0) for t in (operation.start, operation.end))
             if begun > over:
-                self.inspection.joining[operation.index] = over
+                self.inspection.joining[operation.index] = model.factory.unit(operation, over)
         stepping = self.m, self.d, self.inspection, self.hooks, model.settings
         self.motion.stepping = (
             Strides(*stepping, Neighbours(self.m, self.d, self.parts, self.motion.axes))
@@ -101,7 +101,7 @@ class MujocoWorld:
         if operation.label in self.parts.feeders.welds:
             now = self.time + ROUNDED * self.model.settings.tick
             return self.parts.feeders.presents(operation.label, unit, now)
-        if operation.index != self.model.factory.dropoff.index:
+        if not self.model.factory.drops(operation.index):
             return True
         outfeed = self.motion.outfeed
         return self.parts.on_tray is None and (not outfeed.busy or outfeed.rests())
@@ -118,7 +118,7 @@ class MujocoWorld:
         self.parts.complete(ended)
         for operation, unit in ended:
             self.inspection.joining.pop(operation.index, None)
-            if operation.index == self.model.factory.dropoff.index:
+            if self.model.factory.drops(operation.index):
                 self.inspection.measure(*self.parts.finished(unit))
                 self.motion.send_tray(True)
         robots = [robot for operation, _ in ended for robot in operation.robots]

@@ -84,12 +84,12 @@ def flow(timing: Timing, net: TimedNet, units: int) -> Flow:
     """The flow of at least `units` products from the initial marking, all firing as soon as they
     can."""
     found = net.firings(units)
-    products = found.dates[:, timing.factory.dropoff.end]
+    products = leaving_dates(timing, found)
     return Flow(
         units,
         float(products[0]) + timing.leaving,
         float(products[units - 1]) + timing.leaving,
-        _full_pace(products, found),
+        _full_pace(products, found, net.units),
         found.settled is not None,
         _stocks(timing, found),
         tuple(_share(timing, net, robot) for robot in range(len(timing.factory.robots))),
@@ -97,11 +97,17 @@ def flow(timing: Timing, net: TimedNet, units: int) -> Flow:
     )
 
 
-def _full_pace(products: Floats, found: Firings) -> int | None:
+def leaving_dates(timing: Timing, found: Firings) -> Floats:
+    """When each product is dropped off [s]."""
+    return np.asarray(found.dates[:, [o.end for o in timing.factory.dropoffs]].ravel())
+
+
+def _full_pace(products: Floats, found: Firings, units: int) -> int | None:
     """The product, counted from 1, after which the mean interval never leaves the pace."""
     if found.settled is None:
         return None
-    apart = products[found.period :] - products[: -found.period] - found.advance
+    period = found.period * units
+    apart = products[period:] - products[:-period] - found.advance
     late = np.flatnonzero(np.abs(apart) > 1e-9 * (1.0 + products[-1]))
     return int(late[-1]) + 2 if len(late) else 1
 
@@ -114,9 +120,10 @@ def _stocks(timing: Timing, found: Firings) -> tuple[WorkInProgress, ...]:
     periods = int((end - float(dates[settled].max())) / found.advance) if found.advance else 0
     begin = end - max(1, periods) * found.advance
     stocks = []
-    for operation in factory.operations[:-1]:
+    for operation in factory.making:
         part = not operation.inputs
-        parent = factory.dropoff if part else factory.operations[factory.parents[operation.index]]
+        above = factory.operations[factory.parents[operation.index]]
+        parent = factory.dropoffs[operation.turn] if part else above
         enters = dates[:, operation.start if part else operation.end]
         leaves = dates[:, parent.end]
         stocks.append(_stock(operation, enters, leaves, begin, end))
@@ -153,15 +160,16 @@ def _share(timing: Timing, net: TimedNet, number: int) -> Share:
         working += timing.modes[index].dwell
         way = net.ways.get((number, index), index)
         spent += max(net.seconds[index], net.seconds[way]) - timing.settings.tick
-    cycle = net.pace * circuit.tokens
+    cycle = net.pace * circuit.products
     moving = min(moving, spent - working)
     return Share(robot.name, moving, working, max(0.0, spent - moving - working), cycle - spent)
 
 
 def durations(timing: Timing, found: Flow) -> Floats:
-    """(units, operations): how long each operation lasts each time, from its start to its end
+    """(cycles, operations): how long each operation lasts each time, from its start to its end
     [s]."""
-    operations, dates = timing.factory.operations, found.firings.dates[: found.units]
+    operations, cycles = timing.factory.operations, -(-found.units // timing.factory.period)
+    dates = found.firings.dates[:cycles]
     ends, starts = [o.end for o in operations], [o.start for o in operations]
     return np.asarray(dates[:, ends] - dates[:, starts] - timing.settings.tick)
 
@@ -188,15 +196,16 @@ def steady_units(timing: Timing, wip: int | None = None) -> int:
     Robots before the bottleneck fill first, and until then products come at the pace of others.
     """
     net = timed_net(timing, wip=wip)
-    dates = net.firings(MOST).dates[:MOST, timing.factory.dropoff.end]
-    return reached(dates, net.pace)
+    dates = leaving_dates(timing, net.firings(MOST))[:MOST]
+    return reached(dates, net.pace, net.units)
 
 
-def reached(dates: Floats, pace: float) -> int:
-    """The same number, by the `dates` [s] of at least 4 dropoffs; all of them where the pace is not
-    reached."""
+def reached(dates: Floats, pace: float, period: int = 1) -> int:
+    """The same number, by the `dates` [s] of at least 4 dropoffs, of which so many come in a
+    `period`; all of them where the pace is not reached."""
     units = np.arange(LEAST, len(dates) + 1)
-    before = units // 2 - 1
-    mean = (dates[units - 1] - dates[before]) / (units - 1 - before)
+    count = units - units // 2
+    count -= np.where(count >= period, count % period, 0)
+    mean = (dates[units - 1] - dates[units - 1 - count]) / count
     late = np.flatnonzero(np.abs(mean / pace - 1) > APART)
     return min(LEAST + int(late[-1]) + 1, len(dates)) if len(late) else LEAST

@@ -86,7 +86,7 @@ def compare(timing: Timing, net: TimedNet, found: Flow, record: RunRecord) -> Co
     return Comparison(
         record.source,
         len(left),
-        ComparedFigure(net.pace, mean_interval(left)),
+        ComparedFigure(net.pace, mean_interval(left, factory.period)),
         ComparedFigure(found.first, left[0] if left else None),
         ComparedFigure(found.last, last),
         tuple(compared),

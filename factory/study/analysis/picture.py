@@ -93,7 +93,7 @@ def _schedule(axes: Any, found: Analysis, shown: list[int]) -> None:
     """What each robot does over two cycles in the long run; critical operations stand out."""
     operations = found.timing.factory.operations
     critical = {p for circuit in found.net.critical for p in circuit.places}
-    length = CYCLES * found.net.pace
+    length = CYCLES * found.net.pace * found.net.units
     begin = _begin(found, length)
     for row, robot in enumerate(shown):
         for number, start, end in _bars(found, robot, begin, length):

@@ -55,7 +55,7 @@ def critical_words(found: Analysis) -> str:
     circuit, net = found.net.critical[0], found.net
     timed = [(net.net.net.places[p], net.seconds[p]) for p in circuit.places if net.seconds[p]]
     names = [f"{place.mode} {place.label}".strip() + f" {seconds:.3f}" for place, seconds in timed]
-    tokens = f", {circuit.tokens} products a turn" if circuit.tokens > 1 else ""
+    tokens = f", {circuit.products} products a turn" if circuit.products > 1 else ""
     return f"{circuit.name}: {' · '.join(names)} = {circuit.seconds:.3f} s{tokens}"
 
 

@@ -28,17 +28,23 @@ LONGEST_PERIOD = 60
 class Circuit:
     """A circuit of the timed net: its name (a robot, `outfeed`, `station part1`, `wip part1`, of
     several robots `r3 with r5`, that first which spends most of it), its time [s], its tokens, and
-    its places in order."""
+    its places in order; `units`: how many are made in a cycle of the net."""
 
     name: str
     seconds: float
     tokens: int
     places: tuple[int, ...]
+    units: int = 1
+
+    @property
+    def products(self) -> int:
+        """How many products come in its time."""
+        return self.tokens * self.units
 
     @property
     def pace(self) -> float:
-        """Seconds per token, a lower bound on the interval between products."""
-        return self.seconds / self.tokens
+        """Seconds per product, a lower bound on the interval between two."""
+        return self.seconds / self.products
 
 
 @dataclass(frozen=True)
@@ -53,7 +59,7 @@ class TimedNet:
     that take longer than the operation. `train`: the gears of a gear train, whose critical circuit
     may lie in several of them; None for a gear net. `first`: what a place takes for the first time
     [s], and `ready`: when robots have gone ahead that set out at the beginning, where those are
-    other times.
+    other times. `units`: how many products come in a cycle of the net.
     """
 
     net: MarkedNet
@@ -64,6 +70,7 @@ class TimedNet:
     first: Mapping[int, float] = field(default_factory=dict, repr=False)
     ready: Mapping[int, float] = field(default_factory=dict, repr=False)
     train: GearNet | None = field(default=None, repr=False)
+    units: int = 1
 
     @property
     def is_plain(self) -> bool:
@@ -78,7 +85,9 @@ class TimedNet:
     @cached_property
     def pace(self) -> float:
         """The cycle time in the long run [s]."""
-        return max(c.pace for c in self.named) if self.is_plain else self.ratio.seconds
+        if self.is_plain:
+            return max(c.pace for c in self.named)
+        return self.ratio.seconds / self.units
 
     @cached_property
     def circuits(self) -> tuple[Circuit, ...]:
@@ -99,7 +108,8 @@ class TimedNet:
         tokens = sum(self.net.tokens[p] for p in slack.circuit)
         names = [self.net.net.places[p].name for p in slack.circuit if p in self.bounds]
         seconds = sum(self.seconds[p] for p in slack.circuit)
-        return Circuit(" ".join(names).replace(":", " "), seconds, tokens, slack.circuit)
+        name = " ".join(names).replace(":", " ")
+        return Circuit(name, seconds, tokens, slack.circuit, self.units)
 
     def _meeting(self, gears: GearNet, known: Sequence[Circuit]) -> list[Circuit]:
         """The critical circuit of a gear train, where none of those `known` is as slow."""
@@ -114,22 +124,24 @@ class TimedNet:
                 sum(self.seconds[p] for p in places),
                 sum(self.net.tokens[p] for p in places),
                 places,
+                self.units,
             )
         ]
 
     def slack(self, circuit: Circuit) -> float:
         """How much longer a circuit may take before it sets the pace [s]; for a robot's gear, how
         long it waits in a cycle."""
-        found = self.pace * circuit.tokens - circuit.seconds
+        found = self.pace * circuit.products - circuit.seconds
         return found if found > SAME * self.pace else 0.0
 
     def firings(self, units: int) -> Firings:
-        """At least `units` firings of each transition from the initial marking, as soon as
-        possible."""
+        """The firings of each transition for at least `units` products from the initial marking, as
+        soon as possible."""
         period = lcm(*(c.tokens for c in self.critical))
-        period = min(period, LONGEST_PERIOD)
+        period, cycle = min(period, LONGEST_PERIOD), self.pace * self.units
+        rounds = -(-units // self.units)
         return settled_firings(
-            self.net, self.seconds, self.pace, period, units, self.first, self.ready
+            self.net, self.seconds, cycle, period, rounds, self.first, self.ready
         )
 
 
@@ -154,20 +166,25 @@ def timed_net(timing: Timing, change: Change = AS_IT_IS, wip: int | None = None)
         seconds[waiting] = gone
     moving = with_ways(replace(subject, tokens=tuple(tokens)), factory.net, ways)
     tokens, places = list(moving.tokens), list(moving.net.places)
-    back = [(f"station {factory.operations[n].label}", n, 0.0) for n in _alone(timing, change)]
-    if timing.outfeed:
-        for time in serving(timing.layout, seconds, timing.settings):
-            served = factory.by_label.get(time.bottleneck.partition(" ")[2], factory.dropoff)
-            number = served.index
-            back.append((time.bottleneck, number, time.seconds - seconds[number]))
+    back: list[tuple[str, tuple[int, ...], float]]
+    back = [(f"station {factory.operations[n].label}", (n,), 0.0) for n in _alone(timing, change)]
+    for time in serving(timing.layout, seconds, timing.settings) if timing.outfeed else ():
+        fed = factory.by_label.get(time.bottleneck.partition(" ")[2])
+        served = (fed.index,) if fed else tuple(o.index for o in factory.dropoffs)
+        taken = time.seconds * factory.period / len(served)
+        back.append((time.bottleneck, served, taken - seconds[served[0]]))
     named = _gears(timing, seconds, tokens, ways)
-    for name, number, delay in back:
-        operation = factory.operations[number]
-        place = Place(name, (operation.end,), (operation.start,), "wait", operation.label)
-        named.append(Circuit(name, delay + seconds[number], 1, (operation.place, len(places))))
-        places.append(place)
-        tokens.append(1)
-        seconds.append(delay)
+    for name, served, delay in back:
+        first, circuit = len(places), list[int]()
+        for step, number in enumerate(served):
+            onward = factory.operations[served[(step + 1) % len(served)]]
+            operation = factory.operations[number]
+            circuit += [operation.place, first + step]
+            places.append(Place(name, (operation.end,), (onward.start,), "wait", operation.label))
+            tokens.append(int(step == len(served) - 1))
+            seconds.append(delay)
+        spent = sum(seconds[p] for p in circuit)
+        named.append(Circuit(name, spent, 1, tuple(circuit), factory.period))
     net = replace(
         subject,
         net=PetriNet(subject.net.transitions, tuple(places)),
@@ -176,7 +193,17 @@ def timed_net(timing: Timing, change: Change = AS_IT_IS, wip: int | None = None)
     )
     ready = {ways[key]: taken for key, taken in timing.first_ways.items()}
     train = None if factory.net.is_tree else factory.net
-    return TimedNet(net, tuple(seconds), tuple(named), bounds, ways, timing.first, ready, train)
+    return TimedNet(
+        net,
+        tuple(seconds),
+        tuple(named),
+        bounds,
+        ways,
+        timing.first,
+        ready,
+        train,
+        factory.period,
+    )
 
 
 def _gears(
@@ -196,7 +223,11 @@ def _gears(
         places = tuple(p for p in slowest if p != NONE)
         found.append(
             Circuit(
-                gear.robot, sum(seconds[p] for p in places), sum(tokens[p] for p in places), places
+                gear.robot,
+                sum(seconds[p] for p in places),
+                sum(tokens[p] for p in places),
+                places,
+                timing.factory.period,
             )
         )
     return found
@@ -211,5 +242,5 @@ def _alone(timing: Timing, change: Change) -> list[int]:
         n
         for n in numbers
         if all(r in change.copies for r in factory.operations[n].robots)
-        and not (outfed and n == factory.dropoff.index)
+        and not (outfed and factory.drops(n))
     ]

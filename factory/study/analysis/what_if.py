@@ -171,7 +171,7 @@ def wip_curve(timing: Timing) -> WipCurve:
             paces[wip] = timed_net(timing, AS_IT_IS, wip).pace
         return paces[wip]
 
-    top = max(part_pool(timing.factory).values())
+    top = max(part_pool(timing.factory).values()) * timing.factory.period
     low, high = 0, top
     while high - low > 1:
         middle = (low + high) // 2

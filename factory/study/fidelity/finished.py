@@ -17,7 +17,10 @@ class Finished:
 
     def __init__(self, model: Model) -> None:
         product = model.layout.product
-        self.parts = model.factory.contents[model.factory.pag.root]
+        contents = model.factory.contents
+        found = [contents[label] for label in model.factory.products]
+        self.parts = found[0]
+        self._number = {part: n for parts in found for n, part in enumerate(parts)}
         solids = [product.solids[part] for part in self.parts]
         self._centres = np.array([s.centre for s in solids]) - solids[0].centre
         counts = [len(s.corners) for s in solids]
@@ -39,7 +42,7 @@ class Finished:
         held = welds.target[fresh[welds.kinds[fresh] == HOLD]]
         if len(held):
             labels = [names.label_of(welds.m.body(int(body)).name) for body in held]
-            self._held = held[np.argsort([self.parts.index(label) for label in labels])]
+            self._held = held[np.argsort([self._number[label] for label in labels])]
             self.measure(self._held, xpos, xmat)
 
     def measure(self, bodies: Index, xpos: Array, xmat: Array) -> None:

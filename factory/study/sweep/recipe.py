@@ -56,6 +56,7 @@ class Recipe:
             "relay": self.ground.relay,
             "cycle": self.ground.cycle,
             "lines": [list(line) for line in self.ground.lines],
+            **({"parallel": dict(self.ground.parallel)} if self.ground.parallel else {}),
             "fuse": self.fuse,
             **fixed,
         }

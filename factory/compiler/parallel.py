@@ -1,0 +1,199 @@
+"""Parallel stations: branches of a factory that are there several times, and serve in turn.
+
+The product is unrolled: a *period* has k units, each with operations of its own, `x` for the first,
+`x@2`, `x@3` for the next. A robot outside the branch does its program for one unit after the other;
+the branch that makes and brings a label is there k times, the j-th for the j-th unit of each
+period. It delivers to the same robot, at a station of its own.
+
+This is a fold of k units (`folding`): the tours of a period are assigned to lines, and each robot
+does them in the order in which its carrier asks for them. So the net is a gear train, live, safe
+and reversible, and products keep their order. Theorem 4: the cycle time is the greater of the ratio
+of the rest and that of the branch, divided by k.
+
+Guarantees: so, or it is refused (Parallel).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from math import lcm
+
+from factory.compiler.compiler import gear_net
+from factory.compiler.folding import delivery
+from factory.plant.approaches import Approach, Overlap
+from factory.plant.factory import Factory, Operation, Robot, in_turn
+from factory.problem.pag import NOPART
+from factory.support.errors import Diagnostic, InputError, Position, did_you_mean
+from factory.support.settings import MOST_BRANCHES
+
+Branches = Sequence[tuple[str, int]]
+"""Labels, and how often the branch that brings each is to be there."""
+
+
+def in_parallel(factory: Factory, branches: Branches) -> Factory:
+    """The factory with branches that are there several times. Raises InputError (Parallel) with
+    everything that forbids it."""
+    faults = [*_faults(factory, branches)]
+    if faults:
+        raise InputError(faults)
+    times = {_brings(factory, label): k for label, k in branches}
+    lines: list[int] = []  # how many robots stand for each
+    for robot in factory.robots:
+        above = lines[delivery(factory, robot.index).carrier] if lines else 1
+        lines.append(above * times.get(robot.index, 1))
+    period = lcm(*lines)
+    if period > MOST_BRANCHES:
+        names = ", ".join(f"{label} = {k}" for label, k in branches)
+        message = f"{names} would make {period} units in one period; {MOST_BRANCHES} are the most"
+        raise InputError(_fault(message, None, "take numbers with a small common multiple"))
+    return _unrolled(factory, lines, period) if period > 1 else factory
+
+
+def _unrolled(factory: Factory, lines: Sequence[int], period: int) -> Factory:
+    """The factory of a period of units, with so many robots for each."""
+    count, first = len(factory.making), [sum(lines[:robot]) for robot in range(len(lines))]
+
+    def number(operation: int, turn: int) -> int:
+        drops = operation == count
+        return period * count + turn if drops else turn * count + operation
+
+    operations = [
+        _for_unit(
+            o,
+            number(o.index, turn),
+            turn,
+            tuple(first[robot] + turn % lines[robot] for robot in o.robots),
+        )
+        for part in (factory.making, factory.dropoffs)
+        for turn in range(period)
+        for o in part
+    ]
+    robots = [
+        Robot(
+            first[robot.index] + one,
+            f"r{first[robot.index] + one + 1}",
+            robot.type,
+            tuple(
+                number(o, t)
+                for t in range(one, period, lines[robot.index])
+                for o in robot.operations
+            ),
+            robot.position,
+        )
+        for robot in factory.robots
+        for one in range(lines[robot.index])
+    ]
+    parents = [number(factory.parents[o], t) for t in range(period) for o in range(count)]
+    return Factory(
+        factory.pag,
+        tuple(robots),
+        tuple(operations),
+        gear_net(tuple(robots), tuple(operations)),
+        (*parents, *[-1] * period),
+        period=period,
+    )
+
+
+def _for_unit(o: Operation, index: int, turn: int, robots: tuple[int, ...]) -> Operation:
+    """An operation for a unit of a period."""
+
+    def named(label: str) -> str:
+        return label if label == NOPART else in_turn(label, turn)
+
+    approach = o.approach and _approach_for_unit(o.approach, turn)
+    before, after = (tuple(map(named, labels)) for labels in (o.before, o.after))
+    return replace(
+        o,
+        index=index,
+        label=named(o.label),
+        robots=robots,
+        before=before,
+        after=after,
+        approach=approach,
+        turn=turn,
+    )
+
+
+def _approach_for_unit(approach: Approach, turn: int) -> Approach:
+    """How inputs come together, by their names for a unit of a period."""
+
+    def named(overlap: Overlap) -> Overlap:
+        one, other = overlap.parts
+        return replace(overlap, parts=(in_turn(one, turn), in_turn(other, turn)))
+
+    return replace(
+        approach,
+        lowered=approach.lowered and in_turn(approach.lowered, turn),
+        overlaps=tuple(tuple(map(named, found)) for found in approach.overlaps),
+    )
+
+
+def _brings(factory: Factory, label: str) -> int:
+    """The robot that brings a label to another, -1 for none."""
+    found = (
+        robot
+        for o in factory.making
+        for robot, brought in zip(o.robots, o.before, strict=True)
+        if brought == label and robot != o.carrier
+    )
+    return next(found, -1)
+
+
+def _faults(factory: Factory, branches: Branches) -> Iterator[Diagnostic]:
+    """What forbids that these branches are there several times."""
+    times: dict[int, tuple[str, int]] = {}
+    taken = [o.label for o in factory.operations if "@" in o.label]
+    for label, k in branches:
+        robot = _brings(factory, label)
+        if robot < 0:
+            yield _not_brought(factory, label)
+            continue
+        other, number = times.setdefault(robot, (label, k))
+        if (other, number) != (label, k):
+            message = f"one robot brings '{other}', {number} times, and '{label}', {k} times"
+            yield _fault(message, factory.robots[robot].position, "name one of the two")
+        if k > 1:
+            yield from _not_inserted(factory, robot)
+    if taken and any(k > 1 for _, k in branches):
+        message = f"the label '{taken[0]}' looks like one for a further unit"
+        position = factory.by_label[taken[0]].position
+        yield _fault(message, position, "give it a name without '@'")
+
+
+def _not_brought(factory: Factory, label: str) -> Diagnostic:
+    """Why the branch of a label cannot be there several times that no robot brings to another."""
+    made = factory.by_label.get(label)
+    if made is None or factory.drops(made.index):
+        known = [o.label for o in factory.making]
+        return _fault(f"there is no label '{label}'", None, did_you_mean(label, known, "labels"))
+    robot = made.carrier
+    if robot == 0:
+        message = f"'{label}' is made by the output robot, which there is one of"
+        hint = "end its line before: let a third robot carry what is slow, by `mate`"
+        return _fault(message, made.position, hint)
+    brought = factory.deliveries(robot)[0]
+    message = f"no robot brings '{label}' to another: it becomes '{brought}' on its robot"
+    return _fault(message, made.position, f"name '{brought}'")
+
+
+def _not_inserted(factory: Factory, robot: int) -> Iterator[Diagnostic]:
+    """Deliveries of a robot that admit one station only."""
+    for tour in factory.tours[robot]:
+        o = factory.operations[tour[-1]]
+        carrier = o.template.carrier - 1
+        label = o.before[o.robots.index(robot)]
+        hint = f"write it with `insert`, '{label}' last: then there is a station for each branch"
+        if o.before[carrier] == NOPART:
+            message = (
+                f"'{label}' comes to the beginning of a robot's way in '{o.label}', where there is"
+                " room for one"
+            )
+            yield _fault(message, o.position, hint)
+        elif len(o.robots) > 2:
+            message = f"'{o.label}' takes '{label}' together with others, at one place"
+            yield _fault(message, o.position, hint)
+
+
+def _fault(message: str, position: Position | None, hint: str) -> Diagnostic:
+    return Diagnostic("Parallel", message, position, hint)
