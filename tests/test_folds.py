@@ -517,7 +517,7 @@ def test_what_is_no_fold(share: float, labels: tuple[str, ...], message: str) ->
 def test_what_is_taken_and_what_is_inserted_share_no_robot() -> None:
     parts = ((x, "atomic", "", {}) for x in "abc")
     factory = plain(table_pag("s", ("s", "mate", "a b c", {}), *parts))
-    with pytest.raises(InputError, match="'a' and 'c' cannot share a robot: they begin or end"):
+    with pytest.raises(InputError, match="'c' and 'a' cannot share a robot: they begin or end"):
         fold(factory, lines_of_labels(factory, [("a", "c")]), catalogue())
 
 
