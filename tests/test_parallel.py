@@ -27,6 +27,7 @@ from factory.plant.factory import Factory
 from factory.plant.programs import program_of, write_program
 from factory.problem.pag import PAG, Parameter
 from factory.problem.robot_types import load_catalogue
+from factory.show.report.links import about, labels_of, links
 from factory.simulation.request import RunRequest, WorldName
 from factory.simulation.run import Run
 from factory.simulation.simulation import Simulation
@@ -330,6 +331,14 @@ def test_analysis_tells_of_products() -> None:
     assert found.last == pytest.approx(run.dropoffs[-1], rel=0.01)
     assert all(share.cycle == pytest.approx(3 * net.pace) for share in found.shares)
     assert wip_curve(timing).points[-1][1] == pytest.approx(net.pace)
+
+
+def test_a_report_links_what_belongs_together() -> None:
+    factory = project(2).layout.factory
+    labels = labels_of(factory)
+    assert [about(labels, x) for x in ("sub1", "sub1@2", "sub1/2@2", "x@2")] == [*["sub1"] * 3, ""]
+    every = links(factory)
+    assert every["robot"][1]["labels"] == every["robot"][2]["labels"] != []
 
 
 # --- commands ------------------------------------------------------------------------------------

@@ -25,7 +25,8 @@ CALM = 3
 def serving(layout: Layout, delays: Sequence[float], settings: Settings) -> Iterator[CycleTime]:
     """The least cycle times that the outfeed, and feeders for which robots wait, allow, with the
     operations' delays [s]; `turn_ways` has those of robots with several tours."""
-    yield CycleTime(delays[layout.factory.dropoff.index] + away(layout, settings), "outfeed")
+    dropped = [delays[dropoff.index] for dropoff in layout.factory.dropoffs]
+    yield CycleTime(sum(dropped) / len(dropped) + away(layout, settings), "outfeed")
     for leaf in layout.factory.leaves:
         robot = layout.factory.robots[leaf.carrier]
         if len(layout.factory.tours[leaf.carrier]) > 1:

@@ -18,9 +18,10 @@ def labels_of(factory: Factory) -> dict[str, int]:
 
 def about(labels: dict[str, int], label: str) -> str:
     """The label of the PAG that a label of the net belongs to: itself, or, for a stage such as
-    `shelf/2`, `shelf`; "" for none."""
-    whole = label.partition("/")[0]
-    return label if label in labels else whole if whole in labels else ""
+    `shelf/2`, or a further unit of a period, `shelf@3`, `shelf`; "" for none."""
+    first = label.rpartition("@")[0]
+    named = (label, label.partition("/")[0], first, first.partition("/")[0])
+    return next((name for name in named if name in labels), "")
 
 
 def links(factory: Factory) -> dict[str, list[Link]]:

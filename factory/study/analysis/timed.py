@@ -166,13 +166,14 @@ def timed_net(timing: Timing, change: Change = AS_IT_IS, wip: int | None = None)
         seconds[waiting] = gone
     moving = with_ways(replace(subject, tokens=tuple(tokens)), factory.net, ways)
     tokens, places = list(moving.tokens), list(moving.net.places)
-    back: list[tuple[str, tuple[int, ...], float]]
-    back = [(f"station {factory.operations[n].label}", (n,), 0.0) for n in _alone(timing, change)]
+    back: list[tuple[str, tuple[int, ...], float]] = [
+        (f"station {factory.operations[n].label}", (n,), 0.0) for n in _alone(timing, change)
+    ]
     for time in serving(timing.layout, seconds, timing.settings) if timing.outfeed else ():
         fed = factory.by_label.get(time.bottleneck.partition(" ")[2])
         served = (fed.index,) if fed else tuple(o.index for o in factory.dropoffs)
-        taken = time.seconds * factory.period / len(served)
-        back.append((time.bottleneck, served, taken - seconds[served[0]]))
+        spent = time.seconds * factory.period - sum(seconds[number] for number in served)
+        back.append((time.bottleneck, served, spent / len(served)))
     named = _gears(timing, seconds, tokens, ways)
     for name, served, delay in back:
         first, circuit = len(places), list[int]()
