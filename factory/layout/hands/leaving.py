@@ -85,12 +85,17 @@ def _delivering(layout: Layout, carrier: int) -> Iterator[tuple[Operation, int, 
 def awaited_positions(layout: Layout) -> dict[int, float]:
     """Where robots go as soon as they have let go, since what they have delivered waits for that:
     clear of it; and home those whose hands have to be there before what they take, unless others
-    could be where a tall hand comes to."""
+    could be where a tall hand comes to. Where several units are made in a period, one may have
+    nothing more to bring while its carrier comes home for the next: it goes clear of that."""
     found: dict[int, float] = {}
     factory, backs = layout.factory, [0.0] * len(layout.factory.robots)
     for carrier in factory.robots if layout.hands else ():
         for _, guest, back in meetings(layout, carrier.index):
             backs[guest] = max(backs[guest], back)
+        hand = layout.hand(carrier.index)
+        if factory.period > 1 and hand is not None and hand.tall:
+            for operation, guest, _ in _delivering(layout, carrier.index):
+                backs[guest] = max(backs[guest], _behind(layout, guest, operation))
     for robot, hand in enumerate(layout.hands):
         if hand is None or hand.kind == "none":
             continue
@@ -143,7 +148,12 @@ def _short(layout: Layout, robot: int) -> float:
 
 def _gone_behind(layout: Layout, robot: int, operation: Operation) -> Leaving:
     """When all of a robot's hand has gone back behind what it has delivered to."""
+    return _back(layout, robot, _behind(layout, robot, operation))
+
+
+def _behind(layout: Layout, robot: int, operation: Operation) -> float:
+    """How far a robot's hand goes back until all of it is behind what it has delivered to [m]."""
     path, grip = layout.guidepaths[robot], layout.grip(robot)
     assert grip is not None
     box = layout.held(robot, operation.index, operation.label)
-    return _back(layout, robot, max(0.0, grip[1] - path.frame(box)[0]))
+    return max(0.0, grip[1] - path.frame(box)[0])
