@@ -20,6 +20,7 @@ REPORT = Report(
         "profile_300",
         "movers",
         "relays",
+        "few_robots",
         "states",
         "proving",
         "sweeping",
