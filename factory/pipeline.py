@@ -137,6 +137,10 @@ class Project:
         factory = judged(self.compiled, self.product)
         if lines:
             factory = fold(factory, lines_of_labels(factory, lines), self.catalogue)
+        if lines and self.settings.hands:
+            from factory.layout.hands.adjusting import with_lifts
+
+            factory = with_lifts(factory, self.product, self.catalogue, self.settings.acceleration)
         return in_parallel(factory, branches)
 
     @cached_property

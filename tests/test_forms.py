@@ -182,7 +182,7 @@ def test_a_template_without_a_robot_to_spare_is_never_changed(
 def looked_at(project: Project, aim: Aim) -> list[Candidate]:
     """All candidates of a search."""
     seen: list[Candidate] = []
-    Search(project, aim).look(seen.append)
+    Search(project, aim).look(lambda one, _: seen.append(one))
     return seen
 
 

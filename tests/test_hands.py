@@ -142,7 +142,8 @@ def test_pads_are_off_the_surface_by_the_air_between() -> None:
             assert np.all(first - np.array(hand.places)[:, 2] <= reach + 1e-9)
             pads = [limb for limb in limbs(layout, robot) if limb.name.endswith("pad")]
             assert len(pads) == len(hand.places)
-            low = layout.product.low[2] - 0.1 - layout.elevations[robot]
+            up = layout.elevation(robot, layout.factory.robots[robot].operations[0])
+            low = layout.product.low[2] - 0.1 - up
             tops = sorted(limb.high[2] + low for limb in pads)
             assert np.allclose(tops, sorted(z - AIR for _, _, z in hand.places), atol=1e-6)
 

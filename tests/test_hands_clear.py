@@ -10,6 +10,7 @@ import pytest
 from scipy.spatial import ConvexHull
 
 from factory.layout.dimensions import FINGER_TOP, PAYLOAD
+from factory.layout.feeding import feeder_of
 from factory.layout.hands import leaving
 from factory.layout.hands.apart import LEVEL, HandsApart
 from factory.layout.hands.hand import BEAM, Hand
@@ -170,7 +171,7 @@ def test_the_post_of_a_feeder_stands_behind_its_hand(tmp_path: Path) -> None:
     moved = replace(hand, kind="below", places=((float(x), float(y), hand.places[0][2]),))
     hands = tuple(moved if r == leaf.carrier else h for r, h in enumerate(layout.hands))
     there = replace(layout, hands=hands)
-    grip, feeder = there.grip(leaf.carrier), there.feeder("p0")
+    grip, feeder = there.grip(leaf.carrier), feeder_of(there, "p0")
     assert grip is not None
     assert grip[0] <= rear
     assert grip[0] - (feeder.back + 0.015) >= layout.clearance - 1e-9

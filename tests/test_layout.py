@@ -20,6 +20,7 @@ from pag_values import SHAPES, TEMPLATES, catalogue, factory_of, paper
 from factory.compiler.compiler import compile_pag
 from factory.geometry.product import product_geometry
 from factory.layout.embedding import lay_out
+from factory.layout.feeding import feeder_of
 from factory.layout.guidepath import hull
 from factory.layout.layout import Layout, carriers
 from factory.layout.sweeps import piles
@@ -185,7 +186,7 @@ def test_an_insertion_at_a_feeder_keeps_clear_of_its_boom() -> None:
     pag = table_pag("x", *rows)  # type: ignore[arg-type]
     layout = lay_out(factory_of(pag), product_geometry(pag))
     assert layout.stations[layout.factory.by_label["x"].index] >= 0.07
-    boom = layout.feeder("p").boom
+    boom = feeder_of(layout, "p").boom
     assert layout.guidepaths[1].a[0] - 0.05 - boom[1] >= 0.02 - 1e-9
 
 

@@ -11,6 +11,7 @@ from factory.compiler.mating.mating import matings
 from factory.geometry.product import product_geometry
 from factory.lang.pag_reader import read_pag
 from factory.layout.clearance import certify
+from factory.layout.feeding import feeder_of
 from factory.modes.modes import operation_modes, operation_starts
 from factory.nets.verify import verify
 from factory.pipeline import all_templates
@@ -96,14 +97,14 @@ def test_what_a_lift_serves_is_made_at_its_height() -> None:
     layout = laid_out_with_lifts(NESTED)
     factory = layout.factory
     robot = {label: factory.by_label[label].carrier for label in ("n", "inside", "bowl", "f2")}
-    up = layout.elevations
+    up = [layout.elevation(robot.index, robot.operations[0]) for robot in factory.robots]
     inside, ball = robot["inside"], factory.by_label["ball"].carrier
     assert up[robot["n"]] == 0.0
     assert up[inside] == factory.strokes[inside] > 0
     assert up[robot["f2"]] == up[inside]
     assert up[ball] == up[inside] + factory.strokes[ball]
-    assert layout.feeder("f2").low == pytest.approx(
-        layout.feeder("f1").low + up[inside] + 0.0105, abs=1e-9
+    assert feeder_of(layout, "f2").low == pytest.approx(
+        feeder_of(layout, "f1").low + up[inside] + 0.0105, abs=1e-9
     )
 
 

@@ -12,6 +12,7 @@ import pytest
 from opengl import needs_gl
 
 import factory
+from factory.layout.feeding import feeder_of
 from factory.layout.layout import Layout
 from factory.mjcf import names
 from factory.mjcf.parts import HIDDEN
@@ -166,7 +167,7 @@ def test_every_part_is_fed_and_every_product_goes(paper: Layout, found: list[Jum
 
 def test_parts_get_into_their_housings(paper: Layout, found: list[Jump]) -> None:
     for jump in fed(found):
-        feeder = paper.feeder(names.label_of(jump.body))
+        feeder = feeder_of(paper, names.label_of(jump.body))
         solid = paper.product.solids[names.label_of(jump.body)]
         low, high = (jump.in_sight + end - solid.centre for end in (solid.low, solid.high))
         xlo, xhi, ylo, yhi = feeder.housing

@@ -22,6 +22,7 @@ from factory.commands.fidelity import fidelity
 from factory.commands.import_ import import_
 from factory.commands.monitor import monitor
 from factory.commands.new import new
+from factory.commands.pareto import pareto
 from factory.commands.programs import programs
 from factory.commands.render import render
 from factory.commands.report import report
@@ -173,7 +174,7 @@ def cli(ctx: click.Context, version: bool, explain: str | None, as_json: bool) -
         raise click.UsageError("--json comes after the command", ctx)
 
 
-ON_A_FILE = check, build, run, render, view, fidelity, analyze, report, programs, export
+ON_A_FILE = check, build, run, render, view, fidelity, analyze, pareto, report, programs, export
 """The commands whose options may be set in advance for a FILE."""
 
 for _command in (new, import_, *map(with_defaults, ON_A_FILE), sweep, monitor, templates, doctor):

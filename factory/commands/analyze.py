@@ -169,7 +169,7 @@ def _analyze_pag(
         if log is None
         else conditions(log.header)
     )
-    project = given.project(made.settings)
+    project = given.project(out.silent, made.settings)
     layout = project.layout
     proved(layout.factory.net)
     warnings = announced(layout.product.warnings, out)

@@ -65,7 +65,7 @@ def build(
         from factory.export.build import build as build_files
         from factory.nets.verify import proved
 
-        project = given.project()
+        project = given.project(out.silent)
         with Waiting("reading the shapes and laying out", out.silent):
             verdict = proved(project.layout.factory.net)
         spent = perf_counter() - begin

@@ -58,8 +58,9 @@ def check(
         for_a_pag(file, "a net in PNML", "certificate", "against")
     writable(file, certificate)
     writable_folder(clashes)
+    project = None if is_net(file) else given.project(out.silent)
     with Waiting("reading the shapes and proving", out.silent):
-        checked = check_net(file) if is_net(file) else check_project(given.project(), wip)
+        checked = check_project(project, wip) if project else check_net(file)
     announced(checked.warnings, out)
     proved = None if against is None else _proved(against, checked)
     if clashes is not None:

@@ -98,7 +98,7 @@ def _source(given: ProjectOptions, chosen: Exporter, silent: bool) -> Source:
     if kind == "a log":
         return read_partly(file, silent)
     if kind == "a PAG":
-        return given.project()
+        return given.project(silent)
     from factory.foreign_nets.pnml_reader import load_net
 
     return load_net(file)

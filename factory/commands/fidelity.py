@@ -70,7 +70,7 @@ def fidelity(
     if output is not None:
         is_file = output.suffix.lower() == ".json"
         writable(given.file, output) if is_file else writable_folder(output)
-    project = given.project()
+    project = given.project(out.silent)
     layout, settings = project.layout, project.settings
     proved(layout.factory.net)
     warnings = announced(layout.product.warnings, out)

@@ -20,7 +20,7 @@ def programs(given: ProjectOptions, out: OutputOptions, robot: str | None) -> in
     """Print each robot's program, in the paper's form."""
     from factory.plant.programs import program_of, write_program
 
-    factory = given.project().factory
+    factory = given.project(out.silent).factory
     names = [r.name for r in factory.robots]
     if robot is not None and robot not in names:
         hint = did_you_mean(robot, names, "robots")

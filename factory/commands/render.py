@@ -79,7 +79,7 @@ def render(
     else:
         from factory.simulation.simulation import Simulation
 
-        project = given.project()
+        project = given.project(out.silent)
         warnings = announced(project.layout.product.warnings, out)
         made = Simulation(project.layout, asked.request(project))
         taken = (

@@ -106,7 +106,7 @@ def _run(given: ProjectOptions, asked: RunOptions, out: OutputOptions) -> _Made:
     folder that is removed afterwards. Gives the warnings too."""
     from factory.show.report import recording_of
 
-    project = given.project()
+    project = given.project(out.silent)
     warnings = announced(project.layout.product.warnings, out)
     with TemporaryDirectory(prefix="factory-") as folder:
         log = Path(folder) / "run.log"

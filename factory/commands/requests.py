@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import count
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -14,6 +15,7 @@ if TYPE_CHECKING:
     from factory.problem.pag import PAG
     from factory.render import Picture
     from factory.simulation.request import RunRequest, WorldName
+    from factory.study.allocation.candidate import Candidate
     from factory.support.settings import Settings
 
 
@@ -90,9 +92,10 @@ class ProjectOptions:
                 hint = "leave it out, or leave out --parallel and [parallel] in factory.toml"
                 raise InputError(Diagnostic("BadValue", message, None, hint))
 
-    def project(self, settings: Settings | None = None) -> Project:
+    def project(self, silent: bool = True, settings: Settings | None = None) -> Project:
         """The project that the options describe, with the forms and lines that they ask for, for
-        these `settings` if any are given. Raises InputError."""
+        these `settings` if any are given; unless `silent` the search for those shows its progress.
+        Raises InputError."""
         from factory.pipeline import read
 
         project = read(self.file, self.folders, settings or self.settings(), self.ground())
@@ -100,8 +103,15 @@ class ProjectOptions:
             return project
         from factory.study.allocation.aim import SECONDS, Aim
         from factory.study.allocation.search import allocated
+        from factory.support.progress import StepBar
 
-        return allocated(project, Aim(self.robots, self.cycle, self.effort or SECONDS))
+        aim, looked_at = Aim(self.robots, self.cycle, self.effort or SECONDS), count(1)
+        with StepBar("looking for few robots", silent, aim.seconds) as steps:
+
+            def seen(_: Candidate, best: Candidate) -> None:
+                steps.show("looking for few robots", next(looked_at), None, f"best: {best}")
+
+            return allocated(project, aim, seen)
 
 
 @dataclass(frozen=True, slots=True)

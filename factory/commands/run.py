@@ -82,7 +82,7 @@ def run(
     The status is 1 for a run that does not make its units, or does not follow its net, or in which
     bodies do otherwise than the net says: --lenient leaves those out."""
     writable(given.file, video, log, shown.poster)
-    project = given.project()
+    project = given.project(out.silent)
     with Waiting("reading the shapes and laying out", out.silent):
         layout = project.layout
     warnings = announced(project.warnings, out)

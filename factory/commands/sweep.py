@@ -153,7 +153,7 @@ def _carry_out(
     worlds = next((axis.values for axis in axes if axis.key == "world"), (runs.world,))
     if set(worlds) == {"ideal"}:
         check_ideal(runs.fuse)
-    project = given.project()
+    project = given.project(out.silent)
     varies = any(axis.key == "clearance" for axis in axes)
     # a factory that does not fit its floor is refused before the first run
     factory = project.plain if varies else project.layout.factory

@@ -51,7 +51,7 @@ def view(
     from factory.support.interruption import Interruption
 
     check_server(host, expose)
-    project = given.project()
+    project = given.project(out.silent)
     layout = project.layout
     proved(layout.factory.net)
     warnings = announced(layout.product.warnings, out)

@@ -20,6 +20,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
+from itertools import pairwise
 
 from factory.compiler.compiler import gear_net
 from factory.plant.factory import Factory, Operation, Robot
@@ -167,6 +168,25 @@ def _faults(
         both = next(n for n in deliveries if deliveries.count(n) > 1)
         message = f"'{factory.operations[both].label}' needs two inputs of one robot at once"
         yield _fault(message, position=factory.operations[both].position)
+
+
+def kept_apart(factory: Factory, lines: Sequence[Line], catalogue: Catalogue) -> Iterator[str]:
+    """Why lines that deliver to one robot cannot become one, in words, for each two of them."""
+    on = line_of(len(factory.robots), lines)
+    heads: dict[int, list[int]] = {}
+    for robot in dict.fromkeys(on[1:]):
+        if kind_of(factory, robot)[0] != "tool":
+            heads.setdefault(on[delivery(factory, robot).carrier], []).append(robot)
+    for one, other in (pair for group in heads.values() for pair in pairwise(group)):
+        if delivery(factory, one) is delivery(factory, other):
+            continue
+        message = mismatch(factory, one, other, on, catalogue)
+        tours = [robot for robot in range(len(on)) if on[robot] in (one, other)]
+        if not message and not set.intersection(*(sides_of(factory, r) for r in tours)):
+            message = "they cannot come from one side"
+        if message:
+            both = f"{_named(factory, one)} and {_named(factory, other)}"
+            yield f"{both} cannot share a robot: {message}"
 
 
 def mismatch(

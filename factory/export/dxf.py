@@ -11,6 +11,7 @@ from typing import Any
 from factory.export.floor_plan import Flat, flat_shapes, stations
 from factory.export.subject import Subject
 from factory.layout.dimensions import CARRIAGE
+from factory.layout.feeding import feeder_of
 from factory.layout.layout import Box, Layout, Point2
 from factory.support.extras import optional
 
@@ -102,7 +103,7 @@ def _shape(space: Any, shape: Flat) -> None:
 def _labels(layout: Layout) -> Iterator[tuple[str, Point2]]:
     """Parts at their feeders, robots on their carriages, operations where robots meet."""
     for leaf in layout.factory.leaves:
-        xlo, _, _, yhi = layout.feeder(leaf.label).post
+        xlo, _, _, yhi = feeder_of(layout, leaf.label).post
         yield leaf.label, (xlo, yhi + 0.005)
     for robot, path in zip(layout.factory.robots, layout.guidepaths, strict=True):
         x, y = path.carriage(path.length)

@@ -10,6 +10,7 @@ import numpy as np
 from factory.geometry.solids import Solid
 from factory.layout.certificate import ALWAYS, PAYLOAD_BODY
 from factory.layout.dimensions import ARM_WIDTH, CARRIAGE
+from factory.layout.feeding import feeder_of
 from factory.layout.hands.limbs import limbs
 from factory.layout.layout import Box, Extent, Layout, Point2
 from factory.layout.sweeps import piles, regions
@@ -50,7 +51,7 @@ def flat_shapes(layout: Layout) -> Iterator[Flat]:
     for leaf in leaves:
         yield part_outline(layout, leaf.label, layout.guidepaths[0].a, "product")
     for leaf in leaves:
-        feeder = layout.feeder(leaf.label)
+        feeder = feeder_of(layout, leaf.label)
         yield Flat.of_box("boom", feeder.boom)
         yield Flat.of_box("post", feeder.post)
         yield Flat.of_box("housing", feeder.housing)

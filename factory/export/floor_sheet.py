@@ -9,6 +9,7 @@ import numpy as np
 
 from factory.export.floor_plan import Flat, flat_shapes, stations
 from factory.layout.dimensions import CARRIAGE
+from factory.layout.feeding import feeder_of
 from factory.layout.layout import Layout
 from factory.support.canvas import LETTER, Box, Canvas, Point, millimetres, page_box
 
@@ -179,7 +180,7 @@ class _Sheet:
             for label in labels:
                 self.canvas.place(millimetres(at), label, FONT, 8.0, "j")
         for leaf in layout.factory.leaves:
-            xlo, xhi, ylo, yhi = layout.feeder(leaf.label).post
+            xlo, xhi, ylo, yhi = feeder_of(layout, leaf.label).post
             middle = millimetres(((xlo + xhi) / 2, (ylo + yhi) / 2))
             self.canvas.place(middle, leaf.label, FONT, 19.0, "p")
 

@@ -163,4 +163,5 @@ class _Bound:
     def _lowering(self, operation: Operation, slot: int) -> float:
         if slot != operation.lowered:
             return 0.0
-        return self.pace.rest(self.factory.strokes[operation.robots[slot]]) - self.tail
+        stroke = operation.approach.stroke if operation.approach else 0.0
+        return self.pace.rest(stroke) - self.tail

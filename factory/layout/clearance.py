@@ -43,6 +43,7 @@ from factory.layout.dimensions import (
     PAYLOAD,
     PAYLOADS,
 )
+from factory.layout.feeding import passing
 from factory.layout.guidepath import Box
 from factory.layout.layout import Layout
 from factory.layout.sweeps import Pile, piles, regions
@@ -223,11 +224,12 @@ def _raised(layout: Layout, found: Mapping[str, Pile]) -> Iterator[Fault]:
         if operation.lowered < 0:
             continue
         guest = operation.robots[operation.lowered]
-        low = found[operation.before[operation.lowered]].z[0] + layout.elevations[guest]
+        low = found[operation.before[operation.lowered]].z[0]
+        low += layout.elevation(guest, operation.index)
         for robot, label in zip(operation.robots, operation.before, strict=True):
             if robot == guest or label == NOPART:
                 continue
-            over = low - found[label].z[1] - layout.elevations[operation.carrier]
+            over = low - found[label].z[1] - layout.elevation(operation.carrier, operation.index)
             if over < MARGIN - TOLERANCE:
                 name = layout.factory.robots[guest].name
                 message = (
@@ -244,7 +246,7 @@ def _back_at_feeders(layout: Layout, found: Mapping[str, Pile]) -> Iterator[Faul
     operations = layout.factory.operations
     for leaf in layout.factory.leaves:
         robot = leaf.carrier
-        tour, way = layout.factory.tour_of(robot, leaf.index), layout.passing(leaf)
+        tour, way = layout.factory.tour_of(robot, leaf.index), passing(layout, leaf)
         gone = dict(zip(layout.factory.robots[robot].operations, layout.stops(robot), strict=True))
         past = False
         for number in tour:
@@ -266,7 +268,8 @@ def _way(layout: Layout, found: Mapping[str, Pile], operation: Operation, slot: 
     """What a robot's payload sweeps in a mode before its gate opens."""
     robot = operation.robots[slot]
     label = operation.before[slot]
-    pile = found[label].raised(layout.elevations[robot])
+    pile = found[label].raised(layout.elevation(robot, operation.index))
+    pile = pile.moved(layout.shift(robot, operation.index))
     start, end = layout.legs[operation.index, robot]
     end += layout.standoff(operation, slot)
     box = layout.guidepaths[robot].sweep(pile.box, max(start, end), end)

@@ -82,7 +82,8 @@ def _ends_at(layout: Layout, robot: int, operation: Operation) -> Iterator[Fault
     if t != on.heading and not (in_line and u == on.heading):
         message = f"{name}: its side {t} is not {other}'s heading {on.heading}: it is mirrored"
         yield fault(factory, message, robot, carrier)
-    wanted = on.middle(on.length - layout.stations[number])
+    slot = operation.robots.index(robot)
+    wanted = on.middle(on.length - layout.stations[number] + layout.apart(number, slot)[1])
     off = dist(path.a, wanted)
     if off > 1e-6:
         message = (
@@ -91,9 +92,8 @@ def _ends_at(layout: Layout, robot: int, operation: Operation) -> Iterator[Fault
         )
         yield fault(factory, message, robot, carrier, lacking=off)
         return
-    slot = operation.robots.index(robot)
-    mine = path.middle(layout.goal(number, slot))
-    off = dist(mine, layout.meeting(operation))
+    (x, y), (more, beside) = path.middle(layout.goal(number, slot)), layout.shift(robot, number)
+    off = dist((x + more, y + beside), layout.meeting(operation))
     if operation.before[slot] != NOPART and off > 1e-6:
         message = (
             f"{name} brings '{operation.before[slot]}' to {off * 1000:.1f} mm from its place in"

@@ -19,6 +19,7 @@ from factory.layout.certificate import (
 )
 from factory.layout.dimensions import BEHIND, SIDE, WALL, Clearance, up
 from factory.layout.guidepath import Box, Guidepath
+from factory.layout.hands.hand import Point3
 from factory.layout.layout import Layout, carriers
 from factory.layout.shapes import Shape, headings
 from factory.layout.stretching import Stretched
@@ -58,6 +59,15 @@ class LayoutDraft:
             self.payloads,
             _outfeed(guidepaths[0], self.shapes[0], self.clearance),
             tuple(s.hand for s in self.shapes) if any(s.hand for s in self.shapes) else (),
+            self._shifts() if any(s.shifts for s in self.shapes) else (),
+        )
+
+    def _shifts(self) -> tuple[tuple[Point3, ...], ...]:
+        """For each robot those of its tours."""
+        tours = self.factory.tours
+        return tuple(
+            tuple(shape.shift(tour[-1]) for tour in tours[robot])
+            for robot, shape in enumerate(self.shapes)
         )
 
     def _guidepaths(self, travel: Sequence[float], lane: int) -> tuple[Guidepath, ...]:
@@ -68,8 +78,9 @@ class LayoutDraft:
             (u, t), shape, a = frames[robot], self.shapes[robot], (0.0, 0.0)
             if carrier >= 0:
                 number = self.factory.robots[robot].operations[-1]
-                on = paths[carrier]
-                a = on.middle(on.length - self.stretched.stations[number])
+                on, further = paths[carrier], shape.shift(number)[1]
+                further -= self.shapes[carrier].shift(number)[0]
+                a = on.middle(on.length - self.stretched.stations[number] + further)
             a = (round(a[0], 3), round(a[1], 3))
             offset = round(shape.offset + lane * shape.spread, 3)
             paths.append(

@@ -119,10 +119,12 @@ def _operation_time(
             rested[slot] = pace.staged(way, standoff, pace.entered(rested[gate]))
     longest = max(rested)
     if lowered >= 0:
-        stroke = layout.factory.strokes[operation.robots[lowered]]
+        robot = operation.robots[lowered]
+        level = layout.level(robot, operation.index)
+        stroke = level.up - level.down
         longest = max(longest, pace.entered(rested[lowered]) + pace.rest(stroke))
     for robot in operation.robots:
         lifted = robot in layout.factory.strokes
         if lifted and layout.factory.begins(robot, operation.index):
-            longest = max(longest, pace.rest(layout.factory.strokes[robot]))
+            longest = max(longest, pace.rest(layout.strokes[robot]))
     return longest + operation.dwell + pace.lost

@@ -7,7 +7,7 @@ origin at its B station. Everything has half a clearance around it.
 from __future__ import annotations
 
 from bisect import bisect_left
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import accumulate
@@ -158,10 +158,22 @@ class Footprint:
             return station
         return max(station, up(self.housing[1] + self.clearance.c - self.pile(stop)[0]))
 
-    def placed(self, stop: Stop, station: float) -> Placed:
-        """The pile that is there at a stop at a station."""
-        pile = self.shape.laden(self.pile(stop))
-        return station + ahead_of(stop.first, self.shape.reach), pile
+    def placed(self, stop: Stop, station: float, further: Mapping[int, float]) -> Placed:
+        """The pile that is there at a stop at a station, `further` for some of its operations."""
+        rear, front, low, high = self.shape.laden(self.pile(stop))
+        if further:
+            rear, front = rear + min(further.values()), front + max(further.values())
+        return station + ahead_of(stop.first, self.shape.reach), (rear, front, low, high)
+
+    def further(self, stop: Stop, guests: Iterable[tuple[int, Shape]]) -> dict[int, float]:
+        """How much further than at the station of a stop the robot stands for its operations (by
+        their numbers), since it, or one that delivers there, holds in another place what it brings
+        for them [m]; nothing where it always stands there."""
+        shapes = sorted(guests, key=lambda guest: guest[1].tool)
+        if not shapes or not (self.shape.shifts or shapes[0][1].shifts):
+            return {}
+        aside = {o.index: shapes[0][1].shift(o.index)[1] for o in stop.operations}
+        return {n: round(far - self.shape.shift(n)[0], 6) for n, far in aside.items()}
 
 
 def footprint(

@@ -32,6 +32,11 @@ def hull(boxes: Sequence[Box]) -> Box:
     return float(min(xlo)), float(max(xhi)), float(min(ylo)), float(max(yhi))
 
 
+def moved(box: Box, by: Point2) -> Box:
+    """A box, moved; its numbers are those of the axes in which `by` is given [m]."""
+    return box[0] + by[0], box[1] + by[0], box[2] + by[1], box[3] + by[1]
+
+
 @dataclass(frozen=True, slots=True)
 class Guidepath:
     """The guidepath of one robot and how the robot is stretched to its payload.

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from math import hypot
 from types import MappingProxyType
 
 from factory.geometry.solids import Product
@@ -13,22 +12,15 @@ from factory.layout.certificate import Certificate
 from factory.layout.dimensions import (
     BEHIND,
     BELT_GAP,
-    BOOM,
-    BOOM_HEIGHT,
-    FINGER,
-    PAD,
     PAYLOAD,
     PLAY,
-    POST,
-    RISE,
     SIDE,
     TRAY,
     WALL,
-    Clearance,
     up,
 )
-from factory.layout.guidepath import Box, Extent, Feeder, Guidepath, Point2, hull
-from factory.layout.hands.hand import BEAM, Hand
+from factory.layout.guidepath import Box, Extent, Feeder, Guidepath, Point2, moved
+from factory.layout.hands.hand import Hand, Point3
 from factory.layout.hands.mounted import Mount, grip_of
 from factory.plant.approaches import Overlap
 from factory.plant.factory import Factory, Operation
@@ -38,6 +30,21 @@ BESIDE = 0.005
 """What is to be lowered stays this far short of its meeting point until the others stand [m]."""
 
 
+LEAST = 0.001
+"""A lift goes up by so much at least [m]."""
+
+
+@dataclass(frozen=True, slots=True)
+class Level:
+    """How high a robot holds what it brings on one of its tours [m]: how far up its lift is where
+    it delivers (`down`), and before that (`up`), and how far above its place in the product it
+    carries that (`elevation`)."""
+
+    down: float
+    up: float
+    elevation: float
+
+
 @dataclass(frozen=True)
 class Layout:
     """A factory laid out: a guidepath for each robot, and for each operation the arc length at
@@ -45,7 +52,10 @@ class Layout:
 
     `stations[i]`: distance [m] of operation i from its carrier's B end; `payloads[label]`: the box
     of a sub-assembly about the product's middle; `outfeed`: the box of the conveyor in the world;
-    `hands`: those of the robots, None for tools, nothing where they are not chosen;
+    `hands`: those of the robots, None for tools, nothing where they are not chosen; `shifts`: for
+    each robot and each of its tours how far the product's middle is, in the robot's frame (u, t)
+    and upwards, from where it is on the first of them [m], nothing for no shifts
+    (docs/decisions/hands.md, Lines);
     `plain`: the layout without relays, None where this is one; `ground`: what it was made for, by
     the names that `request.Ground` has.
     """
@@ -58,6 +68,7 @@ class Layout:
     payloads: Mapping[str, Box] = field(repr=False)
     outfeed: Box = (0.0, 0.0, 0.0, 0.0)
     hands: tuple[Hand | None, ...] = field(default=(), repr=False)
+    shifts: tuple[tuple[Point3, ...], ...] = field(default=(), repr=False)
     floor: Box = (0.0, 0.0, 0.0, 0.0)
     certificate: Certificate | None = field(default=None, repr=False, compare=False)
     plain: Layout | None = field(default=None, repr=False, compare=False)
@@ -71,17 +82,47 @@ class Layout:
         """The hand of a robot; None for a tool, and where hands are not chosen."""
         return self.hands[robot] if self.hands else None
 
-    def held_at(self, robot: int) -> float:
-        """How far above its place in the product a robot holds its payload with its lift down
-        [m]."""
-        return self.elevations[robot] - self.factory.strokes.get(robot, 0.0)
+    def shift(self, robot: int, operation: int) -> Point2:
+        """How far the product's middle is from where a robot's guidepath has it, in the world, on
+        the robot's tour that an operation (index) is in."""
+        if not self.shifts:
+            return 0.0, 0.0
+        ahead, aside, _ = self.shifts[robot][self.factory.turns[operation, robot]]
+        (u, v), (s, t) = self.guidepaths[robot].heading, self.guidepaths[robot].side
+        return u * ahead + s * aside, v * ahead + t * aside
+
+    def held(self, robot: int, operation: int, label: str) -> Box:
+        """The box of a sub-assembly about the middle that a robot's guidepath tells, on the robot's
+        tour that an operation (index) is in."""
+        return moved(self.payloads[label], self.shift(robot, operation))
+
+    def apart(self, operation: int, slot: int) -> Point2:
+        """Where the robot in a slot of an operation and the carrier of it stand, which hold what
+        they bring in other places than for other operations: how much earlier than at the end of
+        its guidepath the robot delivers, and how much further than where that ends the carrier
+        stands [m]."""
+        chosen = self.factory.operations[operation]
+        robot, carrier = chosen.robots[slot], chosen.carrier
+        if not self.shifts or robot == carrier:
+            return 0.0, 0.0
+        (x, y), (a, b) = self.shift(robot, operation), self.shift(carrier, operation)
+        (u, v), (s, t) = self.guidepaths[robot].heading, self.guidepaths[robot].side
+        ahead, aside = (x - a) * u + (y - b) * v, (x - a) * s + (y - b) * t
+        return round(ahead, 6), round(aside, 6)
+
+    def held_at(self, robot: int, operation: int) -> float:
+        """How far above its place in the product a robot holds its payload with its lift down, on
+        the tour that an operation (index) is in [m]."""
+        level = self.level(robot, operation)
+        return level.elevation - level.up
 
     def mount(self, robot: int) -> Mount:
         """Where a robot's hand is mounted."""
         path, (x, y, _) = self.guidepaths[robot], self.product.middle.tolist()
-        over = PAYLOAD - float(self.product.low[2]) + self.held_at(robot)
+        first = self.factory.robots[robot].operations[0]
+        over = PAYLOAD - float(self.product.low[2]) + self.held_at(robot, first)
         lies = path.heading, path.side, path.reach, path.arm, path.offset
-        stroke = self.factory.strokes.get(robot)
+        stroke = self.strokes.get(robot)
         return Mount(*lies, (x, y), over, stroke or 0.0, stroke is not None)
 
     def grip(self, robot: int) -> Extent | None:
@@ -105,25 +146,29 @@ class Layout:
         """Arc length of the goal of the robot in `slot` of an operation; beyond its robots, height
         of the goal of a lift (see `Factory.axes`).
 
-        A non-carrier delivers at A + 2r; a carrier stands `stations[operation]` from its B end. A
-        lift is up but for the operation it delivers to.
+        A non-carrier delivers at A + 2r, or short of that (`apart`); a carrier stands
+        `stations[operation]` from its B end. A lift is up but for the operation it delivers to.
         """
         chosen = self.factory.operations[operation]
         if slot >= len(chosen.robots):
             robot = self.lifts[self.factory.axes[operation][slot] - len(self.guidepaths)]
-            lowers = self.factory.delivers(robot, operation)
-            return 0.0 if lowers else self.factory.strokes[robot]
+            level = self.level(robot, operation)
+            return level.down if self.factory.delivers(robot, operation) else level.up
         path = self.guidepaths[chosen.robots[slot]]
         point = chosen.template.law.goals[slot]
         if slot != chosen.template.carrier - 1 or point.end == "A":
-            return point.multiple * path.r
+            return point.multiple * path.r + self.apart(operation, slot)[0]
         exact = {"B": 0.0, "S": 2.0}[point.end]
         return path.length - self.stations[operation] + (point.multiple - exact) * path.r
 
     def meeting(self, operation: Operation) -> Point2:
         """The product's middle where the carrier of an operation has its goal."""
-        path = self.guidepaths[operation.carrier]
-        return path.middle(self.goal(operation.index, operation.template.carrier - 1))
+        path, (x, y) = (
+            self.guidepaths[operation.carrier],
+            self.shift(operation.carrier, operation.index),
+        )
+        at = path.middle(self.goal(operation.index, operation.template.carrier - 1))
+        return at[0] + x, at[1] + y
 
     def stops(self, robot: int) -> list[float]:
         """The arc lengths at which a robot has its goals, in the order of its gear."""
@@ -154,17 +199,41 @@ class Layout:
         return tuple(self.factory.strokes)
 
     @cached_property
-    def elevations(self) -> tuple[float, ...]:
-        """How far above its place in the product each robot carries what it brings [m]: the stroke
-        of its own lift over the height at which the robot it delivers to carries it."""
-        strokes, operations = self.factory.strokes, self.factory.operations
-        found: list[float] = []
-        for robot in self.factory.robots:
-            below = 0.0
-            if robot.index:
-                below = found[operations[robot.operations[-1]].carrier]
-            found.append(below + strokes.get(robot.index, 0.0))
-        return tuple(found)
+    def _levels(self) -> list[list[Level]]:
+        """For each robot those of its tours."""
+        factory, found = self.factory, list[list[Level]]()
+        for robot, tours in enumerate(factory.tours):
+            ends = [factory.operations[tour[-1]] for tour in tours]
+            below = [0.0] * len(ends)
+            if robot:
+                turns = ((o.carrier, factory.turns[o.index, o.carrier]) for o in ends)
+                below = [found[carrier][turn].elevation for carrier, turn in turns]
+            stroke, downs = factory.strokes.get(robot, 0.0), [0.0] * len(ends)
+            if robot in factory.strokes and len(ends) > 1 and self.shifts:
+                over = [d - z for d, (_, _, z) in zip(below, self.shifts[robot], strict=True)]
+                downs = [round(at - min(over), 6) for at in over]
+                own = (o.approach.stroke if o.approach else 0.0 for o in ends)
+                stroke = max(at + far for at, far in zip(downs, own, strict=True))
+            ups = downs if robot in factory.adjusted else [stroke] * len(ends)
+            levels = zip(downs, ups, below, strict=True)
+            found.append([Level(down, up, d + (up - down)) for down, up, d in levels])
+        return found
+
+    def level(self, robot: int, operation: int) -> Level:
+        """How high a robot holds what it brings, on the tour that an operation (index) is in."""
+        return self._levels[robot][self.factory.turns[operation, robot]]
+
+    @cached_property
+    def strokes(self) -> Mapping[int, float]:
+        """How far up the lift of each robot that has one goes (index) [m]."""
+        highest = {robot: max(level.up for level in self._levels[robot]) for robot in self.lifts}
+        return MappingProxyType({robot: max(up, LEAST) for robot, up in highest.items()})
+
+    def elevation(self, robot: int, operation: int) -> float:
+        """How far above its place in the product a robot carries what it brings, on the tour that
+        an operation (index) is in [m]: what its own lift has to lower it, over the height at which
+        the robot that it delivers to carries it."""
+        return self.level(robot, operation).elevation
 
     def side(self, operation: Operation) -> int:
         """From which side, +1 or -1, of the axis of its approach the last input of an operation
@@ -195,61 +264,10 @@ class Layout:
             return self.guidepaths[robot].length
         return self.legs[operation, robot][0]
 
-    def feeder(self, label: str) -> Feeder:
-        """The feeder of a part: a housing over the place where it is presented, and the post that
-        carries it, behind the rear stop of the robot that it serves. Parts of one line have one
-        housing, in which they hang with their tops at one height."""
-        operation, room = self.factory.by_label[label], Clearance(self.clearance).room
-        path, solid = self.guidepaths[operation.carrier], self.product.solids[label]
-        middle, shown = self.meeting(operation), self.magazine(operation.carrier)
-        solids = [self.product.solids[part] for part in shown]
-        highest = max(float(solid.high[2]) for solid in solids)
-        tallest = max(float(solid.high[2] - solid.low[2]) for solid in solids)
-        rear, front, near, far = path.frame(hull([self.payloads[part] for part in shown]))
-        inside = rear - PLAY, front + PLAY, near - PLAY, far + PLAY
-        housing = rear - SIDE, front + SIDE, near - SIDE, far + SIDE
-        across, half = path.offset + path.aside, POST / 2
-        hand, grip = self.hand(operation.carrier), self.grip(operation.carrier)
-        back = -Clearance(self.clearance).post(path.reach, min(rear, grip[0]) if grip else rear)
-        if hand is not None and hand.tall:
-            top = max(hand.beam + BEAM, hand.places[0][2] + max(hand.radius, FINGER / 2))
-            room = max(room, round(top - highest + self.clearance, 6))
-            if hand.kind == "above":
-                across = round((near + far) / 2, 3)
-        over = PAYLOAD + self.elevations[operation.carrier] - self.product.low[2]
-        low = float(over + highest) + room
-        high_up = RISE * hypot(inside[1] - inside[0], inside[3] - inside[2])
-        stroke = room + high_up + tallest
-        return Feeder(
-            back,
-            across,
-            inside,
-            path.world((back - half, back + half, across - half, across + half), middle),
-            path.world((back, housing[0], across - BOOM / 2, across + BOOM / 2), middle),
-            path.world(housing, middle),
-            low,
-            max(low - room + stroke + PAD + SIDE, low + BOOM_HEIGHT),
-            stroke + (highest - float(solid.high[2])),
-        )
-
     def magazine(self, robot: int) -> tuple[str, ...]:
         """The parts that the feeder of a robot shows, in the order of its program; none without."""
         firsts = (self.factory.operations[tour[0]] for tour in self.factory.tours[robot])
         return tuple(operation.label for operation in firsts if not operation.inputs)
-
-    def passing(self, leaf: Operation) -> float:
-        """How far the robot of a feeder goes until all that it ever carries is clear of any part
-        that comes down next [m]."""
-        path, operations = self.guidepaths[leaf.carrier], self.factory.operations
-        carried = (
-            operations[number].label
-            for number in self.factory.robots[leaf.carrier].operations
-            if operations[number].carrier == leaf.carrier and not self.factory.drops(number)
-        )
-        rear = min(path.frame(self.payloads[label])[0] for label in carried)
-        shown = self.magazine(leaf.carrier)
-        front = max(path.frame(self.payloads[label])[1] for label in shown)
-        return front - rear + self.clearance
 
     def standoff(self, operation: Operation, slot: int) -> float:
         """How far short of the meeting point the robot in `slot` waits until the carrier stands
@@ -279,12 +297,14 @@ class Layout:
         if hand is None or grip is None or not hand.first:
             return 0.0
         path, on = self.guidepaths[operation.robots[slot]], self.guidepaths[operation.carrier]
+        x, y = self.shift(operation.carrier, operation.index)
+        over = x * path.heading[0] + y * path.heading[1]
         ahead = path.frame(self.payloads[operation.before[slot]])[1]
         lines = [
             path.heading[0] * on.side[0] * line + path.heading[1] * on.side[1] * line
             for line in grip[2:]
         ]
-        return round(max(0.0, ahead - min(lines) + self.clearance), 6)
+        return round(max(0.0, ahead + over - min(lines) + self.clearance), 6)
 
     @property
     def outfeed_way(self) -> float:
@@ -322,7 +342,9 @@ class Layout:
 def carriers(factory: Factory) -> list[int]:
     """For each robot the carrier it delivers to; -1 for the output robot."""
     return [
-        -1 if robot.index == 0 else factory.operations[robot.operations[-1]].carrier
+        -1
+        if factory.drops(robot.operations[-1])
+        else factory.operations[robot.operations[-1]].carrier
         for robot in factory.robots
     ]
 

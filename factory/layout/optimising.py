@@ -36,7 +36,7 @@ WAYS = ((True, 1.0), (False, 0.5), (True, 0.5), (False, 1.0))
 UNWEIGHTED = 2
 """The first so many take all robots to matter the same."""
 
-HURRIES, IDLE = 8, 0.2
+HURRIES, IDLE = 4, 0.2
 """So often robots on critical circuits are hurried; how much the others matter then."""
 
 LARGE = 1500

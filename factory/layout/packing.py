@@ -7,7 +7,7 @@ since where a station is best depends on the next.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
 from math import inf
@@ -154,6 +154,7 @@ class Packing:
         self, way: _Way, stop: Stop, guests: Sequence[Guest], least: float
     ) -> Iterator[_Way]:
         """The stations at which something comes clear, as long as the way there is worth it."""
+        least = up(least + max(0.0, -min(self._further(stop, guests).values(), default=0.0)))
         tried = {least, *self._next(way, least)}
         for guest in guests:
             tried |= way.beside[guest.side].starts(guest.outline, least)
@@ -182,10 +183,14 @@ class Packing:
             _taken(way.beside, guests),
             (*way.guests, *guests),
             (*way.stations, station),
-            (*way.piles, self.own.placed(stop, station)),
+            (*way.piles, self.own.placed(stop, station, self._further(stop, guests))),
             way.time + time,
             way.cost + self._cost(way, time, station, guests, len(stop.operations)),
         )
+
+    def _further(self, stop: Stop, guests: Iterable[Guest]) -> dict[int, float]:
+        """How much further than at its station it stands for the operations of a stop [m]."""
+        return self.own.further(stop, ((guest.robot, guest.outline.shape) for guest in guests))
 
     def _time(self, way: _Way, stop: Stop, station: float, guests: Sequence[Guest]) -> float:
         """How long the operations at a stop take [s]. The carrier goes further for the first of
@@ -238,14 +243,22 @@ class Packing:
             if guests[-1].travel == inf:
                 return None
             beside = _taken(beside, guests[-1:])
-        stops = zip(self.own.stops, way.stations, strict=True)
         choice = Choice(
             {guest.robot: guest.side for guest in guests},
             {guest.robot: guest.travel for guest in guests},
-            {o.index: station for stop, station in stops for o in stop.operations},
+            dict(self._stations_of(way)),
         )
         outline = outlined(self.own, way.piles, guests, choice)
         return self._worth(way, outline), outline
+
+    def _stations_of(self, way: _Way) -> Iterator[tuple[int, float]]:
+        """The station of each operation, by its number."""
+        outlines = {guest.robot: guest for guest in way.guests}
+        for stop, station in zip(self.own.stops, way.stations, strict=True):
+            there = (outlines[robot] for robot in stop.first.robots if robot in outlines)
+            further = self._further(stop, there)
+            for operation in stop.operations:
+                yield operation.index, station + further.get(operation.index, 0.0)
 
     def _worth(self, way: _Way, outline: Outline) -> float:
         """What an outline costs [s]: the robot's own time there and back, and what its breadth adds

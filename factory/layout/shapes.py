@@ -4,13 +4,13 @@ them, arms, lanes."""
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from factory.geometry.solids import Product
 from factory.layout.dimensions import FINGER, MAST, PAYLOAD, Clearance, up
-from factory.layout.guidepath import Box, Extent, Point2, hull, project
+from factory.layout.guidepath import Box, Extent, Point2, hull, moved, project
 from factory.layout.hands.choosing import Hands
-from factory.layout.hands.hand import Hand
+from factory.layout.hands.hand import Hand, Point3
 from factory.layout.hands.mounted import Mount, grip_of
 from factory.layout.layout import carriers
 from factory.layout.sweeps import piles
@@ -25,6 +25,8 @@ OUTPUT: Frame = ((1.0, 0.0), (0.0, 1.0))
 Sides = dict[int, int]
 """For each robot but the first: +1 where it stands on the side t of its carrier's path, else -1."""
 
+NONE: Point3 = (0.0, 0.0, 0.0)
+
 NOWHERE: Extent = (0.0, 0.0, 0.0, 0.0)
 
 
@@ -35,7 +37,9 @@ class Shape:
     ends and its carriage is (`reach`, 2r), how far ahead its finger goes (`nest`), how far its lane
     reaches to either side for relays (`spread`), and its `least` travel [m]; its `hand`, None
     where none is chosen, and the box `grip` of what of that is among the payloads; how far to the
-    side the `post` of its feeder stands [m]."""
+    side the `post` of its feeder stands [m]; by operation how far the product's middle is ahead, to
+    the side and above where the robot has it on its first tour (`shifts`), nothing where it is
+    always there: boxes are about the latter."""
 
     piles: Mapping[int, Extent]
     last: Extent
@@ -49,6 +53,12 @@ class Shape:
     grip: Extent | None = None
     post: float = 0.0
     least: float = 0.0
+    shifts: Mapping[int, Point3] = field(default_factory=dict)
+
+    def shift(self, operation: int) -> Point3:
+        """How far the product's middle is ahead and to the side of where the guidepath has it, and
+        above, on the tour that an operation (index) is in [m]."""
+        return self.shifts.get(operation, NONE)
 
     def laden(self, pile: Extent) -> Extent:
         """The box of a pile with the hand that holds it."""
@@ -106,6 +116,8 @@ def oriented_shape(
         return project(payloads[factory.operations[number].label], *frame)
 
     boxes = {number: lies(number) for number in carried(factory, robot)}
+    shifts = _fronts(factory, robot, boxes)
+    boxes = {number: moved(box, shifts.get(number, NONE)[:2]) for number, box in boxes.items()}
     last, tool = _last(factory, robot, boxes), is_tool(factory, robot)
     lane, belt = 0.0, c.c - last[0]
     if carrier >= 0:
@@ -118,7 +130,19 @@ def oriented_shape(
     offset, nest = round((held[2] + held[3]) / 2, 3), round((held[0] + held[1]) / 2, 3)
     spread = c.spread if robot in wide else 0.0
     reach = up(c.reach(arm, lane))
-    return Shape(boxes, last, offset, arm, reach, nest, tool, spread, post=offset)
+    return Shape(boxes, last, offset, arm, reach, nest, tool, spread, post=offset, shifts=shifts)
+
+
+def _fronts(factory: Factory, robot: int, boxes: Mapping[int, Extent]) -> dict[int, Point3]:
+    """By operation how far ahead a robot that brings several parts, one by one, and has no hand
+    holds them: their front ends are in one place, so that it goes no further for one than it has
+    to; nothing for others."""
+    tours = factory.tours[robot]
+    if len(tours) == 1 or any(len(tour) != 2 for tour in tours) or is_tool(factory, robot):
+        return {}
+    front = max(boxes[tour[0]][1] for tour in tours)
+    ahead = {tour: round(front - boxes[tour[0]][1], 6) for tour in tours}
+    return {number: (ahead[tour], 0.0, 0.0) for tour in tours for number in tour}
 
 
 def held_shape(
@@ -134,49 +158,71 @@ def held_shape(
     its hand; its arm ends beside the line of its carrier. A tower stands behind all that its
     payload is joined to; that of a robot which holds a feeder's part from above passes beside the
     part too. `wide`: robots with room for relays, which run to either side of such a line."""
-    factory, (u, t) = hands.holding.factory, frame
+    factory, (u, t), moves = hands.factory, frame, _moves(hands, robot, carrier, frame)
+    operations, shifts = factory.operations, moves[0]
 
-    def lies(label: str) -> Extent:
-        return project(payloads[label], *frame)
+    def lies(label: str, number: int) -> Extent:
+        return moved(project(payloads[label], *frame), shifts.get(number, NONE)[:2])
 
     def line(robot: int, heading: Point2, side: Point2) -> float:
         across = 0 if side[0] else 1
         at = hands.line(robot, heading) - float(hands.holding.product.middle[across])
         return round(at * side[across], 3)
 
-    operations = factory.operations
-    boxes = {n: lies(operations[n].label) for n in carried(factory, robot)}
+    boxes = {n: lies(operations[n].label, n) for n in carried(factory, robot)}
     last, hand = _last(factory, robot, boxes), hands.hand(robot, u, t)
-    final = operations[factory.robots[robot].operations[-1]]
     lane, belt = 0.0, c.c - last[0]
     if carrier >= 0:
         lane = -line(carrier, t, u) + (c.spread if carrier in wide else 0.0)
         belt = 0.0
-    arm = up(max(c.rim, c.rim + lane, belt))
-    reach = up(c.reach(arm, lane))
+    arm = up(max(c.rim, c.rim + lane, belt) + moves[1])
+    reach = up(c.reach(arm, lane + moves[1]))
     spread = c.spread if robot in wide else 0.0
     if hand is None:
-        held = hull([lies(operations[n].label) for n in factory.robots[robot].operations])
-        offset = round((held[2] + held[3]) / 2, 3)
-        return Shape(
-            boxes, last, offset, arm, reach, round((held[0] + held[1]) / 2, 3), True, spread
-        )
+        held = hull([lies(operations[n].label, n) for n in factory.robots[robot].operations])
+        offset, nest = round((held[2] + held[3]) / 2, 3), round((held[0] + held[1]) / 2, 3)
+        return Shape(boxes, last, offset, arm, reach, nest, True, spread)
     x, y = (hands.holding.product.middle[:2]).tolist()
     pads = [(px - x, py - y) for px, py, _ in hand.places]
     ahead = [px * u[0] + py * u[1] for px, py in pads]
     offset = post = round(pads[0][0] * t[0] + pads[0][1] * t[1], 3)
     least = 0.0
     if hand.tall:
-        joined = last if factory.drops(final.index) else lies(final.label)
-        reach = arm = up(max(reach, c.c + MAST / 2 - joined[0]))
-        if hand.kind == "above" and hands.holding.is_fed(robot):
+        ends = [tour[-1] for tour in factory.tours[robot]]
+        final = [last if factory.drops(n) else lies(operations[n].label, n) for n in ends]
+        rear = min(joined[0] for joined in final)
+        reach = arm = up(max(reach, c.c + MAST / 2 - rear))
+        if hand.kind == "above" and hands.is_fed(robot):
             post, offset = round((last[2] + last[3]) / 2, 3), round(last[2] - c.c - MAST / 2, 3)
-            if hand.waits and robot not in factory.strokes:
+            if hand.waits and not factory.lowers(robot):
                 thick = 2 * max(hand.radius, FINGER / 2)
-                least = last[1] + max(ahead) - min(ahead) + thick - joined[0] + 2 * c.c
+                least = last[1] + max(ahead) - min(ahead) + thick - rear + 2 * c.c
     over = PAYLOAD - float(hands.holding.product.low[2])
     grip, nest = grip_of(hand, Mount(u, t, reach, arm, offset, (x, y), over)), round(max(ahead), 6)
-    return Shape(boxes, last, offset, arm, reach, nest, False, spread, hand, grip, post, up(least))
+    return Shape(
+        boxes, last, offset, arm, reach, nest, False, spread, hand, grip, post, up(least), shifts
+    )
+
+
+def _moves(hands: Hands, robot: int, carrier: int, frame: Frame) -> tuple[dict[int, Point3], float]:
+    """By operation how far the product's middle is ahead of and beside where a robot's guidepath
+    has it; and how much further behind it has to stay, since it delivers further ahead than that
+    where its carrier's line is [m]."""
+    (u, t), factory = frame, hands.factory
+    own = hands.shifts(robot, u, t)
+    carriers = hands.shifts(carrier, t) if carrier >= 0 else ()
+    if not any(map(any, (*own, *carriers))):
+        return {}, 0.0
+    found, back = dict[int, Point3](), 0.0
+    for number, tour in enumerate(factory.tours[robot]):
+        x, y, z = own[number] if own else NONE
+        ahead = round(x * u[0] + y * u[1], 6)
+        found |= dict.fromkeys(tour, (ahead, round(x * t[0] + y * t[1], 6), z))
+        if carriers:
+            x, y, _ = carriers[factory.turns[tour[-1], carrier]]
+            ahead -= x * u[0] + y * u[1]
+        back = max(back, -ahead)
+    return found, up(back)
 
 
 def carried(factory: Factory, robot: int) -> list[int]:

@@ -45,8 +45,9 @@ def stretch(
         builder = _Builder(own, outlines, chosen, sides is None)
         for stop in own.stops:
             station = builder.add(stop)
+            further = builder.further(stop)
             for operation in stop.operations:
-                stations[operation.index] = station
+                stations[operation.index] = station + further.get(operation.index, 0.0)
         guests = builder.attached()
         for guest in guests:
             travel[guest.robot] = guest.travel
@@ -79,14 +80,19 @@ class _Builder:
             self.sides |= self._later(guests) if self.piles else self._mates(guests)
         if self.piles:
             free = (self._free(guest, self.sides[guest]) for guest in guests)
-            self.station = up(max(self.own.least(stop, self.station), *free))
+            back = max(0.0, -min(self.further(stop).values(), default=0.0))
+            self.station = up(max(self.own.least(stop, self.station) + back, *free))
         for guest in guests:
             frontier, high = self.frontier[self.sides[guest]], self.outlines[guest].high
             for layer in LAYERS:
                 frontier[layer] = max(frontier[layer], self.station + high[layer])
             self.guests.append((guest, self.station))
-        self.piles.append(self.own.placed(stop, self.station))
+        self.piles.append(self.own.placed(stop, self.station, self.further(stop)))
         return self.station
+
+    def further(self, stop: Stop) -> dict[int, float]:
+        """How much further than at its station the robot stands for the operations of a stop."""
+        return self.own.further(stop, ((g, self.outlines[g].shape) for g in stop.guests))
 
     def attached(self) -> list[Guest]:
         """The robots that deliver, each with its travel."""

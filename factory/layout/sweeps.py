@@ -42,7 +42,8 @@ from factory.layout.dimensions import (
     PAYLOADS,
     SIDE,
 )
-from factory.layout.guidepath import Box, Extent, hull
+from factory.layout.feeding import feeder_of
+from factory.layout.guidepath import Box, Extent, Point2, hull, moved
 from factory.layout.hands.hand import ROOT
 from factory.layout.hands.limbs import cross_of
 from factory.layout.layout import Layout
@@ -56,6 +57,10 @@ class Pile:
 
     box: Box
     z: tuple[float, float]
+
+    def moved(self, by: Point2) -> Pile:
+        """The same, elsewhere."""
+        return Pile(moved(self.box, by), self.z)
 
     def raised(self, height: float) -> Pile:
         """The same, so much higher [m]."""
@@ -125,7 +130,8 @@ def _payloads(layout: Layout, robot: int, found: Mapping[str, Pile]) -> Iterator
         label = operation.after[operation.robots.index(robot)]
         if label == NOPART:
             continue
-        pile, at = found[label].raised(layout.elevations[robot]), stops[step]
+        pile, at = found[label].raised(layout.elevation(robot, number)), stops[step]
+        pile = pile.moved(layout.shift(robot, number))
         step = (step + 1) % len(gear)
         onward = operations[gear[step]]
         leaves = onward.after[onward.robots.index(robot)] == NOPART
@@ -141,7 +147,7 @@ def _payloads(layout: Layout, robot: int, found: Mapping[str, Pile]) -> Iterator
 
 
 def _feeder(layout: Layout, label: str, robot: int) -> Iterator[Region]:
-    feeder = layout.feeder(label)
+    feeder = feeder_of(layout, label)
     yield from _upright(robot, POST_BODY, feeder.post, feeder.high, label)
     height = feeder.high - BOOM_HEIGHT, feeder.high
     yield Region(robot, PAYLOADS, BOOM, feeder.boom, height, label)

@@ -13,6 +13,7 @@ import numpy as np
 
 from factory.geometry.suction import PadPlace, pad_place
 from factory.layout.dimensions import BOOM, BOOM_HEIGHT, PAD, PAYLOAD, POST, WALL
+from factory.layout.feeding import feeder_of
 from factory.layout.guidepath import Feeder, Guidepath
 from factory.layout.layout import Layout
 from factory.mjcf import names
@@ -73,7 +74,8 @@ class FeederPads:
             return inf, inf, -inf, -inf
         half = max(hand.radius, hand.width / 2) + BESIDE_HAND
         solid = self._layout.product.solids[label]
-        at = np.array(hand.places[0][:2]) - solid.position[:2]
+        shift = self._layout.shift(operation.carrier, operation.index)
+        at = np.array(hand.places[0][:2]) - shift - solid.position[:2]
         ends = [at - half, at + half]
         for way in (path.heading, (-path.side[0], -path.side[1])):
             ends += [at + np.array(way) * FAR]
@@ -91,7 +93,7 @@ def add_feeders(
     the housing of its first part."""
     pads, codes = FeederPads(layout), feeder_codes(layout.factory)
     for operation in layout.factory.leaves:
-        label, found = operation.label, layout.feeder(operation.label)
+        label, found = operation.label, feeder_of(layout, operation.label)
         path = layout.guidepaths[operation.carrier]
         x, y = layout.meeting(operation)
         body = add(
@@ -104,7 +106,7 @@ def add_feeders(
         if label == layout.magazine(operation.carrier)[0]:
             _add_housing(body, names.feeder(label), found, path.left)
         place = pads.of(label)
-        foot = PAYLOAD + layout.elevations[operation.carrier]
+        foot = PAYLOAD + layout.elevation(operation.carrier, operation.index)
         at = PadPlace(place.at + np.array([0.0, 0.0, foot]), place.radius)
         _add_slider(body, label, found, at, codes[label], drives[label], layout.clearance)
         gains = drives[label].attributes()

@@ -18,6 +18,7 @@ from xml.etree.ElementTree import Element
 from xml.sax.saxutils import quoteattr
 
 from factory.control.profile import SpeedProfile
+from factory.layout.feeding import feeder_of
 from factory.layout.layout import Layout
 from factory.mjcf import names
 from factory.mjcf.elements import add, fill
@@ -267,7 +268,7 @@ def drive_for(
 def _hoists(layout: Layout, masses: Mapping[str, float], settings: Settings) -> dict[int, Hoist]:
     """The lifts, for the heaviest load of each: what it delivers."""
     factory, found = layout.factory, {}
-    for robot, stroke in factory.strokes.items():
+    for robot, stroke in layout.strokes.items():
         load = max(masses[label] for label in factory.deliveries(robot))
         most = settings.acceleration + GRAVITY
         drive = drive_for(HOIST_MASS, load, most, settings, HOIST_STIFFNESS)
@@ -292,7 +293,7 @@ def _sliders(layout: Layout, masses: Mapping[str, float], settings: Settings) ->
 def stroke_ticks(layout: Layout, settings: Settings) -> int:
     """No stroke of a feeder's slider takes more ticks."""
     profile = SpeedProfile(*settings.feeder_limits)
-    strokes = (layout.feeder(leaf.label).stroke for leaf in layout.factory.leaves)
+    strokes = (feeder_of(layout, leaf.label).stroke for leaf in layout.factory.leaves)
     return ceil(profile.rest(max(strokes)) / settings.tick) + 4
 
 

@@ -40,7 +40,7 @@ def place_in(
 def presented_at(layout: Layout, label: str) -> tuple[float, float, float]:
     """Where a part's centre of mass is in its feeder."""
     operation, centre = layout.factory.by_label[label], layout.product.solids[label].centre
-    elevation = layout.elevations[operation.carrier]
+    elevation = layout.elevation(operation.carrier, operation.index)
     return place_in(layout.product, centre, layout.meeting(operation), elevation)
 
 

@@ -55,10 +55,11 @@ def add_robots(
 def _low(layout: Layout, robot: int) -> float:
     """How far above z0 the lowest point of a robot's payload is carried, with its lift down [m]."""
     factory, product = layout.factory, layout.product
-    parts = [part for label in factory.deliveries(robot) for part in factory.contents[label]]
-    ground = float(product.low[2])
-    low = min((float(product.solids[part].low[2]) for part in parts), default=ground)
-    return low - ground + layout.held_at(robot)
+    ground, found = float(product.low[2]), list[float]()
+    for tour, label in zip(factory.tours[robot], factory.deliveries(robot), strict=False):
+        low = min(float(product.solids[part].low[2]) for part in factory.contents[label])
+        found.append(low - ground + layout.held_at(robot, tour[0]))
+    return min(found, default=layout.held_at(robot, factory.robots[robot].operations[0]))
 
 
 def _style(hand: Hand | None, loaded: dict[str, Styles]) -> Styles:

@@ -29,7 +29,7 @@ def add_welds(
         label = operation.label
         path = layout.guidepaths[operation.carrier]
         w, _, _, z = heading_quaternion(path)
-        height = layout.elevations[operation.carrier]
+        height = layout.elevation(operation.carrier, operation.index)
         offset = place_in(layout.product, bodies.centre[label], (0.0, 0.0), height)
         pose = (*_turned(offset, path.heading), w, 0, 0, -z)
         _weld(equality, names.feed(label), names.slider(label), names.part(label, 1), pose, True)
@@ -68,8 +68,10 @@ def grip_position(
     path = layout.guidepaths[robot]
     at = path.middle(0.0)
     foot = path.carriage(0.0)
-    middle = (at[0] - foot[0], at[1] - foot[1])
-    x, y, z = place_in(layout.product, bodies.centre[label], middle, layout.held_at(robot))
+    begins, *_ = layout.factory.tours[robot][layout.factory.tour_with(robot, label)]
+    more = layout.shift(robot, begins)
+    middle = (at[0] + more[0] - foot[0], at[1] + more[1] - foot[1])
+    x, y, z = place_in(layout.product, bodies.centre[label], middle, layout.held_at(robot, begins))
     return _turned((x, y, z), path.heading)
 
 

@@ -76,9 +76,10 @@ def operation_starts(layout: Layout) -> list[Array]:
     factory = layout.factory
     left = {leg: start for leg, (start, _) in layout.legs.items()}
     for axis, lift in enumerate(layout.lifts, start=len(factory.robots)):
-        for tour in factory.tours[lift]:
-            left[tour[0], axis] = 0.0
-            left[tour[-1], axis] = factory.strokes[lift]
+        tours = factory.tours[lift]
+        for before, tour in zip((tours[-1], *tours), tours, strict=False):
+            left[tour[0], axis] = layout.level(lift, before[-1]).down
+            left[tour[-1], axis] = layout.level(lift, tour[-1]).up
     return [np.array([left[o.index, a] for a in factory.axes[o.index]]) for o in factory.operations]
 
 
@@ -121,7 +122,7 @@ def operation_mode(layout: Layout, operation: Operation, eps: float) -> Mode:
         for slot, path in enumerate(paths)
     ]
     setting = Setting(
-        lower=np.zeros(len(paths)),
+        lower=np.array([layout.apart(operation.index, s)[0] for s in range(len(paths))]),
         upper=np.array([path.length for path in paths]),
         r=r,
         eps=eps,
@@ -149,9 +150,9 @@ def _with_lifts(mode: Mode, layout: Layout, operation: Operation) -> Mode:
     if not axes:
         return mode
     robots = [layout.lifts[axis - len(factory.robots)] for axis in axes]
-    strokes = np.array([factory.strokes[robot] for robot in robots])
+    strokes = np.array([layout.strokes[robot] for robot in robots])
     goals = np.array([layout.goal(operation.index, count + n) for n in range(len(axes))])
-    lowers = goals < strokes
+    lowers = np.array([factory.lowers(robot) for robot in robots]) & (goals < strokes)
     own = np.array([operation.robots.index(robot) for robot in robots])
     return replace(
         mode,
@@ -159,7 +160,7 @@ def _with_lifts(mode: Mode, layout: Layout, operation: Operation) -> Mode:
         lower=np.append(mode.lower, np.zeros(len(axes))),
         upper=np.append(mode.upper, strokes),
         gate=np.append(mode.gate, np.where(lowers, own, -1)),
-        standoff=np.append(mode.standoff, np.where(lowers, strokes, 0.0)),
+        standoff=np.append(mode.standoff, np.where(lowers, strokes - goals, 0.0)),
     )
 
 

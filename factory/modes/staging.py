@@ -72,6 +72,7 @@ def stages(layout: Layout, modes: Sequence[Mode]) -> tuple[HeadStart, ...]:
                 ahead, goal = empty and robot in awaited, awaited.get(robot, goal)
             if ahead and abs(float(start[slot]) - goal) > ROUNDING:
                 found.append(_ahead(operation, mode, slot, goal, float(start[slot])))
+                found += _adjusting(layout, operation, mode, slot, start)
     return tuple(found)
 
 
@@ -89,6 +90,21 @@ def _rising(
     yield replace(stage, robot=robot, axis=axis)
     if awaited is not None and abs(start - awaited) > ROUNDING:
         yield replace(_ahead(operation, mode, slot, awaited, start), follows=True)
+
+
+def _adjusting(
+    layout: Layout, operation: Operation, mode: Mode, slot: int, start: Array
+) -> Iterator[HeadStart]:
+    """The way of a lift to where it is for the next tour, once its robot is at home."""
+    robot = operation.robots[slot]
+    if robot not in layout.factory.adjusted or not layout.factory.begins(robot, operation.index):
+        return
+    axis = len(layout.factory.robots) + layout.lifts.index(robot)
+    raised = layout.factory.axes[operation.index].index(axis)
+    goal, at = float(mode.goals[raised]), float(start[raised])
+    if abs(goal - at) > ROUNDING:
+        stage = _ahead(operation, mode, raised, goal, at)
+        yield replace(stage, robot=robot, axis=axis, follows=True)
 
 
 def _ahead(operation: Operation, mode: Mode, slot: int, goal: float, start: float) -> HeadStart:

@@ -113,9 +113,10 @@ class Factory:
     """F = (R, ~, N) with the operations it is made of; the last operation is dropoff.
 
     ~ is the union of the templates' identifications over `operations`. `parents[i]` is the
-    operation that takes the result of operation i (dropoff has none, -1). `period`: how many units
-    are made in one cycle of the net, with operations of their own; the last so many operations are
-    their dropoffs, in that order.
+    operation that takes the result of operation i (dropoff has none, -1). `adjusted`: robots with a
+    lift that is set for each of their tours, to where the one hand holds what they bring. `period`:
+    how many units are made in one cycle of the net, with operations of their own; the last so many
+    operations are their dropoffs, in that order.
     """
 
     pag: PAG
@@ -123,6 +124,7 @@ class Factory:
     operations: tuple[Operation, ...]
     net: GearNet
     parents: tuple[int, ...] = field(repr=False)
+    adjusted: frozenset[int] = frozenset()
     period: int = 1
 
     @cached_property
@@ -213,8 +215,9 @@ class Factory:
     @cached_property
     def strokes(self) -> Mapping[int, float]:
         """How far [m] each robot (index) with a lift lowers what it delivers, robot by robot: one
-        with several tours the farthest that one of them asks for."""
-        found: dict[int, float] = {}
+        with several tours the farthest that one of them asks for, one that is adjusted not at
+        all."""
+        found: dict[int, float] = dict.fromkeys(self.adjusted, 0.0)
         for o in self.operations:
             if o.approach is not None and o.lowered >= 0:
                 robot = o.robots[o.lowered]
@@ -225,14 +228,20 @@ class Factory:
     def axes(self) -> tuple[tuple[int, ...], ...]:
         """For each operation the axes that its mode moves: the carriages of its robots, which have
         their robots' numbers, and the lifts that are raised or lowered in it, numbered from R on in
-        the order of `strokes`. A lift is up but for the operations that it delivers to."""
+        the order of `strokes`. A lift is up but for the operations that it delivers to; one that is
+        adjusted stays where it is on a tour."""
         lift = {robot: len(self.robots) + n for n, robot in enumerate(self.strokes)}
         found = [list(operation.robots) for operation in self.operations]
         for robot, axis in lift.items():
             for tour in self.tours[robot]:
-                for number in dict.fromkeys((tour[0], tour[-1])):
+                ends = (tour[0],) if robot in self.adjusted else (tour[0], tour[-1])
+                for number in dict.fromkeys(ends):
                     found[number].append(axis)
         return tuple(map(tuple, found))
+
+    def lowers(self, robot: int) -> bool:
+        """Whether a robot (index) lowers what it delivers."""
+        return robot in self.strokes and robot not in self.adjusted
 
     def begins(self, robot: int, operation: int) -> bool:
         """Whether a robot (index) begins a tour with an operation (index)."""
@@ -246,6 +255,19 @@ class Factory:
         """The tour of a robot (index) that an operation (index) is in."""
         return next(tour for tour in self.tours[robot] if operation in tour)
 
+    @cached_property
+    def turns(self) -> Mapping[tuple[int, int], int]:
+        """Which of the tours of a robot (index) an operation (index) is in, by (operation,
+        robot)."""
+        return MappingProxyType(
+            {
+                (operation, robot): number
+                for robot, tours in enumerate(self.tours)
+                for number, tour in enumerate(tours)
+                for operation in tour
+            }
+        )
+
     def deliveries(self, robot: int) -> tuple[str, ...]:
         """The labels a robot (index) carries to its A end, tour by tour; none for a tool."""
         found = []
@@ -253,6 +275,14 @@ class Factory:
             operation = self.operations[tour[-1]]
             found.append(operation.before[operation.robots.index(robot)])
         return tuple(label for label in found if label != NOPART)
+
+    def tour_with(self, robot: int, label: str) -> int:
+        """Which of its tours a robot (index) holds a part on, or what it makes of parts."""
+        if len(self.tours[robot]) == 1:
+            return 0
+        parts = {*self.contents.get(label, (label,))}
+        brought = [{*self.contents[label]} for label in self.deliveries(robot)]
+        return next(number for number, inside in enumerate(brought) if parts <= inside)
 
     @cached_property
     def contents(self) -> Mapping[str, tuple[str, ...]]:

@@ -250,6 +250,9 @@ class DistributedSupervisor:
                 bundle, _ = self.bundles.of((number,))
                 self._drive(process, mine, bundle.field(at + speed * dt / 2, dt))
                 return
+            if process.goes_ahead:  # it stands while another axis of the robot goes
+                still = np.zeros(len(mine))
+                self.world.move(process.axes[mine], at.copy(), still, still)
         if process.goes_ahead:
             self._stop(process)
             process.goes_ahead = False

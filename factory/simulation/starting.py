@@ -19,6 +19,8 @@ def start_positions(layout: Layout, marking: Marking) -> np.ndarray:
     for robot, gear in zip(factory.robots, net.gears, strict=True):
         step = next(i for i, place in enumerate(gear.places) if place in marking) // 2
         positions[robot.index] = layout.home(robot.index, robot.operations[step])
-        if robot.index in lifts and (step or rises_first(layout, robot.index)):
-            positions[lifts[robot.index]] = factory.strokes[robot.index]
+        always = robot.index in factory.adjusted or rises_first(layout, robot.index)
+        if robot.index in lifts and (step or always):
+            level = layout.level(robot.index, robot.operations[step])
+            positions[lifts[robot.index]] = level.up
     return positions

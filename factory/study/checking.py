@@ -13,7 +13,9 @@ from factory.nets.petri import Place
 from factory.nets.verdict import Verdict
 from factory.nets.verify import verify
 from factory.pipeline import Project
+from factory.plant.factory import Factory
 from factory.problem.shapes import is_plain
+from factory.study.allocation.least import Least, least_robots
 from factory.support.errors import Diagnostic
 from factory.timing.pool import part_pool
 
@@ -28,7 +30,8 @@ class Checked:
     """A net with its verdict, of a PAG called `name` or read from PNML. `pool`: copies of each part
     that are inside at once; `matings`: how its inputs come together, None where no part has a shape
     of its own; `product`: None where every part is a default box; `no_grips`: what no hand can
-    hold, None where hands are not chosen."""
+    hold, None where hands are not chosen; `factory`, and the `least` robots that can make its
+    product, None for a net from elsewhere."""
 
     name: str
     net: GearNet | MarkedNet
@@ -39,6 +42,8 @@ class Checked:
     product: Product | None = None
     warnings: tuple[Diagnostic, ...] = ()
     no_grips: tuple[NoGrip, ...] | None = None
+    factory: Factory | None = None
+    least: Least | None = None
 
     def as_json(self) -> dict[str, Any]:
         """The keys of `check --json`."""
@@ -60,7 +65,20 @@ class Checked:
             "approaches": self.matings.as_json() if self.matings else None,
             "clashes": [mating.clashes_as_json() for mating in blocked],
             **({} if no_grips is None else {"no_grips": no_grips}),
+            **self._allocation(),
             "warnings": [warning.as_json() for warning in self.warnings],
+        }
+
+    def _allocation(self) -> dict[str, Any]:
+        """Which robots serve several labels, how few could do, and a live order."""
+        if self.factory is None or self.least is None:
+            return {}
+        factory = self.factory
+        lines = [(robot.name, factory.deliveries(robot.index)) for robot in factory.robots]
+        return {
+            "least_robots": self.least.total,
+            "lines": [{"robot": n, "labels": list(x)} for n, x in lines if len(x) > 1],
+            "order": [factory.operations[number].label for number in factory.order],
         }
 
 
@@ -90,6 +108,8 @@ def check_project(project: Project, wip: int | None = None) -> Checked:
         None if is_plain(project.pag) else project.product,
         project.warnings,
         project.no_grips if project.settings.hands else None,
+        factory,
+        least_robots(project.pag, project.templates),
     )
 
 

@@ -104,6 +104,43 @@ class Waiting(ProgressBar):
             print(f"{self.what}, {perf_counter() - self.begin:.0f} s so far", file=sys.stderr)
 
 
+class StepBar(Waiting):
+    """Waiting in steps: says what goes on, how many of how many are done, and the time left; of a
+    step with an unknown end that until a `limit` [s]."""
+
+    def __init__(self, what: str, quiet: bool = False, limit: float | None = None) -> None:
+        super().__init__(what, quiet)
+        self.limit = limit
+
+    def drawn(self) -> tuple[Bar, TaskID]:
+        """What goes on before the bar, words behind, the time gone by and the time left."""
+        from rich.progress import (
+            BarColumn,
+            Progress,
+            TextColumn,
+            TimeElapsedColumn,
+            TimeRemainingColumn,
+        )
+
+        before, behind = TextColumn("{task.description}"), TextColumn("{task.fields[words]}")
+        times = TimeElapsedColumn(), TextColumn("left"), TimeRemainingColumn()
+        bar = Progress(before, BarColumn(), behind, *times, console=_stderr(), transient=True)
+        return bar, bar.add_task(self.what, total=None, words="")
+
+    def show(self, what: str, done: int, total: int | None, words: str = "") -> None:
+        """So many are `done` of a `total`, None where that is not known."""
+        count = f"{done}" if total is None else f"{done} of {total}"
+        words = f"{count}, {words}" if words else count
+        if self.bar is not None:
+            part, whole = float(done), total if total is None else float(total)
+            if whole is None and self.limit is not None:
+                part, whole = min(perf_counter() - self.begin, self.limit), self.limit
+            if self.bar.tasks[0].description != what:
+                self.bar.reset(self.task, total=whole)
+            self.bar.update(self.task, total=whole, completed=part, description=what, words=words)
+        self.what = f"{what}: {words}"
+
+
 class Progress(ProgressBar):
     """The bar of a run, which it observes. `seconds`: a bound on its length [simulated s], from
     which the time left is told."""

@@ -88,7 +88,7 @@ def _gone(layout: Layout, leaving: Leaving, limits: Limits) -> float:
     profile = SpeedProfile(float(own.speed[0]), float(own.acceleration[0]))
     lift = axis - len(layout.factory.robots)
     if lift >= 0:
-        return profile.passes(layout.factory.strokes[layout.lifts[lift]], leaving.least)
+        return profile.passes(layout.strokes[layout.lifts[lift]], leaving.least)
     path, rises = layout.guidepaths[axis], 0.0
     if rises_first(layout, axis):
         rises = _gone(layout, raised(layout, axis), limits)

@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 
 from factory.control.profile import SpeedProfile
+from factory.layout.feeding import feeder_of, passing
 from factory.layout.layout import Layout
 from factory.layout.outfeed import away
 from factory.nets.ways import Way
@@ -52,19 +53,28 @@ def turn_ways(layout: Layout, settings: Settings) -> dict[Way, float]:
         for step, tour in enumerate(tours if len(tours) > 1 else ()):
             leaf, before = factory.operations[tour[0]], tours[step - 1][-1]
             if not leaf.inputs:
+                hand = layout.hand(robot)
                 late = _late(layout, leaf, before, settings)
+                if hand is not None and hand.first:  # it is at home before the part comes down
+                    late = _down(layout, leaf, settings) + _home(layout, leaf, before, settings)
                 found[robot, leaf.index] = late + (CALM + 1) * settings.tick
     return found
 
 
 def _down(layout: Layout, leaf: Operation, settings: Settings) -> float:
     """How long a slider takes for its stroke [s]."""
-    return SpeedProfile(*settings.feeder_limits).rest(layout.feeder(leaf.label).stroke)
+    return SpeedProfile(*settings.feeder_limits).rest(feeder_of(layout, leaf.label).stroke)
+
+
+def _home(layout: Layout, leaf: Operation, before: int, settings: Settings) -> float:
+    """How long a robot goes home from the operation before [s]."""
+    way = layout.guidepaths[leaf.carrier].length - layout.legs[before, leaf.carrier][1]
+    return SpeedProfile(settings.speed, settings.acceleration).rest(max(way, 0.0))
 
 
 def _late(layout: Layout, leaf: Operation, before: int, settings: Settings) -> float:
     """How long a part comes down after its robot could be home from the operation before [s]."""
-    path, way = layout.guidepaths[leaf.carrier], layout.passing(leaf)
+    path, way = layout.guidepaths[leaf.carrier], passing(layout, leaf)
     beyond = path.length - layout.legs[before, leaf.carrier][1] - way
     early = SpeedProfile(settings.speed, settings.acceleration).landing(max(beyond, 0.0))
     return max(_down(layout, leaf, settings) - early, 0.0)

@@ -19,12 +19,15 @@ from factory.geometry.meshes import Array
 from factory.geometry.solids import Product
 from factory.layout.dimensions import FINGER
 from factory.layout.hands.apart import BESIDE
-from factory.layout.hands.hand import Hand, Kind
+from factory.layout.hands.hand import Hand, Kind, Point3
 from factory.layout.hands.holding import Holding, held
 from factory.layout.hands.in_the_way import InTheWay
+from factory.layout.hands.lines import Fit, LineHands
 from factory.layout.hands.places import PUSH, Places, centre_of, strain_of_two
+from factory.layout.hands.reach import back
 from factory.layout.hands.surfaces import Way
 from factory.layout.hands.tips import STRONG, TipName, tip
+from factory.layout.hands.tours import Tours
 from factory.plant.factory import Factory
 from factory.problem.pag import NOPART
 
@@ -73,35 +76,92 @@ class Hands:
     that deliver to it depend on its line; that of another on its frame."""
 
     def __init__(self, factory: Factory, product: Product, push: float = PUSH) -> None:
-        self.holding = Holding(factory, product, push)
+        self.factory, self.tours = factory, Tours.apart(factory)
+        self.holding = Holding(self.tours.factory, product, push, self.tours.turning)
         self.in_the_way = InTheWay(self.holding, self._carrier)
+        adjusted = frozenset(tour for r in factory.adjusted for tour in self.tours.of[r])
+        self.line_hands = LineHands(self.in_the_way, self.kinds, self._bad, adjusted)
         self._fed: dict[tuple[int, Way, Way], Hand] = {}
         self._carriers: dict[tuple[int, Way], Hand] = {}
+        self._lines: dict[tuple[tuple[int, ...], object], tuple[Hand, ...]] = {}
+        self._fits: dict[int, frozenset[Fit]] = {}
+        self._on = {tour: of for of in self.tours.of for tour in of}
 
     def hand(self, robot: int, u: Way, t: Way) -> Hand | None:
         """The hand of a robot that heads along u, to a carrier that heads along t; None for a
-        tool."""
-        label = held(self.holding.factory, robot)
+        tool. That of a robot with several tours is in its place on the label of the first."""
+        tour, *others = tours = self.tours.of[robot]
+        label = held(self.holding.factory, tour)
         if not label:
             return None
-        if len(self.holding.factory.tours[robot]) > 1:
-            return self._nowhere(label)
-        if self.holding.is_carrier(robot):
-            return self._carrier(robot, u)
-        found = self._fed.get((robot, u, t))
+        if others:
+            return self._on_line(tours, u, t)[0]
+        if self.holding.is_carrier(tour):
+            return self._carrier(tour, u)
+        found = self._fed.get((tour, u, t))
         if found is None:
-            found = self._fed[robot, u, t] = self._chosen(robot, label, [(u, t)])
+            found = self._fed[tour, u, t] = self._chosen(tour, label, [(u, t)])
         return found
+
+    def shifts(self, robot: int, u: Way, t: Way | None = None) -> tuple[Point3, ...]:
+        """For each tour of a robot how far the product is from where it is on the first, as seen
+        from the robot [m], so that the hand stays where it is; nothing for one tour. `t` does not
+        matter for a carrier."""
+        tours = self.tours.of[robot]
+        if len(tours) == 1 or not held(self.holding.factory, tours[0]):
+            return ()
+        places = [hand.places[0] for hand in self._on_line(tours, u, t)]
+        found = np.round(np.array(places[:1]) - places, 6) + 0.0
+        return tuple((x, y, z) for x, y, z in found.tolist())
+
+    def together(self, robots: Sequence[int]) -> bool:
+        """Whether robots with one tour each could share a hand, by estimate: in some way to lie a
+        hand of one kind holds what each of them brings. It does not know of the size of tips, nor
+        of the hands of others that are on lines."""
+        tours = [tour for robot in robots for tour in self.tours.of[robot]]
+        if any(not held(self.holding.factory, tour) for tour in tours):
+            return True
+        for tour in tours:
+            if tour not in self._fits:
+                self._fits[tour] = self.line_hands.fits(tour)
+        common = frozenset.intersection(*(self._fits[tour] for tour in tours))
+        if not any(map(self.holding.is_carrier, tours)):
+            return bool(common)
+        return any((u, back(t), kind, z) in common for u, t, kind, z in common)
+
+    def carries(self, robot: int) -> bool:
+        """Whether others come to a robot, with something or to work on what it holds."""
+        return any(self.holding.is_carrier(tour) for tour in self.tours.of[robot])
+
+    def is_fed(self, robot: int) -> bool:
+        """Whether a feeder presents what a robot takes."""
+        return self.holding.is_fed(self.tours.of[robot][0])
 
     def line(self, robot: int, u: Way) -> float:
         """Where the line of a robot's hand that heads along u is across its heading, in the frame
         of the product [m]."""
         across = 1 if u[0] else 0
-        if self.holding.is_carrier(robot):
-            return self._carrier(robot, u).places[0][across]
+        if self.carries(robot):
+            return self._carrier(self.tours.of[robot][0], u).places[0][across]
         return float(self.holding.product.middle[across])
 
+    def _on_line(self, tours: tuple[int, ...], u: Way, t: Way | None) -> tuple[Hand, ...]:
+        """The hand of a line in its place on the label of each of its tours, where that can be."""
+        carries = any(map(self.holding.is_carrier, tours))
+        frames = self._sides(tours[0], u) if carries or t is None else ((u, t),)
+        found = self._lines.get((tours, frames))
+        if found is None:
+            found = self.line_hands.chosen(tours, frames)
+            if not found:
+                none = self._nowhere(held(self.holding.factory, tours[0]))
+                found = (none,) * len(tours)
+            self._lines[tours, frames] = found
+        return found
+
     def _carrier(self, robot: int, u: Way) -> Hand:
+        tours = self._on[robot]
+        if len(tours) > 1:
+            return self._on_line(tours, u, None)[tours.index(robot)]
         found = self._carriers.get((robot, u))
         if found is None:
             frames, label = self._sides(robot, u), held(self.holding.factory, robot)
@@ -110,10 +170,10 @@ class Hands:
             self._carriers[robot, u] = found
         return found
 
-    @staticmethod
-    def _sides(robot: int, u: Way) -> tuple[tuple[Way, Way], ...]:
+    def _sides(self, robot: int, u: Way) -> tuple[tuple[Way, Way], ...]:
         """How a carrier that heads along u may lie."""
-        sides = ((u[1], u[0]), (-u[1], -u[0])) if robot else ((0.0, 1.0),)
+        output = self.holding.on[robot] < 0
+        sides = ((0.0, 1.0),) if output else ((u[1], u[0]), (-u[1], -u[0]))
         return tuple((u, (x + 0.0, y + 0.0)) for x, y in sides)
 
     def all_frames(self, robot: int) -> list[tuple[tuple[Way, Way], ...]]:
@@ -204,6 +264,14 @@ class Hands:
             (*late,),
             covered=float(found.covered[at].min()) if holds_well else 1.0,
         )
+
+    def _bad(self, robot: int, kind: Kind, found: Places, waits: Array) -> Array:
+        """How bad (2, n) places are by suction and by a pin, inf where that is too weak."""
+        wait = np.minimum(WAIT * waits[:, 0], LONG)
+        if kind == "below" and self.holding.is_carrier(robot):
+            wait = wait + self._served(robot, found)
+        suction = np.where(found.share <= ENOUGH, wait, np.inf)
+        return np.stack([suction, np.where(found.pinned <= STRONG, wait + PINNED, np.inf)])
 
     def _groups(self, robot: int, label: str, kind: Kind, found: Places) -> TipPlaces:
         """Places that one hand could hold together: each alone, and under a payload two on one

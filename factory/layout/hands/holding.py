@@ -10,7 +10,7 @@ import numpy as np
 from factory.geometry.meshes import Array
 from factory.geometry.solids import Product
 from factory.layout.hands.hand import Kind
-from factory.layout.hands.places import PUSH, Loads, Places, places
+from factory.layout.hands.places import PUSH, Loads, Places, places, resized
 from factory.layout.hands.surfaces import Surfaces, Way
 from factory.layout.layout import carriers
 from factory.plant.factory import Factory, Operation
@@ -19,17 +19,23 @@ from factory.plant.factory import Factory, Operation
 class Holding:
     """The robots of a factory and the surfaces of what they hold. `on`: the carrier that each
     delivers to, -1 for none; `axis`: along which each lies, 0 for x; `push`: their acceleration
-    [m/s²]."""
+    [m/s²]; `turning`: robots that go on either way after what is delivered to them."""
 
-    def __init__(self, factory: Factory, product: Product, push: float = PUSH) -> None:
-        self.factory, self.product, self.push = factory, product, push
+    def __init__(
+        self,
+        factory: Factory,
+        product: Product,
+        push: float = PUSH,
+        turning: frozenset[int] = frozenset(),
+    ) -> None:
+        self.factory, self.product, self.push, self.turning = factory, product, push, turning
         self.surfaces = Surfaces(product)
         self.on = carriers(factory)
         self.axis = [0] * len(factory.robots)
         for robot, carrier in enumerate(self.on):
             if carrier >= 0:
                 self.axis[robot] = 1 - self.axis[carrier]
-        self._places: dict[tuple[str, Kind, int, int], Places] = {}
+        self._places: dict[tuple[str, Kind, int, int, float], Places] = {}
         self._boxes: dict[str, Array] = {}
         self._loads: dict[str, Loads] = {}
 
@@ -60,12 +66,18 @@ class Holding:
         """The operation that a robot delivers to."""
         return self.factory.operations[self.factory.robots[robot].operations[-1]]
 
-    def places(self, label: str, kind: Kind, axis: int, way: int) -> Places:
-        """The places on a side of a sub-assembly, found once."""
-        key = label, kind, axis, way
+    def places(self, label: str, kind: Kind, axis: int, way: int, radius: float = 0.0) -> Places:
+        """The places on a side of a sub-assembly, found once: with the pad that is best at each,
+        or with one of a `radius` [m]."""
+        key = label, kind, axis, way, radius
         if key not in self._places:
             parts, loads = self.factory.contents[label], self.loads(label)
-            self._places[key] = places(self.surfaces, self.product, parts, kind, (axis, way), loads)
+            if radius:
+                known = self.places(label, kind, axis, way)
+                found = resized(self.surfaces, parts, (axis, way), loads, known, radius)
+            else:
+                found = places(self.surfaces, self.product, parts, kind, (axis, way), loads)
+            self._places[key] = found
         return self._places[key]
 
     def loads(self, label: str) -> Loads:

@@ -83,13 +83,16 @@ class InTheWay:
         sides = (self.apart.own_side(robot, kind, ends, u, t) for u, t in frames)
         return all(bool(side.any()) for side in sides)
 
-    def on_side(self, label: str, kind: Kind, frames: Sequence[tuple[Way, Way]]) -> Places:
-        """The places on the side of a sub-assembly that a kind of hand holds."""
+    def on_side(
+        self, label: str, kind: Kind, frames: Sequence[tuple[Way, Way]], radius: float = 0.0
+    ) -> Places:
+        """The places on the side of a sub-assembly that a kind of hand holds, with the pad that is
+        best at each or, if there is room for it, with one of a `radius` [m]."""
         axis, way = (2, -1 if kind == "below" else 1)
         if kind == "behind":
             u, _ = frames[0]
             axis, way = (0, -round(u[0])) if u[0] else (1, -round(u[1]))
-        return self.holding.places(label, kind, axis, way)
+        return self.holding.places(label, kind, axis, way, radius)
 
     def checks(
         self, robot: int, label: str, kind: Kind, found: Places, frames: Sequence[tuple[Way, Way]]
@@ -211,12 +214,14 @@ class InTheWay:
 
     def _going_on(self, robot: int, kind: Kind, found: Places, u: Way, t: Way) -> Array:
         """How far a hand has to go back (n, k) [m] until each of the next k operations of its
-        carrier may start, which leaves along t."""
+        carrier may start, which leaves along t, or either way where it turns."""
         if self.holding.factory.drops(self.holding.last(robot).index):
             return np.zeros((len(found), 1))
         low, high = self.reach(kind, found, u)
         onward = self._met_onward(robot)
         past = retreat(low, high, onward.boxes, (back(u), back(t)))
+        if self.holding.on[robot] in self.holding.turning:
+            past = np.maximum(past, retreat(low, high, onward.boxes, (back(u), t)))
         far = np.zeros((len(found), onward.count))
         operations, begin = np.unique(onward.operations, return_index=True)
         far[:, operations] = np.maximum.reduceat(past, begin, axis=1)

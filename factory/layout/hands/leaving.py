@@ -41,15 +41,17 @@ def leavings(layout: Layout) -> dict[int, tuple[Leaving, ...]]:
     for robot in layout.factory.robots:
         for number, leaving in going_on(layout, robot.index).items():
             found.setdefault(number, []).extend(leaving)
-        first = found.setdefault(robot.operations[0], [])
+        before = list[Leaving]()
         if rises_first(layout, robot.index):
-            first.append(raised(layout, robot.index))
+            before.append(raised(layout, robot.index))
         hand = layout.hand(robot.index)
         if hand is not None and hand.tall:
-            first += [
-                _gone_behind(layout, guest, operation.label)
+            before += [
+                _gone_behind(layout, guest, operation)
                 for operation, guest, _ in _delivering(layout, robot.index)
             ]
+        for tour in layout.factory.tours[robot.index] if before else ():
+            found.setdefault(tour[0], []).extend(before)
     return {number: tuple(dict.fromkeys(leaving)) for number, leaving in found.items() if leaving}
 
 
@@ -89,6 +91,9 @@ def awaited_positions(layout: Layout) -> dict[int, float]:
     for carrier in factory.robots if layout.hands else ():
         for _, guest, back in meetings(layout, carrier.index):
             backs[guest] = max(backs[guest], back)
+        if len(factory.tours[carrier.index]) > 1:
+            for guest, back in _in_the_way_home(layout, carrier.index):
+                backs[guest] = max(backs[guest], back)
     for robot, hand in enumerate(layout.hands):
         if hand is None or hand.kind == "none":
             continue
@@ -105,14 +110,15 @@ def awaited_positions(layout: Layout) -> dict[int, float]:
 
 def goes_early(layout: Layout) -> list[tuple[int, int]]:
     """The operations (index) ahead of which robots go where they are awaited, whatever else."""
-    robots, count = layout.factory.robots, len(layout.factory.robots)
-    return [(robots[r].operations[0], r) for r in awaited_positions(layout) if r < count]
+    count = len(layout.factory.robots)
+    awaited = [r for r in awaited_positions(layout) if r < count]
+    return [(tour[0], r) for r in awaited for tour in layout.factory.tours[r]]
 
 
 def raised(layout: Layout, robot: int) -> Leaving:
     """When a robot's lift is up."""
     axis = len(layout.factory.robots) + list(layout.lifts).index(robot)
-    return Leaving(axis, layout.factory.strokes[robot] - SPARE)
+    return Leaving(axis, layout.strokes[robot] - SPARE)
 
 
 def _gone(layout: Layout, robot: int, back: float) -> Leaving:
@@ -122,13 +128,39 @@ def _gone(layout: Layout, robot: int, back: float) -> Leaving:
 
 
 def _back(layout: Layout, robot: int, back: float) -> Leaving:
-    """When a robot has gone back by so much [m]."""
+    """When a robot has gone back by so much [m], wherever it has delivered."""
     path = layout.guidepaths[robot]
-    return Leaving(robot, min(path.reach + back + SPARE, path.length - SPARE))
+    return Leaving(
+        robot, min(path.reach + _short(layout, robot) + back + SPARE, path.length - SPARE)
+    )
 
 
-def _gone_behind(layout: Layout, robot: int, label: str) -> Leaving:
-    """When all of a robot's hand has gone back behind a sub-assembly."""
+def _short(layout: Layout, robot: int) -> float:
+    """How far from the end of its guidepath a robot delivers at the most [m]."""
+    if not layout.shifts:
+        return 0.0
+    delivers = (tour[-1] for tour in layout.factory.tours[robot])
+    slots = ((n, layout.factory.operations[n].robots.index(robot)) for n in delivers)
+    return max(layout.apart(number, slot)[0] for number, slot in slots)
+
+
+def _gone_behind(layout: Layout, robot: int, operation: Operation) -> Leaving:
+    """When all of a robot's hand has gone back behind what it has delivered to."""
+    return _back(layout, robot, _behind(layout, robot, operation))
+
+
+def _behind(layout: Layout, robot: int, operation: Operation) -> float:
+    """How far all of a robot's hand goes back behind what it has delivered to [m]."""
     path, grip = layout.guidepaths[robot], layout.grip(robot)
     assert grip is not None
-    return _back(layout, robot, max(0.0, grip[1] - path.frame(layout.payloads[label])[0]))
+    box = layout.held(robot, operation.index, operation.label)
+    return max(0.0, grip[1] - path.frame(box)[0])
+
+
+def _in_the_way_home(layout: Layout, carrier: int) -> Iterator[tuple[int, float]]:
+    """The robots that have delivered to a carrier with a tall hand, and how far they go back before
+    it comes home [m]: on its last tour of all they have nothing more to take."""
+    hand = layout.hand(carrier)
+    if hand is not None and hand.tall:
+        for operation, guest, _ in _delivering(layout, carrier):
+            yield guest, _behind(layout, guest, operation)

@@ -17,7 +17,7 @@ def rises_first(layout: Layout, robot: int) -> bool:
     """Whether a robot's lift has to be up before it goes home: its hand is above what it has let
     go."""
     hand = layout.hand(robot)
-    return hand is not None and hand.kind == "above" and robot in layout.factory.strokes
+    return hand is not None and hand.kind == "above" and layout.factory.lowers(robot)
 
 
 def cross_of(layout: Layout, robot: int) -> tuple[float, float]:

@@ -15,7 +15,7 @@ import numpy as np
 
 from factory.geometry.meshes import Array
 from factory.layout.dimensions import PAYLOAD
-from factory.layout.guidepath import hull
+from factory.layout.guidepath import Box, hull
 from factory.layout.hands.apart import BESIDE
 from factory.layout.hands.limbs import limbs, rises_first
 from factory.layout.layout import Layout
@@ -31,7 +31,12 @@ def meetings(layout: Layout, carrier: int) -> Iterator[tuple[int, int, float]]:
     that has to wait for that, the robot, and how far it goes [m]."""
     axis = 0 if layout.guidepaths[carrier].heading[0] else 1
     coming_here = [
-        (layout.guidepaths[robot].a[axis], operation, robot, _boxes(layout, robot))
+        (
+            layout.guidepaths[robot].a[axis],
+            operation,
+            robot,
+            _boxes(layout, robot, _goal(layout, operation, robot)),
+        )
         for operation, robot in guests(layout, carrier)
         if layout.hand(robot) is not None
     ]
@@ -70,9 +75,23 @@ def guests(layout: Layout, carrier: int) -> Iterator[tuple[Operation, int]]:
 def _breadth(layout: Layout, robot: int, boxes: Array, axis: int) -> float:
     """How broad a robot's hand, in `boxes` (n, 2, 3), and payload are together along an axis across
     its way [m]."""
-    box = hull([layout.payloads[label] for label in layout.factory.deliveries(robot)])
+    box = hull([*_delivered(layout, robot)])
     hand = boxes[:, :, axis] - layout.guidepaths[robot].a[axis]
     return 2 * float(max(abs(hand).max(initial=0.0), -box[2 * axis], box[2 * axis + 1]))
+
+
+def _delivered(layout: Layout, robot: int) -> Iterator[Box]:
+    """The boxes of what a robot delivers, about the middle that its guidepath tells."""
+    for tour, label in zip(
+        layout.factory.tours[robot], layout.factory.deliveries(robot), strict=True
+    ):
+        yield layout.held(robot, tour[-1], label)
+
+
+def _goal(layout: Layout, operation: Operation, robot: int) -> float:
+    """Where a robot has its goal in an operation, an arc length [m]."""
+    path = layout.guidepaths[robot]
+    return path.reach + layout.apart(operation.index, operation.robots.index(robot))[0]
 
 
 def _boxes(layout: Layout, robot: int, at: float | None = None, up: float | None = None) -> Array:
@@ -80,7 +99,7 @@ def _boxes(layout: Layout, robot: int, at: float | None = None, up: float | None
     [m], and with its lift `up`, all the way if that is not said."""
     path = layout.guidepaths[robot]
     (x, y), (u, v) = path.carriage(path.reach if at is None else at), path.heading
-    stroke = layout.factory.strokes.get(robot, 0.0) if up is None else up
+    stroke = layout.strokes.get(robot, 0.0) if up is None else up
     found = []
     for limb in limbs(layout, robot):
         ends = np.array([limb.low, limb.high])
@@ -99,12 +118,14 @@ def _coming(layout: Layout, robot: int, carrier: int = -1) -> Array:
     path, product = layout.guidepaths[robot], layout.product
     if carrier >= 0:
         contents, labels = layout.factory.contents, layout.factory.deliveries(robot)
-        parts = [product.solids[part] for label in labels for part in contents[label]]
-        boxes = np.array([[part.low, part.high] for part in parts]) - product.middle
+        tours = zip(layout.factory.tours[robot], labels, strict=True)
+        parts = [(product.solids[p], tour[-1]) for tour, label in tours for p in contents[label]]
+        boxes = np.array([[part.low, part.high] for part, _ in parts]) - product.middle
         boxes[:, :, :2] += path.a
-        over = PAYLOAD + layout.elevations[carrier] + product.middle[2] - product.low[2]
-        boxes[:, :, 2] += over
-        boxes[:, 1, 2] += layout.factory.strokes.get(robot, 0.0)
+        boxes[:, :, :2] += np.array([layout.shift(robot, last) for _, last in parts])[:, None]
+        over = [layout.elevation(carrier, last) for _, last in parts]
+        boxes[:, :, 2] += PAYLOAD + np.array(over)[:, None] + product.middle[2] - product.low[2]
+        boxes[:, 1, 2] += layout.strokes.get(robot, 0.0)
         found.append(boxes)
     swept = np.concatenate(found)
     return _onward(swept, (-path.heading[0], -path.heading[1]))

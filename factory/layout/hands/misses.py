@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -107,11 +108,18 @@ class Miss:
         }
 
 
+def _listed(labels: Sequence[str]) -> str:
+    """Labels, in words."""
+    *first, last = [f"'{label}'" for label in labels]
+    return f"{', '.join(first)} and {last}" if first else last
+
+
 @dataclass(frozen=True, slots=True)
 class NoGrip:
     """A sub-assembly that no hand can hold: its `robot`, its `parts`, those `beside` them once it
-    is delivered, and the nearest miss of each kind that was tried; all `labels` of the robot, where
-    it brings several."""
+    is delivered, and the nearest miss of each kind that was tried. Where the robot brings others
+    too: the labels of all on its `line`; and if hands can hold each of these, but no hand all,
+    which of them each kind can (`ways`)."""
 
     label: str
     robot: str
@@ -119,23 +127,28 @@ class NoGrip:
     beside: tuple[str, ...]
     misses: tuple[Miss, ...]
     position: Position | None = field(default=None, compare=False)
-    labels: tuple[str, ...] = ()
+    line: tuple[str, ...] = ()
+    ways: tuple[tuple[Kind, tuple[str, ...]], ...] = ()
 
     @property
     def shared(self) -> bool:
         """Whether its robot brings several labels."""
-        return len(self.labels) > 1
+        return len(self.line) > 1
 
     def warning(self) -> Diagnostic:
         """What is told of it."""
-        if self.shared:
-            names = ", ".join(f"'{label}'" for label in self.labels[:NAMED])
-            more = len(self.labels) - NAMED
-            names += f" and {more} more" if more > 0 else ""
-            message = f"no hand can hold all that {self.robot} brings: {names}"
-            return Diagnostic("NoGrip", message, self.position, "they are held without one")
+        if self.ways:
+            ways = "; ".join(self._way(kind, labels) for kind, labels in self.ways)
+            message = (
+                f"no one hand can hold all that {self.robot} brings, {_listed(self.line)}: {ways}"
+            )
+            hint = "they are held without one; let other labels share a robot"
+            return Diagnostic("NoGrip", message, self.position, hint)
         words = "; ".join(miss.words for miss in self.misses)
         hint = "it is held without one; join it in another order, or by a relay from above"
+        others = [label for label in self.line if label != self.label]
+        if others:
+            words += f"; so {self.robot} has no hand for {_listed(others)} either"
         return Diagnostic(
             "NoGrip",
             f"no hand can hold '{self.label}': {words}",
@@ -143,12 +156,19 @@ class NoGrip:
             f"{hint} (--clashes DIR draws it)",
         )
 
+    def _way(self, kind: Kind, labels: tuple[str, ...]) -> str:
+        """Which labels of a line a kind of hand can hold, in words."""
+        if labels == self.line:
+            return f"{kind} it can hold each, but not in one place of the hand"
+        return f"{kind} it can hold {_listed(labels) if labels else 'none'}"
+
     def as_json(self) -> dict[str, Any]:
         """The nearest misses."""
         return {
             "label": self.label,
             "robot": self.robot,
-            **({"labels": list(self.labels)} if self.shared else {}),
+            **({"line": list(self.line)} if self.line else {}),
+            **({"ways": {kind: list(labels) for kind, labels in self.ways}} if self.ways else {}),
             "file": self.position.file if self.position else None,
             "line": self.position.line if self.position else None,
             "col": self.position.column if self.position else None,

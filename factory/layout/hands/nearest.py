@@ -3,7 +3,8 @@ is strong enough and has the fewest things in its way."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -30,19 +31,28 @@ AS_WEAK = 1.5
 
 
 def no_grips(hands: Hands) -> tuple[NoGrip, ...]:
-    """Each sub-assembly that no hand of a robot can hold, however that robot lies."""
-    factory, found = hands.holding.factory, []
-    for robot in factory.robots:
-        labels = factory.deliveries(robot.index)
-        if len(labels) > 1:
-            position, parts = factory.by_label[labels[0]].position, factory.contents[labels[0]]
-            found.append(NoGrip(labels[0], robot.name, parts, (), (), position, labels))
-            continue
-        chosen = [hands.hand(robot.index, u, t) for u, t in hands.holding.frames(robot.index)]
+    """Each sub-assembly that no hand of a robot can hold, however that robot lies; and where that
+    can hold all that it brings, but not by one hand, these."""
+    factory, found = hands.holding.factory, list[NoGrip]()
+    for robot, tours in enumerate(hands.tours.of):
+        frames = hands.holding.frames(tours[0])
+        chosen = [hands.hand(robot, u, t) for u, t in frames]
         if chosen and all(hand is not None and hand.kind == "none" for hand in chosen):
-            search = _Search(hands, robot.index, held(factory, robot.index))
-            found.append(search.found())
+            labels = tuple(held(factory, tour) for tour in tours) if len(tours) > 1 else ()
+            lacking = [t for t in tours if not (labels and hands.line_hands.fits(t))]
+            searches = [_Search(hands, tour, held(factory, tour)) for tour in lacking or tours[:1]]
+            ways = () if lacking else tuple(_ways(hands, tours))
+            found += [
+                replace(search.found(not lacking), line=labels, ways=ways) for search in searches
+            ]
     return tuple(found)
+
+
+def _ways(hands: Hands, tours: Sequence[int]) -> Iterator[tuple[Kind, tuple[str, ...]]]:
+    """For each kind of hand which labels of a line it can hold, one by one."""
+    fits = {held(hands.holding.factory, tour): hands.line_hands.fits(tour) for tour in tours}
+    for kind in hands.line_hands.common(tours):
+        yield kind, tuple(label for label, fit in fits.items() if any(kind in way for way in fit))
 
 
 class _Search:
@@ -57,8 +67,8 @@ class _Search:
         self._names = [part for _, part in bodies]
         self._own = frozenset(self.holding.factory.contents[label])
 
-    def found(self) -> NoGrip:
-        """What is told of it."""
+    def found(self, bare: bool = False) -> NoGrip:
+        """What is told of it; nothing of misses if that is to be `bare`."""
         factory, last = self.holding.factory, self.holding.last(self.robot).label
         made = factory.contents.get(last, factory.contents[factory.pag.root])
         return NoGrip(
@@ -66,7 +76,7 @@ class _Search:
             factory.robots[self.robot].name,
             factory.contents[self.label],
             tuple(part for part in made if part not in self._own),
-            tuple(self.nearest(kind) for kind in self.hands.kinds(self.robot)),
+            () if bare else tuple(self.nearest(kind) for kind in self.hands.kinds(self.robot)),
             factory.by_label[self.label].position,
         )
 

@@ -53,6 +53,9 @@ PARTLY = 0.6
 UP = np.array([0.0, 0.0, 1.0])
 """From a tip below to its payload."""
 
+SAME = 1e-9
+"""Radii that differ by no more are one [m]."""
+
 RAYS = 6
 """In so many directions from its middle it is looked at what a pad covers."""
 
@@ -167,6 +170,28 @@ def places(
     pinned = strain(tip("pin"), side, radius, load)
     result = Places(at, radius, share, pinned, covers)
     return result.chosen(np.argsort(np.round(result.share, 2), kind="stable"))
+
+
+def resized(
+    surfaces: Surfaces,
+    parts: Sequence[str],
+    side: tuple[int, int],
+    loads: Loads,
+    known: Places,
+    radius: float,
+) -> Places:
+    """Those of some `known` places with a pad no smaller where one of a `radius` [m] fits, each
+    once, with such a pad; loads and side as for `places`."""
+    points = np.unique(known.at[known.radius >= radius - SAME], axis=0)
+    if not len(points):
+        return known.chosen(np.zeros(0, np.intp))
+    covered, plane = _covered(surfaces, parts, points, side, (radius,))
+    fits = covered[0] > (PARTLY if radius > RADII[-1] else 0.0)
+    at, covers = points[fits], covered[0][fits]
+    at[:, side[0]] = plane[0][fits]
+    sizes, load = np.full(len(at), radius), loads.about(at)
+    share = strain(tip("suction"), side, sizes, load) / covers
+    return Places(at, sizes, share, strain(tip("pin"), side, sizes, load), covers)
 
 
 def _tried(low: Array, high: Array, centre: Array, side: tuple[int, int]) -> Array:

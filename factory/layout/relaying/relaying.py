@@ -48,8 +48,11 @@ def relayed(
     hands: Hands | None = None,
 ) -> Layout:
     """A layout with relays, its own net and certificate, for a `cycle` time [s] if one is given, or
-    near the least there can be; `plain` itself where no relay makes it faster. `hands`: those to
-    choose from, where they are known. Raises RunError (Layout) where it does not fit the floor."""
+    near the least there can be; `plain` itself where no relay makes it faster, or some robot holds
+    its labels in several places. `hands`: those to choose from, where they are known. Raises
+    RunError (Layout) where it does not fit the floor."""
+    if plain.shifts:
+        return plain
     if hands is None and settings.hands:
         hands = Hands(plain.factory, plain.product, settings.acceleration)
     room = Room(plain, Pace.of(settings), floor, hands)

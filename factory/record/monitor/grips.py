@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from factory.mjcf.weld_frames import GRIP, HOLD, WeldFrames
+from factory.plant.factory import Factory
 from factory.record.monitor.anatomy import Anatomy
 from factory.record.monitor.observation import Array, Index, Observation
 
@@ -156,16 +157,19 @@ def _apart(
     return np.sqrt(np.einsum("ni,ni->n", apart, apart)), ~(along >= STRAIGHT)
 
 
-def misplaced(anatomy: Anatomy, places: dict[str, Array], tolerance: float = 1e-6) -> list[int]:
+def misplaced(
+    anatomy: Anatomy, factory: Factory, places: dict[str, Array], tolerance: float = 1e-6
+) -> list[int]:
     """The welds (by number) that do not keep a part in its place in the product, relative to the
-    others that the same holder keeps."""
-    first: dict[tuple[int, int], tuple[Array, Array]] = {}
+    others that the same holder keeps, a robot on one tour."""
+    first: dict[tuple[int, ...], tuple[Array, Array]] = {}
     found = []
     for weld, holder in enumerate(anatomy.holder):
         if holder is None or holder[0] not in (GRIP, HOLD):
             continue
         base, place = anatomy.frames.base[weld], places[anatomy.part[weld]]
-        anchor, middle = first.setdefault(holder, (base, place))
+        tour = factory.tour_with(holder[1], anatomy.part[weld]) if holder[0] == GRIP else 0
+        anchor, middle = first.setdefault((*holder, tour), (base, place))
         if np.abs((base - anchor) - (place - middle)).max() > tolerance:
             found.append(weld)
     return found

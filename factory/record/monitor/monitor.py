@@ -133,7 +133,7 @@ class Monitor:
     def _look_at_frames(self) -> None:
         """Blame welds that put a part elsewhere than where it is in the product."""
         places = {part: np.array(place) for part, place in self.subject.places.items()}
-        for weld in misplaced(self.anatomy, places):
+        for weld in misplaced(self.anatomy, self.subject.factory, places):
             holder, part = self.anatomy.holder[weld], self.anatomy.part[weld]
             words = f"the weld that holds {part} puts it elsewhere than where it is in the product"
             self._blame("Frame", holder[1] if holder else -1, part, words)

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from factory.control.mode import Index
+from factory.layout.feeding import feeder_of
 from factory.mjcf import names
 from factory.mjcf.masks import feeder_codes
 from factory.mjcf.model import Model
@@ -189,5 +190,5 @@ class Feeders:
 
 def _station(m: mujoco.MjModel, model: Model, label: str, code: int) -> Station:
     x, y, z = presented_at(model.layout, label)
-    up = x, y, z + model.layout.feeder(label).stroke
+    up = x, y, z + feeder_of(model.layout, label).stroke
     return Station(label, m.equality(names.feed(label)).id, code, (x, y, z), up)

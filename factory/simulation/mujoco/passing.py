@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
-from factory.control.mode import STILL, Truth
+from factory.control.mode import STILL, Array, Index, Truth
 from factory.control.profile import SpeedProfile
+from factory.layout.feeding import passing
 from factory.mjcf import names
 from factory.mjcf.model import Model
 from factory.plant.factory import Operation
@@ -15,8 +17,35 @@ from factory.problem.pag import NOPART
 from factory.simulation.request import RunRequest
 from factory.support.engine import mujoco
 
+LEVEL = 5e-4
+"""A lift is where it is to be for a part within this [m]."""
+
 HOME = 1e-3
 """A robot is at home within this [m]."""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class _Lifts:
+    """The lifts that are set for each label: the `numbers` (k,) of those labels, the `address` (k,)
+    of each lift's position, and where it is to be (`level`) [m]."""
+
+    numbers: Index
+    address: Index
+    level: Array
+
+    @classmethod
+    def of(cls, m: mujoco.MjModel, model: Model) -> _Lifts:
+        """Those of a model."""
+        factory, layout = model.factory, model.layout
+        leaves = [(n, o) for n, o in enumerate(factory.leaves) if o.carrier in factory.adjusted]
+        lifts = [m.joint(names.lift(factory.robots[o.carrier].name)).id for _, o in leaves]
+        level = [layout.level(o.carrier, o.index).up for _, o in leaves]
+        numbers = np.array([n for n, _ in leaves], np.intp)
+        return cls(numbers, m.jnt_qposadr[np.array(lifts, np.intp)], np.array(level))
+
+    def narrow(self, home: Truth, d: mujoco.MjData) -> None:
+        """Robots are at home for a label (n,) only where their lifts are at its height."""
+        home[self.numbers] &= np.abs(d.qpos[self.address] - self.level) < LEVEL
 
 
 class Passing:
@@ -31,13 +60,14 @@ class Passing:
         joints = [m.joint(names.slide(factory.robots[robot].name)).id for robot in carriers]
         self._d, self._address, self._dof = d, m.jnt_qposadr[joints], m.jnt_dofadr[joints]
         self._home = np.array([layout.guidepaths[robot].length for robot in carriers])
-        self._clear = self._home - [layout.passing(leaf) for leaf in factory.leaves]
+        self._clear = self._home - [passing(layout, leaf) for leaf in factory.leaves]
         hands = [layout.hand(robot) for robot in carriers]
         self._kinds = ["none" if hand is None else hand.kind for hand in hands]
         self._first = np.array([hand is not None and hand.first for hand in hands], bool)
         settings = request.settings
         fastest = settings.speed * (1 + request.jitter)
         self._fastest = SpeedProfile(fastest, settings.acceleration)
+        self._lifts = _Lifts.of(m, model)
         self._fed: dict[int, list[int]] = {}
         for number, robot in enumerate(carriers):
             self._fed.setdefault(robot, []).append(number)
@@ -62,6 +92,7 @@ class Passing:
         its hand has to be there first, rests at home without one."""
         at, still = self._d.qpos[self._address], np.abs(self._d.qvel[self._dof]) < STILL
         home = ~self.holds & still & (at >= self._home - HOME)
+        self._lifts.narrow(home, self._d)
         return np.asarray(np.where(self._first, home, ~self.holds | (at <= self._clear)))
 
     def soonest(self, number: int) -> float:

@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from factory.control.mode import Array, Index
+from factory.layout.feeding import feeder_of
 from factory.mjcf import names
 from factory.mjcf.feeders import SLIDER_MASS
 from factory.mjcf.model import GRAVITY, Model, stroke_ticks
@@ -74,7 +75,7 @@ class Sliders:
         own = m.body_subtreemass[self._body] + m.dof_armature[m.jnt_dofadr[joint]]
         self._drives, self._sleep = Drives(m, d, drives, own.round(9)), sleep
         self._loads = np.array([model.masses[label] for label in labels])
-        lengths = np.array([model.layout.feeder(label).stroke for label in labels])
+        lengths = np.array([feeder_of(model.layout, label).stroke for label in labels])
         ticks = stroke_ticks(model.layout, settings)
         self._strokes = Strokes.of(self._drives, self._loads, lengths, ticks, settings)
         self._begun, self.ends = np.zeros(len(labels)), np.full(len(labels), NEVER)

@@ -118,7 +118,10 @@ class Strength:
         centre, layout = self._model.carried.centre, self._model.layout
         for number, ((robot, label), _) in enumerate(self._grips):
             hand, load = self._hands[robot], np.diag([1.0, 1.0, 1.0, 0.5, 0.5, 0.5])
-            load[3:, :3] = np.cross(centre[label] - middle(hand), np.eye(3)).T
+            tour = layout.factory.tours[robot][layout.factory.tour_with(robot, label)]
+            at = centre[label] - middle(hand)
+            at[:2] += layout.shift(robot, tour[0])
+            load[3:, :3] = np.cross(at, np.eye(3)).T
             found[number] = gauge(hand, layout.guidepaths[robot].heading) @ load
         return found
 

@@ -10,6 +10,7 @@ from factory.modes.modes import operation_modes, robot_limits
 from factory.modes.staging import stages_of
 from factory.pipeline import Project
 from factory.study.allocation.bundles import Filling
+from factory.support.errors import FactoryError
 from factory.timing.cycle_time import CycleTime
 from factory.timing.prediction import all_ways, operation_delays, predict
 
@@ -23,6 +24,13 @@ class Candidate:
     forms: Mapping[str, int]
     filling: Filling | None = None
 
+    def __str__(self) -> str:
+        robots = f"{self.robots} robots"
+        try:
+            return f"{robots}, {self.seconds:.2f} s"
+        except FactoryError:
+            return f"{robots}, no layout"
+
     @property
     def robots(self) -> int:
         """How many robots its factory has, tools included."""
@@ -33,15 +41,27 @@ class Candidate:
         """The cycle time that is predicted for its layout [s]."""
         return self.pace.seconds
 
-    @cached_property
+    @property
     def pace(self) -> CycleTime:
         """The same, and what allows no less."""
+        return self._timed[0]
+
+    @property
+    def work(self) -> float:
+        """What its robots spend in operations in a cycle, all together [robot s]. No factory with
+        these operations has a shorter cycle than that over its number of robots."""
+        pairs = zip(self.project.layout.factory.operations, self._timed[1], strict=True)
+        return sum(len(operation.robots) * delay for operation, delay in pairs)
+
+    @cached_property
+    def _timed(self) -> tuple[CycleTime, list[float]]:
+        """The pace of its layout, and how long each operation takes [s]."""
         layout, settings = self.project.layout, self.project.settings
         modes, (limits, _) = operation_modes(layout, settings.eps), robot_limits(layout, settings)
         stages = stages_of(layout, modes, settings)
         delays = operation_delays(layout, modes, limits, settings, "mujoco", stages)
         ways = all_ways(layout, stages, delays, limits, settings, "mujoco")
-        return predict(layout, delays, settings, "mujoco", None, ways)
+        return predict(layout, delays, settings, "mujoco", None, ways), delays
 
     @cached_property
     def troubles(self) -> int:

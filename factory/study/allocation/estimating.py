@@ -50,12 +50,12 @@ more."""
 @dataclass(frozen=True, slots=True)
 class Estimate:
     """What is estimated of forms and lines: `robots`, tools included, and cycle time [s]; the
-    `forms`, and what lines are filled for."""
+    `forms`, and what the lines are filled for, None for a robot for each label."""
 
     robots: int
     seconds: float
     forms: Mapping[str, int]
-    filling: Filling
+    filling: Filling | None = None
 
     def beats(self, other: Estimate) -> bool:
         """Whether it has no more robots than another, and is clearly faster, or is the same."""
@@ -101,22 +101,40 @@ class Estimator:
         more operations blocked than as the product is written; as many as are found until it is
         `late`."""
         found: list[Estimate] = []
-        most, tried = _blocked(self._reformed(self.written)), set[tuple[int, ...]]()
+        for one in self.estimates(robots, late):
+            if one.filling is not None and not any(other.beats(one) for other in found):
+                found = [other for other in found if not one.beats(other)] + [one]
+        return found
+
+    def estimates(
+        self, robots: float = inf, late: Callable[[], bool] = lambda: False
+    ) -> Iterator[Estimate]:
+        """All estimates with at most so many `robots` and no more operations blocked than as the
+        product is written, until it is `late`: of each forms, those as they are written first, that
+        with a robot for each label, then those with lines."""
+        tried = {tuple(self.written.values())}
+        yield from self.of_forms(self.written, robots)
         for task in self._tasks():
             for bound in self.bounds(task, robots):
                 if late():
-                    return found
+                    return
                 forms, _ = best_forms(task, bound)
                 key = tuple(forms.values())
                 if key in tried:
                     continue
                 tried.add(key)
-                project = self._reformed(forms)
-                if _blocked(project) <= most:
-                    for one in self._filled(project, forms, robots):
-                        if not any(other.beats(one) for other in found):
-                            found = [other for other in found if not one.beats(other)] + [one]
-        return found
+                yield from self.of_forms(forms, robots)
+
+    def of_forms(self, forms: Mapping[str, int], robots: float = inf) -> Iterator[Estimate]:
+        """The estimates of forms, none where more operations are blocked than as the product is
+        written."""
+        project = self._reformed(forms)
+        if _blocked(project) <= self._blocked_as_written:
+            yield from self._filled(project, forms, robots)
+
+    @cached_property
+    def _blocked_as_written(self) -> int:
+        return _blocked(self._reformed(self.written))
 
     def _tasks(self) -> Iterator[FormsTask]:
         orders: tuple[Order, ...] = ("lines", "fewest", "robots")
@@ -137,9 +155,12 @@ class Estimator:
     def _filled(
         self, project: Project, forms: Mapping[str, int], robots: float
     ) -> Iterator[Estimate]:
-        """The estimates of forms with lines for all that they may be filled for."""
+        """The estimates of forms with a robot for each label, and with lines for all that they may
+        be filled for."""
         shift, tried = self._shift(project), set[tuple[Line, ...]]()
         large = len(self.task.nodes) >= LARGE
+        if shift.count(()) <= robots:
+            yield Estimate(shift.count(()), shift.seconds(()), forms)
         for filling in shift.fillings(FILLED, SLACKS[:1] if large else SLACKS):
             lines = shift.lines(filling)
             count = shift.count(lines)

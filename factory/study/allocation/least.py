@@ -10,10 +10,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from itertools import pairwise
 
 from factory.compiler.compiler import Node, expand
 from factory.problem.pag import NOPART, PAG
 from factory.problem.template import Template
+
+SHOWN = 6
+"""So many labels of a proof are shown."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,9 +36,19 @@ class Least:
         return self.robots + self.tools
 
     def __str__(self) -> str:
-        steps = [self.path[0], *(b for a, b in zip(self.path, self.path[1:]) if a[1] != b[1])]  # noqa: B905
-        words = ", ".join(f"'{label}' by fewer than {needs}" for label, needs in steps[:6])
-        return f"nothing can hold {words}{', ...' if len(steps) > 6 else ''}"
+        """Why it takes so many, in words."""
+        product, _ = self.path[0]
+        words = f"'{product}' cannot be held by fewer than {self.robots}{self._why()}"
+        if self.tools:
+            words += f", and takes {self.tools} tool{'' if self.tools == 1 else 's'} besides"
+        return words
+
+    def _why(self) -> str:
+        """The labels on the way down at which it takes one fewer each."""
+        steps = [b for a, b in pairwise(self.path) if a[1] > b[1] > 1]
+        words = ", ".join(f"'{label}' by {needs}" for label, needs in steps[:SHOWN])
+        more = ", ..." if len(steps) > SHOWN else ""
+        return f" ({words}{more})" if steps else ""
 
 
 def least_robots(pag: PAG, templates: Mapping[str, Template]) -> Least:

@@ -14,6 +14,8 @@ from dataclasses import replace
 from math import inf
 from time import monotonic
 
+from factory.compiler.folding import kept_apart, lines_of_labels
+from factory.compiler.mating.mating import judged
 from factory.pipeline import Project
 from factory.study.allocation.aim import Aim
 from factory.study.allocation.blame import blamed, joins_of
@@ -36,10 +38,11 @@ SINGLE, ESTIMATED, SHARED = 0.3, 0.5, 0.8
 """Shares of the time after which nothing more is tried with a robot for each label, nothing more is
 estimated, and no more estimates are laid out."""
 
-Seen = Callable[[Candidate], None]
+Seen = Callable[[Candidate, Candidate], None]
+"""Told of each candidate, and of the best so far."""
 
 
-def allocated(project: Project, aim: Aim, seen: Seen = lambda _: None) -> Project:
+def allocated(project: Project, aim: Aim, seen: Seen = lambda *_: None) -> Project:
     """The project with forms and lines chosen for an aim: as few robots as found for a cycle time,
     or the shortest cycle time found with so many robots; `project` itself where it asks for
     neither. Where nothing found is fast enough, with relays. Each candidate is `seen`. Raises
@@ -56,7 +59,7 @@ def allocated(project: Project, aim: Aim, seen: Seen = lambda _: None) -> Projec
     search.look(seen)
     best = search.best
     if isinstance(aim.robots, int) and best.robots > aim.robots:
-        message = f"{aim.robots} robots are too few: found with {best.robots}"
+        message = f"{aim.robots} robots are too few: found with {best.robots}{search.why()}"
         hint = f"--robots {best.robots}; with more --seconds fewer may be found"
         raise InputError(Diagnostic("TooFewRobots", message, None, hint))
     if aim.robots is None and aim.cycle is not None and best.seconds > aim.cycle:
@@ -70,10 +73,10 @@ def allocated(project: Project, aim: Aim, seen: Seen = lambda _: None) -> Projec
 class Search:
     """Looks for the best forms and lines for an aim; `best`: what was found."""
 
-    def __init__(self, project: Project, aim: Aim) -> None:
+    def __init__(self, project: Project, aim: Aim, estimator: Estimator | None = None) -> None:
         self.aim, self.begun = aim, monotonic()
         bare = replace(project.ground, relay=False, cycle=None)
-        self.estimator = Estimator(project.with_pag(project.pag, bare))
+        self.estimator = estimator or Estimator(project.with_pag(project.pag, bare))
         self.written = self.best = self.estimator.candidate(self.estimator.written)
 
     def late(self, share: float = 1.0) -> bool:
@@ -85,18 +88,26 @@ class Search:
         troubles = max(0, one.troubles - self.written.troubles)
         return self.aim.rank(one.robots, one.seconds, troubles)
 
-    def look(self, seen: Seen = lambda _: None) -> None:
+    def look(self, seen: Seen = lambda *_: None) -> None:
         """For forms and lines, as long as there is time and something better may be found. Each
         candidate is `seen`."""
-        seen(self.written)
-        for found in (self._singles(), self._shared()):
+        seen(self.written, self.best)
+        for found in (self.singles(), self._shared()):
             for one in found:
-                seen(one)
                 self._judge(one)
+                seen(one, self.best)
         while self._better(self._changed(), seen):
             pass
 
-    def _singles(self) -> Iterator[Candidate]:
+    def why(self) -> str:
+        """What keeps two lines of the best apart, in words; "" where nothing is known to."""
+        best = self.best.project
+        compiled = judged(best.compiled, best.product)
+        lines = lines_of_labels(compiled, best.ground.lines)
+        words = next(kept_apart(compiled, lines, best.catalogue), "")
+        return f"; {words}" if words else ""
+
+    def singles(self) -> Iterator[Candidate]:
         """The candidates by estimate with a robot for each label, each forms once, under bounds
         from long to short. Forms that leave a robot without a hand are refused from then on."""
         estimator, before = self.estimator, dict[str, int]()
@@ -119,6 +130,8 @@ class Search:
         aim, most = self.aim, self.aim.robots
         robots = most if isinstance(most, int) else inf
         front = self.estimator.front(robots, lambda: self.late(ESTIMATED))
+        if not front:
+            front = self.estimator.front(inf, lambda: self.late(ESTIMATED))
         front.sort(key=lambda one: aim.rank(one.robots, one.seconds))
         for one in front[:LOOKED_AT]:
             if self.late(SHARED):
@@ -141,8 +154,9 @@ class Search:
             one = next(changed, None)
             if one is None or self.late():
                 return False
-            seen(one)
-            if self._judge(one):
+            better = self._judge(one)
+            seen(one, self.best)
+            if better:
                 return True
         return False
 

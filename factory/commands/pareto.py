@@ -1,0 +1,185 @@
+"""The command `pareto`."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from factory.commands.options import FLOOR, MOTION, OUTPUT, PATH, SECONDS, SOURCE
+from factory.commands.outputs import writable_folder
+from factory.commands.requests import OutputOptions, ProjectOptions
+from factory.commands.warnings import announced
+from factory.support.console import emit, say, table
+from factory.support.errors import Diagnostic, InputError, StoppedError
+
+if TYPE_CHECKING:
+    from factory.pipeline import Project
+    from factory.study.pareto import Effort, FrontPoint, ParetoFront
+    from factory.study.pareto.sweeping import Step
+
+PAGE_NAME = "pareto.html"
+
+
+@click.command()
+@SOURCE
+@click.option(
+    "--validate",
+    "trials",
+    type=click.IntRange(0, 1000),
+    default=0,
+    help="Run so many points, spread over the front, in both worlds.",
+)
+@click.option(
+    "-o", "--output", type=PATH, help="A folder for a page, and for the files of each point."
+)
+@click.option(
+    "--seconds",
+    "effort",
+    type=SECONDS,
+    help="To look for points [s]; 300 by default, 60 with --no-layouts.",
+)
+@click.option(
+    "--layouts/--no-layouts",
+    default=True,
+    help="Lay points out and certify them, which is the default, or go by estimates.",
+)
+@FLOOR
+@MOTION
+@OUTPUT
+def pareto(
+    given: ProjectOptions,
+    out: OutputOptions,
+    trials: int,
+    output: Path | None,
+    layouts: bool,
+) -> int:
+    """Look for the factories for FILE.pag of which no other is as good in robots, cycle time and
+    floor.
+
+    Ctrl-C ends the search: what was found until then is told and written. The status is 1 where a
+    point that was run fails, or is further than 3 % from its prediction."""
+    from factory.study.pareto import Effort
+
+    if trials and not layouts:
+        message = "without layouts there is nothing to run"
+        raise InputError(Diagnostic("Usage", message, None, "leave out --validate or --no-layouts"))
+    writable_folder(output)
+    project = given.project(out.silent)
+    warnings = announced(project.warnings, out)
+    front, stopped = _found(project, Effort(layouts, given.effort), trials, out)
+    commands, files = _written(front, project, output)
+    if out.as_json:
+        points = zip(front.points, commands, strict=True)
+        document = front.as_json()
+        document["points"] = [{**p.as_json(), "command": command} for p, command in points]
+        errors = {"errors": [d.as_json() for d in stopped.diagnostics]} if stopped else {}
+        emit({**document, "files": [*map(str, files)], "warnings": warnings, **errors})
+    elif not out.quiet:
+        _tell(front, commands)
+        if output is not None:
+            say(f"wrote {output / PAGE_NAME}, and the files of {len(front.points)} points")
+    if stopped is not None:
+        print(stopped, file=sys.stderr)
+        return stopped.exit_status
+    return 0 if all(trial.holds for trial in front.trials) else 1
+
+
+def _found(
+    project: Project, effort: Effort, trials: int, out: OutputOptions
+) -> tuple[ParetoFront, StoppedError | None]:
+    """The front, with so many of its points tried; and that it was stopped by the user, if it was
+    after a point had been found."""
+    from factory.study.pareto import FrontSweep
+    from factory.study.pareto.trial import tried
+    from factory.support.progress import StepBar
+
+    front = None
+    with StepBar("looking for the front", out.silent, effort.limit) as bar:
+
+        def seen(step: Step) -> None:
+            bar.show(step.what, step.done, step.total, f"{step.points} points" * bool(step.points))
+
+        sweep = FrontSweep(project, effort, seen)
+        try:
+            sweep.look()
+            front = sweep.front()
+            numbers = front.spread(trials)
+            for done, number in enumerate(numbers):
+                bar.show("running in both worlds", done, len(numbers))
+                front = front.with_trial(number, tried(front.points[number].project))
+        except KeyboardInterrupt:
+            front = front or sweep.front()
+            if not front.points:
+                raise
+            message = f"stopped by the user, with {len(front.points)} points"
+            return front, StoppedError(Diagnostic("Interrupted", message))
+    return front, None
+
+
+def _written(
+    front: ParetoFront, project: Project, folder: Path | None
+) -> tuple[Sequence[str | None], list[Path]]:
+    """Write the page, and the files of the points, where there is a folder for them. Gives the
+    commands that build the points, and the files."""
+    from factory.show.pareto import floor_plans, front_page
+    from factory.study.pareto.point_files import commands_of, point_files
+    from factory.support.files import own_names, write_all
+
+    if folder is None:
+        return [None] * len(front.points), []
+    commands = commands_of(front, folder)
+    plans = floor_plans(front, folder)
+    page = front_page(front, commands, plans, folder)
+    files = {folder / PAGE_NAME: page.encode(), **point_files(front, folder), **plans}
+    own_names(folder, files, [project.file])
+    write_all(files)
+    return commands, list(files)
+
+
+def _tell(front: ParetoFront, commands: Sequence[str | None]) -> None:
+    """The front as a table for people."""
+    heads = ["robots", "tools", "lines", "relays", "cycle [s]", "least [s]", "floor [m²]"]
+    tried, built = bool(front.trials), any(commands)
+    heads += ["measured [s]", "error"] * tried + ["command"] * built
+    rows = [
+        (*_row(point), *_measured(point)[: 2 * tried], *[command or ""] * built)
+        for point, command in zip(front.points, commands, strict=True)
+    ]
+    title = f"{front.name}: {len(front.points)} points, {_looked_at(front)}"
+    table(title, tuple(heads), rows)
+    if front.written is not None:
+        say(f"as written: {front.written}")
+    say(f"{front.least.total} robots at least, tools included")
+    for point in front.points:
+        for failure in point.trial.failures if point.trial else ():
+            print(f"{point.robots} robots: the run failed: {failure}", file=sys.stderr)
+
+
+def _looked_at(front: ParetoFront) -> str:
+    laid_out = f", {front.laid_out} layouts" if front.laid_out else ""
+    rest = "" if front.complete else "; not all was looked at (--seconds)"
+    return f"{front.estimated} estimates{laid_out}{rest}"
+
+
+def _row(point: FrontPoint) -> list[str]:
+    figures = (point.seconds, point.bound, point.area)
+    counts = (point.tools, len(point.lines), point.relays)
+    return [
+        f"{point.robots}",
+        *(f"{count or ''}" for count in counts),
+        *("" if figure is None else f"{figure:.2f}" for figure in figures),
+    ]
+
+
+def _measured(point: FrontPoint) -> tuple[str, str]:
+    """The cycle time of a run, and the error of what was predicted for it."""
+    trial = point.trial
+    if trial is None:
+        return "", ""
+    if trial.error is None or trial.failures:
+        return "failed", ""
+    return f"{trial.measured:.2f}", f"{100 * trial.error:+.1f} %"

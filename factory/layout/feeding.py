@@ -1,0 +1,89 @@
+"""Feeders of a layout: where the magazine of a robot stands, and when it may go on."""
+
+from __future__ import annotations
+
+from math import hypot
+
+from factory.layout.dimensions import (
+    BOOM,
+    BOOM_HEIGHT,
+    FINGER,
+    PAD,
+    PAYLOAD,
+    PLAY,
+    POST,
+    RISE,
+    SIDE,
+    Clearance,
+)
+from factory.layout.guidepath import Extent, Feeder, hull
+from factory.layout.hands.hand import BEAM
+from factory.layout.layout import Layout
+from factory.plant.factory import Operation
+
+
+def feeder_of(layout: Layout, label: str) -> Feeder:
+    """The feeder of a part: a housing over the place where it is presented, and the post that
+    carries it, behind the rear stop of the robot that it serves. Parts of one line have one
+    housing, in which they hang with their tops at one height."""
+    operation, room = layout.factory.by_label[label], Clearance(layout.clearance).room
+    robot, by_label = operation.carrier, layout.factory.by_label
+    path, shown = layout.guidepaths[robot], layout.magazine(robot)
+    middle = path.middle(layout.goal(operation.index, operation.template.carrier - 1))
+    solids = [layout.product.solids[part] for part in shown]
+    first, rises = layout.factory.robots[robot].operations[0], layout.strokes.get(robot, 0.0)
+    elevation = layout.elevation(robot, operation.index)
+    highest = max(
+        float(solid.high[2]) + (layout.elevation(robot, by_label[part].index) - elevation)
+        for part, solid in zip(shown, solids, strict=True)
+    )
+    tallest = max(float(solid.high[2] - solid.low[2]) for solid in solids)
+    rear, front, near, far = _shown(layout, robot)
+    inside = rear - PLAY, front + PLAY, near - PLAY, far + PLAY
+    housing = rear - SIDE, front + SIDE, near - SIDE, far + SIDE
+    across, half = path.offset + path.aside, POST / 2
+    hand, grip = layout.hand(robot), layout.grip(robot)
+    back = -Clearance(layout.clearance).post(path.reach, min(rear, grip[0]) if grip else rear)
+    if hand is not None and hand.tall:
+        top = max(hand.beam + BEAM, hand.places[0][2] + max(hand.radius, FINGER / 2))
+        top += layout.held_at(robot, first) + rises - elevation
+        room = max(room, round(top - highest + layout.clearance, 6))
+        if hand.kind == "above":
+            across = round((near + far) / 2, 3)
+    over = PAYLOAD + elevation - layout.product.low[2]
+    low = float(over + highest) + room
+    high_up = RISE * hypot(inside[1] - inside[0], inside[3] - inside[2])
+    stroke = room + high_up + tallest
+    x, y = layout.shift(robot, operation.index)
+    ahead, _, aside, _ = path.frame((x, x, y, y))
+    return Feeder(
+        back - ahead,
+        across - aside,
+        (inside[0] - ahead, inside[1] - ahead, inside[2] - aside, inside[3] - aside),
+        path.world((back - half, back + half, across - half, across + half), middle),
+        path.world((back, housing[0], across - BOOM / 2, across + BOOM / 2), middle),
+        path.world(housing, middle),
+        low,
+        max(low - room + stroke + PAD + SIDE, low + BOOM_HEIGHT),
+        stroke + (highest - float(layout.product.solids[label].high[2])),
+    )
+
+
+def passing(layout: Layout, leaf: Operation) -> float:
+    """How far the robot of a feeder goes until all that it ever carries is clear of any part that
+    comes down next [m]."""
+    robot, factory = leaf.carrier, layout.factory
+    path = layout.guidepaths[robot]
+    rear = min(
+        path.frame(layout.held(robot, number, factory.operations[number].label))[0]
+        for number in factory.robots[robot].operations
+        if factory.operations[number].carrier == robot and not factory.drops(number)
+    )
+    return _shown(layout, robot)[1] - rear + layout.clearance
+
+
+def _shown(layout: Layout, robot: int) -> Extent:
+    """The box of all that a robot's feeder shows, about the middle that its guidepath tells."""
+    by_label = layout.factory.by_label
+    boxes = [layout.held(robot, by_label[p].index, p) for p in layout.magazine(robot)]
+    return layout.guidepaths[robot].frame(hull(boxes))

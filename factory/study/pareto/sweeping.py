@@ -1,0 +1,258 @@
+"""Look for the front of a product: robots, cycle time, floor.
+
+What is swept: forms that are best by estimate under bounds of cycles from long to short, and those
+of the product as it is written; for each a robot for each label, and lines filled for cycles from
+short to long. The forms of the best are estimated with one changed, too. The estimates that no
+other is as good as are laid out, then those next to them, since estimates are off by up to half;
+the fastest with a robot for each label also with relays. What is on the front is then decided by
+certified layouts.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import product
+from time import monotonic
+
+from factory.pipeline import Project
+from factory.problem.pag import Assembly
+from factory.problem.shapes import SHAPED
+from factory.study.allocation.aim import Aim
+from factory.study.allocation.candidate import Candidate
+from factory.study.allocation.estimating import Estimate, Estimator
+from factory.study.allocation.forms import THIRD
+from factory.study.allocation.least import least_robots
+from factory.study.allocation.search import SINGLE, Search
+from factory.study.pareto.front import (
+    FrontPoint,
+    ParetoFront,
+    candidates_front,
+    point_of,
+    undominated,
+)
+
+SECONDS = 300.0
+"""How long is looked for points with layouts, where nothing else is said [s]."""
+
+BRIEF = 60.0
+"""The same without layouts [s]."""
+
+ESTIMATED = 0.4
+"""The share of that after which nothing more is estimated, where layouts are made."""
+
+CHANGED = 0.15
+"""The same for forms of the best with one changed."""
+
+HELD = 0.15
+"""The share of the time for forms that leave no robot without a hand."""
+
+NEXT = 1.5
+"""Estimates up to so many times the cycle of the front's are laid out."""
+
+EACH = 3
+"""So many estimates with one number of robots are laid out."""
+
+RELAYED = 6
+"""So many of the fastest factories with a robot for each label, each with other robots, are tried
+with relays."""
+
+
+@dataclass(frozen=True, slots=True)
+class Effort:
+    """What is spent on a front: whether `layouts` are made, and how many `seconds` it may take,
+    None for SECONDS, or BRIEF without layouts."""
+
+    layouts: bool = True
+    seconds: float | None = None
+
+    @property
+    def limit(self) -> float:
+        """How long it may take [s]."""
+        return self.seconds or (SECONDS if self.layouts else BRIEF)
+
+
+@dataclass(frozen=True, slots=True)
+class Step:
+    """How far a sweep is: what goes on, how many of how many are `done` (`total` None where that is
+    not known), and how many points the front has."""
+
+    what: str
+    done: int
+    total: int | None
+    points: int
+
+
+Seen = Callable[[Step], None]
+
+
+def pareto(
+    project: Project,
+    effort: Effort = Effort(),
+    seen: Seen = lambda _: None,
+) -> ParetoFront:
+    """The front that is found of a project's product, with its settings. Each step is `seen`.
+    Raises InputError, RunError where no factory has a layout."""
+    sweep = FrontSweep(project, effort, seen)
+    sweep.look()
+    return sweep.front()
+
+
+class FrontSweep:
+    """Looks for the front of a project's product; `points`: what was found so far that no other is
+    as good as."""
+
+    def __init__(self, project: Project, effort: Effort, seen: Seen = lambda _: None) -> None:
+        self.project, self.effort, self.seen = project, effort, seen
+        self.begun = monotonic()
+        bare = replace(project.ground, relay=False, cycle=None, lines=())
+        self.estimator = Estimator(project.with_pag(project.pag, bare))
+        self.written: FrontPoint | None = None
+        self.points: list[FrontPoint] = []
+        self.estimates: list[Estimate] = []
+        self.laid_out, self.complete = 0, False
+
+    @cached_property
+    def troubles(self) -> int:
+        """How many operations are in trouble as the product is written."""
+        return self.estimator.candidate(self.estimator.written).troubles
+
+    def late(self, share: float = 1.0) -> bool:
+        """Whether a share of the time is over."""
+        return monotonic() - self.begun > share * self.effort.limit
+
+    def front(self) -> ParetoFront:
+        """What was found so far."""
+        if not self.effort.layouts:
+            self._count()
+        return ParetoFront(
+            self.project.name,
+            tuple(self.points),
+            least_robots(self.project.pag, self.project.templates),
+            self.written,
+            len(self.estimates),
+            self.laid_out,
+            self.complete,
+        )
+
+    def look(self) -> None:
+        """For points, as long as there is time."""
+        layouts = self.effort.layouts
+        if layouts:
+            self.written = self._added(Candidate(self.project, self.estimator.written))
+        whole = self._estimate(ESTIMATED if layouts else 1.0)
+        if layouts:
+            if self.project.settings.hands:
+                self._hold()
+            whole = self._lay_out() and self._relay() and whole
+            if not self.points:
+                self.project.layout  # noqa: B018 (says why there is none)
+        self.complete = whole
+
+    def _estimate(self, share: float) -> bool:
+        """Estimate what is swept until a share of the time is over; whether there was time for all
+        of it. Then what has one form other than those of the best, as there is time."""
+        for one in self.estimator.estimates(late=lambda: self.late(share)):
+            self._note(one)
+        whole = not self.late(share)
+        for one in self._changed():
+            self._note(one)
+        return whole
+
+    def _note(self, one: Estimate) -> None:
+        self.estimates.append(one)
+        self._say("estimating", len(self.estimates), None)
+
+    def _changed(self) -> Iterator[Estimate]:
+        """The estimates of the forms of the best with one form changed."""
+        best = [one.forms for share, one in candidates_front(self.estimates) if share <= 1]
+        tried = {tuple(one.forms.values()) for one in self.estimates}
+        for label, form, forms in product(self.estimator.written, (THIRD, 0, 1), best):
+            changed = {**forms, label: form}
+            key = tuple(changed.values())
+            if key not in tried:
+                if self.late(CHANGED):
+                    return
+                tried.add(key)
+                yield from self.estimator.of_forms(changed)
+
+    def _say(self, what: str, done: int, total: int | None) -> None:
+        self.seen(Step(what, done, total, len(self.points)))
+
+    def _count(self) -> None:
+        """The points of estimates alone, as there are no layouts."""
+        shares = [one for share, one in candidates_front(self.estimates) if share <= 1]
+        made = [self._candidate(one) for one in shares]
+        found = [FrontPoint.of_estimate(*pair) for pair in zip(made, shares, strict=True)]
+        self.points = undominated(found)
+
+    def _hold(self) -> None:
+        """Lay out those with a robot for each label in which each robot has a hand."""
+        aim = Aim(seconds=HELD * self.effort.limit / SINGLE)
+        search = Search(self.project, aim, self.estimator)
+        for number, one in enumerate(search.singles()):
+            self._say("fitting hands", number, None)
+            self._added(one)
+
+    def _lay_out(self) -> bool:
+        """Lay out what is promising; whether there was time for all of it."""
+        chosen = list(self._promising())
+        for number, one in enumerate(chosen):
+            if self.late():
+                return False
+            self._say("laying out", number, len(chosen))
+            self._added(self._candidate(one), one.seconds)
+        return True
+
+    def _promising(self) -> Iterator[Estimate]:
+        """The estimates of the front, then those next to it."""
+        counts, known = Counter[int](), set[tuple[int, float]]()
+        for share, one in candidates_front(self.estimates):
+            key = one.robots, round(one.seconds, 2)
+            if share <= NEXT and key not in known and counts[one.robots] < EACH:
+                known.add(key)
+                counts[one.robots] += 1
+                yield one
+
+    def _relay(self) -> bool:
+        """Lay out the fastest with a robot for each label anew, with relays; whether there was time
+        for all of it."""
+        plain = sorted(
+            (one for one in self.estimates if one.filling is None), key=lambda one: -one.seconds
+        )
+        fast = {one.robots: one for one in plain}.values()  # of those with as many robots the best
+        every = [*map(self._candidate, sorted(fast, key=lambda one: one.seconds)[:RELAYED])]
+        for number, one in enumerate(every):
+            if self.late():
+                return False
+            self._say("with relays", number, len(every))
+            ground = replace(one.project.ground, relay=True)
+            relayed = one.project.with_pag(one.project.pag, ground)
+            self._added(replace(one, project=relayed))
+        return True
+
+    def _candidate(self, one: Estimate) -> Candidate:
+        """The factory of an estimate. Default boxes lie in the order of the text, so those of a
+        product with other forms are computed anew, as they are where that is read."""
+        made = self.estimator.candidate(one.forms, one.filling)
+        project = made.project
+        if project.ground.formed and any(map(_is_default, project.pag.parts())):
+            made = replace(made, project=replace(project))
+        return made
+
+    def _added(self, one: Candidate, estimated: float | None = None) -> FrontPoint | None:
+        """The point of a candidate, which is then on the front unless others are as good; None
+        where it has no layout, or more operations in trouble than as the product is written."""
+        self.laid_out += 1
+        point = None if one.troubles > self.troubles else point_of(one, estimated)
+        if point is None:
+            return None
+        self.points = undominated([*self.points, point])
+        return point
+
+
+def _is_default(part: Assembly) -> bool:
+    """Whether a part says nothing of where it is."""
+    return not any(p.name in SHAPED for p in part.parameters)

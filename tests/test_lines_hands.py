@@ -1,0 +1,252 @@
+"""One hand for all labels of a line: each is held in its own place about the robot."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import numpy as np
+import pytest
+
+from factory.layout.clearance import certify
+from factory.layout.feeding import feeder_of
+from factory.layout.hands.choosing import Hands
+from factory.layout.hands.hand import AIR, Hand
+from factory.layout.hands.limbs import limbs
+from factory.layout.layout import Layout
+from factory.layout.request import Ground
+from factory.pipeline import Project, read
+from factory.simulation.request import RunRequest
+from factory.simulation.run import Run
+from factory.simulation.simulation import Simulation
+from factory.simulation.watched import watched
+from factory.study.fidelity.hidden import HiddenPenetrations
+from factory.support.settings import Settings
+
+AT_MOST_MM = 0.1
+
+PRODUCTS = {
+    "paper": (
+        """root = sub3; sub3 = insert ( sub2, part3 ); sub2 = weld ( sub1 );
+sub1 = insert ( part1, part2 ); part1 = atomic(); part2 = atomic(); part3 = atomic()""",
+        ("part2", "part3"),
+    ),
+    "blocks": (
+        """root = s3; s1 = insert ( base, w1 ); s2 = insert ( s1, w2 ); s3 = insert ( s2, w3 );
+base = atomic ( box = ( 0.2, 0.04, 0.02 ), pos = ( 0, 0, 0.01 ) );
+w1 = atomic ( box = ( 0.02, 0.02, 0.02 ), pos = ( -0.06, 0.03, 0.01 ) );
+w2 = atomic ( box = ( 0.02, 0.03, 0.02 ), pos = ( 0, 0.035, 0.01 ) );
+w3 = atomic ( box = ( 0.02, 0.02, 0.02 ), pos = ( 0.06, 0.03, 0.01 ) )""",
+        ("w1", "w2", "w3"),
+    ),
+    "shelf": (
+        """root = s3; s1 = insert ( post, w1 ); s2 = insert ( s1, w2 ); s3 = insert ( s2, w3 );
+post = atomic ( box = ( 0.06, 0.04, 0.12 ), pos = ( 0, 0, 0.06 ) );
+w1 = atomic ( box = ( 0.02, 0.02, 0.02 ), pos = ( 0, 0.03, 0.02 ) );
+w2 = atomic ( box = ( 0.03, 0.03, 0.02 ), pos = ( 0, 0.035, 0.06 ) );
+w3 = atomic ( box = ( 0.02, 0.02, 0.02 ), pos = ( 0.01, 0.03, 0.1 ) )""",
+        ("w1", "w2", "w3"),
+    ),
+    "tub": (
+        """root = s2; s1 = insert ( tub, a ); s2 = insert ( s1, b );
+tub = mate ( base, walls ); walls = mate ( left, right, front, back );
+base = atomic ( box = ( 0.1, 0.1, 0.01 ), pos = ( 0, 0, 0.005 ) );
+left = atomic ( box = ( 0.01, 0.1, 0.03 ), pos = ( -0.045, 0, 0.025 ) );
+right = atomic ( box = ( 0.01, 0.1, 0.03 ), pos = ( 0.045, 0, 0.025 ) );
+front = atomic ( box = ( 0.08, 0.01, 0.03 ), pos = ( 0, -0.045, 0.025 ) );
+back = atomic ( box = ( 0.08, 0.01, 0.03 ), pos = ( 0, 0.045, 0.025 ) );
+a = atomic ( box = ( 0.04, 0.04, 0.01 ), pos = ( -0.01, 0, 0.015 ) );
+b = atomic ( box = ( 0.03, 0.03, 0.01 ), pos = ( 0.01, 0, 0.025 ) )""",
+        ("a", "b"),
+    ),
+    "two kinds": (
+        """root = s2; s1 = insert ( base, low ); s2 = insert ( s1, ball );
+base = atomic ( box = ( 0.1, 0.04, 0.06 ), pos = ( 0, 0, 0.03 ) );
+low = atomic ( box = ( 0.02, 0.02, 0.02 ), pos = ( 0.03, 0.03, 0.01 ) );
+ball = atomic ( sphere = 0.002, pos = ( -0.03, 0.022, 0.05 ), mass = 500 )""",
+        ("low", "ball"),
+    ),
+}
+"""Products and the labels that share a robot: boxes at one height, several heights beside a post,
+things that are lowered, and one that no hand can hold."""
+
+
+@cache
+def project(name: str, hands: int = 1, shared: bool = True) -> Project:
+    """A product with or without a line."""
+    text, line = PRODUCTS[name]
+    with TemporaryDirectory() as folder:
+        file = Path(folder) / "product.pag"
+        file.write_text(text)
+        found = read(file, (), Settings(hands=hands), Ground(lines=(line,) if shared else ()))
+        assert found.layout
+        return found
+
+
+def of_line(layout: Layout) -> tuple[int, Hand]:
+    """The robot with several tours, and its hand."""
+    (robot,) = (r for r, tours in enumerate(layout.factory.tours) if layout.magazine(r)[1:])
+    hand = layout.hand(robot)
+    assert hand is not None
+    return robot, hand
+
+
+def run_of(layout: Layout, distributed: bool = False, seed: int = 1) -> Run:
+    """A run with a monitor beside it."""
+    asked = RunRequest(units=4, jitter=0.3, seed=seed, distributed=distributed)
+    return watched(Simulation(layout, asked), max_time=90.0)
+
+
+@pytest.mark.parametrize(
+    ("name", "kind", "lift"),
+    [
+        ("paper", "behind", None),
+        ("blocks", "below", None),
+        ("shelf", "behind", 0.08),
+        ("tub", "above", 0.05),
+    ],
+)
+def test_one_hand_holds_all_labels_of_a_line(name: str, kind: str, lift: float | None) -> None:
+    layout = project(name).layout
+    robot, hand = of_line(layout)
+    assert hand.kind == kind
+    assert layout.strokes.get(robot) == (None if lift is None else pytest.approx(lift))
+    assert certify(layout).holds
+    factory, product = layout.factory, layout.product
+    pad = next(limb for limb in limbs(layout, robot) if limb.name == "pad")
+    ends = [np.array(pad.low), np.array(pad.high)]
+    path = layout.guidepaths[robot]
+    for tour in factory.tours[robot]:
+        (part,) = factory.contents[factory.operations[tour[0]].label]
+        level = layout.level(robot, tour[0])
+        (x, y), (u, v) = path.carriage(path.length), path.heading
+        middle, shift = path.middle(path.length), layout.shift(robot, tour[0])
+        solid = product.solids[part]
+        over = 0.1 + level.elevation - product.low[2]
+        off = np.array([middle[0] + shift[0], middle[1] + shift[1], over])
+        off[:2] -= product.middle[:2]
+        low, high = solid.low + off, solid.high + off
+        tip = [
+            np.array([x + a * u - b * v, y + a * v + b * u, c + level.up * pad.lifted])
+            for a, b, c in ends
+        ]
+        apart = np.maximum(low - np.maximum(*tip), np.minimum(*tip) - high)
+        assert apart.max() == pytest.approx(AIR, abs=2e-6), f"{name}: {part}"
+
+
+@pytest.mark.parametrize("distributed", [False, True])
+@pytest.mark.parametrize("name", ["paper", "blocks", "shelf", "tub"])
+def test_it_makes_units_and_touches_nothing_else(name: str, distributed: bool) -> None:
+    layout = project(name).layout
+    asked = RunRequest(units=4, jitter=0.3, seed=1, distributed=distributed)
+    simulation = Simulation(layout, asked)
+    hidden = HiddenPenetrations.of(simulation)
+    run = watched(simulation, [lambda world, _: hidden.look(world.d.qpos, world.time)], 90.0)
+    assert run.succeeded and run.refines_net, run.trouble
+    assert run.physics is not None and run.physics.unintended_contacts == 0
+    assert run.physics.grip_gap_max_mm is not None and run.physics.grip_gap_max_mm < 0.5
+    # the sliders of one magazine stand for one that shows its parts in turns
+    deep = [p for p in hidden.found() if not all(g.startswith("feeder/") for g in p.geoms)]
+    assert all(p.depth_mm < AT_MOST_MM for p in deep), deep
+
+
+def test_without_hands_front_ends_are_in_one_place() -> None:
+    layout = project("shelf", hands=0).layout
+    assert not layout.hands and certify(layout).holds
+    robot = next(r for r, tours in enumerate(layout.factory.tours) if tours[1:])
+    path, fronts = layout.guidepaths[robot], set[float]()
+    for tour, label in zip(layout.factory.tours[robot], layout.magazine(robot), strict=True):
+        fronts.add(round(path.frame(layout.held(robot, tour[0], label))[1], 6))
+    assert len(fronts) == 1
+    run = run_of(layout)
+    assert run.succeeded, run.verdict.failures
+    assert run.physics is not None and run.physics.unintended_contacts == 0
+
+
+def test_the_carrier_stands_where_each_label_comes() -> None:
+    layout = project("blocks").layout
+    robot, _ = of_line(layout)
+    factory, stops = layout.factory, []
+    for tour in factory.tours[robot]:
+        last = factory.operations[tour[-1]]
+        short, further = layout.apart(last.index, last.robots.index(robot))
+        assert short >= 0, "it never comes nearer to its carrier's line than its path ends"
+        stops.append(round(layout.stations[last.index] - further, 6))
+    assert len(set(stops)) == 1, "all are told from one station"
+    assert len({layout.stations[tour[-1]] for tour in factory.tours[robot]}) == 3
+
+
+def test_the_magazine_shows_each_part_where_the_hand_takes_it() -> None:
+    layout = project("blocks").layout
+    robot, _ = of_line(layout)
+    housings = {feeder_of(layout, part).housing for part in layout.magazine(robot)}
+    assert len(housings) == 1
+    xlo, xhi, ylo, yhi = housings.pop()
+    wide, deep = sorted((round(xhi - xlo, 6), round(yhi - ylo, 6)))
+    assert wide < 0.04 and deep < 0.05, "hardly larger than one block, though they lie 120 mm apart"
+
+
+def test_nothing_is_shifted_where_no_robot_has_several_tours() -> None:
+    layout = project("shelf", shared=False).layout
+    assert layout.shifts == () and not layout.factory.adjusted
+    assert project("shelf", hands=0).layout.factory.adjusted == frozenset()
+    (robot,) = project("shelf").layout.factory.adjusted
+    assert project("shelf").factory.robots[robot].type == "lift"
+
+
+def test_it_is_known_before_which_can_share_a_hand() -> None:
+    alone = project("two kinds", shared=False)
+    hands = Hands(alone.layout.factory, alone.product)
+    brings = {alone.layout.factory.deliveries(r)[0]: r for r in (1, 2)}
+    assert not hands.together([brings["low"], brings["ball"]])
+    blocks = project("blocks", shared=False)
+    hands = Hands(blocks.layout.factory, blocks.product)
+    assert hands.together([1, 2, 3])
+
+
+def test_what_no_hand_of_a_line_can_hold_is_said() -> None:
+    found = project("two kinds")
+    assert of_line(found.layout)[1].kind == "none"
+    (told,) = (warning.message for warning in found.warnings if warning.code == "NoGrip")
+    assert told.startswith("no hand can hold 'ball': ")
+    assert told.endswith("so r2 has no hand for 'low' either")
+
+
+def moved(layout: Layout, by: tuple[float, float, float]) -> Layout:
+    """A layout in which a robot holds the second label of its line elsewhere than it was found."""
+    robot, _ = of_line(layout)
+    shifts = [list(tours) for tours in layout.shifts]
+    x, y, z = shifts[robot][1]
+    shifts[robot][1] = x + by[0], y + by[1], z + by[2]
+    return replace(layout, shifts=tuple(map(tuple, shifts)))
+
+
+@pytest.mark.parametrize("by", [(0.002, 0.0, 0.0), (0.0, 0.0, -0.002)])
+def test_a_label_that_is_held_2_mm_off_fails_the_run(by: tuple[float, float, float]) -> None:
+    layout = project("shelf").layout if by[0] else project("tub").layout
+    run = run_of(moved(layout, by))
+    assert not run.succeeded
+    codes = {failure.code for failure in run.verdict.failures}
+    assert "GripGap" in codes, codes
+
+
+def test_a_hand_over_2_mm_off_fails_certificate_and_run(monkeypatch: pytest.MonkeyPatch) -> None:
+    layout = project("shelf").layout
+    robot, _ = of_line(layout)
+    known: Callable[..., tuple[float, float]] = Layout.apart
+
+    def late(self: Layout, operation: int, slot: int) -> tuple[float, float]:
+        short, further = known(self, operation, slot)
+        second = self.factory.tours[robot][1]
+        return short + 0.002 * (operation == second[-1]), further
+
+    monkeypatch.setattr(Layout, "apart", late)
+    changed = replace(layout, shifts=layout.shifts)
+    (fault, *_) = certify(changed).faults
+    assert "2.0 mm from its place" in fault.message
+    run = run_of(changed)
+    assert not run.succeeded
+    assert "HandOffGap" in {failure.code for failure in run.verdict.failures}
