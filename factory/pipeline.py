@@ -137,11 +137,14 @@ class Project:
         factory = judged(self.compiled, self.product)
         if lines:
             factory = fold(factory, lines_of_labels(factory, lines), self.catalogue)
-        if lines and self.settings.hands:
-            from factory.layout.hands.adjusting import with_lifts
+        factory = in_parallel(factory, branches)
+        if not self.settings.hands:
+            return factory
+        from factory.layout.hands.adjusting import with_lifts
+        from factory.layout.repeated import repeated
 
-            factory = with_lifts(factory, self.product, self.catalogue, self.settings.acceleration)
-        return in_parallel(factory, branches)
+        product = repeated(self.product, factory)
+        return with_lifts(factory, product, self.catalogue, self.settings.acceleration)
 
     @cached_property
     def compiled(self) -> Factory:

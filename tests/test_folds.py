@@ -53,6 +53,7 @@ from tests.fold_values import (
     table_of,
     three_robots,
 )
+from tests.layout_values import table_pag
 from tests.net_values import legal_markings, lost_token, net_from, random_legal_marking
 from tests.pag_values import SHAPES, catalogue, paper, random_pag
 
@@ -500,7 +501,6 @@ def test_labels_that_make_no_line(labels: list[tuple[str, ...]], message: str, h
 @pytest.mark.parametrize(
     ("share", "labels", "message"),
     [
-        (0.0, ("part1", "part2"), "they begin or end in different ways"),
         (0.0, ("sub2", "part2"), "they deliver to different robots"),
     ],
 )
@@ -512,6 +512,13 @@ def test_what_is_no_fold(share: float, labels: tuple[str, ...], message: str) ->
     assert found.code == "BadLine"
     assert found.message == f"'{labels[0]}' and '{labels[1]}' cannot share a robot: {message}"
     assert found.position is not None
+
+
+def test_what_is_taken_and_what_is_inserted_share_no_robot() -> None:
+    parts = ((x, "atomic", "", {}) for x in "abc")
+    factory = plain(table_pag("s", ("s", "mate", "a b c", {}), *parts))
+    with pytest.raises(InputError, match="'c' and 'a' cannot share a robot: they begin or end"):
+        fold(factory, lines_of_labels(factory, [("a", "c")]), catalogue())
 
 
 def test_the_output_robot_and_tools_share_no_line() -> None:

@@ -211,7 +211,7 @@ def test_few_robots_do_it_in_the_time_that_is_predicted(run: Terminal) -> None:
     assert done.json["cycle_time_s"] == pytest.approx(done.json["predicted_cycle_time_s"], rel=0.02)
     few = run("check", paper, "--robots", "2", "--json")
     assert few.codes == ["TooFewRobots"]
-    assert "'sub3' by fewer than 2" in few.json["errors"][0]["message"]
+    assert "'sub3' cannot be held by fewer than 2" in few.json["errors"][0]["message"]
     least = run("check", paper, "--robots", "least", "--json").json
     assert least["robots"] == 3
     assert least["gear_train"]

@@ -62,6 +62,13 @@ a = atomic ( box = ( 0.04, 0.04, 0.01 ), pos = ( -0.01, 0, 0.015 ) );
 b = atomic ( box = ( 0.03, 0.03, 0.01 ), pos = ( 0.01, 0, 0.025 ) )""",
         ("a", "b"),
     ),
+    "ladder": (
+        """root = s2; s1 = insert ( post, w1 ); s2 = insert ( s1, w2 );
+post = atomic ( box = ( 0.06, 0.04, 0.22 ), pos = ( 0, 0, 0.11 ) );
+w1 = atomic ( box = ( 0.02, 0.02, 0.02 ), pos = ( 0, 0.03, 0.02 ) );
+w2 = atomic ( box = ( 0.02, 0.02, 0.02 ), pos = ( 0, 0.03, 0.2 ) )""",
+        ("w1", "w2"),
+    ),
     "two kinds": (
         """root = s2; s1 = insert ( base, low ); s2 = insert ( s1, ball );
 base = atomic ( box = ( 0.1, 0.04, 0.06 ), pos = ( 0, 0, 0.03 ) );
@@ -213,6 +220,14 @@ def test_what_no_hand_of_a_line_can_hold_is_said() -> None:
     (told,) = (warning.message for warning in found.warnings if warning.code == "NoGrip")
     assert told.startswith("no hand can hold 'ball': ")
     assert told.endswith("so r2 has no hand for 'low' either")
+
+
+def test_a_tower_is_not_over_pads_that_have_yet_to_rise() -> None:
+    found = project("ladder")
+    assert of_line(found.layout)[1].kind == "none" and not found.layout.factory.adjusted
+    (told,) = (warning.message for warning in found.warnings if warning.code == "NoGrip")
+    assert told.startswith("no one hand can hold all that r2 brings, 'w1' and 'w2': ")
+    assert "behind it can hold each, but not in one place of the hand" in told
 
 
 def moved(layout: Layout, by: tuple[float, float, float]) -> Layout:

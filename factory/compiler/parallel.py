@@ -91,8 +91,7 @@ def _unrolled(factory: Factory, lines: Sequence[int], period: int) -> Factory:
         tuple(operations),
         gear_net(tuple(robots), tuple(operations)),
         (*parents, *[-1] * period),
-        frozenset(first[robot] + one for robot in factory.adjusted for one in range(lines[robot])),
-        period,
+        period=period,
     )
 
 

@@ -341,12 +341,8 @@ class Layout:
 
 def carriers(factory: Factory) -> list[int]:
     """For each robot the carrier it delivers to; -1 for the output robot."""
-    return [
-        -1
-        if factory.drops(robot.operations[-1])
-        else factory.operations[robot.operations[-1]].carrier
-        for robot in factory.robots
-    ]
+    last = [robot.operations[-1] for robot in factory.robots]
+    return [-1 if factory.drops(n) else factory.operations[n].carrier for n in last]
 
 
 __all__ = ["BESIDE", "Box", "Extent", "Feeder", "Guidepath", "Layout", "Point2", "carriers"]

@@ -20,7 +20,7 @@ from factory.layout.durations import Pace, cycle_of, gear_times, slowest
 from factory.layout.guidepath import Box, Point2, hull
 from factory.layout.hands.choosing import Hands
 from factory.layout.layout import Layout, carriers
-from factory.layout.packing import Task
+from factory.layout.packing import Task, bare
 from factory.layout.shapes import Sides, headings, payload_boxes, symmetric_shapes
 from factory.layout.sides import admissible
 from factory.layout.stretching import stretch
@@ -128,8 +128,9 @@ def bounds(found: Sequence[Region], clearance: float) -> Box:
 
 
 def _score(layout: Layout, cycle: float, floor: Point2 | None) -> tuple[float, ...]:
-    """What a layout is judged by, the less the better: how much the floor is too small [m], `cycle`
-    time [s], guidepaths [m], and the floor [m²] on which they lie."""
+    """What a layout is judged by, the less the better: how much the floor is too small [m], how
+    many labels on lines have no hand, `cycle` time [s], guidepaths [m], and the floor [m²] on which
+    they lie."""
     excess = 0.0
     if floor is not None:
         xlo, xhi, ylo, yhi = floor_of(layout)
@@ -137,7 +138,8 @@ def _score(layout: Layout, cycle: float, floor: Point2 | None) -> tuple[float, .
     ends = [p for g in layout.guidepaths for p in (g.carriage(0.0), g.carriage(g.length))]
     x, y = zip(*ends, strict=True)
     area = (max(x) - min(x)) * (max(y) - min(y))
-    found = excess, cycle, layout.guidepath_length, area
+    lacking = sum(bare(layout.factory, robot, hand) for robot, hand in enumerate(layout.hands))
+    found = excess, lacking, cycle, layout.guidepath_length, area
     return tuple(round(value, 6) for value in found)
 
 

@@ -17,6 +17,7 @@ from factory.layout.durations import Pace
 from factory.layout.footprint import Placed, Stop, extent_to, footprint
 from factory.layout.guidepath import Extent
 from factory.layout.hands.choosing import Hands
+from factory.layout.hands.hand import Hand
 from factory.layout.layout import BESIDE
 from factory.layout.outline import Choice, Guest, Outline, outlined
 from factory.layout.shapes import Shape, Sides
@@ -31,6 +32,10 @@ SOON = 8
 
 ALIGN = 0.05
 """So much further [m] a robot may go to stand where the next operation will be."""
+
+BARE = 5.0
+"""How bad it is that a robot has no hand for what is on its line, where it could lie another way
+[s]."""
 
 PATH = 0.025
 """What guidepath costs, as a share of the time to go along it: where times are the same, the
@@ -229,6 +234,7 @@ class Packing:
             ahead = max(max(guest.outline.high) for guest in guests)
             cost += weights[self.robot] * 2 * ahead / pace.speed
         for guest in guests:
+            cost += BARE * bare(self.task.factory, guest.robot, guest.outline.shape.hand)
             cost += tours * weights[guest.robot] * pace.rest(guest.travel)
             cost += PATH * guest.travel / pace.speed
         return cost
@@ -275,6 +281,12 @@ class Packing:
         breadth = task.breadth * (max(outline.high) - behind * min(outline.low))
         ways = weights[carrier] * breadth + PATH * sum(outline.choice.travels.values())
         return weights[self.robot] * time + ways / pace.speed
+
+
+def bare(factory: Factory, robot: int, hand: Hand | None) -> int:
+    """How many labels a robot brings that one hand for several would hold, but that has none."""
+    count = len(factory.tours[robot])
+    return count if hand is not None and hand.kind == "none" and count > 1 else 0
 
 
 def _came(beside: Mapping[int, Skyline], guest: Guest, station: float, least: float) -> Guest:

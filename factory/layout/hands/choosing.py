@@ -172,8 +172,8 @@ class Hands:
 
     def _sides(self, robot: int, u: Way) -> tuple[tuple[Way, Way], ...]:
         """How a carrier that heads along u may lie."""
-        output = self.holding.on[robot] < 0
-        sides = ((0.0, 1.0),) if output else ((u[1], u[0]), (-u[1], -u[0]))
+        delivers = self.holding.on[robot] >= 0
+        sides = ((u[1], u[0]), (-u[1], -u[0])) if delivers else ((0.0, 1.0),)
         return tuple((u, (x + 0.0, y + 0.0)) for x, y in sides)
 
     def all_frames(self, robot: int) -> list[tuple[tuple[Way, Way], ...]]:

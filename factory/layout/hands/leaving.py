@@ -85,15 +85,17 @@ def _delivering(layout: Layout, carrier: int) -> Iterator[tuple[Operation, int, 
 def awaited_positions(layout: Layout) -> dict[int, float]:
     """Where robots go as soon as they have let go, since what they have delivered waits for that:
     clear of it; and home those whose hands have to be there before what they take, unless others
-    could be where a tall hand comes to."""
+    could be where a tall hand comes to. Where several units are made in a period, one may have
+    nothing more to bring while its carrier comes home for the next: it goes clear of that."""
     found: dict[int, float] = {}
     factory, backs = layout.factory, [0.0] * len(layout.factory.robots)
     for carrier in factory.robots if layout.hands else ():
         for _, guest, back in meetings(layout, carrier.index):
             backs[guest] = max(backs[guest], back)
-        if len(factory.tours[carrier.index]) > 1:
-            for guest, back in _in_the_way_home(layout, carrier.index):
-                backs[guest] = max(backs[guest], back)
+        hand = layout.hand(carrier.index)
+        if factory.period > 1 and hand is not None and hand.tall:
+            for operation, guest, _ in _delivering(layout, carrier.index):
+                backs[guest] = max(backs[guest], _behind(layout, guest, operation))
     for robot, hand in enumerate(layout.hands):
         if hand is None or hand.kind == "none":
             continue
@@ -150,17 +152,8 @@ def _gone_behind(layout: Layout, robot: int, operation: Operation) -> Leaving:
 
 
 def _behind(layout: Layout, robot: int, operation: Operation) -> float:
-    """How far all of a robot's hand goes back behind what it has delivered to [m]."""
+    """How far a robot's hand goes back until all of it is behind what it has delivered to [m]."""
     path, grip = layout.guidepaths[robot], layout.grip(robot)
     assert grip is not None
     box = layout.held(robot, operation.index, operation.label)
     return max(0.0, grip[1] - path.frame(box)[0])
-
-
-def _in_the_way_home(layout: Layout, carrier: int) -> Iterator[tuple[int, float]]:
-    """The robots that have delivered to a carrier with a tall hand, and how far they go back before
-    it comes home [m]: on its last tour of all they have nothing more to take."""
-    hand = layout.hand(carrier)
-    if hand is not None and hand.tall:
-        for operation, guest, _ in _delivering(layout, carrier):
-            yield guest, _behind(layout, guest, operation)

@@ -25,6 +25,10 @@ from factory.layout.hands.tips import TipName
 LEVEL = 5e-5
 """Places are at one height that differ by no more [m]."""
 
+RISING = 0.075
+"""A tower behind is no higher than this over the top of what its robot takes [m]: so far a feeder's
+pad has risen when the tower, which is 20 mm behind, comes to where it was."""
+
 NEAR = 1e-3
 """Places whose distances differ by no more are as near as each other [m]."""
 
@@ -117,10 +121,16 @@ class LineHands:
             if not all(len(option.found) for option in options):
                 continue
             cost, chosen = _level(options, *frames[0], lifted)
-            if cost < np.inf:
+            if cost < np.inf and (kind != "behind" or self._below_pads(tours, chosen[1])):
                 yield cost, self._hands(kind, tours, frames, chosen)
             if not cost:
                 return
+
+    def _below_pads(self, tours: Sequence[int], chosen: Sequence[Candidates]) -> bool:
+        """Whether the pads of a feeder have risen over a tower when it comes to them."""
+        high = max(float(one.found.at[0, 2] + one.found.radius[0]) for one in chosen)
+        boxes = (self.in_the_way.holding.box(self._label(tour)) for tour in tours)
+        return high - min(float(box[1, 2]) for box in boxes) <= RISING
 
     def _possible(self, kind: Kind, tour: int, frames: Frames) -> bool:
         return self.in_the_way.possible(tour, self._label(tour), kind, frames)

@@ -44,7 +44,7 @@ class Filling:
 
 
 @dataclass(frozen=True, slots=True)
-class Timing:
+class SizeTiming:
     """How long operations of a factory take, from the `sizes` of its sub-assemblies [m] and the
     `pace` of its robots."""
 
@@ -53,7 +53,7 @@ class Timing:
     pace: Pace
 
     @classmethod
-    def of(cls, factory: Factory, boxes: Mapping[str, Box], pace: Pace) -> Timing:
+    def of(cls, factory: Factory, boxes: Mapping[str, Box], pace: Pace) -> SizeTiming:
         """That of a factory whose sub-assemblies have some boxes."""
         return cls(factory, {n: max(b[1] - b[0], b[3] - b[2]) for n, b in boxes.items()}, pace)
 
@@ -73,7 +73,7 @@ class Timing:
 
 
 @dataclass(frozen=True, slots=True)
-class Bundle:
+class TourBundle:
     """`tours` on one line, by their robots; how long they last without the way out and back, `busy`
     [s]; their `kind`, and the `sides` from which all of them can come; the bundles `below` that are
     inserted, in the order of their stations, and those `first` that bring what each tour begins
@@ -84,8 +84,8 @@ class Bundle:
     busy: float
     kind: tuple[object, ...]
     sides: frozenset[int]
-    below: tuple[Bundle, ...]
-    first: tuple[Bundle, ...]
+    below: tuple[TourBundle, ...]
+    first: tuple[TourBundle, ...]
     past: float
     pace: Pace
     out: float = 0.0
@@ -102,7 +102,7 @@ class Bundle:
         trips = 2 * len(self.tours) * (self.pace.rest(out) + self.pace.lost)
         object.__setattr__(self, "load", self.busy + trips)
 
-    def merged(self, other: Bundle, filling: Filling) -> Bundle | None:
+    def merged(self, other: TourBundle, filling: Filling) -> TourBundle | None:
         """Both as one bundle, none of whose lines has too much load; None where that cannot be."""
         sides = self.sides & other.sides
         if self.kind != other.kind or not sides or self.load + other.load > filling.limit:
@@ -113,10 +113,10 @@ class Bundle:
         below = _laid_over(self.below, other.below, filling)
         tours, busy = self.tours + other.tours, self.busy + other.busy
         past = max(self.past, other.past)
-        found = Bundle(tours, busy, self.kind, sides, below, first, past, self.pace)
+        found = TourBundle(tours, busy, self.kind, sides, below, first, past, self.pace)
         return found if found.load <= filling.limit else None
 
-    def _first(self, other: Bundle, filling: Filling) -> tuple[Bundle, ...] | None:
+    def _first(self, other: TourBundle, filling: Filling) -> tuple[TourBundle, ...] | None:
         """The two that bring what tours begin with, each of one with one of the other."""
         for pair in (other.first, other.first[::-1]):
             both = [mine.merged(its, filling) for mine, its in zip(self.first, pair, strict=True)]
@@ -135,8 +135,8 @@ class Bundle:
 
 
 def _laid_over(
-    ones: tuple[Bundle, ...], others: tuple[Bundle, ...], filling: Filling
-) -> tuple[Bundle, ...]:
+    ones: tuple[TourBundle, ...], others: tuple[TourBundle, ...], filling: Filling
+) -> tuple[TourBundle, ...]:
     """Bundles in the order of their stations, with others: each of these becomes one with the first
     that it can, or if its robot goes `onward` with the next, else it is one more there."""
     below, at = list(ones), 0
@@ -157,13 +157,13 @@ def _laid_over(
 class _Local:
     """A line that delivers in one tour: its bundle, and when it last did [s]."""
 
-    bundle: Bundle
+    bundle: TourBundle
     at: float
 
 
-def bundled(timing: Timing, filling: Filling) -> Bundle:
+def bundled(timing: SizeTiming, filling: Filling) -> TourBundle:
     """The bundle of the output robot of a factory with a robot for each label."""
-    factory, made = timing.factory, dict[int, Bundle]()
+    factory, made = timing.factory, dict[int, TourBundle]()
     for robot in reversed(range(len(factory.robots))):
         if robot == 0 or kind_of(factory, robot)[0] != "tool":
             made[robot] = _Tour(timing, filling, made).bundle(robot)
@@ -174,11 +174,11 @@ def bundled(timing: Timing, filling: Filling) -> Bundle:
 class _Tour:
     """Makes bundles of single tours; `made`: those of the tours that deliver to them."""
 
-    timing: Timing
+    timing: SizeTiming
     filling: Filling
-    made: dict[int, Bundle]
+    made: dict[int, TourBundle]
 
-    def bundle(self, robot: int) -> Bundle:
+    def bundle(self, robot: int) -> TourBundle:
         """That of one tour. Those that deliver to it are dealt to the line that it waits for the
         least, to one more where it would wait too long; where it only goes onward, of the last two
         lines: two can come to one station."""
@@ -202,7 +202,7 @@ class _Tour:
             if not inserted:
                 now += timing.takes(number, TOOL_WAY)
         first = tuple(self.made[kid] for kid in self._begins(robot))
-        return Bundle(
+        return TourBundle(
             (robot,),
             now,
             kind_of(factory, robot) if robot else ("output",),
@@ -214,11 +214,11 @@ class _Tour:
         )
 
     def _least(
-        self, lines: Sequence[_Local], kid: Bundle, now: float
-    ) -> tuple[float, Bundle | None, _Local | None]:
+        self, lines: Sequence[_Local], kid: TourBundle, now: float
+    ) -> tuple[float, TourBundle | None, _Local | None]:
         """How long a tour has to wait for a kid at the least [s], on which line, and what that is
         then; None where it can be on none of them."""
-        best: tuple[float, Bundle | None, _Local | None] = inf, None, None
+        best: tuple[float, TourBundle | None, _Local | None] = inf, None, None
         for line in lines:
             wait = max(0.0, line.at + kid.load - kid.pace.rest(kid.out) - now)
             if wait < best[0] and (merged := line.bundle.merged(kid, self.filling)) is not None:

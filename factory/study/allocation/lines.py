@@ -17,7 +17,7 @@ from factory.nets.cycle_ratio import max_cycle_ratio
 from factory.nets.marked import marked
 from factory.plant.factory import Factory
 from factory.problem.robot_types import Catalogue
-from factory.study.allocation.bundles import BETWEEN, LANE, Filling, Timing, bundled
+from factory.study.allocation.bundles import BETWEEN, LANE, Filling, SizeTiming, bundled
 
 SLACKS = (inf, 1.5, 0.6, 0.25, 0.0)
 """By which shares of their own work tours may be longer."""
@@ -40,7 +40,7 @@ class Shift:
         cls, factory: Factory, catalogue: Catalogue, boxes: Mapping[str, Box], pace: Pace
     ) -> Shift:
         """That of a factory whose sub-assemblies have some boxes."""
-        delays = estimated_delays(Timing.of(factory, boxes, pace))
+        delays = estimated_delays(SizeTiming.of(factory, boxes, pace))
         work = tuple(sum(delays[n] for n in robot.operations) for robot in factory.robots)
         return cls(factory, catalogue, boxes, pace, work)
 
@@ -49,7 +49,7 @@ class Shift:
         if not lines:
             return max(self.work)
         made = folded(self.factory, lines, self.catalogue)
-        delays = estimated_delays(Timing.of(made, self.boxes, self.pace))
+        delays = estimated_delays(SizeTiming.of(made, self.boxes, self.pace))
         net = marked(made.net)
         idle = [0.0] * (len(net.tokens) - len(delays))
         return max_cycle_ratio(net, [*delays, *idle]).seconds
@@ -70,7 +70,7 @@ class Shift:
 
     def lines(self, filling: Filling) -> tuple[Line, ...]:
         """The lines that are filled so."""
-        timing = Timing.of(self.factory, self.boxes, self.pace)
+        timing = SizeTiming.of(self.factory, self.boxes, self.pace)
         return tuple(bundled(timing, filling).lines())
 
 
@@ -83,7 +83,7 @@ class Ways:
     at: tuple[float, ...]
 
     @classmethod
-    def of(cls, timing: Timing) -> Ways:
+    def of(cls, timing: SizeTiming) -> Ways:
         """Those of a factory. A robot goes past what is joined, and its path has room for all that
         delivers to it, side by side from either side, with what delivers to those."""
         factory, count = timing.factory, len(timing.factory.robots)
@@ -106,7 +106,7 @@ def _guests(factory: Factory, robot: int) -> list[int]:
     return list(dict.fromkeys(found))
 
 
-def estimated_delays(timing: Timing) -> list[float]:
+def estimated_delays(timing: SizeTiming) -> list[float]:
     """How long each operation of a factory takes [s]: as long as the robot that goes farthest, the
     carrier from where it was."""
     factory, ways = timing.factory, Ways.of(timing)
