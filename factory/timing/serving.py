@@ -41,7 +41,7 @@ def _fed(layout: Layout, leaf: Operation, delays: Sequence[float], settings: Set
     gear = layout.factory.robots[leaf.carrier].operations
     busy = sum(delays[number] for number in gear) - delays[leaf.index]
     down, rest = _down(layout, leaf, settings), (CALM + 1) * settings.tick
-    return max(busy + _late(layout, leaf, gear[-1], settings) + rest, 2 * (down + rest))
+    return max(busy + _served(layout, leaf, gear[-1], settings) + rest, 2 * (down + rest))
 
 
 def turn_ways(layout: Layout, settings: Settings) -> dict[Way, float]:
@@ -53,7 +53,7 @@ def turn_ways(layout: Layout, settings: Settings) -> dict[Way, float]:
         for step, tour in enumerate(tours if len(tours) > 1 else ()):
             leaf, before = factory.operations[tour[0]], tours[step - 1][-1]
             if not leaf.inputs:
-                late = _late(layout, leaf, before, settings)
+                late = _served(layout, leaf, before, settings)
                 found[robot, leaf.index] = late + (CALM + 1) * settings.tick
     return found
 
@@ -61,6 +61,18 @@ def turn_ways(layout: Layout, settings: Settings) -> dict[Way, float]:
 def _down(layout: Layout, leaf: Operation, settings: Settings) -> float:
     """How long a slider takes for its stroke [s]."""
     return SpeedProfile(*settings.feeder_limits).rest(feeder_of(layout, leaf.label).stroke)
+
+
+def _served(layout: Layout, leaf: Operation, before: int, settings: Settings) -> float:
+    """How long after the operation before a part is there [s], or how long after its robot could be
+    home where that takes longer. A robot whose hand is there first goes home, and then the part
+    comes down."""
+    hand = layout.hand(leaf.carrier)
+    if hand is None or not hand.first:
+        return _late(layout, leaf, before, settings)
+    way = layout.guidepaths[leaf.carrier].length - layout.legs[before, leaf.carrier][1]
+    home = SpeedProfile(settings.speed, settings.acceleration).rest(max(way, 0.0))
+    return home + _down(layout, leaf, settings)
 
 
 def _late(layout: Layout, leaf: Operation, before: int, settings: Settings) -> float:
