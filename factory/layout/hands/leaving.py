@@ -85,15 +85,15 @@ def _delivering(layout: Layout, carrier: int) -> Iterator[tuple[Operation, int, 
 def awaited_positions(layout: Layout) -> dict[int, float]:
     """Where robots go as soon as they have let go, since what they have delivered waits for that:
     clear of it; and home those whose hands have to be there before what they take, unless others
-    could be where a tall hand comes to. Where several units are made in a period, one may have
-    nothing more to bring while its carrier comes home for the next: it goes clear of that."""
+    could be where a tall hand comes to. Where robots have several tours, one may have nothing more to
+    bring while its carrier comes home for another: it goes clear of that."""
     found: dict[int, float] = {}
     factory, backs = layout.factory, [0.0] * len(layout.factory.robots)
     for carrier in factory.robots if layout.hands else ():
         for _, guest, back in meetings(layout, carrier.index):
             backs[guest] = max(backs[guest], back)
         hand = layout.hand(carrier.index)
-        if factory.period > 1 and hand is not None and hand.tall:
+        if factory.folded and hand is not None and hand.tall:
             for operation, guest, _ in _delivering(layout, carrier.index):
                 backs[guest] = max(backs[guest], _behind(layout, guest, operation))
     for robot, hand in enumerate(layout.hands):
