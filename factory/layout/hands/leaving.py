@@ -85,8 +85,8 @@ def _delivering(layout: Layout, carrier: int) -> Iterator[tuple[Operation, int, 
 def awaited_positions(layout: Layout) -> dict[int, float]:
     """Where robots go as soon as they have let go, since what they have delivered waits for that:
     clear of it; and home those whose hands have to be there before what they take, unless others
-    could be where a tall hand comes to. Where robots have several tours, one may have nothing more to
-    bring while its carrier comes home for another: it goes clear of that."""
+    could be where a tall hand comes to. Where robots have several tours, one may have nothing more
+    to bring while its carrier comes home for another: it goes clear of that."""
     found: dict[int, float] = {}
     factory, backs = layout.factory, [0.0] * len(layout.factory.robots)
     for carrier in factory.robots if layout.hands else ():
