@@ -48,11 +48,11 @@ class Wanted:
 ROWS = (
     Wanted(EXAMPLES / "paper.pag", 3, 4.1, hands=1),
     Wanted(BRICKS / "889-1-RadarTruck.pag", 18, 7.3),
-    Wanted(BRICKS / "889-1-RadarTruck.pag", 18, 7.3, hands=1),
+    Wanted(BRICKS / "889-1-RadarTruck.pag", 18, 7.3, hands=1, seconds=50, seeds=3),
     Wanted(BRICKS / "30023-1-Lighthouse.pag", 7, 15.4),
-    Wanted(BRICKS / "30023-1-Lighthouse.pag", 7, 15.4, hands=1),
-    Wanted(BRICKS / "5935-1-IslandHopper.pag", 12, 150.0, seconds=90, seeds=1),
-    Wanted(BRICKS / "4494-1-Imperial_Shuttle-Mini.pag", 50, 7.1, seconds=150, seeds=2),
+    Wanted(BRICKS / "30023-1-Lighthouse.pag", 7, 15.4, hands=1, seconds=40, seeds=3),
+    Wanted(BRICKS / "5935-1-IslandHopper.pag", 12, 150.0, seeds=1),
+    Wanted(BRICKS / "4494-1-Imperial_Shuttle-Mini.pag", 50, 7.1, seeds=2),
     Wanted(BRICKS.parent / "rocket.pag", 250, 120.0, seconds=150, seeds=1, units=1),
 )
 
