@@ -205,7 +205,7 @@ def test_a_train_with_a_lost_token_is_undecided() -> None:
     assert not verdict.holds
 
 
-def test_a_missing_wait() -> None:
+def without_waits() -> MarkedNet:
     """Two robots go from one shared operation into another, which a third one is in, too."""
     rows = [("a", "b", 0), ("b", "c", 0), ("c", "a", 1), ("c", "a", 1), ("c", "b", 1)]
     net = net_from(rows)
@@ -214,7 +214,11 @@ def test_a_missing_wait() -> None:
         Gear("r2", "", (3, 0, 1), (2, 0, 1)),
         Gear("r3", "", (4, 1), (2, 1)),
     )
-    verdict = verify(MarkedNet(net.net, net.tokens).with_gears(gears))
+    return MarkedNet(net.net, net.tokens).with_gears(gears)
+
+
+def test_a_missing_wait() -> None:
+    verdict = verify(without_waits())
     assert (verdict.gear_net, verdict.gear_train, verdict.live) == (False, False, None)
     found = [w for w in verdict.witness if w.kind == "missing wait"]
     assert [w.robots for w in found] == [("r1",), ("r2",)]
@@ -322,14 +326,7 @@ def test_planted_faults_are_refused(change: Callable[[Json], None], fault: str) 
 
 def test_a_missing_wait_is_refused() -> None:
     """As a gear train: the claim of a net in which robots have no wait between operations."""
-    rows = [("a", "b", 0), ("b", "c", 0), ("c", "a", 1), ("c", "a", 1), ("c", "b", 1)]
-    net = net_from(rows)
-    gears = (
-        Gear("r1", "", (2, 0, 1), (2, 0, 1)),
-        Gear("r2", "", (3, 0, 1), (2, 0, 1)),
-        Gear("r3", "", (4, 1), (2, 1)),
-    )
-    document = certified(MarkedNet(net.net, net.tokens).with_gears(gears))
+    document = certified(without_waits())
     assert check_certificate(document) == []
     document["gear_train"] = {"holds": True, "order": ["a", "b", "c"]}
     faults = check_certificate(seal(document))

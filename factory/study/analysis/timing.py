@@ -109,7 +109,7 @@ class Timing:
         ways = (
             (stage, self._way(stage, positions[stage.axis], AS_IT_IS))
             for stage in self.stages
-            if self.factory.robots[stage.robot].operations[0] == stage.operation  # of its program
+            if self.factory.robots[stage.robot].operations[0] == stage.operation
         )
         return MappingProxyType(one_after_the_other(ways))
 
