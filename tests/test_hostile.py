@@ -278,7 +278,7 @@ def test_references_lead_to_their_node_in_a_step(monkeypatch: pytest.MonkeyPatch
 def test_yaml_is_not_nested_without_end(run: Terminal, here: Path) -> None:
     (here / "t.yaml").write_text("[" * 20_000)
     (error,) = run("import", "t.yaml", "-o", "out", "--json").json["errors"]
-    assert error["message"] == "more than 10000 values are nested here"
+    assert error["message"] == "more than 1000 values are nested here"
 
 
 @pytest.mark.parametrize(

@@ -40,8 +40,10 @@ WORD: /(?:true|false|null)\b/
 JSON_HINT = "JSON has objects { }, lists [ ], texts in double quotes, numbers, true, false and null"
 YAML_HINT = "one YAML document of mappings, sequences and scalars"
 
-DEEPEST = 10_000
-"""The most values of YAML within one another: libyaml takes quadratic time in their number."""
+DEEPEST = 1_000
+"""The most values of YAML within one another: libyaml takes quadratic time in their number, and
+from version 0.2.6 on refuses more itself."""
+TOO_DEEP = f"more than {DEEPEST} values are nested here"
 
 YAML_WORDS = {"true": True, "false": False, "null": None, "~": None, "": None}
 """Plain scalars of YAML that are neither a number, as the PAG language writes it, nor a text."""
@@ -128,6 +130,8 @@ def read_yaml(source: Source) -> DocumentNode:
     except yaml.MarkedYAMLError as error:
         mark = error.problem_mark or error.context_mark
         message = " ".join(filter(None, (error.context, error.problem)))
+        if "nesting depth" in message:
+            message = TOO_DEEP
         line, column = (mark.line + 1, mark.column + 1) if mark else (1, 1)
         raise _syntax_error(source, line, column, message, YAML_HINT) from None
     except yaml.YAMLError as error:
@@ -152,7 +156,7 @@ class _YamlNodes:
         if kind in ("MappingStartEvent", "SequenceStartEvent"):
             self._check_tag(event)
             if len(self.open) == DEEPEST:
-                raise self._error(event, f"more than {DEEPEST} values are nested here")
+                raise self._error(event, TOO_DEEP)
             self.open.append((event, []))
         elif kind == "SequenceEndEvent":
             start, values = self.open.pop()
