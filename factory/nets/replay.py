@@ -114,6 +114,8 @@ def replay(net: GearNet, events: Iterable[str], initial: Marking | None = None) 
         return ReplayVerdict(False, -1, game.fault, game.marking, 0)
     count = 0
     for name in events:
+        if not isinstance(name, str):
+            break
         fault = game.fire(name)
         if fault:
             return ReplayVerdict(False, count, fault, game.marking, count)

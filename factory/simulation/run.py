@@ -42,7 +42,7 @@ def busy_times(factory: Factory, events: Iterable[Event]) -> tuple[float, ...]:
     events was under way from the beginning, time 0."""
     numbers = {t.name: number for number, t in enumerate(factory.net.threaded.transitions)}
     begun, spent = dict[int, float](), [0.0] * len(factory.robots)
-    for t, transition in events:
+    for t, transition in (e for e in events if isinstance(e, Event)):
         operation, is_end = divmod(numbers[transition], 2)
         if not is_end:
             begun[operation] = t

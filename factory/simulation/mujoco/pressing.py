@@ -1,4 +1,5 @@
-"""Contact that is meant: that of a pad with what it is to hold."""
+"""Contact that is no fault of the factory: that of a pad with what it is to hold, and of what has
+fallen."""
 
 from __future__ import annotations
 
@@ -12,16 +13,22 @@ PRESSED = 1e-4
 
 
 class Pressing:
-    """What the pads of robots and feeders are to hold."""
+    """What the pads of robots and feeders are to hold. `fallen`: bodies that lie about, or that a
+    feeder shows askew; `touched`: the pairs of geoms of which one was of such a body."""
 
     def __init__(self, m: mujoco.MjModel, factory: Factory) -> None:
         self._m, self._contents = m, factory.contents
+        self.fallen: set[int] = set()
+        self.touched: set[tuple[int, int]] = set()
         ever = {r.name: held(factory, r.index, at_last=True) for r in factory.robots}
         self._holds = ever | {names.feeder(leaf.label): leaf.label for leaf in factory.leaves}
 
     def meant(self, one: int, other: int, apart: float) -> bool:
         """Whether of two geoms, so far `apart` [m], one is a pad and the other what that is to
-        hold, and neither is deep in the other."""
+        hold, and neither is deep in the other; or one has fallen."""
+        if self.fallen and not self.fallen.isdisjoint(self._m.geom_bodyid[[one, other]].tolist()):
+            self.touched.add((one, other))
+            return True
         if apart < -PRESSED:
             return False
         return self._bears(one, other) or self._bears(other, one)
