@@ -12,6 +12,7 @@ from factory.plant.factory import Factory
 from factory.record.ending import CutOff
 from factory.record.monitor.report import Report
 from factory.record.verdict import RunVerdict, judged, kept_figures
+from factory.simulation.failures import Failures
 from factory.support.errors import Diagnostic
 
 
@@ -106,7 +107,8 @@ class Run:
     """The record of a run: figures and events. `replays`: an independent replay of the events is a
     run of the net; `trouble` is None for a run that reached its end; `monitor` is what a monitor
     reports that watched it, if one did. `lenient`: what is wrong with the bodies does not count;
-    `period`: how many units come in a cycle of the net."""
+    `period`: how many units come in a cycle of the net; `failures`: what went wrong, in a run that
+    goes on when something does."""
 
     world: str
     units: int
@@ -129,6 +131,7 @@ class Run:
     monitor: Report | None = None
     lenient: bool = False
     period: int = 1
+    failures: Failures | None = None
 
     @property
     def refines_net(self) -> bool:
@@ -218,6 +221,7 @@ class Run:
             "fused": physics.fused if physics else None,
             "excluded": [list(pair) for pair in physics.excluded] if physics else None,
             **watched,
+            **({"failures": self.failures.as_json()} if self.failures else {}),
             "verdict": self.verdict.as_json(),
             "events": [{"t": round(e.t, 6), "transition": e.transition} for e in self.events],
         }

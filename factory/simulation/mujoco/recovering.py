@@ -125,6 +125,11 @@ class MujocoPlant:
         hands = self._world.parts.hands.of
         return [robot for robot in found if robot in hands and hands[robot].unit < SCRAP]
 
+    def knocked(self, robot: int) -> bool:
+        """Whether something that fell has touched what a robot holds."""
+        hand, shaken = self._world.parts.hands.of.get(robot), self._world.inspection.pressing.shaken
+        return hand is not None and not shaken.isdisjoint(hand.bodies.values())
+
     def feels(self, robots: Sequence[int]) -> bool:
         """Whether robots feel all that they carry, now."""
         return {*self._grips.lost(self._frames, 0.0)}.isdisjoint(robots)
@@ -316,6 +321,7 @@ class MujocoPlant:
             fallen.discard(body)
             self.bad.pop(body, None)
         if not fallen and _anything in world.hooks.before_step:
+            world.inspection.pressing.shaken.clear()
             world.hooks.before_step.remove(_anything)
 
     def _near(self) -> frozenset[int]:

@@ -21,12 +21,8 @@ KINDS: Mapping[str, str] = MappingProxyType(
 )
 """Every kind of fault, in words."""
 
-OF_ROBOT, OF_LABEL, LASTS = {"down", "dead"}, {"misplaced", "bad_part", "no_part", "bad_joint"}, {
-    "no_part",
-    "blackout",
-    "down",
-}
-"""Kinds that name a robot, that may name a label, and that last for some seconds."""
+OF_ROBOT, OF_LABEL = {"down", "dead"}, {"misplaced", "bad_part", "no_part", "bad_joint"}
+"""Kinds that name a robot, and that may name a label: of a part, or of what is joined."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,6 +74,10 @@ class Sensors:
     noise: float = 5e-5
     delay: float = 0.03
 
+CLEAR, SWAP = 10.0, 30.0
+"""How long what has fallen lies, and how long it takes to replace a robot, unless asked otherwise
+[s]."""
+
 
 @dataclass(frozen=True, slots=True)
 class Campaign:
@@ -86,7 +86,7 @@ class Campaign:
 
     faults: tuple[Fault, ...] = ()
     seed: int = 0
-    clear: float = 10.0
+    clear: float = CLEAR
     sensors: Sensors = field(default_factory=Sensors)
     spares: int = 0
-    swap: float = 30.0
+    swap: float = SWAP

@@ -65,6 +65,10 @@ class IdealPlant:
         self._gone = {robot for robot in self._gone if holds[robot] != NOPART}
         return sorted(self._gone)
 
+    def knocked(self, robot: int) -> bool:
+        """Whether something that fell has touched what a robot holds."""
+        return False
+
     def feels(self, robots: Sequence[int]) -> bool:
         """Whether robots feel all that they carry, now."""
         return self._gone.isdisjoint(robots)

@@ -37,6 +37,9 @@ class Plant(Protocol):
     def lost(self) -> Sequence[int]:
         """The robots that no longer feel what they carry."""
 
+    def knocked(self, robot: int) -> bool:
+        """Whether something that fell has touched what a robot holds."""
+
     def feels(self, robots: Sequence[int]) -> bool:
         """Whether robots feel all that they carry, now."""
 

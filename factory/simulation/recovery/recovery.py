@@ -20,7 +20,7 @@ from factory.problem.template import Failure, Response
 from factory.simulation.recovery.faults import Campaign
 from factory.simulation.recovery.held import held, marking_of, step_of
 from factory.simulation.recovery.plant import Plant
-from factory.simulation.recovery.record import Failing, Failures
+from factory.simulation.failures import Failing, Failures
 from factory.simulation.recovery.returning import Goal, Returning, Way, order_of
 from factory.simulation.recovery.standing import Standing
 from factory.simulation.recovery.striking import Striking
