@@ -146,8 +146,14 @@ class Supervisor:
         starts = [operation.start for operation in factory.operations]
         self.threads = Threads(factory.net.threaded, factory.net.threads_of(marking), starts)
         self.enabled = True
-        kept = [n for n in active.ahead if not any(a in free for a in self.bundles.axes_of[n])]
-        self._activate([n for n in active.operations if self.marked[n]], kept)
+        self._activate([n for n in active.operations if self.marked[n]], active.ahead)
+        self.recall(free)
+
+    def recall(self, axes: Container[int]) -> None:
+        """The stages of axes are over, wherever those are."""
+        ahead, own = self.active.ahead, self.bundles.axes_of
+        kept = [n for n in ahead if not any(axis in axes for axis in own[n])]
+        self._activate(self.active.operations, kept)
 
     def send(self, stages: Iterable[int]) -> None:
         """Let the axes of stages, by number, go to where those lead."""

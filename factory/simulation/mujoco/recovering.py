@@ -43,6 +43,7 @@ class MujocoPlant:
         self._draw = np.random.default_rng((campaign.seed, 1))
         self.heaps: list[Heap] = []
         self.bad: dict[int, bool] = {}
+        self._slipped: set[int] = set()
         self._scrapped = SCRAP
         self._grips = _Grips(world)
         self._closed = frozenset[int]()
@@ -64,6 +65,8 @@ class MujocoPlant:
         hands, robot = self._world.parts.hands, operation.robots[operation.last]
         welds = [hands.grip[robot, label] for label in hands.of[robot].bodies]
         self._world.m.eq_data[welds, 5] += metres
+        self._slipped.update(hands.of[robot].bodies.values())
+        self._watch(hands.of[robot].bodies.values())
 
     def fresh(self) -> Sequence[tuple[str, int]]:
         """The parts that feeders have begun to show since the last question: label and unit."""
@@ -146,6 +149,9 @@ class MujocoPlant:
             if test:
                 found.append((station.label, unit, test))
                 feeders.take_back(station.label, self._next_scrap())
+                carrier = self._world.model.factory.by_label[station.label].carrier
+                if carrier not in self._world.parts.hands.of:
+                    feeders.stay_clear(carrier)
             else:
                 feeders.back.good.add(station.label)
         return found
@@ -293,7 +299,10 @@ class MujocoPlant:
             hand = world.parts.hands.let_go(robot)
             world.parts.feeders.retire(hand.bodies, hand.unit)
         world.parts.welds.write()
+        world.motion.load([robot], [0.0])
         world.motion.put(at)
+        self.came_back(robot)
+        world.parts.feeders.stay_clear(robot)
 
     # --- bodies ---
 
@@ -342,6 +351,8 @@ class MujocoPlant:
         """Nothing that is held has slipped any more."""
         welds = [*self._world.parts.hands.grip.values()]
         self._world.m.eq_data[welds] = self._nominal[welds]
+        self._world.inspection.pressing.fallen -= self._slipped
+        self._slipped.clear()
 
     def _next_scrap(self, count: int = 1) -> int:
         self._scrapped += count

@@ -153,8 +153,7 @@ class Recovery:
     def _sense(self, now: float) -> None:
         """What sensors tell, and what is done about it."""
         for label, _, test in self.plant.refused():
-            self._note(test, label, "", "scrap", (label,))
-            self._count(label)
+            self._refused(self._factory.by_label[label], test)
         for robot in self.plant.lost():
             self._lost(robot)
         for number, test in [*self.pending.items()]:
@@ -165,6 +164,20 @@ class Recovery:
         for robot in self.standing.jammed(now, excused):
             if robot not in self.dead:
                 self._died(robot, now)
+
+    def _refused(self, leaf: Operation, test: str) -> None:
+        """A feeder takes a part back: its robot gets out of the way of the next."""
+        self._note(test, leaf.label, "", "scrap", (leaf.label,))
+        self._count(leaf.label)
+        robot, marking = leaf.carrier, self._marking
+        step = self._place_of(robot)
+        if self._factory.robots[robot].operations[step // 2] != leaf.index:
+            return
+        if leaf.index in self._supervisor.active.operations:
+            self._undo((leaf.start,), leaf, test)
+            return
+        self._supervisor.recall(self.standing.axes([robot]))
+        self.returning.send(robot, Way(self.returning.rest(robot, marking)))
 
     def _lost(self, robot: int) -> None:
         """A robot has lost what it held: that is made again."""
@@ -235,7 +248,8 @@ class Recovery:
         fired = undo(factory.net, supervisor.fired, asked, joins)
         marking = marking_after(factory.net, fired)
         robots = [r for r in range(len(factory.robots)) if step_of(factory, r, before) != step_of(factory, r, marking)]
-        undone = Undone.of(factory.net, self._now, operation.label, reason, asked, supervisor.fired, fired)
+        what = self._now, operation.label, reason
+        undone = Undone.between(factory.net, what, asked, supervisor.fired, fired)
         scrap = self.plant.undone(held(factory, marking), fired, {*robots})
         free = self.standing.axes([*robots, *scrap])
         supervisor.undo(undone, fired, marking, free)
