@@ -31,7 +31,7 @@ class Pressing:
     def meant(self, one: int, other: int, apart: float) -> bool:
         """Whether of two geoms, so far `apart` [m], one is a pad and the other what that is to
         hold, and neither is deep in the other; or one has fallen."""
-        if self.fallen and self._has_fallen(one, other):
+        if (self.fallen or self.shaken) and self._has_fallen(one, other):
             return True
         if apart < -PRESSED:
             return False

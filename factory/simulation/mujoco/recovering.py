@@ -21,6 +21,9 @@ SCRAP = 1 << 20
 BINNED = 1.0
 """What falls into a bin is gone so long after that [s]."""
 
+SETTLES = 0.5
+"""What has slipped is back in its place in the hand so long after that [s]."""
+
 LOST = 5e-3
 """A part further than this from its place in the hand is lost [m]."""
 
@@ -43,7 +46,10 @@ class MujocoPlant:
         self._draw = np.random.default_rng((campaign.seed, 1))
         self.heaps: list[Heap] = []
         self.bad: dict[int, bool] = {}
-        self._slipped: set[int] = set()
+        self._slipped: dict[int, tuple[dict[str, int], int]] = {}
+        self._pressed: dict[int, list[int]] = {}
+        self._settling: dict[float, tuple[int, ...]] = {}
+        self._calm = 0.0
         self._scrapped = SCRAP
         self._grips = _Grips(world)
         self._closed = frozenset[int]()
@@ -65,8 +71,11 @@ class MujocoPlant:
         hands, robot = self._world.parts.hands, operation.robots[operation.last]
         welds = [hands.grip[robot, label] for label in hands.of[robot].bodies]
         self._world.m.eq_data[welds, 5] += metres
-        self._slipped.update(hands.of[robot].bodies.values())
-        self._watch(hands.of[robot].bodies.values())
+        held = [hands.of[r].bodies for r in operation.robots if r in hands.of]
+        self._slipped[operation.index] = {**hands.of[robot].bodies}, robot
+        pressed = [body for bodies in held for body in bodies.values()]
+        self._pressed[operation.index] = pressed
+        self._watch(pressed)
 
     def fresh(self) -> Sequence[tuple[str, int]]:
         """The parts that feeders have begun to show since the last question: label and unit."""
@@ -112,6 +121,12 @@ class MujocoPlant:
         for heap in over:
             self.heaps.remove(heap)
             world.parts.feeders.retire(heap.bodies, heap.unit)
+        hands = world.parts.hands.of
+        self._restore([n for n, (_, robot) in self._slipped.items() if robot not in hands])
+        lie = {body for heap in self.heaps for body in heap.bodies.values()}
+        for since in [since for since in self._settling if since <= now]:
+            calm = {*self._settling.pop(since)} - lie
+            world.inspection.pressing.fallen.difference_update(calm)
         self._forget()
         if over:
             world.parts.welds.write()
@@ -204,7 +219,7 @@ class MujocoPlant:
         some robots are `going` back. Gives those that hold something that is scrap now."""
         world, factory, parts = self._world, self._world.model.factory, self._world.parts
         gone = {*self._grips.lost(self._frames, 0.0)}
-        self._restore()
+        self._restore([o.index for o in factory.operations if fired[o.start] == fired[o.end]])
         scrap = {r for r in parts.hands.of if holds[r] == NOPART}
         units = self._renumbered(holds, fired, scrap)
         parts.copies.renumber(
@@ -329,7 +344,9 @@ class MujocoPlant:
         for body in [body for body in {*fallen, *self.bad} if units[body] < 0]:
             fallen.discard(body)
             self.bad.pop(body, None)
-        if not fallen and _anything in world.hooks.before_step:
+        if fallen:
+            self._calm = world.time + SETTLES
+        elif _anything in world.hooks.before_step and world.time >= self._calm:
             world.inspection.pressing.shaken.clear()
             world.hooks.before_step.remove(_anything)
 
@@ -347,12 +364,14 @@ class MujocoPlant:
             self._world.d.qpos[m.jnt_qposadr[m.body_jntadr[bodies]][:, None] + np.arange(3)]
         )
 
-    def _restore(self) -> None:
-        """Nothing that is held has slipped any more."""
-        welds = [*self._world.parts.hands.grip.values()]
-        self._world.m.eq_data[welds] = self._nominal[welds]
-        self._world.inspection.pressing.fallen -= self._slipped
-        self._slipped.clear()
+    def _restore(self, operations: Iterable[int]) -> None:
+        """What has slipped in operations (index) is held as it should be."""
+        hands = self._world.parts.hands
+        for number in {*operations} & self._slipped.keys():
+            bodies, robot = self._slipped.pop(number)
+            welds = [hands.grip[robot, label] for label in bodies]
+            self._world.m.eq_data[welds] = self._nominal[welds]
+            self._settling[self._world.time + SETTLES] = tuple(self._pressed.pop(number))
 
     def _next_scrap(self, count: int = 1) -> int:
         self._scrapped += count

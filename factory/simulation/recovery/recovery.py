@@ -34,6 +34,7 @@ MOST_SCRAPPED = 20
 
 CAUSES = {
     "drop": "lost",
+    "knocked": "lost",
     "misplaced": "misplaced",
     "bad_part": "rejected",
     "bad_joint": "residual",
@@ -182,6 +183,8 @@ class Recovery:
     def _lost(self, robot: int) -> None:
         """A robot has lost what it held: that is made again."""
         label = self._held()[robot]
+        if self.plant.knocked(robot):
+            self.striking.struck["knocked"] = self.striking.struck.get("knocked", 0) + 1
         step = self._place_of(robot)
         operation = self._factory.operations[self._factory.robots[robot].operations[step // 2]]
         if self._stops(operation, "lost"):
@@ -336,17 +339,22 @@ class Recovery:
 
     def report(self) -> Failures:
         """What went wrong so far."""
-        struck, found = self.striking.struck, Counter(one.test for one in self.found)
+        struck = self.striking.struck
+        found = Counter(one.test for one in self.found)
         wanted = Counter[str]()
         for kind, count in struck.items():
             if kind in CAUSES:
                 wanted[CAUSES[kind]] += count
+        wanted["jammed"] = min(wanted["jammed"], found["jammed"])  # none has to move before the end
+        missed, alarms = wanted - found, found - wanted
+        as_lost = min(missed["residual"], alarms["lost"])
+        knocked = min(missed["residual"] - as_lost, struck.get("knocked", 0))
         undone = (e for e in self._supervisor.events if isinstance(e, Undone))
         return Failures(
             tuple(self.found),
             dict(struck),
-            (wanted - found).total(),
-            (found - wanted).total(),
+            missed.total() - as_lost - knocked,
+            alarms.total() - as_lost,
             sum(len(event.transitions) for event in undone),
             self.campaign.spares - self._spares,
             self.plant.contacts,
