@@ -50,6 +50,7 @@ class MujocoPlant:
         self._pressed: dict[int, list[int]] = {}
         self._settling: dict[float, tuple[int, ...]] = {}
         self._calm = 0.0
+        self._opened: set[int] = set()
         self._scrapped = SCRAP
         self._grips = _Grips(world)
         self._closed = frozenset[int]()
@@ -64,6 +65,7 @@ class MujocoPlant:
         parts.welds.loose([hands.grip[robot, label] for label in hands.of[robot].bodies])
         parts.welds.write()
         self._watch(hands.of[robot].bodies.values())
+        self._opened.add(robot)
         return True
 
     def slip(self, operation: Operation, metres: float) -> None:
@@ -144,9 +146,12 @@ class MujocoPlant:
         return [robot for robot in found if robot in hands and hands[robot].unit < SCRAP]
 
     def knocked(self, robot: int) -> bool:
-        """Whether something that fell has touched what a robot holds."""
-        hand, shaken = self._world.parts.hands.of.get(robot), self._world.inspection.pressing.shaken
-        return hand is not None and not shaken.isdisjoint(hand.bodies.values())
+        """Whether a robot's hand is closed, and something touched what it holds that had fallen or
+        slipped."""
+        hand, pressing = self._world.parts.hands.of.get(robot), self._world.inspection.pressing
+        if hand is None or robot in self._opened:
+            return False
+        return not (pressing.shaken | pressing.fallen).isdisjoint(hand.bodies.values())
 
     def feels(self, robots: Sequence[int]) -> bool:
         """Whether robots feel all that they carry, now."""
@@ -323,6 +328,7 @@ class MujocoPlant:
 
     def _let_fall(self, robot: int, seconds: float) -> None:
         world, parts = self._world, self._world.parts
+        self._opened.discard(robot)
         hand = parts.hands.let_go(robot)
         what = next(iter(hand.bodies))
         self.heaps.append(Heap(what, hand.unit, dict(hand.bodies), world.time + seconds))
