@@ -45,6 +45,16 @@ class Undone:
     asked: tuple[str, ...]
     transitions: tuple[str, ...]
 
+    def as_json(self) -> dict[str, object]:
+        """As `run --json` prints it."""
+        return {
+            "t": round(self.t, 6),
+            "undone": list(self.transitions),
+            "asked": list(self.asked),
+            "operation": self.operation,
+            "reason": self.reason,
+        }
+
     @classmethod
     def between(
         cls,

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import NamedTuple
 
+from factory.nets.undo import Undone
 from factory.plant.approaches import Pair
 from factory.plant.factory import Factory
 from factory.record.ending import CutOff
@@ -21,6 +22,10 @@ class Event(NamedTuple):
 
     t: float
     transition: str
+
+    def as_json(self) -> dict[str, object]:
+        """As `run --json` prints it."""
+        return {"t": round(self.t, 6), "transition": self.transition}
 
 
 STEADY = 4
@@ -38,7 +43,7 @@ def mean_interval(left: Sequence[float], period: int = 1) -> float | None:
     return (tail[-1] - tail[-1 - count]) / count
 
 
-def busy_times(factory: Factory, events: Iterable[Event]) -> tuple[float, ...]:
+def busy_times(factory: Factory, events: Iterable[Event | Undone]) -> tuple[float, ...]:
     """How long each robot was in operations that have ended [s]; one without a start among the
     events was under way from the beginning, time 0."""
     numbers = {t.name: number for number, t in enumerate(factory.net.threaded.transitions)}
@@ -121,7 +126,7 @@ class Run:
     predicted_cycle_time_s: float | None
     bottleneck: str
     replays: bool
-    events: tuple[Event, ...] = field(repr=False)
+    events: tuple[Event | Undone, ...] = field(repr=False)
     dropoffs: tuple[float, ...] = field(repr=False)
     busy: tuple[float, ...] = field(repr=False)
     physics: PhysicsFigures | None = None
@@ -213,7 +218,7 @@ class Run:
             "cycle_time_s": self.cycle_time_s,
             "predicted_cycle_time_s": self.predicted_cycle_time_s,
             "bottleneck": self.bottleneck,
-            "transitions_fired": len(self.events),
+            "transitions_fired": sum(isinstance(event, Event) for event in self.events),
             "refines_net": self.refines_net,
             **{key: getattr(physics, key) if physics else None for key in keys},
             "contacts": list(physics.contacts) if physics else None,
@@ -223,5 +228,5 @@ class Run:
             **watched,
             **({"failures": self.failures.as_json()} if self.failures else {}),
             "verdict": self.verdict.as_json(),
-            "events": [{"t": round(e.t, 6), "transition": e.transition} for e in self.events],
+            "events": [event.as_json() for event in self.events],
         }

@@ -79,6 +79,11 @@ class MujocoPlant:
         self._pressed[operation.index] = pressed
         self._watch(pressed)
 
+    @property
+    def slipped(self) -> frozenset[int]:
+        """The operations (index) under way whose inputs have slipped."""
+        return frozenset(self._slipped)
+
     def fresh(self) -> Sequence[tuple[str, int]]:
         """The parts that feeders have begun to show since the last question: label and unit."""
         back, m = self._world.parts.feeders.back, self._world.m

@@ -38,6 +38,11 @@ class IdealPlant:
         """The last input of an operation that has started slips in its hand."""
         self._slipped[operation.index] = metres
 
+    @property
+    def slipped(self) -> frozenset[int]:
+        """The operations (index) under way whose inputs have slipped."""
+        return frozenset(self._slipped)
+
     def fresh(self) -> Sequence[tuple[str, int]]:
         """The parts that feeders have begun to show since the last question: label and unit."""
         factory, fired = self._simulation.layout.factory, self._simulation.supervisor.fired
@@ -101,7 +106,9 @@ class IdealPlant:
     ) -> Sequence[int]:
         """The robots that hold something that is scrap now."""
         before, gone = self._held(), self._gone
-        self._gone, self._slipped = set(), {}
+        self._gone = set()
+        under_way = {o.index for o in self._simulation.layout.factory.operations if fired[o.start] > fired[o.end]}
+        self._slipped = {n: by for n, by in self._slipped.items() if n in under_way}
         changed = (r for r, label in enumerate(holds) if label == NOPART != before[r])
         return [robot for robot in changed if robot not in gone]
 

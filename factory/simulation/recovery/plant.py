@@ -22,6 +22,10 @@ class Plant(Protocol):
     def slip(self, operation: Operation, metres: float) -> None:
         """The last input of an operation that has started slips in its hand."""
 
+    @property
+    def slipped(self) -> frozenset[int]:
+        """The operations (index) under way whose inputs have slipped."""
+
     def fresh(self) -> Sequence[tuple[str, int]]:
         """The parts that feeders have begun to show since the last question: label and unit."""
 

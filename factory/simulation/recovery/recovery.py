@@ -253,6 +253,8 @@ class Recovery:
         robots = [r for r in range(len(factory.robots)) if step_of(factory, r, before) != step_of(factory, r, marking)]
         what = self._now, operation.label, reason
         undone = Undone.between(factory.net, what, asked, supervisor.fired, fired)
+        untested = self.plant.slipped - marking - {operation.index}
+        self.striking.dissolved(len(untested))
         scrap = self.plant.undone(held(factory, marking), fired, {*robots})
         free = self.standing.axes([*robots, *scrap])
         supervisor.undo(undone, fired, marking, free)

@@ -64,6 +64,11 @@ class Striking:
             "misplaced", unit, now, label
         )
 
+    def dissolved(self, joints: int) -> None:
+        """So many bad joints have been undone before anybody could look at them."""
+        if joints:
+            self.struck["bad_joint"] -= joints
+
     def tick(self, now: float) -> None:
         """What is due: things are dropped; what lasted is over."""
         while self._due and self._due[0][0] <= now:
