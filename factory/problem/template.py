@@ -46,19 +46,6 @@ class Law:
 
 
 @dataclass(frozen=True, slots=True)
-class Response:
-    kind: str
-    times: int = 1
-
-
-@dataclass(frozen=True, slots=True)
-class Failure:
-    test: str
-    limit: float | None
-    responses: tuple[Response, ...]
-
-
-@dataclass(frozen=True, slots=True)
 class Template:
     """An operation template (Definition 4.1).
 
@@ -86,7 +73,6 @@ class Template:
     further_position: Position | None = field(default=None, compare=False)
     instead_position: Position | None = field(default=None, compare=False)
     robot_positions: tuple[Position, ...] = field(default=(), compare=False)
-    failures: tuple = (Failure("residual", 5e-4, (Response("again", 2), Response("scrap"))), Failure("lost", None, (Response("scrap"),)))
 
     @property
     def inputs(self) -> tuple[str, ...]:
