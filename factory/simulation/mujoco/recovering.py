@@ -139,10 +139,6 @@ class MujocoPlant:
             world.parts.welds.write()
             self.supplied()
         self._closed = self._near() if self.heaps else frozenset()
-        back, by_label = world.parts.feeders.back, world.model.factory.by_label
-        if back.parts and back.awaited:
-            busy = back.awaited & {*world.parts.feeders.served()}
-            self._closed |= {by_label[label].carrier for label in busy}
 
     def lost(self) -> Sequence[int]:
         """The robots that no longer feel what they carry, for some time."""
@@ -302,6 +298,11 @@ class MujocoPlant:
         self._world.parts.welds.write()
         self.came_back(robot)
         self._world.parts.feeders.stay_clear(robot)
+
+    def takes_back(self, robot: int) -> bool:
+        """Whether something goes back up in a robot's feeder."""
+        labels = self._world.model.layout.magazine(robot)
+        return not {*labels}.isdisjoint(self._world.parts.feeders.served())
 
     def came_back(self, robot: int) -> None:
         """A robot is where it waits."""

@@ -115,6 +115,10 @@ class IdealPlant:
     def let_go(self, robot: int) -> None:
         """A robot lets scrap fall."""
 
+    def takes_back(self, robot: int) -> bool:
+        """Whether something goes back up in a robot's feeder."""
+        return False
+
     def came_back(self, robot: int) -> None:
         """A robot is where it waits."""
 

@@ -71,6 +71,9 @@ class Plant(Protocol):
     def let_go(self, robot: int) -> None:
         """A robot lets scrap fall."""
 
+    def takes_back(self, robot: int) -> bool:
+        """Whether something goes back up in a robot's feeder."""
+
     def came_back(self, robot: int) -> None:
         """A robot is where it waits."""
 

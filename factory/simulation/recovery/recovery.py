@@ -170,15 +170,20 @@ class Recovery:
         """A feeder takes a part back: its robot gets out of the way of the next."""
         self._note(test, leaf.label, "", "scrap", (leaf.label,))
         self._count(leaf.label)
-        robot, marking = leaf.carrier, self._marking
+        robot = leaf.carrier
         step = self._place_of(robot)
         if self._factory.robots[robot].operations[step // 2] != leaf.index:
             return
         if leaf.index in self._supervisor.active.operations:
             self._undo((leaf.start,), leaf, test)
-            return
         self._supervisor.recall(self.standing.axes([robot]))
-        self.returning.send(robot, Way(self.returning.rest(robot, marking)))
+        rest = Way(self.returning.rest(robot, self._marking), ready=partial(self._is_up, robot))
+        back = partial(self.returning.send, robot, rest)
+        self.returning.send(robot, Way(self.returning.aside(robot, leaf), done=back))
+
+    def _is_up(self, robot: int) -> bool:
+        """Whether nothing goes back up in a robot's feeder."""
+        return not self.plant.takes_back(robot)
 
     def _lost(self, robot: int) -> None:
         """A robot has lost what it held: that is made again."""
@@ -273,13 +278,12 @@ class Recovery:
             for slot, robot in enumerate(came):
                 after[robot] = frozenset(came[slot + 1 :])
         for robot in robots:
-            rest = self.returning.rest(robot, marking)
+            rest, home = self.returning.rest(robot, marking), self.returning.home(robot)
+            goals, done = rest, partial(self.plant.came_back, robot)
             if robot in scrap:
-                home = self.returning.home(robot)
-                way = Way(home, after.get(robot, frozenset()), partial(self._bin, robot, rest))
-            else:
-                way = Way(rest, after.get(robot, frozenset()), partial(self.plant.came_back, robot))
-            self.returning.send(robot, way)
+                goals, done = home, partial(self._bin, robot, rest)
+            first = after.get(robot, frozenset[int]())
+            self.returning.send(robot, Way(goals, first, done, partial(self._is_up, robot)))
 
     def _bin(self, robot: int, rest: list[Goal]) -> None:
         """A robot at the B end of its guidepath lets scrap fall into the bin there, and goes to
