@@ -15,7 +15,8 @@ from factory.foreign_nets.behaviour import play
 from factory.nets.history import firings
 from factory.nets.marked import MarkedNet, marked, token_free
 from factory.nets.petri import Marking
-from factory.nets.undo import Joins, exchange, marking_of, times_undone, undo
+from factory.nets.undo import exchange, marking_of, times_undone, undo
+from factory.nets.undone import Joins
 from factory.plant.factory import Factory
 from factory.plant.material import joins
 from factory.problem.pag import NOPART

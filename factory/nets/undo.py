@@ -21,10 +21,7 @@ from heapq import heapify, heappop, heappush
 
 from factory.nets.gears import GearNet
 from factory.nets.marked import MarkedNet, marked
-
-Joins = Mapping[int, tuple[int, ...]]
-"""For each end the transitions that are undone at least as often as it is: its start, and the ends
-that made what it joined. `factory.plant.material.joins` makes it."""
+from factory.nets.undone import Joins
 
 
 def undo(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from types import MappingProxyType
 
-from factory.nets.undo import Joins
+from factory.nets.undone import Joins
 from factory.plant.factory import Factory
 
 
