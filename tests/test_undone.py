@@ -5,7 +5,6 @@ from __future__ import annotations
 import random
 from dataclasses import dataclass, field, replace
 
-import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
@@ -13,14 +12,14 @@ from factory.compiler.folding import folded
 from factory.nets.gears import GearNet
 from factory.nets.history import firings
 from factory.nets.replay import ReplayVerdict, replay
-from factory.nets.undo import exchange, marking_of, times_undone, undo
-from factory.nets.undone import Entry, Joins, Undone, lasting, woven
+from factory.nets.undo import exchange, marking_after, tokens_after, undo
+from factory.nets.undone import Entry, Joins, Undone, lasting
 from factory.plant.factory import Factory
-from factory.plant.material import joins
+from factory.plant.material import joins_of
 from tests.fold_values import inserted, plain, random_fold, random_lines, three_robots
 from tests.net_values import random_legal_marking
 from tests.pag_values import SHAPES, catalogue, factory_of, paper, random_pag
-from tests.test_undo import failures, set_of
+from tests.test_undo import failures
 
 seeds = st.integers(0, 10**6)
 randoms = st.randoms(use_true_random=False)
@@ -33,8 +32,7 @@ class Story:
     factory: Factory
     rng: random.Random
     fired: list[int] = field(default_factory=list)
-    names: list[str] = field(default_factory=list)
-    undone: list[Undone] = field(default_factory=list)
+    entries: list[Entry] = field(default_factory=list)
     nets: list[GearNet] = field(default_factory=list)
 
     def __post_init__(self) -> None:
@@ -43,51 +41,39 @@ class Story:
     def run(self, steps: int) -> None:
         net = self.factory.net.threaded
         for _ in range(steps):
-            here = marking_of(self.factory.net, self.fired)
+            here = tokens_after(self.factory.net, self.fired)
             needs = net.net.preset
             ready = [e for e in range(len(needs)) if all(here[p] for p in needs[e])]
             event = self.rng.choice(ready)
             self.fired[event] += 1
-            self.names.append(net.transitions[event].name)
+            self.entries.append(net.transitions[event].name)
 
-    def fail(self, material: Joins | None = None) -> bool:
+    def fail(self) -> bool:
         """Whether there was something to fail."""
         every = [*failures(self.factory, self.fired)]
         if every:
-            asked, made = self.rng.choice(every), joins(self.factory)
-            after = undo(
-                self.factory.net, self.fired, asked, made if material is None else material
-            )
+            asked = self.rng.choice(every)
+            after = undo(self.factory.net, self.fired, asked, joins_of(self.factory))
             self._note(asked, after, False)
         return bool(every)
 
     def exchange(self, factory: Factory) -> None:
-        every = [{}, *failures(self.factory, self.fired)]
+        every: list[tuple[int, ...]] = [(), *failures(self.factory, self.fired)]
         asked = self.rng.choice(every)
         self.factory = factory
         self.nets.append(factory.net)
-        self._note(asked, exchange(factory.net, self.fired, asked, joins(factory)), True)
+        self._note(asked, exchange(factory.net, self.fired, asked, joins_of(factory)), True)
 
-    def _note(self, asked: dict[int, int], after: tuple[int, ...], exchanged: bool) -> None:
-        times = times_undone(self.fired, after)
-        self.fired = [*after]
-        self.undone.append(
-            Undone(
-                0.0, len(self.names), "x", "lost", self._named(asked), self._named(times), exchanged
-            )
+    def _note(self, asked: tuple[int, ...], after: tuple[int, ...], exchanged: bool) -> None:
+        what = 0.0, "x", "lost"
+        self.entries.append(
+            Undone.between(self.factory.net, what, asked, self.fired, after, exchanged)
         )
-
-    def _named(self, times: dict[int, int]) -> tuple[str, ...]:
-        names = self.factory.net.threaded.transitions
-        return tuple(names[event].name for event in sorted(times) for _ in range(times[event]))
-
-    @property
-    def entries(self) -> list[Entry]:
-        return [*woven(self.names, self.undone)]
+        self.fired = [*after]
 
 
 def judged(story: Story, first: Factory) -> ReplayVerdict:
-    return replay(first.net, story.entries, None, joins(first), story.nets)
+    return replay(first.net, story.entries, None, joins_of(first), story.nets)
 
 
 def story_of(factory: Factory, rng: random.Random) -> Story:
@@ -108,8 +94,8 @@ def test_a_run_with_failures_replays(seed: int, rng: random.Random) -> None:
     found = judged(story, factory)
     assert (found.refines, found.reason) == (True, "")
     assert found.events == len(story.entries)
-    assert found.marking == set_of(marking_of(factory.net, story.fired))
-    left = replay(factory.net, [story.names[at] for at in lasting(story.names, story.undone)])
+    assert found.marking == marking_after(factory.net, story.fired)
+    left = replay(factory.net, [story.entries[at] for at in lasting(story.entries)])
     assert (left.refines, left.marking) == (True, found.marking)
 
 
@@ -124,9 +110,9 @@ def test_a_run_that_began_elsewhere(seed: int, rng: random.Random) -> None:
     story.run(rng.randint(0, 6))
     assume(story.fail())
     story.run(6)
-    found = replay(factory.net, story.entries, start, joins(factory))
+    found = replay(factory.net, story.entries, start, joins_of(factory))
     assert (found.refines, found.reason) == (True, "")
-    assert found.marking == set_of(marking_of(factory.net, story.fired))
+    assert found.marking == marking_after(factory.net, story.fired)
 
 
 @given(seeds, randoms)
@@ -142,7 +128,7 @@ def test_a_run_with_exchanges_replays(seed: int, rng: random.Random) -> None:
         story.run(5)
     found = judged(story, first)
     assert (found.refines, found.reason) == (True, "")
-    assert found.marking == set_of(marking_of(story.factory.net, story.fired))
+    assert found.marking == marking_after(story.factory.net, story.fired)
 
 
 @given(seeds, randoms, st.integers(0, 4))
@@ -150,9 +136,9 @@ def test_any_other_undo_is_refused(seed: int, rng: random.Random, how: int) -> N
     """A transition less, one more, one in place of another, nothing, something else asked for."""
     factory = random_fold(seed, 10)
     story = story_of(factory, rng)
-    assume(story.undone)
-    at = rng.randrange(len(story.undone))
-    entry = story.undone[at]
+    undone = [(at, entry) for at, entry in enumerate(story.entries) if isinstance(entry, Undone)]
+    assume(undone)
+    at, entry = rng.choice(undone)
     names = [t.name for t in factory.net.threaded.transitions]
     other = rng.choice(names)
     gone = rng.randrange(len(entry.transitions))
@@ -165,32 +151,31 @@ def test_any_other_undo_is_refused(seed: int, rng: random.Random, how: int) -> N
         replace(entry, transitions=()),
         replace(entry, asked=()),
     )[how]
-    story.undone[at] = bad
+    story.entries[at] = bad
     found = judged(story, factory)
     assert not found.refines
-    assert found.index == bad.after + at
+    assert found.index == at
     assert "the undo of x" in found.reason
 
 
 def test_an_undo_without_the_material_rule_is_refused() -> None:
     """Where the rule makes a difference: sub1 is lost, and its parts are said to be there."""
     factory = factory_of(paper())
-    story = Story(factory, random.Random(0))
-    story.names = ["part1_s", "part1_e", "part2_s", "part2_e", "sub1_s", "sub1_e"]
-    undone = Undone(1.0, 6, "sub1", "lost", ("sub1_e",), ("sub1_e",))
-    found = replay(factory.net, [*woven(story.names, [undone])], None, joins(factory))
+    names = ["part1_s", "part1_e", "part2_s", "part2_e", "sub1_s", "sub1_e"]
+    undone = Undone(1.0, "sub1", "lost", ("sub1_e",), ("sub1_e",))
+    found = replay(factory.net, [*names, undone], None, joins_of(factory))
     assert (found.refines, found.index) == (False, 6)
     words = "the undo of sub1 takes back part1_e 0 times, where 1 is the least"
     assert found.reason == words
     assert {factory.net.threaded.places[p].name for p in found.marking} >= {"r3:sub1"}
-    right = replace(undone, transitions=tuple(sorted(story.names)))
-    assert replay(factory.net, [*woven(story.names, [right])], None, joins(factory)).refines
+    right = replace(undone, transitions=tuple(names))
+    assert replay(factory.net, [*names, right], None, joins_of(factory)).refines
 
 
 def test_the_reasons() -> None:
     factory = three_robots()
-    made = joins(factory)
-    undone = Undone(0.0, 0, "part1", "lost", ("part1_s",), ("part1_s",))
+    made = joins_of(factory)
+    undone = Undone(0.0, "part1", "lost", ("part1_s",), ("part1_s",))
 
     def reason(entry: Undone, material: Joins | None = made, nets: tuple[GearNet, ...] = ()) -> str:
         found = replay(factory.net, [entry], None, material, nets)
@@ -207,12 +192,7 @@ def test_the_reasons() -> None:
     assert replay(factory.net, [swap], None, made, [factory.net]).refines
 
 
-def test_woven() -> None:
-    first, last = (Undone(0.0, n, "x", "", ("a",), ("a",)) for n in (1, 2))
-    assert [*woven("abc", [first, first, last])] == ["a", first, first, "b", last, "c"]
-
-
-@pytest.mark.parametrize(("after", "left"), [(3, (0, 1, 3)), (1, (1, 2, 3))])
-def test_the_latest_firings_are_undone(after: int, left: tuple[int, ...]) -> None:
-    names = ["a", "b", "a", "b"]
-    assert lasting(names, [Undone(0.0, after, "x", "", ("a",), ("a",))]) == left
+def test_the_latest_firings_are_undone() -> None:
+    undone = Undone(0.0, "x", "", ("a",), ("a",))
+    assert lasting(["a", "b", "a", undone, "b"]) == [0, 1, 4]
+    assert lasting(["a", undone, undone, "a", "b"]) == [3, 4]

@@ -13,6 +13,7 @@ import click
 
 from factory.commands.monitor import found_by, say_verdict, say_violations
 from factory.commands.options import (
+    FAULTS,
     FLOOR,
     LENIENT,
     MOTION,
@@ -41,6 +42,7 @@ if TYPE_CHECKING:
     from factory.plant.factory import Factory
     from factory.record.observed import Recorder
     from factory.render import Film
+    from factory.simulation.failures import Failures
     from factory.simulation.run import PhysicsFigures, Run
     from factory.simulation.simulation import Simulation
 
@@ -51,6 +53,7 @@ if TYPE_CHECKING:
 
 @click.command()
 @SOURCE
+@FAULTS
 @RUN
 @click.option("--video", type=PATH, help="Film the run (.mp4).")
 @click.option("--log", type=PATH, help="Keep every tick in a file.")
@@ -146,6 +149,11 @@ def run_project(
     seen = log is not None or film is not None
     with Waiting("compiling the model", silent):
         made = Simulation(project.layout, asked.request(project, seen))
+        recovery = None
+        if asked.recovers:
+            from factory.simulation.recovery import recover
+
+            recovery = recover(made, asked.campaign(project.layout.factory))
     recorders: list[Opening] = []
     if log is not None:
         from factory.record.log import LogWriter
@@ -154,7 +162,8 @@ def run_project(
     if film is not None:
         recorders.append(lambda: film(made))
     record = carry_out(made, silent, asked.max_time, recorders, monitor)
-    return replace(record, lenient=asked.lenient)
+    failures = None if recovery is None else recovery.report()
+    return replace(record, lenient=asked.lenient, failures=failures)
 
 
 def carry_out(
@@ -240,6 +249,8 @@ def summarise(record: Run, factory: Factory, verbose: bool) -> None:
             say(f"inputs pressed on each other with {physics.mating_force_max_n:.3f} N in {most}")
         if physics.fused:
             say("parts joined for good are one rigid body (--no-fuse keeps them apart)")
+    if record.failures is not None:
+        say_failures(record.failures, verbose)
     if record.monitor is not None:
         say(found_by(record.monitor, record.cut_off))
     say_verdict(record.verdict)
@@ -248,6 +259,20 @@ def summarise(record: Run, factory: Factory, verbose: bool) -> None:
     table("Utilisation", ("robot", "type", "busy"), rows)
     if more := len(busy) - len(rows):
         say(f"... and {more} more robot{'s' if more > 1 else ''} (-v shows all)")
+
+
+def say_failures(failures: Failures, verbose: bool) -> None:
+    """What went wrong in a run, in a few lines."""
+    struck = ", ".join(f"{count} {kind}" for kind, count in failures.struck.items() if count)
+    say(f"faults: {struck or 'none'}; {failures.missed} missed, {failures.false_alarms} false alarms")
+    say(
+        f"{len(failures.found)} failures, {failures.undone} transitions undone,"
+        f" {failures.scrapped} scrapped, {failures.spares} spares used,"
+        f" {failures.contacts} contacts with what fell"
+    )
+    for one in failures.found if verbose else ():
+        where = f" ({one.robot})" if one.robot else ""
+        say(f"  {one.t:.2f} s: {one.operation}{where}: {one.test}, {one.response}")
 
 
 def say_files(**files: Path | None) -> None:

@@ -16,12 +16,13 @@ from factory.modes.staging import HeadStart, stages_of
 from factory.nets.history import firings
 from factory.nets.petri import Marking
 from factory.nets.replay import replay
-from factory.plant.fused_bodies import bodies_of, fused_copies
+from factory.plant.fused_bodies import FusedBodies, bodies_of, fused_copies
+from factory.plant.material import joins_of
 from factory.problem.robot_types import Catalogue, load_catalogue
 from factory.simulation.distributed import DistributedSupervisor
 from factory.simulation.ideal import IdealWorld
 from factory.simulation.request import RunRequest
-from factory.simulation.run import Run, busy_times
+from factory.simulation.run import Run, busy_times, entries_of
 from factory.simulation.starting import start_positions
 from factory.simulation.supervisor import Supervisor
 from factory.simulation.world import World
@@ -43,6 +44,10 @@ PATIENCE = 10.0
 """A run has stalled when nothing fires for this many times the longest predicted delay."""
 
 LOOK = "look at these robots in `factory render`, or give --max-time more"
+
+SPARE = 2
+"""So many copies more of each body are there where parts may be scrapped: they are back in their
+feeders only when they have been cleared away."""
 
 FALL = 0.5
 """So long after something was dropped a run goes on, for it to be seen [s]; nothing fires then."""
@@ -198,6 +203,8 @@ class Simulation:
                 watched += world.hooks.ended_time
                 trouble = self._trouble("Unstable", f"{reason}, after {before:.2f} s", SMALLER)
                 return self._record(perf_counter() - begin - watched, before, trouble)
+            for act in world.hooks.ticks:
+                act()
             if observers or glances:
                 pause = perf_counter()
                 for observe in (*observers, *glances):
@@ -210,9 +217,11 @@ class Simulation:
     def _ends(self, patience: float, max_time: float | None) -> Diagnostic | None:
         """What ends the run now, whether or not its products have been dropped off."""
         world = self.world
+        if world.hooks.trouble is not None:
+            return world.hooks.trouble
         if world.dropped is not None:
             return world.dropped.diagnostic if world.time >= world.dropped.time + FALL else None
-        if self.silent > patience:
+        if self.silent > patience and world.time > world.hooks.busy + patience:
             what = f"nothing fired for {patience:.2f} s of simulated time"
             return self._trouble("Stalled", what, LOOK)
         if max_time is not None and world.time >= max_time:
@@ -222,7 +231,7 @@ class Simulation:
 
     def _unseen(self, max_time: float | None) -> int:
         """So many ticks may go by at once where nobody looks, and nobody acts between two steps."""
-        if self.world.hooks.before_step:
+        if self.world.hooks.before_step or self.world.hooks.ticks:
             return 1
         if max_time is None:
             return MOST
@@ -233,7 +242,8 @@ class Simulation:
         supervisor, world, factory = self.supervisor, self.world, self.layout.factory
         request, physics, figures = self.request, world.physics_time, world.figures()
         predicted = self.cycle
-        verdict = replay(factory.net, [e.transition for e in supervisor.events], self.start)
+        entries = entries_of(supervisor.events)
+        verdict = replay(factory.net, entries, self.start, joins_of(factory))
         return Run(
             request.world,
             request.units,
@@ -297,15 +307,14 @@ def compiled(layout: Layout, request: RunRequest) -> Compiled:
 
 def _model(layout: Layout, request: RunRequest, under_way: Mapping[str, int]) -> Model:
     """The model that a run takes."""
-    units, settings, catalogue, wip = (
-        request.units,
-        request.settings,
-        request.catalogue,
-        request.wip,
-    )
-    return physical_model(
-        layout, units, settings, catalogue, wip, under_way, request.fuse, request.shown
-    )
+    from factory.mjcf.model import build_model
+
+    bodies = bodies_of(layout.factory, layout.product, request.fuse)
+    copies, wip = _copies(layout, bodies, request.units, request.wip, under_way)
+    if request.recovers:
+        copies = {label: count + SPARE for label, count in copies.items()}
+    catalogue, settings = request.catalogue or load_catalogue(), timed(request.settings, layout)
+    return build_model(layout, catalogue, copies, settings, bodies, request.shown, wip)
 
 
 def physical_model(
@@ -322,18 +331,29 @@ def physical_model(
     parts, or with `fuse` bodies of sub-assemblies too, and then few parts. Where the pool is too
     large, at most so many units are inside as `fitting_wip` says, unless `wip` is given. `shown`:
     with what is only shown, too."""
-    from factory.mjcf.model import build_model, fitting_wip, part_copies
+    from factory.mjcf.model import build_model
 
-    factory = layout.factory
-    bodies = bodies_of(factory, layout.product, fuse)
-    if bodies.wholes:
-        copies = fused_copies(bodies, factory, units)
-    else:
-        pool = part_pool(factory)
-        wip = wip or fitting_wip(pool, units)
-        copies = part_copies(pool, units, wip, under_way)
+    bodies = bodies_of(layout.factory, layout.product, fuse)
+    copies, wip = _copies(layout, bodies, units, wip, under_way or {})
     catalogue, settings = catalogue or load_catalogue(), timed(settings or Settings(), layout)
     return build_model(layout, catalogue, copies, settings, bodies, shown, wip)
+
+
+def _copies(
+    layout: Layout,
+    bodies: FusedBodies,
+    units: int | None,
+    wip: int | None,
+    under_way: Mapping[str, int],
+) -> tuple[dict[str, int], int | None]:
+    """How many copies of each body are needed, and for how many units inside at once at most."""
+    from factory.mjcf.model import fitting_wip, part_copies
+
+    if bodies.wholes:
+        return fused_copies(bodies, layout.factory, units), wip
+    pool = part_pool(layout.factory)
+    wip = wip or fitting_wip(pool, units)
+    return part_copies(pool, units, wip, under_way), wip
 
 
 def require(run: Run) -> Run:

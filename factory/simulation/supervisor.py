@@ -7,7 +7,7 @@ robot costs nothing.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Container, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -17,6 +17,7 @@ from factory.control.navigation import Bundle
 from factory.modes.staging import HeadStart
 from factory.nets.petri import Marking
 from factory.nets.threads import Threads
+from factory.nets.undone import Undone
 from factory.plant.factory import Factory, Operation
 from factory.simulation.bundles import Bundles
 from factory.simulation.run import Event
@@ -134,6 +135,30 @@ class Supervisor:
             ticks = 1
         self.near = self.world.step(self.active.bundle, self.active.axes, ticks)
 
+    def undo(
+        self, undone: Undone, fired: Sequence[int], marking: Marking, free: Container[int]
+    ) -> None:
+        """Go on from a marking, that of the counts `fired`: operations that are no longer marked
+        are over, as are the stages of axes that are `free`."""
+        factory, active = self.factory, self.active
+        self.fired[:] = fired
+        self.events.append(undone)
+        starts = [operation.start for operation in factory.operations]
+        self.threads = Threads(factory.net.threaded, factory.net.threads_of(marking), starts)
+        self.enabled = True
+        self._activate([n for n in active.operations if self.marked[n]], active.ahead)
+        self.recall(free)
+
+    def recall(self, axes: Container[int]) -> None:
+        """The stages of axes are over, wherever those are."""
+        ahead, own = self.active.ahead, self.bundles.axes_of
+        kept = [n for n in ahead if not any(axis in axes for axis in own[n])]
+        self._activate(self.active.operations, kept)
+
+    def send(self, stages: Iterable[int]) -> None:
+        """Let the axes of stages, by number, go to where those lead."""
+        self._activate(self.active.operations, (*self.active.ahead, *stages))
+
     def coast(self, ticks: int = 1) -> None:
         """Let the world go on in the modes under way, for some ticks in which nothing fires."""
         self.world.step(self.active.bundle, self.active.axes, ticks)
@@ -187,7 +212,16 @@ class Supervisor:
                 return []
         still = np.logical_and.reduceat(np.abs(v[active.axes]) < STILL, active.bundle.starts)
         numbers = (*active.operations, *active.ahead)
-        return [numbers[number] for number in (there & still).nonzero()[0].tolist()]
+        over = [numbers[number] for number in (there & still).nonzero()[0].tolist()]
+        return [n for n in over if self._passes(n)] if self.world.hooks.judges else over
+
+    def _passes(self, number: int) -> bool:
+        """Whether what has come to its goal may end: every stage may."""
+        if number >= len(self.factory.operations):
+            return True
+        operation = self.factory.operations[number]
+        unit = self.factory.unit(operation, self.fired[operation.end])
+        return self.world.hooks.pass_on(operation, unit)
 
     def _fire(self, started: list[int], ended: list[int]) -> None:
         operations, now, fired = self.factory.operations, self.world.time, self.fired

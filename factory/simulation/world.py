@@ -22,16 +22,22 @@ class Hooks:
     """Where others take part in a world.
 
     `before_step`: called before every timestep. `sensors`: from positions [m] and speeds [m/s] of
-    all axes to what is sensed. `gates`: an operation may start only where all say so. `ended`:
-    called when operations have ended and parts have changed hands, before the world goes on, to
-    look at it; `ended_time` [s]: what that took.
+    all axes to what is sensed. `gates`: an operation may start only where all say so; `judges`: it
+    may end only where all do. `ticks`: called after every tick. `ended`: called when operations
+    have ended and parts have changed hands, before the world goes on, to look at it; `ended_time`
+    [s]: what that took. `trouble`: what ends the run, if anything does; `busy` [s]: until when it
+    is no stall that nothing fires.
     """
 
     before_step: list[Callable[[], None]] = field(default_factory=list)
     sensors: list[Callable[[Array, Array], tuple[Array, Array]]] = field(default_factory=list)
     gates: list[Callable[[Operation, int], bool]] = field(default_factory=list)
+    judges: list[Callable[[Operation, int], bool]] = field(default_factory=list)
+    ticks: list[Callable[[], None]] = field(default_factory=list)
     ended: list[Callable[[], None]] = field(default_factory=list)
     ended_time: float = 0.0
+    trouble: Diagnostic | None = None
+    busy: float = 0.0
 
     def sensed(self, x: Array, v: Array) -> tuple[Array, Array]:
         """What sensors make of positions and speeds."""
@@ -42,6 +48,10 @@ class Hooks:
     def admit(self, operation: Operation, unit: int) -> bool:
         """Whether all gates are open for an operation."""
         return all(gate(operation, unit) for gate in self.gates)
+
+    def pass_on(self, operation: Operation, unit: int) -> bool:
+        """Whether all judges let an operation end."""
+        return all([judge(operation, unit) for judge in self.judges])
 
     def tell_ended(self) -> None:
         """Operations have ended."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 
 import numpy as np
 
@@ -56,6 +56,16 @@ class Copies:
         self._welds.masks.leave(label, unit)
         self._put_away(label, copy)
         self.free[label].append(copy)
+
+    def renumber(self, units: Mapping[tuple[str, int], int]) -> None:
+        """Copies are for other units from now on, by label and the unit that they were for."""
+        bodies = {part: self[part] for part in units}
+        copies = {part: self._number.pop(part) for part in units}
+        for label, unit in units:
+            self._welds.masks.leave(label, unit)
+        for (label, old), new in units.items():
+            self._number[label, new] = copies[label, old]
+            self._welds.masks.enter(label, new, bodies[label, old])
 
     def _put_away(self, label: str, copy: int) -> None:
         body = int(self.body[label][copy])

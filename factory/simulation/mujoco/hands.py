@@ -21,10 +21,11 @@ class Grasp:
 
 class Grasps:
     """The hands of all robots: `of[robot]` for each that holds something (index); `grip`: the weld
-    by which a robot holds a label."""
+    by which a robot holds a label; `changes`: how often any has taken something or let go."""
 
     def __init__(self, m: mujoco.MjModel, model: Model, welds: Welds) -> None:
         self.of: dict[int, Grasp] = {}
+        self.changes = 0
         self._welds, self._mass = welds, model.carried.mass
         self.grip = {
             (robot.index, label): m.equality(names.grip(robot.name, label)).id
@@ -43,11 +44,13 @@ class Grasps:
         self._hold(robot, unit, bodies)
 
     def _hold(self, robot: int, unit: int, bodies: Mapping[str, int]) -> None:
+        self.changes += 1
         self._welds.hold(bodies.values(), robot + 1)
         self.of.setdefault(robot, Grasp(unit, {})).bodies.update(bodies)
 
     def let_go(self, robot: int) -> Grasp:
         """A robot lets go of all that it holds, and says what that was."""
+        self.changes += 1
         hand = self.of.pop(robot)
         self._welds.loose([self.grip[robot, label] for label in hand.bodies])
         return hand

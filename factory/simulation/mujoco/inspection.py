@@ -22,7 +22,7 @@ class Inspection:
     """Keeps the worst figures of a run. Contacts are looked at after every step of the engine.
 
     `joining`: for each operation under way (index) the unit whose inputs it joins. `unintended`:
-    onsets of contact that nothing intends, by the names of geoms. `residual` [m]: the largest of a
+    onsets of contact that nothing intends, by the names of geoms; `pressing`: what is no such contact. `residual` [m]: the largest of a
     weld's position. `error` [m]: that of a product.
     """
 
@@ -31,7 +31,7 @@ class Inspection:
     ) -> None:
         self._m, self._d, self._model, self._masks = m, d, model, masks
         self._product = ProductError(model)
-        self._pressing = Pressing(m, model.factory)
+        self.pressing = Pressing(m, model.factory)
         self._touching: frozenset[tuple[int, int]] = frozenset()
         self.joining: dict[int, int] = {}
         self.force: dict[str, float] = {}
@@ -59,7 +59,7 @@ class Inspection:
             label = self._joined(a, b)
             if label is not None:
                 self._press(label, number)
-            elif not self._pressing.meant(a, b, float(found.dist[number])):
+            elif not self.pressing.meant(a, b, float(found.dist[number])):
                 now.add((a, b))
         for a, b in sorted(now - self._touching):
             self.unintended.append((self._m.geom(a).name, self._m.geom(b).name))

@@ -33,7 +33,7 @@ class Motion:
     def __init__(
         self, m: mujoco.MjModel, d: mujoco.MjData, model: Model, start: Array, gains: Array
     ) -> None:
-        self.axes, self.settings = Axes.of(m, model.factory), model.settings
+        self.axes, self.settings, self._d = Axes.of(m, model.factory), model.settings, d
         robots = self.axes.actuator[: self.axes.tray]
         m.actuator_biasprm[robots, 1:3] *= np.asarray(gains)[:, None]
         body, dof = self.axes.body, self.axes.dof
@@ -72,6 +72,14 @@ class Motion:
             stand = axes[self.robots.v[axes] == 0.0]
             if len(stand):
                 self.drives.stand(stand, self.robots.x[stand])
+
+    def put(self, at: Mapping[int, float]) -> None:
+        """Axes are put somewhere else [m], and stand there."""
+        axes, x = np.array([*at], np.intp), np.array([*at.values()])
+        self._d.qpos[self.axes.qpos[axes]], self._d.qvel[self.axes.dof[axes]] = x, 0.0
+        self.robots.x[axes] = x
+        self.robots.stop(axes)
+        self.sleep.wake(self.axes.body[axes].tolist())
 
     def turn(self, active: Index) -> None:
         """Other modes are active. Robots whose operation has ended stop where their reference is:

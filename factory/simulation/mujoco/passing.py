@@ -87,6 +87,12 @@ class Passing:
         """A robot (index) has taken a part from one of its feeders."""
         self.took(self._fed[robot])
 
+    def come_clear(self, robot: int) -> None:
+        """A robot (index) holds nothing, and the next part comes down once it is out of the way, or
+        at home if its hand has to be there first."""
+        for number in self._fed.get(robot, ()):
+            self.holds[number] = not self._first[number]
+
     def clear(self) -> Truth:
         """Whether each robot (n,) is so far away with its part that the next can come down; or, if
         its hand has to be there first, rests at home without one."""

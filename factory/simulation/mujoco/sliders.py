@@ -99,11 +99,15 @@ class Sliders:
             self._load(chosen, down)
             self._drives.stand(chosen, self._strokes.lengths[chosen] * (not down))
 
-    def send(self, chosen: Index, down: bool) -> None:
-        """Sliders set out, down with their loads or up without."""
+    def is_up(self, number: int) -> bool:
+        """Whether a slider that rests is up."""
+        return float(self._d.qpos[self._address[number]]) > self._strokes.lengths[number] / 2
+
+    def send(self, chosen: Index, down: bool, loaded: bool = False) -> None:
+        """Sliders set out, down with their loads or up without, or with what is taken back."""
         if not len(chosen):
             return
-        self._load(chosen, down)
+        self._load(chosen, down or loaded)
         self._drives.follow(chosen, self._strokes.setpoints[int(down), chosen])
         self._down[chosen], self._begun[chosen] = down, self._drives.time
         self.ends[chosen] = self._drives.time + self._strokes.seconds[int(down), chosen]

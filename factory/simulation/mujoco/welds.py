@@ -65,6 +65,13 @@ class Welds:
         """Put a free body somewhere [m], upright and at rest."""
         self._placed[body] = at
 
+    def turn(self, body: int, quaternion: Array) -> None:
+        """Turn a free body where it is."""
+        address = self._m.jnt_qposadr[self._m.body_jntadr[body]]
+        self._d.qpos[address + 3 : address + 7] = quaternion
+        self._d.xquat[body] = quaternion
+        self._sleep.wake([body])
+
     def write(self) -> None:
         """Write all that has been gathered into the engine; bodies that it concerns are woken."""
         if not (self._on or self._off or self._held or self._placed):
