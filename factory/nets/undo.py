@@ -1,116 +1,100 @@
-"""Undo: a failure is firing backwards (few-robots.md, sections d and 45).
+"""Failures and exchanged robots: the marking of how often each transition still has fired.
 
-The state of a marked graph is how often each transition has fired, n; its marking is m = m_0 + C n.
-Undo of transitions D is the greatest n' <= n with
+The state of a live gear train is n, how often each transition has fired; its marking is
+m = m_0 + C n. To undo a set D of transitions is to go on from the greatest n' <= n with
+n'(t) <= n(t) - 1 on D, m_0 + C n' >= 0, and the *material* rule: nothing is taken apart, so where
+an end is undone, what made the things that it joined is undone at least as often.
 
-    n'(t) <= n(t) - 1             for t in D                               (what has failed)
-    m_0 + C n' >= 0                                                       (it is a marking)
-    n(z) - n'(z) >= n(t) - n'(t)  for z that was made into what t made    (material)
+Each condition bounds one count by another plus a constant that is not negative, so the greatest n'
+is unique, and one search finds it, least counts first.
 
-All of these bound an n' by a sum of another n' and a number that is not negative, and the least of
-bounds is a bound: so n' is unique, and one search from D finds it.
-
-Theorem 5 (return). In a live marked graph m' = m_0 + C n' can be reached, since it is not negative
-(Murata 1989, Theorem 21). So any number of undos leaves a live, safe and reversible net so.
-
-Theorem 8 (exchange). With D empty and another net N' over the same transitions the same search
-gives the marking of N' from which it goes on: the robots may be others.
+Theorem 5 (return). m_0 + C n' >= 0 is reachable from m_0, as it is in any live marked graph (Murata
+1989, Theorem 21), so the net is as live, safe and reversible as before. Theorem 8 (exchange): the
+same search, with the places of another live gear train N' that has the same transitions, gives a
+marking that is reachable in N'.
 """
 
 from __future__ import annotations
 
-from collections import deque
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from collections import Counter
+from collections.abc import Iterable, Sequence
+from heapq import heapify, heappop, heappush
 
 from factory.nets.gears import GearNet
+from factory.nets.marked import MarkedNet, marked
 from factory.nets.petri import Marking
-
-Joins = Mapping[int, tuple[int, ...]]
-"""For the end of an operation the transitions that made what it has joined: they are undone as
-often, for nothing is taken apart."""
-
-NOTHING: Joins = {}
-
-
-@dataclass(frozen=True, slots=True)
-class Undone:
-    """That transitions were fired backwards at time `t` [s]: those that were `asked` for, since an
-    `operation` failed for a `reason`, and all that went with them, in the order of the net, each as
-    often as it was undone."""
-
-    t: float
-    operation: str
-    reason: str
-    asked: tuple[str, ...]
-    transitions: tuple[str, ...]
-
-    def as_json(self) -> dict[str, object]:
-        """As `run --json` prints it."""
-        return {
-            "t": round(self.t, 6),
-            "undone": list(self.transitions),
-            "asked": list(self.asked),
-            "operation": self.operation,
-            "reason": self.reason,
-        }
-
-    @classmethod
-    def between(
-        cls,
-        net: GearNet,
-        what: tuple[float, str, str],
-        asked: Iterable[int],
-        before: Sequence[int],
-        after: Sequence[int],
-    ) -> Undone:
-        """That between two counts of firings; `what`: time, operation and reason."""
-        names = [transition.name for transition in net.threaded.transitions]
-        undone = (
-            name for name, n, m in zip(names, before, after, strict=True) for _ in range(n - m)
-        )
-        return cls(*what, tuple(names[event] for event in asked), tuple(undone))
+from factory.nets.undone import Joins
 
 
 def undo(
-    net: GearNet, fired: Sequence[int], asked: Iterable[int] = (), joins: Joins = NOTHING
+    net: GearNet | MarkedNet, fired: Sequence[int], asked: Iterable[int], joins: Joins
 ) -> tuple[int, ...]:
-    """n', given how often each transition has `fired` and which are `asked` to be undone once; with
-    none asked, of a net that these counts need not fit. Linear in what changes, and in the places
-    that do not fit.
+    """n': how often each transition still has fired, where each that is `asked` for is undone as
+    often as it stands there, or oftener.
 
-    Raises ValueError where some transition would have to be undone oftener than it fired.
+    `fired` is n, counted from m_0: from another marking on, `factory.nets.history.firings` is to be
+    added. Linear in what is undone, but for the order. Raises ValueError where a transition has not
+    fired so often as is asked, or no transition is asked for.
     """
-    least, places = list(fired), net.threaded.net.places
-    initial, postset = net.initial_marking, net.threaded.net.postset
-    queue = deque(dict.fromkeys(asked))
-    for event in queue:
-        least[event] -= 1
-    for number, place in enumerate(places):
-        (before,), (after,) = place.left, place.right
-        if least[before] + (number in initial) < least[after]:
-            queue.append(before)
-    while queue:
-        event = queue.popleft()
-        bounds = [(places[p].right[0], least[event] + (p in initial)) for p in postset[event]] + [
-            (z, fired[z] + least[event] - fired[event]) for z in joins.get(event, ())
-        ]
-        for other, most in bounds:
-            if least[other] > most:
-                least[other] = most
-                queue.append(other)
-    if min(least, default=0) < 0:
-        worst = min(range(len(least)), key=least.__getitem__)
-        name = net.threaded.transitions[worst].name
-        raise ValueError(f"{name} would be undone oftener than it has fired")
-    return tuple(least)
+    least = Counter(asked)
+    if not least:
+        raise ValueError("no transition is asked to be undone")
+    return _greatest(marked(net), fired, least, joins, least)
+
+
+def exchange(
+    net: GearNet | MarkedNet, fired: Sequence[int], asked: Iterable[int], joins: Joins
+) -> tuple[int, ...]:
+    """n', where robots are exchanged while the factory runs: `net` is N', whose transitions are
+    those of the net N in which `fired` was counted, in the same order; `asked` may be empty.
+
+    Nothing need be undone. Linear in the net, but for the order. Raises ValueError as `undo`.
+    """
+    return _greatest(marked(net), fired, Counter(asked), joins, range(len(fired)))
+
+
+def tokens_after(net: GearNet | MarkedNet, fired: Sequence[int]) -> tuple[int, ...]:
+    """m_0 + C n: the number of tokens of each place, negative where the counts lead nowhere."""
+    subject = marked(net)
+    pairs = zip(subject.tokens, subject.net.places, strict=True)
+    return tuple(
+        tokens + sum(fired[e] for e in place.left) - sum(fired[e] for e in place.right)
+        for tokens, place in pairs
+    )
 
 
 def marking_after(net: GearNet, fired: Sequence[int]) -> Marking:
     """m_0 + C n, for counts that lead to a marking."""
-    initial = net.initial_marking
-    return frozenset(
-        number
-        for number, place in enumerate(net.threaded.net.places)
-        if (number in initial) + fired[place.left[0]] - fired[place.right[0]] > 0
-    )
+    return frozenset(place for place, count in enumerate(tokens_after(net, fired)) if count)
+
+
+def _greatest(
+    net: MarkedNet,
+    fired: Sequence[int],
+    asked: Counter[int],
+    joins: Joins,
+    begin: Iterable[int],
+) -> tuple[int, ...]:
+    """The greatest counts that meet the conditions. Each is settled when it comes off the heap,
+    since no condition bounds a count by less than another."""
+    found = list(fired)
+    for event, times in asked.items():
+        found[event] -= times
+        if found[event] < 0:
+            name = net.net.transitions[event].name
+            raise ValueError(f"{name} is to be undone {times} times, and has fired {fired[event]}")
+    heap = [(found[event], event) for event in begin]
+    heapify(heap)
+    right, postset = net.right, net.net.postset
+    while heap:
+        count, event = heappop(heap)
+        if count > found[event]:
+            continue
+        bounds = [(right[p], count + net.tokens[p]) for p in postset[event]]
+        undone = fired[event] - count
+        bounds += [(made, fired[made] - undone) for made in joins.get(event, ())]
+        for other, bound in bounds:
+            if other >= 0 and found[other] > bound:
+                found[other] = bound
+                heappush(heap, (bound, other))
+    return tuple(found)

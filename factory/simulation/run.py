@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import NamedTuple
 
-from factory.nets.undo import Undone
+from factory.nets.undone import Entry, Undone
 from factory.plant.approaches import Pair
 from factory.plant.factory import Factory
 from factory.record.ending import CutOff
@@ -26,6 +26,11 @@ class Event(NamedTuple):
     def as_json(self) -> dict[str, object]:
         """As `run --json` prints it."""
         return {"t": round(self.t, 6), "transition": self.transition}
+
+
+def entries_of(events: Iterable[Event | Undone]) -> Iterator[Entry]:
+    """The events as a replay takes them: firings by their names."""
+    return (event.transition if isinstance(event, Event) else event for event in events)
 
 
 STEADY = 4

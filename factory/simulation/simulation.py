@@ -17,11 +17,12 @@ from factory.nets.history import firings
 from factory.nets.petri import Marking
 from factory.nets.replay import replay
 from factory.plant.fused_bodies import FusedBodies, bodies_of, fused_copies
+from factory.plant.material import joins_of
 from factory.problem.robot_types import Catalogue, load_catalogue
 from factory.simulation.distributed import DistributedSupervisor
 from factory.simulation.ideal import IdealWorld
 from factory.simulation.request import RunRequest
-from factory.simulation.run import Run, busy_times
+from factory.simulation.run import Run, busy_times, entries_of
 from factory.simulation.starting import start_positions
 from factory.simulation.supervisor import Supervisor
 from factory.simulation.world import World
@@ -241,7 +242,8 @@ class Simulation:
         supervisor, world, factory = self.supervisor, self.world, self.layout.factory
         request, physics, figures = self.request, world.physics_time, world.figures()
         predicted = self.cycle
-        verdict = replay(factory.net, [getattr(e, "transition", e) for e in supervisor.events], self.start)
+        entries = entries_of(supervisor.events)
+        verdict = replay(factory.net, entries, self.start, joins_of(factory))
         return Run(
             request.world,
             request.units,

@@ -17,7 +17,7 @@ from factory.control.navigation import Bundle
 from factory.modes.staging import HeadStart
 from factory.nets.petri import Marking
 from factory.nets.threads import Threads
-from factory.nets.undo import Undone
+from factory.nets.undone import Undone
 from factory.plant.factory import Factory, Operation
 from factory.simulation.bundles import Bundles
 from factory.simulation.run import Event

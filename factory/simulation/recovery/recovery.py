@@ -12,7 +12,8 @@ import numpy as np
 
 from factory.control.mode import Array
 from factory.nets.petri import Marking
-from factory.nets.undo import Undone, marking_after, undo
+from factory.nets.undo import marking_after, undo
+from factory.nets.undone import Undone
 from factory.plant.factory import Factory, Operation
 from factory.plant.material import joins_of
 from factory.problem.pag import NOPART
