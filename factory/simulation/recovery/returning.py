@@ -30,7 +30,7 @@ PAST = 2e-3
 
 
 @dataclass(slots=True)
-class Way:
+class WayBack:
     """What a robot has yet to do: go to `goals` one after the other, but only when the robots in
     `after` are back, and it is `ready`; then what `done` says. `stage`: the number of what it is
     doing."""
@@ -52,9 +52,9 @@ class Returning:
         self._number = {goal: first + n for n, goal in enumerate(goals)}
         modes = [_mode(layout, axis, at, eps) for axis, at in goals]
         supervisor.bundles = supervisor.bundles.with_more(modes, [(axis,) for axis, _ in goals])
-        self.ways: dict[int, Way] = {}
+        self.ways: dict[int, WayBack] = {}
 
-    def send(self, robot: int, way: Way) -> None:
+    def send(self, robot: int, way: WayBack) -> None:
         """A robot is to go a way, in place of any that it goes."""
         self.ways[robot] = way
 
