@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -10,6 +10,8 @@ import numpy as np
 
 from factory.nets.gears import GearNet
 from factory.nets.replay import replay
+from factory.plant.factory import Factory
+from factory.plant.material import joins_of
 from factory.record.log.header import settings_of
 from factory.record.log.model import model_of
 from factory.record.log.reader import Ends, Log
@@ -48,11 +50,13 @@ def watch_log(log: Log) -> tuple[Report, MonitorSubject]:
     return report, subject
 
 
-def verdict_on(log: Log, net: GearNet, report: Report | None) -> RunVerdict:
-    """The verdict on a run of a net that is recorded in a log, with a monitor's report on that
-    where there is one."""
-    cut, names = log.cut_off, [name for _, name in log.events]
-    refines = replay(net, names, frozenset(log.header["start"])).refines
+def verdict_on(
+    log: Log, factory: Factory, report: Report | None, after: Sequence[GearNet] = ()
+) -> RunVerdict:
+    """The verdict on a run of a factory that is recorded in a log, with a monitor's report on that
+    where there is one; `after`: the nets in which it went on where robots were exchanged."""
+    cut, start = log.cut_off, frozenset(log.header["start"])
+    refines = replay(factory.net, log.entries, start, joins_of(factory), after).refines
     trouble = None if cut is None else cut.failure
     return judged(trouble, refines, log.figures, report)
 
