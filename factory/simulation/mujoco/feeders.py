@@ -204,8 +204,7 @@ class Feeders:
         self.back.good.discard(label)
 
     def served(self) -> Iterator[str]:
-        """The labels of what is awaited by robots that must not come yet: their feeders are taking
-        parts back."""
+        """The labels of feeders that take a part back."""
         for number in self.back.parts:
             line = self._turns.lines[number]
             yield from (self._stations[n].label for n in line)
@@ -238,6 +237,8 @@ class Feeders:
             if self._sliders.ends[number] < NEVER:
                 continue
             if not self._sliders.is_up(number):
+                if not self._passing.is_aside(number):
+                    continue
                 self._sliders.send(np.array([number]), down=False, loaded=True)
                 continue
             station = self._stations[number]

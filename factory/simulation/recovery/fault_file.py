@@ -1,4 +1,4 @@
-"""Fault campaigns as files: TOML with a table [[fault]] for each fault."""
+"""WorldFault campaigns as files: TOML with a table [[fault]] for each fault."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from factory.plant.factory import Factory
-from factory.simulation.recovery.faults import CLEAR, KINDS, OF_LABEL, SWAP, Campaign, Fault, Sensors
+from factory.simulation.recovery.faults import CLEAR, KINDS, OF_LABEL, SWAP, Campaign, WorldFault, Sensors
 from factory.support.errors import Diagnostic, InputError, Position, did_you_mean
 from factory.support.user_defaults import key_position, read_toml
 
@@ -72,7 +72,7 @@ class _Reader:
                 message = f"{key} must be {WORDS[known[key]]}{least}"
                 self.wrong.append(Diagnostic("BadValue", message, at, EXAMPLE))
 
-    def faults(self, tables: list[Any]) -> Iterator[Fault]:
+    def faults(self, tables: list[Any]) -> Iterator[WorldFault]:
         """The faults that are described well."""
         starts = [m.start() for m in re.finditer(r"^\s*\[\[\s*fault\s*\]\]", self.text, re.M)]
         for number, table in enumerate(tables):
@@ -86,7 +86,7 @@ class _Reader:
             if len(self.wrong) == before and (fault := self._fault(table, at)):
                 yield fault
 
-    def _fault(self, table: Mapping[str, Any], at: Position) -> Fault | None:
+    def _fault(self, table: Mapping[str, Any], at: Position) -> WorldFault | None:
         kind = table.get("kind", "")
         if kind not in KINDS:
             hint = did_you_mean(str(kind), [*KINDS], "kinds of faults")
@@ -94,7 +94,7 @@ class _Reader:
             self.wrong.append(Diagnostic("BadFault", message, at, hint))
             return None
         try:
-            return Fault(**{k: float(v) if OF_FAULT[k] is float else v for k, v in table.items()})
+            return WorldFault(**{k: float(v) if OF_FAULT[k] is float else v for k, v in table.items()})
         except ValueError as error:
             self.wrong.append(Diagnostic("BadFault", str(error), at, EXAMPLE))
             return None

@@ -26,7 +26,7 @@ OF_ROBOT, OF_LABEL = {"down", "dead"}, {"misplaced", "bad_part", "no_part", "bad
 
 
 @dataclass(frozen=True, slots=True)
-class Fault:
+class WorldFault:
     """A fault of some kind: in the operations of a `unit` (from 1 on), once from a time `at` [s]
     on, or in a share of all operations (`rate`); exactly one of these.
 
@@ -84,7 +84,7 @@ class Campaign:
     """Faults of a run, drawn by `seed`. `clear` [s]: how long a thing that has fallen lies until
     it is taken away; `swap` [s]: how long it takes to replace a dead robot by one of `spares`."""
 
-    faults: tuple[Fault, ...] = ()
+    faults: tuple[WorldFault, ...] = ()
     seed: int = 0
     clear: float = CLEAR
     sensors: Sensors = field(default_factory=Sensors)

@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence, Set
-from types import MappingProxyType
 
 from factory.plant.factory import Operation
 from factory.problem.pag import NOPART
 from factory.simulation.ideal import IdealWorld
-from factory.simulation.recovery.faults import Fault
+from factory.simulation.recovery.faults import WorldFault
 from factory.simulation.recovery.held import held, marking_of
 from factory.simulation.simulation import Simulation
-
-NOTHING: Mapping[str, float] = MappingProxyType({})
 
 
 class IdealPlant:
@@ -24,7 +21,7 @@ class IdealPlant:
         self._simulation = simulation
         self._gone: set[int] = set()
         self._slipped: dict[int, float] = {}
-        self._bad: dict[str, Fault] = {}
+        self._bad: dict[str, WorldFault] = {}
         self._shown: dict[str, int] = {}
 
     def lose(self, robot: int) -> bool:
@@ -51,7 +48,7 @@ class IdealPlant:
         self._shown = now
         return found
 
-    def spoil(self, label: str, fault: Fault) -> None:
+    def spoil(self, label: str, fault: WorldFault) -> None:
         """What a feeder shows is askew or no good."""
         self._bad[label] = fault
 
@@ -115,13 +112,19 @@ class IdealPlant:
     def let_go(self, robot: int) -> None:
         """A robot lets scrap fall."""
 
+    def takes_back(self, robot: int) -> bool:
+        """Whether something goes back up in a robot's feeder."""
+        return False
+
     def came_back(self, robot: int) -> None:
         """A robot is where it waits."""
 
-    def lying(self) -> Mapping[str, float]:
+    @property
+    def lying(self) -> Sequence[float]:
         """Nothing lies about."""
-        return NOTHING
+        return ()
 
+    @property
     def closed(self) -> frozenset[int]:
         """Nothing is in the way."""
         return frozenset()

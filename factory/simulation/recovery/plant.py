@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence, Set
 from typing import Protocol
 
 from factory.plant.factory import Operation
-from factory.simulation.recovery.faults import Fault
+from factory.simulation.recovery.faults import WorldFault
 
 
 class Plant(Protocol):
@@ -29,7 +29,7 @@ class Plant(Protocol):
     def fresh(self) -> Sequence[tuple[str, int]]:
         """The parts that feeders have begun to show since the last question: label and unit."""
 
-    def spoil(self, label: str, fault: Fault) -> None:
+    def spoil(self, label: str, fault: WorldFault) -> None:
         """What a feeder shows is askew or no good."""
 
     def supplied(self) -> None:
@@ -71,12 +71,17 @@ class Plant(Protocol):
     def let_go(self, robot: int) -> None:
         """A robot lets scrap fall."""
 
+    def takes_back(self, robot: int) -> bool:
+        """Whether something goes back up in a robot's feeder."""
+
     def came_back(self, robot: int) -> None:
         """A robot is where it waits."""
 
-    def lying(self) -> Mapping[str, float]:
-        """What lies about, and until when [s]."""
+    @property
+    def lying(self) -> Sequence[float]:
+        """Until when [s] things lie about."""
 
+    @property
     def closed(self) -> frozenset[int]:
         """The robots that could touch what lies about."""
 

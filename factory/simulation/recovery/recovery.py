@@ -22,7 +22,7 @@ from factory.simulation.recovery.faults import Campaign
 from factory.simulation.recovery.held import held, marking_of, step_of
 from factory.simulation.recovery.plant import Plant
 from factory.simulation.failures import Failing, Failures
-from factory.simulation.recovery.returning import Goal, Returning, Way, order_of
+from factory.simulation.recovery.returning import Goal, Returning, WayBack, order_of
 from factory.simulation.recovery.standing import Standing
 from factory.simulation.recovery.striking import Striking
 from factory.simulation.run import Event
@@ -93,7 +93,7 @@ class Recovery:
     @property
     def _stopped(self) -> frozenset[int]:
         """Robots that begin nothing."""
-        return frozenset({*self.plant.closed(), *self.dead, *self.returning.ways})
+        return frozenset({*self.plant.closed, *self.dead, *self.returning.ways})
 
     def _sensed(self, x: Array, v: Array) -> tuple[Array, Array]:
         return (np.full_like(x, np.nan), np.full_like(v, np.nan)) if self._is_dark else (x, v)
@@ -162,7 +162,7 @@ class Recovery:
             del self.pending[number]
             if number in self._supervisor.active.operations:
                 self._failed(self._factory.operations[number], test)
-        excused = frozenset({*self.plant.closed(), *self.dead})
+        excused = frozenset({*self.plant.closed, *self.dead})
         for robot in self.standing.jammed(now, excused):
             if robot not in self.dead:
                 self._died(robot, now)
@@ -171,15 +171,20 @@ class Recovery:
         """A feeder takes a part back: its robot gets out of the way of the next."""
         self._note(test, leaf.label, "", "scrap", (leaf.label,))
         self._count(leaf.label)
-        robot, marking = leaf.carrier, self._marking
+        robot = leaf.carrier
         step = self._place_of(robot)
         if self._factory.robots[robot].operations[step // 2] != leaf.index:
             return
         if leaf.index in self._supervisor.active.operations:
             self._undo((leaf.start,), leaf, test)
-            return
         self._supervisor.recall(self.standing.axes([robot]))
-        self.returning.send(robot, Way(self.returning.rest(robot, marking)))
+        rest = WayBack(self.returning.rest(robot, self._marking), ready=partial(self._is_up, robot))
+        back = partial(self.returning.send, robot, rest)
+        self.returning.send(robot, WayBack(self.returning.aside(robot, leaf), done=back))
+
+    def _is_up(self, robot: int) -> bool:
+        """Whether nothing goes back up in a robot's feeder."""
+        return not self.plant.takes_back(robot)
 
     def _lost(self, robot: int) -> None:
         """A robot has lost what it held: that is made again."""
@@ -274,19 +279,18 @@ class Recovery:
             for slot, robot in enumerate(came):
                 after[robot] = frozenset(came[slot + 1 :])
         for robot in robots:
-            rest = self.returning.rest(robot, marking)
+            rest, home = self.returning.rest(robot, marking), self.returning.home(robot)
+            goals, done = rest, partial(self.plant.came_back, robot)
             if robot in scrap:
-                home = self.returning.home(robot)
-                way = Way(home, after.get(robot, frozenset()), partial(self._bin, robot, rest))
-            else:
-                way = Way(rest, after.get(robot, frozenset()), partial(self.plant.came_back, robot))
-            self.returning.send(robot, way)
+                goals, done = home, partial(self._bin, robot, rest)
+            first = after.get(robot, frozenset[int]())
+            self.returning.send(robot, WayBack(goals, first, done, partial(self._is_up, robot)))
 
     def _bin(self, robot: int, rest: list[Goal]) -> None:
         """A robot at the B end of its guidepath lets scrap fall into the bin there, and goes to
         where it waits."""
         self.plant.let_go(robot)
-        self.returning.send(robot, Way(rest))
+        self.returning.send(robot, WayBack(rest))
 
     def _go_on(self, now: float) -> None:
         """Robots stand, go on and come back; spares come."""
@@ -296,12 +300,12 @@ class Recovery:
             self.returning.ways.pop(robot, None)
             self.plant.lift_out(robot, dict(self.returning.rest(robot, self._marking)))
             self.plant.supplied()
-        closed = self.plant.closed()
+        closed = self.plant.closed
         self.standing.let_stand({*closed, *self.striking.standing, *self.dead})
         self.returning.tick({*closed, *self.dead})
         self._supervisor.enabled |= not self._stopped
         hooks = self.simulation.world.hooks
-        ends = [*self.plant.lying().values(), *self.striking.empty.values(), self.striking.dark]
+        ends = [*self.plant.lying, *self.striking.empty.values(), self.striking.dark]
         ends += [until for until in (*self.dead.values(), *self.striking.standing.values())]
         hooks.busy = max([hooks.busy, *(until for until in ends if np.isfinite(until))])
         if self.returning.ways:
@@ -380,7 +384,7 @@ def recover(simulation: Simulation, campaign: Campaign = Campaign()) -> Recovery
 
         plant = IdealPlant(simulation)
     else:
-        from factory.simulation.mujoco.recovering import MujocoPlant
+        from factory.simulation.mujoco.failing.plant import MujocoPlant
 
         plant = MujocoPlant(simulation.physical, campaign)
     return Recovery(simulation, campaign, plant)

@@ -15,6 +15,7 @@ from factory.control.mode import Array, Mode
 from factory.layout.feeding import passing
 from factory.layout.layout import Layout
 from factory.nets.petri import Marking
+from factory.plant.factory import Operation
 from factory.simulation.starting import start_positions
 from factory.simulation.supervisor import Supervisor
 
@@ -29,13 +30,15 @@ PAST = 2e-3
 
 
 @dataclass(slots=True)
-class Way:
+class WayBack:
     """What a robot has yet to do: go to `goals` one after the other, but only when the robots in
-    `after` are back; then what `done` says. `stage`: the number of what it is doing."""
+    `after` are back, and it is `ready`; then what `done` says. `stage`: the number of what it is
+    doing."""
 
     goals: list[Goal]
     after: frozenset[int] = frozenset()
     done: Callable[[], None] = lambda: None
+    ready: Callable[[], bool] = lambda: True
     stage: int = -1
 
 
@@ -49,9 +52,9 @@ class Returning:
         self._number = {goal: first + n for n, goal in enumerate(goals)}
         modes = [_mode(layout, axis, at, eps) for axis, at in goals]
         supervisor.bundles = supervisor.bundles.with_more(modes, [(axis,) for axis, _ in goals])
-        self.ways: dict[int, Way] = {}
+        self.ways: dict[int, WayBack] = {}
 
-    def send(self, robot: int, way: Way) -> None:
+    def send(self, robot: int, way: WayBack) -> None:
         """A robot is to go a way, in place of any that it goes."""
         self.ways[robot] = way
 
@@ -60,6 +63,8 @@ class Returning:
         going, held, begun = {*self._supervisor.active.ahead}, {*held}, list[int]()
         for robot, way in [*self.ways.items()]:
             if way.stage in going or robot in held or not way.after.isdisjoint(self.ways):
+                continue
+            if way.goals and not way.ready():
                 continue
             if way.goals:
                 way.stage = self._number[_rounded(way.goals.pop(0))]
@@ -75,6 +80,12 @@ class Returning:
         lift, layout = self._lift(robot), self._layout
         rise = [] if lift is None else [(lift, _highest(layout, robot))]
         return [*rise, (robot, layout.guidepaths[robot].length)]
+
+    def aside(self, robot: int, leaf: Operation) -> list[Goal]:
+        """The way of a robot out of the way of its feeder; none where its hand is there before what
+        that shows comes down, and when it goes up again."""
+        hand = self._layout.hand(robot)
+        return [] if hand is not None and hand.first else [(robot, _aside(self._layout, leaf))]
 
     def rest(self, robot: int, marking: Marking) -> list[Goal]:
         """The way of a robot to where it waits in a marking. Where the part that it takes next has
@@ -108,7 +119,13 @@ def _waiting(layout: Layout, robot: int, step: int) -> float:
     at, operation = layout.home(robot, program[step]), factory.operations[program[step]]
     if operation.inputs or (hand is not None and hand.first):
         return at
-    return max(0.0, at - passing(layout, operation) - PAST)
+    return _aside(layout, operation)
+
+
+def _aside(layout: Layout, leaf: Operation) -> float:
+    """Where the robot of a feeder is out of the way of what that shows [m]."""
+    at = layout.guidepaths[leaf.carrier].length
+    return max(0.0, at - passing(layout, leaf) - PAST)
 
 
 def _highest(layout: Layout, robot: int) -> float:
@@ -123,6 +140,8 @@ def _goals(layout: Layout) -> Iterable[Goal]:
         yield _rounded((robot.index, layout.guidepaths[robot.index].length))
         for step, number in enumerate(robot.operations):
             yield _rounded((robot.index, _waiting(layout, robot.index, step)))
+            if not factory.operations[number].inputs:
+                yield _rounded((robot.index, _aside(layout, factory.operations[number])))
             if robot.index in lifts:
                 yield _rounded((lifts[robot.index], layout.level(robot.index, number).up))
         if robot.index in lifts:

@@ -8,7 +8,7 @@ import numpy as np
 
 from factory.plant.factory import Operation
 from factory.problem.pag import NOPART
-from factory.simulation.recovery.faults import Campaign, Fault
+from factory.simulation.recovery.faults import Campaign, WorldFault
 from factory.simulation.recovery.plant import Plant
 
 EARLY, LATE = 0.1, 0.9
@@ -58,7 +58,7 @@ class Striking:
         """A robot (index) stands until then [s]."""
         self.standing[robot] = max(self.standing.get(robot, 0.0), until)
 
-    def shown(self, label: str, unit: int, now: float) -> Fault | None:
+    def shown(self, label: str, unit: int, now: float) -> WorldFault | None:
         """What is wrong with a part that a feeder is about to show for a unit."""
         return self._strikes("bad_part", unit, now, label) or self._strikes(
             "misplaced", unit, now, label
@@ -85,7 +85,7 @@ class Striking:
 
     def _strikes(
         self, kind: str, unit: int, now: float, label: str, robot: str = ""
-    ) -> Fault | None:
+    ) -> WorldFault | None:
         for number, fault in enumerate(self._campaign.faults):
             if fault.kind != kind or number in self._spent:
                 continue
