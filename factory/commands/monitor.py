@@ -37,7 +37,7 @@ def monitor(file: Path, lenient: bool, out: OutputOptions) -> int:
 
     log = read_log(file)
     report, subject = watch_log(log)
-    verdict = replace(verdict_on(log, subject.factory.net, report), lenient=lenient)
+    verdict = replace(verdict_on(log, subject.factory, report), lenient=lenient)
     if out.as_json:
         document = {
             "log": str(file),

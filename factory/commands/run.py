@@ -213,7 +213,7 @@ def summarise(record: Run, factory: Factory, verbose: bool) -> None:
         f"bottleneck {record.bottleneck}"
     )
     say(
-        f"{len(record.events)} transitions fired, "
+        f"{record.fired} transitions fired, "
         f"the record {'refines' if record.replays else 'DOES NOT REFINE'} the net"
     )
     physics = record.physics

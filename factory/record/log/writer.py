@@ -17,8 +17,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from factory.lang import write_pag, write_template
+from factory.nets.undone import Undone
 from factory.problem.pag import PAG
 from factory.record.log.blocks import LENGTH, MAGIC, Arrays, bad_log, block, pack_rows
+from factory.record.log.undone import undone_as_json
 from factory.record.monitor.observation import EngineView
 from factory.record.monitor.subject import subject_of_run
 from factory.record.observed import Observed, Recorder
@@ -33,8 +35,8 @@ STATES = ("qpos", "qvel", "ctrl")
 
 class _Ticks:
     """The ticks of a block: lists with an entry for each, or with a row number and what is recorded
-    of that row; rows of the ends of operations; the marking and the active constraints recorded
-    last."""
+    of that row; rows of the ends of operations; what was undone; the marking and the active
+    constraints recorded last."""
 
     def __init__(self) -> None:
         self.time: list[float] = []
@@ -45,6 +47,7 @@ class _Ticks:
         self.contacts: list[tuple[int, Any, Any]] = []
         self.fired: list[tuple[int, int, float]] = []
         self.ended: list[int] = []
+        self.undone: list[dict[str, object]] = []
         self.marked: bytes | None = None
         self.welds: NDArray[np.intp] | None = None
 
@@ -68,6 +71,7 @@ class _Ticks:
             "fired": fired[:, 1].astype(np.int32),
             "fired_t": fired[:, 2],
             "ended_at": np.array(self.ended, np.int32),
+            **({"undone": _text(json.dumps(self.undone))} if self.undone else {}),
         }
 
 
@@ -93,7 +97,7 @@ class LogWriter(Recorder):
         net = simulation.layout.factory.net.threaded
         self.numbers = {t.name: n for n, t in enumerate(net.transitions)}
         self.most = max(1, round(1.0 / simulation.request.settings.tick))
-        self.events = 0
+        self.events = self.fired = 0
         self.ticks = _Ticks()
         self.trouble: Diagnostic | None = None
         sizes = [len(values) for values in self._state()[:2]]
@@ -138,7 +142,11 @@ class LogWriter(Recorder):
             if self.view.d.ncon:
                 ticks.contacts.append((row, contact.geom.copy(), contact.dist.copy()))
         for event in supervisor.events[self.events :]:
+            if isinstance(event, Undone):
+                ticks.undone.append(undone_as_json(event, self.fired))
+                continue
             ticks.fired.append((row, self.numbers[event.transition], event.t))
+            self.fired += 1
         self.events = len(supervisor.events)
         if row + 1 == self.most:
             self.flush()
@@ -179,7 +187,7 @@ class LogWriter(Recorder):
             texts = {"code": self.trouble.code, "message": self.trouble.message}
         if (figures := self.world.figures()) is not None:
             texts["figures"] = json.dumps(kept_figures(figures))
-        return {name: np.frombuffer(text.encode(), "u1") for name, text in texts.items()}
+        return {name: _text(text) for name, text in texts.items()}
 
     def _append(self, content: bytes) -> None:
         """Write all of it or, where there is no room, nothing, so that the file can be closed."""
@@ -197,6 +205,11 @@ class LogWriter(Recorder):
             return self.world.x.copy(), self.world.v.copy()
         d = self.view.d
         return d.qpos.copy(), d.qvel.copy(), d.ctrl.copy()
+
+
+def _text(text: str) -> NDArray[np.uint8]:
+    """A text as an array."""
+    return np.frombuffer(text.encode(), "u1")
 
 
 def _ragged(name: str, rows: Sequence[tuple[int, Any]], shape: tuple[int, ...]) -> Arrays:

@@ -73,7 +73,7 @@ class Recording:
     @cached_property
     def verdict(self) -> RunVerdict:
         """Whether the run succeeded."""
-        return verdict_on(self.log, self.factory.net, self.monitor)
+        return verdict_on(self.log, self.factory, self.monitor)
 
     @cached_property
     def stage(self) -> DrawnFactory:
