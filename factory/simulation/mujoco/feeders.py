@@ -19,6 +19,7 @@ from factory.mjcf.masks import feeder_codes
 from factory.mjcf.model import Model
 from factory.mjcf.parts import presented_at
 from factory.plant.factory import Operation
+from factory.simulation.keeping import Keeper, one_of, rows, up_to
 from factory.simulation.mujoco.copies import Copies
 from factory.simulation.mujoco.passing import Passing
 from factory.simulation.mujoco.sliders import NEVER, Sliders
@@ -56,6 +57,13 @@ class Supply:
     def rounds(self) -> dict[str, int]:
         """How many parts of each label have been taken."""
         return {label: unit // self.period for label, unit in self.next.items()}
+
+    def keep(self, keeper: Keeper) -> None:
+        """Which units come next."""
+        self.released = keeper.whole("supply.released", self.released)
+        rounds = np.array([*self.next.values()])
+        keeper.array("supply.next", rounds, 0)
+        self.next = dict(zip(self.next, rounds.tolist(), strict=True))
 
     def wants(self, label: str) -> bool:
         """Whether some unit has yet to get its part."""
@@ -164,6 +172,21 @@ class Feeders:
         come = self._asked & {*loaded.tolist()}
         self._asked -= come
         return bool(come)
+
+    def keep(self, keeper: Keeper) -> None:
+        """What is presented and asked for, and whose turn it is."""
+        self.supply.keep(keeper)
+        self._turns.keep(keeper)
+        self._passing.keep(keeper)
+        shown = [[label, unit] for label, unit in self._shown.items()]
+        shown = keeper.value("feeders.shown", shown, rows(one_of(self._number), up_to(np.inf)))
+        asked = [[number] for number in sorted(self._asked)]
+        asked = keeper.value("feeders.asked", asked, rows(up_to(len(self._stations))))
+        self.due = keeper.number("feeders.due", self.due, high=NEVER)
+        self._shown = {label: unit for label, unit in shown}
+        self._asked = {number for (number,) in asked}
+        if any((label, unit) not in self._copies for label, unit in shown):
+            raise ValueError("its feeders show parts that are not there")
 
     def _send(self, numbers: Index, down: bool) -> None:
         self._sliders.send(numbers, down)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from math import comb
 
 import numpy as np
@@ -9,6 +10,7 @@ import numpy as np
 from factory.mjcf.model import Model
 from factory.mjcf.weld_frames import residuals
 from factory.plant.factory import Operation
+from factory.simulation.keeping import Keeper, is_size, one_of, rows, up_to
 from factory.simulation.mujoco.contacts import ContactMasks
 from factory.simulation.mujoco.pressing import Pressing
 from factory.simulation.mujoco.product_error import ProductError
@@ -64,6 +66,26 @@ class Inspection:
         for a, b in sorted(now - self._touching):
             self.unintended.append((self._m.geom(a).name, self._m.geom(b).name))
         self._touching = frozenset(now)
+
+    def keep(self, keeper: Keeper) -> None:
+        """The figures, what touches, and what is being joined."""
+        operations, a_geom = self._model.factory.operations, up_to(self._m.ngeom)
+        labels = {operation.label for operation in operations}
+        joining = [[number, unit] for number, unit in self.joining.items()]
+        joining = keeper.value("joins", joining, rows(up_to(len(operations)), up_to(np.inf)))
+        force = [[label, newtons] for label, newtons in self.force.items()]
+        force = keeper.value("forces", force, rows(one_of(labels), is_size))
+        touching = [[*pair] for pair in sorted(self._touching)]
+        touching = keeper.value("touching", touching, rows(a_geom, a_geom))
+        onsets = [[*pair, count] for pair, count in Counter(self.unintended).items()]
+        is_name = one_of({self._m.geom(n).name for n in range(self._m.ngeom)} if onsets else "")
+        onsets = keeper.value("onsets", onsets, rows(str.__instancecheck__, is_name, up_to(10**6)))
+        self.residual = keeper.number("residual", self.residual, 0)
+        self.error = keeper.value("error", self.error, lambda v: v is None or is_size(v))
+        self.joining = {number: unit for number, unit in joining}
+        self.force = {label: newtons for label, newtons in force}
+        self._touching = frozenset((a, b) for a, b in touching)
+        self.unintended = [(a, b) for a, b, count in onsets for _ in range(count)]
 
     def _joined(self, one: int, other: int) -> str | None:
         """The label of the operation that is joining the parts of two geoms, None for none."""

@@ -14,6 +14,7 @@ from factory.mjcf import names
 from factory.mjcf.model import Model
 from factory.plant.factory import Operation
 from factory.problem.pag import NOPART
+from factory.simulation.keeping import Keeper
 from factory.simulation.request import RunRequest
 from factory.support.engine import mujoco
 
@@ -86,6 +87,10 @@ class Passing:
     def holding(self, robot: int) -> None:
         """A robot (index) has taken a part from one of its feeders."""
         self.took(self._fed[robot])
+
+    def keep(self, keeper: Keeper) -> None:
+        """Which robots have yet to deliver."""
+        keeper.array("passing.holds", self.holds, 0, 1)
 
     def clear(self) -> Truth:
         """Whether each robot (n,) is so far away with its part that the next can come down; or, if
