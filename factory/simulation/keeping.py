@@ -7,13 +7,15 @@ What is taken up comes from a file, which may say anything: each value is checke
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Container, Iterable, Mapping
 from typing import Any, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 T = TypeVar("T")
+R = TypeVar("R", bound=tuple[Any, ...])
+Test = Callable[[Any], bool]
 Arrays = Mapping[str, NDArray[Any]]
 
 LARGE = 10**9
@@ -39,8 +41,11 @@ class Keeper(Protocol):
         """The content of an array, which is written over when it is taken up: of the same shape,
         and from `low` to `high`."""
 
-    def value(self, name: str, value: T, is_good: Callable[[Any], bool]) -> T:
+    def value(self, name: str, value: T, is_good: Test) -> T:
         """A value of JSON, where it `is_good`."""
+
+    def rows(self, name: str, rows: Iterable[R], *tests: Test) -> list[R]:
+        """Rows of values of JSON, each of which passes its test."""
 
     def number(self, name: str, value: float, low: float = -LARGE, high: float = LARGE) -> float:
         """A number from `low` to `high`, to the last bit."""
@@ -72,9 +77,13 @@ class Noting:
     ) -> None:
         self._arrays[name] = np.array(values, KINDS[values.dtype.kind])
 
-    def value(self, name: str, value: T, is_good: Callable[[Any], bool]) -> T:
+    def value(self, name: str, value: T, is_good: Test) -> T:
         self._values[name] = value
         return value
+
+    def rows(self, name: str, rows: Iterable[R], *tests: Test) -> list[R]:
+        self._values[name] = [*rows]
+        return self._values[name]  # type: ignore[no-any-return]
 
     def number(self, name: str, value: float, low: float = -LARGE, high: float = LARGE) -> float:
         self._arrays[name] = np.array([value], float)
@@ -115,7 +124,16 @@ class TakingUp:
             raise ValueError(f"'{name}' is out of range: not from {low:g} to {high:g}")
         values[...] = found
 
-    def value(self, name: str, value: T, is_good: Callable[[Any], bool]) -> T:
+    def rows(self, name: str, rows: Iterable[R], *tests: Test) -> list[R]:
+        found: Any = self.value(name, [], lambda v: isinstance(v, list))
+        for row in found:
+            if not isinstance(row, list) or len(row) != len(tests):
+                raise ValueError(f"'{name}' can have no row {row!r:.60}")
+            if not all(test(x) for test, x in zip(tests, row, strict=True)):
+                raise ValueError(f"'{name}' can have no row {row!r:.60}")
+        return [tuple(row) for row in found]  # type: ignore[misc]
+
+    def value(self, name: str, value: T, is_good: Test) -> T:
         if name not in self._values:
             raise ValueError(f"it has no '{name}'")
         found: T = self._values[name]
@@ -135,22 +153,12 @@ class TakingUp:
         return self.value(name, value, lambda v: type(v) is int and low <= v <= high)
 
 
-def rows(*tests: Callable[[Any], bool]) -> Callable[[Any], bool]:
-    """Whether a value is a list of rows, each with a value for each test that passes it."""
-    return lambda v: isinstance(v, list) and all(
-        isinstance(row, list)
-        and len(row) == len(tests)
-        and all(test(x) for test, x in zip(tests, row, strict=True))
-        for row in v
-    )
-
-
-def up_to(count: float) -> Callable[[Any], bool]:
+def up_to(count: float) -> Test:
     """Whether a value is a whole number from 0 to less than `count`."""
     return lambda v: type(v) is int and 0 <= v < count
 
 
-def one_of(names: Any) -> Callable[[Any], bool]:
+def one_of(names: Container[str]) -> Test:
     """Whether a value is one of some names."""
     return lambda v: isinstance(v, str) and v in names
 
@@ -158,3 +166,8 @@ def one_of(names: Any) -> Callable[[Any], bool]:
 def is_size(value: Any) -> bool:
     """Whether a value is a number from 0, not too large."""
     return type(value) in (int, float) and 0 <= value <= LARGE
+
+
+def is_text(value: Any) -> bool:
+    """Whether a value is a text."""
+    return isinstance(value, str)

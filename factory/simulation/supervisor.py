@@ -19,7 +19,7 @@ from factory.nets.petri import Marking
 from factory.nets.threads import Threads
 from factory.plant.factory import Factory, Operation
 from factory.simulation.bundles import Bundles
-from factory.simulation.keeping import Keeper, rows, up_to
+from factory.simulation.keeping import Keeper, up_to
 from factory.simulation.run import Event
 from factory.simulation.world import World
 
@@ -153,10 +153,10 @@ class Supervisor:
         and its number, where that is taken up. Raises ValueError where these are not of one run."""
         fired = np.array(self.fired)
         keeper.array("fired", fired, 0)
-        going = [[number] for number in self.active.operations]
-        going = keeper.value("going", going, rows(up_to(len(self.factory.operations))))
-        ahead = [[number] for number in self.active.ahead]
-        ahead = keeper.value("ahead", ahead, rows(self.ahead.place.__contains__))
+        going = [(number,) for number in self.active.operations]
+        going = keeper.rows("going", going, up_to(len(self.factory.operations)))
+        ahead = [(number,) for number in self.active.ahead]
+        ahead = keeper.rows("ahead", ahead, self.ahead.place.__contains__)
         clocks = np.zeros(len(going) + len(ahead))
         if self.active.clocks is not None:
             clocks[:] = self.active.clocks

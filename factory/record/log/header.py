@@ -118,6 +118,8 @@ KEYS = (
     Key("jitter", "a number from 0 to less than 1", lambda v: is_number(v) and 0 <= v < 1),
     Key("units", "a whole number from 1", whole(1, LARGE)),
     Key("wip", "a whole number from 1, or null", maybe(whole(1, LARGE)), later=True),
+    Key("fuse", "true or false", of(bool), later=True),
+    Key("distributed", "true or false", of(bool), later=True),
     Key("start", "a list of numbers of places", listed(is_count), later=True),
     Key("settings", "a table of numbers", tabled(is_number)),
     Key("product", "a text", is_text),

@@ -19,7 +19,7 @@ from factory.mjcf.masks import feeder_codes
 from factory.mjcf.model import Model
 from factory.mjcf.parts import presented_at
 from factory.plant.factory import Operation
-from factory.simulation.keeping import Keeper, one_of, rows, up_to
+from factory.simulation.keeping import Keeper, one_of, up_to
 from factory.simulation.mujoco.copies import Copies
 from factory.simulation.mujoco.passing import Passing
 from factory.simulation.mujoco.sliders import NEVER, Sliders
@@ -178,14 +178,14 @@ class Feeders:
         self.supply.keep(keeper)
         self._turns.keep(keeper)
         self._passing.keep(keeper)
-        shown = [[label, unit] for label, unit in self._shown.items()]
-        shown = keeper.value("feeders.shown", shown, rows(one_of(self._number), up_to(np.inf)))
-        asked = [[number] for number in sorted(self._asked)]
-        asked = keeper.value("feeders.asked", asked, rows(up_to(len(self._stations))))
+        a_label, a_unit = one_of(self._number), up_to(np.inf)
+        shown = keeper.rows("feeders.shown", self._shown.items(), a_label, a_unit)
+        asked = [(number,) for number in sorted(self._asked)]
+        asked = keeper.rows("feeders.asked", asked, up_to(len(self._stations)))
         self.due = keeper.number("feeders.due", self.due, high=NEVER)
-        self._shown = {label: unit for label, unit in shown}
+        self._shown = dict(shown)
         self._asked = {number for (number,) in asked}
-        if any((label, unit) not in self._copies for label, unit in shown):
+        if any(part not in self._copies for part in shown):
             raise ValueError("its feeders show parts that are not there")
 
     def _send(self, numbers: Index, down: bool) -> None:

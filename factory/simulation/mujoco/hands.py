@@ -8,7 +8,7 @@ from math import inf
 
 from factory.mjcf import names
 from factory.mjcf.model import Model
-from factory.simulation.keeping import Keeper, rows, up_to
+from factory.simulation.keeping import Keeper, is_text, up_to
 from factory.simulation.mujoco.copies import Copies
 from factory.simulation.mujoco.welds import Welds
 from factory.support.engine import mujoco
@@ -57,9 +57,9 @@ class Grasps:
 
     def keep(self, keeper: Keeper, copies: Copies) -> None:
         """What every robot holds."""
-        held = [[r, hand.unit, label] for r, hand in self.of.items() for label in hand.bodies]
+        held = [(r, hand.unit, label) for r, hand in self.of.items() for label in hand.bodies]
         a_number = up_to(inf)
-        held = keeper.value("hands", held, rows(a_number, a_number, lambda v: isinstance(v, str)))
+        held = keeper.rows("hands", held, a_number, a_number, is_text)
         if not keeper.takes_up:
             return
         self.of.clear()

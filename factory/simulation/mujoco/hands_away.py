@@ -9,7 +9,7 @@ from factory.control.mode import Index
 from factory.layout.hands.leaving import Leaving, leavings
 from factory.layout.layout import Layout
 from factory.plant.factory import Operation
-from factory.simulation.keeping import Keeper, rows, up_to
+from factory.simulation.keeping import Keeper, up_to
 from factory.simulation.mujoco.courses import AHEAD, Follower
 from factory.support.engine import mujoco
 
@@ -51,14 +51,14 @@ class HandsAway:
     def keep(self, keeper: Keeper) -> None:
         """What holds up which operation."""
         held = [
-            [number, self._leavings[number].index(one)]
+            (number, self._leavings[number].index(one))
             for number, left in self._held.items()
             for one in left
         ]
-        held = keeper.value("away.held", held, rows(self._leavings.__contains__, up_to(inf)))
+        held = keeper.rows("away.held", held, up_to(inf), up_to(inf))
         found: dict[int, tuple[Leaving, ...]] = {}
         for number, one in held:
-            if one >= len(self._leavings[number]):
+            if one >= len(self._leavings.get(number, ())):
                 raise ValueError("its operations wait for hands that are not there")
             found[number] = (*found.get(number, ()), self._leavings[number][one])
         self._held = found

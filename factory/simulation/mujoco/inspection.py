@@ -10,7 +10,7 @@ import numpy as np
 from factory.mjcf.model import Model
 from factory.mjcf.weld_frames import residuals
 from factory.plant.factory import Operation
-from factory.simulation.keeping import Keeper, is_size, one_of, rows, up_to
+from factory.simulation.keeping import Keeper, is_size, is_text, one_of, up_to
 from factory.simulation.mujoco.contacts import ContactMasks
 from factory.simulation.mujoco.pressing import Pressing
 from factory.simulation.mujoco.product_error import ProductError
@@ -18,6 +18,9 @@ from factory.simulation.mujoco.strength import StrengthUse
 from factory.simulation.mujoco.welds import Welds
 from factory.simulation.run import PhysicsFigures
 from factory.support.engine import mujoco
+
+MOST_ONSETS = 10**7
+"""So many onsets of contact are taken up at most."""
 
 
 class Inspection:
@@ -71,20 +74,19 @@ class Inspection:
         """The figures, what touches, and what is being joined."""
         operations, a_geom = self._model.factory.operations, up_to(self._m.ngeom)
         labels = {operation.label for operation in operations}
-        joining = [[number, unit] for number, unit in self.joining.items()]
-        joining = keeper.value("joins", joining, rows(up_to(len(operations)), up_to(np.inf)))
-        force = [[label, newtons] for label, newtons in self.force.items()]
-        force = keeper.value("forces", force, rows(one_of(labels), is_size))
-        touching = [[*pair] for pair in sorted(self._touching)]
-        touching = keeper.value("touching", touching, rows(a_geom, a_geom))
-        onsets = [[*pair, count] for pair, count in Counter(self.unintended).items()]
-        is_name = one_of({self._m.geom(n).name for n in range(self._m.ngeom)} if onsets else "")
-        onsets = keeper.value("onsets", onsets, rows(str.__instancecheck__, is_name, up_to(10**6)))
+        an_operation = up_to(len(operations))
+        joins = keeper.rows("joins", self.joining.items(), an_operation, up_to(np.inf))
+        force = keeper.rows("forces", self.force.items(), one_of(labels), is_size)
+        touching = keeper.rows("touching", sorted(self._touching), a_geom, a_geom)
+        onsets = [(*pair, count) for pair, count in Counter(self.unintended).items()]
+        onsets = keeper.rows("onsets", onsets, is_text, is_text, up_to(MOST_ONSETS))
         self.residual = keeper.number("residual", self.residual, 0)
         self.error = keeper.value("error", self.error, lambda v: v is None or is_size(v))
-        self.joining = {number: unit for number, unit in joining}
-        self.force = {label: newtons for label, newtons in force}
-        self._touching = frozenset((a, b) for a, b in touching)
+        self.joining = dict(joins)
+        self.force = dict(force)
+        self._touching = frozenset(touching)
+        if sum(count for _, _, count in onsets) > MOST_ONSETS:
+            raise ValueError(f"'onsets' are more than {MOST_ONSETS}")
         self.unintended = [(a, b) for a, b, count in onsets for _ in range(count)]
 
     def _joined(self, one: int, other: int) -> str | None:

@@ -8,7 +8,7 @@ from types import MappingProxyType
 import numpy as np
 
 from factory.mjcf.model import Model
-from factory.simulation.keeping import Keeper, is_size, one_of, rows, up_to
+from factory.simulation.keeping import Keeper, is_size, one_of, up_to
 from factory.simulation.mujoco.copies import Copies
 from factory.simulation.mujoco.feeders import Feeders
 from factory.simulation.mujoco.fusing import RIGID, SETTLING, Fusion
@@ -34,14 +34,13 @@ class Joining:
 
     def keep(self, keeper: Keeper) -> None:
         """What waits to become one body, and how far out of place parts were."""
-        waiting = [[robot, *since] for robot, since in self.waiting.items()]
-        misfit = [[unit, apart] for unit, apart in self.misfit.items()]
-        a_robot, a_label = self._hands.of.__contains__, one_of(self._copies.body)
-        waiting = keeper.value("joining.waiting", waiting, rows(up_to(np.inf), a_label, is_size))
-        misfit = keeper.value("joining.misfit", misfit, rows(up_to(np.inf), is_size))
+        waiting = [(robot, *since) for robot, since in self.waiting.items()]
+        a_number, a_label = up_to(np.inf), one_of(self._copies.body)
+        waiting = keeper.rows("joining.waiting", waiting, a_number, a_label, is_size)
+        misfit = keeper.rows("joining.misfit", self.misfit.items(), a_number, is_size)
         self.waiting = {robot: (label, since) for robot, label, since in waiting}
-        self.misfit = {unit: apart for unit, apart in misfit}
-        if not all(map(a_robot, self.waiting)):
+        self.misfit = dict(misfit)
+        if not self.waiting.keys() <= self._hands.of.keys():
             raise ValueError("its robots have joined what they do not hold")
 
     def weigh(self, m: mujoco.MjModel, d: mujoco.MjData) -> None:

@@ -154,7 +154,9 @@ class Parts:
         self.joining.keep(keeper)
         self.welds.keep(keeper)
         unit = keeper.value("parts.on_tray", self.on_tray, lambda v: v is None or up_to(np.inf)(v))
-        if unit is not None and any((label, unit) not in self.copies for label in self.labels(unit)):
+        if unit is not None and any(
+            (label, unit) not in self.copies for label in self.labels(unit)
+        ):
             raise ValueError("its tray carries what is not there")
         self.on_tray = unit
 
