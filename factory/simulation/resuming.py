@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from io import FileIO
 from os import SEEK_END
 from pathlib import Path
@@ -24,6 +24,7 @@ from factory.simulation.request import RunRequest
 from factory.simulation.simulation import Simulation
 from factory.support.claim import claimed_again
 from factory.support.errors import Diagnostic, InputError
+from factory.support.settings import AUTO
 
 IN_ITSELF = ("Stalled", "Dropped", "Unstable")
 """What ends a run that would end in the same way if it went on."""
@@ -122,7 +123,7 @@ def _done(kept: KeptRun) -> CutOff | None:
 def _check(kept: KeptRun) -> None:
     """Raises InputError (BadLog) where a run cannot be gone on with."""
     header, now = kept.header, versions()
-    if "distributed" not in header or (kept.ticks > 1 and not kept.checkpoints):
+    if "chosen" not in header or (kept.ticks > 1 and not kept.checkpoints):
         raise InputError(_bad(kept.path, "has no checkpoints to go on from", AGAIN))
     if header["distributed"]:
         words = "is of a run with --distributed, which has no checkpoints to go on from"
@@ -146,6 +147,12 @@ def _request(kept: KeptRun) -> RunRequest:
         header["wip"],
         fuse=header["fuse"],
     )
+
+
+def _asked(request: RunRequest, timestep: bool, wip: bool) -> RunRequest:
+    """The request as it was before timestep and wip were chosen for it, where they were."""
+    settings = replace(request.settings, timestep=AUTO) if timestep else request.settings
+    return replace(request, settings=settings, wip=None if wip else request.wip)
 
 
 def _going_on(
@@ -173,6 +180,7 @@ def _made(kept: KeptRun, project: Project, request: RunRequest) -> Simulation:
     header = kept.header
     with of_its_factory():
         made = Simulation(project.layout, request)
+        made.asked = _asked(request, **header["chosen"])
         factory = made.layout.factory
         net = factory.net.threaded
         names = [[x.name for x in found] for found in (net.transitions, net.places, factory.robots)]

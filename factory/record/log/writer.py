@@ -27,6 +27,7 @@ from factory.record.verdict import kept_figures
 from factory.support.claim import claimed
 from factory.support.errors import Diagnostic, FactoryError, InputError
 from factory.support.files import unwritten
+from factory.support.settings import AUTO
 from factory.support.version import release
 
 STATES = ("qpos", "qvel", "ctrl")
@@ -256,6 +257,10 @@ def _header(
         "jitter": simulation.request.jitter,
         "units": simulation.request.units,
         "wip": simulation.request.wip,
+        "chosen": {
+            "timestep": simulation.asked.settings.timestep == AUTO,
+            "wip": simulation.asked.wip is None,
+        },
         "distributed": simulation.request.distributed,
         "fuse": simulation.request.fuse,
         "start": sorted(simulation.start),
