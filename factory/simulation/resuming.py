@@ -123,11 +123,11 @@ def _done(kept: KeptRun) -> CutOff | None:
 def _check(kept: KeptRun) -> None:
     """Raises InputError (BadLog) where a run cannot be gone on with."""
     header, now = kept.header, versions()
-    if "chosen" not in header or (kept.ticks > 1 and not kept.checkpoints):
-        raise InputError(_bad(kept.path, "has no checkpoints to go on from", AGAIN))
-    if header["distributed"]:
+    if header.get("distributed"):
         words = "is of a run with --distributed, which has no checkpoints to go on from"
         raise InputError(_bad(kept.path, words, "leave out --distributed"))
+    if "chosen" not in header or (kept.ticks > 1 and not kept.checkpoints):
+        raise InputError(_bad(kept.path, "has no checkpoints to go on from", AGAIN))
     for package in ("klavins-factory", "mujoco"):
         then, here = header["versions"].get(package, ""), now.get(package, "")
         if then != here:
