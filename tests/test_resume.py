@@ -429,30 +429,29 @@ def test_sizes() -> None:
 
 
 def killed_and_gone_on(
-    folder: Path, words: tuple[object, ...], kills: int, chance: Random, lasts: float
+    folder: Path, words: tuple[object, ...], kills: int, chance: Random, size: int
 ) -> list[float]:
-    """A run that is killed so many times, at random times, each time within so many seconds [s]
-    after its log has begun; gives where it went on from [s]. It is let come to its end."""
+    """A run that is killed so many times, each at a random time until its log has as large a share
+    of its whole `size` as of its kills; gives where it went on from [s]. It is let come to its
+    end."""
     log, came = folder / "run.log", list[float]()
     command: tuple[object, ...] = ("run", *words, "--log", log, "-q")
-    for _ in range(kills):
+    for kill in range(kills):
+        wanted = size * chance.uniform(kill + 0.05, kill + 0.9) / kills
         with started(*command) as process:
-            size = log.stat().st_size if log.exists() else 0
             deadline = time.monotonic() + 60
-            while not log.exists() or log.stat().st_size == size:
-                if process.poll() is not None or time.monotonic() > deadline:
-                    break
-                time.sleep(0.002)
-            time.sleep(chance.uniform(0.0, lasts))
+            while not log.exists() or log.stat().st_size < wanted:
+                assert process.poll() is None and time.monotonic() < deadline
+                time.sleep(0.001)
+            time.sleep(chance.uniform(0.0, 0.01))
             process.send_signal(signal.SIGKILL)
-            process.wait()
+            assert process.wait() == -signal.SIGKILL
         found = kept_run(log).checkpoints
         came.append(float(found[-1][1]["time"][0]) if found else 0.0)
         command = "run", "--resume", log, "-q"
     done = spawn(*command[:-1], "--json")
     assert done.status == 0, done.err
-    if "sim_time_s" in done.json:
-        assert done.json["unintended_contacts"] == 0 and done.json["refines_net"]
+    assert done.json["unintended_contacts"] == 0 and done.json["refines_net"]
     told = spawn("monitor", log, "--json")
     assert told.status == 0 and told.json["refines_net"] and told.json["verdict"]["succeeded"]
     return came
@@ -461,7 +460,7 @@ def killed_and_gone_on(
 @pytest.mark.skipif(sys.platform == "win32", reason="there is no SIGKILL")
 def test_a_run_that_is_killed_goes_on(whole: Path, tmp_path: Path) -> None:
     words = (PAPER, "--units", UNITS, "--seed", 7, "--jitter", 0.2)
-    killed_and_gone_on(tmp_path, words, 1, Random(3), 0.1)
+    killed_and_gone_on(tmp_path, words, 1, Random(3), whole.stat().st_size)
     assert ticks_of(tmp_path / "run.log") == ticks_of(whole)
 
 
@@ -481,9 +480,7 @@ def test_twenty_kills(tmp_path: Path, number: int) -> None:
     units are made, and the log is that of a run that was never killed."""
     words = (*FACTORIES[number], "--seed", number)
     whole = tmp_path / "whole.log"
-    begin = time.monotonic()
     assert spawn("run", *words, "--log", whole, "-q").status == 0
-    lasts = (time.monotonic() - begin) / 4
-    came = killed_and_gone_on(tmp_path, words, 5, Random(number), lasts)
+    came = killed_and_gone_on(tmp_path, words, 5, Random(number), whole.stat().st_size)
     assert ticks_of(tmp_path / "run.log") == ticks_of(whole)
     print(number, read_log(whole).time[-1], came)
