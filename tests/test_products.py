@@ -56,6 +56,14 @@ def test_large_products_are_made(run: Terminal, name: str) -> None:
     assert_well_made(run, name, 1)
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize(("name", "robots"), [(SMALL[0], 7), (SMALL[1], 17)])
+def test_magazines_of_lines_are_solid(run: Terminal, name: str, robots: int) -> None:
+    words = ("--robots", robots, "--seconds", 30, "--seeds", 1, "--units", 2, "--no-convergence")
+    done = run("fidelity", product(name), *words, "--jobs", 1, "--json")
+    assert done.json["figures"]["hidden_penetration_max_mm"]["worst"] < 0.1
+
+
 @pytest.mark.parametrize("name", LARGE)
 def test_large_products_are_built(run: Terminal, tmp_path: Path, name: str) -> None:
     done = run("build", product(name), "--mjcf", tmp_path / "m.xml", "--units", 1, "--json")
