@@ -25,8 +25,8 @@ INPUTS = 3
 
 
 class Drives:
-    """The drives of some axes, of which `actuators` (axes,) are the numbers; their buffers are of
-    one size, and side by side.
+    """The drives of some axes, of which `actuators` (axes,) are the numbers, one perhaps of several
+    axes of which at most one moves; their buffers are of one size, and side by side.
 
     `mass` [kg] (axes,): what the force of a setpoint accelerates; `own` without a load. `weight`
     [N] (axes,): what it carries. `control` (axes,): where an axis's setpoint is in `ctrl`.
@@ -43,7 +43,8 @@ class Drives:
         size = 2 + (1 + INPUTS) * samples
         at = m.actuator_historyadr[actuators]
         first, self._row = int(at.min()), (at - at.min()) // size
-        self._buffers = d.history[first : first + len(at) * size].reshape(-1, size)
+        count = int(self._row.max()) + 1
+        self._buffers = d.history[first : first + count * size].reshape(-1, size)
         early = np.arange(samples) - samples - self.most - 0.5
         self._head = np.concatenate([[samples - 1.0], self.timestep * early])
 

@@ -136,8 +136,8 @@ class Feeders:
     def begin(self) -> None:
         """Where the run starts, each feeder presents a part if it can and its robot is not yet
         under way with another."""
-        down = self._load(np.flatnonzero(self._turns.now & ~self._passing.holds), down=True)
-        self._sliders.begin(np.setdiff1d(np.arange(len(self._stations)), down))
+        due = np.flatnonzero(self._turns.now & ~self._passing.holds)
+        self._sliders.begin(self._load(due, down=True))
 
     def presents(self, label: str, unit: int, now: float) -> bool:
         """Whether a robot may come for the part for that unit: it is down before the robot can be

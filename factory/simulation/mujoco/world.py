@@ -137,6 +137,8 @@ class MujocoWorld:
         if axes is not motion.active:
             motion.turn(axes)
             self._look()
+            if self.supplied:
+                ticks = 1
         if bundle is None:
             ticks = min(ticks, self.model.settings.stride - self._unseen)
         else:
