@@ -51,7 +51,7 @@ class Kept:
 
 
 @dataclass(frozen=True)
-class Source:
+class InPlace:
     """The parts of a product in place, in the order of the source.
 
     `notes` says in words what was found; `warnings` what may be wrong. `files` are the mesh files
@@ -82,3 +82,6 @@ class Source:
             else:
                 found.setdefault(keep.label, tuple(by_label[label] for label in keep.parts))
         return tuple(found.items())
+
+
+Source = InPlace
