@@ -23,7 +23,7 @@ from factory.support import gl
 from factory.support.engine import mujoco
 from factory.support.resource import Closing
 
-FPS = 24.0
+FPS = 20.0
 
 STILL: tuple[Size, Size] = (1280, 720), (900, 1200)
 FILM: tuple[Size, Size] = (960, 540), (600, 800)
@@ -32,7 +32,7 @@ FILM: tuple[Size, Size] = (960, 540), (600, 800)
 AZIMUTH, ELEVATION, TURN = -58.0, 31.0, 40.0
 """From where the camera looks, and how far round it goes in a film [degrees]."""
 
-BEFORE, AFTER, SLOWEST, LONGEST = 1.2, 2.0, 0.8, 12.0
+BEFORE, AFTER, SLOWEST, LONGEST = 1.2, 1.8, 0.7, 10.0
 """Parts stand apart and the product stands for these times; an operation takes at most the third,
 and all together the fourth [s]."""
 

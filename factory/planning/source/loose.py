@@ -49,7 +49,7 @@ def _folder(folder: Path) -> Bodies:
     found = [made for path in files if (made := _read(path, faults, whole=True)) is not None]
     if faults:
         raise InputError(faults)
-    check_count(folder, [path.name for path in files], "files of meshes")
+    check_count(folder, [path.stem for path in files], "files of meshes")
     left = [p.name for p in seen if p not in files]
     notes = [f"{len(files)} files of meshes, a part each"]
     if left:
@@ -71,7 +71,7 @@ def _read(path: Path, faults: list[Diagnostic], whole: bool = False) -> Bodies |
         return replace(made, notes=(f"{len(made.found)} bodies in {path.name}",))
     except (OSError, UnreadableMesh) as error:
         why = error.strerror if isinstance(error, OSError) else error
-        message = f"cannot read {quoted(str(path))}: {why}"
+        message = f"cannot read {quoted(path.name)}: {why}"
         code = "BadFile" if isinstance(error, OSError) else "BadMesh"
         faults.append(Diagnostic(code, message, None, ANEW))
         return None
