@@ -358,6 +358,19 @@ def test_an_open_mesh_is_mended_and_that_is_said(terminal: Terminal, tmp_path: P
     assert any("it is mended" in warning["message"] for warning in done.json["warnings"])
 
 
+def test_a_hull_that_stands_for_a_mesh_is_told(
+    terminal: Terminal, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("factory.geometry.decomposition.release", lambda package: "")
+    ring = trimesh.creation.annulus(20, 40, 30)
+    ring.apply_translation((300, 200, 440))
+    parts = folder_of(tmp_path / "parts", {**table(), "ring": ring})
+    done = terminal("plan", parts, "-o", tmp_path / "out", "--no-look", "--json")
+    (warning,) = done.json["warnings"]
+    assert "ring.obj is not convex" in warning["message"]
+    assert "decompose" in warning["hint"]
+
+
 def test_a_tree_is_not_thrown_away_unasked(terminal: Terminal, tmp_path: Path) -> None:
     paper = ROOT / "examples" / "paper.pag"
     chair = ROOT / "examples" / "chair.pag"
