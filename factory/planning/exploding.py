@@ -14,7 +14,7 @@ from factory.geometry.solids import Product
 from factory.plant.approaches import Approach, Kind
 from factory.problem.pag import PAG
 
-ROOM = 0.08
+ROOM = 0.15
 """Between what is taken apart there is this share of the product's diagonal."""
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -36,6 +36,9 @@ BEFORE, AFTER, SLOWEST, LONGEST = 1.2, 1.8, 0.7, 10.0
 """Parts stand apart and the product stands for these times; an operation takes at most the third,
 and all together the fourth [s]."""
 
+AROUND = 3.0
+"""So many times the product's depth of the floor gets clean shadows: beyond it is speckled."""
+
 EVEN = 12
 """Half the frames over which the camera's way is evened out."""
 
@@ -68,16 +71,16 @@ class ExplodedView:
         with _Stage(self, size) as stage:
             write_still(path, stage.still())
 
-    def film(self, path: Path) -> int:
+    def film(self, path: Path, fps: float = FPS) -> int:
         """Write the film; gives the number of its frames. Raises as `still` does."""
         size = FILM[self.is_upright]
-        check_output(path, size, FPS)
+        check_output(path, size, fps)
         count = len(self.explosion.steps)
         slow = min(SLOWEST, LONGEST / max(count, 1))
-        frames = round((BEFORE + slow * count + AFTER) * FPS)
-        times = np.arange(frames) / FPS
+        frames = round((BEFORE + slow * count + AFTER) * fps)
+        times = np.arange(frames) / fps
         done = np.clip((times - BEFORE) / slow, 0.0, count)
-        with _Stage(self, size) as stage, VideoFile(path, size, FPS) as file:
+        with _Stage(self, size) as stage, VideoFile(path, size, fps) as file:
             for view, now in zip(stage.views(done), done, strict=True):
                 file.write(stage.picture(float(now), view))
         return frames
@@ -113,7 +116,8 @@ class _Stage(Closing):
         """All apart."""
         self._place(0.0)
         axes = towards(AZIMUTH, ELEVATION)
-        return self.renderer.mean(fit(self.shown._points(0.0), axes, self.framing), SAMPLES)
+        view = fit(self.shown._points(0.0), axes, self.framing)
+        return self.renderer.mean(replace(view, depth=AROUND * view.depth), SAMPLES)
 
     def picture(self, done: float, view: View) -> Pixels:
         """When so many operations are done."""
@@ -134,7 +138,7 @@ class _Stage(Closing):
         turned = [towards(float(angle), ELEVATION) for angle in angles]
         moments = zip(turned, done, strict=True)
         found = [fit(self.shown._points(float(now)), axes, self.framing) for axes, now in moments]
-        numbers = np.array([(*(v.axes @ v.position), v.distance, v.depth) for v in found])
+        numbers = np.array([(*(v.axes @ v.position), v.distance, AROUND * v.depth) for v in found])
         calm = _evened(numbers)
         return [
             View(axes.T @ row[:3], axes, v.wide, v.tall, float(row[3]), float(row[4]))
