@@ -90,7 +90,7 @@ def loose_product(path: Path, bodies: Bodies, unit: str | None) -> TreeProduct:
     notes = list(bodies.notes)
     if len(bodies.found) == 1 and len(pieces := apart(bodies.found[0])) > 1:
         bodies = replace(bodies, found=pieces)
-        notes.append(f"one body of {len(pieces)} pieces that do not touch: a part each")
+        notes.append(f"one body of {len(pieces)} pieces that share no corner: a part each")
     check_count(path, [body.name for body in bodies.found], "bodies")
     metres, said = unit_of(bodies, unit)
     name = file_stem(path.stem if path.suffix else path.resolve().name)
