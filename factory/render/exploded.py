@@ -36,6 +36,9 @@ BEFORE, AFTER, SLOWEST, LONGEST = 1.2, 1.8, 0.7, 10.0
 """Parts stand apart and the product stands for these times; an operation takes at most the third,
 and all together the fourth [s]."""
 
+MANY = 30_000
+"""A film of more triangles has half the frames, and no shadows: these cost a second pass."""
+
 AROUND = 3.0
 """So many times the product's depth of the floor gets clean shadows: beyond it is speckled."""
 
@@ -72,8 +75,10 @@ class ExplodedView:
             write_still(path, stage.still())
 
     def film(self, path: Path, fps: float = FPS) -> int:
-        """Write the film; gives the number of its frames. Raises as `still` does."""
+        """Write the film, with so many frames a second or half as many where there is much to draw;
+        gives the number of its frames. Raises as `still` does."""
         size = FILM[self.is_upright]
+        fps = fps if self.faces <= MANY else fps / 2
         check_output(path, size, fps)
         count = len(self.explosion.steps)
         slow = min(SLOWEST, LONGEST / max(count, 1))
@@ -84,6 +89,12 @@ class ExplodedView:
             for view, now in zip(stage.views(done), done, strict=True):
                 file.write(stage.picture(float(now), view))
         return frames
+
+    @property
+    def faces(self) -> int:
+        """How many triangles it has."""
+        solids = (self.product.solids[label] for label in self.explosion.parts)
+        return sum(12 if solid.mesh is None else len(solid.mesh.faces) for solid in solids)
 
     def _points(self, done: float) -> Array:
         """The corners of all boxes (8 n, 3) when so many operations are done."""
@@ -122,7 +133,7 @@ class _Stage(Closing):
     def picture(self, done: float, view: View) -> Pixels:
         """When so many operations are done."""
         self._place(done)
-        return np.ascontiguousarray(self.renderer.draw(view, True)[::-1])
+        return np.ascontiguousarray(self.renderer.draw(view, self.shown.faces <= MANY)[::-1])
 
     def _place(self, done: float) -> None:
         if done != self.last:
