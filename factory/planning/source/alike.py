@@ -28,7 +28,7 @@ SAMPLE = 12
 
 
 @dataclass(frozen=True)
-class Shape:
+class PartShape:
     """The surface of a part in place: vertices (n, 3) of which each is used, faces (m, 3)."""
 
     vertices: Array = field(repr=False)
@@ -70,13 +70,13 @@ class Shape:
         second += np.einsum("m,mi,mj->ij", area, total, total)
         return float(area.sum()), area @ total / 3, second / 12
 
-    def mirrored(self) -> Shape:
+    def mirrored(self) -> PartShape:
         """Its mirror image in the plane x = 0."""
-        return Shape(self.vertices * (-1.0, 1.0, 1.0), self.faces[:, ::-1])
+        return PartShape(self.vertices * (-1.0, 1.0, 1.0), self.faces[:, ::-1])
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Motion:
+class RigidMotion:
     """A rigid motion: x goes to turn x + shift."""
 
     turn: Array = field(default_factory=lambda: np.eye(3))
@@ -89,29 +89,29 @@ class Alike:
     takes the first to it. `twins` are pairs of kinds that are mirror images of each other."""
 
     kinds: tuple[int, ...]
-    motions: tuple[Motion, ...]
+    motions: tuple[RigidMotion, ...]
     twins: tuple[tuple[int, int], ...]
 
 
-def shape_of(vertices: Array, faces: Indices) -> Shape:
+def shape_of(vertices: Array, faces: Indices) -> PartShape:
     """The shape of a mesh in which vertices in one place may be several, and some unused."""
     import trimesh
 
     body = trimesh.Trimesh(vertices, faces, process=False)
     body.merge_vertices(merge_tex=True, merge_norm=True)
     used, corners = np.unique(np.asarray(body.faces), return_inverse=True)
-    return Shape(np.asarray(body.vertices)[used], corners.reshape(-1, 3))
+    return PartShape(np.asarray(body.vertices)[used], corners.reshape(-1, 3))
 
 
-def alike(shapes: Sequence[Shape]) -> Alike:
+def alike(shapes: Sequence[PartShape]) -> Alike:
     """The kinds of shapes, in the order of the first of each."""
     firsts: dict[int, list[int]] = {}
     kinds: list[int] = []
-    motions: list[Motion] = []
+    motions: list[RigidMotion] = []
     for index, shape in enumerate(shapes):
         same = firsts.setdefault(len(shape.vertices), [])
         found = ((first, motion_between(shapes[first], shape)) for first in same)
-        kind, motion = next(((k, m) for k, m in found if m is not None), (index, Motion()))
+        kind, motion = next(((k, m) for k, m in found if m is not None), (index, RigidMotion()))
         if kind == index:
             same.append(index)
         kinds.append(kind)
@@ -126,7 +126,7 @@ def alike(shapes: Sequence[Shape]) -> Alike:
     return Alike(tuple(kinds), tuple(motions), tuple(sorted(twins)))
 
 
-def motion_between(one: Shape, other: Shape) -> Motion | None:
+def motion_between(one: PartShape, other: PartShape) -> RigidMotion | None:
     """The rigid motion that takes one shape to another; None where there is none."""
     slack = max(one.slack, other.slack)
     if len(one.vertices) != len(other.vertices) or not _may_fit(one, other, slack):
@@ -137,7 +137,7 @@ def motion_between(one: Shape, other: Shape) -> Motion | None:
     return _searched(one, other, slack)
 
 
-def _may_fit(one: Shape, other: Shape, slack: float) -> bool:
+def _may_fit(one: PartShape, other: PartShape, slack: float) -> bool:
     """Whether what no motion changes is the same."""
     if np.abs(np.sort(one.radii) - np.sort(other.radii)).max() > slack:
         return False
@@ -147,7 +147,7 @@ def _may_fit(one: Shape, other: Shape, slack: float) -> bool:
     return bool(close and np.abs(spread).max() <= reach * one.size**2)
 
 
-def _searched(one: Shape, other: Shape, slack: float) -> Motion | None:
+def _searched(one: PartShape, other: PartShape, slack: float) -> RigidMotion | None:
     """The motion found by trying pairs of vertices of the other shape for two of the one: with the
     middles they say how it is turned, and two that stand at rare distances have few candidates."""
     from scipy.spatial import cKDTree
@@ -176,7 +176,7 @@ def _searched(one: Shape, other: Shape, slack: float) -> Motion | None:
     return None
 
 
-def _anchors(shape: Shape, slack: float) -> tuple[int, int]:
+def _anchors(shape: PartShape, slack: float) -> tuple[int, int]:
     """Two vertices, not in line with the middle, of which few others are as far from it."""
     order = np.sort(shape.radii)
     count = np.searchsorted(order, shape.radii + 2 * slack, "right")
@@ -202,7 +202,7 @@ def _frame(pair: Array) -> Array:
     return np.column_stack([along, np.cross(across, along), across])
 
 
-def _fitted(one: Shape, other: Shape, order: Indices, slack: float) -> Motion | None:
+def _fitted(one: PartShape, other: PartShape, order: Indices, slack: float) -> RigidMotion | None:
     """The motion that fits vertex i to vertex order[i] best, if it fits the surfaces too."""
     turn = _turn(one.spokes, other.spokes[order])
     if np.abs(one.spokes @ turn.T - other.spokes[order]).max() > slack:
@@ -212,7 +212,7 @@ def _fitted(one: Shape, other: Shape, order: Indices, slack: float) -> Motion | 
     second = turn @ one.surface[2] @ turn.T - other.surface[2]
     if np.abs(first).max() > reach * one.size or np.abs(second).max() > reach * one.size**2:
         return None
-    return Motion(turn, other.middle - turn @ one.middle)
+    return RigidMotion(turn, other.middle - turn @ one.middle)
 
 
 def _turn(one: Array, other: Array) -> Array:
@@ -222,11 +222,11 @@ def _turn(one: Array, other: Array) -> Array:
     return np.asarray(left @ np.diag([1.0, 1.0, sign]) @ right)
 
 
-def moved(motion: Motion, points: Array) -> Array:
+def moved(motion: RigidMotion, points: Array) -> Array:
     """Points (n, 3) after a motion."""
     return points @ motion.turn.T + motion.shift
 
 
-def after(motion: Motion, turn: Array) -> Motion:
+def after(motion: RigidMotion, turn: Array) -> RigidMotion:
     """A motion, and then a rotation (3, 3) about the origin."""
     return replace(motion, turn=turn @ motion.turn, shift=turn @ motion.shift)

@@ -19,7 +19,7 @@ LONGEST = 5.0
 
 
 @dataclass(frozen=True, slots=True)
-class Body:
+class FileBody:
     """A part of a file: its triangles where they are in the product, in the file's unit. `name` is
     "" where the file has none; `colour` None likewise."""
 
@@ -39,14 +39,14 @@ class Bodies:
     """The bodies of a source. `unit` is the one that it states, "" for none; `by` says which rule
     states it."""
 
-    found: tuple[Body, ...]
+    found: tuple[FileBody, ...]
     unit: str = ""
     by: str = ""
     notes: tuple[str, ...] = ()
     warnings: tuple[Diagnostic, ...] = ()
 
 
-def box_of(body: Body) -> tuple[Array, Array]:
+def box_of(body: FileBody) -> tuple[Array, Array]:
     """The bounding box of a body: low (3,), high (3,)."""
     used = np.concatenate([vertices[np.unique(faces)] for vertices, faces in body.mesh.bodies])
     return used.min(axis=0), used.max(axis=0)
@@ -74,7 +74,7 @@ def _long(length: float, unit: str) -> str:
     return f"the product is {length * UNITS[unit]:.4g} m long"
 
 
-def apart(body: Body) -> tuple[Body, ...]:
+def apart(body: FileBody) -> tuple[FileBody, ...]:
     """The connected components of a body, each as one; the body itself where it is one."""
     vertices, faces = body.mesh.merged()
     number = components(len(vertices), faces)
@@ -84,5 +84,5 @@ def apart(body: Body) -> tuple[Body, ...]:
     for index in range(int(number.max()) + 1):
         used, corners = np.unique(faces[number == index], return_inverse=True)
         mesh = MeshFile(((vertices[used], corners.reshape(-1, 3)),))
-        found.append(Body(f"{body.name}-{index + 1}", mesh, body.colour))
+        found.append(FileBody(f"{body.name}-{index + 1}", mesh, body.colour))
     return tuple(found)

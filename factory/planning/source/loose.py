@@ -17,7 +17,7 @@ from factory.importing.mesh_files import MeshStore
 from factory.importing.places import quaternion, rounded
 from factory.lang.source import quoted
 from factory.planning.source.alike import alike, shape_of
-from factory.planning.source.bodies import Bodies, Body, apart, unit_of
+from factory.planning.source.bodies import Bodies, FileBody, apart, unit_of
 from factory.planning.source.faults import check_count
 from factory.planning.source.scene_file import MESHES, SCENES, read_one, read_scene
 from factory.planning.source.trees import TreeProduct
@@ -98,7 +98,7 @@ def loose_product(path: Path, bodies: Bodies, unit: str | None) -> TreeProduct:
 
 
 def _assembled(
-    name: str, path: Path, bodies: tuple[Body, ...], unit: float
+    name: str, path: Path, bodies: tuple[FileBody, ...], unit: float
 ) -> tuple[PAG, dict[str, bytes]]:
     """The PAG that mates all bodies at once, and its mesh files."""
     here, store = Position(str(path), 1, 1), MeshStore("meshes")
@@ -127,7 +127,7 @@ def _scaled(mesh: tuple[Array, Indices], unit: float) -> tuple[Array, Indices]:
     return mesh[0] * unit, mesh[1]
 
 
-def _name(body: Body, index: int) -> str:
+def _name(body: FileBody, index: int) -> str:
     """A name that begins with a letter: that of the body, or its number."""
     label = label_of(body.name)
     if not label:

@@ -10,7 +10,7 @@ from factory.geometry.meshes import Array, Indices, hull_mesh
 from factory.geometry.product import product_geometry
 from factory.geometry.solids import Solid, rotation
 from factory.planning.parts import PlacedPart
-from factory.planning.source.alike import Shape, shape_of
+from factory.planning.source.alike import PartShape, shape_of
 from factory.problem.pag import PAG
 from factory.support.errors import Diagnostic
 
@@ -38,6 +38,6 @@ def surface(solid: Solid) -> tuple[Array, Indices]:
     return solid.mesh.vertices @ turn.T + solid.position, np.asarray(solid.mesh.faces)
 
 
-def shape_in_place(part: PlacedPart) -> Shape:
+def shape_in_place(part: PlacedPart) -> PartShape:
     """The shape of a part, to be compared with others."""
     return shape_of(part.vertices, part.faces)

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from factory.geometry.mesh_reader import MeshFile, UnreadableMesh, checked, read_mesh, reading
-from factory.planning.source.bodies import Bodies, Body
+from factory.planning.source.bodies import Bodies, FileBody
 from factory.support.extras import optional
 
 if TYPE_CHECKING:
@@ -74,7 +74,7 @@ def read_scene(content: bytes, suffix: str) -> Bodies:
     return Bodies(metres, "m", f"the 3MF file states {unit}")
 
 
-def _body(scene: trimesh.Scene, node: str, suffix: str) -> Body | None:
+def _body(scene: trimesh.Scene, node: str, suffix: str) -> FileBody | None:
     """The body at a node of a scene; None for what has no triangles."""
     import trimesh
 
@@ -87,7 +87,7 @@ def _body(scene: trimesh.Scene, node: str, suffix: str) -> Body | None:
     if np.linalg.det(matrix[:3, :3]) < 0:
         faces = faces[:, ::-1]
     name = next((n for n in (node, geometry) if not NAMELESS.fullmatch(str(n))), "")
-    return Body(str(name), checked([(vertices, faces)], suffix), _colour(mesh))
+    return FileBody(str(name), checked([(vertices, faces)], suffix), _colour(mesh))
 
 
 def _colour(mesh: Any) -> tuple[float, ...] | None:
@@ -102,10 +102,10 @@ def _colour(mesh: Any) -> tuple[float, ...] | None:
     return tuple(round(float(x) / 255, 3) for x in np.asarray(found)[:4])
 
 
-def _scaled(bodies: tuple[Body, ...], unit: float) -> tuple[Body, ...]:
+def _scaled(bodies: tuple[FileBody, ...], unit: float) -> tuple[FileBody, ...]:
     """Bodies with their lengths times a unit."""
     return tuple(
-        Body(b.name, MeshFile(tuple((v * unit, f) for v, f in b.mesh.bodies)), b.colour)
+        FileBody(b.name, MeshFile(tuple((v * unit, f) for v, f in b.mesh.bodies)), b.colour)
         for b in bodies
     )
 
@@ -114,12 +114,12 @@ def read_one(path: Path, content: bytes) -> Bodies:
     """The bodies of a file as one body, named after the file. Raises UnreadableMesh."""
     suffix = path.suffix.lower()
     if suffix in MESHES:
-        return Bodies((Body(path.stem, read_mesh(content, suffix)),))
+        return Bodies((FileBody(path.stem, read_mesh(content, suffix)),))
     scene = read_scene(content, suffix)
     every = tuple(body for found in scene.found for body in found.mesh.bodies)
     colours = {found.colour for found in scene.found}
     colour = colours.pop() if len(colours) == 1 else None
-    return Bodies((Body(path.stem, MeshFile(every), colour),), scene.unit, scene.by)
+    return Bodies((FileBody(path.stem, MeshFile(every), colour),), scene.unit, scene.by)
 
 
 @contextmanager
