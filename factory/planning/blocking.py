@@ -11,7 +11,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -51,36 +50,54 @@ class Blocking:
     """The blocking graphs of the units of a plan, by their `labels`.
 
     `levels` (3, n, n): how much j is in the way of i that goes out along +x, +y or +z; what goes
-    the other way has the transpose. `room` (3, n, n): the least room [m] between both on that way,
+    the other way has the transpose. `locks` (3, n, n): whether it may not go out past j. `room` (3, n, n): the least room [m] between both on that way,
     less than 0 where they overlap, infinite where they do not come near. `touch` (n, n): which
     units touch. `low`, `high` (n, 3): their boxes [m].
     """
 
     labels: tuple[str, ...]
     levels: NDArray[np.int8] = field(repr=False)
+    locks: NDArray[np.bool_] = field(repr=False)
     room: Array = field(repr=False)
     touch: NDArray[np.bool_] = field(repr=False)
     low: Array = field(repr=False)
     high: Array = field(repr=False)
-    allowed: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
-        for array in (self.levels, self.room, self.touch, self.low, self.high):
+        for array in (self.levels, self.locks, self.room, self.touch, self.low, self.high):
             array.setflags(write=False)
 
     def __len__(self) -> int:
         return len(self.labels)
 
-    @cached_property
-    def locks(self) -> NDArray[np.bool_]:
-        """The pairs (3, n, n) that interlock along an axis, but for those with a unit that is
-        `allowed` to pass through others."""
-        free = np.isin(self.labels, self.allowed)
-        return np.asarray((self.levels >= LOCKED) & ~(free[:, None] | free))
-
     def allowing(self, labels: Sequence[str]) -> Blocking:
         """The same, where whatever units with these labels pass through is accepted."""
-        return replace(self, allowed=(*self.allowed, *labels))
+        free = np.isin(self.labels, labels)
+        return replace(self, locks=self.locks & ~(free[:, None] | free))
+
+    def grouped(self, groups: Sequence[Sequence[int]]) -> Blocking:
+        """The same of groups of units, each joined already; each is named after its first."""
+        count = len(groups)
+        member = np.zeros((count, len(self)), bool)
+        for number, group in enumerate(groups):
+            member[number, list(group)] = True
+        order = np.concatenate([np.flatnonzero(row) for row in member])
+        starts = np.concatenate([[0], np.cumsum(member.sum(axis=1))[:-1]])
+
+        def most(table: Array) -> Array:
+            rows = np.maximum.reduceat(table[..., order, :][..., order], starts, axis=-2)
+            return np.asarray(np.maximum.reduceat(rows, starts, axis=-1))
+
+        own = np.eye(count, dtype=bool)
+        return Blocking(
+            tuple(self.labels[group[0]] for group in groups),
+            np.where(own, FREE, most(self.levels)).astype(np.int8),
+            most(self.locks) & ~own,
+            -most(-self.room),
+            most(self.touch),
+            np.minimum.reduceat(self.low[order], starts),
+            np.maximum.reduceat(self.high[order], starts),
+        )
 
 
 def blocking(source: InPlace) -> Blocking:
@@ -102,7 +119,8 @@ def blocking(source: InPlace) -> Blocking:
     starts = np.searchsorted(unit, np.arange(count))
     bounds = np.minimum.reduceat(low, starts), np.maximum.reduceat(high, starts)
     labels = tuple(label for label, _ in units)
-    return Blocking(labels, levels, room, _touching(finder, found, unit, count), *bounds)
+    touch = _touching(finder, found, unit, count)
+    return Blocking(labels, levels, levels >= LOCKED, room, touch, *bounds)
 
 
 def _one_meeting(parts: tuple[str, ...]) -> Meetings:

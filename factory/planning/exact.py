@@ -15,7 +15,7 @@ A robot that takes over what another has made turns the axis (`relay`).
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
@@ -39,9 +39,24 @@ ROBOT = 100.0
 STOPS = 4
 """A carrier under a bound takes at most so many more than two inputs."""
 
+Late = Callable[[], bool]
+"""Whether a search is to end."""
+
+Leaf = Callable[[int, int], Any]
+"""The tree of a unit whose own inputs come along an axis."""
+
 Tree = Any
 """The number of a unit, or a tuple of trees: one that is relayed, two that are joined, or more that
 one robot takes one after the other."""
+
+
+class TooLate(Exception):
+    """A search ended before it had proved anything."""
+
+
+def never() -> bool:
+    """It is never late."""
+    return False
 
 
 @dataclass(frozen=True)
@@ -118,8 +133,8 @@ class Tables:
     time: Array
 
 
-def tables(task: Task) -> Tables:
-    """Solves all states for price and cycle time."""
+def tables(task: Task, late: Late = never) -> Tables:
+    """Solves all states for price and cycle time. Raises TooLate."""
     size = 1 << task.subsets.count
     price, time = np.full((2, size), np.inf), np.zeros((2, size))
     units = 1 << np.arange(task.subsets.count)
@@ -127,6 +142,8 @@ def tables(task: Task) -> Tables:
     time[:, units] = task.expected.pace.lost + task.delivering[units]
     stop = task.expected.stop(task.leg)
     for whole in task.subassemblies():
+        if late():
+            raise TooLate
         one, other, prices = task.divisions(whole)
         if not len(one):
             continue
@@ -153,24 +170,27 @@ def _relayed(whole: int, price: Array, time: Array) -> None:
 
 class Best:
     """The best trees of a task within a `bound` on cycles [s]: least price, then fewest robots, each
-    worth `robot` [m], and smallest sub-assemblies.
+    worth ROBOT [m], and smallest sub-assemblies; with no bound at all (None) and no robot that
+    stays with a pile. Raises TooLate once it is `late`.
 
     `piles` (stops, 2, s): the worth of what a robot holds that has taken so many inputs beyond two;
     `made` (2, s): of what is delivered.
     """
 
-    def __init__(self, task: Task, bound: float = np.inf, robot: float = ROBOT) -> None:
-        self.task, self.bound, self.robot = task, bound, robot
+    def __init__(self, task: Task, bound: float | None = np.inf, late: Late = never) -> None:
+        self.task, self.bound, self.mates = task, np.inf if bound is None else bound, bound is None
         size = 1 << task.subsets.count
-        self.stops = 1 + (STOPS if bound < np.inf else 0)
+        self.stops = 1 + (STOPS if self.bound < np.inf else 0)
         self.piles = np.full((self.stops, 2, size), np.inf)
         self.made = np.full((2, size), np.inf)
         units = 1 << np.arange(task.subsets.count)
         given = np.zeros((2, len(units))) if task.given is None else task.given
-        self.made[:, units] = given * LONG**2 + robot
+        self.made[:, units] = given * LONG**2 + ROBOT
         self.stop = task.expected.stop(task.leg)
         self.step = task.expected.step(task.leg)
         for whole in task.subassemblies():
+            if late():
+                raise TooLate
             self._solve(whole)
 
     def _solve(self, whole: int) -> None:
@@ -183,7 +203,7 @@ class Best:
                 self.piles[stops, axis, whole] = min((o[0].min() for o in options), default=np.inf)
             self.made[axis, whole] = self.piles[:, axis, whole].min()
         for axis in (0, 1):
-            turned = self.made[1 - axis, whole] + RELAY * LONG**2 + self.robot
+            turned = self.made[1 - axis, whole] + RELAY * LONG**2 + ROBOT
             self.made[axis, whole] = min(self.made[axis, whole], turned)
 
     def _options(
@@ -196,7 +216,7 @@ class Best:
         if stops == 0:
             worth = self._mates(whole, axis, one, other, prices) + own
             found.append((worth, one, other, "mate"))
-        if stops > 0 or self.bound == np.inf:
+        if stops > 0 or (self.bound == np.inf and not self.mates):
             for pile, come in ((one, other), (other, one)):
                 worth = self._inserts(whole, axis, stops, pile, come, prices) + own
                 found.append((worth, pile, come, "insert"))
@@ -206,7 +226,7 @@ class Best:
         slides = prices[:, axis] <= prices[:, 2]
         cost = np.where(slides, prices[:, axis], prices[:, 2])
         worth = self.made[1 - axis, one] + self.made[1 - axis, other]
-        worth = worth + cost * LONG**2 + self.robot
+        worth = worth + cost * LONG**2 + ROBOT
         if self.bound < np.inf:
             time = np.maximum(self.stop[one], self.stop[other]) + self.task.delivering[whole]
             lift = self.task.expected.lift(self.task.strokes(one, other))
@@ -227,19 +247,21 @@ class Best:
             worth[time > self.bound + 1e-9] = np.inf
         return worth
 
-    def tree(self, whole: int, axis: int) -> Tree:
-        """The best tree of a subset whose inputs come along an axis."""
+    def tree(self, whole: int, axis: int, leaf: Leaf = lambda unit, _: unit) -> Tree:
+        """The best tree of a subset whose inputs come along an axis; `leaf` gives that of a unit
+        whose own inputs come along an axis."""
         if whole.bit_count() == 1:
-            return whole.bit_length() - 1
+            return leaf(whole.bit_length() - 1, axis)
         if self.piles[:, axis, whole].min() > self.made[axis, whole]:
-            return (self.tree(whole, 1 - axis),)
-        return tuple(self._inputs(whole, axis, int(self.piles[:, axis, whole].argmin())))
+            return (self.tree(whole, 1 - axis, leaf),)
+        stops = int(self.piles[:, axis, whole].argmin())
+        return tuple(self._inputs(whole, axis, stops, leaf))
 
-    def _inputs(self, whole: int, axis: int, stops: int) -> list[Tree]:
+    def _inputs(self, whole: int, axis: int, stops: int, leaf: Leaf) -> list[Tree]:
         options = self._options(whole, axis, stops, self.task.divisions(whole))
         worth, one, other, how = min(options, key=lambda o: float(o[0].min()))
         n = int(worth.argmin())
-        last = self.tree(int(other[n]), 1 - axis)
+        last = self.tree(int(other[n]), 1 - axis, leaf)
         if how == "mate":
-            return [self.tree(int(one[n]), 1 - axis), last]
-        return [*self._inputs(int(one[n]), axis, max(stops - 1, 0)), last]
+            return [self.tree(int(one[n]), 1 - axis, leaf), last]
+        return [*self._inputs(int(one[n]), axis, max(stops - 1, 0), leaf), last]
