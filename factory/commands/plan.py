@@ -32,7 +32,7 @@ KINDS: tuple[Kind, ...] = ("slide", "lower", "blocked")
 
 @click.command()
 @click.argument("source", type=PATH)
-@click.option("-o", "--output", type=PATH, help="The folder to write; named after SOURCE without.")
+@click.option("-o", "--output", type=PATH, help="The folder to write; without, SOURCE-planned.")
 @click.option(
     "--for",
     "aim",
@@ -94,7 +94,7 @@ def plan(
     writable_folder(output)
     with Waiting(f"reading {source.name}", out.silent):
         found = read_source(source, templates, SourceOptions(unit, keep, replan, library, boxes))
-    folder = output or Path(found.name)
+    folder = output or Path(f"{found.name}-planned")
     writable_folder(folder)
     warnings = announced(found.warnings, out)
     if not out.silent:

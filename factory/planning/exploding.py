@@ -14,8 +14,12 @@ from factory.geometry.solids import Product
 from factory.plant.approaches import Approach, Kind
 from factory.problem.pag import PAG
 
-ROOM = 0.08
+ROOM = 0.15
 """Between what is taken apart there is this share of the product's diagonal."""
+
+
+MOST = 24
+"""So many operations, the last ones, are taken back; what was made before stands together."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,7 +37,8 @@ class Withdrawal:
 
 @dataclass(frozen=True)
 class Explosion:
-    """The withdrawals of all operations, in the order of assembly, and the parts of the product."""
+    """The withdrawals of the last operations, in the order of assembly, and the parts of the
+    product."""
 
     parts: tuple[str, ...]
     steps: tuple[Withdrawal, ...] = field(repr=False)
@@ -70,11 +75,13 @@ def explosion(pag: PAG, matings: Matings, product: Product) -> Explosion:
         own = [] if node.inputs else [index[node.label]]
         inside[node.label] = own + [n for label in node.inputs for n in inside[label]]
     steps = []
-    for mating in matings.all:
+    for number, mating in enumerate(matings.all, MOST - len(matings.all)):
         *first, last = mating.inputs
         ours = inside[last]
         rest = [n for label in first for n in inside[label]]
         inside[mating.label] = rest + ours
+        if number < 0:
+            continue
         moving, direction = _moving(mating.approach, last, ours, rest)
         others = rest if moving is ours else ours
         distance = _clear(low, high, moving, others, direction) + room

@@ -82,6 +82,3 @@ class InPlace:
             else:
                 found.setdefault(keep.label, tuple(by_label[label] for label in keep.parts))
         return tuple(found.items())
-
-
-Source = InPlace

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -23,7 +23,7 @@ from factory.support import gl
 from factory.support.engine import mujoco
 from factory.support.resource import Closing
 
-FPS = 24.0
+FPS = 20.0
 
 STILL: tuple[Size, Size] = (1280, 720), (900, 1200)
 FILM: tuple[Size, Size] = (960, 540), (600, 800)
@@ -32,9 +32,15 @@ FILM: tuple[Size, Size] = (960, 540), (600, 800)
 AZIMUTH, ELEVATION, TURN = -58.0, 31.0, 40.0
 """From where the camera looks, and how far round it goes in a film [degrees]."""
 
-BEFORE, AFTER, SLOWEST, LONGEST = 1.2, 2.0, 0.8, 12.0
+BEFORE, AFTER, SLOWEST, LONGEST = 1.2, 1.8, 0.7, 10.0
 """Parts stand apart and the product stands for these times; an operation takes at most the third,
 and all together the fourth [s]."""
+
+MANY = 30_000
+"""A film of more triangles has half the frames, and no shadows: these cost a second pass."""
+
+AROUND = 3.0
+"""So many times the product's depth of the floor gets clean shadows: beyond it is speckled."""
 
 EVEN = 12
 """Half the frames over which the camera's way is evened out."""
@@ -68,19 +74,27 @@ class ExplodedView:
         with _Stage(self, size) as stage:
             write_still(path, stage.still())
 
-    def film(self, path: Path) -> int:
-        """Write the film; gives the number of its frames. Raises as `still` does."""
+    def film(self, path: Path, fps: float = FPS) -> int:
+        """Write the film, with so many frames a second or half as many where there is much to draw;
+        gives the number of its frames. Raises as `still` does."""
         size = FILM[self.is_upright]
-        check_output(path, size, FPS)
+        fps = fps if self.faces <= MANY else fps / 2
+        check_output(path, size, fps)
         count = len(self.explosion.steps)
         slow = min(SLOWEST, LONGEST / max(count, 1))
-        frames = round((BEFORE + slow * count + AFTER) * FPS)
-        times = np.arange(frames) / FPS
+        frames = round((BEFORE + slow * count + AFTER) * fps)
+        times = np.arange(frames) / fps
         done = np.clip((times - BEFORE) / slow, 0.0, count)
-        with _Stage(self, size) as stage, VideoFile(path, size, FPS) as file:
+        with _Stage(self, size) as stage, VideoFile(path, size, fps) as file:
             for view, now in zip(stage.views(done), done, strict=True):
                 file.write(stage.picture(float(now), view))
         return frames
+
+    @property
+    def faces(self) -> int:
+        """How many triangles it has."""
+        solids = (self.product.solids[label] for label in self.explosion.parts)
+        return sum(12 if solid.mesh is None else len(solid.mesh.faces) for solid in solids)
 
     def _points(self, done: float) -> Array:
         """The corners of all boxes (8 n, 3) when so many operations are done."""
@@ -113,12 +127,13 @@ class _Stage(Closing):
         """All apart."""
         self._place(0.0)
         axes = towards(AZIMUTH, ELEVATION)
-        return self.renderer.mean(fit(self.shown._points(0.0), axes, self.framing), SAMPLES)
+        view = fit(self.shown._points(0.0), axes, self.framing)
+        return self.renderer.mean(replace(view, depth=AROUND * view.depth), SAMPLES)
 
     def picture(self, done: float, view: View) -> Pixels:
         """When so many operations are done."""
         self._place(done)
-        return np.ascontiguousarray(self.renderer.draw(view, True)[::-1])
+        return np.ascontiguousarray(self.renderer.draw(view, self.shown.faces <= MANY)[::-1])
 
     def _place(self, done: float) -> None:
         if done != self.last:
@@ -134,7 +149,7 @@ class _Stage(Closing):
         turned = [towards(float(angle), ELEVATION) for angle in angles]
         moments = zip(turned, done, strict=True)
         found = [fit(self.shown._points(float(now)), axes, self.framing) for axes, now in moments]
-        numbers = np.array([(*(v.axes @ v.position), v.distance, v.depth) for v in found])
+        numbers = np.array([(*(v.axes @ v.position), v.distance, AROUND * v.depth) for v in found])
         calm = _evened(numbers)
         return [
             View(axes.T @ row[:3], axes, v.wide, v.tall, float(row[3]), float(row[4]))

@@ -20,6 +20,9 @@ UNIT, SPREAD = 1000.0, 4.0
 """It is taken to be, where a thousandth, or a thousand times its size, is among the sizes of the
 others, give or take this factor."""
 
+AWAY = 2.0
+"""Parts are away from each other that have so many times the larger one's size between them."""
+
 EQUAL = 1e-4
 """Vertices of two parts are in one place that are nearer than this share of their size."""
 
@@ -101,7 +104,7 @@ def _units(parts: Sequence[PlacedPart]) -> list[Diagnostic]:
 
 
 def _far(parts: Sequence[PlacedPart]) -> list[Diagnostic]:
-    """Parts that are away from all others by more than they, and these, are large."""
+    """Parts that are away from all others."""
     import networkx as nx
 
     low, high = (np.array([getattr(p.solid, end) for p in parts]) for end in ("low", "high"))
@@ -110,7 +113,7 @@ def _far(parts: Sequence[PlacedPart]) -> list[Diagnostic]:
     near.add_nodes_from(range(len(parts)))
     for index in range(len(parts)):
         gaps = gap(low[index], high[index], low, high)
-        close = np.flatnonzero(gaps <= np.maximum(size[index], size))
+        close = np.flatnonzero(gaps <= AWAY * np.maximum(size[index], size))
         near.add_edges_from((index, int(other)) for other in close if other > index)
     groups = sorted(nx.connected_components(near), key=lambda g: (-len(g), min(g)))
     main = sorted(groups[0])

@@ -10,6 +10,7 @@ import numpy as np
 
 from factory.geometry.mesh_reader import ANEW, UnreadableMesh
 from factory.geometry.meshes import Array, Indices
+from factory.geometry.solids import colour
 from factory.importing.assembling import assemble
 from factory.importing.draft import PART, DraftNode, ImportFaults
 from factory.importing.labels import file_stem, label_of
@@ -21,7 +22,7 @@ from factory.planning.source.bodies import Bodies, FileBody, apart, unit_of
 from factory.planning.source.faults import check_count
 from factory.planning.source.scene_file import MESHES, SCENES, read_one, read_scene
 from factory.planning.source.trees import TreeProduct
-from factory.problem.pag import PAG, Parameter
+from factory.problem.pag import PAG, Assembly, Parameter
 from factory.support.errors import Diagnostic, InputError, Position
 from factory.support.files import MESH, read_bytes
 
@@ -49,7 +50,7 @@ def _folder(folder: Path) -> Bodies:
     found = [made for path in files if (made := _read(path, faults, whole=True)) is not None]
     if faults:
         raise InputError(faults)
-    check_count(folder, [path.name for path in files], "files of meshes")
+    check_count(folder, [path.stem for path in files], "files of meshes")
     left = [p.name for p in seen if p not in files]
     notes = [f"{len(files)} files of meshes, a part each"]
     if left:
@@ -71,7 +72,7 @@ def _read(path: Path, faults: list[Diagnostic], whole: bool = False) -> Bodies |
         return replace(made, notes=(f"{len(made.found)} bodies in {path.name}",))
     except (OSError, UnreadableMesh) as error:
         why = error.strerror if isinstance(error, OSError) else error
-        message = f"cannot read {quoted(str(path))}: {why}"
+        message = f"cannot read {quoted(path.name)}: {why}"
         code = "BadFile" if isinstance(error, OSError) else "BadMesh"
         faults.append(Diagnostic(code, message, None, ANEW))
         return None
@@ -89,7 +90,7 @@ def loose_product(path: Path, bodies: Bodies, unit: str | None) -> TreeProduct:
     notes = list(bodies.notes)
     if len(bodies.found) == 1 and len(pieces := apart(bodies.found[0])) > 1:
         bodies = replace(bodies, found=pieces)
-        notes.append(f"one body of {len(pieces)} pieces that do not touch: a part each")
+        notes.append(f"one body of {len(pieces)} pieces that share no corner: a part each")
     check_count(path, [body.name for body in bodies.found], "bodies")
     metres, said = unit_of(bodies, unit)
     name = file_stem(path.stem if path.suffix else path.resolve().name)
@@ -100,11 +101,13 @@ def loose_product(path: Path, bodies: Bodies, unit: str | None) -> TreeProduct:
 def _assembled(
     name: str, path: Path, bodies: tuple[FileBody, ...], unit: float
 ) -> tuple[PAG, dict[str, bytes]]:
-    """The PAG that mates all bodies at once, and its mesh files."""
+    """The PAG that mates all bodies at once, and its mesh files. Parts of a kind without a colour
+    have the same."""
     here, store = Position(str(path), 1, 1), MeshStore("meshes")
     drafts = [DraftNode(name, here, inputs=list(range(1, len(bodies) + 1)))]
     shapes = [shape_of(*_scaled(body.mesh.merged(), unit)) for body in bodies]
     found, origins, meshes = alike(shapes), dict[int, Array](), dict[int, str]()
+    numbers = {kind: number for number, kind in enumerate(dict.fromkeys(found.kinds))}
     for index, body in enumerate(bodies):
         kind, motion = found.kinds[index], found.motions[index]
         if kind == index:
@@ -117,8 +120,8 @@ def _assembled(
         given = [Parameter("mesh", meshes[kind]), Parameter("pos", rounded(at))]
         if np.abs(motion.turn - np.eye(3)).max() > STILL:
             given.append(Parameter("quat", quaternion(motion.turn)))
-        if body.colour is not None:
-            given.append(Parameter("rgba", body.colour))
+        plain = Assembly("", PART)
+        given.append(Parameter("rgba", body.colour or colour(plain, numbers[kind])))
         drafts.append(DraftNode(_name(body, index), here, PART, [], tuple(given)))
     return assemble(drafts, ImportFaults()), store.files
 

@@ -60,6 +60,10 @@ def read_source(
 
 def _product(path: Path, templates: Mapping[str, Template], asked: SourceOptions) -> TreeProduct:
     suffix = path.suffix.lower()
+    if not path.exists():
+        message = f"there is no file or folder '{path}'"
+        hint = "a folder of meshes, a .glb, .3mf or .step file, a model .ldr or .mpd, or a .pag"
+        raise InputError(Diagnostic("BadFile", message, None, hint))
     if path.is_dir() or suffix in (*SCENES, *MESHES):
         _refuse_keep(asked, f"{quoted(path.name)} has no tree")
         return loose_product(path, bodies_in(path), asked.unit)
