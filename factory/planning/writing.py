@@ -18,7 +18,8 @@ from factory.problem.pag import PAG, Assembly, Parameter
 
 Tree = str | tuple["Tree", ...]
 """The label of a part or of a sub-tree that is kept, or what is mated: two trees or more, of which
-the first two are mated and each further one is inserted."""
+the first two are mated and each further one is inserted; a single tree is handed over to another
+robot."""
 
 PLACES = ("pos", "quat")
 
@@ -37,7 +38,7 @@ def planned_product(
 ) -> PlannedProduct:
     """The product that a tree makes of a source's parts, turned by a rotation (3, 3) about the
     origin. `by` is said in the first line of the PAG. Only templates that the package ships are
-    used: `mate`, with its further inputs inserted, besides what kept sub-trees name."""
+    used: `mate`, with its further inputs inserted, and `relay`, besides what kept sub-trees name."""
     turn = np.eye(3) if orientation is None else orientation
     kept = {keep.label: keep.nodes for keep in source.kept}
     taken = {part.label for part in source.parts}
@@ -52,7 +53,7 @@ def planned_product(
         for child in below:
             inputs.append(child if isinstance(child, str) else _numbered(names, taken))
             stack.append((inputs[-1], child))
-        made.append(Assembly(label, "mate", tuple(inputs)))
+        made.append(Assembly(label, "mate" if len(inputs) > 1 else "relay", tuple(inputs)))
     whole = [node for nodes in kept.values() for node in nodes if node.inputs]
     parts = [_turned(part.node, turn) for part in source.parts]
     nodes = (*made, *reversed(whole), *parts)
