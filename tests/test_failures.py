@@ -252,6 +252,20 @@ def test_large_factories_have_costs_when_asked(run: Terminal) -> None:
     assert all(test["scrap"] for test in asked["tests"])
 
 
+def test_a_period_of_several_units_has_the_bound_of_one(run: Terminal, tmp_path: Path) -> None:
+    file = tmp_path / "slow.pag"
+    parts = "part1 = atomic(); part2 = atomic(); part3 = atomic()"
+    joins = "sub2 = weld ( sub1, dwell = 2 ); sub1 = insert ( part1, part2 );"
+    file.write_text(f"root = sub3; sub3 = insert ( part3, sub2 ); {joins} {parts}")
+    words = ("check", file, "--no-hands", "--failures", "--json")
+    one = run(*words).json["failures"]
+    three = run(*words, "--parallel", "sub2=3").json["failures"]
+    assert three["bound"] == one["bound"]
+    assert len(three["tests"]) == 3 * len(one["tests"])
+    last = three["tests"][-1]
+    assert (last["operation"], last["scrap"]["lost"]) == ("dropoff@3", "sub3@3")
+
+
 def test_a_template_of_ones_own(run: Terminal, tmp_path: Path) -> None:
     text = WELD.replace("again 2 then scrap, lost : scrap", "again 7, rejected : stop")
     (tmp_path / "weld.op").write_text(text)
