@@ -16,43 +16,44 @@ marking that is reachable in N'.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections import Counter
+from collections.abc import Iterable, Sequence
 from heapq import heapify, heappop, heappush
 
 from factory.nets.gears import GearNet
 from factory.nets.marked import MarkedNet, marked
-
-Joins = Mapping[int, tuple[int, ...]]
-"""For each end the transitions that are undone at least as often as it is: its start, and the ends
-that made what it joined. `factory.plant.material.joins` makes it."""
+from factory.nets.petri import Marking
+from factory.nets.undone import Joins
 
 
 def undo(
-    net: GearNet | MarkedNet, fired: Sequence[int], asked: Mapping[int, int], joins: Joins
+    net: GearNet | MarkedNet, fired: Sequence[int], asked: Iterable[int], joins: Joins
 ) -> tuple[int, ...]:
-    """n': how often each transition still has fired, where some are undone so often at least.
+    """n': how often each transition still has fired, where each that is `asked` for is undone as
+    often as it stands there, or oftener.
 
     `fired` is n, counted from m_0: from another marking on, `factory.nets.history.firings` is to be
     added. Linear in what is undone, but for the order. Raises ValueError where a transition has not
     fired so often as is asked, or no transition is asked for.
     """
-    if not any(asked.values()):
+    least = Counter(asked)
+    if not least:
         raise ValueError("no transition is asked to be undone")
-    return _greatest(marked(net), fired, asked, joins, asked)
+    return _greatest(marked(net), fired, least, joins, least)
 
 
 def exchange(
-    net: GearNet | MarkedNet, fired: Sequence[int], asked: Mapping[int, int], joins: Joins
+    net: GearNet | MarkedNet, fired: Sequence[int], asked: Iterable[int], joins: Joins
 ) -> tuple[int, ...]:
     """n', where robots are exchanged while the factory runs: `net` is N', whose transitions are
     those of the net N in which `fired` was counted, in the same order; `asked` may be empty.
 
     Nothing need be undone. Linear in the net, but for the order. Raises ValueError as `undo`.
     """
-    return _greatest(marked(net), fired, asked, joins, range(len(fired)))
+    return _greatest(marked(net), fired, Counter(asked), joins, range(len(fired)))
 
 
-def marking_of(net: GearNet | MarkedNet, fired: Sequence[int]) -> tuple[int, ...]:
+def tokens_after(net: GearNet | MarkedNet, fired: Sequence[int]) -> tuple[int, ...]:
     """m_0 + C n: the number of tokens of each place, negative where the counts lead nowhere."""
     subject = marked(net)
     pairs = zip(subject.tokens, subject.net.places, strict=True)
@@ -60,6 +61,11 @@ def marking_of(net: GearNet | MarkedNet, fired: Sequence[int]) -> tuple[int, ...
         tokens + sum(fired[e] for e in place.left) - sum(fired[e] for e in place.right)
         for tokens, place in pairs
     )
+
+
+def marking_after(net: GearNet, fired: Sequence[int]) -> Marking:
+    """m_0 + C n, for counts that lead to a marking."""
+    return frozenset(place for place, count in enumerate(tokens_after(net, fired)) if count)
 
 
 def times_undone(before: Sequence[int], after: Sequence[int]) -> dict[int, int]:
@@ -71,7 +77,7 @@ def times_undone(before: Sequence[int], after: Sequence[int]) -> dict[int, int]:
 def _greatest(
     net: MarkedNet,
     fired: Sequence[int],
-    asked: Mapping[int, int],
+    asked: Counter[int],
     joins: Joins,
     begin: Iterable[int],
 ) -> tuple[int, ...]:
@@ -80,7 +86,7 @@ def _greatest(
     found = list(fired)
     for event, times in asked.items():
         found[event] -= times
-        if found[event] < 0 or times < 0:
+        if found[event] < 0:
             name = net.net.transitions[event].name
             raise ValueError(f"{name} is to be undone {times} times, and has fired {fired[event]}")
     heap = [(found[event], event) for event in begin]

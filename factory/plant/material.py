@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from types import MappingProxyType
 
-from factory.nets.undo import Joins
+from factory.nets.undone import Joins
 from factory.plant.factory import Factory
 
 
-def joins(factory: Factory) -> Joins:
+def joins_of(factory: Factory) -> Joins:
     """For the end of each operation its start and the ends of the operations that made its inputs:
     the transitions that are undone as often as the end, since nothing is taken apart."""
     made = factory.by_label
