@@ -81,7 +81,7 @@ class FailingNet:
     ready: Mapping[int, float] = field(default_factory=lambda: MappingProxyType({}), repr=False)
 
     @cached_property
-    def joins_of(self) -> Joins:
+    def joins(self) -> Joins:
         """What is undone with each end."""
         return joins_of(self.factory)
 
