@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 import factory as factory_package
 from factory.nets.marked import marked
-from factory.nets.undo import tokens_after, times_undone, undo
+from factory.nets.undo import times_undone, tokens_after, undo
 from factory.plant.factory import Factory, Operation
 from factory.plant.material import joins_of
 from factory.study.analysis import Timing
@@ -250,6 +250,20 @@ def test_large_factories_have_costs_when_asked(run: Terminal) -> None:
     assert asked["costed"]
     assert asked["bound"] == silent["bound"]
     assert all(test["scrap"] for test in asked["tests"])
+
+
+def test_a_period_of_several_units_has_the_bound_of_one(run: Terminal, tmp_path: Path) -> None:
+    file = tmp_path / "slow.pag"
+    parts = "part1 = atomic(); part2 = atomic(); part3 = atomic()"
+    joins = "sub2 = weld ( sub1, dwell = 2 ); sub1 = insert ( part1, part2 );"
+    file.write_text(f"root = sub3; sub3 = insert ( part3, sub2 ); {joins} {parts}")
+    words = ("check", file, "--no-hands", "--failures", "--json")
+    one = run(*words).json["failures"]
+    three = run(*words, "--parallel", "sub2=3").json["failures"]
+    assert three["bound"] == one["bound"]
+    assert len(three["tests"]) == 3 * len(one["tests"])
+    last = three["tests"][-1]
+    assert (last["operation"], last["scrap"]["lost"]) == ("dropoff@3", "sub3@3")
 
 
 def test_a_template_of_ones_own(run: Terminal, tmp_path: Path) -> None:

@@ -129,9 +129,7 @@ def _one_meeting(parts: tuple[str, ...]) -> Meetings:
     return Meetings(parts, (meeting,), np.zeros(len(parts) - 1, np.int64), np.zeros(1, np.int64))
 
 
-def _along(
-    finder: Finder, axis: int, unit: Ints, levels: NDArray[np.int8], room: Array
-) -> None:
+def _along(finder: Finder, axis: int, unit: Ints, levels: NDArray[np.int8], room: Array) -> None:
     """Enters what is in the way along an axis. The later part of a pair comes from the lower side,
     so goes out there, and the earlier one goes to the upper side; or the other way about."""
     found = finder.along(axis, np.ones(1, bool))
@@ -150,9 +148,7 @@ def _along(
         np.minimum.at(room, at, -np.maximum(path, depths.graze)[apart, column])
 
 
-def _touching(
-    finder: Finder, found: ConvexBodies, unit: Ints, count: int
-) -> NDArray[np.bool_]:
+def _touching(finder: Finder, found: ConvexBodies, unit: Ints, count: int) -> NDArray[np.bool_]:
     """Which units touch: those near each other, then those that bring pieces together."""
     touch = np.eye(count, dtype=bool)
     gap, furthest = NEAR, float((found.high.max(axis=0) - found.low.min(axis=0)).max())

@@ -87,9 +87,7 @@ class Judge:
     def stroke(self, come: Units, pile: Units) -> Array:
         """How far one of two sides is lowered at least [m]."""
         low, high = self.found.low[:, self.stance.axes[2]], self.found.high[:, self.stance.axes[2]]
-        (a, b), (c, d) = (
-            (low[list(side)].min(), high[list(side)].max()) for side in (come, pile)
-        )
+        (a, b), (c, d) = ((low[list(side)].min(), high[list(side)].max()) for side in (come, pile))
         return np.asarray(min(d - a, b - c))
 
     def hangs(self, members: Units) -> bool:
@@ -107,7 +105,10 @@ class Judge:
         if not onto:
             ways.append((self.stance.axes[2], -self.stance.up, True))
         found = [self._way(pile, come, way, onto) for way in ways]
-        return min(found, key=lambda join: (max(join.level, FREE + 1), join.lowered, join.level, -join.room))
+        return min(
+            found,
+            key=lambda join: (max(join.level, FREE + 1), join.lowered, join.level, -join.room),
+        )
 
     def _way(self, pile: Units, come: Units, way: tuple[int, int, bool], onto: bool) -> Join:
         axis, side, lowered = way

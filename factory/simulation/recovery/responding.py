@@ -25,9 +25,7 @@ from factory.simulation.recovery.returning import Goal, Returning, WayBack, orde
 from factory.simulation.recovery.standing import Standing
 from factory.simulation.simulation import Simulation
 from factory.support.errors import Diagnostic
-
-MOST_SCRAPPED = 20
-"""A label of which so many are scrapped on end stops the run."""
+from factory.timing.failing import SCRAPS
 
 
 class Responding:
@@ -187,8 +185,8 @@ class Responding:
         self._note(test, operation, robot, "scrap", labels)
         for label in labels:
             self._scrapped[label] += 1
-            if self._scrapped[label] >= MOST_SCRAPPED:
-                what = f"'{label}' was scrapped {MOST_SCRAPPED} times on end"
+            if self._scrapped[label] >= SCRAPS:
+                what = f"'{label}' was scrapped {SCRAPS} times on end"
                 self._stop(what, self._books.factory.by_label[label])
 
     def _stop(self, what: str, operation: Operation) -> None:
