@@ -1,5 +1,5 @@
-"""Tables over all subsets of a few units, as bit masks: what is in the way, what hangs together, how
-large it is."""
+"""Tables over all subsets of a few units, as bit masks: what is in the way, what hangs together,
+how large it is."""
 
 from __future__ import annotations
 
