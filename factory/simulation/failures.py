@@ -5,29 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-
-@dataclass(frozen=True, slots=True)
-class Failing:
-    """A failure that was found at `t` [s]: the `test` that failed, in which `operation` (its
-    label), of which `robot`, "" for none; the `response`, and what was `scrapped`, by label."""
-
-    t: float
-    test: str
-    operation: str
-    robot: str
-    response: str
-    scrapped: tuple[str, ...] = ()
-
-    def as_json(self) -> dict[str, object]:
-        """As `run --json` prints it."""
-        return {
-            "t": round(self.t, 6),
-            "test": self.test,
-            "operation": self.operation,
-            "robot": self.robot or None,
-            "response": self.response,
-            "scrapped": list(self.scrapped),
-        }
+from factory.record.failing import Failing
 
 
 @dataclass(frozen=True)

@@ -18,10 +18,11 @@ from factory.plant.factory import Factory, Operation
 from factory.plant.material import joins_of
 from factory.problem.pag import NOPART
 from factory.problem.template import Failure, Response
+from factory.record.failing import Failing
 from factory.simulation.recovery.faults import Campaign
 from factory.simulation.recovery.held import held, marking_of, step_of
 from factory.simulation.recovery.plant import Plant
-from factory.simulation.failures import Failing, Failures
+from factory.simulation.failures import Failures
 from factory.simulation.recovery.returning import Goal, Returning, WayBack, order_of
 from factory.simulation.recovery.standing import Standing
 from factory.simulation.recovery.striking import Striking
@@ -72,6 +73,7 @@ class Recovery:
         hooks.judges.append(self._judge)
         hooks.sensors.append(self._sensed)
         hooks.ticks.append(self._tick)
+        hooks.account = self
 
     @property
     def _factory(self) -> Factory:
@@ -81,6 +83,11 @@ class Recovery:
     def _supervisor(self) -> Supervisor:
         assert isinstance(self.simulation.supervisor, Supervisor)
         return self.simulation.supervisor
+
+    @property
+    def at_rest(self) -> frozenset[int]:
+        """The robots (index) that stand, for whatever reason."""
+        return self.standing.now
 
     @property
     def _now(self) -> float:
@@ -242,7 +249,8 @@ class Recovery:
         spared = self._spares > 0
         self.dead[robot] = now + self.campaign.swap if spared else np.inf
         scrapped = () if label == NOPART else (label,)
-        self._note("jammed", operation.label, self._name(robot), "spare" if spared else "none", scrapped)
+        response, until = ("spare", self.dead[robot]) if spared else ("none", None)
+        self._note("jammed", operation.label, self._name(robot), response, scrapped, until)
         if not spared:
             return
         self._spares -= 1
@@ -327,9 +335,15 @@ class Recovery:
         self.simulation.world.hooks.trouble = Diagnostic("Failed", what, operation.position, hint)
 
     def _note(
-        self, test: str, operation: str, robot: str, response: str, scrapped: tuple[str, ...] = ()
+        self,
+        test: str,
+        operation: str,
+        robot: str,
+        response: str,
+        scrapped: tuple[str, ...] = (),
+        until: float | None = None,
     ) -> None:
-        self.found.append(Failing(self._now, test, operation, robot, response, scrapped))
+        self.found.append(Failing(self._now, test, operation, robot, response, scrapped, until))
 
     def _name(self, robot: int) -> str:
         return self._factory.robots[robot].name

@@ -23,11 +23,12 @@ MOVES = 5e-3
 
 
 class Standing:
-    """Lets robots (index) of a simulation stand, each under a limit of its own on its speed."""
+    """Lets robots (index) of a simulation stand, each under a limit of its own on its speed; `now`:
+    those that do."""
 
     def __init__(self, simulation: Simulation) -> None:
         self._simulation, self._limits = simulation, simulation.limits
-        self._now: frozenset[int] = frozenset()
+        self.now: frozenset[int] = frozenset()
         factory = simulation.layout.factory
         lifts = {r: len(factory.robots) + n for n, r in enumerate(simulation.layout.lifts)}
         self._axes = [[r, lifts[r]] if r in lifts else [r] for r in range(len(factory.robots))]
@@ -36,9 +37,9 @@ class Standing:
     def let_stand(self, robots: Iterable[int]) -> None:
         """From now on these robots stand, and no others: they brake as they always do."""
         chosen = frozenset(robots)
-        if chosen == self._now:
+        if chosen == self.now:
             return
-        self._now = chosen
+        self.now = chosen
         speed = np.array(self._limits.speed)
         for robot in chosen:
             speed[self._axes[robot]] = SLOWEST
