@@ -213,7 +213,7 @@ def summarise(record: Run, factory: Factory, verbose: bool) -> None:
         f"bottleneck {record.bottleneck}"
     )
     say(
-        f"{len(record.events)} transitions fired, "
+        f"{record.fired} transitions fired, "
         f"the record {'refines' if record.replays else 'DOES NOT REFINE'} the net"
     )
     physics = record.physics
@@ -264,7 +264,8 @@ def summarise(record: Run, factory: Factory, verbose: bool) -> None:
 def say_failures(failures: Failures, verbose: bool) -> None:
     """What went wrong in a run, in a few lines."""
     struck = ", ".join(f"{count} {kind}" for kind, count in failures.struck.items() if count)
-    say(f"faults: {struck or 'none'}; {failures.missed} missed, {failures.false_alarms} false alarms")
+    missed, alarms = failures.missed, failures.false_alarms
+    say(f"faults: {struck or 'none'}; {missed} missed, {alarms} false alarms")
     say(
         f"{len(failures.found)} failures, {failures.undone} transitions undone,"
         f" {failures.scrapped} scrapped, {failures.spares} spares used,"

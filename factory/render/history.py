@@ -43,7 +43,8 @@ class History:
     fires at a time shows after it, as in a log, whose state at a time is before what fires then.
 
     `events`: what has fired, each at one of `times` [s]; `undone`: what of that was undone, and
-    when; `taken`: how many entries. `failings`: what failed; `standing`: from when on [s] which robots (index) stand.
+    when; `taken`: how many entries. `failings`: what failed; `standing`: from when on [s] which
+    robots (index) stand.
     """
 
     def __init__(self, subject: MonitorSubject) -> None:

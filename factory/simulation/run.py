@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import NamedTuple
 
-from factory.nets.undone import Entry, Undone
+from factory.nets.undone import Entry, Undone, lasting
 from factory.plant.approaches import Pair
 from factory.plant.factory import Factory
 from factory.record.ending import CutOff
@@ -144,6 +144,17 @@ class Run:
     failures: Failures | None = None
 
     @property
+    def fired(self) -> int:
+        """How many transitions fired, those that were undone included."""
+        return sum(isinstance(event, Event) for event in self.events)
+
+    @cached_property
+    def lasting(self) -> tuple[Event, ...]:
+        """The firings that were not undone; they are a run of the net too."""
+        kept = lasting(entries_of(self.events))
+        return tuple(e for e in (self.events[at] for at in kept) if isinstance(e, Event))
+
+    @property
     def refines_net(self) -> bool:
         """Whether its events are a run of the net, and what a monitor saw, if one did."""
         return self.replays and (self.monitor is None or self.monitor.refines_net)
@@ -223,7 +234,7 @@ class Run:
             "cycle_time_s": self.cycle_time_s,
             "predicted_cycle_time_s": self.predicted_cycle_time_s,
             "bottleneck": self.bottleneck,
-            "transitions_fired": sum(isinstance(event, Event) for event in self.events),
+            "transitions_fired": self.fired,
             "refines_net": self.refines_net,
             **{key: getattr(physics, key) if physics else None for key in keys},
             "contacts": list(physics.contacts) if physics else None,

@@ -97,7 +97,7 @@ class Supervisor:
         starts = [operation.start for operation in factory.operations]
         self.threads = Threads(net.threaded, net.threads_of(start), starts)
         self.fired = [counts.get(number, 0) for number in range(len(net.threaded.transitions))]
-        self.events: list[Event] = []
+        self.events: list[Event | Undone] = []
         self.ahead, self.active = Ahead(factory, stages), Active()
         self.near = self.enabled = True
         marked = self.threads.marked

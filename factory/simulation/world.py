@@ -53,7 +53,7 @@ class Hooks:
 
     def pass_on(self, operation: Operation, unit: int) -> bool:
         """Whether all judges let an operation end."""
-        return all([judge(operation, unit) for judge in self.judges])
+        return all(judge(operation, unit) for judge in self.judges)
 
     def tell_ended(self) -> None:
         """Operations have ended."""

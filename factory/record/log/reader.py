@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from factory.nets.undone import Entry
+from factory.nets.undone import Entry, lasting
 from factory.record.ending import CutOff
 from factory.record.log.blocks import LENGTH, MAGIC, Arrays, bad_log, blocks, is_cut, unpack_rows
 from factory.record.log.header import check_header
@@ -113,13 +113,26 @@ class Log:
         return tuple((t, names[n]) for t, n in zip(self.fired_t.tolist(), self.fired, strict=True))
 
     @cached_property
-    def entries(self) -> tuple[Entry, ...]:
-        """The name of every transition that fired, and in between what was undone."""
-        names, found, begin = [name for _, name in self.events], list[Entry](), 0
+    def timed_entries(self) -> tuple[tuple[float, Entry], ...]:
+        """Time [s] and name of every transition that fired, and in between what was undone."""
+        found, begin = list[tuple[float, Entry]](), 0
         for after, undone in self.undone:
-            found += [*names[begin:after], undone]
+            found += [*self.events[begin:after], (undone.t, undone)]
             begin = after
-        return (*found, *names[begin:])
+        return (*found, *self.events[begin:])
+
+    @property
+    def entries(self) -> tuple[Entry, ...]:
+        """The same without times, as a replay takes them."""
+        return tuple(entry for _, entry in self.timed_entries)
+
+    @cached_property
+    def lasting(self) -> tuple[tuple[float, str], ...]:
+        """Time [s] and name of every transition that fired and was not undone."""
+        if not self.undone:
+            return self.events
+        kept, entries = lasting(self.entries), self.timed_entries
+        return tuple((t, e) for t, e in (entries[at] for at in kept) if isinstance(e, str))
 
 
 def read_log(path: Path | str) -> Log:

@@ -1,4 +1,4 @@
-"""What was undone in a run, as a log keeps it: a JSON list in a block of ticks, where there is any."""
+"""What was undone in a run, as a log keeps it: JSON in a block of ticks, where there is any."""
 
 from __future__ import annotations
 

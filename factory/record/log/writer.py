@@ -35,8 +35,8 @@ STATES = ("qpos", "qvel", "ctrl")
 
 class _Ticks:
     """The ticks of a block: lists with an entry for each, or with a row number and what is recorded
-    of that row; rows of the ends of operations; what was undone; the marking and the active constraints recorded
-    last."""
+    of that row; rows of the ends of operations; what was undone; the marking and the active
+    constraints recorded last."""
 
     def __init__(self) -> None:
         self.time: list[float] = []

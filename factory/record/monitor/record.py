@@ -30,8 +30,9 @@ def watch_log(log: Log) -> tuple[Report, MonitorSubject]:
     """The verdict on a recorded run, and its factory, compiled again from the log's header.
 
     Only when nothing is wrong with the states are the log's firings and markings looked at: whether
-    they agree with those, and with each other. Raises InputError (BadLog) for a log of the ideal
-    world, of an older version, or of another factory than its header says.
+    they agree with those, and with each other. States alone do not tell what was undone: where
+    something was, only firings and markings are looked at. Raises InputError (BadLog) for a log of
+    the ideal world, of an older version, or of another factory than its header says.
     """
     m = model_of(log)
     if log.ctrl is None or "monitor" not in log.header:
@@ -39,15 +40,20 @@ def watch_log(log: Log) -> tuple[Report, MonitorSubject]:
         raise InputError(Diagnostic("BadLog", message, None, AGAIN))
     with of_its_factory():
         subject = recorded_subject(log.header)
-        seen = observations(log)
-        monitor = Monitor(subject, Anatomy.of(m, subject.factory), next(seen))
-        for observation in seen:
-            monitor.see(observation)
-        report = monitor.report(log.events)
+        report = Report((), (), ()) if log.undone else _seen(log, subject, m)
         if report.refines_net:
-            found = contradictions(subject, log.events, _markings(log))
+            found = contradictions(subject, log.timed_entries, _markings(log))
             report = replace(report, violations=tuple(found))
     return report, subject
+
+
+def _seen(log: Log, subject: MonitorSubject, m: Any) -> Report:
+    """What a monitor says of the states, and of whether the firings agree with those."""
+    seen = observations(log)
+    monitor = Monitor(subject, Anatomy.of(m, subject.factory), next(seen))
+    for observation in seen:
+        monitor.see(observation)
+    return monitor.report(log.events)
 
 
 def verdict_on(

@@ -70,9 +70,9 @@ class Supply:
 @dataclass(slots=True)
 class TakenBack:
     """What goes wrong with parts that are shown. `parts`: those on their way back, with the unit
-    that they count for, by feeder; `fresh`: those that have begun to be shown, with their unit, by label;
-    `good`: labels whose part has been looked at and is good; `awaited`: labels of which none is
-    to come yet."""
+    that they count for, by feeder; `fresh`: those that have begun to be shown, with their unit, by
+    label; `good`: labels whose part has been looked at and is good; `awaited`: labels of which none
+    is to come yet."""
 
     parts: dict[int, int] = field(default_factory=dict)
     fresh: dict[str, int] = field(default_factory=dict)

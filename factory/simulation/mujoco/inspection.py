@@ -22,8 +22,8 @@ class Inspection:
     """Keeps the worst figures of a run. Contacts are looked at after every step of the engine.
 
     `joining`: for each operation under way (index) the unit whose inputs it joins. `unintended`:
-    onsets of contact that nothing intends, by the names of geoms; `pressing`: what is no such contact. `residual` [m]: the largest of a
-    weld's position. `error` [m]: that of a product.
+    onsets of contact that nothing intends, by the names of geoms; `pressing`: what is no such
+    contact. `residual` [m]: the largest of a weld's position. `error` [m]: that of a product.
     """
 
     def __init__(

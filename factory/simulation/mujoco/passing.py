@@ -96,7 +96,9 @@ class Passing:
     def is_aside(self, number: int) -> bool:
         """Whether a robot is out of the way of what its feeder shows. One whose hand is there
         before that comes down is never in its way."""
-        return bool(self._first[number]) or float(self._d.qpos[self._address[number]]) <= float(self._clear[number])
+        return bool(self._first[number]) or float(self._d.qpos[self._address[number]]) <= float(
+            self._clear[number]
+        )
 
     def clear(self) -> Truth:
         """Whether each robot (n,) is so far away with its part that the next can come down; or, if

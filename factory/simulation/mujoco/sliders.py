@@ -101,7 +101,7 @@ class Sliders:
 
     def is_up(self, number: int) -> bool:
         """Whether a slider that rests is up."""
-        return float(self._d.qpos[self._address[number]]) > self._strokes.lengths[number] / 2
+        return bool(self._d.qpos[self._address[number]] > self._strokes.lengths[number] / 2)
 
     def send(self, chosen: Index, down: bool, loaded: bool = False) -> None:
         """Sliders set out, down with their loads or up without, or with what is taken back."""

@@ -8,7 +8,7 @@ A failure is firing backwards: the marking goes to the greatest one that the fac
 in anyway. What physics does is detected by sensors alone; faults are the world's, and nothing tells
 the supervisor of them."""
 
-from factory.simulation.recovery.faults import Campaign, WorldFault, Sensors
+from factory.simulation.recovery.faults import Campaign, Sensors, WorldFault
 from factory.simulation.recovery.recovery import Recovery, recover
 
-__all__ = ["Campaign", "WorldFault", "Recovery", "Sensors", "recover"]
+__all__ = ["Campaign", "Recovery", "Sensors", "WorldFault", "recover"]

@@ -9,7 +9,15 @@ from pathlib import Path
 from typing import Any
 
 from factory.plant.factory import Factory
-from factory.simulation.recovery.faults import CLEAR, KINDS, OF_LABEL, SWAP, Campaign, WorldFault, Sensors
+from factory.simulation.recovery.faults import (
+    CLEAR,
+    KINDS,
+    OF_LABEL,
+    SWAP,
+    Campaign,
+    Sensors,
+    WorldFault,
+)
 from factory.support.errors import Diagnostic, InputError, Position, did_you_mean
 from factory.support.user_defaults import key_position, read_toml
 
@@ -94,7 +102,9 @@ class _Reader:
             self.wrong.append(Diagnostic("BadFault", message, at, hint))
             return None
         try:
-            return WorldFault(**{k: float(v) if OF_FAULT[k] is float else v for k, v in table.items()})
+            values: dict[str, Any] = dict(table)
+            numbers = {k: float(v) for k, v in values.items() if OF_FAULT[k] is float}
+            return WorldFault(**(values | numbers))
         except ValueError as error:
             self.wrong.append(Diagnostic("BadFault", str(error), at, EXAMPLE))
             return None
@@ -122,6 +132,8 @@ def check_names(campaign: Campaign, factory: Factory) -> None:
         for name, known, kinds in ((fault.robot, robots, "robots"), (fault.label, labels, what)):
             if name and name not in known:
                 message = f"'{fault.kind}' names '{name}', which is none of the {kinds}"
-                wrong.append(Diagnostic("BadFault", message, None, did_you_mean(name, known, kinds)))
+                wrong.append(
+                    Diagnostic("BadFault", message, None, did_you_mean(name, known, kinds))
+                )
     if wrong:
         raise InputError(wrong)

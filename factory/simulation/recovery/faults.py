@@ -74,6 +74,7 @@ class Sensors:
     noise: float = 5e-5
     delay: float = 0.03
 
+
 CLEAR, SWAP = 10.0, 30.0
 """How long what has fallen lies, and how long it takes to replace a robot, unless asked otherwise
 [s]."""

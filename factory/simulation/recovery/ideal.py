@@ -7,8 +7,8 @@ from collections.abc import Mapping, Sequence, Set
 from factory.plant.factory import Operation
 from factory.problem.pag import NOPART
 from factory.simulation.ideal import IdealWorld
+from factory.simulation.recovery.books import Books
 from factory.simulation.recovery.faults import WorldFault
-from factory.simulation.recovery.held import held, marking_of
 from factory.simulation.simulation import Simulation
 
 
@@ -17,8 +17,8 @@ class IdealPlant:
 
     contacts = 0
 
-    def __init__(self, simulation: Simulation) -> None:
-        self._simulation = simulation
+    def __init__(self, simulation: Simulation, books: Books) -> None:
+        self._simulation, self._books = simulation, books
         self._gone: set[int] = set()
         self._slipped: dict[int, float] = {}
         self._bad: dict[str, WorldFault] = {}
@@ -26,7 +26,7 @@ class IdealPlant:
 
     def lose(self, robot: int) -> bool:
         """A robot's hand opens, and nothing tells; whether it held anything."""
-        if self._held()[robot] == NOPART or robot in self._gone:
+        if self._books.held()[robot] == NOPART or robot in self._gone:
             return False
         self._gone.add(robot)
         return True
@@ -42,7 +42,7 @@ class IdealPlant:
 
     def fresh(self) -> Sequence[tuple[str, int]]:
         """The parts that feeders have begun to show since the last question: label and unit."""
-        factory, fired = self._simulation.layout.factory, self._simulation.supervisor.fired
+        factory, fired = self._books.factory, self._books.supervisor.fired
         now = {o.label: factory.unit(o, fired[o.end]) for o in factory.leaves}
         found = [part for part in now.items() if self._shown.get(part[0]) != part[1]]
         self._shown = now
@@ -63,7 +63,7 @@ class IdealPlant:
         """The robots that no longer feel what they carry."""
         if not self._gone:
             return ()
-        holds = self._held()
+        holds = self._books.held()
         self._gone = {robot for robot in self._gone if holds[robot] != NOPART}
         return sorted(self._gone)
 
@@ -98,13 +98,12 @@ class IdealPlant:
         """Nothing that is no good comes further than its feeder."""
         return False
 
-    def undone(
-        self, holds: Sequence[str], fired: Sequence[int], going: Set[int]
-    ) -> Sequence[int]:
+    def undone(self, holds: Sequence[str], fired: Sequence[int], going: Set[int]) -> Sequence[int]:
         """The robots that hold something that is scrap now."""
-        before, gone = self._held(), self._gone
+        before, gone = self._books.held(), self._gone
         self._gone = set()
-        under_way = {o.index for o in self._simulation.layout.factory.operations if fired[o.start] > fired[o.end]}
+        operations = self._books.factory.operations
+        under_way = {o.index for o in operations if fired[o.start] > fired[o.end]}
         self._slipped = {n: by for n, by in self._slipped.items() if n in under_way}
         changed = (r for r, label in enumerate(holds) if label == NOPART != before[r])
         return [robot for robot in changed if robot not in gone]
@@ -135,7 +134,3 @@ class IdealPlant:
         assert isinstance(world, IdealWorld)
         for axis, x in at.items():
             world.x[axis] = x
-
-    def _held(self) -> list[str]:
-        supervisor = self._simulation.supervisor
-        return held(self._simulation.layout.factory, marking_of(supervisor.marked))

@@ -61,9 +61,7 @@ class Plant(Protocol):
     def rejects(self, robot: int) -> bool:
         """Whether an inspection rejects what a robot holds."""
 
-    def undone(
-        self, holds: Sequence[str], fired: Sequence[int], going: Set[int]
-    ) -> Sequence[int]:
+    def undone(self, holds: Sequence[str], fired: Sequence[int], going: Set[int]) -> Sequence[int]:
         """From now on robots hold these labels by the books, NOPART for nothing, transitions have
         fired so often, and some robots are `going` back. Gives those that hold something that is
         scrap now."""

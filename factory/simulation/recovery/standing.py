@@ -76,4 +76,6 @@ class Standing:
         asked = np.abs(bundle.field(x[axes], simulation.request.settings.tick)) > MOVES
         stuck = asked & (np.abs(v[axes]) < STILL)
         of_axis = {axis: robot for robot, own in enumerate(self._axes) for axis in own}
-        return [*dict.fromkeys(of_axis[axis] for axis, is_so in zip(axes, stuck, strict=True) if is_so)]
+        return [
+            *dict.fromkeys(of_axis[axis] for axis, is_so in zip(axes, stuck, strict=True) if is_so)
+        ]

@@ -45,13 +45,12 @@ class Striking:
             for kind in ("down", "dead"):
                 if fault := self._strikes(kind, unit, now, label, name):
                     self.stand(robot, now + fault.seconds if kind == "down" else np.inf)
-        if len(operation.inputs) > 1:
-            if fault := self._strikes("bad_joint", unit, now, operation.label):
-                self._plant.slip(operation, fault.metres)
-        if not operation.inputs:
-            if fault := self._strikes("no_part", unit, now, operation.label):
-                self.empty[operation.label] = now + fault.seconds
-        if fault := self._strikes("blackout", unit, now, operation.label):
+        label, count = operation.label, len(operation.inputs)
+        if count > 1 and (fault := self._strikes("bad_joint", unit, now, label)):
+            self._plant.slip(operation, fault.metres)
+        if not count and (fault := self._strikes("no_part", unit, now, label)):
+            self.empty[label] = now + fault.seconds
+        if fault := self._strikes("blackout", unit, now, label):
             self.dark = max(self.dark, now + fault.seconds)
 
     def stand(self, robot: int, until: float) -> None:
@@ -65,15 +64,18 @@ class Striking:
         )
 
     def dissolved(self, joints: int) -> None:
-        """So many bad joints have been undone before anybody could look at them."""
-        if joints:
-            self.struck["bad_joint"] -= joints
+        """So many bad joints have been undone for another reason before they were looked at."""
+        self.count("bad_joint", -joints)
+
+    def count(self, kind: str, times: int = 1) -> None:
+        """Something has struck so often more."""
+        self.struck[kind] = self.struck.get(kind, 0) + times
 
     def tick(self, now: float) -> None:
         """What is due: things are dropped; what lasted is over."""
         while self._due and self._due[0][0] <= now:
             if not self._plant.lose(heappop(self._due)[1]):
-                self.struck["drop"] -= 1
+                self.count("drop", -1)
         for over in [label for label, until in self.empty.items() if until <= now]:
             del self.empty[over]
             self._plant.supplied()
@@ -98,6 +100,6 @@ class Striking:
                 if hit:
                     self._spent.add(number)
             if hit:
-                self.struck[kind] = self.struck.get(kind, 0) + 1
+                self.count(kind)
                 return fault
         return None

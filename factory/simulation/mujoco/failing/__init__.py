@@ -1,1 +1,1 @@
-"""Where things go wrong in the engine: what is done to bodies, what is sensed, what is cleared away."""
+"""Where things go wrong in the engine."""

@@ -1,4 +1,4 @@
-"""What has fallen: bodies that no robot holds, where they lie, and which robots could touch them."""
+"""What has fallen: where it lies, and which robots could touch it."""
 
 from __future__ import annotations
 

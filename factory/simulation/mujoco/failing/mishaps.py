@@ -14,7 +14,7 @@ from factory.simulation.recovery.faults import WorldFault
 from factory.support.engine import mujoco
 
 SETTLES = 0.5
-"""What has slipped is back in its place in the hand so long after it is held as it should be [s]."""
+"""What has slipped is back in its place in the hand so long after it is held right [s]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,7 +96,9 @@ class Mishaps:
         """A tick is over: what has been joined has not slipped any more, and what is out of sight
         is as good as new."""
         world = self._world
-        self.restore([n for n, slip in self.slips.items() if slip.robot not in world.parts.hands.of])
+        self.restore(
+            [n for n, slip in self.slips.items() if slip.robot not in world.parts.hands.of]
+        )
         for _, bodies in [one for one in self._settling if one[0] <= world.time]:
             self._fallen.calm(bodies)
         self._settling = [one for one in self._settling if one[0] > world.time]

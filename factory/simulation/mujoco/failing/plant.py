@@ -116,9 +116,7 @@ class MujocoPlant:
         hand = self._world.parts.hands.of.get(robot)
         return hand is not None and not self._mishaps.bad.keys().isdisjoint(hand.bodies.values())
 
-    def undone(
-        self, holds: Sequence[str], fired: Sequence[int], going: Set[int]
-    ) -> Sequence[int]:
+    def undone(self, holds: Sequence[str], fired: Sequence[int], going: Set[int]) -> Sequence[int]:
         """From now on robots hold these labels by the books, NOPART for nothing, transitions have
         fired so often, and some robots are `going` back. Gives those that hold something that is
         scrap now."""
@@ -136,9 +134,7 @@ class MujocoPlant:
         parts.welds.write()
         return sorted(scrap - gone)
 
-    def _units(
-        self, holds: Sequence[str], fired: Sequence[int], scrap: Set[int]
-    ) -> dict[int, int]:
+    def _units(self, holds: Sequence[str], fired: Sequence[int], scrap: Set[int]) -> dict[int, int]:
         """The unit for which each robot that holds something holds it from now on: the last that
         was made of it; what is scrap keeps together."""
         found, fresh = dict[int, int](), dict[int, int]()
@@ -152,9 +148,7 @@ class MujocoPlant:
             found[robot] = fresh[hand.unit]
         return found
 
-    def _renumber(
-        self, units: Mapping[int, int], fired: Sequence[int], scrap: Set[int]
-    ) -> None:
+    def _renumber(self, units: Mapping[int, int], fired: Sequence[int], scrap: Set[int]) -> None:
         """Bodies are for other units: those in hands, those that are shown, and the inputs of
         operations under way, or of those that come apart."""
         parts, factory, joining = self._world.parts, self._factory, self._world.inspection.joining

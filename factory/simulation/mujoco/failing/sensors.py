@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from factory.control.mode import Array
+from factory.control.mode import Array, Index
 from factory.mjcf.weld_frames import WeldFrames
 from factory.plant.factory import Operation
 from factory.simulation.mujoco.world import MujocoWorld
@@ -75,7 +75,7 @@ class Senses:
         off = np.linalg.norm(pose[:3] - place + self._noise * self._draw.normal(size=3))
         return bool(off > most or 2 * np.arccos(min(1.0, abs(float(pose[3])))) > TURNED)
 
-    def _gaps(self, welds: Array, bodies: Array) -> Array:
+    def _gaps(self, welds: Index, bodies: Index) -> Array:
         """How far bodies are (n, 3) [m] from where welds should hold them."""
         m, q, frames = self._world.m, self._world.d.qpos, self._frames.chosen(welds)
         place = q[m.jnt_qposadr[m.body_jntadr[bodies]][:, None] + np.arange(3)]
