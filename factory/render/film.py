@@ -44,7 +44,7 @@ class _Observer(Recorder):
             history.add(event.t, event if isinstance(event, Undone) else event.transition)
         if (account := world.hooks.account) is not None:
             history.failings += account.found[len(history.failings) :]
-            history.stand(world.time, account.at_rest)
+            history.stand(account.stood)
         made = world.delivered() - self.simulation.before
         return Moment(world.time, made, Snapshot.of(world.m, world.d))
 
@@ -161,7 +161,11 @@ def take_of(log: Log, picture: Picture) -> Take:
         raise pictureless()
     m, subject = model_of(log), recorded_subject(log.header)
     picture.check(subject.factory.pag)
-    return Take(m, subject, log.header["product"], log.header["units"], picture, History(subject))
+    history = History(subject)
+    if log.failures is not None:
+        history.failings += log.failures.found
+        history.stand(log.failures.stood)
+    return Take(m, subject, log.header["product"], log.header["units"], picture, history)
 
 
 def moment_of(log: Log, row: int) -> Moment:

@@ -13,7 +13,7 @@ from factory.control.mode import Array
 from factory.layout.durations import Pace
 from factory.nets.undone import Entry, Undone
 from factory.plant.factory import Factory, Operation
-from factory.record.failing import Failing
+from factory.record.failures import Failing, Stood
 from factory.record.monitor.subject import MonitorSubject
 
 TIE = 1e-9
@@ -67,7 +67,7 @@ class History:
         self.taken += 1
         number = self.factory.net.threaded.net.transition_index
         if isinstance(entry, Undone):
-            self.undo(time, [number[name] for name in entry.transitions])
+            self.undo(time - 2 * TIE, [number[name] for name in entry.transitions])
         else:
             self.fire(time, number[entry])
 
@@ -100,10 +100,11 @@ class History:
         spells[-1] = replace(last, end=time)
         spells.append(Spell(last.number + places, (last.step + places) % length, time))
 
-    def stand(self, time: float, robots: frozenset[int]) -> None:
-        """From a time on these robots stand, and no others."""
-        if robots != (self.standing[-1][1] if self.standing else frozenset()):
-            self.standing.append((time, robots))
+    def stand(self, stood: Sequence[Stood]) -> None:
+        """Which robots stood up to now."""
+        index = {robot.name: robot.index for robot in self.factory.robots}
+        for start, names in stood[len(self.standing) :]:
+            self.standing.append((start, frozenset(index[name] for name in names)))
 
     def stood(self, robot: int, since: float, time: float) -> list[tuple[float, float]]:
         """From when to when a robot stood, between two times [s]."""
@@ -124,9 +125,13 @@ class History:
         return [one for one in self.failings if since <= one.t < time - TIE]
 
     def catch_up(self, entries: Sequence[tuple[float, Entry]], now: float) -> None:
-        """Take over the entries of a record up to now."""
-        while self.taken < len(entries) and entries[self.taken][0] < now - TIE:
-            self.add(*entries[self.taken])
+        """Take over the entries of a record up to now. What is undone shows at its own time: a tick
+        undoes it after the world has gone on."""
+        while self.taken < len(entries):
+            time, entry = entries[self.taken]
+            if time >= now + (TIE if isinstance(entry, Undone) else -TIE):
+                return
+            self.add(time, entry)
 
     def at(self, robot: int, time: float) -> Spell:
         """The spell that a robot is in at a time."""

@@ -10,7 +10,7 @@ from typing import Protocol
 from factory.control.mode import Array, Index
 from factory.control.navigation import Bundle
 from factory.plant.factory import Operation
-from factory.record.failing import Account
+from factory.record.failures import Account
 from factory.simulation.run import PhysicsFigures
 from factory.support.errors import Diagnostic
 

@@ -11,8 +11,7 @@ from factory.control.mode import Array
 from factory.nets.undone import Undone
 from factory.plant.factory import Factory, Operation
 from factory.problem.template import Failure
-from factory.record.failing import Failing
-from factory.simulation.failures import Failures
+from factory.record.failures import Failing, Failures, Stood
 from factory.simulation.recovery.books import Books
 from factory.simulation.recovery.counting import summed
 from factory.simulation.recovery.faults import Campaign
@@ -54,9 +53,9 @@ class Recovery:
         return self.responding.found
 
     @property
-    def at_rest(self) -> frozenset[int]:
-        """The robots (index) that stand, for whatever reason."""
-        return self.responding.standing.now
+    def stood(self) -> Sequence[Stood]:
+        """From when on which robots stood, for whatever reason."""
+        return self.responding.standing.stood
 
     @property
     def _factory(self) -> Factory:
@@ -184,6 +183,7 @@ class Recovery:
             sum(len(event.transitions) for event in undone),
             self.responding.used_spares,
             self.plant.contacts,
+            self.stood,
         )
 
 

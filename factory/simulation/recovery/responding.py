@@ -17,7 +17,7 @@ from factory.plant.factory import Operation
 from factory.plant.material import joins_of
 from factory.problem.pag import NOPART
 from factory.problem.template import Kind, Response
-from factory.record.failing import Failing
+from factory.record.failures import Failing
 from factory.simulation.recovery.books import Books
 from factory.simulation.recovery.faults import Campaign
 from factory.simulation.recovery.plant import Plant

@@ -1,9 +1,9 @@
-"""A failure that a run went on after: what failed, and what was done about it."""
+"""What went wrong in a run, and what was done about it."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from math import isfinite
 from typing import Protocol
 
@@ -70,11 +70,53 @@ class Failing:
         return f"{self.what}: {self.done}"
 
 
+Stood = tuple[float, tuple[str, ...]]
+"""From when on [s] which robots stand, by name, and no others."""
+
+
+@dataclass(frozen=True)
+class Failures:
+    """All of a run. `struck`: faults of the world, by kind; `missed`: those that no sensor told of;
+    `false_alarms`: failures that nothing caused; `undone`: how many transitions were fired
+    backwards; `spares`: how many were used; `contacts`: of what fell, which are no unintended
+    ones; `stood`: from when on [s] which robots stood, by name."""
+
+    found: tuple[Failing, ...] = ()
+    struck: Mapping[str, int] = field(default_factory=dict)
+    missed: int = 0
+    false_alarms: int = 0
+    undone: int = 0
+    spares: int = 0
+    contacts: int = 0
+    stood: tuple[Stood, ...] = ()
+
+    @property
+    def scrapped(self) -> int:
+        """How many parts and sub-assemblies were scrapped."""
+        return sum(len(one.scrapped) for one in self.found)
+
+    def as_json(self) -> dict[str, object]:
+        """As `run --json` prints it."""
+        return {
+            "struck": dict(self.struck),
+            "found": len(self.found),
+            "missed": self.missed,
+            "false_alarms": self.false_alarms,
+            "transitions_undone": self.undone,
+            "scrapped": self.scrapped,
+            "spares_used": self.spares,
+            "fault_contacts": self.contacts,
+            "standing": [{"t": round(t, 6), "robots": list(robots)} for t, robots in self.stood],
+            "failures": [one.as_json() for one in self.found],
+        }
+
+
 class Account(Protocol):
-    """What a run that goes on after failures tells of them: the failures that it has `found`, and
-    the robots (index) that it lets stand now, `at_rest`."""
+    """What a run that goes on after failures tells of them: those that it has `found`, which robots
+    `stood` so far, and all of it."""
 
     @property
     def found(self) -> Sequence[Failing]: ...
     @property
-    def at_rest(self) -> frozenset[int]: ...
+    def stood(self) -> Sequence[Stood]: ...
+    def report(self) -> Failures: ...
