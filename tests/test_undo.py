@@ -20,7 +20,7 @@ from factory.nets.undone import Joins, Undone
 from factory.plant.factory import Factory
 from factory.plant.material import joins_of
 from factory.problem.pag import NOPART
-from tests.fold_values import inserted, plain, random_fold, random_lines, three_robots
+from tests.fold_values import deputies, inserted, plain, random_fold, random_lines, three_robots
 from tests.net_values import fair_run, random_marked_net
 from tests.pag_values import SHAPES, catalogue, factory_of, paper, random_pag
 from tests.token_game import enabled, follower
@@ -235,3 +235,30 @@ def test_exchanges(seed: int, rng: random.Random) -> None:
         assert after[o.end] - after[end] <= fired[o.end] - fired[end]
     if tokens_after(new.net, fired) == tokens_after(new.net, after):
         assert after == fired
+
+
+@given(st.integers(0, 10**6), randoms)
+def test_deputies(seed: int, rng: random.Random) -> None:
+    """A robot dies, with what it holds, and a sibling takes its tours: no other loses what it holds
+    to a robot that has not had it."""
+    pag = random_pag(rng.randint(3, 14), seed, rng.choice(SHAPES), rng.randint(2, 5))
+    base = plain(inserted(pag, rng.choice((0.5, 1.0)), seed))
+    lines = random_lines(base, rng)
+    pairs = deputies(base, lines)
+    assume(pairs)
+    dead, deputy = rng.choice(pairs)
+    rest = [line for line in lines if line not in (dead, deputy)]
+    old = folded(base, lines, catalogue())
+    new = folded(base, [*rest, tuple(sorted((*dead, *deputy)))], catalogue())
+    fired = fired_by(old, rng.randint(1, 8 * len(old.operations)), rng)
+    had = held(old, marking_after(old.net, fired))
+    brought = {label for tour in dead for label in base.deliveries(tour)}
+    gone = next(r.index for r in old.robots if {*old.deliveries(r.index)} == brought)
+    asked = [old.by_label[had[gone]].end] if had[gone] != NOPART else []
+    after = exchange(new.net, fired, asked, joins_of(new))
+    check_reached(marked(new.net), after)
+    for robot, label in held(new, marking_after(new.net, after)).items():
+        if label != NOPART:
+            before = next(r for r, other in had.items() if other == label)
+            assert before != gone
+            assert {*old.deliveries(before)} <= {*new.deliveries(robot)}

@@ -32,6 +32,7 @@ from factory.commands.requests import (
     RunOptions,
     check_ideal,
 )
+from factory.commands.resuming import resumed
 from factory.commands.warnings import announced
 from factory.support.console import POOL_BOUND, emit, say, table
 from factory.support.errors import Diagnostic, InputError, StoppedError
@@ -43,6 +44,7 @@ if TYPE_CHECKING:
     from factory.record.failures import Failures
     from factory.record.observed import Recorder
     from factory.render import Film
+    from factory.simulation.resuming import Resumed
     from factory.simulation.run import PhysicsFigures, Run
     from factory.simulation.simulation import Simulation
 
@@ -65,6 +67,9 @@ if TYPE_CHECKING:
     default=None,
     help="Judge the run from the engine alone, which is the default: in every tick, or not at all.",
 )
+@click.option(
+    "--resume", is_flag=True, help="FILE is the log of a run that was cut off: go on with it."
+)
 @LENIENT
 @PICTURE
 @FLOOR
@@ -79,11 +84,17 @@ def run(
     video: Path | None,
     log: Path | None,
     monitor: bool | None,
+    resume: bool,
 ) -> int:
     """Run FILE.pag until its products are dropped off.
 
     The status is 1 for a run that does not make its units, or does not follow its net, or in which
-    bodies do otherwise than the net says: --lenient leaves those out."""
+    bodies do otherwise than the net says: --lenient leaves those out.
+
+    With --resume FILE is a log; its run goes on from its last simulated second, in that log."""
+    if resume:
+        going = resumed(given.file, out)
+        return 0 if going is None else _go_on(going, asked, monitor, out)
     writable(given.file, video, log, shown.poster)
     project = given.project(out.silent)
     with Waiting("reading the shapes and laying out", out.silent):
@@ -94,6 +105,38 @@ def run(
         check_ideal(asked.fuse, bool(monitor))
     film = _film(project, asked, video, shown)
     record = run_project(project, asked, out.silent, log, film, monitor)
+    status = _told(record, layout.factory, warnings, monitor, out)
+    if not (out.as_json or out.quiet):
+        say_files(film=video, poster=shown.poster, log=log)
+    return status
+
+
+def _go_on(going: Resumed, asked: RunOptions, monitor: bool | None, out: OutputOptions) -> int:
+    """Let the run in a log go on to its end; the monitor then judges all of it, from the log. Gives
+    the status."""
+    from factory.record.log import read_log
+    from factory.record.monitor.record import watch_log
+
+    made = going.simulation
+    with going.trusted():
+        record = carry_out(made, out.silent, asked.max_time, [going.writer], False)
+    if monitor is not False and made.model is not None:
+        with Waiting("judging the whole run", out.silent):
+            record = replace(record, monitor=watch_log(read_log(going.path))[0])
+    status = _told(replace(record, lenient=asked.lenient), made.layout.factory, [], monitor, out)
+    if not (out.as_json or out.quiet):
+        say_files(log=going.path)
+    return status
+
+
+def _told(
+    record: Run,
+    factory: Factory,
+    warnings: Sequence[object],
+    monitor: bool | None,
+    out: OutputOptions,
+) -> int:
+    """Tell what a run was; gives the status."""
     if out.as_json:
         document = record.as_json()
         document.pop("schema")
@@ -102,8 +145,7 @@ def run(
         trouble = [record.trouble.as_json()] if record.trouble else []
         emit({**document, "warnings": warnings, **({"errors": trouble} if trouble else {})})
     elif not out.quiet:
-        summarise(record, layout.factory, out.verbose)
-        say_files(film=video, poster=shown.poster, log=log)
+        summarise(record, factory, out.verbose)
     say_violations(record.monitor)
     if record.trouble is not None:
         print(record.trouble, file=sys.stderr)
@@ -157,8 +199,11 @@ def run_project(
     recorders: list[Opening] = []
     if log is not None:
         from factory.record.log import LogWriter
+        from factory.simulation.checkpoint import checkpoint
 
-        recorders.append(lambda: LogWriter(log, made, project.pag))
+        recorders.append(
+            lambda: LogWriter(log, made, project.pag, checkpoint=lambda: checkpoint(made))
+        )
     if film is not None:
         recorders.append(lambda: film(made))
     record = carry_out(made, silent, asked.max_time, recorders, monitor)

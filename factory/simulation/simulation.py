@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from time import perf_counter
@@ -16,11 +16,10 @@ from factory.modes.staging import HeadStart, stages_of
 from factory.nets.history import firings
 from factory.nets.petri import Marking
 from factory.nets.replay import replay
-from factory.plant.fused_bodies import FusedBodies, bodies_of, fused_copies
 from factory.plant.material import joins_of
-from factory.problem.robot_types import Catalogue, load_catalogue
 from factory.simulation.distributed import DistributedSupervisor
 from factory.simulation.ideal import IdealWorld
+from factory.simulation.modelling import modelled
 from factory.simulation.request import RunRequest
 from factory.simulation.run import Run, busy_times, entries_of
 from factory.simulation.starting import start_positions
@@ -29,7 +28,6 @@ from factory.simulation.world import World
 from factory.support.errors import Diagnostic, InputError, RunError
 from factory.support.settings import AUTO, MOST, Settings
 from factory.timing.cycle_time import CycleTime
-from factory.timing.pool import part_pool
 from factory.timing.prediction import all_ways, duration, operation_delays, predict
 
 if TYPE_CHECKING:
@@ -44,10 +42,6 @@ PATIENCE = 10.0
 """A run has stalled when nothing fires for this many times the longest predicted delay."""
 
 LOOK = "look at these robots in `factory render`, or give --max-time more"
-
-SPARE = 2
-"""So many copies more of each body are there where parts may be scrapped: they are back in their
-feeders only when they have been cleared away."""
 
 FALL = 0.5
 """So long after something was dropped a run goes on, for it to be seen [s]; nothing fires then."""
@@ -101,7 +95,9 @@ class Simulation:
         else:
             from factory.simulation.mujoco.world import MujocoWorld
 
-            self.model = (compiled and compiled.model) or _model(layout, request, self.under_way())
+            self.model = (compiled and compiled.model) or modelled(
+                layout, request, self.under_way()
+            )
             self.request = request = replace(request, wip=self.model.wip)
             loaded = compiled.loaded if compiled else None
             at = start_positions(layout, self.start)
@@ -301,59 +297,8 @@ def compiled(layout: Layout, request: RunRequest) -> Compiled:
         return Compiled(modes)
     from factory.mjcf.loading import load
 
-    model = _model(layout, request, {})
+    model = modelled(layout, request, {})
     return Compiled(modes, model, load(model))
-
-
-def _model(layout: Layout, request: RunRequest, under_way: Mapping[str, int]) -> Model:
-    """The model that a run takes."""
-    from factory.mjcf.model import build_model
-
-    bodies = bodies_of(layout.factory, layout.product, request.fuse)
-    copies, wip = _copies(layout, bodies, request.units, request.wip, under_way)
-    if request.recovers:
-        copies = {label: count + SPARE for label, count in copies.items()}
-    catalogue, settings = request.catalogue or load_catalogue(), timed(request.settings, layout)
-    return build_model(layout, catalogue, copies, settings, bodies, request.shown, wip)
-
-
-def physical_model(
-    layout: Layout,
-    units: int | None = None,
-    settings: Settings | None = None,
-    catalogue: Catalogue | None = None,
-    wip: int | None = None,
-    under_way: Mapping[str, int] | None = None,
-    fuse: bool = False,
-    shown: bool = True,
-) -> Model:
-    """The MJCF model of a layout with the bodies it needs for `units` (None: for ever): the pool of
-    parts, or with `fuse` bodies of sub-assemblies too, and then few parts. Where the pool is too
-    large, at most so many units are inside as `fitting_wip` says, unless `wip` is given. `shown`:
-    with what is only shown, too."""
-    from factory.mjcf.model import build_model
-
-    bodies = bodies_of(layout.factory, layout.product, fuse)
-    copies, wip = _copies(layout, bodies, units, wip, under_way or {})
-    catalogue, settings = catalogue or load_catalogue(), timed(settings or Settings(), layout)
-    return build_model(layout, catalogue, copies, settings, bodies, shown, wip)
-
-
-def _copies(
-    layout: Layout,
-    bodies: FusedBodies,
-    units: int | None,
-    wip: int | None,
-    under_way: Mapping[str, int],
-) -> tuple[dict[str, int], int | None]:
-    """How many copies of each body are needed, and for how many units inside at once at most."""
-    from factory.mjcf.model import fitting_wip, part_copies
-
-    if bodies.wholes:
-        return fused_copies(bodies, layout.factory, units), wip
-    pool = part_pool(layout.factory)
-    wip = wip or fitting_wip(pool, units)
-    return part_copies(pool, units, wip, under_way), wip
 
 
 def require(run: Run) -> Run:

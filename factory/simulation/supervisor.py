@@ -20,6 +20,7 @@ from factory.nets.threads import Threads
 from factory.nets.undone import Undone
 from factory.plant.factory import Factory, Operation
 from factory.simulation.bundles import Bundles
+from factory.simulation.keeping import Keeper, up_to
 from factory.simulation.run import Event
 from factory.simulation.world import World
 
@@ -171,6 +172,38 @@ class Supervisor:
     def awaited(self) -> list[Operation]:
         """The operations all of whose robots wait for them."""
         return [self.factory.operations[event // 2] for event in sorted(self.threads.possible)]
+
+    def keep(self, keeper: Keeper, past: Sequence[tuple[float, int]] = ()) -> None:
+        """How often each transition has fired, and the modes under way; `past`: when each has [s],
+        and its number, where that is taken up. Raises ValueError where these are not of one run."""
+        fired = np.array(self.fired)
+        keeper.array("fired", fired, 0)
+        going = [(number,) for number in self.active.operations]
+        going = keeper.rows("going", going, up_to(len(self.factory.operations)))
+        ahead = [(number,) for number in self.active.ahead]
+        ahead = keeper.rows("ahead", ahead, self.ahead.place.__contains__)
+        clocks = np.zeros(len(going) + len(ahead))
+        if self.active.clocks is not None:
+            clocks[:] = self.active.clocks
+        keeper.array("clocks", clocks, 0)
+        enabled, near = keeper.flag("enabled", self.enabled), keeper.flag("near", self.near)
+        if not keeper.takes_up:
+            return
+        for _, event in past:
+            self.threads.fire((event,))
+            self.fired[event] += 1
+        if self.fired != fired.tolist():
+            raise ValueError("its counts of firings are not those of its record")
+        transitions = self.factory.net.threaded.transitions
+        self.events += [Event(t, transitions[event].name) for t, event in past]
+        numbers = [number for (number,) in going]
+        if sorted(numbers) != [o.index for o in self.factory.operations if self.marked[o.place]]:
+            raise ValueError("its operations under way are not those of its marking")
+        self.active = Active()
+        self._activate(numbers, [number for (number,) in ahead])
+        if clocks.any():
+            self.active.clocks = clocks
+        self.enabled, self.near = enabled, near
 
     def _startable(self) -> list[int]:
         """Operations X with X_s enabled: waits marked (their goals are everything), the robots in

@@ -148,7 +148,7 @@ def read_log(path: Path | str) -> Log:
     if not data.startswith(MAGIC):
         raise InputError(bad_log(path, "is no log of factory"))
     try:
-        return _read(memoryview(data), written)
+        return log_in(memoryview(data), written)
     except MemoryError as error:
         raise InputError(bad_log(path, f"takes more memory than there is: {error}")) from error
     except UnicodeDecodeError as error:
@@ -162,13 +162,22 @@ def is_log(path: Path | str) -> bool:
     return head_of(Path(path), len(MAGIC)) == MAGIC
 
 
-def _read(data: memoryview, written: bool) -> Log:
+def header_in(data: memoryview) -> tuple[dict[str, Any], int]:
+    """The header of a log, and the byte at which its blocks begin. Raises ValueError where it is
+    none."""
     begin = len(MAGIC) + LENGTH.size
     kept = begin + (LENGTH.unpack_from(data, len(MAGIC))[0] if begin <= len(data) else 0)
     if kept > len(data) or begin > len(data):
         raise ValueError(f"it ends in its header, at byte {len(data)}")
     header = json.loads(bytes(data[begin:kept]))
     check_header(header)
+    return header, kept
+
+
+def log_in(data: memoryview, written: bool = False) -> Log:
+    """The log in the bytes of a file; `written`: its run is still going on. Raises ValueError,
+    KeyError, IndexError, TypeError, OverflowError or RecursionError where they are none."""
+    header, kept = header_in(data)
     left = ROOM + FOLD * len(data)
     xml, files, complete = "", {}, False
     trouble: Arrays = {}

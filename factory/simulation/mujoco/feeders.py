@@ -20,6 +20,7 @@ from factory.mjcf.masks import feeder_codes
 from factory.mjcf.model import Model
 from factory.mjcf.parts import presented_at
 from factory.plant.factory import Operation
+from factory.simulation.keeping import Keeper, one_of, up_to
 from factory.simulation.mujoco.copies import Copies
 from factory.simulation.mujoco.passing import Passing
 from factory.simulation.mujoco.sliders import NEVER, Sliders
@@ -57,6 +58,13 @@ class Supply:
     def rounds(self) -> dict[str, int]:
         """How many parts of each label have been taken."""
         return {label: unit // self.period for label, unit in self.next.items()}
+
+    def keep(self, keeper: Keeper) -> None:
+        """Which units come next."""
+        self.released = keeper.whole("supply.released", self.released)
+        rounds = np.array([*self.next.values()])
+        keeper.array("supply.next", rounds, 0)
+        self.next = dict(zip(self.next, rounds.tolist(), strict=True))
 
     def wants(self, label: str) -> bool:
         """Whether some unit has yet to get its part."""
@@ -128,8 +136,8 @@ class Feeders:
     def begin(self) -> None:
         """Where the run starts, each feeder presents a part if it can and its robot is not yet
         under way with another."""
-        down = self._load(np.flatnonzero(self._turns.now & ~self._passing.holds), down=True)
-        self._sliders.begin(np.setdiff1d(np.arange(len(self._stations)), down))
+        due = np.flatnonzero(self._turns.now & ~self._passing.holds)
+        self._sliders.begin(self._load(due, down=True))
 
     def presents(self, label: str, unit: int, now: float) -> bool:
         """Whether a robot may come for the part for that unit: it is down before the robot can be
@@ -254,6 +262,21 @@ class Feeders:
         held[[*self.back.parts]] = True
         held[[n for n, s in enumerate(self._stations) if s.label in self.back.awaited]] = True
         return held
+
+    def keep(self, keeper: Keeper) -> None:
+        """What is presented and asked for, and whose turn it is."""
+        self.supply.keep(keeper)
+        self._turns.keep(keeper)
+        self._passing.keep(keeper)
+        a_label, a_unit = one_of(self._number), up_to(np.inf)
+        shown = keeper.rows("feeders.shown", self._shown.items(), a_label, a_unit)
+        asked = [(number,) for number in sorted(self._asked)]
+        asked = keeper.rows("feeders.asked", asked, up_to(len(self._stations)))
+        self.due = keeper.number("feeders.due", self.due, high=NEVER)
+        self._shown = dict(shown)
+        self._asked = {number for (number,) in asked}
+        if any(part not in self._copies for part in shown):
+            raise ValueError("its feeders show parts that are not there")
 
     def _send(self, numbers: Index, down: bool) -> None:
         self._sliders.send(numbers, down)

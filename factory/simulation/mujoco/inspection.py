@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from math import comb
 
 import numpy as np
@@ -9,6 +10,7 @@ import numpy as np
 from factory.mjcf.model import Model
 from factory.mjcf.weld_frames import residuals
 from factory.plant.factory import Operation
+from factory.simulation.keeping import Keeper, is_size, is_text, one_of, up_to
 from factory.simulation.mujoco.contacts import ContactMasks
 from factory.simulation.mujoco.pressing import Pressing
 from factory.simulation.mujoco.product_error import ProductError
@@ -16,6 +18,9 @@ from factory.simulation.mujoco.strength import StrengthUse
 from factory.simulation.mujoco.welds import Welds
 from factory.simulation.run import PhysicsFigures
 from factory.support.engine import mujoco
+
+MOST_ONSETS = 10**7
+"""So many onsets of contact are taken up at most."""
 
 
 class Inspection:
@@ -64,6 +69,25 @@ class Inspection:
         for a, b in sorted(now - self._touching):
             self.unintended.append((self._m.geom(a).name, self._m.geom(b).name))
         self._touching = frozenset(now)
+
+    def keep(self, keeper: Keeper) -> None:
+        """The figures, what touches, and what is being joined."""
+        operations, a_geom = self._model.factory.operations, up_to(self._m.ngeom)
+        labels = {operation.label for operation in operations}
+        an_operation = up_to(len(operations))
+        joins = keeper.rows("joins", self.joining.items(), an_operation, up_to(np.inf))
+        force = keeper.rows("forces", self.force.items(), one_of(labels), is_size)
+        touching = keeper.rows("touching", sorted(self._touching), a_geom, a_geom)
+        onsets = [(*pair, count) for pair, count in Counter(self.unintended).items()]
+        onsets = keeper.rows("onsets", onsets, is_text, is_text, up_to(MOST_ONSETS))
+        self.residual = keeper.number("residual", self.residual, 0)
+        self.error = keeper.value("error", self.error, lambda v: v is None or is_size(v))
+        self.joining = dict(joins)
+        self.force = dict(force)
+        self._touching = frozenset(touching)
+        if sum(count for _, _, count in onsets) > MOST_ONSETS:
+            raise ValueError(f"'onsets' are more than {MOST_ONSETS}")
+        self.unintended = [(a, b) for a, b, count in onsets for _ in range(count)]
 
     def _joined(self, one: int, other: int) -> str | None:
         """The label of the operation that is joining the parts of two geoms, None for none."""

@@ -25,8 +25,10 @@ class Pressing:
         self.fallen: set[int] = set()
         self.shaken: set[int] = set()
         self.touched: set[tuple[int, int]] = set()
-        ever = {r.name: held(factory, r.index, at_last=True) for r in factory.robots}
-        self._holds = ever | {names.feeder(leaf.label): leaf.label for leaf in factory.leaves}
+        self._holds = {r.name: {held(factory, r.index, at_last=True)} for r in factory.robots}
+        for leaf in factory.leaves:
+            slider = m.body(int(m.eq_obj1id[m.equality(names.feed(leaf.label)).id])).name
+            self._holds.setdefault(slider.rpartition("/")[0], set()).add(leaf.label)
 
     def meant(self, one: int, other: int, apart: float) -> bool:
         """Whether of two geoms, so far `apart` [m], one is a pad and the other what that is to
@@ -47,6 +49,7 @@ class Pressing:
         return True
 
     def _bears(self, pad: int, geom: int) -> bool:
-        held = self._contents.get(self._holds.get(names.pad_of(self._m.geom(pad).name), ""), ())
+        holds = self._holds.get(names.pad_of(self._m.geom(pad).name), set())
+        held = {part for label in holds for part in self._contents.get(label, ())}
         label = names.label_of(self._m.body(self._m.geom_bodyid[geom]).name)
-        return not set(held).isdisjoint(self._contents.get(label, ()))
+        return not held.isdisjoint(self._contents.get(label, ()))

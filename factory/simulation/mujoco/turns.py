@@ -8,6 +8,7 @@ import numpy as np
 
 from factory.control.mode import Truth
 from factory.layout.layout import Layout
+from factory.simulation.keeping import Keeper
 
 
 class Turns:
@@ -42,6 +43,11 @@ class Turns:
         self.now[number] = False
         self.now[then] = True
         return then
+
+    def keep(self, keeper: Keeper) -> None:
+        """Whose turn it is."""
+        keeper.array("turns.now", self.now, 0, 1)
+        keeper.array("turns.vacant", self.vacant, 0, 1)
 
     def any_of(self, chosen: Truth) -> Truth:
         """Whether one of those that share its robot is chosen, for each (n,)."""
