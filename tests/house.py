@@ -23,7 +23,7 @@ FLOORS = (
     ("layout",),
     ("modes", "mjcf"),
     ("timing", "pipeline"),
-    ("record",),
+    ("record", "planning"),
     ("simulation",),
     ("export", "study", "render"),
     ("show",),
@@ -62,7 +62,7 @@ ENGINE_FIELDS = frozenset(
 )
 """Fields of MjModel and MjData that a run may write."""
 
-MOST_ROOMS, MOST_LINES, MOST_ATTRIBUTES, MOST_PARAMETERS = 22, 350, 12, 8
+MOST_ROOMS, MOST_LINES, MOST_ATTRIBUTES, MOST_PARAMETERS = 23, 350, 12, 8
 
 
 @dataclass(frozen=True)

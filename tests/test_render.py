@@ -27,7 +27,7 @@ from factory.record.log import LogWriter, read_log
 from factory.record.monitor.subject import subject_of_run
 from factory.render import Film, Picture, Still, camera_named, check_output, render_log
 from factory.render.camera import Framing, fit, from_above, overview, towards
-from factory.render.painter import Painter, _Renderer
+from factory.render.painter import Painter, Renderer
 from factory.render.subject import Snapshot
 from factory.render.video import VideoFile
 from factory.simulation.request import RunRequest
@@ -295,7 +295,7 @@ def test_no_more_facets_are_drawn_than_are_seen(layout, tmp_path: Path) -> None:
         assert not painter.renderer.scene.flags[mujoco.mjtRndFlag.mjRND_SKYBOX]
         painter.renderer.close()
         quality.numquads, quality.numstacks = 4, 16
-        painter.renderer = _Renderer(painter.replica, (320, 180))
+        painter.renderer = Renderer(painter.replica, (320, 180))
         many = painter.paint(shown)
     change = np.abs(few.astype(int) - many).max(axis=-1)
     assert change.mean() < 0.1 and (change > 12).mean() < 1e-3 and few.std() > 10

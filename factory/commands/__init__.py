@@ -23,6 +23,7 @@ from factory.commands.import_ import import_
 from factory.commands.monitor import monitor
 from factory.commands.new import new
 from factory.commands.pareto import pareto
+from factory.commands.plan import plan
 from factory.commands.programs import programs
 from factory.commands.render import render
 from factory.commands.report import report
@@ -177,7 +178,16 @@ def cli(ctx: click.Context, version: bool, explain: str | None, as_json: bool) -
 ON_A_FILE = check, build, run, render, view, fidelity, analyze, pareto, report, programs, export
 """The commands whose options may be set in advance for a FILE."""
 
-for _command in (new, import_, *map(with_defaults, ON_A_FILE), sweep, monitor, templates, doctor):
+for _command in (
+    new,
+    import_,
+    plan,
+    *map(with_defaults, ON_A_FILE),
+    sweep,
+    monitor,
+    templates,
+    doctor,
+):
     cli.add_command(_command)
 
 __all__ = ["cli", "main", "run_command"]

@@ -10,6 +10,8 @@ from __future__ import annotations
 import io
 import logging
 import warnings
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from itertools import pairwise
 from math import isfinite
@@ -24,6 +26,9 @@ EXPECTED = {
     ".stl": "an STL file (84 bytes and 50 more a triangle, or a text that begins with 'solid')",
     ".ply": "a PLY file (a header from 'ply' to 'end_header', then all its vertices and faces)",
     ".glb": "a GLB file (binary glTF 2.0, complete, with triangles that are not compressed)",
+    ".off": "an OFF file (a line 'OFF', numbers of vertices, faces and edges, then these)",
+    ".3mf": "a 3MF file (a ZIP archive with 3D/3dmodel.model)",
+    ".step": "a STEP file (ISO 10303-21, which begins with 'ISO-10303-21;', with solids in it)",
 }
 """What a file of a suffix should hold."""
 
@@ -61,16 +66,20 @@ def read_mesh(content: bytes, suffix: str) -> MeshFile:
     """The triangles in a file with this suffix, lower case. Raises UnreadableMesh."""
     if not content.strip():
         raise UnreadableMesh("it is empty")
-    bodies = [_obj(content)] if suffix == ".obj" else _by_trimesh(content, suffix)
-    bodies = [(vertices, faces) for vertices, faces in bodies if len(faces)]
-    if not bodies:
+    return checked([_obj(content)] if suffix == ".obj" else _by_trimesh(content, suffix), suffix)
+
+
+def checked(bodies: Iterable[tuple[Array, Indices]], suffix: str) -> MeshFile:
+    """The bodies that have triangles. Raises UnreadableMesh where none has, or one is broken."""
+    found = [(vertices, faces) for vertices, faces in bodies if len(faces)]
+    if not found:
         raise UnreadableMesh(f"it has no triangles; it should be {EXPECTED[suffix]}")
-    for vertices, faces in bodies:
+    for vertices, faces in found:
         if not 0 <= faces.min() <= faces.max() < len(vertices):
             raise UnreadableMesh("a triangle has a vertex that is not there")
         if not np.isfinite(vertices[faces]).all():
             raise UnreadableMesh("it has vertices that are not finite (nan or inf)")
-    return MeshFile(tuple(bodies))
+    return MeshFile(tuple(found))
 
 
 def _merged(vertices: Array, faces: Indices) -> tuple[Array, Indices]:
@@ -87,16 +96,26 @@ def _by_trimesh(content: bytes, suffix: str) -> list[tuple[Array, Indices]]:
     """The bodies of a file that trimesh reads, where they stand."""
     import trimesh
 
+    with reading(suffix):
+        scene = trimesh.load_scene(io.BytesIO(content), file_type=suffix[1:], process=False)
+        found = [body for body in scene.dump() if isinstance(body, trimesh.Trimesh)]
+        if suffix == ".stl" and not found and len(content) != EMPTY_STL:
+            content.decode()  # without triangles it is a text, or no STL file at all
+        return [(np.array(b.vertices, float), np.array(b.faces, np.int64)) for b in found]
+
+
+@contextmanager
+def reading(suffix: str) -> Iterator[None]:
+    """Within it trimesh reads a file with this suffix, without a word; what it raises is an
+    UnreadableMesh, unless it is one already."""
     logger, level = logging.getLogger("trimesh"), logging.getLogger("trimesh").level
     try:
         with warnings.catch_warnings(), np.errstate(all="ignore"):
             warnings.simplefilter("ignore")
             logger.setLevel(logging.CRITICAL)
-            scene = trimesh.load_scene(io.BytesIO(content), file_type=suffix[1:], process=False)
-            found = [body for body in scene.dump() if isinstance(body, trimesh.Trimesh)]
-            if suffix == ".stl" and not found and len(content) != EMPTY_STL:
-                content.decode()  # without triangles it is a text, or no STL file at all
-            return [(np.array(b.vertices, float), np.array(b.faces, np.int64)) for b in found]
+            yield
+    except UnreadableMesh:
+        raise
     except Exception as error:  # trimesh's readers raise anything on a broken file
         raise UnreadableMesh(f"it is not {EXPECTED[suffix]}") from error
     finally:

@@ -8,10 +8,11 @@ box, with a warning that names it.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
+from types import MappingProxyType
 
 import numpy as np
 
@@ -53,10 +54,11 @@ CELL = 0.06
 
 
 @np.errstate(all="ignore")
-def product_geometry(pag: PAG) -> Product:
-    """The solids of all parts. Raises InputError where a mesh cannot be read (BadMesh), or a part
-    is too large, too far away or too heavy for any engine (BadValue)."""
-    reader = _Reader(Path(pag.folder))
+def product_geometry(pag: PAG, files: Mapping[str, bytes] = MappingProxyType({})) -> Product:
+    """The solids of all parts. Meshes are looked for in `files`, contents by path, before the
+    folder of the PAG. Raises InputError where a mesh cannot be read (BadMesh), or a part is too
+    large, too far away or too heavy for any engine (BadValue)."""
+    reader = _Reader(Path(pag.folder), files)
     leaves = [node for node in pag.postorder() if not node.inputs]
     plain = [node for node in leaves if not _has_shape(node)]
     reader.read([node for node in leaves if node.parameter("mesh") is not None])
@@ -105,8 +107,8 @@ def _box_in_lattice(node: Assembly, number: int, cells: tuple[int, float], lift:
 class _Reader:
     """Reads shapes, collecting errors, and warnings by file; a mesh file is read once."""
 
-    def __init__(self, folder: Path) -> None:
-        self.folder = folder
+    def __init__(self, folder: Path, files: Mapping[str, bytes]) -> None:
+        self.folder, self.files = folder, files
         self.errors: list[Diagnostic] = []
         self.warnings: dict[tuple[str, str], Diagnostic] = {}
         self._meshes: dict[tuple[str, float], MassProperties | Diagnostic] = {}
@@ -153,12 +155,16 @@ class _Reader:
             self.warnings.setdefault((path, said.text), warning)
         return found
 
+    def _content(self, path: str) -> bytes:
+        given = self.files.get(path)
+        return read_bytes(self.folder / path, MESH) if given is None else given
+
     def _opened(self, node: Assembly) -> tuple[str, Work]:
         """What is left to do for a part's mesh once its file is read, and what that depends on:
         files with one content are measured once."""
         path, scale = _file(node)
         try:
-            content, suffix = read_bytes(self.folder / path, MESH), Path(path).suffix.lower()
+            content, suffix = self._content(path), Path(path).suffix.lower()
             key = kept_meshes.key_of(content, suffix, scale)
             kept = kept_meshes.find(key)
             if kept is not None:

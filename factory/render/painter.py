@@ -59,7 +59,7 @@ class Painter(Closing):
         self.fading = Fading(self.replica)
         joints = (names.kind(m.joint(n).name) for n in range(m.njnt))
         self.shadows = sum(kind == "robot" for kind in joints) <= MANY
-        self.renderer = _Renderer(self.replica, size)
+        self.renderer = Renderer(self.replica, size)
 
     def close(self) -> None:
         """Gives the GL context back."""
@@ -74,13 +74,10 @@ class Painter(Closing):
         self.fading.fade(view, self.viewpoint.watched)
         if self.samples == 1:
             return np.ascontiguousarray(self.renderer.draw(view, self.shadows)[::-1])
-        total = np.zeros(self.renderer.pixels.shape, np.float32)
-        for n in range(self.samples):
-            total += self.renderer.draw(view, True, (n, self.samples))
-        return np.ascontiguousarray((total / self.samples + 0.5).astype(np.uint8)[::-1])
+        return self.renderer.mean(view, self.samples)
 
 
-class _Renderer(Closing):
+class Renderer(Closing):
     """Draws a replica as a view has it, with a GL context of its own."""
 
     def __init__(self, replica: Replica, size: Size) -> None:
@@ -117,6 +114,13 @@ class _Renderer(Closing):
         mujoco.mjr_render(self.rectangle, scene, self.drawing)
         mujoco.mjr_readPixels(self.pixels, None, self.rectangle, self.drawing)
         return self.pixels
+
+    def mean(self, view: View, samples: int) -> Pixels:
+        """The mean of so many pictures, from the highest row down: a still."""
+        total = np.zeros(self.pixels.shape, np.float32)
+        for n in range(samples):
+            total += self.draw(view, True, (n, samples))
+        return np.ascontiguousarray((total / samples + 0.5).astype(np.uint8)[::-1])
 
     def _aim(self, view: View, shift: Array) -> None:
         """Set the scene's cameras to a view, moved by a fraction of a pixel."""

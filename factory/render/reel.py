@@ -7,6 +7,7 @@ from pathlib import Path
 import imageio.v3 as iio
 
 from factory.render.camerawork import Camerawork, Moment, Take
+from factory.render.ink import Pixels
 from factory.render.video import VideoFile, check_output
 from factory.support.errors import Diagnostic, InputError
 from factory.support.files import write_bytes
@@ -93,6 +94,11 @@ def save(take: Take, moment: Moment, path: Path) -> None:
     """A still of a moment as PNG."""
     with Camerawork(take, SAMPLES) as work:
         pixels = work.picture(moment)
+    write_still(path, pixels)
+
+
+def write_still(path: Path, pixels: Pixels) -> None:
+    """A picture (height, width, 3) as PNG. Raises InputError where it cannot be written."""
     content = iio.imwrite("<bytes>", pixels, extension=".png", plugin="pillow")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)

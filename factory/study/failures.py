@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 from factory.nets.marked import least_tokens, marked
 from factory.nets.undo import times_undone, undo
 from factory.plant.factory import Factory, Operation
-from factory.plant.material import joins
+from factory.plant.material import joins_of
 from factory.problem.template import Failure
 from factory.timing.failing import (
     SCRAPS,
@@ -162,7 +162,7 @@ class _Costs:
 
     def __init__(self, subject: FailingNet) -> None:
         self.subject, self.factory = subject, subject.factory
-        self.rules = joins(self.factory)
+        self.rules = joins_of(self.factory)
         self.units = (WARM + AFTER) * self.factory.period
         self.plain = self._run(lambda operation, ended: None).dates[-1]
         self.known: dict[tuple[int, tuple[str, ...]], FailureCost] = {}

@@ -17,9 +17,10 @@ from random import Random
 from types import MappingProxyType
 
 from factory.nets.marked import MarkedNet
-from factory.nets.undo import Joins, times_undone, undo
+from factory.nets.undo import times_undone, undo
+from factory.nets.undone import Joins
 from factory.plant.factory import Factory, Operation
-from factory.plant.material import joins
+from factory.plant.material import joins_of
 from factory.problem.template import Kind
 
 SCRAPS = 20
@@ -82,7 +83,7 @@ class FailingNet:
     @cached_property
     def joins(self) -> Joins:
         """What is undone with each end."""
-        return joins(self.factory)
+        return joins_of(self.factory)
 
 
 @dataclass(frozen=True)

@@ -17,8 +17,8 @@ from factory.control.profile import SpeedProfile, World, mode_time
 from factory.layout.hands.leaving import Leaving, going_on, raised
 from factory.layout.hands.limbs import rises_first
 from factory.layout.layout import Layout
-from factory.modes.modes import operation_starts
-from factory.modes.staging import HeadStart, staged
+from factory.modes.modes import operation_modes, operation_starts, robot_limits
+from factory.modes.staging import HeadStart, staged, stages_of
 from factory.nets.ways import with_ways
 from factory.support.settings import Settings
 from factory.timing.cycle_time import (
@@ -161,3 +161,12 @@ def predict(
         bound = marked_graph_cycle_time(with_ways(bounded, factory.net, ways), seconds).seconds
         found.append(CycleTime(bound / factory.period * (1 - 1e-9), f"wip {wip}"))
     return max(found, key=lambda time: time.seconds)
+
+
+def pace(layout: Layout, settings: Settings) -> tuple[CycleTime, list[float]]:
+    """The cycle time of a layout in MuJoCo, and how long each operation takes [s]."""
+    modes, (limits, _) = operation_modes(layout, settings.eps), robot_limits(layout, settings)
+    stages = stages_of(layout, modes, settings)
+    delays = operation_delays(layout, modes, limits, settings, "mujoco", stages)
+    ways = all_ways(layout, stages, delays, limits, settings, "mujoco")
+    return predict(layout, delays, settings, "mujoco", None, ways), delays

@@ -117,14 +117,14 @@ class Finder:
         kept = np.flatnonzero(depths.faulty.any(axis=1))
         return meeting[kept], moving[kept], standing[kept], depths.at(kept)
 
-    def _chunks(self, axis: int) -> Iterator[tuple[Ints, Ints]]:
-        """Pairs (moving, standing) of bodies whose boxes overlap or are near across the axis, the
-        part of the moving one being the later, in chunks."""
+    def _chunks(self, axis: int, apart: float = CLEAR) -> Iterator[tuple[Ints, Ints]]:
+        """Pairs (moving, standing) of bodies whose boxes overlap or are at most so far `apart`
+        across the axis, the part of the moving one being the later, in chunks."""
         from shapely import STRtree, box
 
         u, v = (i for i in range(3) if i != axis)
         low, high, part = self.bodies.low, self.bodies.high, self.bodies.part
-        c = CLEAR / 2
+        c = apart / 2
         flat = box(low[:, u] - c, low[:, v] - c, high[:, u] + c, high[:, v] + c)
         tree = STRtree(flat)
         for start in range(0, len(flat), CHUNK):
@@ -132,6 +132,21 @@ class Finder:
             one = one + start
             later = part[one] > part[other]
             yield one[later], other[later]
+
+    def near(self, gap: float) -> tuple[Ints, Ints]:
+        """Pairs of bodies of two parts that are at most so far [m] from each other, the later part
+        first, wherever they meet. Bodies that meet with corners may be a little further apart."""
+        pairs = [self._beside(gap, *pair) for pair in self._chunks(2, gap)]
+        one, other = np.concatenate([np.zeros((2, 0), np.int64), *pairs], axis=1)
+        depths = _box_depths(self.bodies, one, other, 2)
+        self._refine(one, other, 2, depths)
+        found = depths.finished >= -gap
+        return one[found], other[found]
+
+    def _beside(self, gap: float, one: Ints, other: Ints) -> Ints:
+        low, high = self.bodies.low, self.bodies.high
+        near = (low[one] <= high[other] + gap) & (low[other] <= high[one] + gap)
+        return np.asarray(np.stack([one, other])[:, near.all(axis=1)])
 
     def _near(self, axis: int, wanted: NDArray[np.bool_], moving: Ints, standing: Ints) -> Ints:
         """Those that meet at a wanted meeting and whose boxes come to overlap there: rows moving,

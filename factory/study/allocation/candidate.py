@@ -6,13 +6,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
-from factory.modes.modes import operation_modes, robot_limits
-from factory.modes.staging import stages_of
 from factory.pipeline import Project
 from factory.study.allocation.bundles import Filling
 from factory.support.errors import FactoryError
 from factory.timing.cycle_time import CycleTime
-from factory.timing.prediction import all_ways, operation_delays, predict
+from factory.timing.prediction import pace
 
 
 @dataclass(frozen=True)
@@ -56,12 +54,7 @@ class Candidate:
     @cached_property
     def _timed(self) -> tuple[CycleTime, list[float]]:
         """The pace of its layout, and how long each operation takes [s]."""
-        layout, settings = self.project.layout, self.project.settings
-        modes, (limits, _) = operation_modes(layout, settings.eps), robot_limits(layout, settings)
-        stages = stages_of(layout, modes, settings)
-        delays = operation_delays(layout, modes, limits, settings, "mujoco", stages)
-        ways = all_ways(layout, stages, delays, limits, settings, "mujoco")
-        return predict(layout, delays, settings, "mujoco", None, ways), delays
+        return pace(self.project.layout, self.project.settings)
 
     @cached_property
     def troubles(self) -> int:

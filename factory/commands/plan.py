@@ -1,0 +1,183 @@
+"""The command `plan`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from factory.commands.options import OUTPUT, PATH, SECONDS, Number
+from factory.commands.outputs import writable_folder
+from factory.commands.requests import OutputOptions
+from factory.commands.warnings import announced
+from factory.support.console import emit, say
+from factory.support.progress import StepBar, Waiting
+
+if TYPE_CHECKING:
+    from factory.pipeline import Project
+    from factory.planning.parts import InPlace
+    from factory.plant.approaches import Approach, Kind
+
+UNITS = ("m", "cm", "mm", "in", "ldu")
+"""The names of units of length; `ldu` is that of LDraw, 0.4 mm."""
+
+AIMS = ("cycle", "robots", "floor")
+
+LOOKS = ("exploded.png", "assembly.mp4")
+"""How the names of the still and of the film end."""
+
+KINDS: tuple[Kind, ...] = ("slide", "lower", "blocked")
+
+
+@click.command()
+@click.argument("source", type=PATH)
+@click.option("-o", "--output", type=PATH, help="The folder to write; without, SOURCE-planned.")
+@click.option(
+    "--for",
+    "aim",
+    type=click.Choice(AIMS),
+    default="cycle",
+    help="What the tree is chosen for: a short cycle, few robots, a small floor.",
+)
+@click.option("--seconds", type=SECONDS, default=60.0, help="To look for a better tree [s].")
+@click.option("--keep", multiple=True, help="A sub-tree of a PAG that stays (repeatable).")
+@click.option("--replan", is_flag=True, help="Throw the tree of a PAG away.")
+@click.option(
+    "--allow",
+    multiple=True,
+    help="A part that may pass through others, where there is no other way (repeatable).",
+)
+@click.option(
+    "--tolerance",
+    type=Number(0),
+    help="How deep parts may overlap on their way [m]; that of check.",
+)
+@click.option("--unit", type=click.Choice(UNITS), help="Of lengths; found out without.")
+@click.option("--library", type=PATH, envvar="LDRAWDIR", help="An LDraw parts library.")
+@click.option("--boxes", is_flag=True, help="LDraw parts whose shape is missing become boxes.")
+@click.option("--look/--no-look", default=True, help="Write an exploded view, and its film.")
+@click.option(
+    "--templates",
+    "folders",
+    multiple=True,
+    type=PATH,
+    help="A folder of further operations, searched first (repeatable).",
+)
+@OUTPUT
+def plan(
+    out: OutputOptions,
+    source: Path,
+    output: Path | None,
+    aim: str,
+    seconds: float,
+    keep: tuple[str, ...],
+    replan: bool,
+    allow: tuple[str, ...],
+    tolerance: float | None,
+    unit: str | None,
+    library: Path | None,
+    boxes: bool,
+    look: bool,
+    folders: tuple[Path, ...],
+) -> int:
+    """Find an assembly tree for the parts of SOURCE, which are where they are in the finished
+    product, and write it as a PAG with its meshes. SOURCE is a folder of meshes, a file with named
+    bodies (.glb, .3mf, .step), an LDraw model (.ldr, .mpd), or a PAG whose tree is thrown away."""
+    from factory.pipeline import all_templates, read
+    from factory.planning.source.reading import SourceOptions, read_source
+    from factory.planning.stacking import stacked
+    from factory.planning.writing import planned_product
+    from factory.support.files import own_names, write_all
+
+    templates = all_templates(folders)
+    writable_folder(output)
+    with Waiting(f"reading {source.name}", out.silent):
+        found = read_source(source, templates, SourceOptions(unit, keep, replan, library, boxes))
+    folder = output or Path(f"{found.name}-planned")
+    writable_folder(folder)
+    warnings = announced(found.warnings, out)
+    if not out.silent:
+        for note in found.notes:
+            say(f"  {note}")
+    with StepBar("looking for a tree", out.silent, seconds):
+        tree = stacked(found)
+    made = planned_product(found, tree, None, source.name)
+    files = {folder / name: content for name, content in made.files.items()}
+    own_names(folder, files, [source])
+    write_all(files)
+    pag = next(iter(files))
+    project = read(pag, folders)
+    looked = _looks(project, out) if look else []
+    known = set(map(id, project.product.warnings))
+    warnings += announced([w for w in project.warnings if id(w) not in known], out)
+    if out.as_json:
+        emit(_document(found, project, [*files, *looked], warnings))
+    elif not out.quiet:
+        _tell(project, [*files, *looked], out)
+    return 0
+
+
+def _looks(project: Project, out: OutputOptions) -> list[Path]:
+    """The still and the film of the exploded view, written beside the PAG; none where the machine
+    has no GL, which is said."""
+    from factory.planning.exploding import explosion
+    from factory.render.exploded import ExplodedView
+    from factory.support.errors import MissingError
+    from factory.support.files import own_names
+
+    still, film = (project.file.with_name(f"{project.name}-{end}") for end in LOOKS)
+    own_names(project.file.parent, [still, film])
+    if project.matings is None:
+        return []
+    view = ExplodedView(project.product, explosion(project.pag, project.matings, project.product))
+    try:
+        with Waiting("drawing the exploded view, and filming it", out.silent):
+            view.still(still)
+            view.film(film)
+    except MissingError as error:
+        announced(error.diagnostics, out)
+        return []
+    return [still, film]
+
+
+def _document(
+    found: InPlace, project: Project, files: list[Path], warnings: list[dict[str, Any]]
+) -> dict[str, Any]:
+    """The keys of `plan --json`."""
+    matings = project.matings
+    return {
+        "pag": str(project.file),
+        "product": project.pag.root,
+        "parts": len(found.parts),
+        "kinds": len({part.kind for part in found.parts}),
+        "labels": len(project.pag),
+        "kept": [keep.label for keep in found.kept],
+        "notes": list(found.notes),
+        "approaches": matings.as_json() if matings else None,
+        "files": [str(path) for path in files],
+        "warnings": warnings,
+    }
+
+
+def _tell(project: Project, files: list[Path], out: OutputOptions) -> None:
+    """What was planned and written."""
+    parts = sum(1 for _ in project.pag.parts())
+    matings = project.matings
+    kinds = [(kind, len(matings.of_kind(kind))) for kind in KINDS] if matings else []
+    ways = ", ".join(f"{count} {kind}" for kind, count in kinds if count)
+    say(f"{project.file}: parts {parts}, operations {len(project.pag) - parts}; ways: {ways}")
+    if out.verbose and matings:
+        for mating in matings.all:
+            say(f"  {mating.label}: {' + '.join(mating.inputs)}, {_way(mating.approach)}")
+    for path in files if out.verbose else files[-2:]:
+        say(f"  {path}")
+    say(f"  factory run {project.file} --units 3 --video {project.file.with_suffix('.mp4')}")
+
+
+def _way(approach: Approach) -> str:
+    """An approach in words."""
+    if approach.kind == "lower":
+        return f"{approach.lowered} is lowered {approach.stroke:g} m"
+    sides = " or ".join(f"{'-+'[side > 0]}{'xy'[approach.axis]}" for side in approach.sides)
+    return f"{'slides' if approach.kind == 'slide' else 'is blocked'} from {sides}"

@@ -1,0 +1,141 @@
+"""Which parts interlock, so that no tree of two-handed straight motions along the axes joins them.
+
+*Theorem.* Parts in place can be joined two by two, each time by one straight motion along an axis,
+if and only if no set of two or more of them is strongly connected in the blocking graphs of all
+three axes. *Proof.* Such a set would be divided by some motion of the tree, along some axis; some
+part that goes is in the way of one that stays in the graph of that direction, as a strongly
+connected graph has no closed proper subset. Where there is none, the strong components of the first
+axis that has several come out one after the other, and a subset of what comes apart comes apart:
+so no choice has to be undone. (Axes are of the product, turned onto the floor in any way: a robot
+that hands over to another turns the axis along which its inputs come.)
+
+So the largest interlocked sets are found by refining: all parts are divided by the strong
+components of each axis in turn until nothing divides any more.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from itertools import product
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse.csgraph import connected_components
+
+from factory.planning.blocking import AXES, Blocking
+
+Direction = tuple[int, int]
+"""An axis of the product, 0 to 2, and the side, +1 or -1, to which something goes out."""
+
+Units = tuple[int, ...]
+"""Numbers of units, ascending."""
+
+ROUNDS = 400
+"""So many interlocked sets, at most, are looked for to prove that a removal is the smallest."""
+
+
+@dataclass(frozen=True, slots=True)
+class Interlock:
+    """Parts no two groups of which come apart: their `labels`, and for each of the six directions a
+    circuit of parts each of which, going out there, meets the next one (and the last the first)."""
+
+    labels: tuple[str, ...]
+    circuits: tuple[tuple[Direction, tuple[str, ...]], ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Removal:
+    """Parts without which, or with whose clashes accepted, the rest can be joined; whether it is
+    proved that no fewer do (`smallest`)."""
+
+    labels: tuple[str, ...]
+    smallest: Literal[True, False]
+
+
+def interlocks(found: Blocking) -> tuple[Interlock, ...]:
+    """The largest sets of units that interlock, none for a product that can be joined."""
+    every = tuple(range(len(found)))
+    return tuple(
+        Interlock(tuple(found.labels[n] for n in core), tuple(_circuits(found, core)))
+        for core in cores(found.locks, every)
+    )
+
+
+def cores(locks: NDArray[np.bool_], members: Sequence[int]) -> list[Units]:
+    """The largest interlocked sets among some units; `locks` (3, n, n)."""
+    blocks, found = [np.asarray(members, np.int64)], list[Units]()
+    while blocks:
+        block = blocks.pop()
+        if len(block) < 2:
+            continue
+        for axis in AXES:
+            pieces, piece = strong(locks[axis], block)
+            if pieces > 1:
+                blocks += [block[piece == number] for number in range(pieces)]
+                break
+        else:
+            found.append(tuple(block.tolist()))
+    return sorted(found)
+
+
+def strong(locks: NDArray[np.bool_], block: NDArray[np.int64]) -> tuple[int, NDArray[np.int32]]:
+    """How many strong components some units have along an axis, and that of each."""
+    count, piece = connected_components(locks[np.ix_(block, block)], connection="strong")
+    return int(count), piece
+
+
+def smallest_core(locks: NDArray[np.bool_], core: Units) -> Units:
+    """An interlocked set within one, of which no part can be left out."""
+    for unit in core:
+        if unit not in core:
+            continue
+        rest = cores(locks, [n for n in core if n != unit])
+        if rest:
+            core = min(rest, key=len)
+    return core
+
+
+def removal(found: Blocking) -> Removal:
+    """The fewest units without which nothing interlocks: of every interlocked set one has to go, a
+    smallest hitting set of those seen so far; if what is left interlocks, that is one more."""
+    locks, seen = found.locks, list[Units]()
+    chosen: Units = ()
+    for _ in range(ROUNDS):
+        rest = [n for n in range(len(found)) if n not in chosen]
+        left = cores(locks, rest)
+        if not left:
+            return Removal(tuple(found.labels[n] for n in chosen), True)
+        seen += [smallest_core(locks, core) for core in left]
+        chosen = _hitting(seen, len(found))
+    while left := cores(locks, [n for n in range(len(found)) if n not in chosen]):
+        chosen = (*chosen, smallest_core(locks, left[0])[0])
+    return Removal(tuple(found.labels[n] for n in sorted(chosen)), False)
+
+
+def _hitting(sets: Sequence[Units], count: int) -> Units:
+    """The fewest units that have one of every set: an integer program; of several solutions the
+    later units of the source, which hold less than the first."""
+    from scipy.optimize import Bounds, LinearConstraint, milp
+
+    has = np.zeros((len(sets), count))
+    for row, members in enumerate(sets):
+        has[row, list(members)] = 1.0
+    cost = 1.0 - np.arange(count) / (2.0 * count * count)
+    solved = milp(
+        cost, constraints=LinearConstraint(has, lb=1.0), integrality=1, bounds=Bounds(0, 1)
+    )
+    return tuple(np.flatnonzero(np.round(solved.x)).tolist())
+
+
+def _circuits(found: Blocking, core: Units) -> Iterator[tuple[Direction, tuple[str, ...]]]:
+    """For each direction the shortest circuit through the first unit of an interlocked set."""
+    import networkx as nx
+
+    for axis, side in product(AXES, (+1, -1)):
+        locks = found.locks[axis][np.ix_(core, core)]
+        graph = nx.from_numpy_array(locks if side > 0 else locks.T, create_using=nx.DiGraph)
+        back = min(graph.predecessors(0), key=lambda n: nx.shortest_path_length(graph, 0, n))
+        way = nx.shortest_path(graph, 0, back)
+        yield (axis, side), tuple(found.labels[core[n]] for n in way)

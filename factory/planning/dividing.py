@@ -1,0 +1,124 @@
+"""Ways to divide many units in two: closed sets of the blocking graphs that hang together."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from factory.geometry.meshes import Array
+from factory.planning.blocking import CLASHES, DEEPER, LOCKED, Blocking
+from factory.planning.cannot import Units
+from factory.planning.subsets import APART, BLOCKED, LOOSE, PASSES
+from scipy.sparse.csgraph import connected_components
+
+Sets = NDArray[np.bool_]
+
+SEEDS = 6
+"""From so many units sets are grown along each direction."""
+
+TRIED = 40
+"""Of so many of the most promising divisions it is found out whether both sides hang together."""
+
+
+@dataclass(frozen=True, slots=True)
+class Division:
+    """Two sides of some units and what dividing them costs."""
+
+    one: Units
+    other: Units
+    price: float
+
+
+@dataclass(frozen=True, slots=True)
+class Divider:
+    """Divides units by the blocking graphs of a product."""
+
+    found: Blocking
+
+    def best(
+        self, members: Units, axes: tuple[int, ...], random: np.random.Generator, even: float = 1.0
+    ) -> Division | None:
+        """The division along one of some axes that costs least, and of those one that is about
+        `even`: 0 does not mind; None where the graphs of all these axes hold the units together."""
+        units = np.array(members)
+        sets, prices = self._candidates(units, axes, random)
+        if not len(sets):
+            return None
+        share = sets.sum(axis=1) / len(units)
+        worth = even * np.abs(share - 0.5) + 0.15 * random.random(len(sets))
+        touch = self.found.touch[np.ix_(units, units)]
+        best, chosen = np.inf, 0
+        for n in np.lexsort((worth, prices))[:TRIED].tolist():
+            price = prices[n] + APART * (_pieces(touch, sets[n]) + _pieces(touch, ~sets[n]))
+            if price < best:
+                best, chosen = price, n
+            if price <= prices[n]:
+                break
+        one, other = units[sets[chosen]], units[~sets[chosen]]
+        return Division(tuple(one.tolist()), tuple(other.tolist()), float(best))
+
+    def _candidates(
+        self, units: NDArray[np.int64], axes: tuple[int, ...], random: np.random.Generator
+    ) -> tuple[Sets, Array]:
+        """Closed sets (k, n) and the prices (k,) of taking each out."""
+        here = np.ix_(units, units)
+        touch, found = self.found.touch[here], dict[bytes, tuple[NDArray[np.bool_], float]]()
+        for axis in axes:
+            for turned in (False, True):
+                locks, levels = self.found.locks[axis][here], self.found.levels[axis][here]
+                if turned:
+                    locks, levels = locks.T, levels.T
+                needs = _reached(locks)
+                sets = np.unique(np.array([*needs, *self._grown(needs, touch, random)]), axis=0)
+                sets = sets[~sets.all(axis=1)]
+                for row, price in zip(sets, _prices(levels, sets).tolist(), strict=True):
+                    key = (row if row[0] else ~row).tobytes()
+                    if key not in found or price < found[key][1]:
+                        found[key] = row, price
+        rows = [row for row, _ in found.values()]
+        return np.array(rows), np.array([price for _, price in found.values()])
+
+    def _grown(
+        self, needs: Sets, touch: Sets, random: np.random.Generator
+    ) -> Iterator[NDArray[np.bool_]]:
+        """Closed sets that grow from some units, by one that touches what there is and what that
+        needs."""
+        count = len(needs)
+        weight = needs.sum(axis=1) + random.random(count)
+        for seed in random.permutation(count)[:SEEDS].tolist():
+            grown = needs[seed].copy()
+            while 2 * grown.sum() < count:
+                beside = np.flatnonzero(touch[grown].any(axis=0) & ~grown)
+                if not len(beside):
+                    break
+                grown = grown | needs[beside[weight[beside].argmin()]]
+                if not grown.all():
+                    yield grown
+
+
+def _reached(locks: NDArray[np.bool_]) -> Sets:
+    """What each unit needs to go out (n, n): itself, what is in its way, what is in the way of
+    that."""
+    reach = (locks | np.eye(len(locks), dtype=bool)).astype(np.float32)
+    while True:
+        further = (reach @ reach > 0).astype(np.float32)
+        if np.array_equal(further, reach):
+            return np.asarray(reach > 0)
+        reach = further
+
+
+def _prices(levels: NDArray[np.int8], sets: Sets) -> Array:
+    """What it costs that each of some sets goes out (k,)."""
+    found = np.zeros(len(sets))
+    for level, price in ((DEEPER, LOOSE), (LOCKED, PASSES), (CLASHES, BLOCKED)):
+        meets = sets.astype(np.float32) @ (levels >= level).astype(np.float32)
+        found[((meets > 0) & ~sets).any(axis=1)] = price
+    return found
+
+
+def _pieces(touch: Sets, members: NDArray[np.bool_]) -> bool:
+    """Whether some units are in pieces."""
+    return int(connected_components(touch[np.ix_(members, members)], directed=False)[0]) > 1

@@ -1,0 +1,178 @@
+"""Trees of many units: divided from the top, then bettered piece by piece.
+
+The first tree is found by dividing, always: whatever comes apart is a subset of what comes apart,
+so no choice has to be undone. Then neighbourhoods are solved anew: a join with some of what is
+below it, whose other sub-assemblies are units for the moment, is solved as a small product is
+(`exact`), and taken if the whole tree is worth more.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from factory.geometry.meshes import Array
+from factory.planning.blocking import Blocking
+from factory.planning.cannot import Units
+from factory.planning.dividing import Divider
+from factory.planning.estimate import Expected
+from factory.planning.exact import RELAY, Best, Late, Task, Tree, never
+from factory.planning.judging import Judge, Judged
+from factory.planning.stance import ROOT_AXIS, Stance
+from factory.planning.subsets import subsets
+
+SMALL = 8
+"""So many units are solved exactly."""
+
+ROUNDS = 3
+"""A tree stays as it is when so many neighbourhoods of each join, on average, gave nothing."""
+
+
+@dataclass(frozen=True, slots=True)
+class Group:
+    """Units that are joined already, as a `tree` whose inputs come along an axis of the floor; -1
+    where it does not matter."""
+
+    units: Units
+    tree: Tree = field(repr=False)
+    axis: int = -1
+
+
+@dataclass(frozen=True)
+class Ground:
+    """What trees are sought for: a product's blocking, how it stands, and what is expected; `given`
+    (2, n): the price of each unit if its own inputs come along x or y of the floor."""
+
+    found: Blocking
+    stance: Stance
+    expected: Expected
+    given: Array = field(repr=False)
+
+
+def solved(
+    ground: Ground, groups: Sequence[Group], axis: int, bound: float | None, late: Late = never
+) -> Tree | None:
+    """The best tree of a few groups, whose inputs come along an axis of the floor; sub-assemblies
+    are in pieces only where there is no other way. None where no tree has cycles below the bound.
+    """
+    stance, few = ground.stance, ground.found.grouped([group.units for group in groups])
+    tables = subsets(few)
+    horizontal = tuple(sorted(stance.axes[:2]))
+    turn = [stance.axes.index(h) for h in horizontal]  # of the floor, for each horizontal axis
+    given = np.array([[_price(ground, group, turn[k]) for group in groups] for k in (0, 1)])
+    at = turn.index(axis)
+
+    def leaf(unit: int, k: int) -> Tree:
+        group = groups[unit]
+        return group.tree if group.axis in (-1, turn[k]) else (group.tree,)
+
+    for apart in (False, True):
+        task = Task(tables, ground.expected, stance.axes[2], stance.up, given, apart)
+        best = Best(task, bound, late)
+        if np.isfinite(best.made[at, tables.whole]):
+            return best.tree(tables.whole, at, leaf)
+    return None
+
+
+def _price(ground: Ground, group: Group, axis: int) -> float:
+    if len(group.units) == 1:
+        return float(ground.given[axis, group.units[0]])
+    return 0.0 if group.axis == axis else RELAY
+
+
+def divided(ground: Ground, random: np.random.Generator, even: float) -> Tree:
+    """A tree by dividing from the top, `even` as `Divider.best` says."""
+    divider, stance = Divider(ground.found), ground.stance
+
+    def below(members: Units, axis: int) -> Tree:
+        if len(members) <= SMALL:
+            groups = [Group((unit,), unit) for unit in members]
+            return solved(ground, groups, axis, None) if len(members) > 1 else members[0]
+        for turned in (False, True):
+            along = 1 - axis if turned else axis
+            division = divider.best(members, (stance.axes[along], stance.axes[2]), random, even)
+            if division is not None:
+                tree = tuple(below(side, 1 - along) for side in (division.one, division.other))
+                return (tree,) if turned else tree
+        raise ValueError("interlocked")
+
+    return below(tuple(range(len(ground.found))), ROOT_AXIS)
+
+
+def bettered(
+    ground: Ground, first: Tree, bound: float, late: Late, random: np.random.Generator
+) -> Iterator[Judged]:
+    """Trees each of which is worth more than the one before, from a first one on, within a bound on
+    expected cycles [s], until it is late or ROUNDS neighbourhoods of each join gave nothing."""
+    judge = Judge(ground.found, ground.stance, ground.expected)
+    best = judge.judged(first)
+    yield best
+    idle = 0
+    while not late():
+        joins = [place for place in _places(best.tree) if place]
+        joins.append(())
+        if idle > ROUNDS * len(joins):
+            return
+        place = joins[int(random.integers(len(joins)))]
+        node, axis = _at(best.tree, place), (ROOT_AXIS + len(place)) % 2
+        groups = _groups(node, axis, random)
+        found = solved(ground, groups, axis, bound) if len(groups) > 2 else None
+        idle += 1
+        if found is None or found == node:
+            continue
+        other = judge.judged(_replaced(best.tree, place, found))
+        if _worth(other, bound) < _worth(best, bound):
+            best, idle = other, 0
+            yield best
+
+
+def _worth(judged: Judged, bound: float) -> tuple[float, ...]:
+    """What is better is less."""
+    over = max(judged.seconds - bound, 0.0)
+    return judged.price, round(over, 6), judged.robots, round(judged.sizes, 6)
+
+
+def _places(tree: Tree, place: tuple[int, ...] = ()) -> Iterator[tuple[int, ...]]:
+    """The ways from the root to all joins of a tree."""
+    if not isinstance(tree, int):
+        yield place
+        for number, below in enumerate(tree):
+            yield from _places(below, (*place, number))
+
+
+def _at(tree: Tree, place: tuple[int, ...]) -> Tree:
+    for number in place:
+        tree = tree[number]
+    return tree
+
+
+def _replaced(tree: Tree, place: tuple[int, ...], by: Tree) -> Tree:
+    if not place:
+        return by
+    first, *rest = place
+    return (*tree[:first], _replaced(tree[first], tuple(rest), by), *tree[first + 1 :])
+
+
+def _groups(node: Tree, axis: int, random: np.random.Generator) -> list[Group]:
+    """What is below a join, taken apart further until there are about SMALL groups."""
+    open_ = [(node, axis)]
+    while True:
+        inner = [n for n, (tree, _) in enumerate(open_) if not isinstance(tree, int)]
+        fits = [n for n in inner if len(open_) + len(open_[n][0]) - 1 <= SMALL]
+        if not fits:
+            break
+        chosen = fits[int(random.integers(len(fits)))]
+        tree, own = open_.pop(chosen)
+        open_ += [(below, 1 - own) for below in tree]
+    return [
+        Group(units_of(tree), tree, -1 if isinstance(tree, int) else own) for tree, own in open_
+    ]
+
+
+def units_of(tree: Tree) -> Units:
+    """The units of a tree, ascending."""
+    if isinstance(tree, int):
+        return (tree,)
+    return tuple(sorted(unit for below in tree for unit in units_of(below)))

@@ -1,0 +1,173 @@
+"""What a tree is worth: each of its joins, how it comes together, and what it all costs."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+
+from factory.geometry.meshes import Array
+from factory.planning.blocking import CLASHES, DEEPER, FREE, LOCKED, Blocking
+from factory.planning.cannot import Direction, Units
+from factory.planning.estimate import Expected
+from factory.planning.exact import RELAY, Tree
+from factory.planning.stance import ROOT_AXIS, Stance
+from factory.planning.subsets import APART, BLOCKED, LOOSE, PASSES
+
+PRICES = {CLASHES: BLOCKED, LOCKED: PASSES, DEEPER: LOOSE}
+"""What a join costs in which parts are so much in each other's way."""
+
+
+@dataclass(frozen=True, slots=True)
+class Join:
+    """Two groups of units that come together: `come` goes out along `direction` of the product, so
+    comes in against it. `level`: the worst in its way (`blocking`). `room`: the least room [m] on
+    that way, infinite where nothing comes near. `lowered`: whether it comes along the vertical.
+    `onto`: whether the robot of the pile takes it."""
+
+    pile: Units
+    come: Units
+    direction: Direction
+    level: int
+    room: float
+    lowered: bool
+    onto: bool
+
+
+@dataclass(frozen=True)
+class Judged:
+    """A tree of units in a stance, with its `joins`, how many sub-assemblies are in pieces
+    (`apart`) and how many are relayed; the greatest expected cycle of its robots [s], how many
+    these are, and how long all sub-assemblies are [m]."""
+
+    tree: Tree = field(repr=False)
+    stance: Stance
+    joins: tuple[Join, ...] = field(repr=False)
+    apart: int
+    relays: int
+    seconds: float
+    robots: int
+    sizes: float
+
+    @cached_property
+    def price(self) -> float:
+        """What its joins and its sub-assemblies in pieces cost."""
+        joins = sum(PRICES.get(join.level, 0.0) for join in self.joins)
+        return joins + APART * self.apart + RELAY * self.relays
+
+    def count(self, level: int) -> int:
+        """How many joins have parts that much in each other's way, or more."""
+        return sum(join.level >= level for join in self.joins)
+
+
+class Judge:
+    """Judges trees of one product in one stance."""
+
+    def __init__(self, found: Blocking, stance: Stance, expected: Expected) -> None:
+        self.found, self.stance, self.expected = found, stance, expected
+
+    def judged(self, tree: Tree) -> Judged:
+        """The joins of a tree, and what they cost."""
+        walk = _Walk(self)
+        members, held = walk.made(tree, ROOT_AXIS)
+        walk.seconds.append(held + float(self.expected.delivering(self.size(members))))
+        joins, apart = tuple(walk.joins), walk.apart - (not self.hangs(members))
+        found = joins, apart, walk.relays, max(walk.seconds), walk.robots, walk.sizes
+        return Judged(tree, self.stance, *found)
+
+    def size(self, members: Units) -> Array:
+        """How long some units are at most on the floor [m]."""
+        level = list(self.stance.axes[:2])
+        rows = list(members)
+        extent = self.found.high[rows].max(axis=0) - self.found.low[rows].min(axis=0)
+        return np.asarray(extent[level].max())
+
+    def stroke(self, come: Units, pile: Units) -> Array:
+        """How far one of two sides is lowered at least [m]."""
+        low, high = self.found.low[:, self.stance.axes[2]], self.found.high[:, self.stance.axes[2]]
+        (a, b), (c, d) = (
+            (low[list(side)].min(), high[list(side)].max()) for side in (come, pile)
+        )
+        return np.asarray(min(d - a, b - c))
+
+    def hangs(self, members: Units) -> bool:
+        """Whether some units hang together."""
+        from scipy.sparse.csgraph import connected_components
+
+        touch = self.found.touch[np.ix_(members, members)]
+        return int(connected_components(touch, directed=False)[0]) == 1
+
+    def join(self, pile: Units, come: Units, axis: int, onto: bool) -> Join:
+        """How two groups come together along an axis of the floor, or one from above: the least in
+        the way, then sliding, then the most room."""
+        ways = [(self.stance.axes[axis], side, False) for side in (+1, -1)]
+        ways.append((self.stance.axes[2], self.stance.up, True))
+        if not onto:
+            ways.append((self.stance.axes[2], -self.stance.up, True))
+        found = [self._way(pile, come, way, onto) for way in ways]
+        return min(found, key=lambda join: (max(join.level, FREE + 1), join.lowered, join.level, -join.room))
+
+    def _way(self, pile: Units, come: Units, way: tuple[int, int, bool], onto: bool) -> Join:
+        axis, side, lowered = way
+        at = np.ix_(come, pile) if side > 0 else np.ix_(pile, come)
+        level, room = self.found.levels[axis][at].max(), self.found.room[axis][at].min()
+        return Join(pile, come, (axis, side), int(level), float(room), lowered, onto)
+
+
+@dataclass
+class _Walk:
+    """What is gathered on the way through a tree."""
+
+    judge: Judge
+    joins: list[Join] = field(default_factory=list)
+    seconds: list[float] = field(default_factory=list)
+    apart: int = 0
+    relays: int = 0
+    robots: int = 0
+    sizes: float = 0.0
+
+    def made(self, tree: Tree, axis: int) -> tuple[Units, float]:
+        """The units of a tree whose inputs come along an axis, and what the robot that holds it
+        has done [s]."""
+        expected = self.judge.expected
+        if isinstance(tree, int):
+            self.robots += 1
+            return (tree,), expected.pace.lost
+        if len(tree) == 1:
+            members, held = self.made(tree[0], 1 - axis)
+            self._delivered(members, held)
+            self.relays, self.robots = self.relays + 1, self.robots + 1
+            return members, float(expected.stop(self.judge.size(members)))
+        pile, held = self.made(tree[0], 1 - axis)
+        self._delivered(pile, held)
+        self.robots += 1
+        time = 0.0
+        for number, below in enumerate(tree[1:]):
+            come, held = self.made(below, 1 - axis)
+            self._delivered(come, held)
+            onto = number > 0
+            join = self.judge.join(pile, come, axis, onto)
+            sizes = self.judge.size(come) if onto else max(map(self.judge.size, (come, pile)))
+            time += float(expected.stop(sizes) + (expected.step(sizes) if onto else 0.0))
+            if join.lowered:
+                time += float(expected.lift(self.judge.stroke(come, pile)))
+            self.joins.append(join)
+            pile = tuple(sorted((*pile, *come)))
+            self.apart += not self.judge.hangs(pile)
+            self.sizes += float(self.judge.size(pile))
+        return pile, time
+
+    def _delivered(self, members: Units, held: float) -> None:
+        self.seconds.append(held + float(self.judge.expected.delivering(self.judge.size(members))))
+
+
+def walk_joins(tree: Tree) -> Iterator[Tree]:
+    """All trees within a tree that join or relay something, inner ones first, in the order of
+    `Judged.joins`."""
+    if isinstance(tree, int):
+        return
+    for below in tree:
+        yield from walk_joins(below)
+    yield tree

@@ -1,0 +1,143 @@
+"""Trees laid out as factories, and the best of them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+
+from factory.geometry.product import product_geometry
+from factory.geometry.solids import Product
+from factory.lang.pag_reader import read_pag
+from factory.layout.request import Ground
+from factory.pipeline import Project
+from factory.planning.exact import Late, Tree
+from factory.planning.judging import Judged
+from factory.planning.parts import InPlace
+from factory.planning.searching import Aim
+from factory.planning.stance import Stance
+from factory.planning.writing import Tree as LabelTree
+from factory.planning.writing import planned_product
+from factory.problem.robot_types import load_catalogue
+from factory.problem.template import Template
+from factory.support.errors import FactoryError
+from factory.support.settings import Settings
+from factory.timing.prediction import pace
+
+ALIKE = 0.01
+"""Factories whose figures differ by less than this share are as good as each other."""
+
+
+@dataclass(frozen=True)
+class LaidOut:
+    """A judged tree, as a `tree` of labels and as a `project`; `kinds`: how many different sub-assemblies it has."""
+
+    judged: Judged
+    tree: LabelTree = field(repr=False)
+    project: Project = field(repr=False)
+    kinds: int
+
+    @cached_property
+    def blocked(self) -> int:
+        """How many operations `check` finds blocked."""
+        found = self.project.matings
+        return len(found.of_kind("blocked")) if found else 0
+
+    @cached_property
+    def held(self) -> int:
+        """How many sub-assemblies no hand can hold."""
+        return len(self.project.no_grips)
+
+    @cached_property
+    def seconds(self) -> float:
+        """The predicted cycle time [s], infinite where there is no layout."""
+        try:
+            return pace(self.project.layout, self.project.settings)[0].seconds
+        except FactoryError:
+            return float("inf")
+
+    @property
+    def robots(self) -> int:
+        """How many there are, tools included."""
+        return len(self.project.factory.robots)
+
+    @cached_property
+    def area(self) -> float:
+        """Of the floor [m²]."""
+        try:
+            return float(self.project.layout.area)
+        except FactoryError:
+            return float("inf")
+
+    def rank(self, aim: Aim) -> tuple[float, ...]:
+        """What is better is less: nothing blocked, everything held, what it is for, then fewer
+        kinds of sub-assemblies."""
+        aims = {"cycle": self.seconds, "robots": float(self.robots), "floor": self.area}
+        order = [aims.pop(aim), *aims.values()]
+        rough = [float(np.round(np.log(max(x, 1e-9)) / ALIKE)) for x in order]
+        return self.blocked, self.held, rough[0], self.kinds, *rough[1:]
+
+
+class Layouts:
+    """The layouts of one source's trees. Its geometry is computed once a stance."""
+
+    def __init__(
+        self, source: InPlace, templates: Mapping[str, Template], settings: Settings
+    ) -> None:
+        self.source, self.templates, self.settings = source, templates, settings
+        self.catalogue = load_catalogue()
+        self._products: dict[Stance, Product] = {}
+        self._units = [label for label, _ in source.units()]
+        self._kinds = {part.label: part.kind for part in source.parts}
+
+    def of(self, judged: Judged) -> LaidOut:
+        """A judged tree as a project, which is laid out when it is asked for something."""
+        tree = self.labelled(judged.tree)
+        made = planned_product(self.source, tree, judged.stance.rotation)
+        text = next(iter(made.files.values())).decode()
+        pag = read_pag(text, self.templates, folder=None)
+        project = Project(pag, self.templates, self.catalogue, self.settings, Ground())
+        if judged.stance not in self._products:
+            self._products[judged.stance] = product_geometry(pag, self.source.files)
+        project.__dict__["product"] = self._products[judged.stance]
+        return LaidOut(judged, tree, project, self.kinds(judged.tree))
+
+    def labelled(self, tree: Tree) -> LabelTree:
+        """A tree with the labels of units in place of their numbers."""
+        if isinstance(tree, int):
+            return self._units[tree]
+        return tuple(self.labelled(below) for below in tree)
+
+    def kinds(self, tree: Tree) -> int:
+        """How many different sub-assemblies a tree has, told by the kinds of their units."""
+        found: set[tuple[str, ...]] = set()
+
+        def below(tree: Tree) -> tuple[str, ...]:
+            if isinstance(tree, int):
+                return (self._kinds.get(self._units[tree], self._units[tree]),)
+            kinds = tuple(sorted(kind for one in tree for kind in below(one)))
+            found.add(kinds)
+            return kinds
+
+        below(tree)
+        return len(found)
+
+    def best(
+        self,
+        trees: Sequence[Judged],
+        aim: Aim,
+        late: Late,
+        told: Callable[[LaidOut], None] = lambda _: None,
+    ) -> LaidOut:
+        """The best of some trees, all of which are laid out if there is time, the first always."""
+        best = self.of(trees[0])
+        told(best)
+        for judged in trees[1:]:
+            if late():
+                break
+            laid = self.of(judged)
+            best = min(best, laid, key=lambda one: one.rank(aim))
+            told(best)
+        return best

@@ -1,0 +1,195 @@
+"""Plan the assembly of parts in place: from a source to a tree, or a proof that there is none."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from factory.geometry.meshes import Array
+from factory.layout.durations import Pace
+from factory.pipeline import Project, all_templates
+from factory.planning.blocking import CLASHES, DEEPER, LOCKED, SCRAPES, Blocking, blocking
+from factory.planning.cannot import Interlock, Removal, interlocks, removal
+from factory.planning.estimate import Expected
+from factory.planning.judging import Join, Judged
+from factory.planning.kept import KeptPrices
+from factory.planning.laying import LaidOut, Layouts
+from factory.planning.parts import InPlace
+from factory.planning.searching import Aim, Budget, Sought, trees
+from factory.planning.writing import Tree
+from factory.problem.template import Template
+from factory.support.errors import Diagnostic, InputError, did_you_mean
+from factory.support.settings import Settings
+
+
+@dataclass(frozen=True)
+class PlanOptions:
+    """`aim`: what the tree is chosen for; `seconds` to search; `allow`: units that may pass through
+    others; `lay_out`: whether layouts decide, or estimates alone; `settings` and `templates` of the
+    factory, None for those shipped; `told` hears what goes on, and how many of how many are done;
+    `stopped` says that the best so far is wanted at once."""
+
+    aim: Aim = "cycle"
+    seconds: float = 60.0
+    allow: tuple[str, ...] = ()
+    lay_out: bool = True
+    settings: Settings = field(default_factory=Settings)
+    templates: Mapping[str, Template] | None = field(default=None, repr=False)
+    told: Callable[[str, int, int | None, str], None] = field(default=lambda *_: None, repr=False)
+    stopped: Callable[[], bool] = field(default=lambda: False, repr=False)
+
+
+@dataclass(frozen=True, slots=True)
+class PlannedJoin:
+    """An operation of a plan: the units of the pile and those that `come`, the `direction` (3,) in
+    the product's frame in which these leave it, so against which they come; the least room [m] on
+    that way (infinite where nothing is near, less than 0 for parts drawn into each other), whether
+    they are lowered (or the pile is), and whether they pass through each other."""
+
+    pile: tuple[str, ...]
+    come: tuple[str, ...]
+    direction: tuple[int, int, int]
+    clearance: float
+    lowered: bool
+    blocked: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Figures:
+    """Of a plan: how many operations, how many of them are `blocked`, have parts pass through each
+    other that were drawn into each other (`through`), get a little deeper (`left_out`), or scrape;
+    how many sub-assemblies are in pieces (`apart`), are handed over to turn (`relays`), or cannot
+    be held by any hand (`not_held`, None where nothing was laid out); how many trees were laid out;
+    robots; the cycle time that was expected from sizes and that which is predicted [s], and the
+    floor [m²] (None where nothing was laid out)."""
+
+    operations: int
+    blocked: int
+    through: int
+    left_out: int
+    scrape: int
+    apart: int
+    relays: int
+    robots: int
+    expected: float
+    not_held: int | None = None
+    layouts: int = 0
+    cycle: float | None = None
+    area: float | None = None
+
+
+@dataclass(frozen=True)
+class Planned:
+    """A tree of labels, as `writing.planned_product` takes it, with the rotation (3, 3) of the
+    product onto the floor, its operations, its figures, the laid-out `project` (None where
+    estimates alone decided); `optimal`: whether it is proved that no tree costs less, by what is
+    in the way and by the expected cycle."""
+
+    tree: Tree = field(repr=False)
+    orientation: Array
+    operations: tuple[PlannedJoin, ...] = field(repr=False)
+    figures: Figures
+    optimal: bool
+    project: Project | None = field(default=None, repr=False, compare=False)
+
+
+@dataclass(frozen=True)
+class CannotAssemble:
+    """No tree of straight motions along the axes joins the parts: proved by those that interlock.
+    Without `removal`, or where its clashes are accepted (`allow`), the rest can be joined; `best`
+    is the plan that accepts them."""
+
+    interlocks: tuple[Interlock, ...]
+    removal: Removal
+    best: Planned = field(repr=False)
+
+
+def plan(source: InPlace, options: PlanOptions | None = None) -> Planned | CannotAssemble:
+    """The best tree for a source's parts, or why there is none. Raises InputError where `allow`
+    names nothing that is planned."""
+    asked = options or PlanOptions()
+    budget = Budget(asked.seconds, stopped=asked.stopped)
+    asked.told("looking for what is in the way", 0, None, "")
+    found = blocking(source)
+    _check_allowed(asked.allow, found)
+    found = found.allowing(asked.allow)
+    stuck = interlocks(found)
+    if not stuck:
+        return _planned(source, found, asked, budget)
+    out = removal(found)
+    best = _planned(source, found.allowing(out.labels), asked, budget)
+    return CannotAssemble(stuck, out, best)
+
+
+def _planned(source: InPlace, found: Blocking, asked: PlanOptions, budget: Budget) -> Planned:
+    templates = all_templates() if asked.templates is None else asked.templates
+    expected = Expected(Pace.of(asked.settings))
+    seen = [0]
+
+    def told(judged: Judged) -> None:
+        seen[0] += 1
+        words = f"{judged.robots} robots, about {judged.seconds:.1f} s"
+        asked.told("looking for a tree", seen[0], None, words)
+
+    given = KeptPrices(source, templates)
+    sought = trees(Sought(found, expected, given, asked.aim, budget, told))
+    layouts = Layouts(source, templates, asked.settings)
+    if not asked.lay_out:
+        return _result(layouts.of(sought.all[0]), sought.optimal, found, 0)
+    laid = [0]
+
+    def said(best: LaidOut) -> None:
+        laid[0] += 1
+        words = f"{best.robots} robots, {best.seconds:.2f} s"
+        asked.told("laying out", laid[0], len(sought.all), words)
+
+    best = layouts.best(sought.all, asked.aim, budget.late, said)
+    return _result(best, sought.optimal, found, laid[0])
+
+
+def _result(laid: LaidOut, optimal: bool, found: Blocking, layouts: int) -> Planned:
+    judged = laid.judged
+    figures = Figures(
+        operations=len(judged.joins),
+        blocked=judged.count(CLASHES),
+        through=judged.count(LOCKED) - judged.count(CLASHES),
+        left_out=judged.count(DEEPER) - judged.count(LOCKED),
+        scrape=judged.count(SCRAPES) - judged.count(DEEPER),
+        apart=judged.apart,
+        relays=judged.relays,
+        robots=judged.robots,
+        expected=judged.seconds,
+    )
+    if layouts:
+        figures = replace(
+            figures,
+            blocked=laid.blocked,
+            robots=laid.robots,
+            not_held=laid.held,
+            layouts=layouts,
+            cycle=laid.seconds if np.isfinite(laid.seconds) else None,
+            area=laid.area if np.isfinite(laid.area) else None,
+        )
+    joins = tuple(_join(join, found) for join in judged.joins)
+    project = laid.project if layouts else None
+    return Planned(laid.tree, judged.stance.rotation, joins, figures, optimal, project)
+
+
+def _join(join: Join, found: Blocking) -> PlannedJoin:
+    axis, side = join.direction
+    x, y, z = (side if n == axis else 0 for n in range(3))
+    pile, come = (tuple(found.labels[n] for n in units) for units in (join.pile, join.come))
+    return PlannedJoin(pile, come, (x, y, z), join.room, join.lowered, join.level >= LOCKED)
+
+
+def _check_allowed(allow: tuple[str, ...], found: Blocking) -> None:
+    faults = [
+        Diagnostic("Usage", f"nothing that is planned is called '{label}'", None, hint)
+        for label in allow
+        if label not in found.labels
+        for hint in [did_you_mean(label, list(found.labels), "labels")]
+    ]
+    if faults:
+        raise InputError(faults)

@@ -1,0 +1,92 @@
+"""From a planned tree to the files of a product: its PAG and its meshes."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from itertools import count
+
+import numpy as np
+
+from factory.geometry.meshes import Array
+from factory.geometry.solids import rotation
+from factory.importing.labels import file_stem, label_of
+from factory.importing.places import UNTURNED, quaternion, rounded
+from factory.lang.writer import write_pag
+from factory.planning.parts import InPlace
+from factory.problem.pag import PAG, Assembly, Parameter
+
+Tree = str | tuple["Tree", ...]
+"""The label of a part or of a sub-tree that is kept, or what is mated: two trees or more, of which
+the first two are mated and each further one is inserted; a single tree is handed over to another
+robot."""
+
+PLACES = ("pos", "quat")
+
+
+@dataclass(frozen=True, slots=True)
+class PlannedProduct:
+    """A product as `plan` writes it: its PAG, the contents of its files by path in the output
+    folder, the PAG's first, and the inputs of each node of the tree by label."""
+
+    pag: PAG
+    files: Mapping[str, bytes] = field(repr=False)
+
+
+def planned_product(
+    source: InPlace, tree: Tree, orientation: Array | None = None, by: str = ""
+) -> PlannedProduct:
+    """The product that a tree makes of a source's parts, turned by a rotation (3, 3) about the
+    origin. `by` is said in the first line of the PAG. Only templates that the package ships are
+    used: `mate`, with its further inputs inserted, and `relay`, besides what kept sub-trees name."""
+    turn = np.eye(3) if orientation is None else orientation
+    kept = {keep.label: keep.nodes for keep in source.kept}
+    taken = {part.label for part in source.parts}
+    taken |= {node.label for nodes in kept.values() for node in nodes}
+    root = _free(label_of(source.name) or "product", taken)
+    names, made, stack = count(1), list[Assembly](), [(root, tree)]
+    while stack:
+        label, below = stack.pop()
+        if isinstance(below, str):
+            continue
+        inputs = []
+        for child in below:
+            inputs.append(child if isinstance(child, str) else _numbered(names, taken))
+            stack.append((inputs[-1], child))
+        made.append(Assembly(label, "mate" if len(inputs) > 1 else "relay", tuple(inputs)))
+    whole = [node for nodes in kept.values() for node in nodes if node.inputs]
+    parts = [_turned(part.node, turn) for part in source.parts]
+    nodes = (*made, *reversed(whole), *parts)
+    pag = PAG(root, nodes, len(nodes))
+    name = file_stem(source.name)
+    head = f"// {name}, planned{f' from {by}' if by else ''}\n"
+    text = (head + write_pag(pag)).encode()
+    return PlannedProduct(pag, {f"{name}.pag": text, **source.files})
+
+
+def _free(name: str, taken: set[str]) -> str:
+    """A label like a name that no other node has; it is taken from now on."""
+    label = next(
+        label for n in count() if (label := name if n == 0 else f"{name}-{n}") not in taken
+    )
+    taken.add(label)
+    return label
+
+
+def _numbered(names: count[int], taken: set[str]) -> str:
+    label = next(label for n in names if (label := f"sub{n}") not in taken)
+    taken.add(label)
+    return label
+
+
+def _turned(node: Assembly, turn: Array) -> Assembly:
+    """A part after the product has been turned about the origin."""
+    if np.array_equal(turn, np.eye(3)):
+        return node
+    at = np.array(node.parameter("pos", (0.0, 0.0, 0.0)), float)
+    given = np.array(node.parameter("quat", UNTURNED), float)
+    stands = quaternion(turn @ rotation(given / np.linalg.norm(given)))
+    placed = [Parameter("pos", rounded(turn @ at))]
+    placed += [Parameter("quat", stands)] if stands != UNTURNED else []
+    own = [p for p in node.parameters if p.name not in PLACES]
+    return replace(node, parameters=(*own[:1], *placed, *own[1:]))

@@ -1,0 +1,166 @@
+"""The exploded view of a product as a still, and the film in which it comes together."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+import numpy as np
+
+from factory.geometry.meshes import Array
+from factory.geometry.solids import Product
+from factory.mjcf.loose_parts import loose_parts
+from factory.mjcf.replica import Replica
+from factory.planning.exploding import Explosion
+from factory.planning.source.placing import surface
+from factory.render.camera import Framing, View, fit, towards
+from factory.render.ink import Pixels
+from factory.render.painter import Renderer
+from factory.render.picture import Size
+from factory.render.reel import SAMPLES, write_still
+from factory.render.video import VideoFile, check_output
+from factory.support import gl
+from factory.support.engine import mujoco
+from factory.support.resource import Closing
+
+FPS = 20.0
+
+STILL: tuple[Size, Size] = (1280, 720), (900, 1200)
+FILM: tuple[Size, Size] = (960, 540), (600, 800)
+"""Of pictures: wide, or upright."""
+
+AZIMUTH, ELEVATION, TURN = -58.0, 31.0, 40.0
+"""From where the camera looks, and how far round it goes in a film [degrees]."""
+
+BEFORE, AFTER, SLOWEST, LONGEST = 1.2, 1.8, 0.7, 10.0
+"""Parts stand apart and the product stands for these times; an operation takes at most the third,
+and all together the fourth [s]."""
+
+MANY = 30_000
+"""A film of more triangles has half the frames, and no shadows: these cost a second pass."""
+
+AROUND = 3.0
+"""So many times the product's depth of the floor gets clean shadows: beyond it is speckled."""
+
+EVEN = 12
+"""Half the frames over which the camera's way is evened out."""
+
+
+@dataclass(frozen=True)
+class ExplodedView:
+    """A product, and how it is taken apart."""
+
+    product: Product
+    explosion: Explosion
+    boxes: Array = field(init=False, repr=False)
+    """The corners (n, 8, 3) of the boxes of the parts [m]."""
+
+    def __post_init__(self) -> None:
+        solids = [self.product.solids[label] for label in self.explosion.parts]
+        ends = np.array([[solid.low, solid.high] for solid in solids])
+        bits = np.array([[n >> 2 & 1, n >> 1 & 1, n & 1] for n in range(8)])
+        object.__setattr__(self, "boxes", ends[:, bits, [0, 1, 2]])
+
+    @property
+    def is_upright(self) -> bool:
+        """Whether it stands higher than it is wide, so that pictures of it are upright."""
+        wide, deep, tall = np.ptp(self._points(0.0), axis=0)
+        return bool(tall > 1.1 * max(wide, deep))
+
+    def still(self, path: Path) -> None:
+        """Write it, all apart, as PNG. Raises InputError, MissingError where there is no GL."""
+        size = STILL[self.is_upright]
+        check_output(path, size, still=True)
+        with _Stage(self, size) as stage:
+            write_still(path, stage.still())
+
+    def film(self, path: Path, fps: float = FPS) -> int:
+        """Write the film, with so many frames a second or half as many where there is much to draw;
+        gives the number of its frames. Raises as `still` does."""
+        size = FILM[self.is_upright]
+        fps = fps if self.faces <= MANY else fps / 2
+        check_output(path, size, fps)
+        count = len(self.explosion.steps)
+        slow = min(SLOWEST, LONGEST / max(count, 1))
+        frames = round((BEFORE + slow * count + AFTER) * fps)
+        times = np.arange(frames) / fps
+        done = np.clip((times - BEFORE) / slow, 0.0, count)
+        with _Stage(self, size) as stage, VideoFile(path, size, fps) as file:
+            for view, now in zip(stage.views(done), done, strict=True):
+                file.write(stage.picture(float(now), view))
+        return frames
+
+    @property
+    def faces(self) -> int:
+        """How many triangles it has."""
+        solids = (self.product.solids[label] for label in self.explosion.parts)
+        return sum(12 if solid.mesh is None else len(solid.mesh.faces) for solid in solids)
+
+    def _points(self, done: float) -> Array:
+        """The corners of all boxes (8 n, 3) when so many operations are done."""
+        return np.asarray((self.boxes + self.explosion.offsets(done)[:, None]).reshape(-1, 3))
+
+
+class _Stage(Closing):
+    """Draws the parts of a view where they are at a moment."""
+
+    def __init__(self, shown: ExplodedView, size: Size) -> None:
+        gl.probe()
+        self.shown = shown
+        solids = [shown.product.solids[label] for label in shown.explosion.parts]
+        apart = shown._points(0.0)
+        extent = float(np.linalg.norm(np.ptp(apart, axis=0)))
+        surfaces = {solid.label: surface(solid) for solid in solids}
+        colours = [solid.rgba for solid in solids]
+        model = loose_parts(surfaces, colours, float(apart[:, 2].min()), extent)
+        model.vis.global_.offwidth, model.vis.global_.offheight = size
+        self.replica = Replica(model)
+        self.framing = Framing(size[0] / size[1], 0.06, 0.06, 0.06)
+        self.renderer = Renderer(self.replica, size)
+        self.last: float | None = None
+
+    def close(self) -> None:
+        """Give the GL context back."""
+        self.renderer.close()
+
+    def still(self) -> Pixels:
+        """All apart."""
+        self._place(0.0)
+        axes = towards(AZIMUTH, ELEVATION)
+        view = fit(self.shown._points(0.0), axes, self.framing)
+        return self.renderer.mean(replace(view, depth=AROUND * view.depth), SAMPLES)
+
+    def picture(self, done: float, view: View) -> Pixels:
+        """When so many operations are done."""
+        self._place(done)
+        return np.ascontiguousarray(self.renderer.draw(view, self.shown.faces <= MANY)[::-1])
+
+    def _place(self, done: float) -> None:
+        if done != self.last:
+            offsets = self.shown.explosion.offsets(done)
+            upright = np.tile([1.0, 0.0, 0.0, 0.0], (len(offsets), 1))
+            self.replica.place(np.hstack([offsets, upright]).ravel())
+            mujoco.mj_camlight(self.replica.m, self.replica.d)
+            self.last = done
+
+    def views(self, done: Array) -> list[View]:
+        """The camera at each frame: it goes round, and nearer as the product comes together."""
+        angles = AZIMUTH + TURN * np.linspace(0.0, 1.0, len(done))
+        turned = [towards(float(angle), ELEVATION) for angle in angles]
+        moments = zip(turned, done, strict=True)
+        found = [fit(self.shown._points(float(now)), axes, self.framing) for axes, now in moments]
+        numbers = np.array([(*(v.axes @ v.position), v.distance, AROUND * v.depth) for v in found])
+        calm = _evened(numbers)
+        return [
+            View(axes.T @ row[:3], axes, v.wide, v.tall, float(row[3]), float(row[4]))
+            for axes, v, row in zip(turned, found, calm, strict=True)
+        ]
+
+
+def _evened(values: Array) -> Array:
+    """Rows (n, k), each the mean of those about it; the ends stand."""
+    padded = np.pad(values, ((EVEN, EVEN), (0, 0)), mode="edge")
+    weights = np.hanning(2 * EVEN + 3)[1:-1]
+    weights /= weights.sum()
+    moved = [w * padded[n : n + len(values)] for n, w in enumerate(weights)]
+    return np.asarray(np.sum(moved, axis=0))
