@@ -9,6 +9,8 @@ from typing import Any
 from factory.record.failures import Failing, Failures
 from factory.show.report.recording import Recording
 
+LEGEND = "Robots over time: hatched is what was undone; in a band a robot stands still."
+
 COLUMNS = ("Time", "What failed", "What was done", "Undone", "Scrapped")
 
 
@@ -20,7 +22,7 @@ def failures_section(recording: Recording) -> str:
     head = "".join(f"<th>{name}</th>" for name in COLUMNS)
     rows = "".join(_row(recording, one) for one in found.found)
     table = f"<table><thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table>" if rows else ""
-    text = f"<p>{escape(_summary(found))}</p>{table}"
+    text = f"<p>{escape(_summary(found))}</p>{table}<p class='note'>{LEGEND}</p>"
     return (
         '\n<section class="panel wide failures" aria-labelledby="h-failures">\n'
         '<div class="bar"><h2 id="h-failures">Failures</h2></div>'
