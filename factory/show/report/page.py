@@ -85,7 +85,8 @@ def page(recording: Recording) -> str:
         "options": options(document),
     }
     fields["certificate"] = json_inside(proved.document)
-    scripts, styles = SCRIPTS, STYLES
+    scripts: tuple[str, ...] = SCRIPTS
+    styles: tuple[str, ...] = STYLES
     if recording.log.failures is not None:
         script, style = FAILURES
         scripts, styles = (*SCRIPTS[:-1], script, SCRIPTS[-1]), (*STYLES, style)

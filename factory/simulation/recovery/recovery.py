@@ -14,7 +14,7 @@ from factory.problem.template import Failure
 from factory.record.failures import Failing, Failures, Stood
 from factory.simulation.recovery.books import Books
 from factory.simulation.recovery.counting import summed
-from factory.simulation.recovery.faults import Campaign
+from factory.simulation.recovery.faults import Campaign, WorldFault
 from factory.simulation.recovery.plant import Plant
 from factory.simulation.recovery.responding import Responding
 from factory.simulation.recovery.striking import Striking
@@ -173,6 +173,10 @@ class Recovery:
         ends += [*respond.dead.values(), *striking.standing.values()]
         ends += [now] * bool(respond.returning.ways)
         return max((end for end in ends if np.isfinite(end)), default=0.0)
+
+    def strike(self, fault: WorldFault) -> None:
+        """A fault strikes as soon as it can, whatever it says of when."""
+        self.striking.strike(fault, self._now)
 
     def report(self) -> Failures:
         """What went wrong so far."""

@@ -42,11 +42,19 @@ class Standing:
         if chosen == self._now:
             return
         self._now = chosen
+        self._apply()
         every = self._simulation.layout.factory.robots
         names = tuple(every[robot].name for robot in sorted(chosen))
         self.stood.append((self._simulation.world.time, names))
+
+    def limit(self, limits: Limits) -> None:
+        """From now on these are the limits of robots that do not stand."""
+        self._limits = limits
+        self._apply()
+
+    def _apply(self) -> None:
         speed = np.array(self._limits.speed)
-        for robot in chosen:
+        for robot in self._now:
             speed[self._axes[robot]] = SLOWEST
         self._simulation.limit(Limits(speed, self._limits.acceleration))
 
