@@ -41,9 +41,9 @@ from factory.support.progress import Progress, Waiting
 if TYPE_CHECKING:
     from factory.pipeline import Project
     from factory.plant.factory import Factory
+    from factory.record.failures import Failures
     from factory.record.observed import Recorder
     from factory.render import Film
-    from factory.simulation.failures import Failures
     from factory.simulation.resuming import Resumed
     from factory.simulation.run import PhysicsFigures, Run
     from factory.simulation.simulation import Simulation

@@ -11,9 +11,9 @@ from factory.nets.undone import Entry, Undone, lasting
 from factory.plant.approaches import Pair
 from factory.plant.factory import Factory
 from factory.record.ending import CutOff
+from factory.record.failures import Failures
 from factory.record.monitor.report import Report
 from factory.record.verdict import RunVerdict, judged, kept_figures
-from factory.simulation.failures import Failures
 from factory.support.errors import Diagnostic
 
 

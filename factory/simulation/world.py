@@ -10,6 +10,7 @@ from typing import Protocol
 from factory.control.mode import Array, Index
 from factory.control.navigation import Bundle
 from factory.plant.factory import Operation
+from factory.record.failures import Account
 from factory.simulation.keeping import Keeper
 from factory.simulation.run import PhysicsFigures
 from factory.support.errors import Diagnostic
@@ -27,7 +28,7 @@ class Hooks:
     may end only where all do. `ticks`: called after every tick. `ended`: called when operations
     have ended and parts have changed hands, before the world goes on, to look at it; `ended_time`
     [s]: what that took. `trouble`: what ends the run, if anything does; `busy` [s]: until when it
-    is no stall that nothing fires.
+    is no stall that nothing fires. `account`: what a run that goes on after failures tells of them.
     """
 
     before_step: list[Callable[[], None]] = field(default_factory=list)
@@ -39,6 +40,7 @@ class Hooks:
     ended_time: float = 0.0
     trouble: Diagnostic | None = None
     busy: float = 0.0
+    account: Account | None = None
 
     def sensed(self, x: Array, v: Array) -> tuple[Array, Array]:
         """What sensors make of positions and speeds."""

@@ -26,6 +26,8 @@ appended to.
        end, to be gone on with; see `simulation.checkpoint`. Readers of runs pass it over
     E  the end: the file was closed properly
        figures, bytes (mujoco only)       what its verdict rests on, JSON: see `record.verdict`
+       failures, bytes                    what went wrong, JSON as in `run --json`, where the run
+                                          goes on after failures
        code, message, bytes               what ended the run, as a diagnostic has it, where it
                                           ended before its units were made
 

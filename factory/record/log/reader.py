@@ -15,7 +15,9 @@ from numpy.typing import NDArray
 
 from factory.nets.undone import Entry, lasting
 from factory.record.ending import CutOff
+from factory.record.failures import Failures
 from factory.record.log.blocks import LENGTH, MAGIC, Arrays, bad_log, blocks, is_cut, unpack_rows
+from factory.record.log.failed import failures_in
 from factory.record.log.header import check_header
 from factory.record.log.ticks import check_block, check_course, state_bytes
 from factory.record.log.undone import Placed, undone_in
@@ -76,7 +78,7 @@ class Log:
     run came, None where all of its units were made and the log has all of it. `ends`: the state as
     operations ended, and `figures` of the bodies, as `kept_figures` gives them; None in the ideal
     world and in logs of older versions. `undone`: what was undone, each with how many transitions
-    had fired before it."""
+    had fired before it. `failures`: what went wrong, in a run that goes on when something does."""
 
     header: Mapping[str, Any] = field(repr=False)
     xml: str = field(repr=False)
@@ -97,6 +99,7 @@ class Log:
     ends: Ends | None = field(default=None, repr=False)
     figures: Mapping[str, Any] | None = field(default=None, repr=False)
     undone: tuple[Placed, ...] = field(default=(), repr=False)
+    failures: Failures | None = field(default=None, repr=False)
 
     def __len__(self) -> int:
         return len(self.time)
@@ -232,6 +235,7 @@ def log_in(data: memoryview, written: bool = False) -> Log:
         else Ends(follows, time[at_end], qpos_ended, qvel_ended, ctrl_ended, active.chosen(at_end)),
         _figures(trouble["figures"]) if "figures" in trouble else None,
         undone_in(ticks, header),
+        _failures(trouble["failures"], header) if "failures" in trouble else None,
     )
 
 
@@ -248,6 +252,10 @@ def _figures(content: NDArray[Any]) -> Mapping[str, Any]:
     found = json.loads(content.tobytes())
     check_figures(found)
     return MappingProxyType(found)
+
+
+def _failures(content: NDArray[Any], header: Mapping[str, Any]) -> Failures:
+    return failures_in(content.tobytes(), frozenset(header["robots"]))
 
 
 def _broken(data: memoryview, kept: int, written: bool) -> str:

@@ -208,6 +208,8 @@ class LogWriter(Recorder):
             texts = {"code": self.trouble.code, "message": self.trouble.message}
         if (figures := self.world.figures()) is not None:
             texts["figures"] = json.dumps(kept_figures(figures))
+        if (account := self.world.hooks.account) is not None:
+            texts["failures"] = json.dumps(account.report().as_json())
         return {name: _text(text) for name, text in texts.items()}
 
     def _append(self, content: bytes) -> None:

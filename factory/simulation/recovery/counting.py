@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Mapping, Sequence
 
-from factory.simulation.failures import Failing, Failures
+from factory.record.failures import Failing, Failures, Stood
 
 CAUSES = {
     "drop": "lost",
@@ -19,7 +19,12 @@ CAUSES = {
 
 
 def summed(
-    found: Sequence[Failing], struck: Mapping[str, int], undone: int, spares: int, contacts: int
+    found: Sequence[Failing],
+    struck: Mapping[str, int],
+    undone: int,
+    spares: int,
+    contacts: int,
+    stood: Sequence[Stood],
 ) -> Failures:
     """All failures of a run. A robot that is dead and never asked to move is not missed."""
     tests, wanted = Counter(one.test for one in found), Counter[str]()
@@ -36,4 +41,5 @@ def summed(
         undone,
         spares,
         contacts,
+        tuple(stood),
     )

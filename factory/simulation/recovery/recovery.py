@@ -3,16 +3,18 @@ what is done."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from factory.control.mode import Array
 from factory.nets.undone import Undone
 from factory.plant.factory import Factory, Operation
 from factory.problem.template import Failure
-from factory.simulation.failures import Failures
+from factory.record.failures import Failing, Failures, Stood
 from factory.simulation.recovery.books import Books
 from factory.simulation.recovery.counting import summed
-from factory.simulation.recovery.faults import Campaign
+from factory.simulation.recovery.faults import Campaign, WorldFault
 from factory.simulation.recovery.plant import Plant
 from factory.simulation.recovery.responding import Responding
 from factory.simulation.recovery.striking import Striking
@@ -43,6 +45,17 @@ class Recovery:
         hooks.judges.append(self._judge)
         hooks.sensors.append(self._sensed)
         hooks.ticks.append(self._tick)
+        hooks.account = self
+
+    @property
+    def found(self) -> Sequence[Failing]:
+        """Every failure so far."""
+        return self.responding.found
+
+    @property
+    def stood(self) -> Sequence[Stood]:
+        """From when on which robots stood, for whatever reason."""
+        return self.responding.standing.stood
 
     @property
     def _factory(self) -> Factory:
@@ -161,6 +174,10 @@ class Recovery:
         ends += [now] * bool(respond.returning.ways) + [respond.standing.latest(now)]
         return max((end for end in ends if np.isfinite(end)), default=0.0)
 
+    def strike(self, fault: WorldFault) -> None:
+        """A fault strikes as soon as it can, whatever it says of when."""
+        self.striking.strike(fault, self._now)
+
     def report(self) -> Failures:
         """What went wrong so far."""
         undone = (e for e in self.books.supervisor.events if isinstance(e, Undone))
@@ -170,6 +187,7 @@ class Recovery:
             sum(len(event.transitions) for event in undone),
             self.responding.used_spares,
             self.plant.contacts,
+            self.stood,
         )
 
 

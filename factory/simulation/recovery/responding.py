@@ -18,7 +18,7 @@ from factory.plant.factory import Operation
 from factory.plant.material import joins_of
 from factory.problem.pag import NOPART
 from factory.problem.template import Kind, Response
-from factory.simulation.failures import Failing
+from factory.record.failures import Failing
 from factory.simulation.recovery.books import Books
 from factory.simulation.recovery.faults import Campaign
 from factory.simulation.recovery.plant import Plant
@@ -113,7 +113,7 @@ class Responding:
         self.used_spares += 1
         self.dead[robot] = self._now + self._campaign.swap
         held = () if label == NOPART else (label,)
-        self._note("jammed", operation, robot, "spare", held)
+        self._note("jammed", operation, robot, "spare", held, self.dead[robot])
         ends = tuple(self._books.factory.by_label[label].end for label in held)
         self._undo(ends or (operation.start,), operation, "jammed")
 
@@ -214,9 +214,11 @@ class Responding:
         robot: int,
         response: str,
         scrapped: tuple[str, ...] = (),
+        until: float | None = None,
     ) -> None:
         name = "" if robot < 0 else self._name(robot)
-        self.found.append(Failing(self._now, test, operation.label, name, response, scrapped))
+        what = self._now, test, operation.label, name, response, scrapped, until
+        self.found.append(Failing(*what))
 
     def _name(self, robot: int) -> str:
         return self._books.factory.robots[robot].name

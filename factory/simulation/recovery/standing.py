@@ -10,6 +10,7 @@ import numpy as np
 from factory.control.mode import STILL, Limits
 from factory.control.navigation import Bundle
 from factory.plant.factory import Factory, Operation
+from factory.record.failures import Stood
 from factory.simulation.simulation import Simulation
 
 SLOWEST = 1e-9
@@ -23,11 +24,13 @@ MOVES = 5e-3
 
 
 class Standing:
-    """Lets robots (index) of a simulation stand, each under a limit of its own on its speed."""
+    """Lets robots (index) of a simulation stand, each under a limit of its own on its speed;
+    `stood`: which of them did, from when on."""
 
     def __init__(self, simulation: Simulation) -> None:
         self._simulation, self._limits = simulation, simulation.limits
         self._now: frozenset[int] = frozenset()
+        self.stood: list[Stood] = []
         factory = simulation.layout.factory
         lifts = {r: len(factory.robots) + n for n, r in enumerate(simulation.layout.lifts)}
         self._axes = [[r, lifts[r]] if r in lifts else [r] for r in range(len(factory.robots))]
@@ -39,8 +42,19 @@ class Standing:
         if chosen == self._now:
             return
         self._now = chosen
+        self._apply()
+        every = self._simulation.layout.factory.robots
+        names = tuple(every[robot].name for robot in sorted(chosen))
+        self.stood.append((self._simulation.world.time, names))
+
+    def limit(self, limits: Limits) -> None:
+        """From now on these are the limits of robots that do not stand."""
+        self._limits = limits
+        self._apply()
+
+    def _apply(self) -> None:
         speed = np.array(self._limits.speed)
-        for robot in chosen:
+        for robot in self._now:
             speed[self._axes[robot]] = SLOWEST
         self._simulation.limit(Limits(speed, self._limits.acceleration))
 

@@ -25,7 +25,7 @@ class Striking:
     def __init__(
         self, campaign: Campaign, plant: Plant, names: tuple[str, ...], delays: tuple[float, ...]
     ) -> None:
-        self._campaign, self._plant = campaign, plant
+        self._faults, self._plant = [*campaign.faults], plant
         self._names, self._delays = names, delays
         self._draw = np.random.default_rng(campaign.seed)
         self._spent: set[int] = set()
@@ -34,6 +34,17 @@ class Striking:
         self.dark = -np.inf
         self.empty: dict[str, float] = {}
         self.standing: dict[int, float] = {}
+
+    def strike(self, fault: WorldFault, now: float) -> None:
+        """A fault that names a robot or a label strikes now, or as soon as it can: a robot that
+        holds nothing drops what it carries next, a feeder shows the next part so."""
+        robot = self._names.index(fault.robot) if fault.robot else -1
+        if fault.kind in ("down", "dead"):
+            self.stand(robot, now + fault.seconds if fault.kind == "down" else np.inf)
+        elif not (fault.kind == "drop" and robot >= 0 and self._plant.lose(robot)):
+            self._faults.append(fault)
+            return
+        self.count(fault.kind)
 
     def started(self, operation: Operation, unit: int, now: float) -> None:
         """An operation has started."""
@@ -88,7 +99,7 @@ class Striking:
     def _strikes(
         self, kind: str, unit: int, now: float, label: str, robot: str = ""
     ) -> WorldFault | None:
-        for number, fault in enumerate(self._campaign.faults):
+        for number, fault in enumerate(self._faults):
             if fault.kind != kind or number in self._spent:
                 continue
             if (fault.label and fault.label != label) or (fault.robot and fault.robot != robot):
