@@ -153,7 +153,7 @@ def test_the_option_prints_it(run: Terminal) -> None:
     [
         ("Rooot", "did you mean 'Root'?"),
         ("label", "there are DuplicateLabel, LabelReuse, ReservedLabel, UndefinedLabel"),
-        ("qqqq", "valid codes: Assets, BadFailure, BadFile"),
+        ("qqqq", "valid codes: Assets, BadFailure, BadFault"),
         ("", "valid codes: Assets"),
     ],
 )

@@ -11,9 +11,9 @@ from hypothesis import strategies as st
 
 import factory as factory_package
 from factory.nets.marked import marked
-from factory.nets.undo import marking_of, times_undone, undo
+from factory.nets.undo import times_undone, tokens_after, undo
 from factory.plant.factory import Factory, Operation
-from factory.plant.material import joins
+from factory.plant.material import joins_of
 from factory.study.analysis import Timing
 from factory.study.analysis.failing import failing_net, failing_pace
 from factory.study.analysis.firing import earliest_firings
@@ -195,14 +195,14 @@ def test_an_undo_without_the_material_rule_is_caught(monkeypatch: pytest.MonkeyP
 @settings(max_examples=20)
 def test_undos_pass_the_check_and_nothing_less_does(seed: int, data: st.DataObject) -> None:
     factory = random_fold(seed)
-    net, rules = marked(factory.net), joins(factory)
+    net, rules = marked(factory.net), joins_of(factory)
     operation = data.draw(st.sampled_from(factory.operations))
     base = [20 for _ in net.net.transitions]
     lost = operation.inputs[:1]
     asked = asked_by(factory, operation, lost)
     left = undo(net, base, asked, rules)
     checked(net, base, left, rules)
-    assert min(marking_of(net, left)) >= 0
+    assert min(tokens_after(net, left)) >= 0
     for event in times_undone(base, left).keys() - asked.keys():
         less = [count + (number == event) for number, count in enumerate(left)]
         with pytest.raises(ValueError, match="the undo"):
@@ -250,6 +250,20 @@ def test_large_factories_have_costs_when_asked(run: Terminal) -> None:
     assert asked["costed"]
     assert asked["bound"] == silent["bound"]
     assert all(test["scrap"] for test in asked["tests"])
+
+
+def test_a_period_of_several_units_has_the_bound_of_one(run: Terminal, tmp_path: Path) -> None:
+    file = tmp_path / "slow.pag"
+    parts = "part1 = atomic(); part2 = atomic(); part3 = atomic()"
+    joins = "sub2 = weld ( sub1, dwell = 2 ); sub1 = insert ( part1, part2 );"
+    file.write_text(f"root = sub3; sub3 = insert ( part3, sub2 ); {joins} {parts}")
+    words = ("check", file, "--no-hands", "--failures", "--json")
+    one = run(*words).json["failures"]
+    three = run(*words, "--parallel", "sub2=3").json["failures"]
+    assert three["bound"] == one["bound"]
+    assert len(three["tests"]) == 3 * len(one["tests"])
+    last = three["tests"][-1]
+    assert (last["operation"], last["scrap"]["lost"]) == ("dropoff@3", "sub3@3")
 
 
 def test_a_template_of_ones_own(run: Terminal, tmp_path: Path) -> None:

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,6 +39,9 @@ NEAR = 5e-4
 """Parts no further apart than this [m] touch; where that leaves the product in several pieces,
 the nearest parts of those touch as well."""
 
+AMPLE = 5e-3
+"""More room than this [m] is not measured."""
+
 WIDER = 2.0
 """Pieces are brought together by gaps that grow by this factor."""
 
@@ -50,21 +54,19 @@ class Blocking:
     """The blocking graphs of the units of a plan, by their `labels`.
 
     `levels` (3, n, n): how much j is in the way of i that goes out along +x, +y or +z; what goes
-    the other way has the transpose. `locks` (3, n, n): whether it may not go out past j. `room` (3, n, n): the least room [m] between both on that way,
-    less than 0 where they overlap, infinite where they do not come near. `touch` (n, n): which
-    units touch. `low`, `high` (n, 3): their boxes [m].
+    the other way has the transpose. `locks` (3, n, n): whether it may not go out past j. `touch`
+    (n, n): which units touch. `low`, `high` (n, 3): their boxes [m].
     """
 
     labels: tuple[str, ...]
     levels: NDArray[np.int8] = field(repr=False)
     locks: NDArray[np.bool_] = field(repr=False)
-    room: Array = field(repr=False)
     touch: NDArray[np.bool_] = field(repr=False)
     low: Array = field(repr=False)
     high: Array = field(repr=False)
 
     def __post_init__(self) -> None:
-        for array in (self.levels, self.locks, self.room, self.touch, self.low, self.high):
+        for array in (self.levels, self.locks, self.touch, self.low, self.high):
             array.setflags(write=False)
 
     def __len__(self) -> int:
@@ -84,7 +86,7 @@ class Blocking:
         order = np.concatenate([np.flatnonzero(row) for row in member])
         starts = np.concatenate([[0], np.cumsum(member.sum(axis=1))[:-1]])
 
-        def most(table: Array) -> Array:
+        def most(table: NDArray[Any]) -> NDArray[Any]:
             rows = np.maximum.reduceat(table[..., order, :][..., order], starts, axis=-2)
             return np.asarray(np.maximum.reduceat(rows, starts, axis=-1))
 
@@ -93,7 +95,6 @@ class Blocking:
             tuple(self.labels[group[0]] for group in groups),
             np.where(own, FREE, most(self.levels)).astype(np.int8),
             most(self.locks) & ~own,
-            -most(-self.room),
             most(self.touch),
             np.minimum.reduceat(self.low[order], starts),
             np.maximum.reduceat(self.high[order], starts),
@@ -104,23 +105,43 @@ def blocking(source: InPlace) -> Blocking:
     """The blocking graphs of a source's units. Near linear in the bodies, except where very many
     lie behind one another."""
     units = source.units()
-    parts = [part for _, members in units for part in members]
-    unit = np.repeat(np.arange(len(units)), [len(members) for _, members in units])
-    solids = {part.label: part.solid for part in parts}
-    low = np.array([solid.low for solid in solids.values()]).reshape(-1, 3)
-    high = np.array([solid.high for solid in solids.values()]).reshape(-1, 3)
-    product = Product(solids, low.min(axis=0), high.max(axis=0))
-    found = bodies(product, list(solids))
-    finder = Finder(found, _one_meeting(tuple(solids)))
+    finder, found, unit = _bodies(source)
     count = len(units)
-    levels, room = np.zeros((3, count, count), np.int8), np.full((3, count, count), np.inf)
+    levels = np.zeros((3, count, count), np.int8)
     for axis in AXES:
-        _along(finder, axis, unit, levels[axis], room[axis])
-    starts = np.searchsorted(unit, np.arange(count))
-    bounds = np.minimum.reduceat(low, starts), np.maximum.reduceat(high, starts)
+        _along(finder, axis, unit, levels[axis])
+    bounds = np.full((count, 3), np.inf), np.full((count, 3), -np.inf)
+    np.minimum.at(bounds[0], unit[found.part], found.low)
+    np.maximum.at(bounds[1], unit[found.part], found.high)
     labels = tuple(label for label, _ in units)
     touch = _touching(finder, found, unit, count)
-    return Blocking(labels, levels, levels >= LOCKED, room, touch, *bounds)
+    return Blocking(labels, levels, levels >= LOCKED, touch, *bounds)
+
+
+def rooms(source: InPlace, axis: int) -> Array:
+    """The least room (n, n) [m] between units on the way of the first out along an axis past the
+    second, less than 0 where they overlap; infinite where it is more than AMPLE."""
+    finder, found, unit = _bodies(source)
+    count = len(source.units())
+    room = np.full((count, count), np.inf)
+    moving, standing, depths = finder.passing(axis, AMPLE)
+    one, other = unit[found.part[moving]], unit[found.part[standing]]
+    apart = one != other
+    least = -np.maximum(depths.graze, np.where(depths.path > TOLERANCE, depths.path, -np.inf))
+    for column, at in ((1, (other, one)), (0, (one, other))):
+        np.minimum.at(room, (at[0][apart], at[1][apart]), least[apart, column])
+    return np.where(room > AMPLE, np.inf, room)
+
+
+def _bodies(source: InPlace) -> tuple[Finder, ConvexBodies, Ints]:
+    """The convex bodies of all parts, unit by unit, and the unit of each part."""
+    units = source.units()
+    solids = {part.label: part.solid for _, members in units for part in members}
+    unit = np.repeat(np.arange(len(units)), [len(members) for _, members in units])
+    low = np.min([solid.low for solid in solids.values()], axis=0)
+    high = np.max([solid.high for solid in solids.values()], axis=0)
+    found = bodies(Product(solids, low, high), list(solids))
+    return Finder(found, _one_meeting(tuple(solids))), found, unit
 
 
 def _one_meeting(parts: tuple[str, ...]) -> Meetings:
@@ -129,9 +150,7 @@ def _one_meeting(parts: tuple[str, ...]) -> Meetings:
     return Meetings(parts, (meeting,), np.zeros(len(parts) - 1, np.int64), np.zeros(1, np.int64))
 
 
-def _along(
-    finder: Finder, axis: int, unit: Ints, levels: NDArray[np.int8], room: Array
-) -> None:
+def _along(finder: Finder, axis: int, unit: Ints, levels: NDArray[np.int8]) -> None:
     """Enters what is in the way along an axis. The later part of a pair comes from the lower side,
     so goes out there, and the earlier one goes to the upper side; or the other way about."""
     found = finder.along(axis, np.ones(1, bool))
@@ -147,12 +166,9 @@ def _along(
         apart = moving != standing
         at = moving[apart], standing[apart]
         np.maximum.at(levels, at, level[apart, column].astype(np.int8))
-        np.minimum.at(room, at, -np.maximum(path, depths.graze)[apart, column])
 
 
-def _touching(
-    finder: Finder, found: ConvexBodies, unit: Ints, count: int
-) -> NDArray[np.bool_]:
+def _touching(finder: Finder, found: ConvexBodies, unit: Ints, count: int) -> NDArray[np.bool_]:
     """Which units touch: those near each other, then those that bring pieces together."""
     touch = np.eye(count, dtype=bool)
     gap, furthest = NEAR, float((found.high.max(axis=0) - found.low.min(axis=0)).max())

@@ -7,12 +7,12 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse.csgraph import connected_components
 
 from factory.geometry.meshes import Array
 from factory.planning.blocking import CLASHES, DEEPER, LOCKED, Blocking
 from factory.planning.cannot import Units
 from factory.planning.subsets import APART, BLOCKED, LOOSE, PASSES
-from scipy.sparse.csgraph import connected_components
 
 Sets = NDArray[np.bool_]
 

@@ -7,8 +7,8 @@ its successors both sides. All states are solved, smaller ones first, so what is
 1. `tables`: the least price (clashes that were accepted, parts drawn into each other, relays), and
    of those the least cycle time. Only joins that a third robot takes are needed for it: a join on
    the robot of a pile has the same motions, and makes that robot's cycle longer.
-2. `best`: within these, and a bound on the cycle time, the fewest robots (a pile that stays with its
-   robot saves one), then the smallest sub-assemblies.
+2. `Best`: within these, and a bound on the cycle time, the fewest robots (a pile that stays with
+   its robot saves one), then the smallest sub-assemblies.
 
 A robot that takes over what another has made turns the axis (`relay`).
 """
@@ -21,7 +21,6 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from factory.geometry.meshes import Array
 from factory.planning.estimate import Expected
@@ -109,7 +108,7 @@ class Task:
     def strokes(self, one: Masks, other: Masks) -> Array:
         """How far the side that needs less is lowered (k,) [m]."""
         low, high = self.subsets.low[self.axis], self.subsets.high[self.axis]
-        return np.minimum(high[other] - low[one], high[one] - low[other])
+        return np.asarray(np.minimum(high[other] - low[one], high[one] - low[other]))
 
     def subassemblies(self) -> Iterator[int]:
         """The subsets of two units or more, smaller ones first."""
@@ -169,9 +168,9 @@ def _relayed(whole: int, price: Array, time: Array) -> None:
 
 
 class Best:
-    """The best trees of a task within a `bound` on cycles [s]: least price, then fewest robots, each
-    worth ROBOT [m], and smallest sub-assemblies; with no bound at all (None) and no robot that
-    stays with a pile. Raises TooLate once it is `late`.
+    """The best trees of a task within a `bound` on cycles [s]: least price, then fewest robots,
+    each worth ROBOT [m], and smallest sub-assemblies; with None as a bound no robot stays with a pile.
+    Raises TooLate once it is `late`.
 
     `piles` (stops, 2, s): the worth of what a robot holds that has taken so many inputs beyond two;
     `made` (2, s): of what is delivered.
@@ -231,7 +230,7 @@ class Best:
             time = np.maximum(self.stop[one], self.stop[other]) + self.task.delivering[whole]
             lift = self.task.expected.lift(self.task.strokes(one, other))
             worth[time + np.where(slides, 0.0, lift) > self.bound + 1e-9] = np.inf
-        return worth
+        return np.asarray(worth)
 
     def _inserts(
         self, whole: int, axis: int, stops: int, pile: Masks, come: Masks, prices: Array
@@ -245,7 +244,7 @@ class Best:
             time = self.stop[come] + self.step[come]
             time = time * stops + self.stop[pile] + self.task.delivering[whole]
             worth[time > self.bound + 1e-9] = np.inf
-        return worth
+        return np.asarray(worth)
 
     def tree(self, whole: int, axis: int, leaf: Leaf = lambda unit, _: unit) -> Tree:
         """The best tree of a subset whose inputs come along an axis; `leaf` gives that of a unit

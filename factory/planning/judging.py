@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from factory.geometry.meshes import Array
-from factory.planning.blocking import CLASHES, DEEPER, FREE, LOCKED, Blocking
+from factory.planning.blocking import CLASHES, DEEPER, LOCKED, SCRAPES, Blocking
 from factory.planning.cannot import Direction, Units
 from factory.planning.estimate import Expected
 from factory.planning.exact import RELAY, Tree
@@ -31,7 +31,6 @@ class Join:
     come: Units
     direction: Direction
     level: int
-    room: float
     lowered: bool
     onto: bool
 
@@ -87,9 +86,7 @@ class Judge:
     def stroke(self, come: Units, pile: Units) -> Array:
         """How far one of two sides is lowered at least [m]."""
         low, high = self.found.low[:, self.stance.axes[2]], self.found.high[:, self.stance.axes[2]]
-        (a, b), (c, d) = (
-            (low[list(side)].min(), high[list(side)].max()) for side in (come, pile)
-        )
+        (a, b), (c, d) = ((low[list(side)].min(), high[list(side)].max()) for side in (come, pile))
         return np.asarray(min(d - a, b - c))
 
     def hangs(self, members: Units) -> bool:
@@ -101,19 +98,19 @@ class Judge:
 
     def join(self, pile: Units, come: Units, axis: int, onto: bool) -> Join:
         """How two groups come together along an axis of the floor, or one from above: the least in
-        the way, then sliding, then the most room."""
+        the way, then sliding."""
         ways = [(self.stance.axes[axis], side, False) for side in (+1, -1)]
         ways.append((self.stance.axes[2], self.stance.up, True))
         if not onto:
             ways.append((self.stance.axes[2], -self.stance.up, True))
         found = [self._way(pile, come, way, onto) for way in ways]
-        return min(found, key=lambda join: (max(join.level, FREE + 1), join.lowered, join.level, -join.room))
+        return min(found, key=lambda join: (max(join.level, SCRAPES), join.lowered, join.level))
 
     def _way(self, pile: Units, come: Units, way: tuple[int, int, bool], onto: bool) -> Join:
         axis, side, lowered = way
         at = np.ix_(come, pile) if side > 0 else np.ix_(pile, come)
-        level, room = self.found.levels[axis][at].max(), self.found.room[axis][at].min()
-        return Join(pile, come, (axis, side), int(level), float(room), lowered, onto)
+        level = int(self.found.levels[axis][at].max())
+        return Join(pile, come, (axis, side), level, lowered, onto)
 
 
 @dataclass

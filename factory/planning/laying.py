@@ -32,7 +32,8 @@ ALIKE = 0.01
 
 @dataclass(frozen=True)
 class LaidOut:
-    """A judged tree, as a `tree` of labels and as a `project`; `kinds`: how many different sub-assemblies it has."""
+    """A judged tree, as a `tree` of labels and as a `project`; `kinds`: how many different
+    sub-assemblies it has."""
 
     judged: Judged
     tree: LabelTree = field(repr=False)

@@ -10,7 +10,7 @@ import numpy as np
 from factory.geometry.meshes import Array
 from factory.layout.durations import Pace
 from factory.pipeline import Project, all_templates
-from factory.planning.blocking import CLASHES, DEEPER, LOCKED, SCRAPES, Blocking, blocking
+from factory.planning.blocking import CLASHES, DEEPER, LOCKED, SCRAPES, Blocking, blocking, rooms
 from factory.planning.cannot import Interlock, Removal, interlocks, removal
 from factory.planning.estimate import Expected
 from factory.planning.judging import Join, Judged
@@ -137,7 +137,7 @@ def _planned(source: InPlace, found: Blocking, asked: PlanOptions, budget: Budge
     sought = trees(Sought(found, expected, given, asked.aim, budget, told))
     layouts = Layouts(source, templates, asked.settings)
     if not asked.lay_out:
-        return _result(layouts.of(sought.all[0]), sought.optimal, found, 0)
+        return _result(source, layouts.of(sought.all[0]), sought.optimal, found, 0)
     laid = [0]
 
     def said(best: LaidOut) -> None:
@@ -146,10 +146,12 @@ def _planned(source: InPlace, found: Blocking, asked: PlanOptions, budget: Budge
         asked.told("laying out", laid[0], len(sought.all), words)
 
     best = layouts.best(sought.all, asked.aim, budget.late, said)
-    return _result(best, sought.optimal, found, laid[0])
+    return _result(source, best, sought.optimal, found, laid[0])
 
 
-def _result(laid: LaidOut, optimal: bool, found: Blocking, layouts: int) -> Planned:
+def _result(
+    source: InPlace, laid: LaidOut, optimal: bool, found: Blocking, layouts: int
+) -> Planned:
     judged = laid.judged
     figures = Figures(
         operations=len(judged.joins),
@@ -172,16 +174,20 @@ def _result(laid: LaidOut, optimal: bool, found: Blocking, layouts: int) -> Plan
             cycle=laid.seconds if np.isfinite(laid.seconds) else None,
             area=laid.area if np.isfinite(laid.area) else None,
         )
-    joins = tuple(_join(join, found) for join in judged.joins)
+    axes = sorted({join.direction[0] for join in judged.joins})
+    room = {axis: rooms(source, axis) for axis in axes}
+    joins = tuple(_join(join, found, room[join.direction[0]]) for join in judged.joins)
     project = laid.project if layouts else None
     return Planned(laid.tree, judged.stance.rotation, joins, figures, optimal, project)
 
 
-def _join(join: Join, found: Blocking) -> PlannedJoin:
+def _join(join: Join, found: Blocking, room: Array) -> PlannedJoin:
     axis, side = join.direction
+    at = (join.come, join.pile) if side > 0 else (join.pile, join.come)
+    least = float(room[np.ix_(*at)].min())
     x, y, z = (side if n == axis else 0 for n in range(3))
     pile, come = (tuple(found.labels[n] for n in units) for units in (join.pile, join.come))
-    return PlannedJoin(pile, come, (x, y, z), join.room, join.lowered, join.level >= LOCKED)
+    return PlannedJoin(pile, come, (x, y, z), least, join.lowered, join.level >= LOCKED)
 
 
 def _check_allowed(allow: tuple[str, ...], found: Blocking) -> None:

@@ -1,5 +1,5 @@
-"""Tables over all subsets of a few units, as bit masks: what is in the way, what hangs together, how
-large it is."""
+"""Tables over all subsets of a few units, as bit masks: what is in the way, what hangs together,
+how large it is."""
 
 from __future__ import annotations
 
@@ -51,7 +51,9 @@ class Subsets:
     def price(self, axis: int, side: int, going: Masks, staying: Masks) -> Array:
         """What it costs (k,) that subsets go out along an axis to the upper (0) or lower (1) side,
         past what stays; infinite where they cannot."""
-        locked, deeper, through, clash = (self.ways[n, axis, side][going] & staying for n in range(4))
+        locked, deeper, through, clash = (
+            self.ways[n, axis, side][going] & staying for n in range(4)
+        )
         found = np.where(deeper != 0, LOOSE, 0.0)
         found[through != 0] = PASSES
         found[clash != 0] = BLOCKED

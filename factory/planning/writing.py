@@ -38,7 +38,8 @@ def planned_product(
 ) -> PlannedProduct:
     """The product that a tree makes of a source's parts, turned by a rotation (3, 3) about the
     origin. `by` is said in the first line of the PAG. Only templates that the package ships are
-    used: `mate`, with its further inputs inserted, and `relay`, besides what kept sub-trees name."""
+    used: `mate`, with its further inputs inserted, and `relay`, besides what kept sub-trees
+    name."""
     turn = np.eye(3) if orientation is None else orientation
     kept = {keep.label: keep.nodes for keep in source.kept}
     taken = {part.label for part in source.parts}

@@ -110,8 +110,9 @@ class FailureStudy:
 
     @property
     def retries(self) -> int:
-        """The sum of `again n` over all operations."""
-        return sum(self._retries.values())
+        """The sum of `again n` over the operations of one unit."""
+        first = (one for one in self.failures if one.operation.turn == 0)
+        return sum(one.failure.retries for one in first)
 
     @property
     def attempts(self) -> int:
@@ -144,12 +145,16 @@ def failure_study(project: Project, costs: bool | None = None) -> FailureStudy:
 def estimated_net(project: Project) -> FailingNet:
     """The timed net of a project's factory with delays estimated from sizes."""
     from factory.layout.durations import Pace
+    from factory.layout.repeated import repeated
     from factory.layout.shapes import payload_boxes
     from factory.study.allocation.bundles import SizeTiming
     from factory.study.allocation.lines import estimated_delays
 
     factory = project.factory
-    boxes, pace = payload_boxes(factory, project.product), Pace.of(project.settings)
+    boxes, pace = (
+        payload_boxes(factory, repeated(project.product, factory)),
+        Pace.of(project.settings),
+    )
     delays = estimated_delays(SizeTiming.of(factory, boxes, pace))
     net = marked(factory.net)
     seconds = [*delays, *[0.0] * (len(net.tokens) - len(delays))]

@@ -136,17 +136,24 @@ class Finder:
     def near(self, gap: float) -> tuple[Ints, Ints]:
         """Pairs of bodies of two parts that are at most so far [m] from each other, the later part
         first, wherever they meet. Bodies that meet with corners may be a little further apart."""
-        pairs = [self._beside(gap, *pair) for pair in self._chunks(2, gap)]
-        one, other = np.concatenate([np.zeros((2, 0), np.int64), *pairs], axis=1)
-        depths = _box_depths(self.bodies, one, other, 2)
-        self._refine(one, other, 2, depths)
+        one, other, depths = self.passing(2, gap, still=True)
         found = depths.finished >= -gap
         return one[found], other[found]
 
-    def _beside(self, gap: float, one: Ints, other: Ints) -> Ints:
-        low, high = self.bodies.low, self.bodies.high
-        near = (low[one] <= high[other] + gap) & (low[other] <= high[one] + gap)
-        return np.asarray(np.stack([one, other])[:, near.all(axis=1)])
+    def passing(self, axis: int, gap: float, still: bool = False) -> tuple[Ints, Ints, Depths]:
+        """Pairs of bodies (moving, standing) of two parts, the later one moving, whose boxes are at
+        most so far [m] from each other in some place of the way along an axis, `still` in the
+        finished product, with their depths."""
+        pairs = [self._beside(axis, gap, still, *pair) for pair in self._chunks(axis, gap)]
+        one, other = np.concatenate([np.zeros((2, 0), np.int64), *pairs], axis=1)
+        depths = _box_depths(self.bodies, one, other, axis)
+        self._refine(one, other, axis, depths)
+        return one, other, depths
+
+    def _beside(self, axis: int, gap: float, still: bool, moving: Ints, standing: Ints) -> Ints:
+        depths = _box_depths(self.bodies, moving, standing, axis)
+        near = depths.finished if still else depths.path.max(axis=1)
+        return np.asarray(np.stack([moving, standing])[:, near >= -gap])
 
     def _near(self, axis: int, wanted: NDArray[np.bool_], moving: Ints, standing: Ints) -> Ints:
         """Those that meet at a wanted meeting and whose boxes come to overlap there: rows moving,

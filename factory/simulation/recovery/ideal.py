@@ -108,7 +108,7 @@ class IdealPlant:
         changed = (r for r, label in enumerate(holds) if label == NOPART != before[r])
         return [robot for robot in changed if robot not in gone]
 
-    def let_go(self, robot: int) -> None:
+    def let_go(self, robot: int, seconds: float) -> None:
         """A robot lets scrap fall."""
 
     def takes_back(self, robot: int) -> bool:

@@ -66,8 +66,8 @@ class Plant(Protocol):
         fired so often, and some robots are `going` back. Gives those that hold something that is
         scrap now."""
 
-    def let_go(self, robot: int) -> None:
-        """A robot lets scrap fall."""
+    def let_go(self, robot: int, seconds: float) -> None:
+        """A robot lets scrap fall, which lies for so long [s]."""
 
     def takes_back(self, robot: int) -> bool:
         """Whether something goes back up in a robot's feeder."""

@@ -171,7 +171,7 @@ class Recovery:
         striking, respond = self.striking, self.responding
         ends = [*self.plant.lying, *striking.empty.values(), striking.dark]
         ends += [*respond.dead.values(), *striking.standing.values()]
-        ends += [now] * bool(respond.returning.ways)
+        ends += [now] * bool(respond.returning.ways) + [respond.standing.latest(now)]
         return max((end for end in ends if np.isfinite(end)), default=0.0)
 
     def strike(self, fault: WorldFault) -> None:

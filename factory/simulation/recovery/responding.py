@@ -5,11 +5,12 @@ for any more."""
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Sequence, Set
+from collections.abc import Iterable, Mapping, Sequence
 from functools import partial
 
 import numpy as np
 
+from factory.layout.scrapping import not_carried_back
 from factory.nets.petri import Marking
 from factory.nets.undo import marking_after, undo
 from factory.nets.undone import Undone
@@ -25,9 +26,10 @@ from factory.simulation.recovery.returning import Goal, Returning, WayBack, orde
 from factory.simulation.recovery.standing import Standing
 from factory.simulation.simulation import Simulation
 from factory.support.errors import Diagnostic
+from factory.timing.failing import SCRAPS
 
-MOST_SCRAPPED = 20
-"""A label of which so many are scrapped on end stops the run."""
+BINNED = 1.0
+"""What falls into a bin is gone so long after that [s]."""
 
 
 class Responding:
@@ -52,6 +54,7 @@ class Responding:
         self.used_spares = 0
         self._tried: Counter[int] = Counter()
         self._scrapped: Counter[str] = Counter()
+        self._barred = not_carried_back(simulation.layout)
 
     def passed(self, operation: Operation) -> None:
         """An operation has come to its goal and is good."""
@@ -151,14 +154,20 @@ class Responding:
         scrap = {*self._plant.undone(books.held(marking), fired, going)}
         supervisor.undo(undone, fired, marking, self.standing.axes(going | scrap))
         over = [factory.operations[n] for n in under_way if n not in marking]
-        self._send_back(sorted(going | scrap), scrap, over, marking)
+        wasted = {robot: books.holds(robot, before) for robot in scrap}
+        self._send_back(sorted(going | scrap), wasted, over, marking)
         self._plant.supplied()
 
     def _send_back(
-        self, robots: Iterable[int], scrap: Set[int], over: Sequence[Operation], marking: Marking
+        self,
+        robots: Iterable[int],
+        scrap: Mapping[int, str],
+        over: Sequence[Operation],
+        marking: Marking,
     ) -> None:
-        """Robots go to where they wait in a marking, by way of their B ends with `scrap`; those of
-        operations that are `over` leave in the reverse order of their coming."""
+        """Robots go to where they wait in a marking, by way of their B ends with `scrap`, given by
+        its label, or let it fall at once where they cannot carry it there; those of operations that
+        are `over` leave in the reverse order of their coming."""
         after = dict[int, frozenset[int]]()
         for operation in over:
             came = order_of(self._simulation.modes[operation.index], operation.robots)
@@ -167,7 +176,9 @@ class Responding:
         for robot in robots:
             rest = self.returning.rest(robot, marking)
             goals, done = rest, partial(self._plant.came_back, robot)
-            if robot in scrap:
+            if robot in scrap and (robot, scrap[robot]) in self._barred:
+                self._plant.let_go(robot, self._campaign.clear)
+            elif robot in scrap:
                 goals, done = self.returning.home(robot), partial(self._bin, robot, rest)
             first = after.get(robot, frozenset[int]())
             self.returning.send(robot, WayBack(goals, first, done, partial(self._is_up, robot)))
@@ -175,7 +186,7 @@ class Responding:
     def _bin(self, robot: int, rest: list[Goal]) -> None:
         """A robot at the B end of its guidepath lets scrap fall into the bin there, and goes to
         where it waits."""
-        self._plant.let_go(robot)
+        self._plant.let_go(robot, BINNED)
         self.returning.send(robot, WayBack(rest))
 
     def _is_up(self, robot: int) -> bool:
@@ -187,8 +198,8 @@ class Responding:
         self._note(test, operation, robot, "scrap", labels)
         for label in labels:
             self._scrapped[label] += 1
-            if self._scrapped[label] >= MOST_SCRAPPED:
-                what = f"'{label}' was scrapped {MOST_SCRAPPED} times on end"
+            if self._scrapped[label] >= SCRAPS:
+                what = f"'{label}' was scrapped {SCRAPS} times on end"
                 self._stop(what, self._books.factory.by_label[label])
 
     def _stop(self, what: str, operation: Operation) -> None:

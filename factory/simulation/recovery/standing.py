@@ -76,10 +76,18 @@ class Standing:
             if not excused.isdisjoint(operation.robots):
                 self.begun(operation, now)
                 continue
-            most = SLUGGISH * self._simulation.delays[number] + GRACE
-            if now - self._begun.setdefault(number, now) > most:
+            if now > self._late(number, now):
                 found += self._at_fault(factory, operation)
         return found
+
+    def latest(self, now: float) -> float:
+        """When the last of the operations under way is late [s]."""
+        active = self._simulation.supervisor.active.operations
+        return max((self._late(number, now) for number in active), default=0.0)
+
+    def _late(self, number: int, now: float) -> float:
+        begun = self._begun.setdefault(number, now)
+        return begun + SLUGGISH * self._simulation.delays[number] + GRACE
 
     def _at_fault(self, factory: Factory, operation: Operation) -> list[int]:
         simulation, axes = self._simulation, [*factory.axes[operation.index]]

@@ -17,9 +17,6 @@ from factory.simulation.recovery.faults import Campaign, WorldFault
 SCRAP = 1 << 20
 """Bodies that are scrap count for units from this one on."""
 
-BINNED = 1.0
-"""What falls into a bin is gone so long after that [s]."""
-
 
 class MujocoPlant:
     """What recovery asks of a `MujocoWorld`, and does to it."""
@@ -192,9 +189,9 @@ class MujocoPlant:
                     if label in feeders.shown():
                         feeders.take_back(label, self._next_scrap())
 
-    def let_go(self, robot: int) -> None:
-        """A robot lets scrap fall."""
-        self._let_fall(robot, BINNED)
+    def let_go(self, robot: int, seconds: float) -> None:
+        """A robot lets scrap fall, which lies for so long [s]."""
+        self._let_fall(robot, seconds)
         self._world.parts.welds.write()
         self.came_back(robot)
         self._world.parts.feeders.stay_clear(robot)

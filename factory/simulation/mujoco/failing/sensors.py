@@ -13,9 +13,8 @@ from factory.simulation.recovery.faults import Campaign
 LOST = 5e-3
 """A part further than this from its place in the hand is lost [m]."""
 
-ASKEW, TURNED = 1e-3, 0.05
-"""What a feeder shows is askew when it is so far off [m], unless the template of its operation says
-otherwise, or turned so far [rad]."""
+TURNED = 0.05
+"""What a feeder shows is askew, too, when it is turned so far [rad]."""
 
 
 class Senses:
@@ -68,12 +67,13 @@ class Senses:
 
     def is_askew(self, label: str, body: int, place: Array) -> bool:
         """Whether a feeder's camera finds the part in its `place` (3,) [m]."""
-        failures = self._world.model.factory.by_label[label].template.failures
-        most = next((f.limit for f in failures if f.test == "misplaced"), None) or ASKEW
+        test = self._world.model.factory.by_label[label].template.failure("misplaced")
+        if test is None or test.limit is None:
+            return False
         m = self._world.m
         pose = self._world.d.qpos[m.jnt_qposadr[m.body_jntadr[body]] + np.arange(7)]
         off = np.linalg.norm(pose[:3] - place + self._noise * self._draw.normal(size=3))
-        return bool(off > most or 2 * np.arccos(min(1.0, abs(float(pose[3])))) > TURNED)
+        return bool(off > test.limit or 2 * np.arccos(min(1.0, abs(float(pose[3])))) > TURNED)
 
     def _gaps(self, welds: Index, bodies: Index) -> Array:
         """How far bodies are (n, 3) [m] from where welds should hold them."""
