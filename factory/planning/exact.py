@@ -169,7 +169,8 @@ def _relayed(whole: int, price: Array, time: Array) -> None:
 
 class Best:
     """The best trees of a task within a `bound` on cycles [s]: least price, then fewest robots,
-    each worth ROBOT [m], and smallest sub-assemblies; with None as a bound no robot stays with a pile.
+    each worth ROBOT [m], and smallest sub-assemblies; with None as a bound no robot stays with a
+    pile.
     Raises TooLate once it is `late`.
 
     `piles` (stops, 2, s): the worth of what a robot holds that has taken so many inputs beyond two;
