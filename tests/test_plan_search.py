@@ -129,6 +129,15 @@ def test_no_fewer_parts_can_be_removed(found: Blocking) -> None:
     assert not interlocks(found.allowing(least.labels))
 
 
+def test_the_hub_of_many_pairs_is_removed() -> None:
+    levels = np.zeros((3, 5, 5), np.int8)
+    levels[:, 4, :4] = levels[:, :4, 4] = CLASHES
+    touch, low = np.ones((5, 5), bool), np.zeros((5, 3))
+    found = Blocking(tuple("abcde"), levels, levels >= LOCKED, touch, low, low + 1)
+    assert interlocks(found)[0].labels == tuple("abcde")
+    assert removal(found).labels == ("e",)
+
+
 @settings(max_examples=25, deadline=None)
 @given(graphs(most=4), st.sampled_from(stances()))
 def test_least_price_and_cycle_are_those_of_all_trees(found: Blocking, stance: Stance) -> None:
@@ -209,7 +218,7 @@ def boxes(draw: st.DrawFn) -> InPlace:
     return InPlace("boxes", parts)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=80, deadline=None)
 @given(boxes(), st.sampled_from(stances()), st.randoms(use_true_random=False))
 def test_what_is_free_is_what_check_calls_free(
     source: InPlace, stance: Stance, random: object
@@ -221,7 +230,7 @@ def test_what_is_free_is_what_check_calls_free(
     while len(trees) > 1:
         rng.shuffle(trees)
         pile, come = trees.pop(), trees.pop()
-        joined = isinstance(pile, tuple) and rng.random() < 0.5
+        joined = isinstance(pile, tuple) and rng.random() < 0.8
         trees.append((*pile, come) if joined else (pile, come))
     mine = Judge(found, stance, EXPECTED).judged(trees[0])
 
@@ -234,7 +243,7 @@ def test_what_is_free_is_what_check_calls_free(
     assert mine.count(CLASHES) == blocked
     assert len(theirs.all) == len(mine.joins)
     lowered = sum(join.lowered and join.level < CLASHES for join in mine.joins)
-    assert blocked or lowered == len(theirs.of_kind("lower"))
+    assert lowered == len(theirs.of_kind("lower"))
 
 
 def test_stances_are_the_rotations_up_to_half_a_turn() -> None:
