@@ -10,12 +10,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from factory.compiler.mating.admitting import admitted
+from factory.compiler.mating.findings import BLOCKED, LEFT_OUT, NO_DEEPER, STRICT
 from factory.compiler.mating.mating import matings
 from factory.geometry.product import product_geometry
 from factory.lang.pag_reader import read_pag
 from factory.layout.durations import Pace
 from factory.pipeline import all_templates
-from factory.planning.blocking import CLASHES, DEEPER, LOCKED, Blocking, blocking
+from factory.planning.blocking import CLASHES, DEEPER, FREE, LOCKED, SCRAPES, Blocking, blocking
 from factory.planning.cannot import cores, interlocks, removal
 from factory.planning.dividing import Divider
 from factory.planning.estimate import Expected
@@ -218,32 +220,51 @@ def boxes(draw: st.DrawFn) -> InPlace:
     return InPlace("boxes", parts)
 
 
-@settings(max_examples=80, deadline=None)
-@given(boxes(), st.sampled_from(stances()), st.randoms(use_true_random=False))
-def test_what_is_free_is_what_check_calls_free(
-    source: InPlace, stance: Stance, random: object
-) -> None:
-    """Of any tree in any stance the same operations are blocked as `check` finds."""
-    found, count = blocking(source), len(source.parts)
-    rng = np.random.default_rng(random.getrandbits(32))  # type: ignore[attr-defined]
+LEVEL_OF = {FREE: STRICT, SCRAPES: NO_DEEPER, DEEPER: LEFT_OUT, LOCKED: LEFT_OUT, CLASHES: BLOCKED}
+
+
+@settings(max_examples=60, deadline=None)
+@given(boxes(), st.sampled_from(stances()), st.integers(0, 2**32))
+def test_what_is_free_is_what_check_calls_free(source: InPlace, stance: Stance, seed: int) -> None:
+    """Of any tree in any stance each operation is as free along each way as `check` finds, and
+    comes along the way that `check` chooses."""
+    found, count, rng = blocking(source), len(source.parts), np.random.default_rng(seed)
     trees: list[Tree] = list(range(count))
     while len(trees) > 1:
         rng.shuffle(trees)
         pile, come = trees.pop(), trees.pop()
-        joined = isinstance(pile, tuple) and rng.random() < 0.8
-        trees.append((*pile, come) if joined else (pile, come))
-    mine = Judge(found, stance, EXPECTED).judged(trees[0])
+        trees.append(
+            (*pile, come) if isinstance(pile, tuple) and rng.random() < 0.7 else (pile, come)
+        )
+    joins = Judge(found, stance, EXPECTED).judged(trees[0]).joins
 
     def named(tree: Tree) -> Tree:
         return source.parts[tree].label if isinstance(tree, int) else tuple(map(named, tree))
 
     pag = planned_product(source, named(trees[0]), stance.rotation).pag
-    theirs = matings(pag, TEMPLATES, product_geometry(pag))
-    blocked = len(theirs.of_kind("blocked"))
-    assert mine.count(CLASHES) == blocked
-    assert len(theirs.all) == len(mine.joins)
-    lowered = sum(join.lowered and join.level < CLASHES for join in mine.joins)
-    assert lowered == len(theirs.of_kind("lower"))
+    solids = product_geometry(pag)
+    theirs, admits = matings(pag, TEMPLATES, solids), admitted(pag, TEMPLATES, solids)
+    inside: dict[str, frozenset[int]] = {
+        p.label: frozenset([n]) for n, p in enumerate(source.parts)
+    }
+    mine = {frozenset((*join.pile, *join.come)): join for join in joins}
+    assert len(theirs.all) == len(mine)
+    for mating in theirs.all:
+        inside[mating.label] = frozenset().union(*(inside[label] for label in mating.inputs))
+        join, admit = mine[inside[mating.label]], admits[mating.label]
+        last = tuple(inside[mating.inputs[-1]])
+        other = tuple(inside[mating.label] - {*last})
+
+        def level(come: tuple[int, ...], stay: tuple[int, ...], axis: int, side: int) -> int:
+            levels = found.levels[axis] if side > 0 else found.levels[axis].T
+            return LEVEL_OF[int(levels[np.ix_(come, stay)].max())]
+
+        x, y, z = stance.axes
+        assert admit.slides == tuple(max(level(last, other, n, s) for s in (1, -1)) for n in (x, y))
+        assert admit.lowers[1] == level(last, other, z, stance.up)
+        assert admit.lowers[0] == level(other, last, z, stance.up)
+        assert (join.level == CLASHES) == (mating.approach.kind == "blocked")
+        assert (join.lowered and join.level < CLASHES) == (mating.approach.kind == "lower")
 
 
 def test_stances_are_the_rotations_up_to_half_a_turn() -> None:
