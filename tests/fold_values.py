@@ -24,6 +24,7 @@ from factory.layout.layout import Layout
 from factory.nets.gears import GearNet
 from factory.nets.marked import MarkedNet, marked
 from factory.pipeline import Project, all_templates
+from factory.plant.approaches import Approach
 from factory.plant.factory import Factory
 from factory.problem.pag import PAG
 from factory.problem.robot_types import Catalogue, load_catalogue
@@ -91,6 +92,18 @@ def random_lines(factory: Factory, rng: random.Random) -> list[Line]:
     return lines
 
 
+def deputies(factory: Factory, lines: list[Line]) -> list[tuple[Line, Line]]:
+    """The pairs of lines that one robot could serve: they deliver to one line, never in the same
+    operation."""
+    on = line_of(len(factory.robots), lines)
+    to = {line: on[delivery(factory, line[0]).carrier] for line in lines if line[0]}
+    return [
+        (one, other)
+        for one, other in combinations(to, 2)
+        if to[one] == to[other] and all(_fits(factory, [*one], kid) for kid in other)
+    ]
+
+
 def _fits(factory: Factory, group: list[int], kid: int) -> bool:
     robots = factory.robots
     return all(
@@ -127,6 +140,13 @@ def fold_layout(seed: int, settings: Settings) -> Layout:
     templates = {**shipped, "insert": replace(shipped["insert"], further="insert")}
     project = Project(pag, templates, load_catalogue(), settings)
     factory, known = judged(project.compiled, project.product), project.catalogue
+    lines = lines_of_one_side(factory, known, rng)
+    made = fold(factory, lines, known)
+    return lay_out(made, project.product, pace=Pace.of(settings))
+
+
+def lines_of_one_side(factory: Factory, known: Catalogue, rng: random.Random) -> list[Line]:
+    """Random lines of tours that can share a robot, each as full as can be but for one in five."""
     lines: list[Line] = [(0,)]
     for line in lines:
         groups: list[list[int]] = []
@@ -140,8 +160,17 @@ def fold_layout(seed: int, settings: Settings) -> Layout:
             else:
                 group.append(kid)
         lines += [tuple(sorted(group)) for group in groups]
-    made = fold(factory, lines, known)
-    return lay_out(made, project.product, pace=Pace.of(settings))
+    return lines
+
+
+def with_sides(factory: Factory, rng: random.Random) -> Factory:
+    """The factory in which what comes together does so from one side, the other, or both."""
+    sides = ((-1,), (+1,), (-1, +1))
+    operations = (
+        replace(o, approach=Approach("slide", 0, rng.choice(sides))) if len(o.inputs) > 1 else o
+        for o in factory.operations
+    )
+    return replace(factory, operations=tuple(operations))
 
 
 def _shares(

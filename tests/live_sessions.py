@@ -9,6 +9,7 @@ from typing import Any
 import pytest
 
 from factory.show.live import LiveFrame, Session
+from factory.simulation.recovery import Campaign
 from factory.simulation.request import RunRequest
 from factory.simulation.simulation import Simulation
 from tests.layout_values import paper_layout
@@ -18,16 +19,17 @@ class Stopped(Exception):
     """Ends a session."""
 
 
-def a_session(playing: bool) -> Session:
+def a_session(playing: bool, campaign: Campaign | None = None) -> Session:
     """A session of the paper's example, without end; it does not run yet."""
-    return Session(lambda: Simulation(paper_layout(), RunRequest(units=10**9)), playing)
+    request = RunRequest(units=10**9, recovers=campaign is not None)
+    return Session(lambda: Simulation(paper_layout(), request), playing, campaign)
 
 
 class Running:
     """A session that runs in a thread of its own."""
 
-    def __init__(self, playing: bool = True) -> None:
-        self.session = a_session(playing)
+    def __init__(self, playing: bool = True, campaign: Campaign | None = None) -> None:
+        self.session = a_session(playing, campaign)
         self.over = False
         self.thread = Thread(target=self._run, daemon=True)
         self.thread.start()

@@ -8,7 +8,7 @@ from typing import Any
 from hypothesis import strategies as st
 
 from factory.problem.pag import PAG, RESERVED, Assembly, Parameter, Value
-from factory.problem.template import Law, Point, Template
+from factory.problem.template import Failure, Law, Point, Response, Template, Test
 from factory.support.settings import DWELL
 
 LABEL_LETTERS = "abzAZ0189_-.äßλД中é"
@@ -171,7 +171,25 @@ def templates(draw: st.DrawFn) -> Template:
         draw(st.sampled_from(["", "insert"])) if spare else "",
         tuple(defaults.items()),
         geometry,
+        draw(_failures(any(brings), any(b == "nopart" for b in before[: j - 1] + before[j:]))),
     )
+
+
+@st.composite
+def _failures(draw: st.DrawFn, takes: bool, tools: bool) -> tuple[Failure, ...]:
+    """Failures of a template that takes sub-assemblies or none, with tools or without."""
+    again = st.integers(1, 1000).map(lambda times: Response("again", times))
+    found = []
+    tests: list[Test] = ["lost", "residual", "jammed"]
+    tests += [] if takes else ["misplaced"]
+    tests += ["rejected"] if tools else []
+    for test in draw(st.permutations(tests))[: draw(st.integers(0, 3))]:
+        scrapped = st.just(Response("stop" if test == "jammed" and not takes else "scrap"))
+        first = [] if test == "lost" and takes else draw(st.lists(again, max_size=1))
+        last = draw(scrapped | st.just(Response("stop")))
+        limit = draw(st.floats(1e-9, 1)) if test in ("residual", "misplaced") else None
+        found.append(Failure(test, limit, (*first, last)))
+    return tuple(found)
 
 
 def _is_time(name: str, value: Value) -> bool:

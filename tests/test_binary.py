@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from factory.mjcf import binary, loading
 from factory.mjcf.binary import beside, kept, key_of, packed, seal_of, sealed
 from factory.mjcf.model import Model
-from factory.simulation.simulation import physical_model
+from factory.simulation.modelling import physical_model
 from tests.command_line import PAPER, Terminal, files_in
 from tests.fidelity.products import layout
 

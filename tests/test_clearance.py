@@ -25,7 +25,7 @@ from layout_values import (
 from pag_values import SHAPES
 
 from factory.layout.certificate import ALWAYS, KINDS, PAYLOAD_BODY, STATIONS, Certificate, Region
-from factory.layout.clearance import _Search, certify, separation
+from factory.layout.clearance import ClearanceSearch, certify, separation
 from factory.layout.crossings import touching
 from factory.layout.dimensions import PAYLOADS, SIDE
 from factory.layout.layout import Layout
@@ -296,7 +296,7 @@ def test_only_who_is_coupled_may_share_room() -> None:
     def faults(*found: tuple[int, str, int]) -> int:
         box, height = (0.0, 1.0, 0.0, 1.0), (0.1, 0.2)
         regions = [Region(r, PAYLOADS, PAYLOAD_BODY, box, height, k, o) for r, k, o in found]
-        return len(list(_Search(layout, regions).faults()))
+        return len(list(ClearanceSearch(layout, regions).faults()))
 
     assert faults((1, "part3", mate), (2, "sub2", mate)) == 0
     assert faults((1, "part3", mate), (2, "sub2", ALWAYS)) == 0

@@ -22,7 +22,7 @@ NOT_PROVOKED = {
     *("Dropped", "Early", "Exchanged", "Frame", "Order", "Start", "Stuck", "TwoHolders"),
     *("CutOff", "NotProved", "Stalled", "Unstable"),
     *("Contact", "EngineWarning", "GripGap", "HandOffGap", "Missed", "NotRefined"),
-    "Record",
+    *("Record", "CannotAssemble"),
 }
 """Codes that need a broken machine, run or factory, which other tests make."""
 
@@ -153,7 +153,7 @@ def test_the_option_prints_it(run: Terminal) -> None:
     [
         ("Rooot", "did you mean 'Root'?"),
         ("label", "there are DuplicateLabel, LabelReuse, ReservedLabel, UndefinedLabel"),
-        ("qqqq", "valid codes: Assets, BadFile, BadLevel"),
+        ("qqqq", "valid codes: Assets, BadFailure, BadFault"),
         ("", "valid codes: Assets"),
     ],
 )

@@ -22,7 +22,7 @@ from factory.nets.marked import MarkedNet, marked
 from factory.nets.replay import replay
 from factory.record.log import read_log
 from factory.record.log.model import model_of
-from factory.simulation.simulation import physical_model
+from factory.simulation.modelling import physical_model
 from tests.command_line import PAPER, ROOT
 from tests.export_values import (
     LAMP,

@@ -7,12 +7,22 @@ import json
 import random
 import re
 from collections.abc import Callable
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from factory.compiler.folding import fold, folded, lines_of_labels
+from factory.compiler import folding
+from factory.compiler.folding import (
+    Line,
+    delivery,
+    fold,
+    folded,
+    kept_apart,
+    line_of,
+    lines_of_labels,
+)
 from factory.export.certificate.check import check_certificate
 from factory.export.certificate.listing import digest
 from factory.export.certificate.writer import certificate
@@ -30,6 +40,7 @@ from factory.nets.marked import MarkedNet, marked
 from factory.nets.petri import Marking
 from factory.nets.verdict import BEHAVIOUR
 from factory.nets.verify import proved, verify
+from factory.plant.factory import Factory
 from factory.plant.programs import program_of, write_program
 from factory.simulation.request import RunRequest
 from factory.simulation.simulation import Simulation
@@ -43,6 +54,7 @@ from tests.command_line import Terminal
 from tests.fold_values import (
     fold_layout,
     inserted,
+    lines_of_one_side,
     pairs_of_tours,
     plain,
     random_fold,
@@ -52,6 +64,7 @@ from tests.fold_values import (
     swapped,
     table_of,
     three_robots,
+    with_sides,
 )
 from tests.layout_values import table_pag
 from tests.net_values import legal_markings, lost_token, net_from, random_legal_marking
@@ -528,6 +541,84 @@ def test_the_output_robot_and_tools_share_no_line() -> None:
     ):
         with pytest.raises(InputError, match=message):
             fold(factory, [line], catalogue())
+
+
+REASON = re.compile("(.*) and (.*) cannot share a robot: (.*)")
+
+
+def told_apart(factory: Factory, lines: list[Line]) -> dict[tuple[str, str], str]:
+    """What is said to keep lines apart, by what their first robots bring."""
+    said = (REASON.fullmatch(words) for words in kept_apart(factory, lines, catalogue()))
+    return {(found[1], found[2]): found[3] for found in said if found}
+
+
+def apart(factory: Factory, lines: list[Line]) -> dict[tuple[str, str], str]:
+    """Why one line in place of two is no fold: of each two that follow each other at one robot, and
+    do not come there at once, by what their first robots bring."""
+    on, found = line_of(len(factory.robots), lines), dict[tuple[str, str], str]()
+    heads: dict[int, list[int]] = {}
+    for line in sorted(lines)[1:]:
+        if factory.robots[line[0]].type != "tool":
+            heads.setdefault(on[delivery(factory, line[0]).carrier], []).append(line[0])
+    for one, other in (pair for group in heads.values() for pair in pairwise(group)):
+        both = tuple(robot for robot in range(len(on)) if on[robot] in (one, other))
+        rest = [line for line in lines if line[0] not in both]
+        reason = refusal(factory, [*rest, both])
+        if reason and delivery(factory, one) is not delivery(factory, other):
+            found[brought(factory, one), brought(factory, other)] = reason
+    return found
+
+
+def refusal(factory: Factory, lines: list[Line]) -> str:
+    """Why lines are no fold: what no two of one line have in common, or no side for all."""
+    try:
+        fold(factory, lines, catalogue())
+    except InputError as error:
+        messages = [found.message for found in error.diagnostics]
+        pairs = [found[3] for found in map(REASON.fullmatch, messages) if found]
+        sides = any("cannot all come from one side" in message for message in messages)
+        return (pairs or ["they cannot come from one side"] * sides or [""])[0]
+    return ""
+
+
+def brought(factory: Factory, robot: int) -> str:
+    """What a robot brings, in quotes."""
+    last = delivery(factory, robot)
+    return f"'{last.before[last.robots.index(robot)]}'"
+
+
+def random_sides(seed: int) -> tuple[Factory, list[Line]]:
+    rng = random.Random(seed)
+    pag = random_pag(rng.randint(5, 14), seed, rng.choice(("any", "chain", "balanced")), 3)
+    factory = with_sides(plain(inserted(pag, rng.choice((0.5, 1.0)), seed)), rng)
+    return factory, lines_of_one_side(factory, catalogue(), rng)
+
+
+def test_what_keeps_lines_apart_is_why_they_are_no_fold_as_one() -> None:
+    reasons: set[str] = set()
+    for seed in range(200):
+        factory, lines = random_sides(seed)
+        truth = apart(factory, lines)
+        assert told_apart(factory, lines) == truth, seed
+        reasons.update(truth.values())
+    assert reasons == {"they cannot come from one side", "they begin or end in different ways"}
+
+
+@pytest.mark.parametrize(
+    ("name", "planted"),
+    [
+        ("sides_of", lambda *_: {-1, +1}),
+        ("mismatch", lambda *_: ""),
+        ("mismatch", lambda *_: "no type of robot is fit for both"),
+    ],
+)
+def test_what_is_wrongly_said_to_keep_lines_apart_is_found(
+    monkeypatch: pytest.MonkeyPatch, name: str, planted: Callable[..., object]
+) -> None:
+    made = [random_sides(seed) for seed in range(200)]
+    truth = [apart(*one) for one in made]
+    monkeypatch.setattr(folding, name, planted)
+    assert [told_apart(*one) for one in made] != truth
 
 
 def test_two_inputs_of_one_operation_share_no_robot() -> None:

@@ -15,10 +15,11 @@ from factory.geometry.product import product_geometry
 from factory.plant.fused_bodies import FUSE_FROM, bodies_of, fused_copies, fusing_pays
 from factory.record.monitor import beside
 from factory.simulation.disturbance import Mass, disturb
+from factory.simulation.modelling import physical_model
 from factory.simulation.mujoco.feeders import Feeders
 from factory.simulation.mujoco.fusing import SETTLING, Fusion, rotations
 from factory.simulation.request import RunRequest
-from factory.simulation.simulation import Simulation, physical_model
+from factory.simulation.simulation import Simulation
 from factory.support.engine import mujoco
 from factory.support.settings import Settings
 from tests.command_line import PAPER, Terminal

@@ -130,3 +130,10 @@ def test_a_seed_lists_its_worst_penetrations_and_the_command_tells_them(run: Ter
     assert key in told.out
     for penetration in listed:
         assert " - ".join(penetration["geoms"]) in told.out
+
+
+def test_a_magazine_of_a_line_is_solid(run: Terminal) -> None:
+    words = (PAPER, "--robots", 3, "--seeds", 1, "--units", 2, "--jobs", 1, "--no-convergence")
+    done = run("fidelity", *words, "--json")
+    assert done.status == 0, done.err
+    assert done.json["figures"]["hidden_penetration_max_mm"]["worst"] < 0.1

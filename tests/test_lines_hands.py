@@ -18,6 +18,8 @@ from factory.layout.hands.hand import AIR, Hand
 from factory.layout.hands.limbs import limbs
 from factory.layout.layout import Layout
 from factory.layout.request import Ground
+from factory.mjcf import hanging
+from factory.mjcf.hanging import Hanging
 from factory.pipeline import Project, read
 from factory.simulation.request import RunRequest
 from factory.simulation.run import Run
@@ -41,6 +43,13 @@ w1 = atomic ( box = ( 0.02, 0.02, 0.02 ), pos = ( -0.06, 0.03, 0.01 ) );
 w2 = atomic ( box = ( 0.02, 0.03, 0.02 ), pos = ( 0, 0.035, 0.01 ) );
 w3 = atomic ( box = ( 0.02, 0.02, 0.02 ), pos = ( 0.06, 0.03, 0.01 ) )""",
         ("w1", "w2", "w3"),
+    ),
+    "steps": (
+        """root = s2; s1 = insert ( base, low ); s2 = insert ( s1, tall );
+base = atomic ( box = ( 0.1, 0.04, 0.02 ), pos = ( 0, 0, 0.01 ) );
+tall = atomic ( box = ( 0.02, 0.02, 0.04 ), pos = ( -0.03, 0.03, 0.02 ) );
+low = atomic ( box = ( 0.02, 0.02, 0.02 ), pos = ( 0.03, 0.03, 0.01 ) )""",
+        ("low", "tall"),
     ),
     "shelf": (
         """root = s3; s1 = insert ( post, w1 ); s2 = insert ( s1, w2 ); s3 = insert ( s2, w3 );
@@ -77,14 +86,19 @@ ball = atomic ( sphere = 0.002, pos = ( -0.03, 0.022, 0.05 ), mass = 500 )""",
         ("low", "ball"),
     ),
 }
-"""Products and the labels that share a robot: boxes at one height, several heights beside a post,
+"""Products and the labels that share a robot: boxes at one height, of two heights, several heights
+beside a post,
 things that are lowered, and one that no hand can hold."""
 
 
 @cache
 def project(name: str, hands: int = 1, shared: bool = True) -> Project:
     """A product with or without a line."""
-    text, line = PRODUCTS[name]
+    return planned(*PRODUCTS[name], hands, shared)
+
+
+def planned(text: str, line: tuple[str, ...], hands: int = 1, shared: bool = True) -> Project:
+    """A product with or without a line."""
     with TemporaryDirectory() as folder:
         file = Path(folder) / "product.pag"
         file.write_text(text)
@@ -105,6 +119,15 @@ def run_of(layout: Layout, distributed: bool = False, seed: int = 1) -> Run:
     """A run with a monitor beside it."""
     asked = RunRequest(units=4, jitter=0.3, seed=seed, distributed=distributed)
     return watched(Simulation(layout, asked), max_time=90.0)
+
+
+def looked_into(layout: Layout, distributed: bool = False) -> tuple[Run, HiddenPenetrations]:
+    """A run with a monitor beside it, and what was inside what."""
+    asked = RunRequest(units=4, jitter=0.3, seed=1, distributed=distributed)
+    simulation = Simulation(layout, asked)
+    hidden = HiddenPenetrations.of(simulation)
+    look = [lambda world, _: hidden.look(world.d.qpos, world.time)]
+    return watched(simulation, look, 90.0), hidden
 
 
 @pytest.mark.parametrize(
@@ -145,19 +168,51 @@ def test_one_hand_holds_all_labels_of_a_line(name: str, kind: str, lift: float |
 
 
 @pytest.mark.parametrize("distributed", [False, True])
-@pytest.mark.parametrize("name", ["paper", "blocks", "shelf", "tub"])
+@pytest.mark.parametrize("name", ["paper", "steps", "shelf", "tub"])
 def test_it_makes_units_and_touches_nothing_else(name: str, distributed: bool) -> None:
-    layout = project(name).layout
-    asked = RunRequest(units=4, jitter=0.3, seed=1, distributed=distributed)
-    simulation = Simulation(layout, asked)
-    hidden = HiddenPenetrations.of(simulation)
-    run = watched(simulation, [lambda world, _: hidden.look(world.d.qpos, world.time)], 90.0)
+    run, hidden = looked_into(project(name).layout, distributed)
     assert run.succeeded and run.refines_net, run.trouble
     assert run.physics is not None and run.physics.unintended_contacts == 0
     assert run.physics.grip_gap_max_mm is not None and run.physics.grip_gap_max_mm < 0.5
-    # the sliders of one magazine stand for one that shows its parts in turns
-    deep = [p for p in hidden.found() if not all(g.startswith("feeder/") for g in p.geoms)]
-    assert all(p.depth_mm < AT_MOST_MM for p in deep), deep
+    assert hidden.deepest() < AT_MOST_MM, hidden.found()
+
+
+def test_sliders_in_each_others_way_are_seen(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(hanging, "common_places", lambda *_: [])
+    run, hidden = looked_into(project("paper").layout)
+    assert run.succeeded
+    assert {p.geoms for p in hidden.found() if p.depth_mm > AT_MOST_MM} == {
+        ("feeder/part2/pad", "feeder/part3/pad"),
+        ("feeder/part2/pad", "feeder/part3/rod"),
+        ("feeder/part2/rod", "feeder/part3/pad"),
+        ("feeder/part2/rod", "feeder/part3/rod"),
+    }
+
+
+@pytest.mark.parametrize("name", ["paper", "blocks", "steps", "shelf", "tub"])
+def test_a_line_with_a_place_on_all_parts_has_one_slider(name: str) -> None:
+    layout = project(name).layout
+    found = Hanging.of(layout)
+    shown = layout.magazine(of_line(layout)[0])
+    assert {found.slider[label] for label in shown} == {shown[0]}
+    feet = {label: found.raised[label] + feeder_of(layout, label).stroke for label in shown}
+    assert max(feet.values()) - min(feet.values()) < 1e-9, "it goes up to one height"
+    assert {round(up, 9) for up in found.raised.values()} >= ({0.02} if name == "steps" else {0.0})
+
+
+def test_parts_apart_hang_from_sliders_apart() -> None:
+    """Without hands parts are beside each other in the housing, as in the product."""
+    text = """root = s2; s1 = insert ( base, a ); s2 = insert ( s1, b );
+base = atomic ( box = ( 0.1, 0.1, 0.02 ), pos = ( 0, 0, 0.01 ) );
+a = atomic ( box = ( 0.02, 0.02, 0.02 ), pos = ( -0.04, 0.06, 0.01 ) );
+b = atomic ( box = ( 0.02, 0.02, 0.03 ), pos = ( 0.04, 0.06, 0.015 ) )"""
+    layout = planned(text, ("a", "b"), hands=0).layout
+    found = Hanging.of(layout)
+    assert dict(found.slider) == {"base": "base", "a": "a", "b": "b"}
+    run, hidden = looked_into(layout)
+    assert run.succeeded
+    inside = [p for p in hidden.found() if any(g.startswith("feeder/") for g in p.geoms)]
+    assert not inside
 
 
 def test_without_hands_front_ends_are_in_one_place() -> None:

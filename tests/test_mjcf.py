@@ -24,7 +24,7 @@ from factory.layout.layout import Layout
 from factory.mjcf import names
 from factory.mjcf.loading import load
 from factory.mjcf.model import Model, model_files
-from factory.simulation.simulation import physical_model
+from factory.simulation.modelling import physical_model
 from factory.support.errors import InputError
 from factory.support.files import write_all
 from factory.support.settings import Settings

@@ -25,10 +25,11 @@ from factory.mjcf.loading import load
 from factory.mjcf.model import Model
 from factory.pipeline import read
 from factory.show.live import Session
+from factory.simulation.modelling import physical_model
 from factory.simulation.mujoco.fast.neighbours import boxes
 from factory.simulation.mujoco.world import MujocoWorld
 from factory.simulation.request import RunRequest
-from factory.simulation.simulation import Simulation, physical_model
+from factory.simulation.simulation import Simulation
 from factory.support.engine import mujoco
 from factory.support.settings import Settings
 from tests.command_line import ROOT, Terminal

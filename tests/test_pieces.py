@@ -39,7 +39,7 @@ from factory.geometry.solids import Solid
 from factory.mjcf import names
 from factory.mjcf.model import model_files
 from factory.problem.pag import PAG
-from factory.simulation.simulation import physical_model
+from factory.simulation.modelling import physical_model
 
 radii = st.floats(1e-4, 2.0)
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from itertools import combinations, product
+from itertools import combinations, islice, product
 
 import numpy as np
 import pytest
@@ -21,8 +21,8 @@ from factory.planning.blocking import CLASHES, DEEPER, FREE, LOCKED, SCRAPES, Bl
 from factory.planning.cannot import cores, interlocks, removal
 from factory.planning.dividing import Divider
 from factory.planning.estimate import Expected
-from factory.planning.exact import Best, Task, Tree, tables
-from factory.planning.growing import Ground, bettered, divided, units_of
+from factory.planning.exact import Best, Tree, TreeTask, tables
+from factory.planning.growing import Site, bettered, divided, units_of
 from factory.planning.judging import Judge, Judged
 from factory.planning.parts import InPlace
 from factory.planning.source.placing import placed
@@ -143,7 +143,7 @@ def test_the_hub_of_many_pairs_is_removed() -> None:
 @settings(max_examples=25, deadline=None)
 @given(graphs(most=4), st.sampled_from(stances()))
 def test_least_price_and_cycle_are_those_of_all_trees(found: Blocking, stance: Stance) -> None:
-    task = Task(subsets(found), EXPECTED, stance.axes[2], stance.up, apart=True)
+    task = TreeTask(subsets(found), EXPECTED, stance.axes[2], stance.up, apart=True)
     known, at = tables(task), task.level.index(stance.axes[ROOT_AXIS])
     all_ = judged(found, stance, (t for t in binary(tuple(range(len(found))))))
     price, time = known.price[at, -1], known.time[at, -1]
@@ -160,7 +160,7 @@ def test_least_price_and_cycle_are_those_of_all_trees(found: Blocking, stance: S
 @settings(max_examples=25, deadline=None)
 @given(graphs(most=4), st.sampled_from(stances()))
 def test_no_tree_of_that_price_has_fewer_robots(found: Blocking, stance: Stance) -> None:
-    task = Task(subsets(found), EXPECTED, stance.axes[2], stance.up, apart=True)
+    task = TreeTask(subsets(found), EXPECTED, stance.axes[2], stance.up, apart=True)
     best, at = Best(task), task.level.index(stance.axes[ROOT_AXIS])
     all_ = judged(found, stance, piled(tuple(range(len(found)))))
     if not np.isfinite(best.made[at, -1]):
@@ -183,13 +183,14 @@ def test_dividing_finds_a_tree_whenever_there_is_one(
     if interlocks(found):
         return
     random = np.random.default_rng(seed)
-    ground = Ground(found, stance, EXPECTED, np.zeros((2, len(found))))
-    tree = divided(ground, random, 1.0)
+    site = Site(found, stance, EXPECTED, np.zeros((2, len(found))))
+    tree = divided(site, random, 1.0)
     judge = Judge(found, stance, EXPECTED)
     assert units_of(tree) == tuple(range(len(found)))
     assert judge.judged(tree).count(LOCKED) == 0
     last = judge.judged(tree)
-    for better, _ in zip(bettered(ground, tree, np.inf, lambda: False, random), range(3)):
+    betters = bettered(site, tree, np.inf, lambda: False, random)
+    for better in islice(betters, 3):
         assert better.price <= last.price and units_of(better.tree) == units_of(tree)
         assert better.count(LOCKED) == 0
         last = better

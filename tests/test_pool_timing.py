@@ -19,8 +19,9 @@ from factory.mjcf import loading, model
 from factory.nets.marked import MarkedNet, marked
 from factory.pipeline import all_templates
 from factory.plant.factory import Factory
+from factory.simulation.modelling import physical_model
 from factory.simulation.request import RunRequest
-from factory.simulation.simulation import Simulation, physical_model
+from factory.simulation.simulation import Simulation
 from factory.support.errors import InputError
 from factory.timing.cycle_time import cycle_time, marked_graph_cycle_time
 from factory.timing.pool import part_pool, with_wip

@@ -8,7 +8,7 @@ from pathlib import Path
 import mujoco
 import pytest
 
-from tests.command_line import Terminal, files_in
+from tests.command_line import PAPER, Terminal, files_in
 
 FOLDER = Path(__file__).parents[2] / "shared" / "products" / "ldraw"
 
@@ -54,6 +54,26 @@ def test_small_products_are_made(run: Terminal, name: str) -> None:
 @pytest.mark.parametrize("name", [LARGE[0], pytest.param(LARGE[1], marks=pytest.mark.slow)])
 def test_large_products_are_made(run: Terminal, name: str) -> None:
     assert_well_made(run, name, 1)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("name", "robots"), [(SMALL[0], 7), (SMALL[1], 17)])
+def test_magazines_of_lines_are_solid(run: Terminal, name: str, robots: int) -> None:
+    words = ("--robots", robots, "--seconds", 30, "--seeds", 1, "--units", 2, "--no-convergence")
+    done = run("fidelity", product(name), *words, "--jobs", 1, "--json")
+    assert done.json["figures"]["hidden_penetration_max_mm"]["worst"] < 0.1
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("hands", ["--hands", "--no-hands"])
+@pytest.mark.parametrize(
+    "file", [product(SMALL[0]), PAPER.with_name("truck.pag")], ids=["light", "truck"]
+)
+def test_few_robots_take_the_time_that_is_predicted(run: Terminal, file: Path, hands: str) -> None:
+    robots = 7 if file.parent == FOLDER else 17
+    words = ("--robots", robots, "--seconds", 25, "--units", 12, hands, "--json")
+    done = run("run", file, *words).json
+    assert done["cycle_time_s"] == pytest.approx(done["predicted_cycle_time_s"], rel=0.02)
 
 
 @pytest.mark.parametrize("name", LARGE)

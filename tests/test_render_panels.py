@@ -57,7 +57,7 @@ def kept(layout, path: Path, world: str = "mujoco", units: int = 2, **options) -
 def told(log: Log) -> History:
     """All that happened in a log."""
     history = History(recorded_subject(log.header))
-    history.catch_up(list(zip(log.fired_t.tolist(), log.fired.tolist(), strict=True)), np.inf)
+    history.catch_up(log.timed_entries, np.inf)
     return history
 
 
@@ -110,8 +110,8 @@ def test_tokens_are_where_the_log_has_its_marking(seed: int, tmp_path: Path) -> 
 
 def test_a_firing_left_out_would_be_noticed(paper: Log) -> None:
     history = History(recorded_subject(paper.header))
-    firings = list(zip(paper.fired_t.tolist(), paper.fired.tolist(), strict=True))
-    history.catch_up(firings[:5] + firings[6:], np.inf)
+    entries = paper.timed_entries
+    history.catch_up(entries[:5] + entries[6:], np.inf)
     shown = [marking(history, t) for t in paper.time[1:].tolist()]
     assert shown != [frozenset(paper.marking[row].tolist()) for row in range(1, len(paper))]
 
@@ -388,7 +388,7 @@ def test_the_poster_is_when_the_product_has_become_whole_and_most_is_there(paper
     poster = Poster(take, Path("poster.png"))
     firings = list(zip(paper.fired_t.tolist(), paper.fired.tolist(), strict=True))
     for row in range(len(paper)):
-        take.history.catch_up(firings, float(paper.time[row]))
+        take.history.catch_up(paper.timed_entries, float(paper.time[row]))
         poster.see(moment_of(paper, row))
     root = take.subject.factory.by_label["sub3"]
     ends = [t for t, event in firings if event == root.end]

@@ -15,8 +15,9 @@ from factory.mjcf import names
 from factory.mjcf.scene import SHOE
 from factory.mjcf.stops import OVERLOAD
 from factory.mjcf.timestep import timed
+from factory.simulation.modelling import physical_model
 from factory.simulation.request import RunRequest
-from factory.simulation.simulation import Simulation, physical_model
+from factory.simulation.simulation import Simulation
 from factory.support.engine import mujoco
 from factory.support.resources import mjcf_folder
 from factory.support.settings import TICK, Settings

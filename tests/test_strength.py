@@ -343,7 +343,7 @@ def test_a_run_says_what_was_dropped(
     assert done.json["cut_off"]["code"] == "Dropped" and done.json["grip_strength_share_max"] > 1
     assert (done.json["grip_strength_robot"], done.json["grip_strength_label"]) == ("r3", "sub1")
     report, subject = watch_log(read_log(log))
-    verdict = verdict_on(read_log(log), subject.factory.net, report)
+    verdict = verdict_on(read_log(log), subject.factory, report)
     assert {failure.code for failure in verdict.failures} >= {"Dropped"}
     assert run("monitor", log).status == 1
     assert run("report", log, "-o", page).status == 1

@@ -12,7 +12,7 @@ from strategies import mutations
 from strategies import templates as random_templates
 
 from factory.lang import load_templates, read_template, write_template
-from factory.problem.template import Law, Point, Template
+from factory.problem.template import LOST, Failure, Law, Point, Response, Template
 from factory.support.errors import Diagnostic, InputError
 from tests.pag_texts import MATE
 
@@ -117,6 +117,36 @@ def test_geometry() -> None:
 def test_words_of_the_grammar_may_be_names() -> None:
     text = MATE.replace("dot, dot, dot", "R, W, further").replace("mate =", "geometry =")
     assert read_template(text).robots == ("R", "W", "further")
+
+
+# Failures
+
+
+def test_failures() -> None:
+    text = (
+        MATE + "failure = { residual > 5e-4 : again 2 then scrap, lost : stop, jammed : again 3 };"
+    )
+    template = read_template(text, "mate.op")
+    assert template.failures == (
+        Failure("residual", 5e-4, (Response("again", 2), Response("scrap"))),
+        Failure("lost", None, (Response("stop"),)),
+        Failure("jammed", None, (Response("again", 3), Response("stop"))),
+    )
+    assert [failure.retries for failure in template.failures] == [2, 0, 3]
+    assert [failure.last for failure in template.failures] == ["scrap", "stop", "stop"]
+    assert str(template.failures[0].position) == "mate.op:8:13"
+    assert template.failure("jammed") == template.failures[2]
+    assert template.failure("rejected") is None
+
+
+def test_a_template_that_says_nothing_scraps_what_is_lost() -> None:
+    silent, said = read_template(MATE), read_template(MATE + "failure = { lost : scrap };")
+    assert silent == said
+    assert silent.failures == LOST
+    assert "failure" not in write_template(silent)
+    none = read_template(MATE + "failure = {};")
+    assert none.failures == ()
+    assert "failure = {};" in write_template(none)
 
 
 # The writer
@@ -285,6 +315,12 @@ def test_broken_files(path: Path, golden: Callable[[str, str], None]) -> None:
         ("mate =", "a+b =", ["Syntax"]),
         ("<a; b>", "<b; a>", ["Syntax", "Syntax"]),
         ("where", "", ["Syntax"]),
+        ("further = insert", "failure = { residual > 1e999 : scrap }", ["BadFailure"]),
+        ("further = insert", "failure = { jammed : again 9999999999 }", ["BadFailure"]),
+        ("further = insert", "failure = { jammed : again 1.5 }", ["BadFailure"]),
+        ("further = insert", "failure = { jammed : stop 2 }", ["BadFailure"]),
+        ("further = insert", "failure = { jammed : }", ["Syntax"]),
+        ("further = insert", "failure = { jammed : stop, }", ["Syntax"]),
         ("on W to", "on V to", ["Syntax"]),
         ("dot, dot, dot", "dot, , dot", ["Syntax"]),
         ("further = insert", "further = < insert >", ["Syntax"]),
@@ -326,6 +362,7 @@ def test_any_text(text: str) -> None:
 
 
 WORDS = 'R j ~ < a ; b > F where = ( ) { } , "x" " // \n A1 + 2r on W to within for and eps LAB1 3'
+WORDS += " failure : lost > again then scrap"
 
 
 @given(st.lists(st.sampled_from(WORDS.split(" "))))
@@ -334,6 +371,11 @@ def test_any_words(words: list[str]) -> None:
 
 
 @settings(max_examples=300)
-@given(mutations(MATE + 'parameters = ( dwell = 1.0, x = "y", v = ( 1, 2 ) );'))
+@given(
+    mutations(
+        MATE
+        + 'parameters = ( dwell = 1.0, x = "y", v = ( 1, 2 ) ); failure = { jammed : again 2 };'
+    )
+)
 def test_any_damage(text: str) -> None:
     survives(text)

@@ -22,8 +22,9 @@ from factory.layout.request import Ground
 from factory.mjcf import timestep
 from factory.mjcf.timestep import ALLOWED, FRICTION, STEPS, USUAL, predicted_error, timed
 from factory.problem.pag import PAG, Parameter
+from factory.simulation.modelling import physical_model
 from factory.simulation.request import RunRequest
-from factory.simulation.simulation import Simulation, physical_model
+from factory.simulation.simulation import Simulation
 from factory.study.fidelity.quantities import QUANTITIES
 from factory.support.errors import InputError
 from factory.support.resources import mjcf_folder

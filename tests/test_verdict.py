@@ -296,7 +296,7 @@ def test_a_weld_that_is_on_for_50_ms(tmp_path: Path, logged: bool, hands: int) -
     with LogWriter(log, simulation) as writer:
         simulation.run([writer.observe])
     report, subject = watch_log(read_log(log))
-    verdict = verdict_on(read_log(log), subject.factory.net, report)
+    verdict = verdict_on(read_log(log), subject.factory, report)
     assert "TwoHolders" in codes(verdict)
     found = next(v for v in report.violations if v.code == "TwoHolders")
     assert found.label == "part1" and 1.0 <= found.t <= 1.03
@@ -410,7 +410,7 @@ def test_two_events_exchanged_in_a_log(log_file: Path) -> None:
         fired[[one, other]] = fired[[other, one]]
         changed = replace(log, fired=fired)
         report, subject = watch_log(changed)
-        verdict = verdict_on(changed, subject.factory.net, report)
+        verdict = verdict_on(changed, subject.factory, report)
         assert not verdict.succeeded and codes(verdict) <= {"Record", "NotRefined"}
         assert "Record" in codes(verdict), (one, other)
 
@@ -434,7 +434,7 @@ def test_a_log_without_what_a_verdict_rests_on(log_file: Path) -> None:
     assert (log.ends.time <= log.time[log.ends.row]).all()
     old = replace(log, ends=None, figures=None)
     report, subject = watch_log(old)
-    assert verdict_on(old, subject.factory.net, report).succeeded
+    assert verdict_on(old, subject.factory, report).succeeded
 
 
 @pytest.mark.parametrize(

@@ -20,12 +20,16 @@ from factory.support.progress import Waiting
 if TYPE_CHECKING:
     from factory.compiler.mating.findings import Matings
     from factory.study.checking import Checked
+    from factory.study.failures import FailureCost, FailureStudy
 
 SHOWN = 24
 """The most robots that are printed, unless `-v` asks for all."""
 
 PICTURES = "Write a picture of each blocked operation, and of what no hand can hold, in a folder."
 """What `--clashes` does."""
+
+COSTS = "Say what each failure costs, with times estimated from sizes, and how retries are bounded."
+"""What `--failures` does."""
 
 POOLED = 8
 """The most parts whose copies are printed."""
@@ -37,6 +41,7 @@ POOLED = 8
 @click.option("--against", type=PATH, help="Check a proof that --certificate has written.")
 @WIP
 @click.option("--clashes", type=PATH, help=PICTURES)
+@click.option("--failures", is_flag=True, help=COSTS)
 @RELAY
 @HANDS
 @OUTPUT
@@ -48,6 +53,7 @@ def check(
     against: Path | None,
     wip: int | None,
     clashes: Path | None,
+    failures: bool,
 ) -> int:
     """Parse, compile and prove FILE.pag (or a net in FILE.pnml); or check its certificate."""
     from factory.study.checking import check_net, check_project
@@ -60,7 +66,7 @@ def check(
     writable_folder(clashes)
     project = None if is_net(file) else given.project(out.silent)
     with Waiting("reading the shapes and proving", out.silent):
-        checked = check_project(project, wip) if project else check_net(file)
+        checked = check_project(project, wip, failures or None) if project else check_net(file)
     announced(checked.warnings, out)
     proved = None if against is None else _proved(against, checked)
     if clashes is not None:
@@ -77,6 +83,8 @@ def check(
         emit({**checked.as_json(), **found})
     elif not out.quiet:
         _describe(checked, out.verbose)
+        if failures and checked.failures:
+            _describe_failures(checked.failures, out.verbose)
         if proved:
             say(f"{against} is a certificate of this net: {_claims(proved)}")
     return 0 if checked.verdict.holds else 1
@@ -150,6 +158,38 @@ def _describe(checked: Checked, verbose: bool) -> None:
         say(f"copies inside at once: {listed}{', ...' if len(checked.pool) > POOLED else ''}")
     if checked.matings is not None:
         _describe_approaches(checked.matings)
+
+
+def _describe_failures(study: FailureStudy, verbose: bool) -> None:
+    """For people: a row for each test of each operation, and the bound on retries."""
+    from factory.lang.writer import write_failure
+    from factory.timing.failing import SCRAPS
+
+    rows = [
+        (
+            one.operation.label,
+            write_failure(one.failure),
+            f"{one.again.later:.2f} s" if one.again else "",
+            *_scrap_words(one.scrap),
+        )
+        for one in study.failures
+    ]
+    columns = ("operation", "failure", "again", "scrap of", "parts", "undone", "scrap")
+    most = len(rows) if verbose else SHOWN
+    table("What each failure costs (estimated)", columns, rows[:most])
+    if len(rows) > most:
+        say(f"... and {len(rows) - most} more failures (-v shows all)")
+    say(
+        f"retries: at most {study.retries} a unit without a scrap, and {study.attempts} attempts on"
+        f" end at one operation, for {SCRAPS} scraps on end stop the run"
+    )
+
+
+def _scrap_words(cost: FailureCost | None) -> tuple[str, str, str, str]:
+    if cost is None:
+        return ("",) * 4
+    undone = f"{cost.undone}" if cost.undone == cost.most else f"{cost.undone} to {cost.most}"
+    return cost.lost, str(cost.parts), undone, f"{cost.later:.2f} s"
 
 
 def _describe_approaches(matings: Matings) -> None:

@@ -27,7 +27,8 @@ SHOWN = 8
 @LENIENT
 @OUTPUT
 def monitor(file: Path, lenient: bool, out: OutputOptions) -> int:
-    """Judge the run in a LOG that `run --log` has kept against its net, from its states.
+    """Judge the run in a LOG that `run --log` has kept against its net, from its states; where
+    something failed and was undone, from its firings and markings alone.
 
     The status is 1 for a run that does not follow its net, in which bodies did otherwise than the
     net says, or that was cut off before its units were made, and 2 for a LOG that ends before there
@@ -37,7 +38,7 @@ def monitor(file: Path, lenient: bool, out: OutputOptions) -> int:
 
     log = read_log(file)
     report, subject = watch_log(log)
-    verdict = replace(verdict_on(log, subject.factory.net, report), lenient=lenient)
+    verdict = replace(verdict_on(log, subject.factory, report), lenient=lenient)
     if out.as_json:
         document = {
             "log": str(file),
@@ -52,7 +53,7 @@ def monitor(file: Path, lenient: bool, out: OutputOptions) -> int:
         }
         emit(document)
     elif not out.quiet:
-        say(found_by(report, log.cut_off))
+        say(without_states(report) if log.undone else found_by(report, log.cut_off))
         say_verdict(verdict)
         for firing in (*report.seen, *report.inferred) if out.verbose else ():
             how = "inferred" if firing.seen is None else "seen"
@@ -83,6 +84,13 @@ def found_by(report: Report, cut_off: CutOff | None) -> str:
     if report.refines_net:
         judged = f"they explain the run{' as far as it goes' if cut_off else ''}"
     return f"monitor: {counts}; {judged}" + (f", {cut_off}" if cut_off else "")
+
+
+def without_states(report: Report) -> str:
+    """What was found where something was undone, in a line for people."""
+    judged = "lead" if report.refines_net else "DO NOT LEAD"
+    words = "states not judged, for they do not tell what was undone"
+    return f"monitor: {words}; what fired and was undone {judged} to the markings"
 
 
 def say_violations(report: Report | None, shown: int = SHOWN) -> None:

@@ -275,6 +275,11 @@ RUN = options(
     click.option("--max-time", type=SECONDS, help="Stop after this simulated time [s]."),
     RUNS,
 )
+FAULTS = options(
+    click.option("--faults", type=PATH, help="What goes wrong in the run (.toml)."),
+    click.option("--spares", type=click.IntRange(0, 10**6), default=0, help="Robots in the depot."),
+    click.option("--swap", type=SECONDS, help="To replace a dead robot takes so long [s]."),
+)
 PICTURE = options(
     click.option("--size", default="1280x720", help="Of the picture, as 1280x720."),
     click.option("--fps", type=click.IntRange(1, 120), default=30, help="Pictures a second."),

@@ -2,21 +2,26 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from factory.commands.options import OUTPUT, PATH, SECONDS, Number
+from factory.commands.options import OUTPUT, PATH, SECONDS
 from factory.commands.outputs import writable_folder
 from factory.commands.requests import OutputOptions
 from factory.commands.warnings import announced
+from factory.nets.verdict import listing
 from factory.support.console import emit, say
+from factory.support.errors import Diagnostic, InputError
 from factory.support.progress import StepBar, Waiting
 
 if TYPE_CHECKING:
     from factory.pipeline import Project
     from factory.planning.parts import InPlace
+    from factory.planning.plan import CannotAssemble, Planned, PlanOptions
+    from factory.planning.searching import Aim
     from factory.plant.approaches import Approach, Kind
 
 UNITS = ("m", "cm", "mm", "in", "ldu")
@@ -48,11 +53,6 @@ KINDS: tuple[Kind, ...] = ("slide", "lower", "blocked")
     multiple=True,
     help="A part that may pass through others, where there is no other way (repeatable).",
 )
-@click.option(
-    "--tolerance",
-    type=Number(0),
-    help="How deep parts may overlap on their way [m]; that of check.",
-)
 @click.option("--unit", type=click.Choice(UNITS), help="Of lengths; found out without.")
 @click.option("--library", type=PATH, envvar="LDRAWDIR", help="An LDraw parts library.")
 @click.option("--boxes", is_flag=True, help="LDraw parts whose shape is missing become boxes.")
@@ -69,12 +69,11 @@ def plan(
     out: OutputOptions,
     source: Path,
     output: Path | None,
-    aim: str,
+    aim: Aim,
     seconds: float,
     keep: tuple[str, ...],
     replan: bool,
     allow: tuple[str, ...],
-    tolerance: float | None,
     unit: str | None,
     library: Path | None,
     boxes: bool,
@@ -85,8 +84,8 @@ def plan(
     product, and write it as a PAG with its meshes. SOURCE is a folder of meshes, a file with named
     bodies (.glb, .3mf, .step), an LDraw model (.ldr, .mpd), or a PAG whose tree is thrown away."""
     from factory.pipeline import all_templates, read
+    from factory.planning.plan import CannotAssemble, PlanOptions
     from factory.planning.source.reading import SourceOptions, read_source
-    from factory.planning.stacking import stacked
     from factory.planning.writing import planned_product
     from factory.support.files import own_names, write_all
 
@@ -100,9 +99,10 @@ def plan(
     if not out.silent:
         for note in found.notes:
             say(f"  {note}")
-    with StepBar("looking for a tree", out.silent, seconds):
-        tree = stacked(found)
-    made = planned_product(found, tree, None, source.name)
+    planned = _sought(found, PlanOptions(aim, seconds, allow, templates=templates), out)
+    if isinstance(planned, CannotAssemble):
+        raise InputError(cannot(planned))
+    made = planned_product(found, planned.tree, planned.orientation, source.name)
     files = {folder / name: content for name, content in made.files.items()}
     own_names(folder, files, [source])
     write_all(files)
@@ -112,10 +112,30 @@ def plan(
     known = set(map(id, project.product.warnings))
     warnings += announced([w for w in project.warnings if id(w) not in known], out)
     if out.as_json:
-        emit(_document(found, project, [*files, *looked], warnings))
+        emit(_document(found, planned, project, [*files, *looked], warnings))
     elif not out.quiet:
-        _tell(project, [*files, *looked], out)
+        _tell(planned, project, [*files, *looked], out)
     return 0
+
+
+def _sought(found: InPlace, asked: PlanOptions, out: OutputOptions) -> Planned | CannotAssemble:
+    """The best plan that is found in time, or until a signal; or why there is none."""
+    from factory.planning.plan import plan as sought
+    from factory.support.interruption import Interruption
+
+    with Interruption() as stop, StepBar("looking for a tree", out.silent, asked.seconds) as bar:
+        return sought(found, replace(asked, told=bar.show, stopped=lambda: stop.noted))
+
+
+def cannot(found: CannotAssemble) -> Diagnostic:
+    """That parts interlock, and what would help."""
+    stuck = "; ".join(listing(lock.labels) for lock in found.interlocks)
+    more = " and ".join(found.removal.labels)
+    fewest = "no fewer parts do" if found.removal.smallest else "fewer may do"
+    options = " ".join(f"--allow {name}" for name in found.removal.labels)
+    message = f"no straight motion along x, y or z divides these parts: {stuck}"
+    hint = f"without {more} the rest can be joined ({fewest}); {options} lets parts clash"
+    return Diagnostic("CannotAssemble", message, None, hint)
 
 
 def _looks(project: Project, out: OutputOptions) -> list[Path]:
@@ -142,7 +162,11 @@ def _looks(project: Project, out: OutputOptions) -> list[Path]:
 
 
 def _document(
-    found: InPlace, project: Project, files: list[Path], warnings: list[dict[str, Any]]
+    found: InPlace,
+    planned: Planned,
+    project: Project,
+    files: list[Path],
+    warnings: list[dict[str, Any]],
 ) -> dict[str, Any]:
     """The keys of `plan --json`."""
     matings = project.matings
@@ -154,19 +178,26 @@ def _document(
         "labels": len(project.pag),
         "kept": [keep.label for keep in found.kept],
         "notes": list(found.notes),
+        "figures": asdict(planned.figures),
+        "optimal": planned.optimal,
+        "joins": [asdict(join) for join in planned.operations],
         "approaches": matings.as_json() if matings else None,
         "files": [str(path) for path in files],
         "warnings": warnings,
     }
 
 
-def _tell(project: Project, files: list[Path], out: OutputOptions) -> None:
+def _tell(planned: Planned, project: Project, files: list[Path], out: OutputOptions) -> None:
     """What was planned and written."""
     parts = sum(1 for _ in project.pag.parts())
     matings = project.matings
     kinds = [(kind, len(matings.of_kind(kind))) for kind in KINDS] if matings else []
     ways = ", ".join(f"{count} {kind}" for kind, count in kinds if count)
     say(f"{project.file}: parts {parts}, operations {len(project.pag) - parts}; ways: {ways}")
+    figures = planned.figures
+    best = "no tree is better" if planned.optimal else "the best that was found"
+    cycle = f", cycle time about {figures.cycle or figures.expected:.2f} s"
+    say(f"{figures.robots} robots{cycle}; {best}")
     if out.verbose and matings:
         for mating in matings.all:
             say(f"  {mating.label}: {' + '.join(mating.inputs)}, {_way(mating.approach)}")

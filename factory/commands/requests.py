@@ -12,8 +12,10 @@ from factory.support.errors import Diagnostic, InputError
 if TYPE_CHECKING:
     from factory.layout.request import Ground
     from factory.pipeline import Project
+    from factory.plant.factory import Factory
     from factory.problem.pag import PAG
     from factory.render import Picture
+    from factory.simulation.recovery.faults import Campaign
     from factory.simulation.request import RunRequest, WorldName
     from factory.study.allocation.candidate import Candidate
     from factory.support.settings import Settings
@@ -128,6 +130,26 @@ class RunOptions:
     max_time: float | None = None
     distributed: bool = False
     lenient: bool = False
+    faults: Path | None = None
+    spares: int = 0
+    swap: float | None = None
+
+    @property
+    def recovers(self) -> bool:
+        """Whether the run is asked to go on when things go wrong."""
+        return self.faults is not None or self.spares > 0
+
+    def campaign(self, factory: Factory) -> Campaign:
+        """The faults of the run, and its spares. Raises InputError."""
+        from factory.simulation.recovery.fault_file import check_names, read_campaign
+        from factory.simulation.recovery.faults import SWAP, Campaign
+
+        swap = SWAP if self.swap is None else self.swap
+        if self.faults is None:
+            return Campaign(seed=self.seed, spares=self.spares, swap=swap)
+        found = read_campaign(self.faults, self.spares, swap)
+        check_names(found, factory)
+        return found
 
     def request(self, project: Project, shown: bool = True) -> RunRequest:
         """The run that is asked for, and whether it is to be `shown`. Raises InputError."""
@@ -147,6 +169,7 @@ class RunOptions:
             self.distributed,
             fusing_pays(layout.factory, layout.product) if self.fuse is None else self.fuse,
             shown,
+            recovers=self.recovers,
             catalogue=project.catalogue,
         )
 

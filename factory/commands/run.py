@@ -13,6 +13,7 @@ import click
 
 from factory.commands.monitor import found_by, say_verdict, say_violations
 from factory.commands.options import (
+    FAULTS,
     FLOOR,
     LENIENT,
     MOTION,
@@ -31,6 +32,7 @@ from factory.commands.requests import (
     RunOptions,
     check_ideal,
 )
+from factory.commands.resuming import resumed
 from factory.commands.warnings import announced
 from factory.support.console import POOL_BOUND, emit, say, table
 from factory.support.errors import Diagnostic, InputError, StoppedError
@@ -39,8 +41,10 @@ from factory.support.progress import Progress, Waiting
 if TYPE_CHECKING:
     from factory.pipeline import Project
     from factory.plant.factory import Factory
+    from factory.record.failures import Failures
     from factory.record.observed import Recorder
     from factory.render import Film
+    from factory.simulation.resuming import Resumed
     from factory.simulation.run import PhysicsFigures, Run
     from factory.simulation.simulation import Simulation
 
@@ -51,6 +55,7 @@ if TYPE_CHECKING:
 
 @click.command()
 @SOURCE
+@FAULTS
 @RUN
 @click.option("--video", type=PATH, help="Film the run (.mp4).")
 @click.option("--log", type=PATH, help="Keep every tick in a file.")
@@ -61,6 +66,9 @@ if TYPE_CHECKING:
     "--monitor/--no-monitor",
     default=None,
     help="Judge the run from the engine alone, which is the default: in every tick, or not at all.",
+)
+@click.option(
+    "--resume", is_flag=True, help="FILE is the log of a run that was cut off: go on with it."
 )
 @LENIENT
 @PICTURE
@@ -76,11 +84,17 @@ def run(
     video: Path | None,
     log: Path | None,
     monitor: bool | None,
+    resume: bool,
 ) -> int:
     """Run FILE.pag until its products are dropped off.
 
     The status is 1 for a run that does not make its units, or does not follow its net, or in which
-    bodies do otherwise than the net says: --lenient leaves those out."""
+    bodies do otherwise than the net says: --lenient leaves those out.
+
+    With --resume FILE is a log; its run goes on from its last simulated second, in that log."""
+    if resume:
+        going = resumed(given.file, out)
+        return 0 if going is None else _go_on(going, asked, monitor, out)
     writable(given.file, video, log, shown.poster)
     project = given.project(out.silent)
     with Waiting("reading the shapes and laying out", out.silent):
@@ -91,6 +105,38 @@ def run(
         check_ideal(asked.fuse, bool(monitor))
     film = _film(project, asked, video, shown)
     record = run_project(project, asked, out.silent, log, film, monitor)
+    status = _told(record, layout.factory, warnings, monitor, out)
+    if not (out.as_json or out.quiet):
+        say_files(film=video, poster=shown.poster, log=log)
+    return status
+
+
+def _go_on(going: Resumed, asked: RunOptions, monitor: bool | None, out: OutputOptions) -> int:
+    """Let the run in a log go on to its end; the monitor then judges all of it, from the log. Gives
+    the status."""
+    from factory.record.log import read_log
+    from factory.record.monitor.record import watch_log
+
+    made = going.simulation
+    with going.trusted():
+        record = carry_out(made, out.silent, asked.max_time, [going.writer], False)
+    if monitor is not False and made.model is not None:
+        with Waiting("judging the whole run", out.silent):
+            record = replace(record, monitor=watch_log(read_log(going.path))[0])
+    status = _told(replace(record, lenient=asked.lenient), made.layout.factory, [], monitor, out)
+    if not (out.as_json or out.quiet):
+        say_files(log=going.path)
+    return status
+
+
+def _told(
+    record: Run,
+    factory: Factory,
+    warnings: Sequence[object],
+    monitor: bool | None,
+    out: OutputOptions,
+) -> int:
+    """Tell what a run was; gives the status."""
     if out.as_json:
         document = record.as_json()
         document.pop("schema")
@@ -99,8 +145,7 @@ def run(
         trouble = [record.trouble.as_json()] if record.trouble else []
         emit({**document, "warnings": warnings, **({"errors": trouble} if trouble else {})})
     elif not out.quiet:
-        summarise(record, layout.factory, out.verbose)
-        say_files(film=video, poster=shown.poster, log=log)
+        summarise(record, factory, out.verbose)
     say_violations(record.monitor)
     if record.trouble is not None:
         print(record.trouble, file=sys.stderr)
@@ -146,15 +191,24 @@ def run_project(
     seen = log is not None or film is not None
     with Waiting("compiling the model", silent):
         made = Simulation(project.layout, asked.request(project, seen))
+        recovery = None
+        if asked.recovers:
+            from factory.simulation.recovery import recover
+
+            recovery = recover(made, asked.campaign(project.layout.factory))
     recorders: list[Opening] = []
     if log is not None:
         from factory.record.log import LogWriter
+        from factory.simulation.checkpoint import checkpoint
 
-        recorders.append(lambda: LogWriter(log, made, project.pag))
+        recorders.append(
+            lambda: LogWriter(log, made, project.pag, checkpoint=lambda: checkpoint(made))
+        )
     if film is not None:
         recorders.append(lambda: film(made))
     record = carry_out(made, silent, asked.max_time, recorders, monitor)
-    return replace(record, lenient=asked.lenient)
+    failures = None if recovery is None else recovery.report()
+    return replace(record, lenient=asked.lenient, failures=failures)
 
 
 def carry_out(
@@ -204,7 +258,7 @@ def summarise(record: Run, factory: Factory, verbose: bool) -> None:
         f"bottleneck {record.bottleneck}"
     )
     say(
-        f"{len(record.events)} transitions fired, "
+        f"{record.fired} transitions fired, "
         f"the record {'refines' if record.replays else 'DOES NOT REFINE'} the net"
     )
     physics = record.physics
@@ -240,6 +294,8 @@ def summarise(record: Run, factory: Factory, verbose: bool) -> None:
             say(f"inputs pressed on each other with {physics.mating_force_max_n:.3f} N in {most}")
         if physics.fused:
             say("parts joined for good are one rigid body (--no-fuse keeps them apart)")
+    if record.failures is not None:
+        say_failures(record.failures, verbose)
     if record.monitor is not None:
         say(found_by(record.monitor, record.cut_off))
     say_verdict(record.verdict)
@@ -248,6 +304,21 @@ def summarise(record: Run, factory: Factory, verbose: bool) -> None:
     table("Utilisation", ("robot", "type", "busy"), rows)
     if more := len(busy) - len(rows):
         say(f"... and {more} more robot{'s' if more > 1 else ''} (-v shows all)")
+
+
+def say_failures(failures: Failures, verbose: bool) -> None:
+    """What went wrong in a run, in a few lines."""
+    struck = ", ".join(f"{count} {kind}" for kind, count in failures.struck.items() if count)
+    missed, alarms = failures.missed, failures.false_alarms
+    say(f"faults: {struck or 'none'}; {missed} missed, {alarms} false alarms")
+    say(
+        f"{len(failures.found)} failures, {failures.undone} transitions undone,"
+        f" {failures.scrapped} scrapped, {failures.spares} spares used,"
+        f" {failures.contacts} contacts with what fell"
+    )
+    for one in failures.found if verbose else ():
+        where = f" ({one.robot})" if one.robot else ""
+        say(f"  {one.t:.2f} s: {one.operation}{where}: {one.test}, {one.response}")
 
 
 def say_files(**files: Path | None) -> None:

@@ -34,6 +34,7 @@ def templates(folders: tuple[Path, ...], out: OutputOptions) -> int:
                         "inputs": len(t.inputs),
                         "further": t.further or None,
                         "instead": t.instead or None,
+                        "failures": [failure.as_json() for failure in t.failures],
                         "parameters": dict(t.parameters),
                         "geometry": t.geometry,
                         "text": write_template(t),

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from factory.commands.options import DRAW, FLOOR, MOTION, OUTPUT, RELAY, RUNS, SOURCE, WIP
+from factory.commands.options import DRAW, FAULTS, FLOOR, MOTION, OUTPUT, RELAY, RUNS, SOURCE, WIP
 from factory.commands.requests import OutputOptions, ProjectOptions, RunOptions
 from factory.commands.warnings import announced
 from factory.support.console import emit, say
@@ -22,6 +22,7 @@ FOR_EVER = 10**9
 
 @click.command()
 @SOURCE
+@FAULTS
 @click.option("--port", type=click.IntRange(0, 65535), default=8765, help="0: a free one.")
 @click.option("--host", default="127.0.0.1", help="Listen here; only this machine can come.")
 @click.option("--expose", is_flag=True, help="Let HOST be one that other machines can reach.")
@@ -42,7 +43,10 @@ def view(
     expose: bool,
     paused: bool,
 ) -> int:
-    """Run FILE.pag for ever and show it in a browser: pause it, push robots, block feeders."""
+    """Run FILE.pag for ever and show it in a browser: pause it, push robots, block feeders.
+
+    With --spares or --faults it goes on after failures: let robots drop things and die, and parts
+    be no good."""
     from factory.nets.verify import proved
     from factory.show.live import Server, Session
     from factory.show.live.page import page
@@ -56,7 +60,8 @@ def view(
     proved(layout.factory.net)
     warnings = announced(layout.product.warnings, out)
     request = replace(asked, units=FOR_EVER, fuse=False).request(project)
-    session = Session(lambda: Simulation(layout, request), not paused)
+    campaign = asked.campaign(layout.factory) if asked.recovers else None
+    session = Session(lambda: Simulation(layout, request), not paused, campaign)
     with Interruption() as stop, Server(session, page(session), host, port, expose) as server:
         if out.as_json:
             shown = {"address": server.address, "host": host, "port": server.port}

@@ -171,7 +171,8 @@ def _faults(
 
 
 def kept_apart(factory: Factory, lines: Sequence[Line], catalogue: Catalogue) -> Iterator[str]:
-    """Why lines that deliver to one robot cannot become one, in words, for each two of them."""
+    """Why lines that deliver to one robot cannot become one, in words, for each two that follow
+    each other there and are not needed at once. They are named by what their first tours bring."""
     on = line_of(len(factory.robots), lines)
     heads: dict[int, list[int]] = {}
     for robot in dict.fromkeys(on[1:]):

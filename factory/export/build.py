@@ -18,7 +18,7 @@ from factory.modes.modes import operation_modes
 from factory.nets.verdict import Verdict
 from factory.pipeline import Project
 from factory.plant.programs import program_of, write_program
-from factory.simulation.simulation import physical_model
+from factory.simulation.modelling import physical_model
 from factory.support.errors import RunError
 from factory.support.files import own_names, write_all
 

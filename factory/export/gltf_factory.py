@@ -15,7 +15,7 @@ from factory.geometry.solids import rotation
 from factory.mjcf import names
 from factory.mjcf.parts import HIDDEN
 from factory.record.log import Log
-from factory.simulation.simulation import physical_model
+from factory.simulation.modelling import physical_model
 from factory.support.errors import Diagnostic, InputError
 
 if TYPE_CHECKING:

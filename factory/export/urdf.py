@@ -21,7 +21,7 @@ from factory.geometry.solids import rotation
 from factory.mjcf import names
 from factory.mjcf.elements import add, exact, numbers
 from factory.mjcf.mesh_files import stl
-from factory.simulation.simulation import physical_model
+from factory.simulation.modelling import physical_model
 
 if TYPE_CHECKING:
     from factory.support.engine import mujoco

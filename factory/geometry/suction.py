@@ -53,7 +53,7 @@ def pad_place(
     whose middle there is something, too."""
     low, high, ahead = solid.low[:2], solid.high[:2], np.array(heading)
     widest = max(min(WIDEST, SHARE * float((high - low).min())), NARROWEST)
-    faces, drawn = _pieces(solid), _drawn(solid)
+    faces, drawn = _pieces(solid), drawn_triangles(solid)
     for radius in (widest, widest / 2, widest / 4):
         places = _grid(solid, radius)
         centre = places[0]
@@ -156,7 +156,7 @@ def _hull(points: Array) -> Array:
     return np.asarray(hull.points[hull.simplices])
 
 
-def _drawn(solid: Solid) -> Array:
+def drawn_triangles(solid: Solid) -> Array:
     """The triangles (n, 3, 3) of what is drawn."""
     if solid.mesh is None:
         return _pieces(solid)

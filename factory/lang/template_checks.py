@@ -7,12 +7,13 @@ from collections.abc import Mapping
 
 from lark import Token
 
+from factory.lang.failures import FailureReader
 from factory.lang.source import Findings, quoted
 from factory.lang.template_syntax import Labels, ParameterClause, RawLaw, TemplateDraft, Words
 from factory.lang.values import GEOMETRY, ValueReader
 from factory.lang.words import LABEL_HINT, is_label, is_number, number
 from factory.problem.pag import NOPART, RESERVED, Value
-from factory.problem.template import Law, Point, Template
+from factory.problem.template import LOST, Failure, Law, Point, Template
 from factory.support.errors import did_you_mean
 from factory.support.settings import DWELL
 
@@ -48,6 +49,7 @@ class TemplateMaker:
             self._check_labels(labels, count, carrier)
             self._check_kind(labels, given.geometry, further)
             self._check_instead(labels, carrier, instead)
+        failures = self._failures(labels, carrier)
         if name is None or robots is None or carrier is None or labels is None or law is None:
             return None
         at = self.findings.source.at
@@ -63,6 +65,7 @@ class TemplateMaker:
             str(instead or ""),
             tuple(parameters.items()),
             given.geometry,
+            failures,
             at(name),
             at(further) if further else None,
             at(instead) if instead else None,
@@ -187,6 +190,17 @@ class TemplateMaker:
             elif (value := values.any(name, found)) is not None:
                 made[str(name)] = value
         return made
+
+    def _failures(self, labels: Labels | None, carrier: int | None) -> tuple[Failure, ...]:
+        """What is tested; LOST without a clause."""
+        clause = self.draft.clauses.get("failure")
+        if clause is None:
+            return LOST
+        takes = labels is None or any(label != NOPART for label in labels.before)
+        tools = labels is None or any(
+            label == NOPART and robot != carrier for robot, label in enumerate(labels.before, 1)
+        )
+        return FailureReader(self.findings, takes, tools).read(clause.content)
 
     def _check_kind(self, labels: Labels, geometry: bool, further: Token | None) -> None:
         """Geometry belongs to operations that take nothing, further inputs to those that take and

@@ -29,6 +29,7 @@ FORMS: Mapping[str, str] = MappingProxyType(
         "F": "F = navigation on W to ( A1 + 2r, A2 + 2r, B3 ) within eps;",
         "further": "further = insert;",
         "instead": "instead = insert;",
+        "failure": "failure = { residual > 5e-4 : again 2 then scrap, lost : scrap };",
         "parameters": "parameters = ( dwell = 1.0 );",
     }
 )
@@ -59,6 +60,13 @@ class ParameterClause(NamedTuple):
     values: Sequence[tuple[Token, Token | Vector]] = ()
 
 
+class FailureCase(NamedTuple):
+    """`test > limit : responses`: the words of the test, one or two, and those of the responses."""
+
+    test: Words
+    responses: Words
+
+
 class Clause(NamedTuple):
     """The first token of a clause, and what stands behind its `=`."""
 
@@ -84,12 +92,16 @@ class _Builder(Transformer[Token, Any]):
     def header(self, content: Any) -> Any:
         return content
 
-    robots = carrier = further = instead = parameters = identifications = header
+    robots = carrier = further = instead = failure = parameters = header
+    identifications = header
 
     def names(self, *items: Any) -> tuple[Any, ...]:
         return items
 
-    classes = same = point = goals = defaults = default = names
+    classes = same = point = goals = defaults = default = cases = test = names
+
+    def case(self, test: Words, *responses: Token) -> FailureCase:
+        return FailureCase(test, responses)
 
     def geometry(self, *values: Any) -> ParameterClause:
         return ParameterClause(True, *values)
@@ -190,7 +202,8 @@ def _parse(piece: list[Token], start: str, form: str, findings: Findings) -> Any
 def _names(expected: frozenset[str]) -> str:
     """Kinds of tokens in words: signs and keywords in quotes, any name as `a name`."""
     signs = [_lark().get_terminal(kind) for kind in expected - {"WORD", "STRING", END}]
-    names = {"R", "j", "F", "W", "a", "b", "further", "instead", "parameters", "geometry"}
+    names = {"R", "j", "F", "W", "a", "b"}
+    names |= {"further", "instead", "failure", "parameters", "geometry"}
     if "WORD" not in expected:
         names = set()
     shown = sorted(f"'{sign.pattern.value}'" for sign in signs if sign.pattern.value not in names)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from factory.problem.pag import PAG, Assembly, Value
-from factory.problem.template import Law, Template
+from factory.problem.template import LOST, Failure, Law, Template
 
 
 def write_pag(pag: PAG) -> str:
@@ -49,6 +49,7 @@ def write_template(template: Template) -> str:
         f"F = {_law(template.law)}",
         *([f"further = {template.further}"] if template.further else []),
         *([f"instead = {template.instead}"] if template.instead else []),
+        *([f"failure = {_failures(template)}"] if template.failures != LOST else []),
         *_parameters(template),
     ]
     lines = [f"{template.name} = (R, j, ~, <a; b>, F) where", *(f"  {c};" for c in clauses)]
@@ -66,6 +67,16 @@ def _law(law: Law) -> str:
     if law.dwell is None:
         return text
     return f"{text} for {law.dwell if isinstance(law.dwell, str) else write_number(law.dwell)}"
+
+
+def _failures(template: Template) -> str:
+    return _braces([write_failure(failure) for failure in template.failures])
+
+
+def write_failure(failure: Failure) -> str:
+    """One failure: `residual > 0.0005 : again 2 then scrap`."""
+    limit = "" if failure.limit is None else f" > {write_number(failure.limit)}"
+    return f"{failure.test}{limit} : {' then '.join(map(str, failure.responses))}"
 
 
 def _parameters(template: Template) -> list[str]:

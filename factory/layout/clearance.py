@@ -63,7 +63,7 @@ def certify(layout: Layout) -> Certificate:
     factory = layout.factory
     found = piles(factory, layout.product)
     swept = regions(layout, found)
-    search = _Search(layout, swept)
+    search = ClearanceSearch(layout, swept)
     faults = [
         *islice(embedding_faults(layout), MOST),
         *islice(search.faults(), MOST),
@@ -100,7 +100,7 @@ def separation(one: Box, other: Box) -> float:
     return float(np.hypot(max(x, 0.0), max(y, 0.0)))
 
 
-class _Search:
+class ClearanceSearch:
     """Finds the pairs of regions that are too near, and why some of them may be.
 
     `pairs` counts those looked at, to tell how the work grows.
@@ -116,11 +116,11 @@ class _Search:
         """Every pair that is too near with no reason."""
         for layer in range(len(NAMES)):
             here = [region for region in self.swept if region.layer == layer]
-            for one, other in self._near(here):
-                if not self._settled(one, other):
+            for one, other in self.near(here):
+                if not self.settled(one, other):
                     yield self._fault(one, other)
 
-    def _near(self, here: list[Region]) -> Iterator[tuple[Region, Region]]:
+    def near(self, here: list[Region]) -> Iterator[tuple[Region, Region]]:
         """Pairs in one layer that are less than a clearance apart in plan: of different robots,
         or of a station and its own robot."""
         corners = np.array([region.box for region in here], float).reshape(-1, 4)
@@ -134,7 +134,7 @@ class _Search:
             for i, j in zip(first[kept].tolist(), second[kept].tolist(), strict=True):
                 yield here[i], here[j]
 
-    def _settled(self, one: Region, other: Region) -> bool:
+    def settled(self, one: Region, other: Region) -> bool:
         """Whether two regions that are near in plan are never taken at once, or are apart in
         height."""
         kinds = {one.kind, other.kind}

@@ -16,7 +16,7 @@ from factory.layout.arranging import arrange, shape_of
 from factory.layout.certificate import Region
 from factory.layout.dimensions import Clearance
 from factory.layout.drafting import LayoutDraft
-from factory.layout.durations import Pace, cycle_of, gear_times, slowest
+from factory.layout.durations import Pace, cycle_of, gear_times
 from factory.layout.guidepath import Box, Point2, hull
 from factory.layout.hands.choosing import Hands
 from factory.layout.layout import Layout, carriers
@@ -35,9 +35,6 @@ WAYS = ((True, 1.0), (False, 0.5), (True, 0.5), (False, 1.0))
 
 UNWEIGHTED = 2
 """The first so many take all robots to matter the same."""
-
-HURRIES, IDLE = 4, 0.2
-"""So often robots on critical circuits are hurried; how much the others matter then."""
 
 LARGE = 1500
 """A factory of more robots is packed once, with the sides of the first feasible layout."""
@@ -89,29 +86,6 @@ def optimised(
         score = _score(layout, cycle_of(layout, pace), floor)
         if score < least:
             best, times, least = layout, found, score
-    if not factory.folded:
-        return best
-    return _hurried(task, product, payloads, best, floor)
-
-
-def _hurried(
-    task: Task, product: Product, payloads: Mapping[str, Box], best: Layout, floor: Point2 | None
-) -> Layout:
-    """A layout of robots that serve several labels, or a better one: those on the critical circuits
-    of all layouts so far matter more than others."""
-    critical = set[int]()
-    cycle, slow = slowest(best, task.pace)
-    least = _score(best, cycle, floor)
-    for number in range(min(HURRIES, EFFORT // len(task.weights))):
-        critical.update(slow)
-        weights = [1.0 if robot in critical else IDLE for robot in range(len(task.weights))]
-        corridor, breadth = WAYS[number % len(WAYS)]
-        way = replace(task, corridor=corridor, breadth=breadth, weights=weights)
-        layout = _packed(way, product, payloads)
-        cycle, slow = slowest(layout, task.pace)
-        score = _score(layout, cycle, floor)
-        if score < least:
-            best, least = layout, score
     return best
 
 

@@ -23,6 +23,7 @@ from factory.layout.layout import Layout
 from factory.mjcf import names
 from factory.mjcf.elements import add, fill
 from factory.mjcf.feeders import SLIDER_MASS, add_feeders
+from factory.mjcf.hanging import Hanging
 from factory.mjcf.insets import Insets, insets_of
 from factory.mjcf.outfeed import SHUTTER_MASS, TRAY_MASS, add_outfeed
 from factory.mjcf.parts import add_meshes, add_parts, add_wholes
@@ -199,11 +200,12 @@ def build_model(
         HOIST_MASS, 0.0, settings.shutter_limits[1] + GRAVITY, settings, HOIST_STIFFNESS
     )
     add_outfeed(world, actuator, layout, tray, shutter)
-    sliders = _sliders(layout, masses, settings)
-    add_feeders(world, actuator, layout, sliders)
-    add_parts(world, layout, copies, insets)
+    hanging = Hanging.of(layout)
+    sliders = _sliders(layout, hanging, masses, settings)
+    add_feeders(world, actuator, layout, hanging, sliders)
+    add_parts(world, layout, hanging, copies, insets)
     add_wholes(world, layout, bodies, copies, insets, {inside for both in apart for inside in both})
-    add_welds(equality, layout, bodies, copies)
+    add_welds(equality, layout, hanging, bodies, copies)
     add_exclusions(section["contact"], apart, copies)
     if not len(section["contact"]):
         root.remove(section["contact"])
@@ -276,18 +278,24 @@ def _hoists(layout: Layout, masses: Mapping[str, float], settings: Settings) -> 
     return found
 
 
-def _sliders(layout: Layout, masses: Mapping[str, float], settings: Settings) -> dict[str, Drive]:
-    """The drives of the feeders' sliders, for what they bring down. Their buffers hold the
-    setpoints of a whole stroke of any of them, and longer than until it is seen to be over: what is
-    shown of a stroke meanwhile comes after those."""
+def _sliders(
+    layout: Layout, hanging: Hanging, masses: Mapping[str, float], settings: Settings
+) -> dict[str, Drive]:
+    """The drives of the feeders' sliders, for the heaviest that they bring down. Their buffers hold
+    the setpoints of a whole stroke of any of them, and longer than until it is seen to be over:
+    what is shown of a stroke meanwhile comes after those."""
     most = settings.feeder_limits[1] + GRAVITY
     samples = (stroke_ticks(layout, settings) + 2 * settings.stride) * settings.steps + 2
-    found = {}
+    loads: dict[str, float] = {}
     for leaf in layout.factory.leaves:
-        load = masses[leaf.label]
-        drive = drive_for(HOIST_MASS, load, most, settings, HOIST_STIFFNESS)
-        found[leaf.label] = replace(drive, samples=samples)
-    return found
+        slider = hanging.slider[leaf.label]
+        loads[slider] = max(loads.get(slider, 0.0), masses[leaf.label])
+    return {
+        slider: replace(
+            drive_for(HOIST_MASS, load, most, settings, HOIST_STIFFNESS), samples=samples
+        )
+        for slider, load in loads.items()
+    }
 
 
 def stroke_ticks(layout: Layout, settings: Settings) -> int:

@@ -11,6 +11,7 @@ from factory.geometry.solids import Product, Solid
 from factory.layout.dimensions import PAYLOAD
 from factory.layout.layout import Layout, Point2
 from factory.mjcf.elements import add, exact, numbers
+from factory.mjcf.hanging import Hanging
 from factory.mjcf.insets import Insets
 from factory.mjcf.mesh_files import inset_file, inset_name, mesh_file, piece_files
 from factory.mjcf.names import part, piece
@@ -50,17 +51,20 @@ def parked_at(layout: Layout, label: str, number: int) -> tuple[float, float, fl
     return x, y, PARKED - 0.4 * (number - 1)
 
 
-def add_parts(world: Element, layout: Layout, copies: Mapping[str, int], insets: Insets) -> None:
-    """All copies of all parts; the first of each in its feeder, the others parked."""
+def add_parts(
+    world: Element, layout: Layout, hanging: Hanging, copies: Mapping[str, int], insets: Insets
+) -> None:
+    """All copies of all parts; the first that hangs from each slider there, the others parked."""
     for operation in layout.factory.leaves:
         label = operation.label
         solid = layout.product.solids[label]
         home = presented_at(layout, label)
         for number in range(1, copies[label] + 1):
-            at = home if number == 1 else parked_at(layout, label, number)
+            shown = number == 1 and label in hanging.places
+            at = home if shown else parked_at(layout, label, number)
             name = part(label, number)
             body = _add_body(world, name, at, solid.mass, solid.inertia)
-            _add_geoms(body, name, solid, solid.centre, insets.of(label), number == 1)
+            _add_geoms(body, name, solid, solid.centre, insets.of(label), shown)
 
 
 def add_wholes(

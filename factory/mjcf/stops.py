@@ -50,9 +50,9 @@ def carriage_stops(layout: Layout, robot: int) -> Stops:
     return _beyond(layout.ends(robot), robot_room(layout.clearance))
 
 
-def lift_stops(stroke: float, clearance: float) -> Stops:
-    """Of a lift that is raised by a stroke [m]."""
-    return _beyond((0.0, stroke), robot_room(clearance))
+def lift_stops(stroke: float, clearance: float, low: float = 0.0) -> Stops:
+    """Of a lift that is raised by a stroke, from as `low` as it gets [m]."""
+    return _beyond((low, stroke), robot_room(clearance))
 
 
 def tray_stops(layout: Layout) -> Stops:

@@ -8,13 +8,18 @@ from xml.etree.ElementTree import Element
 from factory.layout.layout import Layout
 from factory.mjcf import names
 from factory.mjcf.elements import add, numbers
+from factory.mjcf.hanging import Hanging
 from factory.mjcf.parts import parked_at, place_in
 from factory.mjcf.robots import heading_quaternion
 from factory.plant.fused_bodies import FusedBodies, Inside
 
 
 def add_welds(
-    equality: Element, layout: Layout, bodies: FusedBodies, copies: Mapping[str, int]
+    equality: Element,
+    layout: Layout,
+    hanging: Hanging,
+    bodies: FusedBodies,
+    copies: Mapping[str, int],
 ) -> None:
     """Grips, feeders, parking places, and the star that holds a finished product together."""
     factory = layout.factory
@@ -29,11 +34,14 @@ def add_welds(
         label = operation.label
         path = layout.guidepaths[operation.carrier]
         w, _, _, z = heading_quaternion(path)
-        height = layout.elevation(operation.carrier, operation.index)
-        offset = place_in(layout.product, bodies.centre[label], (0.0, 0.0), height)
+        slider = hanging.slider[label]
+        (x, y), (u, v) = layout.meeting(operation), layout.meeting(factory.by_label[slider])
+        height = layout.elevation(operation.carrier, operation.index) - hanging.raised[label]
+        offset = place_in(layout.product, bodies.centre[label], (x - u, y - v), height)
         pose = (*_turned(offset, path.heading), w, 0, 0, -z)
-        _weld(equality, names.feed(label), names.slider(label), names.part(label, 1), pose, True)
-        _park(equality, layout, label, copies[label], 1)
+        shown, body = label == slider, names.part(label, 1)
+        _weld(equality, names.feed(label), names.slider(slider), body, pose, shown)
+        _park(equality, layout, label, copies[label], int(shown))
     for label in bodies.wholes:
         _park(equality, layout, label, copies[label], 0)
     for label in (body for product in factory.products for body in bodies.carried[product]):

@@ -1,15 +1,19 @@
 """An independent replay of a record of events against a net: does the run refine it?
 
-Tokens are counted and robots followed from place to place, without `PetriNet.follower`.
+Tokens are counted and robots followed from place to place, without `PetriNet.follower`. What was
+undone is taken back firing by firing, without `factory.nets.undo`.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections import Counter
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 from factory.nets.gears import GearNet
+from factory.nets.history import firings
 from factory.nets.petri import Marking
+from factory.nets.undone import Entry, Joins, Undone
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,15 +32,21 @@ class ReplayVerdict:
 
 
 class _Game:
-    """The tokens on places and the place of each robot."""
+    """The tokens on places, the place of each robot, and how often each transition has fired."""
 
     def __init__(self, net: GearNet, initial: Marking) -> None:
-        self.net = net
         self.number = {t.name: i for i, t in enumerate(net.threaded.transitions)}
+        self.fired = [0] * len(self.number)
+        self.start: Marking | None = initial
+        self._play_on(net)
+        self.fault = self._set_up(initial)
+
+    def _play_on(self, net: GearNet) -> None:
+        """Go on in a net, with no tokens."""
+        self.net = net
         self.tokens = [0] * len(net.threaded.places)
         self.at = [-1] * len(net.gears)
         self.needs, self.gives = net.threaded.net.preset, net.threaded.net.postset
-        self.fault = self._set_up(initial)
 
     def _set_up(self, initial: Marking) -> str:
         for place in sorted(initial):
@@ -75,6 +85,7 @@ class _Game:
             self.tokens[place] -= 1
         for place in self.gives[event]:
             self.tokens[place] += 1
+        self.fired[event] += 1
         return self._legal(name, event)
 
     def _enabled(self, event: int) -> str:
@@ -97,25 +108,157 @@ class _Game:
                 return f"after {name} the marking is not legal at {place_name}"
         return ""
 
+    def take_back(self, entry: Undone, joins: Joins, after: GearNet | None) -> str:
+        """Take back what was undone, and go on in the net `after`, if one is given; why that is not
+        the least that had to be undone, "" where it is."""
+        unknown = next(
+            (x for x in (*entry.asked, *entry.transitions) if x not in self.number), None
+        )
+        if unknown is not None:
+            return f"the net has no transition '{unknown}'"
+        fault = self._count_from_the_first() or self._asked_too_much(entry)
+        if fault:
+            return fault
+        if after is not None:
+            self._play_on(after)
+            self.tokens = self._counted(after)
+        asked = Counter(self.number[name] for name in entry.asked)
+        begin = asked if after is None else range(len(self.fired))
+        taken = self._taken_back(asked, joins, begin)
+        names = [t.name for t in self.net.threaded.transitions]
+        least = Counter({names[event]: times for event, times in taken.items()})
+        if least != Counter(entry.transitions):
+            return _differs(entry, least)
+        return self._find_robots(taken if after is None else begin)
+
+    def _count_from_the_first(self) -> str:
+        """Count what had fired when the run began, if that has not been done."""
+        if self.start is not None:
+            try:
+                before = firings(self.net, self.start)
+            except ValueError as error:
+                return f"nothing can be undone: {error}"
+            self.fired = [times + before[event] for event, times in enumerate(self.fired)]
+            self.start = None
+        return ""
+
+    def _asked_too_much(self, entry: Undone) -> str:
+        if not entry.asked and not entry.exchanged:
+            return f"the undo of {entry.operation} asks for nothing"
+        for name, times in Counter(entry.asked).items():
+            if times > self.fired[self.number[name]]:
+                return f"{name} is to be undone, and has not fired so often"
+        return ""
+
+    def _counted(self, net: GearNet) -> list[int]:
+        """The tokens that the counts give in a net, where some may be missing (negative)."""
+        found = [int(place in net.initial_marking) for place in range(len(net.threaded.places))]
+        for event, times in enumerate(self.fired):
+            for place in self.gives[event]:
+                found[place] += times
+            for place in self.needs[event]:
+                found[place] -= times
+        return found
+
+    def _taken_back(self, asked: Counter[int], joins: Joins, begin: Iterable[int]) -> Counter[int]:
+        """Fire backwards, one by one, what is due: it is asked for, a token that it took is
+        missing, or what was made of its result is taken back oftener. Only what must be is."""
+        back = Counter[int]()
+        made_into = _turned(joins)
+        todo = list(begin)
+        while todo:
+            event = todo.pop()
+            due = (
+                back[event] < asked[event]
+                or any(self.tokens[place] < 0 for place in self.needs[event])
+                or any(back[event] < back[end] for end in made_into.get(event, ()))
+            )
+            if not due:
+                continue
+            back[event] += 1
+            self.fired[event] -= 1
+            for place in self.needs[event]:
+                self.tokens[place] += 1
+            for place in self.gives[event]:
+                self.tokens[place] -= 1
+                todo += self.net.threaded.places[place].right
+            todo += (event, *joins.get(event, ()))
+        return back
+
+    def _find_robots(self, events: Iterable[int]) -> str:
+        """Where the robots are that the events move."""
+        sides = (self.needs, self.gives)
+        places = {p for event in events for side in sides for p in side[event]}
+        for robot in sorted({robot for place in places for robot in self.net.slots[place]}):
+            gear = self.net.gears[robot]
+            here = [place for place in gear.places for _ in range(self.tokens[place])]
+            if len(here) != 1:
+                return f"{gear.robot} is at {len(here)} places after what was undone"
+            self.at[robot] = here[0]
+        return ""
+
     @property
     def marking(self) -> Marking:
         """The marked places."""
         return frozenset(place for place, count in enumerate(self.tokens) if count)
 
 
-def replay(net: GearNet, events: Iterable[str], initial: Marking | None = None) -> ReplayVerdict:
+def _turned(joins: Joins) -> dict[int, list[int]]:
+    """For each transition the ends that are undone no oftener than it is."""
+    found: dict[int, list[int]] = {}
+    for end, others in joins.items():
+        for other in others:
+            found.setdefault(other, []).append(end)
+    return found
+
+
+def _differs(entry: Undone, least: Counter[str]) -> str:
+    """The first transition that was undone more or less often than it had to be."""
+    said = Counter(entry.transitions)
+    name = next(name for name in sorted(said | least) if said[name] != least[name])
+    times = f"{said[name]} times, where {least[name]} is the least"
+    return f"the undo of {entry.operation} takes back {name} {times}"
+
+
+def replay(
+    net: GearNet,
+    events: Iterable[Entry],
+    initial: Marking | None = None,
+    joins: Joins | None = None,
+    after: Sequence[GearNet] = (),
+) -> ReplayVerdict:
     """Fire the events, by name and one by one, from `initial` (m_0 where None).
 
     Linear: each event costs time in its own places only. The events of a detached set that fired
-    in one tick may come in any order.
+    in one tick may come in any order. What is undone must be exactly the least that had to be, by
+    `joins`, the material rule; without that nothing may be. `after`: the nets in which the run went
+    on where robots were exchanged, in their order, with the transitions of `net` in its order.
     """
     game = _Game(net, net.initial_marking if initial is None else initial)
     if game.fault:
         return ReplayVerdict(False, -1, game.fault, game.marking, 0)
-    count = 0
-    for name in events:
-        fault = game.fire(name)
+    count, nets = 0, list(after)
+    for entry in events:
+        if isinstance(entry, str):
+            fault, marking = game.fire(entry), None
+        else:
+            marking = game.marking
+            fault = _take_back(game, entry, joins, nets)
         if fault:
-            return ReplayVerdict(False, count, fault, game.marking, count)
+            return ReplayVerdict(False, count, fault, marking or game.marking, count)
         count += 1
     return ReplayVerdict(True, None, "", game.marking, count)
+
+
+def _take_back(game: _Game, entry: Undone, joins: Joins | None, nets: list[GearNet]) -> str:
+    """Take back what was undone; why that cannot be, "" where it can."""
+    if joins is None:
+        return f"the undo of {entry.operation} cannot be judged: no material is known"
+    if not entry.exchanged:
+        return game.take_back(entry, joins, None)
+    if not nets:
+        return f"at {entry.operation} robots are exchanged, and there is no further net"
+    onward = nets.pop(0)
+    if [t.name for t in onward.threaded.transitions] != list(game.number):
+        return f"the net after {entry.operation} has other transitions"
+    return game.take_back(entry, joins, onward)

@@ -7,6 +7,7 @@ The text of a template is read by `factory.lang.read_template`; the shipped ones
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import Literal
 
 from factory.problem.pag import NOPART, Value
 from factory.support.errors import Position
@@ -45,6 +46,57 @@ class Law:
     position: Position | None = field(default=None, compare=False)
 
 
+Test = Literal["lost", "residual", "misplaced", "rejected", "jammed"]
+"""What is tested: a part is further than 5 mm from its nest, or no grip holds it; the joint's error
+[m] when the goal is reached, before X_e fires; a part's error at its feeder [m]; a tool says that
+it is bad; a robot makes no progress for longer than the timed net allows."""
+
+Kind = Literal["again", "scrap", "stop"]
+
+
+@dataclass(frozen=True, slots=True)
+class Response:
+    """What is done about a failure: the operation `again`, at most `times` times on end (0 for the
+    others); `scrap`, what was to be joined goes to the bin and is made anew; `stop`, the run."""
+
+    kind: Kind
+    times: int = 0
+
+    def __str__(self) -> str:
+        """The response as the language writes it: `again 2`, `scrap`."""
+        return f"{self.kind} {self.times}" if self.times else self.kind
+
+
+@dataclass(frozen=True, slots=True)
+class Failure:
+    """A test with its `limit` [m], None for those without one, and the responses, in order: at most
+    one `again`, then a `scrap` or a `stop`."""
+
+    test: Test
+    limit: float | None
+    responses: tuple[Response, ...]
+    position: Position | None = field(default=None, compare=False)
+
+    @property
+    def retries(self) -> int:
+        """How often the operation is done again, at most, before the last response."""
+        return sum(response.times for response in self.responses)
+
+    @property
+    def last(self) -> Kind:
+        """What is done when doing it again has not helped: `scrap` or `stop`."""
+        return self.responses[-1].kind
+
+    def as_json(self) -> dict[str, object]:
+        """The failure as `templates --json` and `check --json` list it."""
+        responses = [str(response) for response in self.responses]
+        return {"test": self.test, "limit": self.limit, "responses": responses}
+
+
+LOST = (Failure("lost", None, (Response("scrap"),)),)
+"""The failures of a template that says nothing of them."""
+
+
 @dataclass(frozen=True, slots=True)
 class Template:
     """An operation template (Definition 4.1).
@@ -55,7 +107,7 @@ class Template:
     `instead`: the one that does the same with one robot fewer, where the robot of one input keeps
     what is joined, "" if none does;
     `parameters`: keyword arguments and their defaults; `geometry`: True where the operation makes a
-    part and takes mesh, pos, box and so on.
+    part and takes mesh, pos, box and so on; `failures`: what is tested, and what is done about it.
     """
 
     name: str
@@ -69,6 +121,7 @@ class Template:
     instead: str = ""
     parameters: tuple[tuple[str, Value], ...] = ()
     geometry: bool = False
+    failures: tuple[Failure, ...] = LOST
     position: Position | None = field(default=None, compare=False)
     further_position: Position | None = field(default=None, compare=False)
     instead_position: Position | None = field(default=None, compare=False)
@@ -92,6 +145,10 @@ class Template:
     def result(self) -> str:
         """b_j, the label the carrier holds afterwards; NOPART for dropoff."""
         return self.after[self.carrier - 1]
+
+    def failure(self, test: Test) -> Failure | None:
+        """What is done where a test finds a failure; None where it is not tested."""
+        return next((failure for failure in self.failures if failure.test == test), None)
 
     def tools(self) -> tuple[int, ...]:
         """Indices (from 0) of the robots that bring nothing and are not the carrier."""

@@ -28,20 +28,26 @@ class ObservedRequest(Protocol):
     @property
     def wip(self) -> int | None: ...
     @property
+    def distributed(self) -> bool: ...
+    @property
+    def fuse(self) -> bool: ...
+    @property
     def settings(self) -> Settings: ...
 
 
 class Observed(Protocol):
     """A simulation that a log or a monitor is kept of; `simulation.Simulation` is one.
 
-    `model`: None in the ideal world; `start`: the marking the run began from; `before`: products
-    delivered before that. `world` has `time` [s] and `delivered()`; in MuJoCo the engine's `m` and
-    `d`, in the ideal world positions `x` [m] and speeds `v` [m/s]. `supervisor` has `marked` (a
-    byte for each place) and `events`.
+    `asked`: the request before anything was chosen for it; `model`: None in the ideal world;
+    `start`: the marking the run began from; `before`: products delivered before that. `world` has
+    `time` [s] and `delivered()`; in MuJoCo the engine's `m` and `d`, in the ideal world positions
+    `x` [m] and speeds `v` [m/s]. `supervisor` has `marked` (a byte for each place) and `events`.
     """
 
     @property
     def layout(self) -> Layout: ...
+    @property
+    def asked(self) -> ObservedRequest: ...
     @property
     def request(self) -> ObservedRequest: ...
     @property

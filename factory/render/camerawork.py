@@ -17,6 +17,7 @@ from factory.render.gantt_panel import GanttPanel
 from factory.render.history import History
 from factory.render.ink import Pixels
 from factory.render.net_panel import NetPanel
+from factory.render.notices import draw_notices
 from factory.render.painter import Painter
 from factory.render.picture import Area, PanelName, Picture, Size, shared
 from factory.render.rows import Rows
@@ -87,6 +88,7 @@ class Camerawork(Closing):
         pixels = self.painter.paint(moment.shown, elapsed, time)
         if self.caption is not None:
             pixels = self.caption.draw(pixels, take.product, moment.made, take.units, time)
+            draw_notices(pixels, take.history, time, self.caption)
         if take.picture.title:
             draw_title(pixels, take.picture.title, take.detail, 0.0 if self.still else time)
         if self.panels is not None:

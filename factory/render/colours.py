@@ -15,6 +15,9 @@ GROUND, INK, FAINT, LINE = (243, 243, 245), (38, 44, 54), (112, 121, 134), (205,
 EDGE, FLASH = (222, 224, 229), (232, 60, 48)
 """Between the picture and the panels; what fires, and the present."""
 
+AMBER = (214, 148, 22)
+"""Robots that stand."""
+
 WHITE = (255, 255, 255)
 
 TEMPLATES = {

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from factory.mjcf.model import product_name
+from factory.nets.undone import Undone
 from factory.record.log import Log
 from factory.record.log.model import model_of
 from factory.record.monitor.record import recorded_subject
@@ -35,13 +36,15 @@ class _Observer(Recorder):
         m, self.history = simulation.physical.m, History(subject)
         name, units = product_name(factory), simulation.request.units
         self.take = Take(m, subject, name, units, picture, self.history)
-        self.number = factory.net.threaded.net.transition_index
         self.last = self._moment()
 
     def _moment(self) -> Moment:
-        world, events = self.simulation.physical, self.simulation.supervisor.events
-        for event in events[len(self.history.events) :]:
-            self.history.fire(event.t, self.number[event.transition])
+        world, history = self.simulation.physical, self.history
+        for event in self.simulation.supervisor.events[history.taken :]:
+            history.add(event.t, event if isinstance(event, Undone) else event.transition)
+        if (account := world.hooks.account) is not None:
+            history.failings += account.found[len(history.failings) :]
+            history.stand(account.stood)
         made = world.delivered() - self.simulation.before
         return Moment(world.time, made, Snapshot.of(world.m, world.d))
 
@@ -139,16 +142,15 @@ def render_log(
     or one that is not of the factory in its header, and for a time after its end."""
     is_still = check_output(path, picture.size, fps, still=None)
     take = take_of(log, picture)
-    firings = list(zip(log.fired_t.tolist(), log.fired.tolist(), strict=True))
     if is_still:
         moment = moment_of(log, _row(log, take, at))
-        take.history.catch_up(firings, moment.time)
+        take.history.catch_up(log.timed_entries, moment.time)
         save(take, moment, Path(path))
         return 1
     with Reel(take, Path(path), fps, None if poster is None else Path(poster)) as reel:
         for row in range(len(log)):
             moment = moment_of(log, row)
-            take.history.catch_up(firings, moment.time)
+            take.history.catch_up(log.timed_entries, moment.time)
             reel.until(moment)
     return reel.frames
 
@@ -159,7 +161,11 @@ def take_of(log: Log, picture: Picture) -> Take:
         raise pictureless()
     m, subject = model_of(log), recorded_subject(log.header)
     picture.check(subject.factory.pag)
-    return Take(m, subject, log.header["product"], log.header["units"], picture, History(subject))
+    history = History(subject)
+    if log.failures is not None:
+        history.failings += log.failures.found
+        history.stand(log.failures.stood)
+    return Take(m, subject, log.header["product"], log.header["units"], picture, history)
 
 
 def moment_of(log: Log, row: int) -> Moment:

@@ -6,6 +6,7 @@ from math import ceil
 
 from factory.control.mode import Array
 from factory.render.colours import (
+    AMBER,
     FAINT,
     FLASH,
     LINE,
@@ -14,7 +15,7 @@ from factory.render.colours import (
     pale,
     template_colours,
 )
-from factory.render.history import History, OperationProgress, Spell
+from factory.render.history import TIE, History, OperationProgress, Spell
 from factory.render.ink import Ink, Pixels, fitted, width
 from factory.render.rows import PanelRow, Rows
 from factory.render.sheet import FOOT, PanelSheet
@@ -55,11 +56,12 @@ class GanttPanel:
         bottom = self.sheet.top + self.rows.count * self.sheet.pitch
         self._lines(ink, time, bottom)
         for row in self.rows.shown:
+            self._stands(ink, row, time)
             for spell in self.history.since(row.robot, time - self.window):
                 self._spell(ink, row, spell, time)
         thin = self.sheet.scale
         ink.box(self.right - thin, self.sheet.top, self.right + thin, bottom, FLASH)
-        self.sheet.names(ink)
+        self.sheet.names(ink, self.history.stands(time))
         return ink.pixels
 
     def at(self, time: float, now: float) -> float:
@@ -67,9 +69,12 @@ class GanttPanel:
         return self.right - (now - time) / self.window * (self.right - self.left)
 
     def _legend(self, ink: Ink) -> None:
-        """The colours of the operations, from the right."""
+        """The colours of the operations, from the right, and of what goes wrong."""
         x, y, small = self.right, 20 * self.sheet.scale, self.sheet.points - 2
-        for name, colour in reversed(template_colours(self.factory).items()):
+        colours = template_colours(self.factory)
+        colours |= {"stands": AMBER} if self.history.standing else {}
+        colours |= {"undone": FLASH} if self.history.undone else {}
+        for name, colour in reversed(colours.items()):
             if x - width(name, small) < self.sheet.size[0] / 3:
                 break
             ink.words(x, y, name, small, FAINT, "r")
@@ -89,16 +94,24 @@ class GanttPanel:
             number += 1
         ink.words(self.right, y, "now", small, FLASH, "r")
 
+    def _stands(self, ink: Ink, row: PanelRow, now: float) -> None:
+        """A band where a robot stood."""
+        y, half = self.sheet.height(row), 0.5 * self.sheet.pitch
+        for start, end in self.history.stood(row.robot, now - self.window, now):
+            left, right = max(self.at(start, now), self.left), self.at(end, now)
+            ink.box(left, y - half, right, y + half, AMBER, 0.3 * row.alpha)
+
     def _spell(self, ink: Ink, row: PanelRow, spell: Spell, now: float) -> None:
-        """A bar for an operation, a thin one where a robot waits with a part; empty-handed it has
-        none."""
+        """A bar for an operation, hatched where that was undone, a thin one where a robot
+        waits with a part; empty-handed it has none."""
         if spell.start > now or not spell.step:
             return
+        is_undone = spell.undone < now - TIE
         left = max(self.at(spell.start, now), self.left)
         right = self.at(min(spell.end, now), now)
         y, gear = self.sheet.height(row), self.factory.robots[row.robot].operations
         if not spell.operation:
-            before = self.colours[gear[spell.step // 2 - 1]]
+            before = FLASH if is_undone else self.colours[gear[spell.step // 2 - 1]]
             thin = 1.6 * self.sheet.scale
             ink.box(left, y - thin, right, y + thin, pale(before, 0.35), row.alpha)
             return
@@ -107,7 +120,16 @@ class GanttPanel:
             0.38 * min(self.sheet.pitch, 30 * self.sheet.scale),
             self.colours[operation.index],
         )
-        ink.box(left, y - half, right, y + half, colour, row.alpha, 3 * self.sheet.scale)
         room = right - left - 8 * self.sheet.scale
         name = fitted(operation.label, self.sheet.small, room)
-        ink.words(left + 4 * self.sheet.scale, y, name, self.sheet.small, WHITE, "l", row.alpha)
+        start = left + 4 * self.sheet.scale
+        if is_undone:
+            ink.box(left, y - half, right, y + half, WHITE, row.alpha)
+            ink.hatched(left, y - half, right, y + half, FLASH, 6 * self.sheet.scale)
+            if name:
+                end = start + width(name, self.sheet.small)
+                ink.box(start - 2, y - half + 2, end + 2, y + half - 2, WHITE, row.alpha)
+        else:
+            ink.box(left, y - half, right, y + half, colour, row.alpha, 3 * self.sheet.scale)
+        paint = FLASH if is_undone else WHITE
+        ink.words(start, y, name, self.sheet.small, paint, "l", row.alpha)

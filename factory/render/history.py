@@ -5,13 +5,15 @@ from __future__ import annotations
 from bisect import bisect_right
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from math import inf
 
 from factory.control.mode import Array
 from factory.layout.durations import Pace
+from factory.nets.undone import Entry, Undone
 from factory.plant.factory import Factory, Operation
+from factory.record.failures import Failing, Stood
 from factory.record.monitor.subject import MonitorSubject
 
 TIE = 1e-9
@@ -21,12 +23,13 @@ TIE = 1e-9
 @dataclass(frozen=True, slots=True)
 class Spell:
     """A robot's stay at place `step` of its gear, from `start` to `end` [s]; `number` counts the
-    spells of the robot."""
+    places that the robot has gone through, back where operations are `undone`, at that time [s]."""
 
     number: int
     step: int
     start: float
     end: float = inf
+    undone: float = inf
 
     @property
     def operation(self) -> bool:
@@ -36,8 +39,13 @@ class Spell:
 
 
 class History:
-    """Grows firing by firing, in the order of time; it can be asked for any time up to now. What
-    fires at a time shows after it, as in a log, whose state at a time is before what fires then."""
+    """Grows entry by entry, in the order of time; it can be asked for any time up to now. What
+    fires at a time shows after it, as in a log, whose state at a time is before what fires then.
+
+    `events`: what has fired, each at one of `times` [s]; `undone`: what of that was undone, and
+    when; `taken`: how many entries. `failings`: what failed; `standing`: from when on [s] which
+    robots (index) stand.
+    """
 
     def __init__(self, subject: MonitorSubject) -> None:
         self.subject, self.factory = subject, subject.factory
@@ -48,23 +56,82 @@ class History:
             self.spells.append([Spell(0, step, 0.0)])
         self.times: list[float] = []
         self.events: list[int] = []
+        self.undone: list[tuple[float, int]] = []
         self.fired = Counter(subject.counts)
+        self.taken = 0
+        self.failings: list[Failing] = []
+        self.standing: list[tuple[float, frozenset[int]]] = []
+
+    def add(self, time: float, entry: Entry) -> None:
+        """The next entry of a record: a transition fires, or some are undone."""
+        self.taken += 1
+        number = self.factory.net.threaded.net.transition_index
+        if isinstance(entry, Undone):
+            self.undo(time - 2 * TIE, [number[name] for name in entry.transitions])
+        else:
+            self.fire(time, number[entry])
 
     def fire(self, time: float, event: int) -> None:
         """A transition fires: its robots go on to the next place of their gears."""
         for robot in self.factory.operations[event // 2].robots:
-            last = self.spells[robot][-1]
-            step = (last.step + 1) % len(self.factory.net.gears[robot].places)
-            self.spells[robot][-1] = Spell(last.number, last.step, last.start, time)
-            self.spells[robot].append(Spell(last.number + 1, step, time))
+            self._go(robot, time, 1)
         self.times.append(time)
         self.events.append(event)
         self.fired[event] += 1
 
-    def catch_up(self, firings: Sequence[tuple[float, int]], now: float) -> None:
-        """Fire what has fired before now."""
-        while len(self.events) < len(firings) and firings[len(self.events)][0] < now - TIE:
-            self.fire(*firings[len(self.events)])
+    def undo(self, time: float, events: Sequence[int]) -> None:
+        """Transitions fire backwards, each as often as it is there: their robots go back to where
+        they were before them, and what they have done since is undone."""
+        back = Counter(r for e in events for r in self.factory.operations[e // 2].robots)
+        for robot, places in back.items():
+            self._go(robot, time, -places)
+            spells, now = self.spells[robot], self.spells[robot][-1].number
+            spells[:-1] = [
+                replace(spell, undone=min(spell.undone, time)) if spell.number > now else spell
+                for spell in spells[:-1]
+            ]
+        self.undone += [(time, event) for event in events]
+        self.fired.subtract(events)
+
+    def _go(self, robot: int, time: float, places: int) -> None:
+        """A robot is so many places further in its gear from a time on."""
+        spells, length = self.spells[robot], len(self.factory.net.gears[robot].places)
+        last = spells[-1]
+        spells[-1] = replace(last, end=time)
+        spells.append(Spell(last.number + places, (last.step + places) % length, time))
+
+    def stand(self, stood: Sequence[Stood]) -> None:
+        """Which robots stood up to now."""
+        index = {robot.name: robot.index for robot in self.factory.robots}
+        for start, names in stood[len(self.standing) :]:
+            self.standing.append((start, frozenset(index[name] for name in names)))
+
+    def stood(self, robot: int, since: float, time: float) -> list[tuple[float, float]]:
+        """From when to when a robot stood, between two times [s]."""
+        found = list[tuple[float, float]]()
+        for number, (start, robots) in enumerate(self.standing):
+            end = self.standing[number + 1][0] if number + 1 < len(self.standing) else inf
+            if robot in robots and start < time - TIE and end > since:
+                found.append((max(start, since), min(end, time)))
+        return found
+
+    def stands(self, time: float) -> frozenset[int]:
+        """The robots that stand at a time."""
+        before = bisect_right(self.standing, time - TIE, key=lambda pair: pair[0])
+        return self.standing[before - 1][1] if before else frozenset()
+
+    def failed(self, since: float, time: float) -> list[Failing]:
+        """What failed from one time and before another."""
+        return [one for one in self.failings if since <= one.t < time - TIE]
+
+    def catch_up(self, entries: Sequence[tuple[float, Entry]], now: float) -> None:
+        """Take over the entries of a record up to now. What is undone shows at its own time: a tick
+        undoes it after the world has gone on."""
+        while self.taken < len(entries):
+            time, entry = entries[self.taken]
+            if time >= now + (TIE if isinstance(entry, Undone) else -TIE):
+                return
+            self.add(time, entry)
 
     def at(self, robot: int, time: float) -> Spell:
         """The spell that a robot is in at a time."""
@@ -85,10 +152,12 @@ class History:
         return list(zip(self.times[first:last], self.events[first:last], strict=True))
 
     def counts(self, time: float) -> Counter[int]:
-        """How often each transition has fired before a time."""
+        """How often each transition has fired before a time, and was not undone."""
         found = Counter(self.fired)
         for event in self.events[bisect_right(self.times, time - TIE) :]:
             found[event] -= 1
+        for when, event in self.undone:
+            found[event] += when > time - TIE
         return found
 
 

@@ -49,6 +49,22 @@ class Ink:
             covered = covered - _covered(x, y, *inner, max(0.0, radius - line))
         self._blend(x0, y0, covered * np.float32(alpha), colour)
 
+    def hatched(
+        self, left: float, top: float, right: float, bottom: float, colour: Colour, pitch: float
+    ) -> None:
+        """A box with only its edge and stripes that rise to the right, so far from each other."""
+        x0, y0 = max(0, int(left) - 1), max(0, int(top) - 1)
+        x1 = min(self.pixels.shape[1], int(right) + 2)
+        y1 = min(self.pixels.shape[0], int(bottom) + 2)
+        if x1 <= x0 or y1 <= y0 or right <= left or bottom <= top:
+            return
+        x, y = np.arange(x0, x1, dtype=np.float32), np.arange(y0, y1, dtype=np.float32)
+        covered, line = _covered(x, y, left, top, right, bottom, 0.0), max(1.0, pitch / 5)
+        inner = _covered(x, y, left + line, top + line, right - line, bottom - line, 0.0)
+        phase = (x[None] - np.float32(right) + y[:, None]) % np.float32(pitch)
+        stripes = np.clip(np.abs(phase - pitch / 2) - (pitch / 2 - line), 0, 1)
+        self._blend(x0, y0, np.asarray(covered - inner * (1 - stripes), np.float32), colour)
+
     def disc(self, x: float, y: float, radius: float, colour: Colour, alpha: float = 1.0) -> None:
         """A disc."""
         self.box(x - radius, y - radius, x + radius, y + radius, colour, alpha, radius)

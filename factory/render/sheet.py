@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from factory.render.colours import EDGE, FAINT, GROUND, INK, robot_colours
+from factory.render.colours import AMBER, EDGE, FAINT, GROUND, INK, robot_colours
 from factory.render.ink import Ink, width
 from factory.render.rows import PanelRow, Rows
 
@@ -85,10 +85,14 @@ class PanelSheet:
         ink.words(self.size[0] - self.edge, y, detail, self.points - 1, FAINT, "r")
         return ink
 
-    def names(self, ink: Ink) -> None:
-        """The robots' names, each with a spot of its paint."""
+    def names(self, ink: Ink, standing: frozenset[int] = frozenset()) -> None:
+        """The robots' names, each with a spot of its paint; those of robots that stand on amber."""
         for row in self.rows.shown:
             y, colour = self.height(row), robot_colours(self.rows.factory)[row.robot]
+            if row.robot in standing:
+                half = 0.42 * self.pitch
+                left, right, alpha = 0.4 * self.edge, self.gutter - 3, 0.6 * row.alpha
+                ink.box(left, y - half, right, y + half, AMBER, alpha, 3)
             radius = min(4.5 * self.scale, 0.3 * self.pitch)
             ink.disc(self.edge + radius, y, radius, colour, row.alpha)
             name = self.rows.factory.robots[row.robot].name

@@ -20,15 +20,19 @@ class Bundles:
     def __init__(
         self, modes: Sequence[Mode], axes_of: Sequence[tuple[int, ...]], limits: Limits
     ) -> None:
-        self.modes, self._axes_of = tuple(modes), tuple(axes_of)
+        self.modes, self.axes_of = tuple(modes), tuple(axes_of)
         self._axes = np.array([axis for axes in axes_of for axis in axes], np.intp)
         self._kept: dict[tuple[int, ...], tuple[Bundle, Index]] = {}
         self.limit(limits)
 
+    def with_more(self, modes: Sequence[Mode], axes_of: Sequence[tuple[int, ...]]) -> Bundles:
+        """Those, and then these."""
+        return Bundles((*self.modes, *modes), (*self.axes_of, *axes_of), self.limits)
+
     def limit(self, limits: Limits) -> None:
         """From now on axes have these limits."""
         self.limits = limits
-        self._all = Bundle.of(self.modes, [limits.of(axes) for axes in self._axes_of])
+        self._all = Bundle.of(self.modes, [limits.of(axes) for axes in self.axes_of])
         self._kept.clear()
 
     def of(self, numbers: tuple[int, ...]) -> tuple[Bundle, Index]:

@@ -20,8 +20,8 @@ class RunRequest:
     begins from, m_0 where None. `wip`: most units inside at once. `distributed`: robots run their
     own programs. `fuse`: parts joined for good become one rigid body. `shown`: it is filmed, logged
     or watched; if not, the model has nothing that is only shown, and the run is the same and
-    faster. `fast`: with what only makes it faster. `catalogue`: robot types, the shipped ones where
-    None.
+    faster. `recovers`: with some bodies more, for parts that are scrapped. `fast`: with what only
+    makes it faster. `catalogue`: robot types, the shipped ones where None.
     """
 
     world: WorldName = "mujoco"
@@ -34,5 +34,6 @@ class RunRequest:
     distributed: bool = False
     fuse: bool = False
     shown: bool = True
+    recovers: bool = False
     fast: bool = True
     catalogue: Catalogue | None = field(default=None, hash=False)

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import NamedTuple
 
+from factory.nets.undone import Entry, Undone, lasting
 from factory.plant.approaches import Pair
 from factory.plant.factory import Factory
 from factory.record.ending import CutOff
+from factory.record.failures import Failures
 from factory.record.monitor.report import Report
 from factory.record.verdict import RunVerdict, judged, kept_figures
 from factory.support.errors import Diagnostic
@@ -20,6 +22,15 @@ class Event(NamedTuple):
 
     t: float
     transition: str
+
+    def as_json(self) -> dict[str, object]:
+        """As `run --json` prints it."""
+        return {"t": round(self.t, 6), "transition": self.transition}
+
+
+def entries_of(events: Iterable[Event | Undone]) -> Iterator[Entry]:
+    """The events as a replay takes them: firings by their names."""
+    return (event.transition if isinstance(event, Event) else event for event in events)
 
 
 STEADY = 4
@@ -37,12 +48,12 @@ def mean_interval(left: Sequence[float], period: int = 1) -> float | None:
     return (tail[-1] - tail[-1 - count]) / count
 
 
-def busy_times(factory: Factory, events: Iterable[Event]) -> tuple[float, ...]:
+def busy_times(factory: Factory, events: Iterable[Event | Undone]) -> tuple[float, ...]:
     """How long each robot was in operations that have ended [s]; one without a start among the
     events was under way from the beginning, time 0."""
     numbers = {t.name: number for number, t in enumerate(factory.net.threaded.transitions)}
     begun, spent = dict[int, float](), [0.0] * len(factory.robots)
-    for t, transition in events:
+    for t, transition in (e for e in events if isinstance(e, Event)):
         operation, is_end = divmod(numbers[transition], 2)
         if not is_end:
             begun[operation] = t
@@ -106,7 +117,8 @@ class Run:
     """The record of a run: figures and events. `replays`: an independent replay of the events is a
     run of the net; `trouble` is None for a run that reached its end; `monitor` is what a monitor
     reports that watched it, if one did. `lenient`: what is wrong with the bodies does not count;
-    `period`: how many units come in a cycle of the net."""
+    `period`: how many units come in a cycle of the net; `failures`: what went wrong, in a run that
+    goes on when something does."""
 
     world: str
     units: int
@@ -119,7 +131,7 @@ class Run:
     predicted_cycle_time_s: float | None
     bottleneck: str
     replays: bool
-    events: tuple[Event, ...] = field(repr=False)
+    events: tuple[Event | Undone, ...] = field(repr=False)
     dropoffs: tuple[float, ...] = field(repr=False)
     busy: tuple[float, ...] = field(repr=False)
     physics: PhysicsFigures | None = None
@@ -129,6 +141,18 @@ class Run:
     monitor: Report | None = None
     lenient: bool = False
     period: int = 1
+    failures: Failures | None = None
+
+    @property
+    def fired(self) -> int:
+        """How many transitions fired, those that were undone included."""
+        return sum(isinstance(event, Event) for event in self.events)
+
+    @cached_property
+    def lasting(self) -> tuple[Event, ...]:
+        """The firings that were not undone; they are a run of the net too."""
+        kept = lasting(entries_of(self.events))
+        return tuple(e for e in (self.events[at] for at in kept) if isinstance(e, Event))
 
     @property
     def refines_net(self) -> bool:
@@ -210,7 +234,7 @@ class Run:
             "cycle_time_s": self.cycle_time_s,
             "predicted_cycle_time_s": self.predicted_cycle_time_s,
             "bottleneck": self.bottleneck,
-            "transitions_fired": len(self.events),
+            "transitions_fired": self.fired,
             "refines_net": self.refines_net,
             **{key: getattr(physics, key) if physics else None for key in keys},
             "contacts": list(physics.contacts) if physics else None,
@@ -218,6 +242,7 @@ class Run:
             "fused": physics.fused if physics else None,
             "excluded": [list(pair) for pair in physics.excluded] if physics else None,
             **watched,
+            **({"failures": self.failures.as_json()} if self.failures else {}),
             "verdict": self.verdict.as_json(),
-            "events": [{"t": round(e.t, 6), "transition": e.transition} for e in self.events],
+            "events": [event.as_json() for event in self.events],
         }

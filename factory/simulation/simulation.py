@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from time import perf_counter
@@ -16,19 +16,18 @@ from factory.modes.staging import HeadStart, stages_of
 from factory.nets.history import firings
 from factory.nets.petri import Marking
 from factory.nets.replay import replay
-from factory.plant.fused_bodies import bodies_of, fused_copies
-from factory.problem.robot_types import Catalogue, load_catalogue
+from factory.plant.material import joins_of
 from factory.simulation.distributed import DistributedSupervisor
 from factory.simulation.ideal import IdealWorld
+from factory.simulation.modelling import modelled
 from factory.simulation.request import RunRequest
-from factory.simulation.run import Run, busy_times
+from factory.simulation.run import Run, busy_times, entries_of
 from factory.simulation.starting import start_positions
 from factory.simulation.supervisor import Supervisor
 from factory.simulation.world import World
 from factory.support.errors import Diagnostic, InputError, RunError
 from factory.support.settings import AUTO, MOST, Settings
 from factory.timing.cycle_time import CycleTime
-from factory.timing.pool import part_pool
 from factory.timing.prediction import all_ways, duration, operation_delays, predict
 
 if TYPE_CHECKING:
@@ -96,7 +95,9 @@ class Simulation:
         else:
             from factory.simulation.mujoco.world import MujocoWorld
 
-            self.model = (compiled and compiled.model) or _model(layout, request, self.under_way())
+            self.model = (compiled and compiled.model) or modelled(
+                layout, request, self.under_way()
+            )
             self.request = request = replace(request, wip=self.model.wip)
             loaded = compiled.loaded if compiled else None
             at = start_positions(layout, self.start)
@@ -198,6 +199,8 @@ class Simulation:
                 watched += world.hooks.ended_time
                 trouble = self._trouble("Unstable", f"{reason}, after {before:.2f} s", SMALLER)
                 return self._record(perf_counter() - begin - watched, before, trouble)
+            for act in world.hooks.ticks:
+                act()
             if observers or glances:
                 pause = perf_counter()
                 for observe in (*observers, *glances):
@@ -210,9 +213,11 @@ class Simulation:
     def _ends(self, patience: float, max_time: float | None) -> Diagnostic | None:
         """What ends the run now, whether or not its products have been dropped off."""
         world = self.world
+        if world.hooks.trouble is not None:
+            return world.hooks.trouble
         if world.dropped is not None:
             return world.dropped.diagnostic if world.time >= world.dropped.time + FALL else None
-        if self.silent > patience:
+        if self.silent > patience and world.time > world.hooks.busy + patience:
             what = f"nothing fired for {patience:.2f} s of simulated time"
             return self._trouble("Stalled", what, LOOK)
         if max_time is not None and world.time >= max_time:
@@ -222,7 +227,7 @@ class Simulation:
 
     def _unseen(self, max_time: float | None) -> int:
         """So many ticks may go by at once where nobody looks, and nobody acts between two steps."""
-        if self.world.hooks.before_step:
+        if self.world.hooks.before_step or self.world.hooks.ticks:
             return 1
         if max_time is None:
             return MOST
@@ -233,7 +238,8 @@ class Simulation:
         supervisor, world, factory = self.supervisor, self.world, self.layout.factory
         request, physics, figures = self.request, world.physics_time, world.figures()
         predicted = self.cycle
-        verdict = replay(factory.net, [e.transition for e in supervisor.events], self.start)
+        entries = entries_of(supervisor.events)
+        verdict = replay(factory.net, entries, self.start, joins_of(factory))
         return Run(
             request.world,
             request.units,
@@ -291,49 +297,8 @@ def compiled(layout: Layout, request: RunRequest) -> Compiled:
         return Compiled(modes)
     from factory.mjcf.loading import load
 
-    model = _model(layout, request, {})
+    model = modelled(layout, request, {})
     return Compiled(modes, model, load(model))
-
-
-def _model(layout: Layout, request: RunRequest, under_way: Mapping[str, int]) -> Model:
-    """The model that a run takes."""
-    units, settings, catalogue, wip = (
-        request.units,
-        request.settings,
-        request.catalogue,
-        request.wip,
-    )
-    return physical_model(
-        layout, units, settings, catalogue, wip, under_way, request.fuse, request.shown
-    )
-
-
-def physical_model(
-    layout: Layout,
-    units: int | None = None,
-    settings: Settings | None = None,
-    catalogue: Catalogue | None = None,
-    wip: int | None = None,
-    under_way: Mapping[str, int] | None = None,
-    fuse: bool = False,
-    shown: bool = True,
-) -> Model:
-    """The MJCF model of a layout with the bodies it needs for `units` (None: for ever): the pool of
-    parts, or with `fuse` bodies of sub-assemblies too, and then few parts. Where the pool is too
-    large, at most so many units are inside as `fitting_wip` says, unless `wip` is given. `shown`:
-    with what is only shown, too."""
-    from factory.mjcf.model import build_model, fitting_wip, part_copies
-
-    factory = layout.factory
-    bodies = bodies_of(factory, layout.product, fuse)
-    if bodies.wholes:
-        copies = fused_copies(bodies, factory, units)
-    else:
-        pool = part_pool(factory)
-        wip = wip or fitting_wip(pool, units)
-        copies = part_copies(pool, units, wip, under_way)
-    catalogue, settings = catalogue or load_catalogue(), timed(settings or Settings(), layout)
-    return build_model(layout, catalogue, copies, settings, bodies, shown, wip)
 
 
 def require(run: Run) -> Run:

@@ -7,7 +7,7 @@ robot costs nothing.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Container, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -17,8 +17,10 @@ from factory.control.navigation import Bundle
 from factory.modes.staging import HeadStart
 from factory.nets.petri import Marking
 from factory.nets.threads import Threads
+from factory.nets.undone import Undone
 from factory.plant.factory import Factory, Operation
 from factory.simulation.bundles import Bundles
+from factory.simulation.keeping import Keeper, up_to
 from factory.simulation.run import Event
 from factory.simulation.world import World
 
@@ -96,7 +98,7 @@ class Supervisor:
         starts = [operation.start for operation in factory.operations]
         self.threads = Threads(net.threaded, net.threads_of(start), starts)
         self.fired = [counts.get(number, 0) for number in range(len(net.threaded.transitions))]
-        self.events: list[Event] = []
+        self.events: list[Event | Undone] = []
         self.ahead, self.active = Ahead(factory, stages), Active()
         self.near = self.enabled = True
         marked = self.threads.marked
@@ -134,6 +136,30 @@ class Supervisor:
             ticks = 1
         self.near = self.world.step(self.active.bundle, self.active.axes, ticks)
 
+    def undo(
+        self, undone: Undone, fired: Sequence[int], marking: Marking, free: Container[int]
+    ) -> None:
+        """Go on from a marking, that of the counts `fired`: operations that are no longer marked
+        are over, as are the stages of axes that are `free`."""
+        factory, active = self.factory, self.active
+        self.fired[:] = fired
+        self.events.append(undone)
+        starts = [operation.start for operation in factory.operations]
+        self.threads = Threads(factory.net.threaded, factory.net.threads_of(marking), starts)
+        self.enabled = True
+        self._activate([n for n in active.operations if self.marked[n]], active.ahead)
+        self.recall(free)
+
+    def recall(self, axes: Container[int]) -> None:
+        """The stages of axes are over, wherever those are."""
+        ahead, own = self.active.ahead, self.bundles.axes_of
+        kept = [n for n in ahead if not any(axis in axes for axis in own[n])]
+        self._activate(self.active.operations, kept)
+
+    def send(self, stages: Iterable[int]) -> None:
+        """Let the axes of stages, by number, go to where those lead."""
+        self._activate(self.active.operations, (*self.active.ahead, *stages))
+
     def coast(self, ticks: int = 1) -> None:
         """Let the world go on in the modes under way, for some ticks in which nothing fires."""
         self.world.step(self.active.bundle, self.active.axes, ticks)
@@ -146,6 +172,38 @@ class Supervisor:
     def awaited(self) -> list[Operation]:
         """The operations all of whose robots wait for them."""
         return [self.factory.operations[event // 2] for event in sorted(self.threads.possible)]
+
+    def keep(self, keeper: Keeper, past: Sequence[tuple[float, int]] = ()) -> None:
+        """How often each transition has fired, and the modes under way; `past`: when each has [s],
+        and its number, where that is taken up. Raises ValueError where these are not of one run."""
+        fired = np.array(self.fired)
+        keeper.array("fired", fired, 0)
+        going = [(number,) for number in self.active.operations]
+        going = keeper.rows("going", going, up_to(len(self.factory.operations)))
+        ahead = [(number,) for number in self.active.ahead]
+        ahead = keeper.rows("ahead", ahead, self.ahead.place.__contains__)
+        clocks = np.zeros(len(going) + len(ahead))
+        if self.active.clocks is not None:
+            clocks[:] = self.active.clocks
+        keeper.array("clocks", clocks, 0)
+        enabled, near = keeper.flag("enabled", self.enabled), keeper.flag("near", self.near)
+        if not keeper.takes_up:
+            return
+        for _, event in past:
+            self.threads.fire((event,))
+            self.fired[event] += 1
+        if self.fired != fired.tolist():
+            raise ValueError("its counts of firings are not those of its record")
+        transitions = self.factory.net.threaded.transitions
+        self.events += [Event(t, transitions[event].name) for t, event in past]
+        numbers = [number for (number,) in going]
+        if sorted(numbers) != [o.index for o in self.factory.operations if self.marked[o.place]]:
+            raise ValueError("its operations under way are not those of its marking")
+        self.active = Active()
+        self._activate(numbers, [number for (number,) in ahead])
+        if clocks.any():
+            self.active.clocks = clocks
+        self.enabled, self.near = enabled, near
 
     def _startable(self) -> list[int]:
         """Operations X with X_s enabled: waits marked (their goals are everything), the robots in
@@ -187,7 +245,16 @@ class Supervisor:
                 return []
         still = np.logical_and.reduceat(np.abs(v[active.axes]) < STILL, active.bundle.starts)
         numbers = (*active.operations, *active.ahead)
-        return [numbers[number] for number in (there & still).nonzero()[0].tolist()]
+        over = [numbers[number] for number in (there & still).nonzero()[0].tolist()]
+        return [n for n in over if self._passes(n)] if self.world.hooks.judges else over
+
+    def _passes(self, number: int) -> bool:
+        """Whether what has come to its goal may end: every stage may."""
+        if number >= len(self.factory.operations):
+            return True
+        operation = self.factory.operations[number]
+        unit = self.factory.unit(operation, self.fired[operation.end])
+        return self.world.hooks.pass_on(operation, unit)
 
     def _fire(self, started: list[int], ended: list[int]) -> None:
         operations, now, fired = self.factory.operations, self.world.time, self.fired

@@ -19,8 +19,10 @@ def watched(
 ) -> Run:
     """`simulation.run`, with a monitor where there are bodies. It looks where operations end, where
     a weld is switched, and at times; with `every_tick` after every tick, and so it does where
-    robots run their own programs, which stop within ticks."""
-    if simulation.model is None:
+    robots run their own programs, which stop within ticks. A run that goes on where something fails
+    has none: it is the states alone that a monitor judges, and these do not tell what was undone.
+    """
+    if simulation.model is None or simulation.request.recovers:
         return simulation.run(observers, max_time, glances)
     monitor = beside(simulation)
     if every_tick:
@@ -29,4 +31,4 @@ def watched(
         look = monitor.observe if simulation.request.distributed else monitor.glance
         glances = [look, *glances]
     run = simulation.run(observers, max_time, glances)
-    return replace(run, monitor=monitor.report(run.events))
+    return replace(run, monitor=monitor.report(run.lasting))

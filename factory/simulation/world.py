@@ -10,6 +10,8 @@ from typing import Protocol
 from factory.control.mode import Array, Index
 from factory.control.navigation import Bundle
 from factory.plant.factory import Operation
+from factory.record.failures import Account
+from factory.simulation.keeping import Keeper
 from factory.simulation.run import PhysicsFigures
 from factory.support.errors import Diagnostic
 
@@ -22,16 +24,23 @@ class Hooks:
     """Where others take part in a world.
 
     `before_step`: called before every timestep. `sensors`: from positions [m] and speeds [m/s] of
-    all axes to what is sensed. `gates`: an operation may start only where all say so. `ended`:
-    called when operations have ended and parts have changed hands, before the world goes on, to
-    look at it; `ended_time` [s]: what that took.
+    all axes to what is sensed. `gates`: an operation may start only where all say so; `judges`: it
+    may end only where all do. `ticks`: called after every tick. `ended`: called when operations
+    have ended and parts have changed hands, before the world goes on, to look at it; `ended_time`
+    [s]: what that took. `trouble`: what ends the run, if anything does; `busy` [s]: until when it
+    is no stall that nothing fires. `account`: what a run that goes on after failures tells of them.
     """
 
     before_step: list[Callable[[], None]] = field(default_factory=list)
     sensors: list[Callable[[Array, Array], tuple[Array, Array]]] = field(default_factory=list)
     gates: list[Callable[[Operation, int], bool]] = field(default_factory=list)
+    judges: list[Callable[[Operation, int], bool]] = field(default_factory=list)
+    ticks: list[Callable[[], None]] = field(default_factory=list)
     ended: list[Callable[[], None]] = field(default_factory=list)
     ended_time: float = 0.0
+    trouble: Diagnostic | None = None
+    busy: float = 0.0
+    account: Account | None = None
 
     def sensed(self, x: Array, v: Array) -> tuple[Array, Array]:
         """What sensors make of positions and speeds."""
@@ -42,6 +51,10 @@ class Hooks:
     def admit(self, operation: Operation, unit: int) -> bool:
         """Whether all gates are open for an operation."""
         return all(gate(operation, unit) for gate in self.gates)
+
+    def pass_on(self, operation: Operation, unit: int) -> bool:
+        """Whether all judges let an operation end."""
+        return all(judge(operation, unit) for judge in self.judges)
 
     def tell_ended(self) -> None:
         """Operations have ended."""
@@ -78,7 +91,7 @@ class World(Protocol):
         """Where others take part."""
 
     @property
-    def dropoffs(self) -> Sequence[float]:
+    def dropoffs(self) -> list[float]:
         """When each product left the factory [s]."""
 
     @property
@@ -120,6 +133,11 @@ class World(Protocol):
     def dropped(self) -> Drop | None:
         """The first that a robot has let fall, None while none has. From then on nothing may
         fire."""
+
+    def keep(self, keeper: Keeper, bundle: Bundle | None, axes: Index) -> None:
+        """All that goes on between two ticks, while the modes of a bundle are active on `axes`, to
+        be noted down or taken up; `dropoffs` apart. Raises ValueError where what is taken up is no
+        state of this world."""
 
     def figures(self) -> PhysicsFigures | None:
         """What only bodies can tell, None where there are none."""

@@ -16,6 +16,7 @@ from factory.pipeline import Project
 from factory.plant.factory import Factory
 from factory.problem.shapes import is_plain
 from factory.study.allocation.least import Least, least_robots
+from factory.study.failures import FailureStudy, failure_study
 from factory.support.errors import Diagnostic
 from factory.timing.pool import part_pool
 
@@ -30,8 +31,8 @@ class Checked:
     """A net with its verdict, of a PAG called `name` or read from PNML. `pool`: copies of each part
     that are inside at once; `matings`: how its inputs come together, None where no part has a shape
     of its own; `product`: None where every part is a default box; `no_grips`: what no hand can
-    hold, None where hands are not chosen; `factory`, and the `least` robots that can make its
-    product, None for a net from elsewhere."""
+    hold, None where hands are not chosen; `factory`, the `least` robots that can make its product,
+    and what is done about its `failures`, None for a net from elsewhere."""
 
     name: str
     net: GearNet | MarkedNet
@@ -44,6 +45,7 @@ class Checked:
     no_grips: tuple[NoGrip, ...] | None = None
     factory: Factory | None = None
     least: Least | None = None
+    failures: FailureStudy | None = None
 
     def as_json(self) -> dict[str, Any]:
         """The keys of `check --json`."""
@@ -66,6 +68,7 @@ class Checked:
             "clashes": [mating.clashes_as_json() for mating in blocked],
             **({} if no_grips is None else {"no_grips": no_grips}),
             **self._allocation(),
+            **({} if self.failures is None else {"failures": self.failures.as_json()}),
             "warnings": [warning.as_json() for warning in self.warnings],
         }
 
@@ -94,14 +97,16 @@ def _gear_json(gear: Gear, places: Sequence[Place]) -> dict[str, Any]:
     }
 
 
-def check_project(project: Project, wip: int | None = None) -> Checked:
-    """Check a PAG, with at most `wip` units inside at once. Raises InputError."""
+def check_project(project: Project, wip: int | None = None, costs: bool | None = None) -> Checked:
+    """Check a PAG, with at most `wip` units inside at once, and find the `costs` of failures if
+    that is said, or the factory is small and live. Raises InputError."""
     factory = project.factory
     sources = {r.name: r.position for r in factory.robots if r.position}
+    verdict = verify(factory.net, sources)
     return Checked(
         project.pag.root,
         factory.net,
-        verify(factory.net, sources),
+        verdict,
         len(factory.pag),
         part_pool(factory, wip),
         project.matings,
@@ -110,6 +115,7 @@ def check_project(project: Project, wip: int | None = None) -> Checked:
         project.no_grips if project.settings.hands else None,
         factory,
         least_robots(project.pag, project.templates),
+        failure_study(project, costs if verdict.holds else False),
     )
 
 

@@ -18,13 +18,24 @@ def claimed(path: Path) -> FileIO:
     pipe or a device is not claimed. Raises InputError (BadFile) where another process holds it,
     which leaves that one's file as it is, and OSError where it cannot be opened.
     """
-    file = FileIO(path, "a")
+    file = _claimed(path, "a")
     if path.is_file():
-        if not _lock(file):
-            file.close()
-            words, hint = IN_USE
-            raise InputError(Diagnostic("BadFile", f"'{path}' {words}", None, hint))
         file.truncate(0)
+    return file
+
+
+def claimed_again(path: Path) -> FileIO:
+    """A file that is there, to be written on, at its beginning, with its content as it is. It is
+    claimed as by `claimed`, which raises the same."""
+    return _claimed(path, "r+")
+
+
+def _claimed(path: Path, mode: str) -> FileIO:
+    file = FileIO(path, mode)
+    if path.is_file() and not _lock(file):
+        file.close()
+        words, hint = IN_USE
+        raise InputError(Diagnostic("BadFile", f"'{path}' {words}", None, hint))
     return file
 
 

@@ -150,10 +150,10 @@ def predict(
     robot; the bound `wip` on what is inside."""
     factory = layout.factory
     if world == "mujoco" and factory.folded:
-        ways = longer(ways, turn_ways(layout, settings))
+        ways = longer(ways, turn_ways(layout, delays, settings))
     found = [cycle_time(factory, delays, ways)]
     if world == "mujoco":
-        found += serving(layout, delays, settings)
+        found += serving(layout, delays, settings, ways)
     if wip is not None:
         most = min(wip, len(factory.robots))  # no more are inside without a bound
         bounded = with_wip(factory, most)

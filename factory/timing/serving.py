@@ -11,6 +11,8 @@ from collections.abc import Iterator, Mapping, Sequence
 
 from factory.control.profile import SpeedProfile
 from factory.layout.feeding import feeder_of, passing
+from factory.layout.hands.leaving import raised
+from factory.layout.hands.limbs import rises_first
 from factory.layout.layout import Layout
 from factory.layout.outfeed import away
 from factory.nets.ways import Way
@@ -22,40 +24,66 @@ CALM = 3
 """So many ticks after its stroke a slider is at rest."""
 
 
-def serving(layout: Layout, delays: Sequence[float], settings: Settings) -> Iterator[CycleTime]:
+def serving(
+    layout: Layout, delays: Sequence[float], settings: Settings, ways: Mapping[Way, float]
+) -> Iterator[CycleTime]:
     """The least cycle times that the outfeed, and feeders for which robots wait, allow, with the
-    operations' delays [s]; `turn_ways` has those of robots with several tours."""
+    operations' delays [s], and the `ways` of robots that take longer; `turn_ways` has those of
+    robots with several tours."""
     dropped = [delays[dropoff.index] for dropoff in layout.factory.dropoffs]
     yield CycleTime(sum(dropped) / len(dropped) + away(layout, settings), "outfeed")
     for leaf in layout.factory.leaves:
         robot = layout.factory.robots[leaf.carrier]
         if len(layout.factory.tours[leaf.carrier]) > 1:
             continue
-        fed = _fed(layout, leaf, delays, settings)
-        if fed > sum(delays[number] for number in robot.operations):
+        taken = {n: max(delays[n], ways.get((robot.index, n), 0.0)) for n in robot.operations}
+        busy, down = sum(taken.values()), _down(layout, leaf, settings)
+        late = _turn(layout, leaf, robot.operations[-1], delays, settings)
+        strokes = 2 * (down + (CALM + 1) * settings.tick)
+        fed = max(busy - taken[leaf.index] + late, strokes)
+        if fed > busy:
             yield CycleTime(fed / layout.factory.period, f"feeder {leaf.label}")
 
 
-def _fed(layout: Layout, leaf: Operation, delays: Sequence[float], settings: Settings) -> float:
-    """The cycle time of a feeder, and of its robot where that waits for it [s]."""
-    gear = layout.factory.robots[leaf.carrier].operations
-    busy = sum(delays[number] for number in gear) - delays[leaf.index]
-    down, rest = _down(layout, leaf, settings), (CALM + 1) * settings.tick
-    return max(busy + _served(layout, leaf, gear[-1], settings) + rest, 2 * (down + rest))
-
-
-def turn_ways(layout: Layout, settings: Settings) -> dict[Way, float]:
-    """How long after the end of a tour the next part can be taken at the earliest [s], for robots
-    with several tours, by the robot and the operation that takes the part."""
+def turn_ways(layout: Layout, delays: Sequence[float], settings: Settings) -> dict[Way, float]:
+    """How long after the end of a tour the next part can be taken at the earliest [s], by the robot
+    and the operation that takes the part, with the operations' delays [s]."""
     factory = layout.factory
-    found: dict[Way, float] = {}
-    for robot, tours in enumerate(factory.tours):
-        for step, tour in enumerate(tours if len(tours) > 1 else ()):
-            leaf, before = factory.operations[tour[0]], tours[step - 1][-1]
-            if not leaf.inputs:
-                late = _served(layout, leaf, before, settings)
-                found[robot, leaf.index] = late + (CALM + 1) * settings.tick
-    return found
+    return {
+        (robot, leaf.index): _turn(layout, leaf, tours[step - 1][-1], delays, settings)
+        for robot, tours in enumerate(factory.tours)
+        for step, tour in enumerate(tours)
+        for leaf in (factory.operations[tour[0]],)
+        if not leaf.inputs
+    }
+
+
+def _turn(
+    layout: Layout, leaf: Operation, before: int, delays: Sequence[float], settings: Settings
+) -> float:
+    """How long after the operation before a part can be taken at the earliest [s]."""
+    robot, hand = leaf.carrier, layout.hand(leaf.carrier)
+    late = _served(layout, leaf, before, settings) + (CALM + 1) * settings.tick
+    if robot in layout.factory.adjusted:
+        late += _set(layout, robot, (before, leaf.index), settings)
+    if rises_first(layout, robot):
+        late = max(late, _raised(layout, robot, settings))
+    if hand is not None and (hand.first or hand.kind == "above"):
+        late += delays[leaf.index]  # it sets out when the part is down
+    return late
+
+
+def _raised(layout: Layout, robot: int, settings: Settings) -> float:
+    """How long after it has delivered a robot's hand is above that [s]."""
+    profile = SpeedProfile(settings.speed, settings.acceleration)
+    return profile.passes(layout.strokes[robot], raised(layout, robot).least)
+
+
+def _set(layout: Layout, robot: int, between: tuple[int, int], settings: Settings) -> float:
+    """How long the lift of a robot that is at home takes to be set for the next operation [s]."""
+    before, after = (layout.level(robot, number).up for number in between)
+    profile = SpeedProfile(settings.speed, settings.acceleration)
+    return profile.rest(abs(after - before)) + settings.settle
 
 
 def _down(layout: Layout, leaf: Operation, settings: Settings) -> float:

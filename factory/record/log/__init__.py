@@ -22,8 +22,12 @@ appended to.
        contact_dist                       their distances [m]
        fired_at, fired, fired_t           row, number and time [s] of the transitions fired
        ended_at                           the rows that are ends of operations, not ticks
+    C  a checkpoint, about every simulated second: the state of the run where the ticks before it
+       end, to be gone on with; see `simulation.checkpoint`. Readers of runs pass it over
     E  the end: the file was closed properly
        figures, bytes (mujoco only)       what its verdict rests on, JSON: see `record.verdict`
+       failures, bytes                    what went wrong, JSON as in `run --json`, where the run
+                                          goes on after failures
        code, message, bytes               what ended the run, as a diagnostic has it, where it
                                           ended before its units were made
 

@@ -108,6 +108,11 @@ def maybe(test: Test) -> Test:
     return lambda v: v is None or test(v)
 
 
+def is_choice(value: Any) -> bool:
+    """Whether a value says of timestep and wip whether they were chosen."""
+    return tabled(of(bool))(value) and value.keys() == {"timestep", "wip"}
+
+
 KEYS = (
     Key("nq", "a whole number from 0", is_count),
     Key("nv", "a whole number from 0", is_count),
@@ -118,6 +123,9 @@ KEYS = (
     Key("jitter", "a number from 0 to less than 1", lambda v: is_number(v) and 0 <= v < 1),
     Key("units", "a whole number from 1", whole(1, LARGE)),
     Key("wip", "a whole number from 1, or null", maybe(whole(1, LARGE)), later=True),
+    Key("fuse", "true or false", of(bool), later=True),
+    Key("chosen", "true or false for timestep and wip", is_choice, later=True),
+    Key("distributed", "true or false", of(bool), later=True),
     Key("start", "a list of numbers of places", listed(is_count), later=True),
     Key("settings", "a table of numbers", tabled(is_number)),
     Key("product", "a text", is_text),

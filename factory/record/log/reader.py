@@ -13,10 +13,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from factory.nets.undone import Entry, lasting
 from factory.record.ending import CutOff
+from factory.record.failures import Failures
 from factory.record.log.blocks import LENGTH, MAGIC, Arrays, bad_log, blocks, is_cut, unpack_rows
+from factory.record.log.failed import failures_in
 from factory.record.log.header import check_header
 from factory.record.log.ticks import check_block, check_course, state_bytes
+from factory.record.log.undone import Placed, undone_in
 from factory.record.verdict import check_figures
 from factory.support.claim import is_claimed
 from factory.support.errors import InputError
@@ -73,7 +77,8 @@ class Log:
     logs of older versions. `complete`: whether the file was closed properly; `cut_off`: how far the
     run came, None where all of its units were made and the log has all of it. `ends`: the state as
     operations ended, and `figures` of the bodies, as `kept_figures` gives them; None in the ideal
-    world and in logs of older versions."""
+    world and in logs of older versions. `undone`: what was undone, each with how many transitions
+    had fired before it. `failures`: what went wrong, in a run that goes on when something does."""
 
     header: Mapping[str, Any] = field(repr=False)
     xml: str = field(repr=False)
@@ -93,6 +98,8 @@ class Log:
     cut_off: CutOff | None = None
     ends: Ends | None = field(default=None, repr=False)
     figures: Mapping[str, Any] | None = field(default=None, repr=False)
+    undone: tuple[Placed, ...] = field(default=(), repr=False)
+    failures: Failures | None = field(default=None, repr=False)
 
     def __len__(self) -> int:
         return len(self.time)
@@ -108,6 +115,28 @@ class Log:
         names = self.header["transitions"]
         return tuple((t, names[n]) for t, n in zip(self.fired_t.tolist(), self.fired, strict=True))
 
+    @cached_property
+    def timed_entries(self) -> tuple[tuple[float, Entry], ...]:
+        """Time [s] and name of every transition that fired, and in between what was undone."""
+        found, begin = list[tuple[float, Entry]](), 0
+        for after, undone in self.undone:
+            found += [*self.events[begin:after], (undone.t, undone)]
+            begin = after
+        return (*found, *self.events[begin:])
+
+    @property
+    def entries(self) -> tuple[Entry, ...]:
+        """The same without times, as a replay takes them."""
+        return tuple(entry for _, entry in self.timed_entries)
+
+    @cached_property
+    def lasting(self) -> tuple[tuple[float, str], ...]:
+        """Time [s] and name of every transition that fired and was not undone."""
+        if not self.undone:
+            return self.events
+        kept, entries = lasting(self.entries), self.timed_entries
+        return tuple((t, e) for t, e in (entries[at] for at in kept) if isinstance(e, str))
+
 
 def read_log(path: Path | str) -> Log:
     """The log in a file, whole or cut off. Raises InputError (BadLog) where it is not one."""
@@ -119,7 +148,7 @@ def read_log(path: Path | str) -> Log:
     if not data.startswith(MAGIC):
         raise InputError(bad_log(path, "is no log of factory"))
     try:
-        return _read(memoryview(data), written)
+        return log_in(memoryview(data), written)
     except MemoryError as error:
         raise InputError(bad_log(path, f"takes more memory than there is: {error}")) from error
     except UnicodeDecodeError as error:
@@ -133,13 +162,22 @@ def is_log(path: Path | str) -> bool:
     return head_of(Path(path), len(MAGIC)) == MAGIC
 
 
-def _read(data: memoryview, written: bool) -> Log:
+def header_in(data: memoryview) -> tuple[dict[str, Any], int]:
+    """The header of a log, and the byte at which its blocks begin. Raises ValueError where it is
+    none."""
     begin = len(MAGIC) + LENGTH.size
     kept = begin + (LENGTH.unpack_from(data, len(MAGIC))[0] if begin <= len(data) else 0)
     if kept > len(data) or begin > len(data):
         raise ValueError(f"it ends in its header, at byte {len(data)}")
     header = json.loads(bytes(data[begin:kept]))
     check_header(header)
+    return header, kept
+
+
+def log_in(data: memoryview, written: bool = False) -> Log:
+    """The log in the bytes of a file; `written`: its run is still going on. Raises ValueError,
+    KeyError, IndexError, TypeError, OverflowError or RecursionError where they are none."""
+    header, kept = header_in(data)
     left = ROOM + FOLD * len(data)
     xml, files, complete = "", {}, False
     trouble: Arrays = {}
@@ -196,6 +234,8 @@ def _read(data: memoryview, written: bool) -> Log:
         if ctrl_ended is None
         else Ends(follows, time[at_end], qpos_ended, qvel_ended, ctrl_ended, active.chosen(at_end)),
         _figures(trouble["figures"]) if "figures" in trouble else None,
+        undone_in(ticks, header),
+        _failures(trouble["failures"], header) if "failures" in trouble else None,
     )
 
 
@@ -212,6 +252,10 @@ def _figures(content: NDArray[Any]) -> Mapping[str, Any]:
     found = json.loads(content.tobytes())
     check_figures(found)
     return MappingProxyType(found)
+
+
+def _failures(content: NDArray[Any], header: Mapping[str, Any]) -> Failures:
+    return failures_in(content.tobytes(), frozenset(header["robots"]))
 
 
 def _broken(data: memoryview, kept: int, written: bool) -> str:

@@ -6,9 +6,10 @@ import hashlib
 import json
 import platform
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import asdict
+from io import FileIO
 from os import SEEK_CUR
 from pathlib import Path
 from typing import Any
@@ -17,8 +18,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from factory.lang import write_pag, write_template
+from factory.nets.undone import Undone
 from factory.problem.pag import PAG
 from factory.record.log.blocks import LENGTH, MAGIC, Arrays, bad_log, block, pack_rows
+from factory.record.log.undone import undone_as_json
 from factory.record.monitor.observation import EngineView
 from factory.record.monitor.subject import subject_of_run
 from factory.record.observed import Observed, Recorder
@@ -26,6 +29,7 @@ from factory.record.verdict import kept_figures
 from factory.support.claim import claimed
 from factory.support.errors import Diagnostic, FactoryError, InputError
 from factory.support.files import unwritten
+from factory.support.settings import AUTO
 from factory.support.version import release
 
 STATES = ("qpos", "qvel", "ctrl")
@@ -33,8 +37,8 @@ STATES = ("qpos", "qvel", "ctrl")
 
 class _Ticks:
     """The ticks of a block: lists with an entry for each, or with a row number and what is recorded
-    of that row; rows of the ends of operations; the marking and the active constraints recorded
-    last."""
+    of that row; rows of the ends of operations; what was undone; the marking and the active
+    constraints recorded last."""
 
     def __init__(self) -> None:
         self.time: list[float] = []
@@ -45,6 +49,7 @@ class _Ticks:
         self.contacts: list[tuple[int, Any, Any]] = []
         self.fired: list[tuple[int, int, float]] = []
         self.ended: list[int] = []
+        self.undone: list[dict[str, object]] = []
         self.marked: bytes | None = None
         self.welds: NDArray[np.intp] | None = None
 
@@ -68,6 +73,7 @@ class _Ticks:
             "fired": fired[:, 1].astype(np.int32),
             "fired_t": fired[:, 2],
             "ended_at": np.array(self.ended, np.int32),
+            **({"undone": _text(json.dumps(self.undone))} if self.undone else {}),
         }
 
 
@@ -76,7 +82,9 @@ class LogWriter(Recorder):
     same file meanwhile.
 
     `pag`: the PAG as it was read, where the factory was compiled from more; `command`: the
-    command line, that of this process unless given. `trouble`: what ended the run early, if
+    command line, that of this process unless given; `checkpoint`: what gives the state of the run
+    after a tick, to be gone on with, None where it has none; `going_on`: the log itself, claimed,
+    of a run that is gone on with, at the place to write on. `trouble`: what ended the run early, if
     something has. Raises InputError where the file cannot be written (BadLog), another run writes
     it, or there is no more room for it (BadFile)."""
 
@@ -86,6 +94,8 @@ class LogWriter(Recorder):
         simulation: Observed,
         pag: PAG | None = None,
         command: Sequence[str] | None = None,
+        checkpoint: Callable[[], Arrays | None] = lambda: None,
+        going_on: FileIO | None = None,
     ) -> None:
         self.path, self.world, self.supervisor = Path(path), simulation.world, simulation.supervisor
         self.view = EngineView(self.world.m, self.world.d) if simulation.model else None
@@ -93,15 +103,26 @@ class LogWriter(Recorder):
         net = simulation.layout.factory.net.threaded
         self.numbers = {t.name: n for n, t in enumerate(net.transitions)}
         self.most = max(1, round(1.0 / simulation.request.settings.tick))
-        self.events = 0
+        self.events = len(self.supervisor.events)
         self.ticks = _Ticks()
         self.trouble: Diagnostic | None = None
+        self.checkpoint = checkpoint
+        self.file = self._begun(simulation, pag, command) if going_on is None else going_on
+        if going_on is None or not self.world.time:
+            self.observe(self.world, self.supervisor)
+        if self.view is not None:
+            self.world.hooks.ended.append(self.ended)
+
+    def _begun(
+        self, simulation: Observed, pag: PAG | None, command: Sequence[str] | None
+    ) -> FileIO:
+        """The file, with its header and the model."""
         sizes = [len(values) for values in self._state()[:2]]
         header = json.dumps(_header(simulation, pag, command, *sizes)).encode()
         content = MAGIC + LENGTH.pack(len(header)) + header + _model(simulation)
         try:
             self.path.parent.mkdir(parents=True, exist_ok=True)
-            self.file = claimed(self.path)
+            file = self.file = claimed(self.path)
         except OSError as error:
             raise InputError(bad_log(self.path, f"cannot be written: {error.strerror}")) from error
         try:
@@ -109,19 +130,25 @@ class LogWriter(Recorder):
         except InputError:
             if self.path.is_file():
                 self.path.unlink()
-            self.file.close()
+            file.close()
             raise
-        self.observe(self.world, self.supervisor)
-        if self.view is not None:
-            self.world.hooks.ended.append(self.ended)
+        return file
 
     def ended(self) -> None:
         """Operations have ended: record what is there before the engine goes on."""
         if not self.file.closed:
             self.ticks.ended.append(len(self.ticks.time))
-            self.observe(self.world, self.supervisor)
+            self._record(self.world, self.supervisor)
 
     def observe(self, world: Any, supervisor: Any) -> None:
+        self._record(world, supervisor)
+        if len(self.ticks.time) >= self.most:
+            self.flush()
+            if (state := self.checkpoint()) is not None:
+                self._append(block(b"C", state))
+
+    def _record(self, world: Any, supervisor: Any) -> None:
+        """A row of the log."""
         ticks, row = self.ticks, len(self.ticks.time)
         ticks.time.append(world.time)
         ticks.delivered.append(world.delivered() - self.before)
@@ -137,11 +164,13 @@ class LogWriter(Recorder):
                 ticks.active.append((row, welds))
             if self.view.d.ncon:
                 ticks.contacts.append((row, contact.geom.copy(), contact.dist.copy()))
-        for event in supervisor.events[self.events :]:
+        for number, event in enumerate(supervisor.events[self.events :], start=self.events):
+            if isinstance(event, Undone):
+                before = sum(not isinstance(e, Undone) for e in supervisor.events[:number])
+                ticks.undone.append(undone_as_json(event, before))
+                continue
             ticks.fired.append((row, self.numbers[event.transition], event.t))
         self.events = len(supervisor.events)
-        if row + 1 == self.most:
-            self.flush()
 
     def flush(self) -> None:
         """Write the ticks since the last block."""
@@ -179,7 +208,9 @@ class LogWriter(Recorder):
             texts = {"code": self.trouble.code, "message": self.trouble.message}
         if (figures := self.world.figures()) is not None:
             texts["figures"] = json.dumps(kept_figures(figures))
-        return {name: np.frombuffer(text.encode(), "u1") for name, text in texts.items()}
+        if (account := self.world.hooks.account) is not None:
+            texts["failures"] = json.dumps(account.report().as_json())
+        return {name: _text(text) for name, text in texts.items()}
 
     def _append(self, content: bytes) -> None:
         """Write all of it or, where there is no room, nothing, so that the file can be closed."""
@@ -197,6 +228,11 @@ class LogWriter(Recorder):
             return self.world.x.copy(), self.world.v.copy()
         d = self.view.d
         return d.qpos.copy(), d.qvel.copy(), d.ctrl.copy()
+
+
+def _text(text: str) -> NDArray[np.uint8]:
+    """A text as an array."""
+    return np.frombuffer(text.encode(), "u1")
 
 
 def _ragged(name: str, rows: Sequence[tuple[int, Any]], shape: tuple[int, ...]) -> Arrays:
@@ -229,13 +265,19 @@ def _header(
     text = said if layout.plain is None else write_pag(factory.pag)
     templates = {o.template.name: o.template for o in factory.operations}
     return {
-        "versions": {"python": platform.python_version(), **_versions()},
+        "versions": {"python": platform.python_version(), **versions()},
         "command": list(sys.argv if command is None else command),
         "world": simulation.request.world,
         "seed": simulation.request.seed,
         "jitter": simulation.request.jitter,
         "units": simulation.request.units,
         "wip": simulation.request.wip,
+        "chosen": {
+            "timestep": simulation.asked.settings.timestep == AUTO,
+            "wip": simulation.asked.wip is None,
+        },
+        "distributed": simulation.request.distributed,
+        "fuse": simulation.request.fuse,
         "start": sorted(simulation.start),
         "settings": asdict(simulation.request.settings),
         "product": file.stem or "factory",
@@ -256,6 +298,7 @@ def _header(
     }
 
 
-def _versions() -> dict[str, str]:
+def versions() -> dict[str, str]:
+    """Of the packages that a run depends on."""
     names = ("klavins-factory", "mujoco", "numpy")
     return {name: found for name in names if (found := release(name))}

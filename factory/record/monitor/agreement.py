@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections import deque
+from collections.abc import Iterable, Iterator, Sequence
 
+from factory.nets.petri import PetriNet
+from factory.nets.undone import Entry, Undone
 from factory.record.monitor.report import Firing, Violation
 from factory.record.monitor.subject import MonitorSubject
 
@@ -45,25 +48,44 @@ def disagreements(
 
 
 def contradictions(
-    subject: MonitorSubject, recorded: Recorded, markings: Iterable[tuple[float, Sequence[int]]]
+    subject: MonitorSubject,
+    entries: Iterable[tuple[float, Entry]],
+    markings: Iterable[tuple[float, Sequence[int]]],
 ) -> Iterator[Violation]:
-    """The first marking in a log that its own firings do not lead to; each is given with the time
-    [s] of its tick."""
+    """The first marking in a log that its own entries do not lead to: what fired, and what was
+    undone. Each marking is given with the time [s] of its tick; what was undone after that tick is
+    in it. Where robots were exchanged the net is another one from then on, and nothing is said."""
     net = subject.factory.net.threaded
-    events: Mapping[str, int] = net.net.transition_index
-    marked, at = set(subject.start), 0
+    tokens = [int(place in subject.start) for place in range(len(net.places))]
+    left = deque(entries)
     for time, marking in markings:
-        while at < len(recorded) and recorded[at][0] < time - ROUNDING:
-            event = events[recorded[at][1]]
-            marked.difference_update(net.net.preset[event])
-            marked.update(net.net.postset[event])
-            at += 1
+        while left and left[0][0] < time + (ROUNDING if _is_undone(left[0][1]) else -ROUNDING):
+            _, entry = left.popleft()
+            if isinstance(entry, Undone) and entry.exchanged:
+                return
+            _play(net.net, tokens, entry)
+        marked = {place for place, count in enumerate(tokens) if count}
         if marked != set(marking):
             places = sorted(marked.symmetric_difference(marking))
             names = ", ".join(net.places[place].name for place in places[:4])
             words = f"its firings do not lead to the marking of that time: {names}"
             yield _violation(subject, time, "", words)
             return
+
+
+def _is_undone(entry: Entry) -> bool:
+    return isinstance(entry, Undone)
+
+
+def _play(net: PetriNet, tokens: list[int], entry: Entry) -> None:
+    """Fire a transition, or fire what was undone backwards."""
+    names, sign = (entry.transitions, -1) if isinstance(entry, Undone) else ((entry,), 1)
+    for name in names:
+        event = net.transition_index[name]
+        for place in net.preset[event]:
+            tokens[place] -= sign
+        for place in net.postset[event]:
+            tokens[place] += sign
 
 
 def _violation(subject: MonitorSubject, t: float, label: str, words: str) -> Violation:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -10,6 +10,8 @@ import numpy as np
 
 from factory.nets.gears import GearNet
 from factory.nets.replay import replay
+from factory.plant.factory import Factory
+from factory.plant.material import joins_of
 from factory.record.log.header import settings_of
 from factory.record.log.model import model_of
 from factory.record.log.reader import Ends, Log
@@ -28,8 +30,9 @@ def watch_log(log: Log) -> tuple[Report, MonitorSubject]:
     """The verdict on a recorded run, and its factory, compiled again from the log's header.
 
     Only when nothing is wrong with the states are the log's firings and markings looked at: whether
-    they agree with those, and with each other. Raises InputError (BadLog) for a log of the ideal
-    world, of an older version, or of another factory than its header says.
+    they agree with those, and with each other. States alone do not tell what was undone: where
+    something was, only firings and markings are looked at. Raises InputError (BadLog) for a log of
+    the ideal world, of an older version, or of another factory than its header says.
     """
     m = model_of(log)
     if log.ctrl is None or "monitor" not in log.header:
@@ -37,22 +40,29 @@ def watch_log(log: Log) -> tuple[Report, MonitorSubject]:
         raise InputError(Diagnostic("BadLog", message, None, AGAIN))
     with of_its_factory():
         subject = recorded_subject(log.header)
-        seen = observations(log)
-        monitor = Monitor(subject, Anatomy.of(m, subject.factory), next(seen))
-        for observation in seen:
-            monitor.see(observation)
-        report = monitor.report(log.events)
+        report = Report((), (), ()) if log.undone else _seen(log, subject, m)
         if report.refines_net:
-            found = contradictions(subject, log.events, _markings(log))
+            found = contradictions(subject, log.timed_entries, _markings(log))
             report = replace(report, violations=tuple(found))
     return report, subject
 
 
-def verdict_on(log: Log, net: GearNet, report: Report | None) -> RunVerdict:
-    """The verdict on a run of a net that is recorded in a log, with a monitor's report on that
-    where there is one."""
-    cut, names = log.cut_off, [name for _, name in log.events]
-    refines = replay(net, names, frozenset(log.header["start"])).refines
+def _seen(log: Log, subject: MonitorSubject, m: Any) -> Report:
+    """What a monitor says of the states, and of whether the firings agree with those."""
+    seen = observations(log)
+    monitor = Monitor(subject, Anatomy.of(m, subject.factory), next(seen))
+    for observation in seen:
+        monitor.see(observation)
+    return monitor.report(log.events)
+
+
+def verdict_on(
+    log: Log, factory: Factory, report: Report | None, after: Sequence[GearNet] = ()
+) -> RunVerdict:
+    """The verdict on a run of a factory that is recorded in a log, with a monitor's report on that
+    where there is one; `after`: the nets in which it went on where robots were exchanged."""
+    cut, start = log.cut_off, frozenset(log.header["start"])
+    refines = replay(factory.net, log.entries, start, joins_of(factory), after).refines
     trouble = None if cut is None else cut.failure
     return judged(trouble, refines, log.figures, report)
 

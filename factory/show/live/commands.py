@@ -17,8 +17,18 @@ SHARES = (-1.0, -0.5, 0.5, 1.0)
 """Pushes, as shares of the greatest force of a robot's drive, which can hold no more."""
 
 
-PUSH = 0.3
-"""Duration of a push [s]."""
+PUSH, DOWN = 0.3, 5.0
+"""How long a push lasts, and how long a robot stands [s]."""
+
+FAILURES: Mapping[str, tuple[str, ...]] = {
+    "drop": ("robot",),
+    "spoil": ("part",),
+    "down": ("robot",),
+    "dead": ("robot",),
+}
+"""The commands to a factory that goes on after failures, with the keys that each has: a robot drops
+what it holds, or carries next; the next part of a feeder is no good; a robot stands for DOWN
+seconds; a robot dies."""
 
 KEYS: Mapping[str, tuple[str, ...]] = {
     "pause": (),
@@ -48,18 +58,21 @@ class Command:
     blocked: bool = False
 
 
-def command_of(message: str | bytes, robots: int, parts: Collection[str]) -> Command:
+def command_of(
+    message: str | bytes, robots: int, parts: Collection[str], fails: bool = False
+) -> Command:
     """The command in a message such as `{"do": "slow", "robot": 3, "factor": 0.5}`, to a factory of
-    so many robots and these parts. Raises ValueError with what is wrong and what is valid."""
+    so many robots and these parts; `fails`: it goes on after failures. Raises ValueError with what
+    is wrong and what is valid."""
     try:
         told = json.loads(message)
     except (ValueError, RecursionError):
         raise ValueError("a command is a JSON object") from None
     if not isinstance(told, dict):
         raise ValueError("a command is a JSON object")
-    name = told.get("do")
-    if not isinstance(name, str) or name not in KEYS:
-        raise ValueError(f"'do' is {name!r}: there are {', '.join(KEYS)}")
+    name, keys = told.get("do"), {**KEYS, **(FAILURES if fails else {})}
+    if not isinstance(name, str) or name not in keys:
+        raise ValueError(f"'do' is {name!r}: there are {', '.join(keys)}")
     factors = SPEEDS if name == "speed" else FACTORS
     valid: Mapping[str, tuple[Callable[[Any], bool], str]] = {
         "robot": (lambda v: type(v) is int and 0 <= v < robots, f"a number from 0 to {robots - 1}"),
@@ -68,11 +81,11 @@ def command_of(message: str | bytes, robots: int, parts: Collection[str]) -> Com
         "share": (lambda v: _is_one(v, SHARES), f"one of {SHARES}"),
         "factor": (lambda v: _is_one(v, factors), f"one of {factors}"),
     }
-    for key in KEYS[name]:
+    for key in keys[name]:
         holds, words = valid[key]
         if not holds(told.get(key)):
             raise ValueError(f"'{key}' of '{name}' is {told.get(key)!r}: {words} is needed")
-    return Command(name, **{key: told[key] for key in KEYS[name]})
+    return Command(name, **{key: told[key] for key in keys[name]})
 
 
 def _is_one(value: object, of: Collection[float]) -> bool:

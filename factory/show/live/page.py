@@ -46,6 +46,7 @@ def page(session: Session) -> bytes:
         "roles": list(stage.roles),
         "parts": [o.label for o in factory.leaves],
         "factors": FACTORS,
+        "fails": session.fails,
         "scene": scene(stage, labels, pack),
         "frames": {
             "parents": {},
@@ -70,7 +71,7 @@ def page(session: Session) -> bytes:
         ),
         "options": options(document),
     }
-    styles = ("report/report.css", "live/live.css")
+    styles = ("report/report.css", "report/failures.css", "live/live.css")
     text = filled("live/live.html", fields, document, pack.text(), SCRIPTS, styles, "'self'")
     return text.encode()
 

@@ -12,7 +12,7 @@ from threading import Thread
 from typing import TYPE_CHECKING, Any
 
 from factory.show.live.commands import command_of
-from factory.show.live.session import LiveFrame, Session
+from factory.show.live.session import LiveFrame, Session, Told
 from factory.support.errors import Diagnostic, InputError
 from factory.support.extras import optional
 from factory.support.resource import Closing
@@ -153,11 +153,11 @@ class Server(Closing):
         from websockets.exceptions import ConnectionClosed
 
         factory = self._session.simulation.layout.factory
-        parts = {o.label for o in factory.leaves}
+        parts, fails = {o.label for o in factory.leaves}, self._session.fails
         try:
             for message in connection:
                 try:
-                    command = command_of(message, len(factory.robots), parts)
+                    command = command_of(message, len(factory.robots), parts, fails)
                 except ValueError as error:
                     connection.send(json.dumps({"error": str(error)}))
                 else:
@@ -173,7 +173,7 @@ def _silent() -> logging.Logger:
     return logger
 
 
-def packed(frame: LiveFrame, fired: list[tuple[float, int]]) -> bytes:
+def packed(frame: LiveFrame, fired: list[Told]) -> bytes:
     """A frame as the page reads it: the length of a JSON text (4 bytes, little-endian), the text,
     padded to a multiple of 4, and the poses."""
     told = {**asdict(frame), "fired": fired}

@@ -12,8 +12,10 @@ from time import perf_counter
 import numpy as np
 from numpy.typing import NDArray
 
-from factory.show.live.commands import PUSH, Command
+from factory.nets.undone import Undone
+from factory.show.live.commands import DOWN, PUSH, Command
 from factory.simulation.disturbance.interventions import Interventions
+from factory.simulation.recovery import Campaign
 from factory.simulation.simulation import FALL, Observer, Simulation
 
 RATE = 30.0
@@ -29,12 +31,20 @@ LOOK = 0.05
 """Interval at which a session that is paused looks for commands [s]."""
 
 
+SAID = 6.0
+"""How long a failure is told [s]."""
+
+Told = tuple[float, int | list[int]]
+"""When [s], and which transition fired, or which were undone."""
+
+
 @dataclass(frozen=True, slots=True)
 class LiveFrame:
     """The state at an instant, as the page is told it. `number`: of the frame; `run`: number of
     restarts; `poses`: positions [m] and quaternions (bodies, 7) as float32; `marked` places;
-    `count`: how many transitions have fired; `rhythm`: between the last two products [s]; `pace`:
-    simulated seconds in a second; `note`: what is wrong, if anything."""
+    `count`: how often something has fired, or was undone; `rhythm`: between the last two products
+    [s]; `pace`: simulated seconds in a second; `standing`: robots that stand; `note`: what is
+    wrong, if anything."""
 
     number: int
     run: int
@@ -49,6 +59,7 @@ class LiveFrame:
     pace: float
     slowed: dict[int, float]
     blocked: tuple[str, ...]
+    standing: tuple[str, ...]
     note: str
 
 
@@ -81,11 +92,18 @@ class WallClock:
 
 
 class Session:
-    """Runs what `make` gives, anew after each restart; `run` ends with an exception of an observer.
-    `frame` may be read, `send` and `wait` called from any thread."""
+    """Runs what `make` gives, anew after each restart; with a `campaign` it goes on after failures,
+    and can be made to fail. `run` ends with an exception of an observer. `frame` may be read,
+    `send` and `wait` called from any thread."""
 
-    def __init__(self, make: Callable[[], Simulation], playing: bool = True) -> None:
-        self._make, self._clock = make, WallClock()
+    def __init__(
+        self,
+        make: Callable[[], Simulation],
+        playing: bool = True,
+        campaign: Campaign | None = None,
+    ) -> None:
+        self._make: Callable[[], Interventions] = lambda: Interventions(make(), campaign)
+        self._clock = WallClock()
         self._commands: SimpleQueue[Command] = SimpleQueue()
         self._changed = Condition()
         self._playing, self._stepping = playing, False
@@ -94,10 +112,15 @@ class Session:
         self._publish()
 
     def _begin(self) -> None:
-        self.simulation = self._make()
-        self.interventions = Interventions(self.simulation)
+        self.interventions = self._make()
+        self.simulation = self.interventions.simulation
         self._trouble = ""
         self._clock.start(self.simulation.world.time)
+
+    @property
+    def fails(self) -> bool:
+        """Whether it goes on after failures."""
+        return self.interventions.recovery is not None
 
     @property
     def bodies(self) -> NDArray[np.intp]:
@@ -114,13 +137,18 @@ class Session:
             self._changed.wait_for(lambda: self.frame.number > number, timeout)
             return self.frame
 
-    def fired(self, run: int, since: int, until: int) -> list[tuple[float, int]]:
-        """Time [s] and transition of some of the firings of a run; none of one that is over."""
+    def fired(self, run: int, since: int, until: int) -> list[Told]:
+        """What fired in a run and what was undone, some of it; none of a run that is over."""
         if run != self._runs:
             return []
         numbers = self.simulation.layout.factory.net.threaded.net.transition_index
         events = self.simulation.supervisor.events[since:until]
-        return [(round(e.t, 4), numbers[e.transition]) for e in events]
+        return [
+            (round(e.t, 4), [numbers[name] for name in e.transitions])
+            if isinstance(e, Undone)
+            else (round(e.t, 4), numbers[e.transition])
+            for e in events
+        ]
 
     def run(self, observe: Observer) -> None:
         """Run for ever; `observe` is called after every tick, and repeatedly while it is paused."""
@@ -157,6 +185,11 @@ class Session:
             count += 1
             if reason := world.unstable():
                 self._trouble = f"{reason}: begin anew"
+                break
+            for act in world.hooks.ticks:
+                act()
+            if (trouble := world.hooks.trouble) is not None:
+                self._trouble = f"{trouble.message}: begin anew"
             elif (drop := world.dropped) and world.time >= drop.time + FALL:
                 self._trouble = f"{drop.diagnostic.message}: begin anew"
             elif self._stepping and len(supervisor.events) > before:
@@ -196,6 +229,14 @@ class Session:
                 hands.slow(command.robot, command.factor)
             case "block":
                 (hands.block if command.blocked else hands.free)(command.part)
+            case "drop":
+                hands.drop(command.robot)
+            case "spoil":
+                hands.spoil(command.part)
+            case "down":
+                hands.halt(command.robot, DOWN)
+            case "dead":
+                hands.kill(command.robot)
         self._clock.start(self.simulation.world.time)
 
     def _publish(self) -> None:
@@ -223,11 +264,22 @@ class Session:
             round(self._clock.pace, 3),
             dict(self.interventions.slowed),
             tuple(sorted(self.interventions.blocked)),
-            self._trouble or self._waits(),
+            self._standing(),
+            self._trouble or self._failed() or self._waits(),
         )
         with self._changed:
             self.frame = frame
             self._changed.notify_all()
+
+    def _standing(self) -> tuple[str, ...]:
+        account = self.simulation.world.hooks.account
+        return account.stood[-1][1] if account and account.stood else ()
+
+    def _failed(self) -> str:
+        """What has failed lately, the latest last."""
+        world = self.simulation.world
+        found = world.hooks.account.found if world.hooks.account else ()
+        return "; ".join(str(one) for one in found[-3:] if one.t > world.time - SAID)
 
     def _waits(self) -> str:
         """Which robots wait for what, where nothing has fired for a long time."""

@@ -148,8 +148,8 @@ def _ideal(recording: Recording) -> dict[str, float | None]:
             wip=made.wip,
         ),
     ).run()
-    events = [Event(t, name) for t, name in log.events]
-    apart = duration_differences(causal_record(net, thought.events), causal_record(net, events))
+    events = [Event(t, name) for t, name in log.lasting]
+    apart = duration_differences(causal_record(net, thought.lasting), causal_record(net, events))
     if not len(apart):
         return {}
     return {

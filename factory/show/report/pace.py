@@ -38,7 +38,8 @@ class MeasuredPace:
 def measured(recording: Recording) -> MeasuredPace:
     """The pace by the events of a log."""
     log, factory = recording.log, recording.factory
-    spent = operation_times(factory, zip(log.fired.tolist(), log.fired_t.tolist(), strict=True))
+    number = factory.net.threaded.net.transition_index
+    spent = operation_times(factory, ((number[name], t) for t, name in log.lasting))
     counted = [times[1:] or times for times in spent]
     durations = [sum(times) / len(times) if times else None for times in counted]
     dropoffs = dropoff_times(log.time, log.delivered)

@@ -11,6 +11,7 @@ from typing import Any
 
 from factory.plant.factory import Factory
 from factory.show.report.drawings import floor_plan, net_drawing
+from factory.show.report.failures import failures_data, failures_section
 from factory.show.report.fidelity import fidelity
 from factory.show.report.frames import frames
 from factory.show.report.links import data, labels_of
@@ -44,6 +45,9 @@ SCRIPTS = (
 
 STYLES = ("report/report.css",)
 
+FAILURES = "report/failures.js", "report/failures.css"
+"""What a page has more where the run goes on after failures."""
+
 
 def page(recording: Recording) -> str:
     """The text of the page, the same for the same recording."""
@@ -61,6 +65,7 @@ def page(recording: Recording) -> str:
         "times": [round(t, 4) for t in recording.log.fired_t.tolist()],
         "scene": scene(recording.stage, labels, pack),
         "frames": frames(recording, pack),
+        **failures_data(recording),
         "arrays": pack.index,
     }
     fields = {
@@ -71,6 +76,7 @@ def page(recording: Recording) -> str:
         "tree": assembly_tree(recording.factory.pag, labels),
         "floor": floor_plan(recording.stage, labels),
         "net": net_drawing(recording.factory, recording.stage.roles),
+        "failures": failures_section(recording),
         "pace": pace(recording, run, plan),
         "utilisation": utilisation(recording, run, plan),
         "proof": proof_words(proved),
@@ -79,7 +85,12 @@ def page(recording: Recording) -> str:
         "options": options(document),
     }
     fields["certificate"] = json_inside(proved.document)
-    return filled("report/report.html", fields, document, pack.text(), SCRIPTS, STYLES)
+    scripts: tuple[str, ...] = SCRIPTS
+    styles: tuple[str, ...] = STYLES
+    if recording.log.failures is not None:
+        script, style = FAILURES
+        scripts, styles = (*SCRIPTS[:-1], script, SCRIPTS[-1]), (*STYLES, style)
+    return filled("report/report.html", fields, document, pack.text(), scripts, styles)
 
 
 def counts(factory: Factory) -> str:

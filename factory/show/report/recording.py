@@ -3,9 +3,7 @@ made again, the layout that it ran in."""
 
 from __future__ import annotations
 
-import os
-from collections.abc import Iterator, Mapping
-from contextlib import suppress
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -14,15 +12,11 @@ import numpy as np
 
 from factory.export.motion import BodyMotion, motion_of
 from factory.geometry.meshes import Array
-from factory.lang import read_pag, read_template
 from factory.layout.layout import Layout
-from factory.layout.request import Ground
-from factory.pipeline import Project
 from factory.plant.factory import Factory, Operation
-from factory.problem.pag import PAG
-from factory.problem.template import Template
 from factory.record.log import Log, read_log
 from factory.record.log.recompiled import factory_of
+from factory.record.log.relaid import project_of
 from factory.record.monitor import Report, subject_of
 from factory.record.monitor.record import verdict_on, watch_log
 from factory.record.verdict import RunVerdict
@@ -73,7 +67,7 @@ class Recording:
     @cached_property
     def verdict(self) -> RunVerdict:
         """Whether the run succeeded."""
-        return verdict_on(self.log, self.factory.net, self.monitor)
+        return verdict_on(self.log, self.factory, self.monitor)
 
     @cached_property
     def stage(self) -> DrawnFactory:
@@ -120,26 +114,8 @@ def _laid_out(log: Log, beside: Path) -> Layout:
     missing, RunError where the floor is too small, ValueError where the run was in another
     layout."""
     header, made = log.header, conditions(log.header)
-    templates = {word: read_template(text, word) for word, text in header["templates"].items()}
-    pag, kept = _pag(header["pag"], templates, beside), header.get("ground", {})
-    floor = kept.get("floor") and tuple(map(float, kept["floor"]))
-    lines = tuple(map(tuple, kept.get("lines", ())))
-    branches = tuple((str(label), int(k)) for label, k in kept.get("parallel", ()))
-    ground = Ground(**{**kept, "floor": floor, "lines": lines, "parallel": branches})
-    layout = Project(pag, templates, settings=made.settings, ground=ground).layout
+    layout = project_of(header, beside).layout
     goals = subject_of(layout, made.settings, made.jitter, None, made.wip).as_json()["goals"]
     if goals != header["monitor"]["goals"]:
         raise ValueError("the run was in another layout than the one its PAG gets now")
     return layout
-
-
-def _pag(kept: Mapping[str, str], templates: Mapping[str, Template], beside: Path) -> PAG:
-    """The PAG in a log, with its meshes from the folder that the PAG was in or, where they are not
-    there, from beside the log. Raises InputError where they are in neither."""
-    file, text = kept["file"], kept.get("plain") or kept["text"]
-    try:
-        return read_pag(text, templates, file, os.path.dirname(file) or ".")
-    except InputError:
-        with suppress(InputError):
-            return read_pag(text, templates, file, str(beside))
-        raise

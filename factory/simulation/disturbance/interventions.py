@@ -1,4 +1,5 @@
-"""Interventions in a running factory: robots are pushed and slowed down, feeders blocked."""
+"""Interventions in a running factory: robots are pushed and slowed down, feeders blocked; where it
+goes on after failures things are dropped, parts are no good, robots stand and die."""
 
 from __future__ import annotations
 
@@ -12,6 +13,7 @@ from factory.mjcf import names
 from factory.plant.factory import Operation
 from factory.simulation.mujoco.interference import Interference
 from factory.simulation.mujoco.world import MujocoWorld
+from factory.simulation.recovery import Campaign, WorldFault, recover
 from factory.simulation.simulation import Simulation
 from factory.support.errors import Diagnostic, InputError
 
@@ -20,14 +22,16 @@ class Interventions:
     """Into a simulation in MuJoCo.
 
     A robot is pushed along its guidepath. One that is slowed down knows its new limits; no other
-    robot does. A feeder that is blocked gives no part.
+    robot does. A feeder that is blocked gives no part. With a `campaign` the simulation goes on
+    after failures, and more of them can be made.
     """
 
-    def __init__(self, simulation: Simulation) -> None:
+    def __init__(self, simulation: Simulation, campaign: Campaign | None = None) -> None:
         if not isinstance(simulation.world, MujocoWorld):
             message = "the ideal world has nothing to push"
             raise InputError(Diagnostic("BadValue", message, None, "take the world mujoco"))
-        self._simulation, self._world = simulation, simulation.world
+        self.simulation, self._world = simulation, simulation.world
+        self.recovery = None if campaign is None else recover(simulation, campaign)
         self._interference = Interference(simulation.world)
         self._limits = simulation.limits
         self._slowed: dict[int, float] = {}
@@ -48,7 +52,7 @@ class Interventions:
     def push(self, robot: int, share: float, seconds: float) -> None:
         """Push a robot forwards, to where it delivers, with a `share` of the greatest force of its
         drive, backwards where that is negative, for so long from now on."""
-        layout = self._simulation.layout
+        layout = self.simulation.layout
         body = int(self._world.m.body(names.carriage(layout.factory.robots[robot].name)).id)
         heading = np.array([*layout.guidepaths[robot].heading, 0.0])
         force = share * self._interference.greatest_force(robot) * heading
@@ -65,7 +69,11 @@ class Interventions:
         speed = np.array(self._limits.speed)
         for number, share in self._slowed.items():
             speed[self._world.motion.axes.of_robot(number)] *= share
-        self._simulation.limit(Limits(speed, self._limits.acceleration))
+        limits = Limits(speed, self._limits.acceleration)
+        if self.recovery is None:
+            self.simulation.limit(limits)
+        else:
+            self.recovery.responding.standing.limit(limits)
 
     def block(self, label: str) -> None:
         """Let the feeder of a part give nothing."""
@@ -75,6 +83,32 @@ class Interventions:
         """Let it give parts again."""
         self._blocked.discard(label)
         self._world.supplied = True
+
+    def drop(self, robot: int) -> None:
+        """Let a robot drop what it holds, or what it carries next."""
+        self._strike("drop", robot=self._name(robot))
+
+    def spoil(self, label: str) -> None:
+        """Let the next part that its feeder shows be no good."""
+        self._strike("bad_part", label=label)
+
+    def halt(self, robot: int, seconds: float) -> None:
+        """Let a robot stand for so long."""
+        self._strike("down", robot=self._name(robot), seconds=seconds)
+
+    def kill(self, robot: int) -> None:
+        """Let a robot never move again."""
+        self._strike("dead", robot=self._name(robot))
+
+    def _name(self, robot: int) -> str:
+        return self.simulation.layout.factory.robots[robot].name
+
+    def _strike(self, kind: str, label: str = "", robot: str = "", seconds: float = 0.0) -> None:
+        if self.recovery is None:
+            message = "this factory does not go on after failures"
+            raise InputError(Diagnostic("BadFault", message, None, "give --spares or --faults"))
+        now = float(self._world.time)
+        self.recovery.strike(WorldFault(kind, label, robot, at=now, seconds=seconds))
 
     def _let_go(self) -> None:
         """Before a timestep: end the pushes whose time is over."""

@@ -17,6 +17,7 @@ from __future__ import annotations
 import numpy as np
 
 from factory.control.mode import Array, Index
+from factory.simulation.keeping import Keeper
 from factory.support.engine import mujoco
 
 INPUTS = 3
@@ -24,8 +25,8 @@ INPUTS = 3
 
 
 class Drives:
-    """The drives of some axes, of which `actuators` (axes,) are the numbers; their buffers are of
-    one size, and side by side.
+    """The drives of some axes, of which `actuators` (axes,) are the numbers, one perhaps of several
+    axes of which at most one moves; their buffers are of one size, and side by side.
 
     `mass` [kg] (axes,): what the force of a setpoint accelerates; `own` without a load. `weight`
     [N] (axes,): what it carries. `control` (axes,): where an axis's setpoint is in `ctrl`.
@@ -42,7 +43,8 @@ class Drives:
         size = 2 + (1 + INPUTS) * samples
         at = m.actuator_historyadr[actuators]
         first, self._row = int(at.min()), (at - at.min()) // size
-        self._buffers = d.history[first : first + len(at) * size].reshape(-1, size)
+        count = int(self._row.max()) + 1
+        self._buffers = d.history[first : first + count * size].reshape(-1, size)
         early = np.arange(samples) - samples - self.most - 0.5
         self._head = np.concatenate([[samples - 1.0], self.timestep * early])
 
@@ -87,6 +89,11 @@ class Drives:
         """Let axes stand at x [m]."""
         still = np.stack([x, np.zeros_like(x), self.weight[axes]], axis=-1)
         self.follow(axes, still[:, None])
+
+    def keep(self, keeper: Keeper, name: str) -> None:
+        """What they carry; their buffers are the engine's."""
+        keeper.array(f"{name}.mass", self.mass, 0)
+        keeper.array(f"{name}.weight", self.weight, 0)
 
     def load(self, axes: Index, mass: Array, weight: Array) -> None:
         """From the next setpoints on axes move a mass beside their own [kg], and carry a weight

@@ -8,17 +8,19 @@ order of their robot's program: no part comes down before all their sliders are 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 
-from factory.control.mode import Index
+from factory.control.mode import Index, Truth
 from factory.layout.feeding import feeder_of
 from factory.mjcf import names
 from factory.mjcf.masks import feeder_codes
 from factory.mjcf.model import Model
 from factory.mjcf.parts import presented_at
 from factory.plant.factory import Operation
+from factory.simulation.keeping import Keeper, one_of, up_to
 from factory.simulation.mujoco.copies import Copies
 from factory.simulation.mujoco.passing import Passing
 from factory.simulation.mujoco.sliders import NEVER, Sliders
@@ -57,6 +59,13 @@ class Supply:
         """How many parts of each label have been taken."""
         return {label: unit // self.period for label, unit in self.next.items()}
 
+    def keep(self, keeper: Keeper) -> None:
+        """Which units come next."""
+        self.released = keeper.whole("supply.released", self.released)
+        rounds = np.array([*self.next.values()])
+        keeper.array("supply.next", rounds, 0)
+        self.next = dict(zip(self.next, rounds.tolist(), strict=True))
+
     def wants(self, label: str) -> bool:
         """Whether some unit has yet to get its part."""
         return self.next[label] < max(self._units, self._begun[label])
@@ -66,12 +75,25 @@ class Supply:
         return self._wip is None or unit < self.released + self._wip
 
 
+@dataclass(slots=True)
+class TakenBack:
+    """What goes wrong with parts that are shown. `parts`: those on their way back, with the unit
+    that they count for, by feeder; `fresh`: those that have begun to be shown, with their unit, by
+    label; `good`: labels whose part has been looked at and is good; `awaited`: labels of which none
+    is to come yet."""
+
+    parts: dict[int, int] = field(default_factory=dict)
+    fresh: dict[str, int] = field(default_factory=dict)
+    good: set[str] = field(default_factory=set)
+    awaited: set[str] = field(default_factory=set)
+
+
 class Feeders:
     """The feeders of a factory (n,), in the order of their labels. `counts`: how often each
     transition has fired where the run starts.
 
-    `welds`: what holds the part that a feeder presents, by label. `due`: when a part that a robot
-    has asked for too early comes soon enough [s].
+    `due`: when a part that a robot has asked for too early comes soon enough [s]. `back`: what is
+    taken back.
     """
 
     def __init__(
@@ -89,12 +111,17 @@ class Feeders:
         self._stations = [
             _station(m, model, label, code) for label, code in feeder_codes(model.factory).items()
         ]
-        self.welds = {station.label: station.weld for station in self._stations}
+        self.back = TakenBack()
         self._number = {station.label: n for n, station in enumerate(self._stations)}
         self._shown: dict[str, int] = {}
         self._asked: set[int] = set()
         self.due = NEVER
         self._turns = Turns(model.layout, supply.rounds())
+
+    @cached_property
+    def welds(self) -> dict[str, int]:
+        """What holds the part that a feeder presents, by label."""
+        return {station.label: station.weld for station in self._stations}
 
     @property
     def trees(self) -> dict[int, int]:
@@ -109,8 +136,8 @@ class Feeders:
     def begin(self) -> None:
         """Where the run starts, each feeder presents a part if it can and its robot is not yet
         under way with another."""
-        down = self._load(np.flatnonzero(self._turns.now & ~self._passing.holds), down=True)
-        self._sliders.begin(np.setdiff1d(np.arange(len(self._stations)), down))
+        due = np.flatnonzero(self._turns.now & ~self._passing.holds)
+        self._sliders.begin(self._load(due, down=True))
 
     def presents(self, label: str, unit: int, now: float) -> bool:
         """Whether a robot may come for the part for that unit: it is down before the robot can be
@@ -154,7 +181,9 @@ class Feeders:
         """Let the next parts come down from housings whose sliders have come up, where the robots
         are out of the way. Whether one comes that a robot has asked for."""
         self._sliders.settle()
-        busy = self._turns.any_of(self._sliders.ends < NEVER)
+        if self.back.parts:
+            self._take_back()
+        busy = self._turns.any_of((self._sliders.ends < NEVER) | self._held_back())
         free = self._turns.vacant & ~busy & self._passing.clear()
         if not np.count_nonzero(free):
             return False
@@ -164,6 +193,90 @@ class Feeders:
         come = self._asked & {*loaded.tolist()}
         self._asked -= come
         return bool(come)
+
+    def at_rest(self) -> Iterator[tuple[Station, int, int]]:
+        """The parts that are shown by sliders that rest, and have not been looked at: where, for
+        which unit, and the body."""
+        for label, unit in self._shown.items():
+            number = self._number[label]
+            if label not in self.back.good and self._sliders.ends[number] == NEVER:
+                yield self._stations[number], unit, self._copies[label, unit]
+
+    def take_back(self, label: str, scrap: int) -> None:
+        """A part that is shown goes back into the housing, and is no longer for any unit but for
+        `scrap`."""
+        number, unit = self._number[label], self._shown.pop(label)
+        self.supply.next[label] -= self.supply.period
+        self._copies.renumber({(label, unit): scrap})
+        self.back.parts[number] = scrap
+        self.back.good.discard(label)
+
+    def served(self) -> Iterator[str]:
+        """The labels of feeders that take a part back."""
+        for number in self.back.parts:
+            line = self._turns.lines[number]
+            yield from (self._stations[n].label for n in line)
+
+    def shown(self) -> dict[str, int]:
+        """The unit of the part that is shown of each label."""
+        return dict(self._shown)
+
+    def undone(self, units: Mapping[str, int], rounds: Mapping[str, int], scrap: int) -> None:
+        """The next part of each label is for another unit, after so many rounds; what it is no
+        longer the turn of is taken back."""
+        self._turns.recount(rounds)
+        for label, unit in units.items():
+            number, is_shown = self._number[label], label in self._shown
+            if is_shown:
+                self._shown[label] = unit
+            self.supply.next[label] = unit + self.supply.period * is_shown
+            if is_shown and not self._turns.now[number]:
+                self.take_back(label, scrap + number)
+            waits = label not in self._shown and number not in self.back.parts
+            self._turns.vacant[number] = self._turns.now[number] and waits
+
+    def stay_clear(self, robot: int) -> None:
+        """The next part for a robot (index) comes down when that is out of the way."""
+        self._passing.come_clear(robot)
+
+    def _take_back(self) -> None:
+        """Sliders with what is taken back go up, and let go of it where nothing of it is seen."""
+        for number, unit in [*self.back.parts.items()]:
+            if self._sliders.ends[number] < NEVER:
+                continue
+            if not self._sliders.is_up(number):
+                if not self._passing.is_aside(number):
+                    continue
+                self._sliders.send(np.array([number]), down=False, loaded=True)
+                continue
+            station = self._stations[number]
+            self._welds.loose([station.weld])
+            self._copies.put_back(station.label, unit)
+            del self.back.parts[number]
+            self._turns.vacant[number] = self._turns.now[number]
+        self._welds.write()
+
+    def _held_back(self) -> Truth:
+        """Whether each (n,) is to show nothing yet."""
+        held = np.zeros(len(self._stations), bool)
+        held[[*self.back.parts]] = True
+        held[[n for n, s in enumerate(self._stations) if s.label in self.back.awaited]] = True
+        return held
+
+    def keep(self, keeper: Keeper) -> None:
+        """What is presented and asked for, and whose turn it is."""
+        self.supply.keep(keeper)
+        self._turns.keep(keeper)
+        self._passing.keep(keeper)
+        a_label, a_unit = one_of(self._number), up_to(np.inf)
+        shown = keeper.rows("feeders.shown", self._shown.items(), a_label, a_unit)
+        asked = [(number,) for number in sorted(self._asked)]
+        asked = keeper.rows("feeders.asked", asked, up_to(len(self._stations)))
+        self.due = keeper.number("feeders.due", self.due, high=NEVER)
+        self._shown = dict(shown)
+        self._asked = {number for (number,) in asked}
+        if any(part not in self._copies for part in shown):
+            raise ValueError("its feeders show parts that are not there")
 
     def _send(self, numbers: Index, down: bool) -> None:
         self._sliders.send(numbers, down)
@@ -182,6 +295,8 @@ class Feeders:
             self._welds.place(body, station.down if down else station.up)
             self._welds.hold([body], station.code)
             self._welds.join({station.weld: body})
+            self.back.good.discard(station.label)
+            self.back.fresh[station.label] = unit
         return np.array(loaded, np.intp)
 
     def _supplied(self, label: str) -> bool:

@@ -4,9 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from math import inf
 
 from factory.mjcf import names
 from factory.mjcf.model import Model
+from factory.simulation.keeping import Keeper, is_text, up_to
+from factory.simulation.mujoco.copies import Copies
 from factory.simulation.mujoco.welds import Welds
 from factory.support.engine import mujoco
 
@@ -21,10 +24,11 @@ class Grasp:
 
 class Grasps:
     """The hands of all robots: `of[robot]` for each that holds something (index); `grip`: the weld
-    by which a robot holds a label."""
+    by which a robot holds a label; `changes`: how often any has taken something or let go."""
 
     def __init__(self, m: mujoco.MjModel, model: Model, welds: Welds) -> None:
         self.of: dict[int, Grasp] = {}
+        self.changes = 0
         self._welds, self._mass = welds, model.carried.mass
         self.grip = {
             (robot.index, label): m.equality(names.grip(robot.name, label)).id
@@ -43,14 +47,30 @@ class Grasps:
         self._hold(robot, unit, bodies)
 
     def _hold(self, robot: int, unit: int, bodies: Mapping[str, int]) -> None:
+        self.changes += 1
         self._welds.hold(bodies.values(), robot + 1)
         self.of.setdefault(robot, Grasp(unit, {})).bodies.update(bodies)
 
     def let_go(self, robot: int) -> Grasp:
         """A robot lets go of all that it holds, and says what that was."""
+        self.changes += 1
         hand = self.of.pop(robot)
         self._welds.loose([self.grip[robot, label] for label in hand.bodies])
         return hand
+
+    def keep(self, keeper: Keeper, copies: Copies) -> None:
+        """What every robot holds."""
+        held = [(r, hand.unit, label) for r, hand in self.of.items() for label in hand.bodies]
+        a_number = up_to(inf)
+        held = keeper.rows("hands", held, a_number, a_number, is_text)
+        if not keeper.takes_up:
+            return
+        self.of.clear()
+        for robot, unit, label in held:
+            hand = self.of.setdefault(robot, Grasp(unit, {}))
+            if (robot, label) not in self.grip or (label, unit) not in copies or hand.unit != unit:
+                raise ValueError("its robots hold what they cannot")
+            hand.bodies[label] = copies[label, unit]
 
     def loads(self) -> dict[int, float]:
         """What each robot that holds something carries [kg]."""

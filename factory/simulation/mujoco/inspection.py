@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from math import comb
 
 import numpy as np
@@ -9,6 +10,7 @@ import numpy as np
 from factory.mjcf.model import Model
 from factory.mjcf.weld_frames import residuals
 from factory.plant.factory import Operation
+from factory.simulation.keeping import Keeper, is_size, is_text, one_of, up_to
 from factory.simulation.mujoco.contacts import ContactMasks
 from factory.simulation.mujoco.pressing import Pressing
 from factory.simulation.mujoco.product_error import ProductError
@@ -17,13 +19,16 @@ from factory.simulation.mujoco.welds import Welds
 from factory.simulation.run import PhysicsFigures
 from factory.support.engine import mujoco
 
+MOST_ONSETS = 10**7
+"""So many onsets of contact are taken up at most."""
+
 
 class Inspection:
     """Keeps the worst figures of a run. Contacts are looked at after every step of the engine.
 
     `joining`: for each operation under way (index) the unit whose inputs it joins. `unintended`:
-    onsets of contact that nothing intends, by the names of geoms. `residual` [m]: the largest of a
-    weld's position. `error` [m]: that of a product.
+    onsets of contact that nothing intends, by the names of geoms; `pressing`: what is no such
+    contact. `residual` [m]: the largest of a weld's position. `error` [m]: that of a product.
     """
 
     def __init__(
@@ -31,7 +36,7 @@ class Inspection:
     ) -> None:
         self._m, self._d, self._model, self._masks = m, d, model, masks
         self._product = ProductError(model)
-        self._pressing = Pressing(m, model.factory)
+        self.pressing = Pressing(m, model.factory)
         self._touching: frozenset[tuple[int, int]] = frozenset()
         self.joining: dict[int, int] = {}
         self.force: dict[str, float] = {}
@@ -59,11 +64,30 @@ class Inspection:
             label = self._joined(a, b)
             if label is not None:
                 self._press(label, number)
-            elif not self._pressing.meant(a, b, float(found.dist[number])):
+            elif not self.pressing.meant(a, b, float(found.dist[number])):
                 now.add((a, b))
         for a, b in sorted(now - self._touching):
             self.unintended.append((self._m.geom(a).name, self._m.geom(b).name))
         self._touching = frozenset(now)
+
+    def keep(self, keeper: Keeper) -> None:
+        """The figures, what touches, and what is being joined."""
+        operations, a_geom = self._model.factory.operations, up_to(self._m.ngeom)
+        labels = {operation.label for operation in operations}
+        an_operation = up_to(len(operations))
+        joins = keeper.rows("joins", self.joining.items(), an_operation, up_to(np.inf))
+        force = keeper.rows("forces", self.force.items(), one_of(labels), is_size)
+        touching = keeper.rows("touching", sorted(self._touching), a_geom, a_geom)
+        onsets = [(*pair, count) for pair, count in Counter(self.unintended).items()]
+        onsets = keeper.rows("onsets", onsets, is_text, is_text, up_to(MOST_ONSETS))
+        self.residual = keeper.number("residual", self.residual, 0)
+        self.error = keeper.value("error", self.error, lambda v: v is None or is_size(v))
+        self.joining = dict(joins)
+        self.force = dict(force)
+        self._touching = frozenset(touching)
+        if sum(count for _, _, count in onsets) > MOST_ONSETS:
+            raise ValueError(f"'onsets' are more than {MOST_ONSETS}")
+        self.unintended = [(a, b) for a, b, count in onsets for _ in range(count)]
 
     def _joined(self, one: int, other: int) -> str | None:
         """The label of the operation that is joining the parts of two geoms, None for none."""

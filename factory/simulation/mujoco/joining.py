@@ -8,6 +8,7 @@ from types import MappingProxyType
 import numpy as np
 
 from factory.mjcf.model import Model
+from factory.simulation.keeping import Keeper, is_size, one_of, up_to
 from factory.simulation.mujoco.copies import Copies
 from factory.simulation.mujoco.feeders import Feeders
 from factory.simulation.mujoco.fusing import RIGID, SETTLING, Fusion
@@ -30,6 +31,17 @@ class Joining:
         self._feeders, self._welds = feeders, welds
         self.waiting: dict[int, tuple[str, float]] = {}
         self.misfit: dict[int, float] = {}
+
+    def keep(self, keeper: Keeper) -> None:
+        """What waits to become one body, and how far out of place parts were."""
+        waiting = [(robot, *since) for robot, since in self.waiting.items()]
+        a_number, a_label = up_to(np.inf), one_of(self._copies.body)
+        waiting = keeper.rows("joining.waiting", waiting, a_number, a_label, is_size)
+        misfit = keeper.rows("joining.misfit", self.misfit.items(), a_number, is_size)
+        self.waiting = {robot: (label, since) for robot, label, since in waiting}
+        self.misfit = dict(misfit)
+        if not self.waiting.keys() <= self._hands.of.keys():
+            raise ValueError("its robots have joined what they do not hold")
 
     def weigh(self, m: mujoco.MjModel, d: mujoco.MjData) -> None:
         """From now on bodies have the masses that the model has."""

@@ -9,8 +9,9 @@ import numpy as np
 from factory.control.mode import Array, Index
 from factory.control.navigation import Bundle
 from factory.mjcf.model import GRAVITY, HEAD_MASS, Model
+from factory.simulation.keeping import Keeper
 from factory.simulation.mujoco.axes import Axes
-from factory.simulation.mujoco.courses import Follower, along, planned
+from factory.simulation.mujoco.courses import Course, Follower, along, planned
 from factory.simulation.mujoco.drives import Drives
 from factory.simulation.mujoco.guides import Guides
 from factory.simulation.mujoco.outfeed import Outfeed
@@ -33,7 +34,7 @@ class Motion:
     def __init__(
         self, m: mujoco.MjModel, d: mujoco.MjData, model: Model, start: Array, gains: Array
     ) -> None:
-        self.axes, self.settings = Axes.of(m, model.factory), model.settings
+        self.axes, self.settings, self._d = Axes.of(m, model.factory), model.settings, d
         robots = self.axes.actuator[: self.axes.tray]
         m.actuator_biasprm[robots, 1:3] *= np.asarray(gains)[:, None]
         body, dof = self.axes.body, self.axes.dof
@@ -72,6 +73,14 @@ class Motion:
             stand = axes[self.robots.v[axes] == 0.0]
             if len(stand):
                 self.drives.stand(stand, self.robots.x[stand])
+
+    def put(self, at: Mapping[int, float]) -> None:
+        """Axes are put somewhere else [m], and stand there."""
+        axes, x = np.array([*at], np.intp), np.array([*at.values()])
+        self._d.qpos[self.axes.qpos[axes]], self._d.qvel[self.axes.dof[axes]] = x, 0.0
+        self.robots.x[axes] = x
+        self.robots.stop(axes)
+        self.sleep.wake(self.axes.body[axes].tolist())
 
     def turn(self, active: Index) -> None:
         """Other modes are active. Robots whose operation has ended stop where their reference is:
@@ -119,7 +128,7 @@ class Motion:
         """The tray's next course begins where one is over. Come to its goal, it stands."""
         outfeed, follower = self.outfeed, self.outfeed.follower
         if outfeed.moves and not follower.left:
-            follower.begin(outfeed.axes, self.stepping.course(outfeed.beginning, outfeed.course))
+            follower.begin(outfeed.axes, self._tray_course(*outfeed.beginning))
             follower.show(0)
         elif not outfeed.moves and follower.course is not None:
             follower.stop(outfeed.axes)
@@ -134,19 +143,48 @@ class Motion:
 
     def _plan(self, bundle: Bundle) -> None:
         """The next stride of the active modes. The load of each robot is that of its operation."""
-        axes, robots, settings = self.active, self.robots, self.settings
-        x, v = robots.x[axes], robots.v[axes]
-        course = self.stepping.course(
+        axes, robots = self.active, self.robots
+        robots.begin(axes, self._course(bundle, robots.x[axes], robots.v[axes]))
+
+    def _course(self, bundle: Bundle, x: Array, v: Array) -> Course:
+        """A stride of the active modes from x [m] and v [m/s]."""
+        settings = self.settings
+        return self.stepping.course(
             (bundle, x.tobytes(), v.tobytes()),
             lambda: planned(
                 self.drives,
-                axes,
+                self.active,
                 (x, v),
                 (settings.stride, settings.steps),
                 along(bundle, settings.tick),
             ),
         )
-        robots.begin(axes, course)
+
+    def _tray_course(self, x: Array, v: Array) -> Course:
+        """A stride of the tray's way from x [m] and v [m/s]."""
+        outfeed = self.outfeed
+        begin = outfeed.goal, x.tobytes(), v.tobytes()
+        return self.stepping.course(begin, lambda: outfeed.course(x, v))
+
+    def keep(self, keeper: Keeper, bundle: Bundle | None, active: Index) -> None:
+        """What axes carry, where their references are, and on which courses: those of robots are
+        of the modes of a bundle, on the `active` axes."""
+        self.active = active
+        self.drives.keep(keeper, "axes")
+        self.guides.keep(keeper)
+        self.sleep.keep(keeper)
+        self.outfeed.keep(keeper)
+        self.sliders.keep(keeper)
+        keeper.array("axes.x", self.robots.x)
+        keeper.array("axes.v", self.robots.v)
+
+        def planned(x: Array, v: Array) -> Course:
+            if bundle is None:
+                raise ValueError("it has a course, and no mode is active")
+            return self._course(bundle, x, v)
+
+        self.robots.keep(keeper, "course", active, planned)
+        self.outfeed.follower.keep(keeper, "tray", self.outfeed.axes, self._tray_course)
 
     def send_tray(self, loaded: bool) -> None:
         """The tray goes away with a product, or home without."""

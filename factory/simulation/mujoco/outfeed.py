@@ -3,14 +3,13 @@ shed is shut."""
 
 from __future__ import annotations
 
-from collections.abc import Hashable
-
 import numpy as np
 
 from factory.control.mode import Array
 from factory.layout.dimensions import BEHIND, PLAY
 from factory.mjcf.model import GRAVITY, Model
 from factory.mjcf.outfeed import SHUTTER_MASS
+from factory.simulation.keeping import Keeper
 from factory.simulation.mujoco.axes import Axes
 from factory.simulation.mujoco.courses import AHEAD, Course, Follower, Move, planned, towards
 from factory.simulation.mujoco.drives import Drives
@@ -80,15 +79,20 @@ class Outfeed:
         x, v = self.follower.x[self.axes], self.follower.v[self.axes]
         return bool((x != self.ends).any() or v.any())
 
-    @property
-    def beginning(self) -> Hashable:
-        """All that its next course depends on."""
-        x, v = self.follower.x[self.axes], self.follower.v[self.axes]
-        return self.goal, x.tobytes(), v.tobytes()
+    def keep(self, keeper: Keeper) -> None:
+        """Where the tray goes."""
+        away = keeper.flag("outfeed.away", self.goal != 0.0)
+        self.goal = self._far[0] if away else 0.0
+        self.busy = keeper.flag("outfeed.busy", self.busy)
+        self.loading = keeper.flag("outfeed.loading", self.loading)
 
-    def course(self) -> Course:
-        """A stride of its way, as fast as its limits allow, until it is nearly there."""
-        x, v = self.follower.x[self.axes], self.follower.v[self.axes]
+    @property
+    def beginning(self) -> tuple[Array, Array]:
+        """Where its next course begins [m], and how fast [m/s]."""
+        return self.follower.x[self.axes], self.follower.v[self.axes]
+
+    def course(self, x: Array, v: Array) -> Course:
+        """A stride of its way from there, as fast as its limits allow, until it is nearly there."""
         ticks = self._settings.stride, self._settings.steps
         return planned(self._drives, self.axes, (x, v), ticks, self._go)
 

@@ -14,6 +14,7 @@ from factory.mjcf import names
 from factory.mjcf.model import Model
 from factory.plant.factory import Operation
 from factory.problem.pag import NOPART
+from factory.simulation.keeping import Keeper
 from factory.simulation.request import RunRequest
 from factory.support.engine import mujoco
 
@@ -86,6 +87,22 @@ class Passing:
     def holding(self, robot: int) -> None:
         """A robot (index) has taken a part from one of its feeders."""
         self.took(self._fed[robot])
+
+    def come_clear(self, robot: int) -> None:
+        """A robot (index) holds nothing, and the next part comes down once it is out of the way, or
+        at home if its hand has to be there first."""
+        for number in self._fed.get(robot, ()):
+            self.holds[number] = not self._first[number]
+
+    def is_aside(self, number: int) -> bool:
+        """Whether a robot is out of the way of what its feeder shows. One whose hand is there
+        before that comes down is never in its way."""
+        at = self._d.qpos[self._address[number]]
+        return bool(self._first[number] or at <= self._clear[number])
+
+    def keep(self, keeper: Keeper) -> None:
+        """Which robots have yet to deliver."""
+        keeper.array("passing.holds", self.holds, 0, 1)
 
     def clear(self) -> Truth:
         """Whether each robot (n,) is so far away with its part that the next can come down; or, if

@@ -1,4 +1,5 @@
-"""Contact that is meant: that of a pad with what it is to hold."""
+"""Contact that is no fault of the factory: that of a pad with what it is to hold, and of what has
+fallen."""
 
 from __future__ import annotations
 
@@ -10,23 +11,45 @@ from factory.support.engine import mujoco
 PRESSED = 1e-4
 """So deep may a part lie in a pad that holds it, or is about to: its rubber gives way [m]."""
 
+FREE = 6
+"""Degrees of freedom of a part's body."""
+
 
 class Pressing:
-    """What the pads of robots and feeders are to hold."""
+    """What the pads of robots and feeders are to hold. `fallen`: bodies that lie about, or that a
+    feeder shows askew; `shaken`: those that such a body has touched since; `touched`: the pairs of
+    geoms of which one was of any of these."""
 
     def __init__(self, m: mujoco.MjModel, factory: Factory) -> None:
         self._m, self._contents = m, factory.contents
-        ever = {r.name: held(factory, r.index, at_last=True) for r in factory.robots}
-        self._holds = ever | {names.feeder(leaf.label): leaf.label for leaf in factory.leaves}
+        self.fallen: set[int] = set()
+        self.shaken: set[int] = set()
+        self.touched: set[tuple[int, int]] = set()
+        self._holds = {r.name: {held(factory, r.index, at_last=True)} for r in factory.robots}
+        for leaf in factory.leaves:
+            slider = m.body(int(m.eq_obj1id[m.equality(names.feed(leaf.label)).id])).name
+            self._holds.setdefault(slider.rpartition("/")[0], set()).add(leaf.label)
 
     def meant(self, one: int, other: int, apart: float) -> bool:
         """Whether of two geoms, so far `apart` [m], one is a pad and the other what that is to
-        hold, and neither is deep in the other."""
+        hold, and neither is deep in the other; or one has fallen."""
+        if (self.fallen or self.shaken) and self._has_fallen(one, other):
+            return True
         if apart < -PRESSED:
             return False
         return self._bears(one, other) or self._bears(other, one)
 
+    def _has_fallen(self, one: int, other: int) -> bool:
+        """Whether one of two geoms is of what has fallen, or what that has shaken."""
+        bodies = {*self._m.geom_bodyid[[one, other]].tolist()}
+        if bodies.isdisjoint(self.fallen | self.shaken):
+            return False
+        self.touched.add((one, other))
+        self.shaken |= {body for body in bodies if self._m.body_dofnum[body] == FREE}
+        return True
+
     def _bears(self, pad: int, geom: int) -> bool:
-        held = self._contents.get(self._holds.get(names.pad_of(self._m.geom(pad).name), ""), ())
+        holds = self._holds.get(names.pad_of(self._m.geom(pad).name), set())
+        held = {part for label in holds for part in self._contents.get(label, ())}
         label = names.label_of(self._m.body(self._m.geom_bodyid[geom]).name)
-        return not set(held).isdisjoint(self._contents.get(label, ()))
+        return not held.isdisjoint(self._contents.get(label, ()))

@@ -1,4 +1,5 @@
-"""The sliders of the feeders: each goes up empty and comes down with a part.
+"""The sliders of the feeders: each goes up empty and comes down with a part. From that of a line
+several parts hang, one after the other; it comes down to a height of its own with each.
 
 A stroke is planned once for all, and written ahead as a whole when it begins. So nothing is done
 for a slider while it is under way.
@@ -15,6 +16,7 @@ from factory.layout.feeding import feeder_of
 from factory.mjcf import names
 from factory.mjcf.feeders import SLIDER_MASS
 from factory.mjcf.model import GRAVITY, Model, stroke_ticks
+from factory.simulation.keeping import Keeper
 from factory.simulation.mujoco.courses import Course, Move, planned, towards
 from factory.simulation.mujoco.drives import Drives
 from factory.simulation.mujoco.sleep import Sleep
@@ -28,38 +30,45 @@ NEVER = np.inf
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Strokes:
-    """The ways of n sliders, up without a load and then down with it: their `lengths` (n,) [m], the
-    `seconds` (2, n) that they take, and the `setpoints` (2, n, samples, 3) of their drives."""
+    """The ways of n sliders, up without a load and then down with it: from where to where they go,
+    `low` and `high` (n,) [m], the `seconds` (2, n) that they take, and the `setpoints` (2, n,
+    samples, 3) of their drives."""
 
-    lengths: Array
+    low: Array
+    high: Array
     seconds: Array
     setpoints: Array = field(repr=False)
 
     @classmethod
-    def of(cls, drives: Drives, loads: Array, lengths: Array, ticks: int, s: Settings) -> Strokes:
-        """Those of sliders that go so far [m] with such loads [kg], in no more than so many
-        ticks."""
-        every, zero = np.arange(len(lengths)), np.zeros(len(lengths))
-        limits = _limits(s, len(lengths))
+    def of(
+        cls, drives: Drives, loads: Array, ends: tuple[Array, Array], ticks: int, s: Settings
+    ) -> Strokes:
+        """Those of sliders that go up and down between two `ends` [m] with such loads [kg], in no
+        more than so many ticks."""
+        (low, high), every = ends, np.arange(len(loads))
+        limits = _limits(s, len(loads))
         ways: list[Course] = []
-        for begin, goals, load in ((zero, lengths, zero), (lengths, zero, loads)):
+        for begin, goals, load in ((low, high, np.zeros(len(loads))), (high, low, loads)):
 
             def go(x: Array, v: Array, goals: Array = goals) -> Move:
                 x1, v1, a = towards(goals, x, v, limits, s.tick)
                 return x1, v1, a, bool((x1 == goals).all() and not v1.any())
 
             drives.load(every, load, (SLIDER_MASS + load) * GRAVITY)
-            ways.append(planned(drives, every, (begin, zero), (ticks, s.steps), go))
+            still = np.zeros(len(loads))
+            ways.append(planned(drives, every, (begin, still), (ticks, s.steps), go))
         longest = max(way.setpoints.shape[1] for way in ways)
         return cls(
-            lengths,
+            low,
+            high,
             np.stack([((way.x != way.x[-1]).sum(axis=0) + CALM) * s.tick for way in ways]),
             np.stack([_padded(way.setpoints, longest) for way in ways]),
         )
 
 
 class Sliders:
-    """The sliders of the feeders (n,), in the order of their labels.
+    """The sliders of the feeders (n,), in the order of the labels that hang from them: one from
+    which several hang is there for each, and has at most one of them at a time.
 
     `ends` (n,): when each that is under way comes to the end of its way [s], NEVER for others.
     `trees` (n,): their kinematic trees.
@@ -67,17 +76,22 @@ class Sliders:
 
     def __init__(self, m: mujoco.MjModel, d: mujoco.MjData, model: Model, sleep: Sleep) -> None:
         labels = [leaf.label for leaf in model.factory.leaves]
-        joint = np.array([m.joint(names.slider(label)).id for label in labels])
-        drives = np.array([m.actuator(names.slider(label)).id for label in labels])
-        self._body, settings = m.jnt_bodyid[joint], model.settings
+        feeds = [m.equality(names.feed(label)).id for label in labels]
+        self._body, settings = m.eq_obj1id[feeds], model.settings
+        sliders = [m.body(body).name for body in self._body.tolist()]
+        joint = m.body_jntadr[self._body]
+        drives = np.array([m.actuator(slider).id for slider in sliders])
         self.trees = m.body_treeid[self._body]
         self._d, self._step, self._address = d, settings.step, m.jnt_qposadr[joint]
         own = m.body_subtreemass[self._body] + m.dof_armature[m.jnt_dofadr[joint]]
         self._drives, self._sleep = Drives(m, d, drives, own.round(9)), sleep
         self._loads = np.array([model.masses[label] for label in labels])
         lengths = np.array([feeder_of(model.layout, label).stroke for label in labels])
+        named = {names.slider(label): number for number, label in enumerate(labels)}
+        high = lengths[[named[slider] for slider in sliders]]
+        ends = high - lengths, high
         ticks = stroke_ticks(model.layout, settings)
-        self._strokes = Strokes.of(self._drives, self._loads, lengths, ticks, settings)
+        self._strokes = Strokes.of(self._drives, self._loads, ends, ticks, settings)
         self._begun, self.ends = np.zeros(len(labels)), np.full(len(labels), NEVER)
         self._down = np.zeros(len(labels), np.intp)
 
@@ -86,24 +100,34 @@ class Sliders:
         load = self._loads[chosen] * loaded
         self._drives.load(chosen, load, (SLIDER_MASS + load) * GRAVITY)
 
-    def begin(self, up: Index) -> None:
-        """All sliders stand where the run begins: down with their loads, but for those that are
-        `up` without."""
-        self._stand(np.arange(len(self.ends)), True)
-        self._d.qpos[self._address[up]] = self._strokes.lengths[up]
-        self._stand(up, False)
+    def begin(self, down: Index) -> None:
+        """All sliders stand where the run begins: up without a load, but for those that are `down`
+        with theirs."""
+        up = np.setdiff1d(np.arange(len(self.ends)), down)
+        for chosen, at, is_down in (
+            (up, self._strokes.high, False),
+            (down, self._strokes.low, True),
+        ):
+            self._d.qpos[self._address[chosen]] = at[chosen]
+            self._stand(chosen, is_down)
 
     def _stand(self, chosen: Index, down: bool) -> None:
         """Sliders stand down with their loads, or up without."""
         if len(chosen):
             self._load(chosen, down)
-            self._drives.stand(chosen, self._strokes.lengths[chosen] * (not down))
+            ends = self._strokes.low if down else self._strokes.high
+            self._drives.stand(chosen, ends[chosen])
 
-    def send(self, chosen: Index, down: bool) -> None:
-        """Sliders set out, down with their loads or up without."""
+    def is_up(self, number: int) -> bool:
+        """Whether a slider that rests is up."""
+        low, high = self._strokes.low[number], self._strokes.high[number]
+        return bool(self._d.qpos[self._address[number]] > (low + high) / 2)
+
+    def send(self, chosen: Index, down: bool, loaded: bool = False) -> None:
+        """Sliders set out, down with their loads or up without, or with what is taken back."""
         if not len(chosen):
             return
-        self._load(chosen, down)
+        self._load(chosen, down or loaded)
         self._drives.follow(chosen, self._strokes.setpoints[int(down), chosen])
         self._down[chosen], self._begun[chosen] = down, self._drives.time
         self.ends[chosen] = self._drives.time + self._strokes.seconds[int(down), chosen]
@@ -120,6 +144,13 @@ class Sliders:
             at = np.rint(since).astype(np.intp) + steps
             at = np.clip(at, 0, setpoints.shape[2] - 1)
             self._drives.show(moving, setpoints[self._down[moving], moving, at])
+
+    def keep(self, keeper: Keeper) -> None:
+        """Which are under way, and what they carry."""
+        self._drives.keep(keeper, "sliders")
+        keeper.array("sliders.begun", self._begun)
+        keeper.array("sliders.ends", self.ends, high=NEVER)
+        keeper.array("sliders.down", self._down, 0, 1)
 
     def settle(self) -> None:
         """Sliders that have come to the end of their ways since stand. The engine lets them sleep

@@ -8,6 +8,7 @@ import numpy as np
 
 from factory.control.mode import Truth
 from factory.layout.layout import Layout
+from factory.simulation.keeping import Keeper
 
 
 class Turns:
@@ -22,13 +23,18 @@ class Turns:
         numbers = {leaf.label: n for n, leaf in enumerate(leaves)}
         shown = [layout.magazine(leaf.carrier) for leaf in leaves]
         self.lines = [[numbers[label] for label in line] for line in shown]
-        self.now = np.zeros(len(leaves), bool)
-        for leaf, line in zip(leaves, shown, strict=True):
-            fewest = min(counts[label] for label in line)
-            due = next(label for label in line if counts[label] == fewest)
-            self.now[numbers[leaf.label]] = leaf.label == due
-        self.vacant = self.now.copy()
+        self._labels = [leaf.label for leaf in leaves]
         self._line = np.array([line[0] for line in self.lines], np.intp)
+        self.recount(counts)
+        self.vacant = self.now.copy()
+
+    def recount(self, counts: Mapping[str, int]) -> None:
+        """So many parts of each label have been taken: it is the turn of the first that is
+        behind."""
+        self.now = np.zeros(len(self._labels), bool)
+        for number, line in enumerate(self.lines):
+            taken = [counts[self._labels[n]] for n in line]
+            self.now[number] = number == line[taken.index(min(taken))]
 
     def taken(self, number: int) -> int:
         """The part of a feeder has been taken; gives the one whose turn it is then."""
@@ -37,6 +43,11 @@ class Turns:
         self.now[number] = False
         self.now[then] = True
         return then
+
+    def keep(self, keeper: Keeper) -> None:
+        """Whose turn it is."""
+        keeper.array("turns.now", self.now, 0, 1)
+        keeper.array("turns.vacant", self.vacant, 0, 1)
 
     def any_of(self, chosen: Truth) -> Truth:
         """Whether one of those that share its robot is chosen, for each (n,)."""

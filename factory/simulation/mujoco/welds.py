@@ -9,6 +9,7 @@ from collections.abc import Iterable, Mapping
 import numpy as np
 
 from factory.control.mode import Array
+from factory.simulation.keeping import Keeper, is_size
 from factory.simulation.mujoco.contacts import ContactMasks
 from factory.simulation.mujoco.pad_gaps import PadGaps
 from factory.simulation.mujoco.sleep import Sleep
@@ -65,6 +66,13 @@ class Welds:
         """Put a free body somewhere [m], upright and at rest."""
         self._placed[body] = at
 
+    def turn(self, body: int, quaternion: Array) -> None:
+        """Turn a free body where it is."""
+        address = self._m.jnt_qposadr[self._m.body_jntadr[body]]
+        self._d.qpos[address + 3 : address + 7] = quaternion
+        self._d.xquat[body] = quaternion
+        self._sleep.wake([body])
+
     def write(self) -> None:
         """Write all that has been gathered into the engine; bodies that it concerns are woken."""
         if not (self._on or self._off or self._held or self._placed):
@@ -86,6 +94,14 @@ class Welds:
         self.masks.hold(self._held)
         for gathered in (self._on, self._off, self._gripped, self._held, self._placed):
             gathered.clear()
+
+    def keep(self, keeper: Keeper) -> None:
+        """What was measured of those that have been switched. Nothing is gathered between ticks;
+        which are on, and on what, is in the engine."""
+        self.taken.keep(keeper)
+        largest = self.pads.largest
+        self.pads.largest = keeper.value("pads.gap", largest, lambda v: v is None or is_size(v))
+        self.closed = keeper.number("welds.closed", self.closed, low=-np.inf)
 
     def _put(self) -> None:
         """Put bodies where they belong; `xpos` too, which the engine renews in its next step."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from math import inf
 
+from factory.study.analysis.failing import FailingPace, failing_pace
 from factory.study.analysis.flow import Flow, flow
 from factory.study.analysis.measured import Comparison, RunRecord, compare
 from factory.study.analysis.slack import slacks
@@ -19,13 +20,15 @@ from factory.study.analysis.what_if import (
     sensitivities,
     wip_curve,
 )
+from factory.timing.failing import Rates
 
 
 @dataclass(frozen=True)
 class Analysis:
     """The results of the timed net of a laid-out factory.
 
-    `slack[i]`: how much longer operation i may take before it sets the pace [s].
+    `slack[i]`: how much longer operation i may take before it sets the pace [s]; `failing`: the
+    pace with rates of failures, None where none were given.
     """
 
     timing: Timing
@@ -37,6 +40,7 @@ class Analysis:
     scenarios: tuple[Scenario, ...] = field(repr=False)
     curve: WipCurve = field(repr=False)
     measured: Comparison | None = field(repr=False)
+    failing: FailingPace | None = field(default=None, repr=False)
 
     @property
     def bottlenecks(self) -> tuple[str, ...]:
@@ -50,10 +54,11 @@ def analyse(
     wip: int | None = None,
     asked: tuple[str, Change] | None = None,
     record: RunRecord | None = None,
+    rates: Rates | None = None,
 ) -> Analysis:
     """The analysis of a laid-out factory: of `units` products from the initial marking, with a
-    bound `wip` on copies of each part, with a change that is `asked` about, in words, and with the
-    `record` of a run to compare with.
+    bound `wip` on copies of each part, with a change that is `asked` about, in words, with the
+    `record` of a run to compare with, and with `rates` at which operations fail.
 
     Raises InputError where `wip` is below 1 or a mode cannot reach its goal.
     """
@@ -73,6 +78,7 @@ def analyse(
         made,
         wip_curve(timing),
         compare(timing, net, found, record) if record else None,
+        failing_pace(timing, net, rates) if rates else None,
     )
 
 

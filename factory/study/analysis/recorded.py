@@ -32,7 +32,7 @@ class Conditions:
 def record_of(run: Run) -> RunRecord:
     """The record of a run that was just made. Raises InputError (BadLog) where it finished no
     product."""
-    return _checked(RunRecord("a run on the spot", run.events, run.dropoffs))
+    return _checked(RunRecord("a run on the spot", run.lasting, run.dropoffs))
 
 
 def logged_record(source: str, log: Log, factory: Factory) -> RunRecord:
@@ -46,7 +46,7 @@ def logged_record(source: str, log: Log, factory: Factory) -> RunRecord:
         message = f"the run in '{source}' began in the middle (--from)"
         hint = "take one that began at the beginning"
         raise InputError(Diagnostic("BadLog", message, None, hint))
-    made = tuple(Event(t, name) for t, name in log.events)
+    made = tuple(Event(t, name) for t, name in log.lasting)
     return _checked(RunRecord(source, made, dropoff_times(log.time, log.delivered)))
 
 

@@ -6,6 +6,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from factory.study.analysis.analysing import Analysis
+from factory.study.analysis.failing import FailingPace
 from factory.study.analysis.measured import ComparedFigure, Comparison
 from factory.study.analysis.what_if import listed
 
@@ -48,6 +49,21 @@ def summary(found: Analysis) -> Iterator[str]:
     )
     if not flow.settled:
         yield "stocks are those of the last products looked at: the factory still fills then"
+    if found.failing is not None:
+        yield failing_words(found.failing)
+
+
+def failing_words(failing: FailingPace) -> str:
+    """The pace with failures, in a line."""
+    rates, stopped = failing.rates, failing.run.stopped
+    pace = "no cycle time"
+    if failing.cycle is not None and failing.loss is not None:
+        pace = f"cycle time {failing.cycle:.3f} s ({100 * failing.loss:+.1f} %)"
+    return (
+        f"{100 * rates.redo:g} % redone and {100 * rates.lose:g} % lost at each operation: {pace}; "
+        f"{failing.made} of {failing.units} made, {failing.redone} times again, {failing.scrapped} "
+        f"scrapped{f'; stopped at {stopped}' if stopped else ''}"
+    )
 
 
 def critical_words(found: Analysis) -> str:

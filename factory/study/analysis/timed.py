@@ -156,20 +156,23 @@ def timed_net(timing: Timing, change: Change = AS_IT_IS, wip: int | None = None)
     tokens = list(subject.tokens)
     for robot, copies in change.copies.items():
         tokens[factory.net.initial[robot]] += copies - 1
-    went = timing.ways(change)
+    went, delays = timing.ways(change), timing.changed(change)
     if timing.outfeed and factory.folded:
-        went = longer(went, turn_ways(timing.layout, timing.settings))
+        went = longer(went, turn_ways(timing.layout, delays, timing.settings))
     ways = dict(zip(went, range(len(tokens), len(tokens) + len(went)), strict=True))
-    seconds = [*timing.changed(change)]
+    seconds = [*delays]
     seconds += [*[0.0] * (len(tokens) - len(seconds)), *went.values()]
-    for waiting, gone in timing.waits(change).items():
-        seconds[waiting] = gone
+    waits = timing.waits(change)
+    for (robot, number), gone in waits.items():
+        gear = factory.net.gears[robot].places
+        seconds[gear[gear.index(number) - 1]] = gone
     moving = with_ways(replace(subject, tokens=tuple(tokens)), factory.net, ways)
     tokens, places = list(moving.tokens), list(moving.net.places)
     back: list[tuple[str, tuple[int, ...], float]] = [
         (f"station {factory.operations[n].label}", (n,), 0.0) for n in _alone(timing, change)
     ]
-    for time in serving(timing.layout, seconds, timing.settings) if timing.outfeed else ():
+    held = longer(went, {key: gone + delays[key[1]] for key, gone in waits.items()})
+    for time in serving(timing.layout, delays, timing.settings, held) if timing.outfeed else ():
         fed = factory.by_label.get(time.bottleneck.partition(" ")[2])
         served = (fed.index,) if fed else tuple(o.index for o in factory.dropoffs)
         spent = time.seconds * factory.period - sum(seconds[number] for number in served)

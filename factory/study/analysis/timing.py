@@ -89,18 +89,14 @@ class Timing:
             (stage, self._way(stage, stage.start, change)) for stage in self.stages
         )
 
-    def waits(self, change: Change = AS_IT_IS) -> dict[int, float]:
+    def waits(self, change: Change = AS_IT_IS) -> dict[tuple[int, int], float]:
         """How long a carrier waits at least, for hands that have delivered to it to be gone [s], by
-        the place in which it waits; nowhere in the ideal world, which has no hands."""
+        (robot, operation to come); nowhere in the ideal world, which has no hands."""
         if self.world == "ideal":
             return {}
         robots = [*range(len(self.factory.robots)), *self.layout.lifts]
         limits = self._limits(range(len(robots)), robots, change)
-        found = {}
-        for (robot, number), gone in waits_for_hands(self.layout, limits).items():
-            step = self.factory.robots[robot].operations.index(number)
-            found[self.factory.net.gears[robot].places[2 * step]] = gone
-        return found
+        return waits_for_hands(self.layout, limits)
 
     @cached_property
     def first_ways(self) -> Mapping[tuple[int, int], float]:

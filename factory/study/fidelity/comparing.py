@@ -149,7 +149,7 @@ def _compared(net: GearNet, ideal: Run, run: Run) -> tuple[dict[str, float | Non
     }
     if illegal:
         return figures, np.empty(0), np.empty(0)
-    one, other = causal_record(net, ideal.events), causal_record(net, run.events)
+    one, other = causal_record(net, ideal.lasting), causal_record(net, run.lasting)
     orders = compare(one, other)
     apart, spent = differences(one, other), duration_differences(one, other)
     figures |= {

@@ -23,7 +23,8 @@ from factory.mjcf import names
 from factory.mjcf.loading import load
 from factory.mjcf.solid import SolidReplica
 from factory.plant.approaches import Pair
-from factory.simulation.simulation import Simulation, physical_model
+from factory.simulation.modelling import physical_model
+from factory.simulation.simulation import Simulation
 from factory.study.fidelity.record import Penetration
 from factory.support.engine import mujoco
 

@@ -50,7 +50,7 @@ class Measurement:
         watcher = beside(self.simulation)
         with self._steps:
             run = self.simulation.run([self.observe, watcher.observe], max_time)
-        report = watcher.report(run.events)
+        report = watcher.report(run.lasting)
         self.seconds += report.time_s
         return replace(run, monitor=report)
 

@@ -61,7 +61,9 @@ class Acts {
     this.draw();
   }
 
-  take({ slowed, blocked }) {
+  take({ slowed, blocked, standing }) {
+    const stands = new Set(standing);
+    document.querySelectorAll('[data-robot]').forEach((e) => e.classList.toggle('standing', stands.has(DATA.robots[e.dataset.robot])));
     const same = JSON.stringify([slowed, blocked]) === JSON.stringify([this.slowed, this.blocked]);
     if (same) return;
     Object.assign(this, { slowed, blocked });
@@ -97,6 +99,12 @@ class Acts {
       made.push(this.group('Speed', [...DATA.factors].reverse().map((factor) =>
         [factor === 1 ? 'full' : `${100 * factor} %`, { do: 'slow', robot, factor }, factor === now])));
     }
+    if (robot !== undefined && DATA.fails)
+      made.push(this.group('Let it', [
+        ['drop what it holds', { do: 'drop', robot }],
+        ['stand for 5 s', { do: 'down', robot }],
+        ['die', { do: 'dead', robot }],
+      ]));
     if (part !== undefined) {
       const stopped = this.blocked.includes(part);
       made.push(this.words('h3', `Feeder of ${part}`));
@@ -104,6 +112,7 @@ class Acts {
         ['gives parts', { do: 'block', part, blocked: false }, !stopped],
         ['is blocked', { do: 'block', part, blocked: true }, stopped],
       ]));
+      if (DATA.fails) made.push(this.group('Next', [['is no good', { do: 'spoil', part }]]));
     }
     if (!made.length) made.push(this.words('p', 'Choose a robot to push it or slow it down, or a part to block its feeder: in the picture, the net, the plan or the tree.'));
     const changes = [
@@ -164,8 +173,10 @@ class Said {
       const row = document.createElement('li');
       const [at, name] = [document.createElement('time'), document.createElement('span')];
       at.textContent = `${time.toFixed(2)} s`;
-      name.textContent = DATA.transitions[event];
-      name.dataset.transition = event;
+      const isUndone = Array.isArray(event);
+      name.textContent = isUndone ? `undone: ${event.map((e) => DATA.transitions[e]).join(', ')}` : DATA.transitions[event];
+      if (isUndone) name.className = 'bad';
+      else name.dataset.transition = event;
       row.append(at, name);
       return row;
     });

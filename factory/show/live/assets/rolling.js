@@ -56,9 +56,29 @@ class Rolling {
   // Transitions that have fired: [[time, event], ...]. `open` are the operations under way.
   fire(fired) {
     for (const [time, event] of fired) {
+      if (Array.isArray(event)) {
+        this.undo(event, time);
+        continue;
+      }
       const operation = event >> 1;
       if (event % 2 === 0) this.begin(operation, time);
       else this.end(operation, time);
+    }
+  }
+
+  // Transitions that were undone: operations end where they are, or were over, and are hatched.
+  undo(events, time) {
+    for (const event of events.filter((e) => e % 2 === 0)) {
+      const operation = event >> 1;
+      const bar = [...this.bars].reverse().find((b) => b.operation === operation && !b.undone);
+      this.end(operation, time);
+      this.units[operation] -= 1;
+      if (!bar) continue;
+      bar.undone = true;
+      bar.elements.forEach((element) => {
+        element.classList.add('undone');
+        element.title += ', undone';
+      });
     }
   }
 

@@ -1,0 +1,40 @@
+"""Opening the log of a run that is gone on with: `run --resume LOG`."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from factory.commands.options import for_a_pag
+from factory.commands.requests import OutputOptions
+from factory.support.console import emit, say
+from factory.support.progress import Waiting
+
+if TYPE_CHECKING:
+    from factory.simulation.resuming import Resumed
+
+ALLOWED = ("resume", "max_time", "lenient", "monitor")
+"""The options of `run` that a run can be gone on with."""
+
+
+def resumed(file: Path, out: OutputOptions) -> Resumed | None:
+    """The run in a log, to be gone on with; where it comes from is said. None for one that has made
+    its units: there is nothing to be done, and that is said."""
+    from factory.record.ending import CutOff
+    from factory.simulation.resuming import resume
+
+    for_a_pag(file, "a log", *ALLOWED)
+    with Waiting("making the run in the log again", out.silent):
+        found = resume(file)
+    if isinstance(found, CutOff):
+        if out.as_json:
+            emit({"log": str(file), "units": found.units, "products": found.products})
+        elif not out.quiet:
+            say(f"'{file}' has made its units, {found.products} of {found.units}: nothing is left")
+        return None
+    for skipped in found.skipped:
+        print(skipped, file=sys.stderr)
+    if not out.silent:
+        say(f"'{file}' goes on from where it is {found.came}")
+    return found

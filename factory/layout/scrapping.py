@@ -1,0 +1,53 @@
+"""Which piles a robot can carry back to the B end of its guidepath, when they are scrap.
+
+A pile is swept from where it is complete back to B, and held against all regions of the clearance
+certificate, wherever the other robots are. Where it may come too near to one it is let fall where
+it is.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+
+from factory.layout.certificate import HAND_BODY, PAYLOAD_BODY, Region
+from factory.layout.clearance import ClearanceSearch
+from factory.layout.dimensions import PAYLOADS
+from factory.layout.layout import Layout
+from factory.layout.sweeps import Pile, piles, regions
+from factory.problem.pag import NOPART
+
+
+def not_carried_back(layout: Layout) -> frozenset[tuple[int, str]]:
+    """The robots (index) with the labels that they cannot carry back to B. Near linear."""
+    found = piles(layout.factory, layout.product)
+    ways = [way for r in range(len(layout.guidepaths)) for way in _ways_back(layout, r, found)]
+    here = [region for region in regions(layout, found) if region.layer == PAYLOADS]
+    search, back = ClearanceSearch(layout, [*here, *ways]), {id(way) for way in ways}
+    barred = set[tuple[int, str]]()
+    for one, other in search.near(search.swept):
+        mine = [region for region in (one, other) if id(region) in back]
+        if len(mine) == 1 and not search.settled(one, other):
+            barred.add((mine[0].robot, mine[0].label))
+    return frozenset(barred)
+
+
+def _ways_back(layout: Layout, robot: int, found: Mapping[str, Pile]) -> Iterator[Region]:
+    """Each pile of a robot, with its hand, from where it is before it is delivered to B."""
+    path, operations = layout.guidepaths[robot], layout.factory.operations
+    gear, stops = layout.factory.robots[robot].operations, layout.stops(robot)
+    grip = layout.grip(robot)
+    for step, number in enumerate(gear):
+        label = operations[number].after[operations[number].robots.index(robot)]
+        if label == NOPART:
+            continue
+        onward = (step + 1) % len(gear)
+        then = operations[gear[onward]]
+        leaves = then.after[then.robots.index(robot)] == NOPART
+        pile = found[label].raised(layout.elevation(robot, number))
+        pile, at = pile.moved(layout.shift(robot, number)), stops[step if leaves else onward]
+        yield Region(
+            robot, PAYLOADS, PAYLOAD_BODY, path.sweep(pile.box, path.length, at), pile.z, label
+        )
+        if grip is not None:
+            hand = path.sweep(path.world(grip, (0.0, 0.0)), path.length, at)
+            yield Region(robot, PAYLOADS, HAND_BODY, hand, pile.z, label)

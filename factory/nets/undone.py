@@ -1,0 +1,80 @@
+"""What a record of a run says of a failure, or of robots that were exchanged."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import chain
+
+from factory.nets.gears import GearNet
+
+Joins = Mapping[int, tuple[int, ...]]
+"""For each end the transitions that are undone at least as often as it is: its start, and the ends
+that made what it joined. `factory.plant.material.joins_of` makes it."""
+
+
+@dataclass(frozen=True, slots=True)
+class Undone:
+    """Transitions that were undone at time t [s].
+
+    `operation`: the label of the operation that failed; `reason`: why, in words; `asked`: the
+    transitions that had to be undone for that; `transitions`: all that were, in the order of their
+    numbers. Each name stands there as often as it is undone. `exchanged`: the run went on in the
+    next of its nets; then nothing need be undone. `factory.nets.undo` has the definition.
+    """
+
+    t: float
+    operation: str
+    reason: str
+    asked: tuple[str, ...]
+    transitions: tuple[str, ...]
+    exchanged: bool = False
+
+    @classmethod
+    def between(
+        cls,
+        net: GearNet,
+        what: tuple[float, str, str],
+        asked: Iterable[int],
+        before: Sequence[int],
+        after: Sequence[int],
+        exchanged: bool = False,
+    ) -> Undone:
+        """What was undone between two counts of firings; `what`: time, operation and reason."""
+        names = [transition.name for transition in net.threaded.transitions]
+        triples = zip(names, before, after, strict=True)
+        undone = (name for name, was, now in triples for _ in range(was - now))
+        return cls(*what, tuple(names[event] for event in asked), tuple(undone), exchanged)
+
+    def as_json(self) -> dict[str, object]:
+        """As `run --json` prints it."""
+        return {
+            "t": round(self.t, 6),
+            "undone": list(self.transitions),
+            "asked": list(self.asked),
+            "operation": self.operation,
+            "reason": self.reason,
+            **({"exchanged": True} if self.exchanged else {}),
+        }
+
+
+Entry = str | Undone
+"""A transition that fired, by its name, or what was undone."""
+
+
+def lasting(entries: Iterable[Entry]) -> list[int]:
+    """Which entries (index) are firings that last: an undo takes back the latest of its
+    transitions.
+
+    They too are a firing sequence of the net, to the same marking, unless robots are exchanged:
+    counts with m_0 + C n >= 0 are closed under the lesser of two.
+    """
+    left: dict[str, list[int]] = {}
+    for number, entry in enumerate(entries):
+        if isinstance(entry, str):
+            left.setdefault(entry, []).append(number)
+            continue
+        for name in entry.transitions:
+            if left.get(name):  # others fired before the run began
+                left[name].pop()
+    return sorted(chain.from_iterable(left.values()))

@@ -1,0 +1,85 @@
+"""What went wrong in a run, as a log keeps it: JSON in its last block, where the run goes on after
+failures."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from typing import Any
+
+from factory.record.failures import Failing, Failures, Stood
+from factory.record.log.header import LARGE, Key, is_count, is_table, is_text, listed
+
+
+def _is_time(value: Any) -> bool:
+    return type(value) in (int, float) and 0 <= value <= LARGE
+
+
+def _is_listed(value: Any) -> bool:
+    return isinstance(value, list)
+
+
+def _is_tally(value: Any) -> bool:
+    return is_table(value) and all(is_text(k) and is_count(v) for k, v in value.items())
+
+
+_TIME = f"a time in s, at most {LARGE}"
+_COUNT = "a whole number from 0"
+
+_KEYS = (
+    Key("struck", "how many faults there were of each kind", _is_tally),
+    *(
+        Key(name, _COUNT, is_count)
+        for name in ("missed", "false_alarms", "transitions_undone", "spares_used")
+    ),
+    Key("fault_contacts", _COUNT, is_count),
+    Key("standing", "a list of which robots stood", _is_listed),
+    Key("failures", "a list of failures", _is_listed),
+)
+
+_OF_STOOD = (Key("t", _TIME, _is_time), Key("robots", "a list of robots", listed(is_text)))
+
+_OF_FAILING = (
+    Key("t", _TIME, _is_time),
+    *(Key(name, "a text", is_text) for name in ("test", "operation", "response")),
+    Key("robot", "a text, or null", lambda v: v is None or is_text(v)),
+    Key("scrapped", "a list of labels", listed(is_text)),
+    Key("until", _TIME, _is_time, later=True),
+)
+
+
+def failures_in(content: bytes, robots: frozenset[str]) -> Failures:
+    """What went wrong in the run of a log whose robots have these names. Raises ValueError where
+    the text is not what `Failures.as_json` gives."""
+    told = _checked(json.loads(content), _KEYS)
+    stood = tuple(_stood(_checked(entry, _OF_STOOD)) for entry in told["standing"])
+    unknown = {name for _, names in stood for name in names} - robots
+    if unknown:
+        raise ValueError(f"'{min(unknown)}' stood, which is no robot")
+    return Failures(
+        tuple(_failing(_checked(entry, _OF_FAILING)) for entry in told["failures"]),
+        told["struck"],
+        told["missed"],
+        told["false_alarms"],
+        told["transitions_undone"],
+        told["spares_used"],
+        told["fault_contacts"],
+        stood,
+    )
+
+
+def _checked(entry: Any, keys: tuple[Key, ...]) -> Mapping[str, Any]:
+    if not isinstance(entry, dict):
+        raise ValueError(f"what went wrong is no table: {entry!r:.40}")
+    for key in keys:
+        key.check(entry)
+    return entry
+
+
+def _stood(entry: Mapping[str, Any]) -> Stood:
+    return float(entry["t"]), tuple(entry["robots"])
+
+
+def _failing(entry: Mapping[str, Any]) -> Failing:
+    names = entry["test"], entry["operation"], entry["robot"] or "", entry["response"]
+    return Failing(float(entry["t"]), *names, tuple(entry["scrapped"]), entry.get("until"))

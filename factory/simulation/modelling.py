@@ -1,0 +1,72 @@
+"""The engine's model of a laid-out factory, with the bodies that a run needs."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+from factory.layout.layout import Layout
+from factory.mjcf.timestep import timed
+from factory.plant.fused_bodies import FusedBodies, bodies_of, fused_copies
+from factory.problem.robot_types import Catalogue, load_catalogue
+from factory.simulation.request import RunRequest
+from factory.support.settings import Settings
+from factory.timing.pool import part_pool
+
+if TYPE_CHECKING:
+    from factory.mjcf.model import Model
+
+SPARE = 2
+"""So many copies more of each body are there where parts may be scrapped: they are back in their
+feeders only when they have been cleared away."""
+
+
+def modelled(layout: Layout, request: RunRequest, under_way: Mapping[str, int]) -> Model:
+    """The model that a run takes."""
+    from factory.mjcf.model import build_model
+
+    bodies = bodies_of(layout.factory, layout.product, request.fuse)
+    copies, wip = _copies(layout, bodies, request.units, request.wip, under_way)
+    if request.recovers:
+        copies = {label: count + SPARE for label, count in copies.items()}
+    catalogue, settings = request.catalogue or load_catalogue(), timed(request.settings, layout)
+    return build_model(layout, catalogue, copies, settings, bodies, request.shown, wip)
+
+
+def physical_model(
+    layout: Layout,
+    units: int | None = None,
+    settings: Settings | None = None,
+    catalogue: Catalogue | None = None,
+    wip: int | None = None,
+    under_way: Mapping[str, int] | None = None,
+    fuse: bool = False,
+    shown: bool = True,
+) -> Model:
+    """The MJCF model of a layout with the bodies it needs for `units` (None: for ever): the pool of
+    parts, or with `fuse` bodies of sub-assemblies too, and then few parts. Where the pool is too
+    large, at most so many units are inside as `fitting_wip` says, unless `wip` is given. `shown`:
+    with what is only shown, too."""
+    from factory.mjcf.model import build_model
+
+    bodies = bodies_of(layout.factory, layout.product, fuse)
+    copies, wip = _copies(layout, bodies, units, wip, under_way or {})
+    catalogue, settings = catalogue or load_catalogue(), timed(settings or Settings(), layout)
+    return build_model(layout, catalogue, copies, settings, bodies, shown, wip)
+
+
+def _copies(
+    layout: Layout,
+    bodies: FusedBodies,
+    units: int | None,
+    wip: int | None,
+    under_way: Mapping[str, int],
+) -> tuple[dict[str, int], int | None]:
+    """How many copies of each body are needed, and for how many units inside at once at most."""
+    from factory.mjcf.model import fitting_wip, part_copies
+
+    if bodies.wholes:
+        return fused_copies(bodies, layout.factory, units), wip
+    pool = part_pool(layout.factory)
+    wip = wip or fitting_wip(pool, units)
+    return part_copies(pool, units, wip, under_way), wip

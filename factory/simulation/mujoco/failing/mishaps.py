@@ -1,0 +1,106 @@
+"""What the world does to bodies: hands that open, inputs that slip, parts that lie askew."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from factory.plant.factory import Operation
+from factory.simulation.mujoco.failing.fallen import Fallen
+from factory.simulation.mujoco.world import MujocoWorld
+from factory.simulation.recovery.faults import WorldFault
+from factory.support.engine import mujoco
+
+SETTLES = 0.5
+"""What has slipped is back in its place in the hand so long after it is held right [s]."""
+
+
+@dataclass(frozen=True, slots=True)
+class Slip:
+    """The `welds` of a robot's hand in which something has slipped, and all the `bodies` of the
+    operation, which press on each other."""
+
+    robot: int
+    welds: tuple[int, ...]
+    bodies: tuple[int, ...]
+
+
+class Mishaps:
+    """Those of a world. `slips`: by operation under way (index); `opened`: robots (index) whose
+    hands have opened and that do not know; `bad`: bodies that are no good, and whether that is
+    hidden from feeders' cameras."""
+
+    def __init__(self, world: MujocoWorld, fallen: Fallen) -> None:
+        self._world, self._fallen, self._nominal = world, fallen, world.m.eq_data.copy()
+        self._settling: list[tuple[float, tuple[int, ...]]] = []
+        self.slips: dict[int, Slip] = {}
+        self.opened: set[int] = set()
+        self.bad: dict[int, bool] = {}
+
+    def open(self, robot: int) -> None:
+        """A robot's hand opens."""
+        parts = self._world.parts
+        held = parts.hands.of[robot].bodies
+        parts.welds.loose([parts.hands.grip[robot, label] for label in held])
+        parts.welds.write()
+        self._fallen.watch(held.values())
+        self.opened.add(robot)
+
+    def slip(self, operation: Operation, metres: float) -> None:
+        """The last input of an operation slips up in its hand."""
+        hands, robot = self._world.parts.hands, operation.robots[operation.last]
+        welds = tuple(hands.grip[robot, label] for label in hands.of[robot].bodies)
+        self._world.m.eq_data[[*welds], 5] += metres
+        held = (hands.of[r].bodies.values() for r in operation.robots if r in hands.of)
+        bodies = tuple(body for found in held for body in found)
+        self.slips[operation.index] = Slip(robot, welds, bodies)
+        self._fallen.watch(bodies)
+
+    def restore(self, operations: Iterable[int]) -> None:
+        """What has slipped in operations (index) is held as it should be."""
+        for number in {*operations} & self.slips.keys():
+            slip = self.slips.pop(number)
+            self._world.m.eq_data[[*slip.welds]] = self._nominal[[*slip.welds]]
+            self._settling.append((self._world.time + SETTLES, slip.bodies))
+
+    def fresh(self) -> Sequence[tuple[str, int]]:
+        """The parts that feeders have begun to show since the last question, none of them askew."""
+        feeders = self._world.parts.feeders
+        found, feeders.back.fresh = [*feeders.back.fresh.items()], {}
+        welds = [feeders.welds[label] for label, _ in found]
+        self._world.m.eq_data[welds] = self._nominal[welds]
+        return found
+
+    def spoil(self, label: str, fault: WorldFault) -> None:
+        """What a feeder shows is askew or no good."""
+        parts, m = self._world.parts, self._world.m
+        unit = parts.feeders.shown().get(label)
+        if unit is None:
+            return
+        body, weld = parts.copies[label, unit], parts.feeders.welds[label]
+        if fault.kind == "bad_part":
+            self.bad[body] = fault.hidden
+            return
+        half = np.radians(fault.degrees) / 2
+        about_x, turn, pose = np.array([np.cos(half), np.sin(half), 0, 0]), np.zeros(4), np.zeros(4)
+        mujoco.mju_mulQuat(turn, self._nominal[weld, 6:10], about_x)
+        mujoco.mju_mulQuat(pose, self._world.d.xquat[m.eq_obj1id[weld]], turn)
+        m.eq_data[weld, 5] += fault.metres
+        m.eq_data[weld, 6:10] = turn
+        parts.welds.turn(body, pose)
+        self._fallen.watch([body])
+
+    def tick(self) -> None:
+        """A tick is over: what has been joined has not slipped any more, and what is out of sight
+        is as good as new."""
+        world = self._world
+        self.restore(
+            [n for n, slip in self.slips.items() if slip.robot not in world.parts.hands.of]
+        )
+        for _, bodies in [one for one in self._settling if one[0] <= world.time]:
+            self._fallen.calm(bodies)
+        self._settling = [one for one in self._settling if one[0] > world.time]
+        units = world.parts.masks.unit
+        self.bad = {body: hidden for body, hidden in self.bad.items() if units[body] >= 0}

@@ -1,0 +1,243 @@
+"""The bodies of a factory in which things go wrong, in the engine."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence, Set
+
+import numpy as np
+
+from factory.plant.factory import Operation
+from factory.problem.pag import NOPART
+from factory.simulation.mujoco.failing.fallen import Fallen
+from factory.simulation.mujoco.failing.mishaps import Mishaps
+from factory.simulation.mujoco.failing.sensors import Senses
+from factory.simulation.mujoco.world import MujocoWorld
+from factory.simulation.recovery.faults import Campaign, WorldFault
+
+SCRAP = 1 << 20
+"""Bodies that are scrap count for units from this one on."""
+
+
+class MujocoPlant:
+    """What recovery asks of a `MujocoWorld`, and does to it."""
+
+    def __init__(self, world: MujocoWorld, campaign: Campaign) -> None:
+        self._world, self._factory, self._clear = world, world.model.factory, campaign.clear
+        self._fallen = Fallen(world)
+        self._mishaps, self._senses = Mishaps(world, self._fallen), Senses(world, campaign)
+        self._scrapped = SCRAP
+
+    def lose(self, robot: int) -> bool:
+        """A robot's hand opens, and nothing tells; whether it held anything."""
+        hand = self._world.parts.hands.of.get(robot)
+        if hand is None or hand.unit >= SCRAP:
+            return False
+        self._mishaps.open(robot)
+        return True
+
+    def slip(self, operation: Operation, metres: float) -> None:
+        """The last input of an operation that has started slips in its hand."""
+        self._mishaps.slip(operation, metres)
+
+    @property
+    def slipped(self) -> frozenset[int]:
+        """The operations (index) under way whose inputs have slipped."""
+        return frozenset(self._mishaps.slips)
+
+    def fresh(self) -> Sequence[tuple[str, int]]:
+        """The parts that feeders have begun to show since the last question: label and unit."""
+        return self._mishaps.fresh()
+
+    def spoil(self, label: str, fault: WorldFault) -> None:
+        """What a feeder shows is askew or no good."""
+        self._mishaps.spoil(label, fault)
+
+    def supplied(self) -> None:
+        """Some operation may have become prepared."""
+        self._world.supplied = True
+
+    def tick(self) -> None:
+        """A tick is over."""
+        self._world.parts.strength.dropped = None
+        self._mishaps.tick()
+        if self._fallen.tick():
+            self.supplied()
+
+    def lost(self) -> Sequence[int]:
+        """The robots that no longer feel what they carry."""
+        hands = self._world.parts.hands.of
+        return [r for r in self._senses.lost() if r in hands and hands[r].unit < SCRAP]
+
+    def knocked(self, robot: int) -> bool:
+        """Whether a robot's hand is closed, and something touched what it holds that had fallen or
+        slipped."""
+        hand, pressing = self._world.parts.hands.of.get(robot), self._world.inspection.pressing
+        if hand is None or robot in self._mishaps.opened:
+            return False
+        return not (pressing.shaken | pressing.fallen).isdisjoint(hand.bodies.values())
+
+    def feels(self, robots: Sequence[int]) -> bool:
+        """Whether robots feel all that they carry, now."""
+        return self._senses.unfelt().isdisjoint(robots)
+
+    def offers(self, label: str) -> bool:
+        """Whether a feeder shows a part that has been looked at and found good."""
+        return label in self._world.parts.feeders.back.good
+
+    def refused(self) -> Sequence[tuple[str, int, str]]:
+        """Parts that a feeder's camera finds askew or no good: label, unit, the test that says so.
+        They are taken back, and the next come."""
+        feeders, found = self._world.parts.feeders, list[tuple[str, int, str]]()
+        for station, unit, body in [*feeders.at_rest()]:
+            label, test = station.label, ""
+            if self._mishaps.bad.get(body) is False:
+                test = "rejected"
+            elif self._senses.is_askew(label, body, np.array(station.down)):
+                test = "misplaced"
+            if not test:
+                feeders.back.good.add(label)
+                continue
+            found.append((label, unit, test))
+            feeders.take_back(label, self._next_scrap())
+            if (carrier := self._factory.by_label[label].carrier) not in self._world.parts.hands.of:
+                feeders.stay_clear(carrier)
+        return found
+
+    def residual(self, operation: Operation) -> float:
+        """How far inputs are from where they belong when they are about to be joined, as measured
+        [m]."""
+        return self._senses.residual(operation)
+
+    def rejects(self, robot: int) -> bool:
+        """Whether an inspection rejects what a robot holds."""
+        hand = self._world.parts.hands.of.get(robot)
+        return hand is not None and not self._mishaps.bad.keys().isdisjoint(hand.bodies.values())
+
+    def undone(self, holds: Sequence[str], fired: Sequence[int], going: Set[int]) -> Sequence[int]:
+        """From now on robots hold these labels by the books, NOPART for nothing, transitions have
+        fired so often, and some robots are `going` back. Gives those that hold something that is
+        scrap now."""
+        parts, operations = self._world.parts, self._factory.operations
+        self._mishaps.restore([o.index for o in operations if fired[o.start] == fired[o.end]])
+        scrap = {robot for robot in parts.hands.of if holds[robot] == NOPART}
+        gone = self._senses.unfelt() & scrap
+        units = self._units(holds, fired, scrap)
+        self._renumber(units, fired, scrap)
+        for robot in scrap:
+            parts.joining.waiting.pop(robot, None)
+        for robot in sorted(gone):
+            self._let_fall(robot, self._clear)
+        self._recount(fired, going, scrap - gone)
+        parts.welds.write()
+        return sorted(scrap - gone)
+
+    def _units(self, holds: Sequence[str], fired: Sequence[int], scrap: Set[int]) -> dict[int, int]:
+        """The unit for which each robot that holds something holds it from now on: the last that
+        was made of it; what is scrap keeps together."""
+        found, fresh = dict[int, int](), dict[int, int]()
+        for robot, hand in self._world.parts.hands.of.items():
+            if robot not in scrap:
+                maker = self._factory.by_label[holds[robot]]
+                found[robot] = self._factory.unit(maker, fired[maker.end] - 1)
+                continue
+            if hand.unit not in fresh:
+                fresh[hand.unit] = hand.unit if hand.unit >= SCRAP else self._next_scrap()
+            found[robot] = fresh[hand.unit]
+        return found
+
+    def _renumber(self, units: Mapping[int, int], fired: Sequence[int], scrap: Set[int]) -> None:
+        """Bodies are for other units: those in hands, those that are shown, and the inputs of
+        operations under way, or of those that come apart."""
+        parts, factory, joining = self._world.parts, self._factory, self._world.inspection.joining
+        shown = parts.feeders.shown()
+        for_units = {
+            (label, hand.unit): units[robot]
+            for robot, hand in parts.hands.of.items()
+            for label in hand.bodies
+        }
+        for_units |= {
+            (leaf.label, shown[leaf.label]): factory.unit(leaf, fired[leaf.end])
+            for leaf in factory.leaves
+            if leaf.label in shown
+        }
+        parts.copies.renumber(for_units)
+        for robot, unit in units.items():
+            parts.hands.of[robot].unit = unit
+        for number in joining:
+            operation = factory.operations[number]
+            wasted = [units[robot] for robot in operation.robots if robot in scrap]
+            unit = factory.unit(operation, fired[operation.end])
+            joining[number] = wasted[0] if wasted else unit
+
+    def _recount(self, fired: Sequence[int], going: Set[int], scrap: Set[int]) -> None:
+        """Feeders show what is needed now. Where a robot comes home with something, nothing comes
+        down until it is there, and what has come goes up again; where with nothing, when it is out
+        of the way."""
+        factory, feeders = self._factory, self._world.parts.feeders
+        hands = self._world.parts.hands.of
+        ends = {leaf.label: fired[leaf.end] for leaf in factory.leaves}
+        units = {leaf.label: factory.unit(leaf, ends[leaf.label]) for leaf in factory.leaves}
+        feeders.undone(units, ends, self._next_scrap(len(ends)))
+        for leaf in factory.leaves:
+            hand = hands.get(leaf.carrier)
+            if hand is None:
+                if leaf.carrier in going:
+                    feeders.stay_clear(leaf.carrier)
+            elif leaf.carrier in scrap or (leaf.carrier in going and leaf.label in hand.bodies):
+                for label in self._world.model.layout.magazine(leaf.carrier):
+                    feeders.back.awaited.add(label)
+                    if label in feeders.shown():
+                        feeders.take_back(label, self._next_scrap())
+
+    def let_go(self, robot: int, seconds: float) -> None:
+        """A robot lets scrap fall, which lies for so long [s]."""
+        self._let_fall(robot, seconds)
+        self._world.parts.welds.write()
+        self.came_back(robot)
+        self._world.parts.feeders.stay_clear(robot)
+
+    def _let_fall(self, robot: int, seconds: float) -> None:
+        self._mishaps.opened.discard(robot)
+        self._fallen.let_fall(robot, seconds)
+
+    def takes_back(self, robot: int) -> bool:
+        """Whether something goes back up in a robot's feeder."""
+        labels = self._world.model.layout.magazine(robot)
+        return not {*labels}.isdisjoint(self._world.parts.feeders.served())
+
+    def came_back(self, robot: int) -> None:
+        """A robot is where it waits."""
+        feeders = self._world.parts.feeders
+        feeders.back.awaited.difference_update(self._world.model.layout.magazine(robot))
+
+    @property
+    def lying(self) -> Sequence[float]:
+        """Until when [s] things lie about."""
+        return [heap.until for heap in self._fallen.heaps]
+
+    @property
+    def closed(self) -> frozenset[int]:
+        """The robots that could touch what lies about."""
+        return self._fallen.closed
+
+    @property
+    def contacts(self) -> int:
+        """Pairs of things that touched of which one had fallen, or lay askew."""
+        return len(self._world.inspection.pressing.touched)
+
+    def lift_out(self, robot: int, at: Mapping[int, float]) -> None:
+        """A dead robot and what it holds are taken away, and another is put in its place, with its
+        axes at these places [m]."""
+        world, feeders = self._world, self._world.parts.feeders
+        if robot in world.parts.hands.of:
+            hand = world.parts.hands.let_go(robot)
+            feeders.retire(hand.bodies, hand.unit)
+        world.parts.welds.write()
+        world.motion.load([robot], [0.0])
+        world.motion.put(at)
+        self.came_back(robot)
+        feeders.stay_clear(robot)
+
+    def _next_scrap(self, count: int = 1) -> int:
+        self._scrapped += count
+        return self._scrapped - count

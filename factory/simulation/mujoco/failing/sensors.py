@@ -1,0 +1,82 @@
+"""What sensors tell of bodies: of grips, of joints, of parts that are shown."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from factory.control.mode import Array, Index
+from factory.mjcf.weld_frames import WeldFrames
+from factory.plant.factory import Operation
+from factory.simulation.mujoco.world import MujocoWorld
+from factory.simulation.recovery.faults import Campaign
+
+LOST = 5e-3
+"""A part further than this from its place in the hand is lost [m]."""
+
+TURNED = 0.05
+"""What a feeder shows is askew, too, when it is turned so far [rad]."""
+
+
+class Senses:
+    """Those of a world: what is measured is off by `noise` [m], drawn anew each time."""
+
+    def __init__(self, world: MujocoWorld, campaign: Campaign) -> None:
+        self._world, self._noise = world, campaign.sensors.noise
+        self._delay, self._draw = campaign.sensors.delay, np.random.default_rng((campaign.seed, 1))
+        self._frames, self._seen = WeldFrames.of(world.m, world.d), -1
+        self._welds = self._bodies = self._robots = np.empty(0, np.intp)
+        self._since: dict[int, float] = {}
+
+    def unfelt(self) -> frozenset[int]:
+        """The robots (index) that do not feel now what they hold: there is no grip, or it is not in
+        its place."""
+        hands, d = self._world.parts.hands, self._world.d
+        if self._seen != hands.changes:
+            self._seen = hands.changes
+            held = [
+                (hands.grip[robot, label], body, robot)
+                for robot, hand in hands.of.items()
+                for label, body in hand.bodies.items()
+            ]
+            self._welds, self._bodies, self._robots = np.array(held, np.intp).reshape(-1, 3).T
+        off = np.linalg.norm(self._gaps(self._welds, self._bodies), axis=1)
+        gone = (off > LOST) | (d.eq_active[self._welds] == 0)
+        return frozenset(self._robots[gone].tolist())
+
+    def lost(self) -> list[int]:
+        """The robots (index) that have not felt what they hold for some time."""
+        now = self._world.time
+        self._since = {robot: self._since.get(robot, now) for robot in sorted(self.unfelt())}
+        return [robot for robot, since in self._since.items() if now - since >= self._delay]
+
+    def residual(self, operation: Operation) -> float:
+        """How far inputs are from where they belong when they are about to be joined, as measured
+        [m]."""
+        hands = self._world.parts.hands
+        held = [
+            (hands.grip[operation.carrier, label], body)
+            for robot in operation.robots
+            if robot != operation.carrier and robot in hands.of
+            for label, body in hands.of[robot].bodies.items()
+        ]
+        if not held:
+            return 0.0
+        gaps = self._gaps(*np.array(held).T)
+        gaps += self._noise * self._draw.normal(size=gaps.shape)
+        return float(np.linalg.norm(gaps, axis=1).max())
+
+    def is_askew(self, label: str, body: int, place: Array) -> bool:
+        """Whether a feeder's camera finds the part in its `place` (3,) [m]."""
+        test = self._world.model.factory.by_label[label].template.failure("misplaced")
+        if test is None or test.limit is None:
+            return False
+        m = self._world.m
+        pose = self._world.d.qpos[m.jnt_qposadr[m.body_jntadr[body]] + np.arange(7)]
+        off = np.linalg.norm(pose[:3] - place + self._noise * self._draw.normal(size=3))
+        return bool(off > test.limit or 2 * np.arccos(min(1.0, abs(float(pose[3])))) > TURNED)
+
+    def _gaps(self, welds: Index, bodies: Index) -> Array:
+        """How far bodies are (n, 3) [m] from where welds should hold them."""
+        m, q, frames = self._world.m, self._world.d.qpos, self._frames.chosen(welds)
+        place = q[m.jnt_qposadr[m.body_jntadr[bodies]][:, None] + np.arange(3)]
+        return np.asarray(place - frames.at(q[frames.along]))

@@ -1,0 +1,41 @@
+"""The books: where robots are by the marking, and what they hold there."""
+
+from __future__ import annotations
+
+from factory.nets.petri import Marking
+from factory.plant.factory import Factory, Operation
+from factory.simulation.supervisor import Supervisor
+
+
+class Books:
+    """Those of a supervisor, as they are now or in another marking."""
+
+    def __init__(self, factory: Factory, supervisor: Supervisor) -> None:
+        self.factory, self.supervisor = factory, supervisor
+
+    @property
+    def marking(self) -> Marking:
+        """The places that are marked now."""
+        return frozenset(place for place, is_so in enumerate(self.supervisor.marked) if is_so)
+
+    def step_of(self, robot: int, marking: Marking | None = None) -> int:
+        """The step of its gear that a robot (index) is at: twice that of its program, and one more
+        where the operation is under way."""
+        marked = self.marking if marking is None else marking
+        places = self.factory.net.gears[robot].places
+        return next(step for step, place in enumerate(places) if place in marked)
+
+    def operation_of(self, robot: int, marking: Marking | None = None) -> Operation:
+        """The operation that a robot (index) is in, or waits for."""
+        step = self.step_of(robot, marking)
+        return self.factory.operations[self.factory.robots[robot].operations[step // 2]]
+
+    def holds(self, robot: int, marking: Marking | None = None) -> str:
+        """The label that a robot (index) holds, NOPART for nothing."""
+        operation = self.operation_of(robot, marking)
+        return operation.before[operation.robots.index(robot)]
+
+    def held(self, marking: Marking | None = None) -> list[str]:
+        """The label that each robot holds, NOPART for nothing."""
+        marked = self.marking if marking is None else marking
+        return [self.holds(robot.index, marked) for robot in self.factory.robots]

@@ -1,0 +1,45 @@
+"""Faults and failures counted against each other: what was missed, and what was a false alarm."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+
+from factory.record.failures import Failing, Failures, Stood
+
+CAUSES = {
+    "drop": "lost",
+    "knocked": "lost",
+    "misplaced": "misplaced",
+    "bad_part": "rejected",
+    "bad_joint": "residual",
+    "dead": "jammed",
+}
+"""The test that finds each kind of fault, of those that some test finds."""
+
+
+def summed(
+    found: Sequence[Failing],
+    struck: Mapping[str, int],
+    undone: int,
+    spares: int,
+    contacts: int,
+    stood: Sequence[Stood],
+) -> Failures:
+    """All failures of a run. A robot that is dead and never asked to move is not missed."""
+    tests, wanted = Counter(one.test for one in found), Counter[str]()
+    for kind, count in struck.items():
+        if kind in CAUSES:
+            wanted[CAUSES[kind]] += count
+    wanted["jammed"] = min(wanted["jammed"], tests["jammed"])
+    missed, alarms = wanted - tests, tests - wanted
+    return Failures(
+        tuple(found),
+        {kind: count for kind, count in struck.items() if count},
+        missed.total(),
+        alarms.total(),
+        undone,
+        spares,
+        contacts,
+        tuple(stood),
+    )

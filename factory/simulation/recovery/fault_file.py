@@ -1,0 +1,139 @@
+"""WorldFault campaigns as files: TOML with a table [[fault]] for each fault."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping
+from dataclasses import fields
+from pathlib import Path
+from typing import Any
+
+from factory.plant.factory import Factory
+from factory.simulation.recovery.faults import (
+    CLEAR,
+    KINDS,
+    OF_LABEL,
+    SWAP,
+    Campaign,
+    Sensors,
+    WorldFault,
+)
+from factory.support.errors import Diagnostic, InputError, Position, did_you_mean
+from factory.support.user_defaults import key_position, read_toml
+
+EXAMPLE = 'for example [[fault]], and below it kind = "drop", label = "part1", unit = 2'
+
+KEYS: Mapping[str, type] = {"seed": int, "clear": float, "sensors": dict, "fault": list}
+OF_FAULT: Mapping[str, type] = {
+    "kind": str,
+    "label": str,
+    "robot": str,
+    "unit": int,
+    "at": float,
+    "rate": float,
+    "seconds": float,
+    "metres": float,
+    "degrees": float,
+    "hidden": bool,
+}
+OF_SENSORS: Mapping[str, type] = {field.name: float for field in fields(Sensors)}
+WORDS = {int: "a whole number", float: "a number", str: "a text", bool: "true or false"}
+WORDS |= {dict: "a table", list: "a list of tables [[fault]]"}
+
+
+def read_campaign(path: Path, spares: int = 0, swap: float = SWAP) -> Campaign:
+    """The campaign that a file describes, with so many spares. Raises InputError with every fault
+    of the file: BadFile, Syntax, UnknownParameter, BadValue, BadFault."""
+    text, values = read_toml(path, EXAMPLE)
+    found = _Reader(path, text)
+    found.check(values, KEYS, "")
+    sensors = values.get("sensors", {})
+    if isinstance(sensors, dict):
+        found.check(sensors, OF_SENSORS, "in [sensors]")
+    tables = values.get("fault", [])
+    faults = [*found.faults(tables if isinstance(tables, list) else [])]
+    if found.wrong:
+        raise InputError(found.wrong)
+    known = {k: float(v) for k, v in sensors.items()}
+    clear = float(values.get("clear", CLEAR))
+    seed = values.get("seed", 0)
+    return Campaign(tuple(faults), seed, clear, Sensors(**known), spares, swap)
+
+
+class _Reader:
+    """Collects what is wrong with a file."""
+
+    def __init__(self, path: Path, text: str) -> None:
+        self.path, self.text = path, text
+        self.wrong: list[Diagnostic] = []
+
+    def check(self, values: Mapping[str, Any], known: Mapping[str, type], where: str) -> None:
+        """Every key is known, and its value of the right type and not negative."""
+        for key, value in values.items():
+            at = key_position(self.path, self.text, key)
+            if key not in known:
+                message = " ".join(filter(None, (f"unknown key '{key}'", where)))
+                hint = did_you_mean(key, [*known], "keys")
+                self.wrong.append(Diagnostic("UnknownParameter", message, at, hint))
+            elif not _is(value, known[key]) or (_is(value, float) and value < 0):
+                least = ", from 0 on" if known[key] in (int, float) else ""
+                message = f"{key} must be {WORDS[known[key]]}{least}"
+                self.wrong.append(Diagnostic("BadValue", message, at, EXAMPLE))
+
+    def faults(self, tables: list[Any]) -> Iterator[WorldFault]:
+        """The faults that are described well."""
+        starts = [m.start() for m in re.finditer(r"^\s*\[\[\s*fault\s*\]\]", self.text, re.M)]
+        for number, table in enumerate(tables):
+            line = self.text.count("\n", 0, starts[number]) + 1 if number < len(starts) else 1
+            at = Position(str(self.path), line, 1, "[[fault]]")
+            before = len(self.wrong)
+            if not isinstance(table, dict):
+                self.wrong.append(Diagnostic("BadFault", "a fault is a table", at, EXAMPLE))
+                continue
+            self.check(table, OF_FAULT, "of a fault")
+            if len(self.wrong) == before and (fault := self._fault(table, at)):
+                yield fault
+
+    def _fault(self, table: Mapping[str, Any], at: Position) -> WorldFault | None:
+        kind = table.get("kind", "")
+        if kind not in KINDS:
+            hint = did_you_mean(str(kind), [*KINDS], "kinds of faults")
+            message = f"there is no fault '{kind}'" if kind else "this fault has no 'kind'"
+            self.wrong.append(Diagnostic("BadFault", message, at, hint))
+            return None
+        try:
+            values: dict[str, Any] = dict(table)
+            numbers = {k: float(v) for k, v in values.items() if OF_FAULT[k] is float}
+            return WorldFault(**(values | numbers))
+        except ValueError as error:
+            self.wrong.append(Diagnostic("BadFault", str(error), at, EXAMPLE))
+            return None
+
+
+def _is(value: object, kind: type) -> bool:
+    if isinstance(value, bool) or kind is bool:
+        return isinstance(value, bool) and kind is bool
+    return isinstance(value, int | float if kind is float else kind)
+
+
+def check_names(campaign: Campaign, factory: Factory) -> None:
+    """Raises InputError (BadFault) where a fault names a robot or label that the factory has not,
+    or a label that no such fault can concern."""
+    robots = [robot.name for robot in factory.robots]
+    parts = [leaf.label for leaf in factory.leaves]
+    joined = [o.label for o in factory.making if len(o.inputs) > 1]
+    every = [o.label for o in factory.making]
+    wrong = list[Diagnostic]()
+    for fault in campaign.faults:
+        labels, what = every, "labels"
+        if fault.kind in OF_LABEL:
+            is_joint = fault.kind == "bad_joint"
+            labels, what = (joined, "joined labels") if is_joint else (parts, "parts")
+        for name, known, kinds in ((fault.robot, robots, "robots"), (fault.label, labels, what)):
+            if name and name not in known:
+                message = f"'{fault.kind}' names '{name}', which is none of the {kinds}"
+                wrong.append(
+                    Diagnostic("BadFault", message, None, did_you_mean(name, known, kinds))
+                )
+    if wrong:
+        raise InputError(wrong)

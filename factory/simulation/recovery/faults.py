@@ -1,0 +1,93 @@
+"""Faults: what the world does to a factory that goes wrong, as values."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from math import isfinite
+from types import MappingProxyType
+
+KINDS: Mapping[str, str] = MappingProxyType(
+    {
+        "drop": "a robot lets fall what it carries",
+        "misplaced": "a feeder shows a part that lies askew or upside down",
+        "bad_part": "a feeder shows a part that is no good",
+        "no_part": "a feeder is empty for some time",
+        "bad_joint": "an input has slipped in its hand when it is joined",
+        "blackout": "no sensor tells anything for some time",
+        "down": "a robot stands for some time",
+        "dead": "a robot never moves again",
+    }
+)
+"""Every kind of fault, in words."""
+
+OF_ROBOT, OF_LABEL = {"down", "dead"}, {"misplaced", "bad_part", "no_part", "bad_joint"}
+"""Kinds that name a robot, and that may name a label: of a part, or of what is joined."""
+
+
+@dataclass(frozen=True, slots=True)
+class WorldFault:
+    """A fault of some kind: in the operations of a `unit` (from 1 on), once from a time `at` [s]
+    on, or in a share of all operations (`rate`); exactly one of these.
+
+    `robot`, `label`: which one it concerns; any where there is a rate and none is named. `seconds`:
+    how long it lasts. `metres`, `degrees`: how far a part is off or has slipped, and how far it is
+    turned. `hidden`: a bad part that only an inspection finds. Raises ValueError.
+    """
+
+    kind: str
+    label: str = ""
+    robot: str = ""
+    unit: int | None = None
+    at: float | None = None
+    rate: float | None = None
+    seconds: float = 5.0
+    metres: float = 1e-3
+    degrees: float = 0.0
+    hidden: bool = False
+
+    def __post_init__(self) -> None:
+        if self.kind not in KINDS:
+            raise ValueError(f"there is no fault '{self.kind}'")
+        if sum(value is not None for value in (self.unit, self.at, self.rate)) != 1:
+            raise ValueError("one of 'unit', 'at' and 'rate' is needed")
+        if self.kind in OF_ROBOT and not self.robot:
+            raise ValueError(f"'{self.kind}' needs a 'robot'")
+        named = self.label or self.robot or self.kind == "blackout"
+        if self.rate is None and not named:
+            raise ValueError(f"'{self.kind}' needs a 'label'")
+        if self.unit is not None and self.unit < 1:
+            raise ValueError(f"'unit' is {self.unit}: they are counted from 1")
+        if self.rate is not None and not 0 <= self.rate <= 1:
+            raise ValueError(f"'rate' is {self.rate}: a share from 0 to 1 is needed")
+        for name in ("at", "seconds", "metres", "degrees"):
+            value = getattr(self, name)
+            if value is not None and not (isfinite(value) and value >= 0):
+                raise ValueError(f"'{name}' is {value}: a number from 0 on is needed")
+
+
+@dataclass(frozen=True, slots=True)
+class Sensors:
+    """What sensors are worth: standard deviation of a measured distance [m], and what is sensed of
+    a grip must have held for so long [s] to be believed."""
+
+    noise: float = 5e-5
+    delay: float = 0.03
+
+
+CLEAR, SWAP = 10.0, 30.0
+"""How long what has fallen lies, and how long it takes to replace a robot, unless asked otherwise
+[s]."""
+
+
+@dataclass(frozen=True, slots=True)
+class Campaign:
+    """Faults of a run, drawn by `seed`. `clear` [s]: how long a thing that has fallen lies until
+    it is taken away; `swap` [s]: how long it takes to replace a dead robot by one of `spares`."""
+
+    faults: tuple[WorldFault, ...] = ()
+    seed: int = 0
+    clear: float = CLEAR
+    sensors: Sensors = field(default_factory=Sensors)
+    spares: int = 0
+    swap: float = SWAP

@@ -1,0 +1,215 @@
+"""A factory that goes on: what sensors tell is a failure of an operation, and its template says
+what is done."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from factory.control.mode import Array
+from factory.nets.undone import Undone
+from factory.plant.factory import Factory, Operation
+from factory.problem.template import Failure
+from factory.record.failures import Failing, Failures, Stood
+from factory.simulation.recovery.books import Books
+from factory.simulation.recovery.counting import summed
+from factory.simulation.recovery.faults import Campaign, WorldFault
+from factory.simulation.recovery.plant import Plant
+from factory.simulation.recovery.responding import Responding
+from factory.simulation.recovery.striking import Striking
+from factory.simulation.run import Event
+from factory.simulation.simulation import Simulation
+from factory.simulation.supervisor import Supervisor
+from factory.support.errors import Diagnostic, InputError
+
+IN_VAIN = 2.0
+"""Nothing more will happen when nothing fires for so many times the longest delay of all."""
+
+
+class Recovery:
+    """What goes wrong in a simulation, and what is done about it; see `recover`.
+
+    `pending`: operations that must not end as they are, each with the test that says so.
+    """
+
+    def __init__(self, simulation: Simulation, books: Books, plant: Plant, campaign: Campaign):
+        self.simulation, self.books, self.plant = simulation, books, plant
+        names = tuple(robot.name for robot in simulation.layout.factory.robots)
+        self.striking = Striking(campaign, plant, names, tuple(simulation.delays))
+        self.responding = Responding(simulation, books, plant, campaign)
+        self.pending: dict[int, str] = {}
+        self._seen = 0
+        hooks = simulation.world.hooks
+        hooks.gates.append(self._admits)
+        hooks.judges.append(self._judge)
+        hooks.sensors.append(self._sensed)
+        hooks.ticks.append(self._tick)
+        hooks.account = self
+
+    @property
+    def found(self) -> Sequence[Failing]:
+        """Every failure so far."""
+        return self.responding.found
+
+    @property
+    def stood(self) -> Sequence[Stood]:
+        """From when on which robots stood, for whatever reason."""
+        return self.responding.standing.stood
+
+    @property
+    def _factory(self) -> Factory:
+        return self.simulation.layout.factory
+
+    @property
+    def _now(self) -> float:
+        return float(self.simulation.world.time)
+
+    @property
+    def _is_dark(self) -> bool:
+        return self._now < self.striking.dark
+
+    @property
+    def _stopped(self) -> frozenset[int]:
+        """Robots that begin nothing."""
+        busy = self.responding
+        return frozenset({*self.plant.closed, *busy.dead, *busy.returning.ways})
+
+    def _sensed(self, x: Array, v: Array) -> tuple[Array, Array]:
+        return (np.full_like(x, np.nan), np.full_like(v, np.nan)) if self._is_dark else (x, v)
+
+    def _admits(self, operation: Operation, unit: int) -> bool:
+        if self._is_dark or operation.label in self.striking.empty:
+            return False
+        return self._stopped.isdisjoint(operation.robots)
+
+    def _judge(self, operation: Operation, unit: int) -> bool:
+        """Whether an operation that has come to its goal is as it should be."""
+        if operation.index in self.pending or not self.plant.feels(operation.robots):
+            return False
+        if not operation.inputs:
+            return self.plant.offers(operation.label)
+        for failure in operation.template.failures:
+            if self._fails(failure, operation):
+                self.pending[operation.index] = failure.test
+                return False
+        self.responding.passed(operation)
+        return True
+
+    def _fails(self, failure: Failure, operation: Operation) -> bool:
+        if failure.test == "residual":
+            return self.plant.residual(operation) > (failure.limit or 0.0)
+        if failure.test == "rejected":
+            return self.plant.rejects(operation.carrier)
+        return False
+
+    def _tick(self) -> None:
+        """After every tick of the world."""
+        now = self._now
+        self._take_notice(now)
+        self.striking.tick(now)
+        for label, unit in self.plant.fresh():
+            if fault := self.striking.shown(label, unit, now):
+                self.plant.spoil(label, fault)
+        self.plant.tick()
+        if not self._is_dark:
+            self._sense(now)
+        self._go_on(now)
+
+    def _take_notice(self, now: float) -> None:
+        """Of what has fired since the last tick."""
+        supervisor, factory = self.books.supervisor, self._factory
+        fresh, self._seen = supervisor.events[self._seen :], len(supervisor.events)
+        for event in fresh:
+            if not isinstance(event, Event):
+                continue
+            number = factory.net.threaded.net.transition_index[event.transition]
+            operation = factory.operations[number // 2]
+            if number == operation.start:
+                unit = factory.unit(operation, supervisor.fired[number] - 1)
+                self.responding.standing.begun(operation, now)
+                self.striking.started(operation, unit, now)
+            for label in operation.inputs if number == operation.end else ():
+                self.responding.used(label)
+
+    def _sense(self, now: float) -> None:
+        """What sensors tell, and what is done about it."""
+        respond, by_label = self.responding, self._factory.by_label
+        untested = self.plant.slipped - self.pending.keys()
+        for label, _, test in self.plant.refused():
+            respond.refused(by_label[label], test)
+        for robot in self.plant.lost():
+            if self.plant.knocked(robot):
+                self.striking.count("knocked")
+            respond.lost(robot)
+        for number, test in [*self.pending.items()]:
+            del self.pending[number]
+            if number in self.books.supervisor.active.operations:
+                respond.failed(self._factory.operations[number], test)
+        excused = frozenset({*self.plant.closed, *respond.dead})
+        for robot in respond.standing.jammed(now, excused):
+            if robot not in respond.dead:
+                respond.died(robot)
+        self.striking.dissolved(len(untested - self.plant.slipped))
+
+    def _go_on(self, now: float) -> None:
+        """Robots stand, go on and come back; spares come."""
+        respond = self.responding
+        for robot in respond.replaced(now):
+            self.striking.standing.pop(robot, None)
+        closed = self.plant.closed
+        respond.standing.let_stand({*closed, *self.striking.standing, *respond.dead})
+        respond.returning.tick({*closed, *respond.dead})
+        self.books.supervisor.enabled |= not self._stopped
+        self.simulation.world.hooks.busy = max(self.simulation.world.hooks.busy, self._ends(now))
+        silent, longest = self.simulation.silent, max(self.simulation.delays)
+        if np.inf in respond.dead.values() and silent > IN_VAIN * longest:
+            respond.give_up()
+
+    def _ends(self, now: float) -> float:
+        """Until when something lasts that excuses the factory [s]."""
+        striking, respond = self.striking, self.responding
+        ends = [*self.plant.lying, *striking.empty.values(), striking.dark]
+        ends += [*respond.dead.values(), *striking.standing.values()]
+        ends += [now] * bool(respond.returning.ways) + [respond.standing.latest(now)]
+        return max((end for end in ends if np.isfinite(end)), default=0.0)
+
+    def strike(self, fault: WorldFault) -> None:
+        """A fault strikes as soon as it can, whatever it says of when."""
+        self.striking.strike(fault, self._now)
+
+    def report(self) -> Failures:
+        """What went wrong so far."""
+        undone = (e for e in self.books.supervisor.events if isinstance(e, Undone))
+        return summed(
+            self.responding.found,
+            self.striking.struck,
+            sum(len(event.transitions) for event in undone),
+            self.responding.used_spares,
+            self.plant.contacts,
+            self.stood,
+        )
+
+
+def recover(simulation: Simulation, campaign: Campaign = Campaign()) -> Recovery:  # noqa: B008
+    """Let a simulation that is ready to run go on when its operations fail as the faults of a
+    campaign make them; call it once, before `run`.
+
+    Raises InputError (BadFault) where a fault names a robot or label that is not there, and where
+    the robots run their own programs.
+    """
+    supervisor = simulation.supervisor
+    if not isinstance(supervisor, Supervisor):
+        message = "robots that run their own programs do not recover"
+        raise InputError(Diagnostic("BadFault", message, None, "leave out --distributed"))
+    books = Books(simulation.layout.factory, supervisor)
+    plant: Plant
+    if simulation.model is None:
+        from factory.simulation.recovery.ideal import IdealPlant
+
+        plant = IdealPlant(simulation, books)
+    else:
+        from factory.simulation.mujoco.failing.plant import MujocoPlant
+
+        plant = MujocoPlant(simulation.physical, campaign)
+    return Recovery(simulation, books, plant, campaign)

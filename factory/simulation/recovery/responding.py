@@ -1,0 +1,228 @@
+"""What is done about a failure: the net fires backwards to the greatest marking without it
+(nets/undo.py), robots go back to where they wait there, and let fall on the way what nobody asks
+for any more."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
+from functools import partial
+
+import numpy as np
+
+from factory.layout.scrapping import not_carried_back
+from factory.nets.petri import Marking
+from factory.nets.undo import marking_after, undo
+from factory.nets.undone import Undone
+from factory.plant.factory import Operation
+from factory.plant.material import joins_of
+from factory.problem.pag import NOPART
+from factory.problem.template import Kind, Response
+from factory.record.failures import Failing
+from factory.simulation.recovery.books import Books
+from factory.simulation.recovery.faults import Campaign
+from factory.simulation.recovery.plant import Plant
+from factory.simulation.recovery.returning import Goal, Returning, WayBack, order_of
+from factory.simulation.recovery.standing import Standing
+from factory.simulation.simulation import Simulation
+from factory.support.errors import Diagnostic
+from factory.timing.failing import SCRAPS
+
+BINNED = 1.0
+"""What falls into a bin is gone so long after that [s]."""
+
+
+class Responding:
+    """`found`: every failure. `dead`: robots (index) that are known to be dead, and when they are
+    replaced [s], never without a spare. `returning`: robots on their way back. `standing`: robots
+    that stand."""
+
+    def __init__(
+        self, simulation: Simulation, books: Books, plant: Plant, campaign: Campaign
+    ) -> None:
+        self._simulation, self._books, self._plant, self._campaign = (
+            simulation,
+            books,
+            plant,
+            campaign,
+        )
+        eps = simulation.request.settings.eps
+        self.returning = Returning(simulation.layout, books.supervisor, eps)
+        self.standing = Standing(simulation)
+        self.found: list[Failing] = []
+        self.dead: dict[int, float] = {}
+        self.used_spares = 0
+        self._tried: Counter[int] = Counter()
+        self._scrapped: Counter[str] = Counter()
+        self._barred = not_carried_back(simulation.layout)
+
+    def passed(self, operation: Operation) -> None:
+        """An operation has come to its goal and is good."""
+        self._tried[operation.index] = 0
+
+    def used(self, label: str) -> None:
+        """Something has been joined, and was not scrapped."""
+        self._scrapped[label] = 0
+
+    def refused(self, leaf: Operation, test: str) -> None:
+        """A feeder takes a part back: its robot gets out of the way of the next."""
+        self._scrap(test, leaf, -1, (leaf.label,))
+        robot = leaf.carrier
+        if self._books.operation_of(robot) is not leaf:
+            return
+        if leaf.index in self._books.supervisor.active.operations:
+            self._undo((leaf.start,), leaf, test)
+        self._books.supervisor.recall(self.standing.axes([robot]))
+        waits, is_up = self.returning.rest(robot, self._books.marking), partial(self._is_up, robot)
+        back = partial(self.returning.send, robot, WayBack(waits, ready=is_up))
+        self.returning.send(robot, WayBack(self.returning.aside(robot, leaf), done=back))
+
+    def lost(self, robot: int) -> None:
+        """A robot has lost what it held: that is made again."""
+        label, operation = self._books.holds(robot), self._books.operation_of(robot)
+        if self._response(operation, "lost") == "stop":
+            self._stop(f"{self._name(robot)} has lost '{label}'", operation)
+            return
+        self._scrap("lost", operation, robot, (label,))
+        self._undo((self._books.factory.by_label[label].end,), operation, "lost")
+
+    def failed(self, operation: Operation, test: str) -> None:
+        """An operation has come to its goal and is no good: it is done again, or all that it was to
+        join is made again."""
+        response, by_label = self._response(operation, test), self._books.factory.by_label
+        if response == "again":
+            self._tried[operation.index] += 1
+            self._note(test, operation, -1, response)
+            self._undo((operation.start,), operation, test)
+        elif response == "stop":
+            self._stop(f"'{operation.label}' fails the test '{test}'", operation)
+        else:
+            self._tried[operation.index] = 0
+            self._scrap(test, operation, -1, operation.inputs)
+            ends = tuple(by_label[label].end for label in operation.inputs)
+            self._undo(ends, operation, test)
+
+    def died(self, robot: int) -> None:
+        """A robot makes no progress. One from the depot takes its place after some time; what it
+        held is lost with it."""
+        label, operation = self._books.holds(robot), self._books.operation_of(robot)
+        if self.used_spares == self._campaign.spares:
+            self.dead[robot] = np.inf
+            self._note("jammed", operation, robot, "no spare")
+            return
+        self.used_spares += 1
+        self.dead[robot] = self._now + self._campaign.swap
+        held = () if label == NOPART else (label,)
+        self._note("jammed", operation, robot, "spare", held, self.dead[robot])
+        ends = tuple(self._books.factory.by_label[label].end for label in held)
+        self._undo(ends or (operation.start,), operation, "jammed")
+
+    def replaced(self, now: float) -> list[int]:
+        """The robots that are replaced now [s], and stand where they wait."""
+        found = [robot for robot, until in self.dead.items() if until <= now]
+        for robot in found:
+            del self.dead[robot]
+            self.returning.ways.pop(robot, None)
+            at = self.returning.rest(robot, self._books.marking)
+            self._plant.lift_out(robot, dict(at))
+            self._plant.supplied()
+        return found
+
+    def give_up(self) -> None:
+        """What can be finished without the robots that are dead is: the run ends."""
+        robot = next(robot for robot, until in self.dead.items() if until == np.inf)
+        operation = self._books.operation_of(robot)
+        self._stop(f"{self._name(robot)} is dead, and there is no spare", operation)
+
+    def _response(self, operation: Operation, test: str) -> Kind:
+        """What is done about a failure of an operation that has been tried so often."""
+        tried, none = self._tried[operation.index], tuple[Response, ...]()
+        failures = operation.template.failures
+        responses = next((f.responses for f in failures if f.test == test), none)
+        left = (r for r in responses if r.kind != "again" or tried < r.times)
+        return next((response.kind for response in left), "scrap")
+
+    def _undo(self, asked: tuple[int, ...], operation: Operation, reason: str) -> None:
+        """The net fires backwards, and robots go back."""
+        books, supervisor, factory = self._books, self._books.supervisor, self._books.factory
+        before, under_way = books.marking, supervisor.active.operations
+        fired = undo(factory.net, supervisor.fired, asked, joins_of(factory))
+        marking, robots = marking_after(factory.net, fired), range(len(factory.robots))
+        going = {r for r in robots if books.step_of(r, before) != books.step_of(r, marking)}
+        what = self._now, operation.label, reason
+        undone = Undone.between(factory.net, what, asked, supervisor.fired, fired)
+        scrap = {*self._plant.undone(books.held(marking), fired, going)}
+        supervisor.undo(undone, fired, marking, self.standing.axes(going | scrap))
+        over = [factory.operations[n] for n in under_way if n not in marking]
+        wasted = {robot: books.holds(robot, before) for robot in scrap}
+        self._send_back(sorted(going | scrap), wasted, over, marking)
+        self._plant.supplied()
+
+    def _send_back(
+        self,
+        robots: Iterable[int],
+        scrap: Mapping[int, str],
+        over: Sequence[Operation],
+        marking: Marking,
+    ) -> None:
+        """Robots go to where they wait in a marking, by way of their B ends with `scrap`, given by
+        its label, or let it fall at once where they cannot carry it there; those of operations that
+        are `over` leave in the reverse order of their coming."""
+        after = dict[int, frozenset[int]]()
+        for operation in over:
+            came = order_of(self._simulation.modes[operation.index], operation.robots)
+            for slot, robot in enumerate(came):
+                after[robot] = frozenset(came[slot + 1 :])
+        for robot in robots:
+            rest = self.returning.rest(robot, marking)
+            goals, done = rest, partial(self._plant.came_back, robot)
+            if robot in scrap and (robot, scrap[robot]) in self._barred:
+                self._plant.let_go(robot, self._campaign.clear)
+            elif robot in scrap:
+                goals, done = self.returning.home(robot), partial(self._bin, robot, rest)
+            first = after.get(robot, frozenset[int]())
+            self.returning.send(robot, WayBack(goals, first, done, partial(self._is_up, robot)))
+
+    def _bin(self, robot: int, rest: list[Goal]) -> None:
+        """A robot at the B end of its guidepath lets scrap fall into the bin there, and goes to
+        where it waits."""
+        self._plant.let_go(robot, BINNED)
+        self.returning.send(robot, WayBack(rest))
+
+    def _is_up(self, robot: int) -> bool:
+        """Whether nothing goes back up in a robot's feeder."""
+        return not self._plant.takes_back(robot)
+
+    def _scrap(self, test: str, operation: Operation, robot: int, labels: tuple[str, ...]) -> None:
+        """Things are scrapped; one too often on end, and the run stops."""
+        self._note(test, operation, robot, "scrap", labels)
+        for label in labels:
+            self._scrapped[label] += 1
+            if self._scrapped[label] >= SCRAPS:
+                what = f"'{label}' was scrapped {SCRAPS} times on end"
+                self._stop(what, self._books.factory.by_label[label])
+
+    def _stop(self, what: str, operation: Operation) -> None:
+        hint = "`factory run --json` lists all failures"
+        trouble = Diagnostic("Failed", what, operation.position, hint)
+        self._simulation.world.hooks.trouble = trouble
+
+    def _note(
+        self,
+        test: str,
+        operation: Operation,
+        robot: int,
+        response: str,
+        scrapped: tuple[str, ...] = (),
+        until: float | None = None,
+    ) -> None:
+        name = "" if robot < 0 else self._name(robot)
+        what = self._now, test, operation.label, name, response, scrapped, until
+        self.found.append(Failing(*what))
+
+    def _name(self, robot: int) -> str:
+        return self._books.factory.robots[robot].name
+
+    @property
+    def _now(self) -> float:
+        return float(self._simulation.world.time)

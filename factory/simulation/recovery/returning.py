@@ -1,0 +1,160 @@
+"""Robots on their way back, after what they did has been undone.
+
+Each goes to where it waits in the marking that the factory goes on from. Those of one operation
+leave in the reverse order of their coming, one after the other; so each goes back the way it came.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from factory.control.mode import Array, Mode
+from factory.layout.feeding import passing
+from factory.layout.layout import Layout
+from factory.nets.petri import Marking
+from factory.plant.factory import Operation
+from factory.simulation.starting import start_positions
+from factory.simulation.supervisor import Supervisor
+
+Goal = tuple[int, float]
+"""An axis and where it goes [m]."""
+
+EXACT = 9
+"""Goals that agree to so many decimals are one."""
+
+PAST = 2e-3
+"""So much further than it has to does a robot go out of the way of its feeder [m]."""
+
+
+@dataclass(slots=True)
+class WayBack:
+    """What a robot has yet to do: go to `goals` one after the other, but only when the robots in
+    `after` are back, and it is `ready`; then what `done` says. `stage`: the number of what it is
+    doing."""
+
+    goals: list[Goal]
+    after: frozenset[int] = frozenset()
+    done: Callable[[], None] = lambda: None
+    ready: Callable[[], bool] = lambda: True
+    stage: int = -1
+
+
+class Returning:
+    """The robots (index) of a factory that are on their way back: `ways`."""
+
+    def __init__(self, layout: Layout, supervisor: Supervisor, eps: float) -> None:
+        self._layout, self._supervisor = layout, supervisor
+        goals = [*dict.fromkeys(_goals(layout))]
+        first = len(supervisor.bundles.modes)
+        self._number = {goal: first + n for n, goal in enumerate(goals)}
+        modes = [_mode(layout, axis, at, eps) for axis, at in goals]
+        supervisor.bundles = supervisor.bundles.with_more(modes, [(axis,) for axis, _ in goals])
+        self.ways: dict[int, WayBack] = {}
+
+    def send(self, robot: int, way: WayBack) -> None:
+        """A robot is to go a way, in place of any that it goes."""
+        self.ways[robot] = way
+
+    def tick(self, held: Iterable[int]) -> None:
+        """Let robots that are at the end of a stage begin the next, but those that are `held`."""
+        going, held, begun = {*self._supervisor.active.ahead}, {*held}, list[int]()
+        for robot, way in [*self.ways.items()]:
+            if way.stage in going or robot in held or not way.after.isdisjoint(self.ways):
+                continue
+            if way.goals and not way.ready():
+                continue
+            if way.goals:
+                way.stage = self._number[_rounded(way.goals.pop(0))]
+                begun.append(way.stage)
+            else:
+                del self.ways[robot]
+                way.done()
+        if begun:
+            self._supervisor.send(begun)
+
+    def home(self, robot: int) -> list[Goal]:
+        """The way of a robot to the B end of its guidepath, its lift first."""
+        lift, layout = self._lift(robot), self._layout
+        rise = [] if lift is None else [(lift, _highest(layout, robot))]
+        return [*rise, (robot, layout.guidepaths[robot].length)]
+
+    def aside(self, robot: int, leaf: Operation) -> list[Goal]:
+        """The way of a robot out of the way of its feeder; none where its hand is there before what
+        that shows comes down, and when it goes up again."""
+        hand = self._layout.hand(robot)
+        return [] if hand is not None and hand.first else [(robot, _aside(self._layout, leaf))]
+
+    def rest(self, robot: int, marking: Marking) -> list[Goal]:
+        """The way of a robot to where it waits in a marking. Where the part that it takes next has
+        to come down before it, it waits out of the way."""
+        layout, gear = self._layout, self._layout.factory.net.gears[robot]
+        step = next(i for i, place in enumerate(gear.places) if place in marking) // 2
+        at, lift = start_positions(layout, marking), self._lift(robot)
+        goals = [(robot, _waiting(layout, robot, step))]
+        if lift is None:
+            return goals
+        rise = (lift, float(at[lift]))
+        if robot in layout.factory.adjusted:
+            return [*goals, rise]
+        return [rise, *goals] if rise[1] else goals
+
+    def _lift(self, robot: int) -> int | None:
+        lifts = self._layout.lifts
+        return len(self._layout.guidepaths) + lifts.index(robot) if robot in lifts else None
+
+
+def order_of(mode: Mode, robots: Sequence[int]) -> tuple[int, ...]:
+    """The robots of an operation in the order in which they come to it."""
+    return tuple(robots[slot] for slot in mode.order if slot < len(robots))
+
+
+def _waiting(layout: Layout, robot: int, step: int) -> float:
+    """Where a robot waits for the operation of a step of its program [m]: where it would as a run
+    begins, but out of the way of the part that it takes next, which has to come down."""
+    factory, hand = layout.factory, layout.hand(robot)
+    program = factory.robots[robot].operations
+    at, operation = layout.home(robot, program[step]), factory.operations[program[step]]
+    if operation.inputs or (hand is not None and hand.first):
+        return at
+    return _aside(layout, operation)
+
+
+def _aside(layout: Layout, leaf: Operation) -> float:
+    """Where the robot of a feeder is out of the way of what that shows [m]."""
+    at = layout.guidepaths[leaf.carrier].length
+    return max(0.0, at - passing(layout, leaf) - PAST)
+
+
+def _highest(layout: Layout, robot: int) -> float:
+    return max(layout.level(robot, tour[0]).up for tour in layout.factory.tours[robot])
+
+
+def _goals(layout: Layout) -> Iterable[Goal]:
+    """Every goal that a robot may be sent to."""
+    factory = layout.factory
+    lifts = {robot: len(factory.robots) + n for n, robot in enumerate(layout.lifts)}
+    for robot in factory.robots:
+        yield _rounded((robot.index, layout.guidepaths[robot.index].length))
+        for step, number in enumerate(robot.operations):
+            yield _rounded((robot.index, _waiting(layout, robot.index, step)))
+            if not factory.operations[number].inputs:
+                yield _rounded((robot.index, _aside(layout, factory.operations[number])))
+            if robot.index in lifts:
+                yield _rounded((lifts[robot.index], layout.level(robot.index, number).up))
+        if robot.index in lifts:
+            yield _rounded((lifts[robot.index], _highest(layout, robot.index)))
+
+
+def _rounded(goal: Goal) -> Goal:
+    return goal[0], round(goal[1], EXACT)
+
+
+def _mode(layout: Layout, axis: int, at: float, eps: float) -> Mode:
+    """The mode that moves an axis alone to a place [m]."""
+    robots = len(layout.guidepaths)
+    longest = layout.guidepaths[axis].length if axis < robots else at
+    upper: Array = np.array([max(longest, at)])
+    return Mode(np.array([at]), np.zeros(1), upper, eps)

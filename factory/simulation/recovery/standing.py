@@ -1,0 +1,102 @@
+"""Robots that stand: those that the world has stopped, and those that must not come near what lies
+about."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+
+from factory.control.mode import STILL, Limits
+from factory.control.navigation import Bundle
+from factory.plant.factory import Factory, Operation
+from factory.record.failures import Stood
+from factory.simulation.simulation import Simulation
+
+SLOWEST = 1e-9
+"""The speed limit of a robot that stands [m/s]."""
+
+SLUGGISH, GRACE = 3.0, 5.0
+"""An operation is late when it takes so many times what it should, and so long [s] more."""
+
+MOVES = 5e-3
+"""A robot is asked to move when its mode asks for this speed [m/s]."""
+
+
+class Standing:
+    """Lets robots (index) of a simulation stand, each under a limit of its own on its speed;
+    `stood`: which of them did, from when on."""
+
+    def __init__(self, simulation: Simulation) -> None:
+        self._simulation, self._limits = simulation, simulation.limits
+        self._now: frozenset[int] = frozenset()
+        self.stood: list[Stood] = []
+        factory = simulation.layout.factory
+        lifts = {r: len(factory.robots) + n for n, r in enumerate(simulation.layout.lifts)}
+        self._axes = [[r, lifts[r]] if r in lifts else [r] for r in range(len(factory.robots))]
+        self._begun: dict[int, float] = {}
+
+    def let_stand(self, robots: Iterable[int]) -> None:
+        """From now on these robots stand, and no others: they brake as they always do."""
+        chosen = frozenset(robots)
+        if chosen == self._now:
+            return
+        self._now = chosen
+        self._apply()
+        every = self._simulation.layout.factory.robots
+        names = tuple(every[robot].name for robot in sorted(chosen))
+        self.stood.append((self._simulation.world.time, names))
+
+    def limit(self, limits: Limits) -> None:
+        """From now on these are the limits of robots that do not stand."""
+        self._limits = limits
+        self._apply()
+
+    def _apply(self) -> None:
+        speed = np.array(self._limits.speed)
+        for robot in self._now:
+            speed[self._axes[robot]] = SLOWEST
+        self._simulation.limit(Limits(speed, self._limits.acceleration))
+
+    def axes(self, robots: Iterable[int]) -> frozenset[int]:
+        """The axes of robots."""
+        return frozenset(axis for robot in robots for axis in self._axes[robot])
+
+    def begun(self, operation: Operation, now: float) -> None:
+        """An operation begins now [s], or goes on after a wait that is no fault of its robots."""
+        self._begun[operation.index] = now
+
+    def jammed(self, now: float, excused: frozenset[int]) -> list[int]:
+        """The robots of operations that are late which are asked to move and do not, but for those
+        that are `excused`, as are all in their operations."""
+        factory, supervisor = self._simulation.layout.factory, self._simulation.supervisor
+        found = list[int]()
+        for number in supervisor.active.operations:
+            operation = factory.operations[number]
+            if not excused.isdisjoint(operation.robots):
+                self.begun(operation, now)
+                continue
+            if now > self._late(number, now):
+                found += self._at_fault(factory, operation)
+        return found
+
+    def latest(self, now: float) -> float:
+        """When the last of the operations under way is late [s]."""
+        active = self._simulation.supervisor.active.operations
+        return max((self._late(number, now) for number in active), default=0.0)
+
+    def _late(self, number: int, now: float) -> float:
+        begun = self._begun.setdefault(number, now)
+        return begun + SLUGGISH * self._simulation.delays[number] + GRACE
+
+    def _at_fault(self, factory: Factory, operation: Operation) -> list[int]:
+        simulation, axes = self._simulation, [*factory.axes[operation.index]]
+        mode = simulation.modes[operation.index]
+        x, v = simulation.world.sense()
+        bundle = Bundle.of([mode], [self._limits.of(axes)])
+        asked = np.abs(bundle.field(x[axes], simulation.request.settings.tick)) > MOVES
+        stuck = asked & (np.abs(v[axes]) < STILL)
+        of_axis = {axis: robot for robot, own in enumerate(self._axes) for axis in own}
+        return [
+            *dict.fromkeys(of_axis[axis] for axis, is_so in zip(axes, stuck, strict=True) if is_so)
+        ]

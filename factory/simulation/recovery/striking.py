@@ -1,0 +1,116 @@
+"""When faults strike: drawn for each operation that starts, for each part that is shown."""
+
+from __future__ import annotations
+
+from heapq import heappop, heappush
+
+import numpy as np
+
+from factory.plant.factory import Operation
+from factory.problem.pag import NOPART
+from factory.simulation.recovery.faults import Campaign, WorldFault
+from factory.simulation.recovery.plant import Plant
+
+EARLY, LATE = 0.1, 0.9
+"""A robot drops what it carries after a share of its operation's time between these."""
+
+
+class Striking:
+    """Lets the faults of a campaign strike a plant whose operations take so long (`delays` [s]).
+
+    `struck`: how many have, by kind. `dark` [s]: until when no sensor tells anything. `empty`:
+    until when feeders give nothing, by label. `standing`: until when robots (index) stand.
+    """
+
+    def __init__(
+        self, campaign: Campaign, plant: Plant, names: tuple[str, ...], delays: tuple[float, ...]
+    ) -> None:
+        self._faults, self._plant = [*campaign.faults], plant
+        self._names, self._delays = names, delays
+        self._draw = np.random.default_rng(campaign.seed)
+        self._spent: set[int] = set()
+        self._due: list[tuple[float, int]] = []
+        self.struck: dict[str, int] = {}
+        self.dark = -np.inf
+        self.empty: dict[str, float] = {}
+        self.standing: dict[int, float] = {}
+
+    def strike(self, fault: WorldFault, now: float) -> None:
+        """A fault that names a robot or a label strikes now, or as soon as it can: a robot that
+        holds nothing drops what it carries next, a feeder shows the next part so."""
+        robot = self._names.index(fault.robot) if fault.robot else -1
+        if fault.kind in ("down", "dead"):
+            self.stand(robot, now + fault.seconds if fault.kind == "down" else np.inf)
+        elif not (fault.kind == "drop" and robot >= 0 and self._plant.lose(robot)):
+            self._faults.append(fault)
+            return
+        self.count(fault.kind)
+
+    def started(self, operation: Operation, unit: int, now: float) -> None:
+        """An operation has started."""
+        for robot, label in zip(operation.robots, operation.before, strict=True):
+            name = self._names[robot]
+            if label != NOPART and self._strikes("drop", unit, now, label, name):
+                share = self._draw.uniform(EARLY, LATE)
+                heappush(self._due, (now + share * self._delays[operation.index], robot))
+            for kind in ("down", "dead"):
+                if fault := self._strikes(kind, unit, now, label, name):
+                    self.stand(robot, now + fault.seconds if kind == "down" else np.inf)
+        label, count = operation.label, len(operation.inputs)
+        if count > 1 and (fault := self._strikes("bad_joint", unit, now, label)):
+            self._plant.slip(operation, fault.metres)
+        if not count and (fault := self._strikes("no_part", unit, now, label)):
+            self.empty[label] = now + fault.seconds
+        if fault := self._strikes("blackout", unit, now, label):
+            self.dark = max(self.dark, now + fault.seconds)
+
+    def stand(self, robot: int, until: float) -> None:
+        """A robot (index) stands until then [s]."""
+        self.standing[robot] = max(self.standing.get(robot, 0.0), until)
+
+    def shown(self, label: str, unit: int, now: float) -> WorldFault | None:
+        """What is wrong with a part that a feeder is about to show for a unit."""
+        return self._strikes("bad_part", unit, now, label) or self._strikes(
+            "misplaced", unit, now, label
+        )
+
+    def dissolved(self, joints: int) -> None:
+        """So many bad joints have been undone for another reason before they were looked at."""
+        self.count("bad_joint", -joints)
+
+    def count(self, kind: str, times: int = 1) -> None:
+        """Something has struck so often more."""
+        self.struck[kind] = self.struck.get(kind, 0) + times
+
+    def tick(self, now: float) -> None:
+        """What is due: things are dropped; what lasted is over."""
+        while self._due and self._due[0][0] <= now:
+            if not self._plant.lose(heappop(self._due)[1]):
+                self.count("drop", -1)
+        for over in [label for label, until in self.empty.items() if until <= now]:
+            del self.empty[over]
+            self._plant.supplied()
+        for robot in [robot for robot, until in self.standing.items() if until <= now]:
+            del self.standing[robot]
+        if -np.inf < self.dark <= now:
+            self.dark = -np.inf
+            self._plant.supplied()
+
+    def _strikes(
+        self, kind: str, unit: int, now: float, label: str, robot: str = ""
+    ) -> WorldFault | None:
+        for number, fault in enumerate(self._faults):
+            if fault.kind != kind or number in self._spent:
+                continue
+            if (fault.label and fault.label != label) or (fault.robot and fault.robot != robot):
+                continue
+            if fault.rate is not None:
+                hit = bool(self._draw.random() < fault.rate)
+            else:
+                hit = fault.unit == unit + 1 if fault.unit is not None else now >= (fault.at or 0)
+                if hit:
+                    self._spent.add(number)
+            if hit:
+                self.count(kind)
+                return fault
+        return None

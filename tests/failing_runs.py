@@ -1,0 +1,67 @@
+"""Runs of the paper's example in which something fails, for tests of what is shown of them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from factory.layout.layout import Layout
+from factory.pipeline import read
+from factory.record.log import Log, LogWriter, read_log
+from factory.simulation.recovery import Campaign, WorldFault, recover
+from factory.simulation.request import RunRequest, WorldName
+from factory.simulation.simulation import Simulation
+from tests.command_line import PAPER
+
+FAULTS = """
+clear = 2
+
+[[fault]]
+kind = "bad_part"
+label = "part1"
+unit = 1
+
+[[fault]]
+kind = "drop"
+label = "part2"
+unit = 2
+
+[[fault]]
+kind = "bad_joint"
+label = "sub1"
+unit = 3
+metres = 2e-3
+
+[[fault]]
+kind = "dead"
+robot = "r2"
+unit = 3
+"""
+
+CAMPAIGN = Campaign(
+    (
+        WorldFault("bad_part", label="part1", unit=1),
+        WorldFault("drop", label="part2", unit=2),
+        WorldFault("bad_joint", label="sub1", unit=3, metres=2e-3),
+        WorldFault("dead", robot="r2", unit=3),
+    ),
+    clear=2.0,
+    spares=1,
+    swap=3.0,
+)
+"""The same, with a spare."""
+
+
+def paper_layout() -> Layout:
+    """The paper's example, laid out."""
+    return read(PAPER).layout
+
+
+def failing(
+    path: Path, world: WorldName = "mujoco", units: int = 4, campaign: Campaign = CAMPAIGN
+) -> Log:
+    """The log of a run in which all of a campaign happens."""
+    made = Simulation(paper_layout(), RunRequest(world, units=units, recovers=True))
+    recover(made, campaign)
+    with LogWriter(path, made) as log:
+        made.run([log.observe])
+    return read_log(path)

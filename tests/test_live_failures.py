@@ -1,0 +1,153 @@
+"""A running factory that goes on after failures, and is made to fail: by hand, and in the page."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+
+import pytest
+
+from factory.nets.replay import replay
+from factory.nets.undone import Undone
+from factory.plant.material import joins_of
+from factory.show.live import Server
+from factory.show.live.commands import FAILURES, Command, command_of
+from factory.show.live.page import page
+from factory.simulation.disturbance.interventions import Interventions
+from factory.simulation.recovery import Campaign
+from factory.simulation.request import RunRequest
+from factory.simulation.run import entries_of
+from factory.simulation.simulation import Simulation
+from factory.support.errors import InputError
+from tests.layout_values import paper_layout
+from tests.live_sessions import Running, a_session
+
+websockets = pytest.importorskip("websockets.sync.client", reason="pip install websockets")
+
+PARTS = ("part1", "part2", "part3")
+CAMPAIGN = Campaign(clear=1.0, spares=1, swap=2.0)
+
+
+@pytest.fixture
+def running() -> Iterator[Running]:
+    made = Running(campaign=CAMPAIGN)
+    yield made
+    made.close()
+
+
+@pytest.mark.parametrize("name", FAILURES)
+def test_commands_to_fail_are_read_where_it_goes_on_after_failures(name: str) -> None:
+    key, value = ("part", "part1") if name == "spoil" else ("robot", 2)
+    message = json.dumps({"do": name, key: value})
+    assert command_of(message, 6, PARTS, True) == Command(name, **{key: value})
+    with pytest.raises(ValueError, match=f"'do' is '{name}': there are pause"):
+        command_of(message, 6, PARTS)
+    bad = json.dumps({"do": name, key: "sub1" if name == "spoil" else 6})
+    with pytest.raises(ValueError, match=f"'{key}' of '{name}'"):
+        command_of(bad, 6, PARTS, True)
+
+
+def test_a_run_that_is_made_to_fail_goes_on() -> None:
+    simulation = Simulation(paper_layout(), RunRequest(units=6, recovers=True))
+    hands, ticks = Interventions(simulation, CAMPAIGN), 0
+
+    def act(world: object, supervisor: object) -> None:
+        nonlocal ticks
+        ticks += 1
+        match ticks:
+            case 50:
+                hands.slow(4, 0.5)
+                hands.spoil("part1")
+            case 150:
+                hands.drop(5)
+            case 700:
+                hands.halt(1, 1.0)
+            case 900:
+                hands.slow(4, 1.0)
+                hands.kill(4)
+
+    run = simulation.run([act])
+    assert run.products == 6 and run.trouble is None and run.refines_net
+    assert hands.recovery is not None
+    report = hands.recovery.report()
+    assert report.struck == {"bad_part": 1, "drop": 1, "down": 1, "dead": 1}
+    assert {one.test for one in report.found} == {"rejected", "lost", "jammed"}
+    assert report.spares == 1 and report.missed == report.false_alarms == 0
+
+
+def test_a_robot_that_is_slow_stays_slow_when_others_stand() -> None:
+    simulation = Simulation(paper_layout(), RunRequest(units=6, recovers=True))
+    hands = Interventions(simulation, CAMPAIGN)
+    full = simulation.limits.speed.copy()
+    hands.slow(1, 0.5)
+    hands.halt(2, 0.1)
+    for _ in range(3):
+        simulation.supervisor.step()
+        for act in simulation.world.hooks.ticks:
+            act()
+    assert simulation.limits.speed[2] < 1e-6
+    hands.slow(3, 0.25)
+    assert simulation.limits.speed[2] < 1e-6, "it still stands"
+    for _ in range(20):
+        simulation.supervisor.step()
+        for act in simulation.world.hooks.ticks:
+            act()
+    assert (simulation.limits.speed / full)[:4].tolist() == pytest.approx([1, 0.5, 1, 0.25])
+
+
+def test_without_a_campaign_nothing_fails() -> None:
+    hands = Interventions(Simulation(paper_layout(), RunRequest(units=1)))
+    with pytest.raises(InputError, match="does not go on after failures"):
+        hands.drop(1)
+
+
+def test_a_session_tells_what_failed_and_begins_anew(running: Running) -> None:
+    session, send = running.session, running.session.send
+    send(Command("speed", factor=0.0))
+    running.until(lambda f: f.products > 0)
+    send(Command("drop", robot=5))
+    failed = running.until(lambda f: "r6 lost part2: made again" in f.note)
+    assert failed.run == 0 and session.fails
+    running.until(lambda f: f.products > failed.products + 2 and not f.standing)
+    account = session.simulation.world.hooks.account
+    assert account is not None and any("r6" in robots for _, robots in account.stood)
+    told = session.fired(0, 0, session.frame.count)
+    undone = [event for _, event in told if isinstance(event, list)]
+    assert len(undone) == 1
+    events = session.simulation.supervisor.events
+    entry = next(e for e in events if isinstance(e, Undone))
+    assert len(undone[0]) == len(entry.transitions)
+    net, joins = paper_layout().factory.net, joins_of(paper_layout().factory)
+    assert replay(net, entries_of([*events]), joins=joins).refines
+    send(Command("restart"))
+    running.until(lambda f: f.run == 1 and not f.standing and f.time > 0.1)
+    assert session.fails
+
+
+def test_no_spare_ends_the_run_until_it_begins_anew() -> None:
+    running = Running(campaign=Campaign())
+    try:
+        running.session.send(Command("speed", factor=0.0))
+        running.session.send(Command("dead", robot=5))
+        running.until(lambda f: "r6 is dead, and there is no spare: begin anew" in f.note)
+        running.session.send(Command("restart"))
+        running.until(lambda f: f.run == 1 and f.products > 0)
+    finally:
+        running.close()
+
+
+def test_watchers_make_it_fail(running: Running) -> None:
+    with Server(running.session, b"") as server:
+        address = server.address.replace("http", "ws") + "live"
+        with websockets.connect(address, proxy=None) as watcher:
+            watcher.send('{"do": "down", "robot": 3}')
+            frame: dict = {}
+            while "r4" not in frame.get("standing", ()):
+                message = watcher.recv(10)
+                frame = json.loads(message[4 : 4 + int.from_bytes(message[:4], "little")])
+
+
+def test_the_page_has_the_buttons_only_where_it_can_fail() -> None:
+    for campaign, word in ((CAMPAIGN, b'"fails":true'), (None, b'"fails":false')):
+        text = page(a_session(False, campaign))
+        assert word in text.replace(b'"fails": ', b'"fails":')

@@ -1,0 +1,81 @@
+"""Failures in a report: a section of what failed and what was done, undone operations and robots
+that stood over time; nothing of it in a report of any other run."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from factory.record.log import LogWriter
+from factory.show.report import page, recording_of
+from factory.show.report.failures import failures_data, failures_section
+from factory.show.report.pace import measured
+from factory.show.report.recording import Recording
+from factory.simulation.recovery import Campaign, recover
+from factory.simulation.request import RunRequest
+from factory.simulation.simulation import Simulation
+from tests.command_line import PAPER, Terminal
+from tests.failing_runs import FAULTS, failing, paper_layout
+
+
+@pytest.fixture(scope="module")
+def recording(tmp_path_factory: pytest.TempPathFactory) -> Recording:
+    path = tmp_path_factory.mktemp("failing") / "log"
+    failing(path)
+    return recording_of(path, paper_layout())
+
+
+def test_the_section_tells_every_failure(recording: Recording) -> None:
+    section, failures = failures_section(recording), recording.log.failures
+    assert failures is not None and len(failures.found) >= 4
+    assert section.count(" s</th><td>") == len(failures.found)
+    for one in failures.found:
+        assert f"<tr><th>{one.t:.2f} s</th><td>{one.what}</td><td>{one.done}</td>" in section
+    lost = next(u for _, u in recording.log.undone if u.reason == "lost")
+    assert ", ".join(lost.transitions) in section
+    assert f"{failures.contacts} contact" in section and "1 spare used" in section
+
+
+def test_the_page_can_draw_what_was_undone(recording: Recording) -> None:
+    data, count = failures_data(recording), len(recording.log.fired)
+    names = recording.log.header["transitions"]
+    assert len(data["undone"]) == len(recording.log.undone) >= 3
+    for (after, t, events), (_, undone) in zip(data["undone"], recording.log.undone, strict=True):
+        assert 0 <= after <= count and t == pytest.approx(undone.t, abs=1e-4)
+        assert [names[event] for event in events] == [*undone.transitions]
+    assert any(robots for _, robots in data["stood"])
+    text = page(recording)
+    assert "Failures</h2>" in text and "spansWithUndone" in text and ".op.undone" in text
+
+
+def test_what_was_undone_does_not_count_as_work(recording: Recording) -> None:
+    """The third part2 takes no longer because the second was dropped."""
+    durations = measured(recording).durations
+    assert all(seconds is not None and 0 < seconds < 3 for seconds in durations)
+
+
+def test_other_runs_have_none_of_it(tmp_path: Path) -> None:
+    texts = []
+    for name, recovers in (("plain", False), ("none", True)):
+        made = Simulation(paper_layout(), RunRequest(units=1))
+        if recovers:
+            recover(made, Campaign())
+        with LogWriter(tmp_path / name, made, command=()) as writer:
+            made.run([writer.observe])
+        texts.append(page(recording_of(tmp_path / name)))
+    plain, none = texts
+    for word in ("Failures", "undone", "stood", "plainDraw"):
+        assert word not in plain.partition('id="certificate"')[0].partition("<body>")[2]
+    assert "spansWithUndone" not in plain and "spansWithUndone" in none
+    assert "Faults: none" in none
+
+
+def test_from_the_command_line(run: Terminal, tmp_path: Path) -> None:
+    faults, log, out = tmp_path / "faults.toml", tmp_path / "run.log", tmp_path / "report.html"
+    faults.write_text(FAULTS)
+    words = "--units", 3, "--faults", faults, "--spares", 1, "--swap", 3, "--log", log
+    found = run("run", PAPER, *words, "--json")
+    assert found.status == 0 and len(found.json["failures"]["failures"]) >= 3
+    assert run("report", log, "-o", out).status == 0
+    assert "r6 lost part2" in out.read_text()

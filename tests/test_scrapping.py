@@ -1,0 +1,35 @@
+"""Piles that are carried back to the beginning of a way when they are scrap."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from factory.layout.clearance import separation
+from factory.layout.scrapping import not_carried_back
+from factory.layout.sweeps import piles
+from factory.pipeline import read
+from tests.fidelity.products import EXAMPLES
+
+
+@pytest.mark.parametrize("name", ["paper", "balanced", "lamp"])
+def test_most_piles_can_be_carried_back(name: str) -> None:
+    assert not_carried_back(read(EXAMPLES / f"{name}.pag").layout) == frozenset()
+
+
+def test_the_finished_chest_would_hit_a_post() -> None:
+    layout = read(EXAMPLES / "chest.pag").layout
+    assert not_carried_back(layout) == {(0, "chest")}
+    path, label = layout.guidepaths[0], "chest"
+    pile = piles(layout.factory, layout.product)[label]
+    way = path.sweep(pile.box, path.length, layout.stops(0)[-2])
+    posts = [r for r in layout.certificate.regions if r.robot == 7 and r.label == "front1"]
+    assert min(separation(way, post.box) for post in posts) < layout.clearance
+
+
+def test_a_wider_clearance_bars_more() -> None:
+    layout = read(EXAMPLES / "truck.pag").layout
+    found = not_carried_back(layout)
+    assert {label for _, label in found} == {"rear", "rear_set"}
+    assert found < not_carried_back(replace(layout, clearance=2 * layout.clearance))
