@@ -140,13 +140,13 @@ class Siblings:
     def pairs(self) -> Iterator[tuple[int, int]]:
         """Robots with their deputies, each of which gives a live net."""
         for carried in self.kids:
-            yield from self._leaves([robot for robot in carried if not self.kids[robot]])
+            yield from self._for_leaves(carried)
             for top, twin in self._branches([robot for robot in carried if self.kids[robot]]):
                 yield from self.twins(top, twin).items()
 
-    def _leaves(self, robots: Sequence[int]) -> Iterator[tuple[int, int]]:
-        """Of the leaves of a carrier. Those that are alike in all but what they deliver in are
-        judged once."""
+    def _for_leaves(self, robots: Sequence[int]) -> Iterator[tuple[int, int]]:
+        """The leaves among the robots of a carrier, with their deputies among all. Robots that are
+        alike in all but what they deliver in are judged once."""
         alike: dict[tuple[object, ...], list[int]] = {}
         for robot in robots:
             key = kind_of(self.factory, robot), self.factory.robots[robot].type, self._sides[robot]
@@ -156,7 +156,7 @@ class Siblings:
             [other for other in groups if not self._unlike(group[0], other[0])] for group in groups
         ]
         for group, others in zip(groups, fitting, strict=True):
-            for dead in group:
+            for dead in (robot for robot in group if not self.kids[robot]):
                 deputies = (r for other in others for r in other if self._live(dead, r))
                 yield from ((dead, deputy) for deputy in islice(deputies, MOST))
 

@@ -15,10 +15,11 @@ from dataclasses import dataclass, replace
 
 from factory.compiler.compiler import gear_net
 from factory.compiler.deputies import Moved, moved_to, postorder, program_with
+from factory.nets.petri import Marking
 from factory.nets.undo import exchange, marking_after
 from factory.nets.undone import Undone
 from factory.nets.verify import proved
-from factory.plant.factory import Factory
+from factory.plant.factory import Factory, Operation
 from factory.plant.material import joins_of
 from factory.problem.pag import NOPART
 from factory.problem.robot_types import Catalogue
@@ -44,8 +45,8 @@ class Takeover:
         counts = exchange(net, fired, asked, joins_of(self.after))
         robots = self.before.robots
         dead, deputy = robots[self.dead], robots[self.moved[self.dead]]
-        label = self.before.operations[_next(self.before, fired, self.dead)].label
-        what = t, label, f"{dead.name} is dead, and {deputy.name} takes its tours"
+        at = _next(self.before, marking_after(self.before.net, fired), self.dead)
+        what = t, at.label, f"{dead.name} is dead, and {deputy.name} takes its tours"
         return counts, Undone.between(net, what, asked, fired, counts, exchanged=True)
 
 
@@ -82,22 +83,33 @@ def with_moved(factory: Factory, moved: Moved) -> Factory:
 
 
 def lost(factory: Factory, fired: Sequence[int], robots: Iterable[int]) -> tuple[int, ...]:
-    """The transitions that are undone with robots (indices) that are gone: the end that made what
-    each holds, or the start of what it is at with empty hands."""
-    found = list[int]()
+    """The transitions that are undone with robots (indices) that are gone: all ends that made what
+    they hold, each as often as it is in their hands, or the start of what one is at with nothing.
+
+    The material rule counts what is in one pile. A part in a pile and another copy of it in the
+    next hand are two.
+    """
+    found, begun, marking = list[int](), set[int](), marking_after(factory.net, fired)
     for robot in robots:
-        o = factory.operations[_next(factory, fired, robot)]
+        o = _next(factory, marking, robot)
         label = o.before[o.robots.index(robot)]
         if label != NOPART:
-            found.append(factory.by_label[label].end)
+            found += _ends_in(factory, label)
         elif fired[o.start] > fired[o.end]:
-            found.append(o.start)
-    return tuple(dict.fromkeys(found))
+            begun.add(o.start)
+    return (*found, *sorted(begun))
 
 
-def _next(factory: Factory, fired: Sequence[int], robot: int) -> int:
+def _ends_in(factory: Factory, label: str) -> list[int]:
+    """The ends of the operations that made a label, the last first."""
+    made = [factory.by_label[label]]
+    for o in made:
+        made += [factory.by_label[label] for label in o.inputs]
+    return [o.end for o in made]
+
+
+def _next(factory: Factory, marking: Marking, robot: int) -> Operation:
     """The operation that a robot is at, or waits for."""
-    marking = marking_after(factory.net, fired)
     gear = factory.net.gears[robot].places
     step = next(step for step, place in enumerate(gear) if place in marking)
-    return factory.robots[robot].operations[step // 2]
+    return factory.operations[factory.robots[robot].operations[step // 2]]
