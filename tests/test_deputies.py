@@ -22,6 +22,7 @@ from factory.nets.marked import marked
 from factory.nets.petri import Marking
 from factory.nets.replay import replay
 from factory.nets.undo import marking_after
+from factory.nets.undone import Entry
 from factory.nets.verify import verify
 from factory.pipeline import read
 from factory.plant.approaches import Approach
@@ -292,7 +293,7 @@ def check_exchange(factory: Factory, dead: int, deputy: int, rng: random.Random)
     assert wanted(takeover, fired, after) == []
     begun = marking_after(takeover.after.net, after)
     onward = fair_run(takeover.after.net, begun, 20, rng)
-    entries = [*(names[e] for e in record), undone, *(names[e] for e in onward)]
+    entries: list[Entry] = [*(names[e] for e in record), undone, *(names[e] for e in onward)]
     found = replay(factory.net, entries, None, joins_of(factory), (takeover.after.net,))
     assert (found.refines, found.reason) == (True, "")
     counts = [count + onward.count(event) for event, count in enumerate(after)]
@@ -374,6 +375,10 @@ def test_a_wrong_order_is_refused_with_its_circuit() -> None:
     words = "\n".join(d.message for d in caught.value.diagnostics)
     assert {d.code for d in caught.value.diagnostics} == {"NotProved"}
     assert "circuit through" in words and "carries no token" in words
+    order = deputy.operations[2:] + deputy.operations[:2]
+    robots = (replace(r, operations=order) if r is deputy else r for r in right.after.robots)
+    with pytest.raises(ValueError, match="do not ascend in the postorder"):
+        deputies(replace(right.after, robots=tuple(robots)), catalogue())
 
 
 # --- the command ----------------------------------------------------------------------------------

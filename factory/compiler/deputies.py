@@ -65,7 +65,7 @@ def moved_to(factory: Factory, dead: int, deputy: int, catalogue: Catalogue) -> 
         return found
     one, other = factory.robots[dead], factory.robots[deputy]
     text = f"{other.name} cannot take over the tours of {one.name}: {message}"
-    hint = "`factory check -v` says which robots have deputies; another needs a spare"
+    hint = "`factory check --json` lists the deputies of each robot; one without needs a spare"
     raise InputError(Diagnostic("BadLine", text, one.position, hint))
 
 
