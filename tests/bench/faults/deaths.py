@@ -64,16 +64,25 @@ def section(results: dict[str, Any]) -> str:
         for product in PRODUCTS
         for world in ("ideal", "mujoco")
     ]
-    head = ("product", "world", "runs", "robots", "replaced", "units made", "error [mm]", "contacts")
+    head = (
+        "product",
+        "world",
+        "runs",
+        "robots",
+        "replaced",
+        "units made",
+        "error [mm]",
+        "contacts",
+    )
     more = ("missed", "false alarms", "interval [s]", "predicted [s]", "off by", "as they should")
     return "\n\n".join(
         [
             "## Each robot dies",
             f"A robot dies as it begins its next operation after a time of about two cycles, of"
             f" {UNITS} units at jitter {JITTER:g}; nothing tells the supervisor but that the robot"
-            f" does not move. A spare comes {SWAP:g} s after that was found. In the ideal world each"
-            " robot dies at three times, in a run of its own each; in MuJoCo so do the paper's, and"
-            " each of the others' at one of the three by turns. A tool that has come to its"
+            f" does not move. A spare comes {SWAP:g} s after that was found. In the ideal world"
+            " each robot dies at three times, in a run of its own each; in MuJoCo so do the"
+            " paper's, and each of the others' at one of the three by turns. A tool that has come to its"
             " station stays there, so its death is often of no consequence: nothing was to be found"
             f" then. *Interval*: mean of the last {LAST} between products, where a spare came;"
             " *off by*: from the prediction for the factory, at most.",

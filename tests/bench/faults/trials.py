@@ -44,9 +44,7 @@ def project(product: str) -> Project:
 def tried(trial: Trial) -> dict[str, Any]:
     """What came of a trial."""
     made = project(trial.product)
-    request = RunRequest(
-        trial.world, trial.units, trial.seed, JITTER, made.settings, recovers=True
-    )
+    request = RunRequest(trial.world, trial.units, trial.seed, JITTER, made.settings, recovers=True)
     simulation = Simulation(made.layout, request)
     campaign = Campaign(
         trial.faults,
