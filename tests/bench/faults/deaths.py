@@ -83,8 +83,8 @@ def section(results: dict[str, Any]) -> str:
             f" does not move. A spare comes {SWAP:g} s after that was found. In the ideal world"
             " each robot dies at three times, in a run of its own each; in MuJoCo so do the"
             " paper's, and each of the others' at one of the three by turns. A tool that has come"
-            " to its station stays there, so its death is often of no consequence: nothing was to be found"
-            f" then. *Interval*: mean of the last {LAST} between products, where a spare came;"
+            " to its station stays there, so its death is often of no consequence: nothing was to"
+            f" be found then. *Interval*: mean of the last {LAST} between products, where a spare came;"
             " *off by*: from the prediction for the factory, at most.",
             table((*head, *more), [_row(*group) for group in groups if group[2]]),
         ]
