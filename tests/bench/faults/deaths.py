@@ -84,8 +84,8 @@ def section(results: dict[str, Any]) -> str:
             " each robot dies at three times, in a run of its own each; in MuJoCo so do the"
             " paper's, and each of the others' at one of the three by turns. A tool that has come"
             " to its station stays there, so its death is often of no consequence: nothing was to"
-            f" be found then. *Interval*: mean of the last {LAST} between products, where a spare came;"
-            " *off by*: from the prediction for the factory, at most.",
+            f" be found then. *Interval*: mean of the last {LAST} between products, where a spare"
+            " came; *off by*: from the prediction for the factory, at most.",
             table((*head, *more), [_row(*group) for group in groups if group[2]]),
         ]
     )

@@ -74,8 +74,8 @@ def section(results: dict[str, Any]) -> str:
             f"The paper's example, jitter {JITTER:g}: {100 * REDONE:g} % of the joints of two"
             f" inputs slip, {100 * LOST:g} % of all that robots carry is dropped, at each"
             " operation. *Predicted*: by a timed net in which the same happens, and things are gone"
-            " as they fall (`factory/timing/failing.py`); it does not know of robots that stand while"
-            " what fell lies in their way, so its prediction is for 0 s.",
+            " as they fall (`factory/timing/failing.py`); it does not know of robots that stand"
+            " while what fell lies in their way, so its prediction is for 0 s.",
             table(
                 (*head, *more, "predicted [s]", "off by", "all as it should be"),
                 [

@@ -69,10 +69,10 @@ def section(results: dict[str, Any]) -> str:
             "Faults that no test told of, and failures that nothing caused, in the runs in MuJoCo"
             " of the sections above; then with more noise than is usual, in the paper's example as"
             f" in the production above (jitter {JITTER:g}), so that it is seen what noise does."
-            " They are counted by kind in each run, so a miss and a false alarm of the same test in one"
-            " run would hide each other. *Found* has no blackouts, robots that stand for a while or"
-            " empty feeders, for which nothing looks, and more than one failure for one fault where"
-            " something that fell knocks against others.",
+            " They are counted by kind in each run, so a miss and a false alarm of the same test in"
+            " one run would hide each other. *Found* has no blackouts, robots that stand for a"
+            " while or empty feeders, for which nothing looks, and more than one failure for one"
+            " fault where something that fell knocks against others.",
             table(
                 (*head, *more),
                 [
