@@ -62,6 +62,11 @@ class Budget:
         return self.stopped() or perf_counter() - self.begin > self.seconds
 
     @property
+    def left(self) -> float:
+        """The time that is left [s], 0 where it is to end at once."""
+        return 0.0 if self.late() else self.seconds * (1 - self.gone)
+
+    @property
     def gone(self) -> float:
         """The share that is gone."""
         return (perf_counter() - self.begin) / self.seconds
