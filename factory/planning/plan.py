@@ -145,7 +145,7 @@ def _planned(source: InPlace, found: Blocking, asked: PlanOptions, budget: Budge
         words = f"{best.robots} robots, {best.seconds:.2f} s"
         asked.told("laying out", laid[0], len(sought.all), words)
 
-    best = layouts.best(sought.all, asked.aim, budget.late, said)
+    best = layouts.best(sought.all, asked.aim, budget, said)
     return _result(source, best, sought.optimal, found, laid[0])
 
 

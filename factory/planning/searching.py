@@ -13,7 +13,7 @@ import numpy as np
 from factory.geometry.meshes import Array
 from factory.planning.blocking import Blocking
 from factory.planning.estimate import Expected
-from factory.planning.exact import Best, Late, TooLate, TreeTask, never, tables
+from factory.planning.exact import Best, Late, TooLate, TreeTask, tables
 from factory.planning.growing import Site, bettered, divided
 from factory.planning.judging import Judge, Judged
 from factory.planning.stance import ROOT_AXIS, Stance, stances
@@ -39,7 +39,7 @@ EVEN = (1.0, 0.3, 0.0)
 """Many units are divided in about equal halves first, then less evenly."""
 
 SURE = 12
-"""The trees of so many units are proved, however long it takes."""
+"""The trees of so many units are proved, however long it takes, unless the search is stopped."""
 
 GROWN, PROVED = 0.4, 0.6
 """The shares of the time after which large products grow no more, and proofs are given up: layouts
@@ -60,6 +60,11 @@ class Budget:
     def late(self) -> bool:
         """Whether all of it is gone."""
         return self.stopped() or perf_counter() - self.begin > self.seconds
+
+    @property
+    def left(self) -> float:
+        """The time that is left [s], 0 where it is to end at once."""
+        return 0.0 if self.late() else self.seconds * (1 - self.gone)
 
     @property
     def gone(self) -> float:
@@ -110,12 +115,13 @@ def trees(sought: Sought) -> Trees:
 
     if not sure:
         keep(_grown(sought, GROWN / 2 if few else GROWN))
-    if few:
-        try:
-            keep(_proved(sought, never if sure else sought.budget.share(PROVED)))
+    try:
+        if few:
+            keep(_proved(sought, sought.budget.stopped if sure else sought.budget.share(PROVED)))
             optimal = True
-        except TooLate:
-            pass
+    except TooLate:
+        if not kept:
+            keep(_grown(sought, GROWN))
     by_robots = sought.aim == "robots"
     ranks = {j: (j.price, j.robots if by_robots else 0, j.seconds, j.robots) for j in kept.values()}
     least = min(judged.price for judged in ranks)
