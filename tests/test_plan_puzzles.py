@@ -191,7 +191,7 @@ def test_hooks_come_apart(tmp_path: Path) -> None:
 def test_mirrored_twins_come_from_opposite_sides(tmp_path: Path) -> None:
     found = planned(tmp_path, TWINS)
     ways = [direction(found, label) for label in ("left", "right")]
-    assert ways[0][0] + ways[1][0] == 0
+    assert ways[0][0] <= 0 <= ways[1][0] and ways[0][0] < ways[1][0]
 
 
 def test_what_is_in_the_way_later_counts(tmp_path: Path) -> None:

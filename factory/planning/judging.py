@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from factory.geometry.meshes import Array
-from factory.planning.blocking import CLASHES, DEEPER, LOCKED, SCRAPES, Blocking
+from factory.planning.blocking import CLASHES, DEEPER, LOCKED, Blocking
 from factory.planning.cannot import Direction, Units
 from factory.planning.estimate import Expected
 from factory.planning.exact import RELAY, Tree
@@ -104,7 +104,7 @@ class Judge:
         if not onto:
             ways.append((self.stance.axes[2], -self.stance.up, True))
         found = [self._way(pile, come, way, onto) for way in ways]
-        return min(found, key=lambda join: (max(join.level, SCRAPES), join.lowered, join.level))
+        return min(found, key=lambda join: (join.level, join.lowered))
 
     def _way(self, pile: Units, come: Units, way: tuple[int, int, bool], onto: bool) -> Join:
         axis, side, lowered = way
