@@ -14,7 +14,7 @@ from factory.commands.requests import OutputOptions
 from factory.commands.warnings import announced
 from factory.nets.verdict import listing
 from factory.support.console import emit, say
-from factory.support.errors import Diagnostic, InputError
+from factory.support.errors import Diagnostic, InputError, MissingError
 from factory.support.progress import StepBar, Waiting
 
 if TYPE_CHECKING:
@@ -31,6 +31,9 @@ AIMS = ("cycle", "robots", "floor")
 
 LOOKS = ("exploded.png", "assembly.mp4")
 """How the names of the still and of the film end."""
+
+DRAWN = 6
+"""So many sets of parts that interlock, the first ones, get a picture."""
 
 KINDS: tuple[Kind, ...] = ("slide", "lower", "blocked")
 
@@ -101,7 +104,7 @@ def plan(
             say(f"  {note}")
     planned = _sought(found, PlanOptions(aim, seconds, allow, templates=templates), out)
     if isinstance(planned, CannotAssemble):
-        raise InputError(cannot(planned))
+        return _refuse(found, planned, folder, look, out)
     made = planned_product(found, planned.tree, planned.orientation, source.name)
     files = {folder / name: content for name, content in made.files.items()}
     own_names(folder, files, [source])
@@ -127,15 +130,54 @@ def _sought(found: InPlace, asked: PlanOptions, out: OutputOptions) -> Planned |
         return sought(found, replace(asked, told=bar.show, stopped=lambda: stop.noted))
 
 
-def cannot(found: CannotAssemble) -> Diagnostic:
-    """That parts interlock, and what would help."""
+def _refuse(
+    found: InPlace, why: CannotAssemble, folder: Path, look: bool, out: OutputOptions
+) -> int:
+    """Say that there is no tree, and why, with pictures; gives the exit status."""
+    from factory.support.console import fail
+
+    pictures = _interlocked(found, why, folder, out) if look else []
+    details = {
+        "interlocks": [lock.as_json() for lock in why.interlocks],
+        "removal": {"labels": list(why.removal.labels), "smallest": why.removal.smallest},
+        "files": [str(path) for path in pictures],
+    }
+    return fail(InputError(cannot(why, pictures)), out.as_json, details)
+
+
+def cannot(found: CannotAssemble, pictures: list[Path]) -> Diagnostic:
+    """That parts interlock, what shows it, and what would help."""
     stuck = "; ".join(listing(lock.labels) for lock in found.interlocks)
     more = " and ".join(found.removal.labels)
     fewest = "no fewer parts do" if found.removal.smallest else "fewer may do"
     options = " ".join(f"--allow {name}" for name in found.removal.labels)
-    message = f"no straight motion along x, y or z divides these parts: {stuck}"
+    shown = f" (see {listing(map(str, pictures), 2)})" if pictures else ""
+    message = f"no straight motion along x, y or z divides these parts: {stuck}{shown}"
     hint = f"without {more} the rest can be joined ({fewest}); {options} lets parts clash"
     return Diagnostic("CannotAssemble", message, None, hint)
+
+
+def _interlocked(
+    found: InPlace, why: CannotAssemble, folder: Path, out: OutputOptions
+) -> list[Path]:
+    """A picture of each of the first few sets of parts that interlock; none where the machine has
+    no GL, which is said."""
+    from factory.importing.labels import file_stem
+    from factory.render.interlocked import InterlockedView
+    from factory.support.files import own_names
+
+    locks = why.interlocks[:DRAWN]
+    ends = ["", *(f"-{n}" for n in range(2, len(locks) + 1))]
+    paths = [folder / f"{file_stem(found.name)}-interlocked{end}.png" for end in ends]
+    own_names(folder, paths)
+    try:
+        with Waiting("drawing what interlocks", out.silent):
+            for lock, path in zip(locks, paths, strict=True):
+                InterlockedView(found, lock).still(path)
+    except MissingError as error:
+        announced(error.diagnostics, out)
+        return []
+    return paths
 
 
 def _looks(project: Project, out: OutputOptions) -> list[Path]:
@@ -143,7 +185,6 @@ def _looks(project: Project, out: OutputOptions) -> list[Path]:
     has no GL, which is said."""
     from factory.planning.exploding import explosion
     from factory.render.exploded import ExplodedView
-    from factory.support.errors import MissingError
     from factory.support.files import own_names
 
     still, film = (project.file.with_name(f"{project.name}-{end}") for end in LOOKS)
