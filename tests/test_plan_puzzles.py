@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 
+from factory.compiler.mating.paths import TOLERANCE
 from factory.planning.plan import CannotAssemble, Planned, PlanOptions, plan
 from factory.support.errors import InputError
 from tests.plan_puzzles import Box, Parts, block, dovetail, pinwheel, ring, source, tub
@@ -127,6 +128,13 @@ def test_a_peg_is_put_into_a_hole_from_below_by_lowering_the_hole(tmp_path: Path
     found = planned(tmp_path, PEG)
     assert direction(found, "cap") == (0, 0, 1)
     assert found.figures.robots == 3
+
+
+@pytest.mark.parametrize("parts", [PEG, NEST, LOADED, dovetail(stops=(30,))])
+def test_there_is_room_on_every_way(tmp_path: Path, parts: Parts) -> None:
+    """Nothing is drawn into another, so a way without room would be the wrong one."""
+    found = planned(tmp_path, parts)
+    assert all(join.clearance > -TOLERANCE for join in found.operations)
 
 
 def test_a_dovetail_slides_along_its_groove_only(tmp_path: Path) -> None:

@@ -189,7 +189,9 @@ def test_dividing_finds_a_tree_whenever_there_is_one(
     assert units_of(tree) == tuple(range(len(found)))
     assert judge.judged(tree).count(LOCKED) == 0
     last = judge.judged(tree)
-    for better, _ in zip(bettered(ground, tree, np.inf, lambda: False, random), range(3)):
+    for better, _ in zip(
+        bettered(ground, tree, np.inf, lambda: False, random), range(3), strict=False
+    ):
         assert better.price <= last.price and units_of(better.tree) == units_of(tree)
         assert better.count(LOCKED) == 0
         last = better

@@ -20,7 +20,7 @@ from factory.support.progress import StepBar, Waiting
 if TYPE_CHECKING:
     from factory.pipeline import Project
     from factory.planning.parts import InPlace
-    from factory.planning.plan import CannotAssemble, Planned, PlanOptions
+    from factory.planning.plan import CannotAssemble, Planned, PlannedJoin, PlanOptions
     from factory.planning.searching import Aim
     from factory.plant.approaches import Approach, Kind
 
@@ -117,7 +117,7 @@ def plan(
     if out.as_json:
         emit(_document(found, planned, project, [*files, *looked], warnings))
     elif not out.quiet:
-        _tell(planned, project, [*files, *looked], out)
+        _tell(found, planned, project, [*files, *looked], out)
     return 0
 
 
@@ -211,6 +211,7 @@ def _document(
 ) -> dict[str, Any]:
     """The keys of `plan --json`."""
     matings = project.matings
+    labels = {id(join): label for label, join in _by_label(found, planned, project).items()}
     return {
         "pag": str(project.file),
         "product": project.pag.root,
@@ -221,14 +222,31 @@ def _document(
         "notes": list(found.notes),
         "figures": asdict(planned.figures),
         "optimal": planned.optimal,
-        "joins": [asdict(join) for join in planned.operations],
+        "joins": [{"label": labels[id(join)], **asdict(join)} for join in planned.operations],
         "approaches": matings.as_json() if matings else None,
         "files": [str(path) for path in files],
         "warnings": warnings,
     }
 
 
-def _tell(planned: Planned, project: Project, files: list[Path], out: OutputOptions) -> None:
+def _by_label(found: InPlace, planned: Planned, project: Project) -> dict[str, PlannedJoin]:
+    """The joins of a plan by the labels of the operations that they have become: those that make
+    the same of units. Operations in sub-trees that were kept have none."""
+    made = {frozenset((*join.pile, *join.come)): join for join in planned.operations}
+    inside = {part.label: frozenset([label]) for label, own in found.units() for part in own}
+    matings = project.matings.all if project.matings else ()
+    steps = {mating.label: mating.inputs for mating in matings}
+    for node in project.pag.postorder():
+        if node.inputs:
+            inside[node.label] = frozenset[str]().union(*(inside[name] for name in node.inputs))
+    for label, inputs in steps.items():
+        inside[label] = frozenset[str]().union(*(inside[name] for name in inputs))
+    return {label: made[inside[label]] for label in steps if inside[label] in made}
+
+
+def _tell(
+    found: InPlace, planned: Planned, project: Project, files: list[Path], out: OutputOptions
+) -> None:
     """What was planned and written."""
     parts = sum(1 for _ in project.pag.parts())
     matings = project.matings
@@ -240,8 +258,11 @@ def _tell(planned: Planned, project: Project, files: list[Path], out: OutputOpti
     cycle = f", cycle time about {figures.cycle or figures.expected:.2f} s"
     say(f"{figures.robots} robots{cycle}; {best}")
     if out.verbose and matings:
+        joins = _by_label(found, planned, project)
         for mating in matings.all:
-            say(f"  {mating.label}: {' + '.join(mating.inputs)}, {_way(mating.approach)}")
+            words = f"{mating.label}: {' + '.join(mating.inputs)}, {_way(mating.approach)}"
+            join = joins.get(mating.label)
+            say(f"  {words}{f', {_room(join.clearance)}' if join else ''}")
     for path in files if out.verbose else files[-2:]:
         say(f"  {path}")
     say(f"  factory run {project.file} --units 3 --video {project.file.with_suffix('.mp4')}")
@@ -253,3 +274,11 @@ def _way(approach: Approach) -> str:
         return f"{approach.lowered} is lowered {approach.stroke:g} m"
     sides = " or ".join(f"{'-+'[side > 0]}{'xy'[approach.axis]}" for side in approach.sides)
     return f"{'slides' if approach.kind == 'slide' else 'is blocked'} from {sides}"
+
+
+def _room(clearance: float) -> str:
+    """The least room on a way, in words."""
+    if clearance == float("inf"):
+        return "nothing near"
+    room = round(1e3 * clearance, 2)
+    return f"room {room:.2f} mm" if room >= 0 else f"drawn {-room:.2f} mm into each other"
