@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 
+from factory.compiler.mating.paths import TOLERANCE
 from factory.planning.plan import CannotAssemble, Planned, PlanOptions, plan
 from factory.support.errors import InputError
 from tests.plan_puzzles import Box, Parts, block, dovetail, pinwheel, ring, source, tub
@@ -129,6 +130,13 @@ def test_a_peg_is_put_into_a_hole_from_below_by_lowering_the_hole(tmp_path: Path
     assert found.figures.robots == 3
 
 
+@pytest.mark.parametrize("parts", [PEG, NEST, LOADED, dovetail(stops=(30,))])
+def test_there_is_room_on_every_way(tmp_path: Path, parts: Parts) -> None:
+    """Nothing is drawn into another, so a way without room would be the wrong one."""
+    found = planned(tmp_path, parts)
+    assert all(join.clearance > -TOLERANCE for join in found.operations)
+
+
 def test_a_dovetail_slides_along_its_groove_only(tmp_path: Path) -> None:
     found = planned(tmp_path, dovetail())
     assert [abs(x) for x in direction(found, "tail")] == [1, 0, 0]
@@ -171,7 +179,9 @@ def test_a_chain_of_closed_links_is_freed_by_the_middle_one(tmp_path: Path) -> N
     found = refused(tmp_path, CHAIN)
     assert [one.labels for one in found.interlocks] == [("one", "two", "three")]
     assert found.removal.labels == ("two",) and found.removal.smallest
-    assert found.best.figures.blocked == 2
+    allowed = PlanOptions(lay_out=False, allow=found.removal.labels)
+    best = plan(source(tmp_path, CHAIN), allowed)
+    assert isinstance(best, Planned) and best.figures.blocked == 2
 
 
 def test_clashes_that_are_allowed_make_a_chain_possible(tmp_path: Path) -> None:

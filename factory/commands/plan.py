@@ -14,13 +14,13 @@ from factory.commands.requests import OutputOptions
 from factory.commands.warnings import announced
 from factory.nets.verdict import listing
 from factory.support.console import emit, say
-from factory.support.errors import Diagnostic, InputError
+from factory.support.errors import Diagnostic, InputError, MissingError
 from factory.support.progress import StepBar, Waiting
 
 if TYPE_CHECKING:
     from factory.pipeline import Project
     from factory.planning.parts import InPlace
-    from factory.planning.plan import CannotAssemble, Planned, PlanOptions
+    from factory.planning.plan import CannotAssemble, Planned, PlannedJoin, PlanOptions
     from factory.planning.searching import Aim
     from factory.plant.approaches import Approach, Kind
 
@@ -31,6 +31,9 @@ AIMS = ("cycle", "robots", "floor")
 
 LOOKS = ("exploded.png", "assembly.mp4")
 """How the names of the still and of the film end."""
+
+DRAWN = 6
+"""So many sets of parts that interlock, the first ones, get a picture."""
 
 KINDS: tuple[Kind, ...] = ("slide", "lower", "blocked")
 
@@ -101,7 +104,7 @@ def plan(
             say(f"  {note}")
     planned = _sought(found, PlanOptions(aim, seconds, allow, templates=templates), out)
     if isinstance(planned, CannotAssemble):
-        raise InputError(cannot(planned))
+        return _refuse(found, planned, folder, look, out)
     made = planned_product(found, planned.tree, planned.orientation, source.name)
     files = {folder / name: content for name, content in made.files.items()}
     own_names(folder, files, [source])
@@ -114,7 +117,7 @@ def plan(
     if out.as_json:
         emit(_document(found, planned, project, [*files, *looked], warnings))
     elif not out.quiet:
-        _tell(planned, project, [*files, *looked], out)
+        _tell(found, planned, project, [*files, *looked], out)
     return 0
 
 
@@ -127,15 +130,54 @@ def _sought(found: InPlace, asked: PlanOptions, out: OutputOptions) -> Planned |
         return sought(found, replace(asked, told=bar.show, stopped=lambda: stop.noted))
 
 
-def cannot(found: CannotAssemble) -> Diagnostic:
-    """That parts interlock, and what would help."""
+def _refuse(
+    found: InPlace, why: CannotAssemble, folder: Path, look: bool, out: OutputOptions
+) -> int:
+    """Say that there is no tree, and why, with pictures; gives the exit status."""
+    from factory.support.console import fail
+
+    pictures = _interlocked(found, why, folder, out) if look else []
+    details = {
+        "interlocks": [lock.as_json() for lock in why.interlocks],
+        "removal": {"labels": list(why.removal.labels), "smallest": why.removal.smallest},
+        "files": [str(path) for path in pictures],
+    }
+    return fail(InputError(cannot(why, pictures)), out.as_json, details)
+
+
+def cannot(found: CannotAssemble, pictures: list[Path]) -> Diagnostic:
+    """That parts interlock, what shows it, and what would help."""
     stuck = "; ".join(listing(lock.labels) for lock in found.interlocks)
     more = " and ".join(found.removal.labels)
     fewest = "no fewer parts do" if found.removal.smallest else "fewer may do"
     options = " ".join(f"--allow {name}" for name in found.removal.labels)
-    message = f"no straight motion along x, y or z divides these parts: {stuck}"
+    shown = f" (see {listing(map(str, pictures), 2)})" if pictures else ""
+    message = f"no straight motion along x, y or z divides these parts: {stuck}{shown}"
     hint = f"without {more} the rest can be joined ({fewest}); {options} lets parts clash"
     return Diagnostic("CannotAssemble", message, None, hint)
+
+
+def _interlocked(
+    found: InPlace, why: CannotAssemble, folder: Path, out: OutputOptions
+) -> list[Path]:
+    """A picture of each of the first few sets of parts that interlock; none where the machine has
+    no GL, which is said."""
+    from factory.importing.labels import file_stem
+    from factory.render.interlocked import InterlockedView
+    from factory.support.files import own_names
+
+    locks = why.interlocks[:DRAWN]
+    ends = ["", *(f"-{n}" for n in range(2, len(locks) + 1))]
+    paths = [folder / f"{file_stem(found.name)}-interlocked{end}.png" for end in ends]
+    own_names(folder, paths)
+    try:
+        with Waiting("drawing what interlocks", out.silent):
+            for lock, path in zip(locks, paths, strict=True):
+                InterlockedView(found, lock).still(path)
+    except MissingError as error:
+        announced(error.diagnostics, out)
+        return []
+    return paths
 
 
 def _looks(project: Project, out: OutputOptions) -> list[Path]:
@@ -143,7 +185,6 @@ def _looks(project: Project, out: OutputOptions) -> list[Path]:
     has no GL, which is said."""
     from factory.planning.exploding import explosion
     from factory.render.exploded import ExplodedView
-    from factory.support.errors import MissingError
     from factory.support.files import own_names
 
     still, film = (project.file.with_name(f"{project.name}-{end}") for end in LOOKS)
@@ -170,6 +211,7 @@ def _document(
 ) -> dict[str, Any]:
     """The keys of `plan --json`."""
     matings = project.matings
+    labels = {id(join): label for label, join in _by_label(found, planned, project).items()}
     return {
         "pag": str(project.file),
         "product": project.pag.root,
@@ -180,14 +222,31 @@ def _document(
         "notes": list(found.notes),
         "figures": asdict(planned.figures),
         "optimal": planned.optimal,
-        "joins": [asdict(join) for join in planned.operations],
+        "joins": [{"label": labels[id(join)], **asdict(join)} for join in planned.operations],
         "approaches": matings.as_json() if matings else None,
         "files": [str(path) for path in files],
         "warnings": warnings,
     }
 
 
-def _tell(planned: Planned, project: Project, files: list[Path], out: OutputOptions) -> None:
+def _by_label(found: InPlace, planned: Planned, project: Project) -> dict[str, PlannedJoin]:
+    """The joins of a plan by the labels of the operations that they have become: those that make
+    the same of units. Operations in sub-trees that were kept have none."""
+    made = {frozenset((*join.pile, *join.come)): join for join in planned.operations}
+    inside = {part.label: frozenset([label]) for label, own in found.units() for part in own}
+    matings = project.matings.all if project.matings else ()
+    steps = {mating.label: mating.inputs for mating in matings}
+    for node in project.pag.postorder():
+        if node.inputs:
+            inside[node.label] = frozenset[str]().union(*(inside[name] for name in node.inputs))
+    for label, inputs in steps.items():
+        inside[label] = frozenset[str]().union(*(inside[name] for name in inputs))
+    return {label: made[inside[label]] for label in steps if inside[label] in made}
+
+
+def _tell(
+    found: InPlace, planned: Planned, project: Project, files: list[Path], out: OutputOptions
+) -> None:
     """What was planned and written."""
     parts = sum(1 for _ in project.pag.parts())
     matings = project.matings
@@ -195,12 +254,15 @@ def _tell(planned: Planned, project: Project, files: list[Path], out: OutputOpti
     ways = ", ".join(f"{count} {kind}" for kind, count in kinds if count)
     say(f"{project.file}: parts {parts}, operations {len(project.pag) - parts}; ways: {ways}")
     figures = planned.figures
-    best = "no tree is better" if planned.optimal else "the best that was found"
+    best = "none is better by estimate" if planned.optimal else "the best that was found"
     cycle = f", cycle time about {figures.cycle or figures.expected:.2f} s"
     say(f"{figures.robots} robots{cycle}; {best}")
     if out.verbose and matings:
+        joins = _by_label(found, planned, project)
         for mating in matings.all:
-            say(f"  {mating.label}: {' + '.join(mating.inputs)}, {_way(mating.approach)}")
+            words = f"{mating.label}: {' + '.join(mating.inputs)}, {_way(mating.approach)}"
+            join = joins.get(mating.label)
+            say(f"  {words}{f', {_room(join.clearance)}' if join else ''}")
     for path in files if out.verbose else files[-2:]:
         say(f"  {path}")
     say(f"  factory run {project.file} --units 3 --video {project.file.with_suffix('.mp4')}")
@@ -212,3 +274,11 @@ def _way(approach: Approach) -> str:
         return f"{approach.lowered} is lowered {approach.stroke:g} m"
     sides = " or ".join(f"{'-+'[side > 0]}{'xy'[approach.axis]}" for side in approach.sides)
     return f"{'slides' if approach.kind == 'slide' else 'is blocked'} from {sides}"
+
+
+def _room(clearance: float) -> str:
+    """The least room on a way, in words."""
+    if clearance == float("inf"):
+        return "nothing near"
+    room = round(1e3 * clearance, 2)
+    return f"room {room:.2f} mm" if room >= 0 else f"drawn {-room:.2f} mm into each other"

@@ -128,7 +128,7 @@ def rooms(source: InPlace, axis: int) -> Array:
     one, other = unit[found.part[moving]], unit[found.part[standing]]
     apart = one != other
     least = -np.maximum(depths.graze, np.where(depths.path > TOLERANCE, depths.path, -np.inf))
-    for column, at in ((1, (other, one)), (0, (one, other))):
+    for column, at in enumerate(((other, one), (one, other))):
         np.minimum.at(room, (at[0][apart], at[1][apart]), least[apart, column])
     return np.where(room > AMPLE, np.inf, room)
 

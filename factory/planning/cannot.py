@@ -18,7 +18,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import product
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -43,6 +43,11 @@ class Interlock:
 
     labels: tuple[str, ...]
     circuits: tuple[tuple[Direction, tuple[str, ...]], ...]
+
+    def as_json(self) -> dict[str, Any]:
+        """The labels, and the circuits by direction, as `+x`."""
+        ways = {f"{'-+'[side > 0]}{'xyz'[axis]}": way for (axis, side), way in self.circuits}
+        return {"parts": list(self.labels), "circuits": {w: list(c) for w, c in ways.items()}}
 
 
 @dataclass(frozen=True, slots=True)

@@ -98,12 +98,10 @@ class Planned:
 @dataclass(frozen=True)
 class CannotAssemble:
     """No tree of straight motions along the axes joins the parts: proved by those that interlock.
-    Without `removal`, or where its clashes are accepted (`allow`), the rest can be joined; `best`
-    is the plan that accepts them."""
+    Without `removal`, or where its clashes are accepted (`allow`), the rest can be joined."""
 
     interlocks: tuple[Interlock, ...]
     removal: Removal
-    best: Planned = field(repr=False)
 
 
 def plan(source: InPlace, options: PlanOptions | None = None) -> Planned | CannotAssemble:
@@ -116,11 +114,9 @@ def plan(source: InPlace, options: PlanOptions | None = None) -> Planned | Canno
     _check_allowed(asked.allow, found)
     found = found.allowing(asked.allow)
     stuck = interlocks(found)
-    if not stuck:
-        return _planned(source, found, asked, budget)
-    out = removal(found)
-    best = _planned(source, found.allowing(out.labels), asked, budget)
-    return CannotAssemble(stuck, out, best)
+    if stuck:
+        return CannotAssemble(stuck, removal(found))
+    return _planned(source, found, asked, budget)
 
 
 def _planned(source: InPlace, found: Blocking, asked: PlanOptions, budget: Budget) -> Planned:

@@ -71,12 +71,13 @@ def warning(diagnostic: Diagnostic) -> Diagnostic:
     return replace(diagnostic, message=f"warning: {diagnostic.message}")
 
 
-def fail(error: FactoryError, as_json: bool) -> int:
-    """Print an error to stderr, with `as_json` also to stdout, as far as they can be written; gives
-    the exit status."""
+def fail(error: FactoryError, as_json: bool, details: Mapping[str, Any] | None = None) -> int:
+    """Print an error to stderr, with `as_json` also to stdout, there with `details` as further
+    keys, as far as they can be written; gives the exit status."""
     with suppress(OSError):
         if as_json:
-            told = {"errors": [d.as_json() for d in error.diagnostics[:SHOWN]]}
+            errors = [d.as_json() for d in error.diagnostics[:SHOWN]]
+            told = {"errors": errors, **(details or {})}
             more = len(error.diagnostics) - SHOWN
             emit({**told, "errors_left_out": more} if more > 0 else told)
     with suppress(OSError):

@@ -1,0 +1,199 @@
+"""`factory plan` from end to end: what it is asked for, and what it says and writes."""
+
+from __future__ import annotations
+
+import os
+import signal
+from collections.abc import Callable
+from itertools import count, pairwise
+from pathlib import Path
+
+import imageio.v3 as iio
+import numpy as np
+import pytest
+
+from factory.pipeline import read
+from factory.planning.blocking import blocking
+from factory.planning.cannot import interlocks
+from factory.render.interlocked import PAINTS, InterlockedView
+from factory.support.progress import StepBar
+from tests.command_line import ROOT, Done, Terminal, files_in
+from tests.opengl import needs_gl
+from tests.plan_puzzles import Parts, block, pinwheel, source, tub
+from tests.test_plan_puzzles import CHAIN, LOADED, PEG
+
+EXAMPLES = ROOT / "examples"
+Planning = Callable[..., Done]
+
+
+@pytest.fixture
+def terminal(capsys: pytest.CaptureFixture[str]) -> Terminal:
+    return Terminal(capsys)
+
+
+@pytest.fixture
+def planning(terminal: Terminal, tmp_path: Path) -> Planning:
+    """Plans a puzzle, or a PAG, with its tree thrown away, into `out`."""
+
+    def planned(what: Parts | Path, *words: object, out: str = "out") -> Done:
+        file = what if isinstance(what, Path) else puzzle(tmp_path, what)
+        return terminal("plan", file, "--replan", "-o", tmp_path / out, *words, "--json")
+
+    return planned
+
+
+def puzzle(folder: Path, parts: Parts) -> Path:
+    source(folder, parts)
+    return folder / "puzzle.pag"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["gearbox", "chest", "truck", "chair"])
+def test_a_plan_is_free_and_no_slower_than_the_tree_drawn_by_hand(
+    planning: Planning, terminal: Terminal, name: str
+) -> None:
+    from factory.timing.prediction import pace
+
+    done = planning(EXAMPLES / f"{name}.pag", "--no-look", "--seconds", 20)
+    assert done.status == 0, done.err
+    checked = terminal("check", done.json["pag"], "--json").json
+    assert checked["live"] and checked["approaches"]["blocked"] == 0
+    assert checked["robots"] == done.json["figures"]["robots"]
+    by_hand, planned = read(EXAMPLES / f"{name}.pag"), read(Path(done.json["pag"]))
+    cycles = [pace(one.layout, one.settings)[0].seconds for one in (planned, by_hand)]
+    assert cycles[0] <= cycles[1]
+    assert cycles[0] == pytest.approx(done.json["figures"]["cycle"])
+
+
+def test_few_robots_a_small_floor_or_a_short_cycle(planning: Planning) -> None:
+    asked = {}
+    for aim in ("cycle", "robots", "floor"):
+        done = planning(LOADED, "--for", aim, "--no-look", "--seconds", 5, out=aim)
+        assert done.status == 0, done.err
+        asked[aim] = done.json["figures"]
+    slack = 1.01  # figures that differ by less are as good as each other
+    assert asked["robots"]["robots"] < asked["cycle"]["robots"]
+    assert asked["cycle"]["cycle"] <= slack * min(one["cycle"] for one in asked.values())
+    assert asked["floor"]["area"] <= slack * min(one["area"] for one in asked.values())
+
+
+def test_each_operation_has_its_room(
+    planning: Planning, terminal: Terminal, tmp_path: Path
+) -> None:
+    joins = planning(PEG, "--no-look").json["joins"]
+    assert {join["label"] for join in joins} == labels_of(tmp_path / "out" / "puzzle.pag")
+    rooms = [join["clearance"] for join in joins]
+    assert all(room is None or room >= -1e-5 for room in rooms)
+    words = ("plan", tmp_path / "puzzle.pag", "--replan", "-o", tmp_path / "out", "--no-look")
+    told = terminal(*words, "-v").out
+    for join in joins:
+        (line,) = [line for line in told.splitlines() if line.startswith(f"  {join['label']}: ")]
+        room = join["clearance"]
+        assert line.endswith("nothing near" if room is None else f"room {1e3 * room:.2f} mm")
+
+
+def labels_of(pag: Path) -> set[str]:
+    matings = read(pag).matings
+    assert matings is not None
+    return {mating.label for mating in matings.all}
+
+
+@needs_gl
+def test_what_interlocks_is_said_and_drawn_and_nothing_else_is_written(
+    planning: Planning, tmp_path: Path
+) -> None:
+    done = planning(pinwheel())
+    assert (done.status, done.codes) == (2, ["CannotAssemble"])
+    (error,) = done.json["errors"]
+    assert "a, b, c" in error["message"] and "puzzle-interlocked.png" in error["message"]
+    assert "--allow" in error["hint"]
+    (lock,) = done.json["interlocks"]
+    assert lock["parts"] == ["a", "b", "c"]
+    assert sorted(lock["circuits"]) == ["+x", "+y", "+z", "-x", "-y", "-z"]
+    assert all(set(way) <= {"a", "b", "c"} and len(way) > 1 for way in lock["circuits"].values())
+    assert done.json["removal"]["smallest"] and len(done.json["removal"]["labels"]) == 1
+    assert list(files_in(tmp_path / "out")) == ["puzzle-interlocked.png"]
+    pixels = iio.imread(tmp_path / "out" / "puzzle-interlocked.png")
+    assert all((pixels == paint).all(axis=2).any() for paint in PAINTS[:3])
+
+
+def test_what_interlocks_is_not_drawn_where_no_pictures_are_wanted(
+    planning: Planning, tmp_path: Path
+) -> None:
+    done = planning(CHAIN, "--no-look")
+    assert (done.status, done.codes, done.json["files"]) == (2, ["CannotAssemble"], [])
+    assert not (tmp_path / "out").exists()
+
+
+def test_what_is_drawn_out_is_clear_of_each_other(tmp_path: Path) -> None:
+    found = source(tmp_path, pinwheel())
+    (lock,) = interlocks(blocking(found))
+    view = InterlockedView(found, lock)
+    for axis in range(3):
+        moved = view.boxes + view.drawn_out(axis)[:, None]
+        spans = sorted(map(tuple, moved[:, :, axis]))
+        assert all(one[1] < other[0] for one, other in pairwise(spans))
+        still = np.delete(moved - view.boxes, axis, axis=2)
+        assert not still.any()
+
+
+def test_clashes_that_are_allowed_are_counted(planning: Planning) -> None:
+    refused = planning(CHAIN, "--no-look")
+    (label,) = refused.json["removal"]["labels"]
+    done = planning(CHAIN, "--allow", label, "--no-look")
+    assert done.status == 0, done.err
+    assert done.json["figures"]["blocked"] == done.json["approaches"]["blocked"] > 0
+    assert [w["code"] for w in done.json["warnings"]].count("Blocked") > 0
+    assert planning(CHAIN, "--allow", f"{label}s", "--no-look").codes == ["Usage"]
+
+
+STACK = """root = stack; stack = mate ( pair, third );
+pair = press ( two, dwell = 0.5 ); two = mate ( first, second );
+first = atomic ( box = ( 0.1, 0.1, 0.1 ), pos = ( 0, 0, 0.05 ) );
+second = atomic ( box = ( 0.1, 0.1, 0.1 ), pos = ( 0, 0, 0.15 ) );
+third = atomic ( box = ( 0.1, 0.1, 0.1 ), pos = ( 0, 0, 0.25 ) )
+"""
+
+
+def test_a_sub_tree_is_kept(terminal: Terminal, tmp_path: Path) -> None:
+    (tmp_path / "stack.pag").write_text(STACK)
+    words = ("--keep", "pair", "--no-look", "-o", tmp_path / "out")
+    done = terminal("plan", tmp_path / "stack.pag", *words, "--json")
+    assert done.status == 0, done.err
+    assert done.json["kept"] == ["pair"]
+    after = read(Path(done.json["pag"])).pag
+    assert (after["pair"].operation, after["pair"].inputs) == ("press", ("two",))
+    assert (after["two"].operation, after["two"].inputs) == ("mate", ("first", "second"))
+    (join,) = done.json["joins"]
+    assert {*join["pile"], *join["come"]} == {"pair", "third"}
+
+
+MANY: Parts = {
+    "tube": [*tub(20, 20, 0, 140)],
+    **{f"disc{n}": [block(19, 19, 10 * n + 0.2, 10 * n + 10)] for n in range(13)},
+}
+"""More parts than a proof is sure to be made for."""
+
+
+def test_a_tree_is_found_in_no_time(planning: Planning) -> None:
+    done = planning(MANY, "--no-look", "--seconds", 0.001)
+    assert done.status == 0, done.err
+    figures = done.json["figures"]
+    assert figures["layouts"] == 1 and figures["blocked"] == 0 and not done.json["optimal"]
+
+
+def test_the_best_so_far_is_kept_on_a_signal(
+    planning: Planning, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    shown = count()
+
+    def stop(*words: object) -> None:
+        if next(shown) == 1:  # the first tree
+            os.kill(os.getpid(), signal.SIGINT)
+
+    monkeypatch.setattr(StepBar, "show", stop)
+    done = planning(MANY, "--no-look", "--seconds", 600)
+    assert done.status == 0, done.err
+    figures = done.json["figures"]
+    assert figures["layouts"] == 1 and figures["blocked"] == 0 and not done.json["optimal"]
+    assert labels_of(Path(done.json["pag"]))
