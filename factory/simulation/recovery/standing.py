@@ -22,6 +22,11 @@ MOVES = 5e-3
 """A robot is asked to move when its mode asks for this speed [m/s]."""
 
 
+def patience(seconds: float) -> float:
+    """What should take some seconds is late after so many [s]."""
+    return SLUGGISH * seconds + GRACE
+
+
 class Standing:
     """Lets robots (index) of a simulation stand, each under a limit of its own on its speed."""
 
@@ -62,7 +67,7 @@ class Standing:
             if not excused.isdisjoint(operation.robots):
                 self.begun(operation, now)
                 continue
-            most = SLUGGISH * self._simulation.delays[number] + GRACE
+            most = patience(self._simulation.delays[number])
             if now - self._begun.setdefault(number, now) > most:
                 found += self._at_fault(factory, operation)
         return found
