@@ -36,7 +36,7 @@ class Inspection:
     ) -> None:
         self._m, self._d, self._model, self._masks = m, d, model, masks
         self._product = ProductError(model)
-        self.pressing = Pressing(m, model.factory)
+        self.pressing = Pressing(m, model.factory, masks)
         self._touching: frozenset[tuple[int, int]] = frozenset()
         self.joining: dict[int, int] = {}
         self.force: dict[str, float] = {}
@@ -64,6 +64,7 @@ class Inspection:
             label = self._joined(a, b)
             if label is not None:
                 self._press(label, number)
+                self.pressing.knocked(a, b)
             elif not self.pressing.meant(a, b, float(found.dist[number])):
                 now.add((a, b))
         for a, b in sorted(now - self._touching):

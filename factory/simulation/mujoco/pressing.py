@@ -3,9 +3,15 @@ fallen."""
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
+import numpy as np
+
 from factory.layout.hands.holding import held
 from factory.mjcf import names
+from factory.mjcf.masks import NOBODY
 from factory.plant.factory import Factory
+from factory.simulation.mujoco.contacts import ContactMasks
 from factory.support.engine import mujoco
 
 PRESSED = 1e-4
@@ -17,11 +23,11 @@ FREE = 6
 
 class Pressing:
     """What the pads of robots and feeders are to hold. `fallen`: bodies that lie about, or that a
-    feeder shows askew; `shaken`: those that such a body has touched since; `touched`: the pairs of
-    geoms of which one was of any of these."""
+    feeder shows askew; `shaken`: those that such a body has touched since, with all that is in the
+    same hands; `touched`: the pairs of geoms of which one was of any of these."""
 
-    def __init__(self, m: mujoco.MjModel, factory: Factory) -> None:
-        self._m, self._contents = m, factory.contents
+    def __init__(self, m: mujoco.MjModel, factory: Factory, masks: ContactMasks) -> None:
+        self._m, self._contents, self._masks = m, factory.contents, masks
         self.fallen: set[int] = set()
         self.shaken: set[int] = set()
         self.touched: set[tuple[int, int]] = set()
@@ -45,8 +51,26 @@ class Pressing:
         if bodies.isdisjoint(self.fallen | self.shaken):
             return False
         self.touched.add((one, other))
-        self.shaken |= {body for body in bodies if self._m.body_dofnum[body] == FREE}
+        self._shake(bodies)
         return True
+
+    def knocked(self, one: int, other: int) -> None:
+        """Two geoms touch that are joined now: one is shaken where the other alone has fallen."""
+        bodies = {*self._m.geom_bodyid[[one, other]].tolist()}
+        if self.fallen and len(bodies & self.fallen) == 1:
+            self._shake(bodies)
+
+    def _shake(self, bodies: Iterable[int]) -> None:
+        for body in bodies:
+            if self._m.body_dofnum[body] == FREE and body not in self.shaken:
+                self.shaken |= self._together(body)
+
+    def _together(self, body: int) -> set[int]:
+        """A part's body, and those in the same hands."""
+        code, free = self._masks.code, self._m.body_dofnum == FREE
+        if code[body] == NOBODY:
+            return {body}
+        return {*np.flatnonzero((code == code[body]) & free).tolist()}
 
     def _bears(self, pad: int, geom: int) -> bool:
         holds = self._holds.get(names.pad_of(self._m.geom(pad).name), set())

@@ -90,6 +90,10 @@ class IdealPlant:
         self._bad.clear()
         return found
 
+    def unseen(self) -> Sequence[str]:
+        """What a feeder shows is looked at at once."""
+        return ()
+
     def residual(self, operation: Operation) -> float:
         """How far inputs are from where they belong when they are about to be joined [m]."""
         return self._slipped.get(operation.index, 0.0)

@@ -54,6 +54,10 @@ class Plant(Protocol):
         """Parts that a feeder's camera finds askew or no good: label, unit, the test that says so.
         They are taken back, and the next come."""
 
+    def unseen(self) -> Sequence[str]:
+        """The kinds of faults of parts that have been taken back, since the last question, for
+        another reason, before any camera looked at them."""
+
     def residual(self, operation: Operation) -> float:
         """How far inputs are from where they belong when they are about to be joined, as measured
         [m]."""

@@ -147,10 +147,11 @@ class Recovery:
             if number in self.books.supervisor.active.operations:
                 respond.failed(self._factory.operations[number], test)
         excused = frozenset({*self.plant.closed, *respond.dead})
-        for robot in respond.standing.jammed(now, excused):
+        for robot in respond.jammed(now, excused):
             if robot not in respond.dead:
                 respond.died(robot)
-        self.striking.dissolved(len(untested - self.plant.slipped))
+        for kind in (*self.plant.unseen(), *["bad_joint"] * len(untested - self.plant.slipped)):
+            self.striking.count(kind, -1)
 
     def _go_on(self, now: float) -> None:
         """Robots stand, go on and come back; spares come."""
@@ -159,7 +160,7 @@ class Recovery:
             self.striking.standing.pop(robot, None)
         closed = self.plant.closed
         respond.standing.let_stand({*closed, *self.striking.standing, *respond.dead})
-        respond.returning.tick({*closed, *respond.dead})
+        respond.returning.tick({*closed, *respond.dead}, now)
         self.books.supervisor.enabled |= not self._stopped
         self.simulation.world.hooks.busy = max(self.simulation.world.hooks.busy, self._ends(now))
         silent, longest = self.simulation.silent, max(self.simulation.delays)

@@ -23,7 +23,7 @@ from factory.simulation.recovery.books import Books
 from factory.simulation.recovery.faults import Campaign
 from factory.simulation.recovery.plant import Plant
 from factory.simulation.recovery.returning import Goal, Returning, WayBack, order_of
-from factory.simulation.recovery.standing import Standing
+from factory.simulation.recovery.standing import Standing, patience
 from factory.simulation.simulation import Simulation
 from factory.support.errors import Diagnostic
 from factory.timing.failing import SCRAPS
@@ -102,6 +102,11 @@ class Responding:
             ends = tuple(by_label[label].end for label in operation.inputs)
             self._undo(ends, operation, test)
 
+    def jammed(self, now: float, excused: frozenset[int]) -> list[int]:
+        """The robots that make no progress now [s], but for those that are `excused`."""
+        slow = self.returning.late(now - patience(max(self._simulation.delays)))
+        return [*self.standing.jammed(now, excused), *slow]
+
     def died(self, robot: int) -> None:
         """A robot makes no progress. One from the depot takes its place after some time; what it
         held is lost with it."""
@@ -115,7 +120,9 @@ class Responding:
         held = () if label == NOPART else (label,)
         self._note("jammed", operation, robot, "spare", held, self.dead[robot])
         ends = tuple(self._books.factory.by_label[label].end for label in held)
-        self._undo(ends or (operation.start,), operation, "jammed")
+        begun = operation.index in self._books.supervisor.active.operations
+        if asked := ends or (operation.start,) * begun:
+            self._undo(asked, operation, "jammed")
 
     def replaced(self, now: float) -> list[int]:
         """The robots that are replaced now [s], and stand where they wait."""

@@ -33,13 +33,14 @@ PAST = 2e-3
 class WayBack:
     """What a robot has yet to do: go to `goals` one after the other, but only when the robots in
     `after` are back, and it is `ready`; then what `done` says. `stage`: the number of what it is
-    doing."""
+    doing, `since` when [s] it could have been."""
 
     goals: list[Goal]
     after: frozenset[int] = frozenset()
     done: Callable[[], None] = lambda: None
     ready: Callable[[], bool] = lambda: True
     stage: int = -1
+    since: float = np.inf
 
 
 class Returning:
@@ -58,10 +59,13 @@ class Returning:
         """A robot is to go a way, in place of any that it goes."""
         self.ways[robot] = way
 
-    def tick(self, held: Iterable[int]) -> None:
-        """Let robots that are at the end of a stage begin the next, but those that are `held`."""
+    def tick(self, held: Iterable[int], now: float) -> None:
+        """Let robots that are at the end of a stage begin the next now [s], but those that are
+        `held`."""
         going, held, begun = {*self._supervisor.active.ahead}, {*held}, list[int]()
         for robot, way in [*self.ways.items()]:
+            if way.stage not in going or robot in held:
+                way.since = now
             if way.stage in going or robot in held or not way.after.isdisjoint(self.ways):
                 continue
             if way.goals and not way.ready():
@@ -74,6 +78,10 @@ class Returning:
                 way.done()
         if begun:
             self._supervisor.send(begun)
+
+    def late(self, before: float) -> list[int]:
+        """The robots that have done the same since before some time [s]."""
+        return [robot for robot, way in self.ways.items() if way.since < before]
 
     def home(self, robot: int) -> list[Goal]:
         """The way of a robot to the B end of its guidepath, its lift first."""

@@ -23,6 +23,11 @@ MOVES = 5e-3
 """A robot is asked to move when its mode asks for this speed [m/s]."""
 
 
+def patience(seconds: float) -> float:
+    """What should take some seconds is late after so many [s]."""
+    return SLUGGISH * seconds + GRACE
+
+
 class Standing:
     """Lets robots (index) of a simulation stand, each under a limit of its own on its speed;
     `stood`: which of them did, from when on."""
@@ -87,7 +92,7 @@ class Standing:
 
     def _late(self, number: int, now: float) -> float:
         begun = self._begun.setdefault(number, now)
-        return begun + SLUGGISH * self._simulation.delays[number] + GRACE
+        return begun + patience(self._simulation.delays[number])
 
     def _at_fault(self, factory: Factory, operation: Operation) -> list[int]:
         simulation, axes = self._simulation, [*factory.axes[operation.index]]

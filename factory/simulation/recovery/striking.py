@@ -74,12 +74,8 @@ class Striking:
             "misplaced", unit, now, label
         )
 
-    def dissolved(self, joints: int) -> None:
-        """So many bad joints have been undone for another reason before they were looked at."""
-        self.count("bad_joint", -joints)
-
     def count(self, kind: str, times: int = 1) -> None:
-        """Something has struck so often more."""
+        """Something has struck so often more; less often, where it is gone unseen."""
         self.struck[kind] = self.struck.get(kind, 0) + times
 
     def tick(self, now: float) -> None:

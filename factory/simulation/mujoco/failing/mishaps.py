@@ -30,7 +30,8 @@ class Slip:
 class Mishaps:
     """Those of a world. `slips`: by operation under way (index); `opened`: robots (index) whose
     hands have opened and that do not know; `bad`: bodies that are no good, and whether that is
-    hidden from feeders' cameras."""
+    hidden from feeders' cameras; `unseen`: bodies that no camera has looked at, and the fault;
+    `gone`: faults that none will look at any more."""
 
     def __init__(self, world: MujocoWorld, fallen: Fallen) -> None:
         self._world, self._fallen, self._nominal = world, fallen, world.m.eq_data.copy()
@@ -38,6 +39,8 @@ class Mishaps:
         self.slips: dict[int, Slip] = {}
         self.opened: set[int] = set()
         self.bad: dict[int, bool] = {}
+        self.unseen: dict[int, str] = {}
+        self.gone: list[str] = []
 
     def open(self, robot: int) -> None:
         """A robot's hand opens."""
@@ -78,8 +81,10 @@ class Mishaps:
         parts, m = self._world.parts, self._world.m
         unit = parts.feeders.shown().get(label)
         if unit is None:
+            self.gone.append(fault.kind)
             return
         body, weld = parts.copies[label, unit], parts.feeders.welds[label]
+        self.unseen[body] = fault.kind
         if fault.kind == "bad_part":
             self.bad[body] = fault.hidden
             return
@@ -91,6 +96,11 @@ class Mishaps:
         m.eq_data[weld, 6:10] = turn
         parts.welds.turn(body, pose, fault.metres)
         self._fallen.watch([body])
+
+    def take_back(self, body: int) -> None:
+        """A part is taken back, whether it has been looked at or not."""
+        if fault := self.unseen.pop(body, ""):
+            self.gone.append(fault)
 
     def tick(self) -> None:
         """A tick is over: what has been joined has not slipped any more, and what is out of sight

@@ -90,6 +90,7 @@ class MujocoPlant:
         feeders, found = self._world.parts.feeders, list[tuple[str, int, str]]()
         for station, unit, body in [*feeders.at_rest()]:
             label, test = station.label, ""
+            self._mishaps.unseen.pop(body, None)
             if self._mishaps.bad.get(body) is False:
                 test = "rejected"
             elif self._senses.is_askew(label, body, np.array(station.down)):
@@ -102,6 +103,12 @@ class MujocoPlant:
             if (carrier := self._factory.by_label[label].carrier) not in self._world.parts.hands.of:
                 feeders.stay_clear(carrier)
         return found
+
+    def unseen(self) -> Sequence[str]:
+        """The kinds of faults of parts that have been taken back, since the last question, for
+        another reason, before any camera looked at them."""
+        gone, self._mishaps.gone = self._mishaps.gone, []
+        return gone
 
     def residual(self, operation: Operation) -> float:
         """How far inputs are from where they belong when they are about to be joined, as measured
@@ -186,7 +193,8 @@ class MujocoPlant:
             elif leaf.carrier in scrap or (leaf.carrier in going and leaf.label in hand.bodies):
                 for label in self._world.model.layout.magazine(leaf.carrier):
                     feeders.back.awaited.add(label)
-                    if label in feeders.shown():
+                    if label in (shown := feeders.shown()):
+                        self._mishaps.take_back(self._world.parts.copies[label, shown[label]])
                         feeders.take_back(label, self._next_scrap())
 
     def let_go(self, robot: int, seconds: float) -> None:
