@@ -97,7 +97,7 @@ def test_the_tutorial_shows_what_is_printed(
     assert {"paper.mp4", "paper.png", "paper.xml", "results.db", "bell.log"} <= made
 
 
-@pytest.mark.parametrize("page", ["index.md", "ten-minutes.md", "guide/pace.md"])
+@pytest.mark.parametrize("page", ["index.md", "ten-minutes.md", "guide/pace.md", "guide/faults.md"])
 def test_the_way_in_shows_what_is_printed(
     page: str, run: Terminal, elsewhere: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from itertools import combinations, product
+from itertools import combinations, islice, product
 
 import numpy as np
 import pytest
@@ -21,10 +21,11 @@ from factory.planning.blocking import CLASHES, DEEPER, FREE, LOCKED, SCRAPES, Bl
 from factory.planning.cannot import cores, interlocks, removal
 from factory.planning.dividing import Divider
 from factory.planning.estimate import Expected
-from factory.planning.exact import Best, Task, Tree, tables
-from factory.planning.growing import Ground, bettered, divided, units_of
+from factory.planning.exact import Best, Tree, TreeTask, tables
+from factory.planning.growing import Site, bettered, divided, units_of
 from factory.planning.judging import Judge, Judged
 from factory.planning.parts import InPlace
+from factory.planning.searching import Budget, Sought, trees
 from factory.planning.source.placing import placed
 from factory.planning.stance import ROOT_AXIS, Stance, stances
 from factory.planning.subsets import subsets
@@ -95,10 +96,10 @@ def piled(members: tuple[int, ...]) -> Iterator[Tree]:
                     yield (*tree, last)
 
 
-def judged(found: Blocking, stance: Stance, trees: Iterator[Tree]) -> list[Judged]:
+def judged(found: Blocking, stance: Stance, all_: Iterator[Tree]) -> list[Judged]:
     """The trees of which no join is locked."""
     judge = Judge(found, stance, EXPECTED)
-    return [one for one in map(judge.judged, trees) if not one.count(LOCKED)]
+    return [one for one in map(judge.judged, all_) if not one.count(LOCKED)]
 
 
 @settings(max_examples=60, deadline=None)
@@ -143,7 +144,7 @@ def test_the_hub_of_many_pairs_is_removed() -> None:
 @settings(max_examples=25, deadline=None)
 @given(graphs(most=4), st.sampled_from(stances()))
 def test_least_price_and_cycle_are_those_of_all_trees(found: Blocking, stance: Stance) -> None:
-    task = Task(subsets(found), EXPECTED, stance.axes[2], stance.up, apart=True)
+    task = TreeTask(subsets(found), EXPECTED, stance.axes[2], stance.up, apart=True)
     known, at = tables(task), task.level.index(stance.axes[ROOT_AXIS])
     all_ = judged(found, stance, (t for t in binary(tuple(range(len(found))))))
     price, time = known.price[at, -1], known.time[at, -1]
@@ -160,7 +161,7 @@ def test_least_price_and_cycle_are_those_of_all_trees(found: Blocking, stance: S
 @settings(max_examples=25, deadline=None)
 @given(graphs(most=4), st.sampled_from(stances()))
 def test_no_tree_of_that_price_has_fewer_robots(found: Blocking, stance: Stance) -> None:
-    task = Task(subsets(found), EXPECTED, stance.axes[2], stance.up, apart=True)
+    task = TreeTask(subsets(found), EXPECTED, stance.axes[2], stance.up, apart=True)
     best, at = Best(task), task.level.index(stance.axes[ROOT_AXIS])
     all_ = judged(found, stance, piled(tuple(range(len(found)))))
     if not np.isfinite(best.made[at, -1]):
@@ -183,18 +184,29 @@ def test_dividing_finds_a_tree_whenever_there_is_one(
     if interlocks(found):
         return
     random = np.random.default_rng(seed)
-    ground = Ground(found, stance, EXPECTED, np.zeros((2, len(found))))
-    tree = divided(ground, random, 1.0)
+    site = Site(found, stance, EXPECTED, np.zeros((2, len(found))))
+    tree = divided(site, random, 1.0)
     judge = Judge(found, stance, EXPECTED)
     assert units_of(tree) == tuple(range(len(found)))
     assert judge.judged(tree).count(LOCKED) == 0
     last = judge.judged(tree)
-    for better, _ in zip(
-        bettered(ground, tree, np.inf, lambda: False, random), range(3), strict=False
-    ):
+    betters = bettered(site, tree, np.inf, lambda: False, random)
+    for better in islice(betters, 3):
         assert better.price <= last.price and units_of(better.tree) == units_of(tree)
         assert better.count(LOCKED) == 0
         last = better
+
+
+def test_a_search_that_is_stopped_gives_a_tree() -> None:
+    count = 10
+    levels, touch = np.zeros((3, count, count), np.int8), np.ones((count, count), bool)
+    low = np.random.default_rng(0).random((count, 3))
+    found = Blocking(tuple("abcdefghij"), levels, levels > 0, touch, low, low + 0.1)
+    given_ = np.zeros((2, count))
+    budget = Budget(60.0, stopped=lambda: True)
+    stopped = trees(Sought(found, EXPECTED, lambda _: given_, budget=budget))
+    assert not stopped.optimal
+    assert units_of(stopped.all[0].tree) == tuple(range(count))
 
 
 def test_many_units_that_interlock_are_not_divided() -> None:
@@ -231,19 +243,19 @@ def test_what_is_free_is_what_check_calls_free(source: InPlace, stance: Stance, 
     """Of any tree in any stance each operation is as free along each way as `check` finds, and
     comes along the way that `check` chooses."""
     found, count, rng = blocking(source), len(source.parts), np.random.default_rng(seed)
-    trees: list[Tree] = list(range(count))
-    while len(trees) > 1:
-        rng.shuffle(trees)
-        pile, come = trees.pop(), trees.pop()
-        trees.append(
+    made: list[Tree] = list(range(count))
+    while len(made) > 1:
+        rng.shuffle(made)
+        pile, come = made.pop(), made.pop()
+        made.append(
             (*pile, come) if isinstance(pile, tuple) and rng.random() < 0.7 else (pile, come)
         )
-    joins = Judge(found, stance, EXPECTED).judged(trees[0]).joins
+    joins = Judge(found, stance, EXPECTED).judged(made[0]).joins
 
     def named(tree: Tree) -> Tree:
         return source.parts[tree].label if isinstance(tree, int) else tuple(map(named, tree))
 
-    pag = planned_product(source, named(trees[0]), stance.rotation).pag
+    pag = planned_product(source, named(made[0]), stance.rotation).pag
     solids = product_geometry(pag)
     theirs, admits = matings(pag, TEMPLATES, solids), admitted(pag, TEMPLATES, solids)
     inside: dict[str, frozenset[int]] = {

@@ -3,11 +3,13 @@ that stood over time; nothing of it in a report of any other run."""
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import pytest
 
 from factory.record.log import LogWriter
+from factory.record.log.failed import failures_in
 from factory.show.report import page, recording_of
 from factory.show.report.failures import failures_data, failures_section
 from factory.show.report.pace import measured
@@ -79,3 +81,29 @@ def test_from_the_command_line(run: Terminal, tmp_path: Path) -> None:
     assert found.status == 0 and len(found.json["failures"]["failures"]) >= 3
     assert run("report", log, "-o", out).status == 0
     assert "r6 lost part2" in out.read_text()
+
+
+def test_what_a_log_keeps_is_read_as_it_was_written(recording: Recording) -> None:
+    failures, robots = recording.log.failures, frozenset(recording.log.header["robots"])
+    assert failures is not None
+    assert failures_in(json.dumps(failures.as_json()).encode(), robots) == failures
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "words"),
+    [
+        ("missed", -1, "'missed' must be a whole number"),
+        ("struck", {"drop": "often"}, "'struck' must be"),
+        ("standing", [{"t": 1.0, "robots": ["r9"]}], "'r9' stood"),
+        ("standing", [[1.0]], "no table"),
+        ("failures", [{"t": -1}], "'t' must be a time"),
+        ("failures", "none", "'failures' must be a list"),
+    ],
+)
+def test_what_is_no_account_of_failures_is_refused(
+    recording: Recording, key: str, value: object, words: str
+) -> None:
+    assert recording.log.failures is not None
+    told = {**recording.log.failures.as_json(), key: value}
+    with pytest.raises(ValueError, match=words):
+        failures_in(json.dumps(told).encode(), frozenset(recording.log.header["robots"]))

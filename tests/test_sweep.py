@@ -636,3 +636,37 @@ def test_summaries_are_told_and_drawn(tmp_path: Path, run: Terminal, here: None)
 def test_columns_are_named_once() -> None:
     assert set(FIGURES) < set(COLUMNS)
     assert {"seed", "jitter", "world", "clearance", "reason", "row_time_s"} < set(COLUMNS)
+
+
+# What fails
+
+
+def test_the_rate_of_faults_may_vary(here: None, tmp_path: Path) -> None:
+    """Without faults the runs are as ever; with them as many units are made, more slowly."""
+    path, axes = tmp_path / "db", read_axes(["fault_rate=0,0.1", "seed=0:3"])
+    tally = sweep(recipe_of(units=12), axes, path)
+    assert (tally.done, tally.failed) == (6, 0)
+    rows = rows_of(path, "fault_rate, products, failures, cycle_time_s, transitions_undone")
+    assert {row[1] for row in rows} == {12}
+    good, bad = ([row for row in rows if row[0] == rate] for rate in (0.0, 0.1))
+    assert {row[2] for row in good} == {row[4] for row in good} == {0}
+    assert all(row[2] > 0 and row[4] > 0 for row in bad)
+    (plain,) = {row[3] for row in good}
+    assert all(row[3] >= plain - 1e-9 for row in bad) and max(row[3] for row in bad) > plain
+    groups = summarise(path).groups
+    assert [dict(group.values) for group in groups] == [{"fault_rate": 0.0}, {"fault_rate": 0.1}]
+    assert groups[1].figures["failures"].mean == pytest.approx(np.mean([row[2] for row in bad]))
+
+
+def test_a_sweep_without_faults_keeps_nothing_of_them(here: None, tmp_path: Path) -> None:
+    sweep(recipe_of(units=2), read_axes(["seed=0:2"]), tmp_path / "db")
+    with sqlite3.connect(tmp_path / "db") as connection:
+        names = [row[1] for row in connection.execute("PRAGMA table_info(runs)")]
+    assert names == list(COLUMNS) and "fault_rate" not in names and "failures" not in names
+
+
+@pytest.mark.parametrize("text", ["fault_rate=0.6", "fault_rate=-0.1", "fault_rate=often"])
+def test_a_rate_of_faults_is_a_share(text: str) -> None:
+    with pytest.raises(InputError) as error:
+        read_axes([text])
+    assert "--vary fault_rate=0,0.01,0.05" in str(error.value.diagnostics[0])

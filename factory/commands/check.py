@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -32,7 +33,7 @@ COSTS = "Say what each failure costs, with times estimated from sizes, and how r
 """What `--failures` does."""
 
 POOLED = 8
-"""The most parts whose copies are printed."""
+"""The most parts whose copies are printed, and robots that need spares."""
 
 
 @click.command()
@@ -66,7 +67,10 @@ def check(
     writable_folder(clashes)
     project = None if is_net(file) else given.project(out.silent)
     with Waiting("reading the shapes and proving", out.silent):
-        checked = check_project(project, wip, failures or None) if project else check_net(file)
+        asked = out.as_json or out.verbose
+        checked = (
+            check_project(project, wip, failures or None, asked) if project else check_net(file)
+        )
     announced(checked.warnings, out)
     proved = None if against is None else _proved(against, checked)
     if clashes is not None:
@@ -158,6 +162,8 @@ def _describe(checked: Checked, verbose: bool) -> None:
         say(f"copies inside at once: {listed}{', ...' if len(checked.pool) > POOLED else ''}")
     if checked.matings is not None:
         _describe_approaches(checked.matings)
+    if "deputies" in document:
+        _describe_deputies(document["deputies"])
 
 
 def _describe_failures(study: FailureStudy, verbose: bool) -> None:
@@ -200,4 +206,14 @@ def _describe_approaches(matings: Matings) -> None:
         f"approach: {left_out} of {len(matings.all)} operations clean with finished overlaps left"
         f" out, {no_deeper} with paths no deeper, {strict} strictly; {lowered} lowered,"
         f" {blocked} blocked{' (--clashes DIR draws each)' if blocked else ''}"
+    )
+
+
+def _describe_deputies(deputies: Mapping[str, Sequence[str]]) -> None:
+    """For people: for how many robots another could take over, and which others need spares."""
+    alone = [robot for robot, found in deputies.items() if not found]
+    listed = f"{', '.join(alone[:POOLED])}{', ...' if len(alone) > POOLED else ''}"
+    say(
+        f"deputies: another robot could take over for {len(deputies) - len(alone)} of"
+        f" {len(deputies)}; spares are needed for {listed}"
     )

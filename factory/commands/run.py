@@ -317,8 +317,7 @@ def say_failures(failures: Failures, verbose: bool) -> None:
         f" {failures.contacts} contacts with what fell"
     )
     for one in failures.found if verbose else ():
-        where = f" ({one.robot})" if one.robot else ""
-        say(f"  {one.t:.2f} s: {one.operation}{where}: {one.test}, {one.response}")
+        say(f"  {one.t:.2f} s: {one}")
 
 
 def say_files(**files: Path | None) -> None:

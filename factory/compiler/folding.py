@@ -231,11 +231,15 @@ def begun_by(factory: Factory, robot: int) -> list[int]:
 
 def sides_of(factory: Factory, robot: int) -> set[int]:
     """From which sides of the axis of its approach a robot may come with what it delivers."""
-    last = delivery(factory, robot)
-    approach = last.approach
-    if approach is None or last.before[last.robots.index(robot)] == NOPART:
+    return sides_at(delivery(factory, robot), robot)
+
+
+def sides_at(o: Operation, robot: int) -> set[int]:
+    """From which sides of the axis of its approach a robot may come to an operation."""
+    slot, approach = o.robots.index(robot), o.approach
+    if approach is None or o.before[slot] == NOPART:
         return {-1, +1}
-    turned = 1 if last.robots.index(robot) == last.last else -1
+    turned = 1 if slot == o.last else -1
     return {turned * side for side in approach.sides}
 
 

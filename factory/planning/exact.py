@@ -59,7 +59,7 @@ def never() -> bool:
 
 
 @dataclass(frozen=True)
-class Task:
+class TreeTask:
     """Units whose best trees are wanted: tables of their `subsets`, what stands upright (`axis`,
     and `up`, +1 or -1), `given` (2, n): the price of each unit if its own inputs come along either
     horizontal axis; `apart`: whether sub-assemblies may be in pieces, at a price."""
@@ -132,7 +132,7 @@ class Tables:
     time: Array
 
 
-def tables(task: Task, late: Late = never) -> Tables:
+def tables(task: TreeTask, late: Late = never) -> Tables:
     """Solves all states for price and cycle time. Raises TooLate."""
     size = 1 << task.subsets.count
     price, time = np.full((2, size), np.inf), np.zeros((2, size))
@@ -176,7 +176,7 @@ class Best:
     `made` (2, s): of what is delivered.
     """
 
-    def __init__(self, task: Task, bound: float | None = np.inf, late: Late = never) -> None:
+    def __init__(self, task: TreeTask, bound: float | None = np.inf, late: Late = never) -> None:
         self.task, self.bound, self.mates = task, np.inf if bound is None else bound, bound is None
         size = 1 << task.subsets.count
         self.stops = 1 + (STOPS if self.bound < np.inf else 0)

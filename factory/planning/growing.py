@@ -18,7 +18,7 @@ from factory.planning.blocking import Blocking
 from factory.planning.cannot import Units
 from factory.planning.dividing import Divider
 from factory.planning.estimate import Expected
-from factory.planning.exact import RELAY, Best, Late, Task, Tree, never
+from factory.planning.exact import RELAY, Best, Late, Tree, TreeTask, never
 from factory.planning.judging import Judge, Judged
 from factory.planning.stance import ROOT_AXIS, Stance
 from factory.planning.subsets import subsets
@@ -31,7 +31,7 @@ ROUNDS = 3
 
 
 @dataclass(frozen=True, slots=True)
-class Group:
+class Joined:
     """Units that are joined already, as a `tree` whose inputs come along an axis of the floor; -1
     where it does not matter."""
 
@@ -41,7 +41,7 @@ class Group:
 
 
 @dataclass(frozen=True)
-class Ground:
+class Site:
     """What trees are sought for: a product's blocking, how it stands, and what is expected; `given`
     (2, n): the price of each unit if its own inputs come along x or y of the floor."""
 
@@ -52,16 +52,16 @@ class Ground:
 
 
 def solved(
-    ground: Ground, groups: Sequence[Group], axis: int, bound: float | None, late: Late = never
+    site: Site, groups: Sequence[Joined], axis: int, bound: float | None, late: Late = never
 ) -> Tree | None:
     """The best tree of a few groups, whose inputs come along an axis of the floor; sub-assemblies
     are in pieces only where there is no other way. None where no tree has cycles below the bound.
     """
-    stance, few = ground.stance, ground.found.grouped([group.units for group in groups])
+    stance, few = site.stance, site.found.grouped([group.units for group in groups])
     tables = subsets(few)
     horizontal = tuple(sorted(stance.axes[:2]))
     turn = [stance.axes.index(h) for h in horizontal]  # of the floor, for each horizontal axis
-    given = np.array([[_price(ground, group, turn[k]) for group in groups] for k in (0, 1)])
+    given = np.array([[_price(site, group, turn[k]) for group in groups] for k in (0, 1)])
     at = turn.index(axis)
 
     def leaf(unit: int, k: int) -> Tree:
@@ -69,27 +69,27 @@ def solved(
         return group.tree if group.axis in (-1, turn[k]) else (group.tree,)
 
     for apart in (False, True):
-        task = Task(tables, ground.expected, stance.axes[2], stance.up, given, apart)
+        task = TreeTask(tables, site.expected, stance.axes[2], stance.up, given, apart)
         best = Best(task, bound, late)
         if np.isfinite(best.made[at, tables.whole]):
             return best.tree(tables.whole, at, leaf)
     return None
 
 
-def _price(ground: Ground, group: Group, axis: int) -> float:
+def _price(site: Site, group: Joined, axis: int) -> float:
     if len(group.units) == 1:
-        return float(ground.given[axis, group.units[0]])
+        return float(site.given[axis, group.units[0]])
     return 0.0 if group.axis == axis else RELAY
 
 
-def divided(ground: Ground, random: np.random.Generator, even: float) -> Tree:
+def divided(site: Site, random: np.random.Generator, even: float) -> Tree:
     """A tree by dividing from the top, `even` as `Divider.best` says."""
-    divider, stance = Divider(ground.found), ground.stance
+    divider, stance = Divider(site.found), site.stance
 
     def below(members: Units, axis: int) -> Tree:
         if len(members) <= SMALL:
-            groups = [Group((unit,), unit) for unit in members]
-            return solved(ground, groups, axis, None) if len(members) > 1 else members[0]
+            groups = [Joined((unit,), unit) for unit in members]
+            return solved(site, groups, axis, None) if len(members) > 1 else members[0]
         for turned in (False, True):
             along = 1 - axis if turned else axis
             division = divider.best(members, (stance.axes[along], stance.axes[2]), random, even)
@@ -98,15 +98,15 @@ def divided(ground: Ground, random: np.random.Generator, even: float) -> Tree:
                 return (tree,) if turned else tree
         raise ValueError("interlocked")
 
-    return below(tuple(range(len(ground.found))), ROOT_AXIS)
+    return below(tuple(range(len(site.found))), ROOT_AXIS)
 
 
 def bettered(
-    ground: Ground, first: Tree, bound: float, late: Late, random: np.random.Generator
+    site: Site, first: Tree, bound: float, late: Late, random: np.random.Generator
 ) -> Iterator[Judged]:
     """Trees each of which is worth more than the one before, from a first one on, within a bound on
     expected cycles [s], until it is late or ROUNDS neighbourhoods of each join gave nothing."""
-    judge = Judge(ground.found, ground.stance, ground.expected)
+    judge = Judge(site.found, site.stance, site.expected)
     best = judge.judged(first)
     yield best
     idle = 0
@@ -118,7 +118,7 @@ def bettered(
         place = joins[int(random.integers(len(joins)))]
         node, axis = _at(best.tree, place), (ROOT_AXIS + len(place)) % 2
         groups = _groups(node, axis, random)
-        found = solved(ground, groups, axis, bound) if len(groups) > 2 else None
+        found = solved(site, groups, axis, bound) if len(groups) > 2 else None
         idle += 1
         if found is None or found == node:
             continue
@@ -155,7 +155,7 @@ def _replaced(tree: Tree, place: tuple[int, ...], by: Tree) -> Tree:
     return (*tree[:first], _replaced(tree[first], tuple(rest), by), *tree[first + 1 :])
 
 
-def _groups(node: Tree, axis: int, random: np.random.Generator) -> list[Group]:
+def _groups(node: Tree, axis: int, random: np.random.Generator) -> list[Joined]:
     """What is below a join, taken apart further until there are about SMALL groups."""
     open_ = [(node, axis)]
     while True:
@@ -167,7 +167,7 @@ def _groups(node: Tree, axis: int, random: np.random.Generator) -> list[Group]:
         tree, own = open_.pop(chosen)
         open_ += [(below, 1 - own) for below in tree]
     return [
-        Group(units_of(tree), tree, -1 if isinstance(tree, int) else own) for tree, own in open_
+        Joined(units_of(tree), tree, -1 if isinstance(tree, int) else own) for tree, own in open_
     ]
 
 

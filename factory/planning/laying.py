@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from time import perf_counter
 
 import numpy as np
 
@@ -13,10 +14,10 @@ from factory.geometry.solids import Product
 from factory.lang.pag_reader import read_pag
 from factory.layout.request import Ground
 from factory.pipeline import Project
-from factory.planning.exact import Late, Tree
+from factory.planning.exact import Tree
 from factory.planning.judging import Judged
 from factory.planning.parts import InPlace
-from factory.planning.searching import Aim
+from factory.planning.searching import Aim, Budget
 from factory.planning.stance import Stance
 from factory.planning.writing import Tree as LabelTree
 from factory.planning.writing import planned_product
@@ -129,16 +130,20 @@ class Layouts:
         self,
         trees: Sequence[Judged],
         aim: Aim,
-        late: Late,
+        budget: Budget,
         told: Callable[[LaidOut], None] = lambda _: None,
     ) -> LaidOut:
-        """The best of some trees, all of which are laid out if there is time, the first always."""
-        best = self.of(trees[0])
-        told(best)
-        for judged in trees[1:]:
-            if late():
+        """The best of some trees, as many of which are laid out as there is time for, the first
+        always. The next one is taken to need as long as the longest did."""
+        best: LaidOut | None = None
+        longest = 0.0
+        for judged in trees:
+            if best is not None and budget.left < longest:
                 break
-            laid = self.of(judged)
-            best = min(best, laid, key=lambda one: one.rank(aim))
+            begin, laid = perf_counter(), self.of(judged)
+            best = laid if best is None else min(best, laid, key=lambda one: one.rank(aim))
             told(best)
+            longest = max(longest, perf_counter() - begin)
+        if best is None:
+            raise ValueError("there is no tree to lay out")
         return best

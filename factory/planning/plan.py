@@ -57,7 +57,7 @@ class PlannedJoin:
 
 
 @dataclass(frozen=True, slots=True)
-class Figures:
+class PlanFigures:
     """Of a plan: how many operations, how many of them are `blocked`, have parts pass through each
     other that were drawn into each other (`through`), get a little deeper (`left_out`), or scrape;
     how many sub-assemblies are in pieces (`apart`), are handed over to turn (`relays`), or cannot
@@ -90,7 +90,7 @@ class Planned:
     tree: Tree = field(repr=False)
     orientation: Array
     operations: tuple[PlannedJoin, ...] = field(repr=False)
-    figures: Figures
+    figures: PlanFigures
     optimal: bool
     project: Project | None = field(default=None, repr=False, compare=False)
 
@@ -141,7 +141,7 @@ def _planned(source: InPlace, found: Blocking, asked: PlanOptions, budget: Budge
         words = f"{best.robots} robots, {best.seconds:.2f} s"
         asked.told("laying out", laid[0], len(sought.all), words)
 
-    best = layouts.best(sought.all, asked.aim, budget.late, said)
+    best = layouts.best(sought.all, asked.aim, budget, said)
     return _result(source, best, sought.optimal, found, laid[0])
 
 
@@ -149,7 +149,7 @@ def _result(
     source: InPlace, laid: LaidOut, optimal: bool, found: Blocking, layouts: int
 ) -> Planned:
     judged = laid.judged
-    figures = Figures(
+    figures = PlanFigures(
         operations=len(judged.joins),
         blocked=judged.count(CLASHES),
         through=judged.count(LOCKED) - judged.count(CLASHES),

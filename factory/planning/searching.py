@@ -13,8 +13,8 @@ import numpy as np
 from factory.geometry.meshes import Array
 from factory.planning.blocking import Blocking
 from factory.planning.estimate import Expected
-from factory.planning.exact import Best, Late, Task, TooLate, never, tables
-from factory.planning.growing import Ground, bettered, divided
+from factory.planning.exact import Best, Late, TooLate, TreeTask, tables
+from factory.planning.growing import Site, bettered, divided
 from factory.planning.judging import Judge, Judged
 from factory.planning.stance import ROOT_AXIS, Stance, stances
 from factory.planning.subsets import MOST, Subsets, subsets
@@ -39,7 +39,7 @@ EVEN = (1.0, 0.3, 0.0)
 """Many units are divided in about equal halves first, then less evenly."""
 
 SURE = 12
-"""The trees of so many units are proved, however long it takes."""
+"""The trees of so many units are proved, however long it takes, unless the search is stopped."""
 
 GROWN, PROVED = 0.4, 0.6
 """The shares of the time after which large products grow no more, and proofs are given up: layouts
@@ -62,6 +62,11 @@ class Budget:
         return self.stopped() or perf_counter() - self.begin > self.seconds
 
     @property
+    def left(self) -> float:
+        """The time that is left [s], 0 where it is to end at once."""
+        return 0.0 if self.late() else self.seconds * (1 - self.gone)
+
+    @property
     def gone(self) -> float:
         """The share that is gone."""
         return (perf_counter() - self.begin) / self.seconds
@@ -82,9 +87,9 @@ class Sought:
     budget: Budget = field(default_factory=lambda: Budget(60.0))
     told: Callable[[Judged], None] = field(default=lambda _: None)
 
-    def ground(self, stance: Stance) -> Ground:
+    def site(self, stance: Stance) -> Site:
         """The same in one stance."""
-        return Ground(self.found, stance, self.expected, self.given(stance))
+        return Site(self.found, stance, self.expected, self.given(stance))
 
 
 @dataclass(frozen=True)
@@ -110,12 +115,13 @@ def trees(sought: Sought) -> Trees:
 
     if not sure:
         keep(_grown(sought, GROWN / 2 if few else GROWN))
-    if few:
-        try:
-            keep(_proved(sought, never if sure else sought.budget.share(PROVED)))
+    try:
+        if few:
+            keep(_proved(sought, sought.budget.stopped if sure else sought.budget.share(PROVED)))
             optimal = True
-        except TooLate:
-            pass
+    except TooLate:
+        if not kept:
+            keep(_grown(sought, GROWN))
     by_robots = sought.aim == "robots"
     ranks = {j: (j.price, j.robots if by_robots else 0, j.seconds, j.robots) for j in kept.values()}
     least = min(judged.price for judged in ranks)
@@ -139,13 +145,13 @@ def _proved(sought: Sought, late: Late) -> Iterator[Judged]:
             yield judges[stance].judged(best.tree(table.whole, at))
 
 
-def _task(sought: Sought, table: Subsets, stance: Stance, apart: bool) -> Task:
+def _task(sought: Sought, table: Subsets, stance: Stance, apart: bool) -> TreeTask:
     level = sorted(stance.axes[:2])
     given = sought.given(stance)[[stance.axes.index(axis) for axis in level]]
-    return Task(table, sought.expected, stance.axes[2], stance.up, given, apart)
+    return TreeTask(table, sought.expected, stance.axes[2], stance.up, given, apart)
 
 
-def _ranks(task_of: Callable[[Stance], Task], late: Late) -> list[tuple[Stance, float, float]]:
+def _ranks(task_of: Callable[[Stance], TreeTask], late: Late) -> list[tuple[Stance, float, float]]:
     """The stances to be tried, each with its least price and its least expected cycle [s]."""
     found: list[tuple[Stance, float, float]] = []
     solved: dict[bytes, tuple[Array, Array]] = {}
@@ -177,8 +183,8 @@ def _grown(sought: Sought, share: float) -> Iterator[Judged]:
     first: list[Judged] = []
     for stance in stances():
         for even in EVEN:
-            ground = sought.ground(stance)
-            tree = divided(ground, random, even)
+            site = sought.site(stance)
+            tree = divided(site, random, even)
             first.append(Judge(sought.found, stance, sought.expected).judged(tree))
             if late() or first[-1].price == 0.0:
                 break
@@ -192,8 +198,8 @@ def _grown(sought: Sought, share: float) -> Iterator[Judged]:
     for number, factor in enumerate(factors):
         bound = factor * best.seconds
         late = sought.budget.share(begin + (share - begin) * (number + 1) / len(factors))
-        ground, last = sought.ground(best.stance), best
-        for judged in bettered(ground, best.tree, bound, late, random):
+        site, last = sought.site(best.stance), best
+        for judged in bettered(site, best.tree, bound, late, random):
             sought.told(judged)
             last = judged
         yield last

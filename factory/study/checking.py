@@ -32,7 +32,8 @@ class Checked:
     that are inside at once; `matings`: how its inputs come together, None where no part has a shape
     of its own; `product`: None where every part is a default box; `no_grips`: what no hand can
     hold, None where hands are not chosen; `factory`, the `least` robots that can make its product,
-    and what is done about its `failures`, None for a net from elsewhere."""
+    and what is done about its `failures`, None for a net from elsewhere; `deputies` of each robot,
+    None where not asked for."""
 
     name: str
     net: GearNet | MarkedNet
@@ -46,6 +47,7 @@ class Checked:
     factory: Factory | None = None
     least: Least | None = None
     failures: FailureStudy | None = None
+    deputies: tuple[tuple[int, ...], ...] | None = None
 
     def as_json(self) -> dict[str, Any]:
         """The keys of `check --json`."""
@@ -82,7 +84,16 @@ class Checked:
             "least_robots": self.least.total,
             "lines": [{"robot": n, "labels": list(x)} for n, x in lines if len(x) > 1],
             "order": [factory.operations[number].label for number in factory.order],
+            **self._deputies(factory),
         }
+
+    def _deputies(self, factory: Factory) -> dict[str, Any]:
+        """Which robots could take over for each, none for one that needs a spare."""
+        if self.deputies is None:
+            return {}
+        names = [robot.name for robot in factory.robots]
+        rows = zip(names, self.deputies, strict=True)
+        return {"deputies": {name: [names[deputy] for deputy in row] for name, row in rows}}
 
 
 def _gear_json(gear: Gear, places: Sequence[Place]) -> dict[str, Any]:
@@ -97,9 +108,12 @@ def _gear_json(gear: Gear, places: Sequence[Place]) -> dict[str, Any]:
     }
 
 
-def check_project(project: Project, wip: int | None = None, costs: bool | None = None) -> Checked:
-    """Check a PAG, with at most `wip` units inside at once, and find the `costs` of failures if
-    that is said, or the factory is small and live. Raises InputError."""
+def check_project(
+    project: Project, wip: int | None = None, costs: bool | None = None, deputies: bool = False
+) -> Checked:
+    """Check a PAG, with at most `wip` units inside at once, find the `costs` of failures if that is
+    said, or the factory is small and live, and look for `deputies`, which asks how boxes come
+    together. Raises InputError."""
     factory = project.factory
     sources = {r.name: r.position for r in factory.robots if r.position}
     verdict = verify(factory.net, sources)
@@ -116,7 +130,15 @@ def check_project(project: Project, wip: int | None = None, costs: bool | None =
         factory,
         least_robots(project.pag, project.templates),
         failure_study(project, costs if verdict.holds else False),
+        _deputies(project, factory) if deputies else None,
     )
+
+
+def _deputies(project: Project, factory: Factory) -> tuple[tuple[int, ...], ...]:
+    from factory.compiler.deputies import deputies
+    from factory.compiler.mating.mating import judged
+
+    return deputies(judged(factory, project.product), project.catalogue)
 
 
 def check_net(file: Path) -> Checked:

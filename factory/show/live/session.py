@@ -276,10 +276,14 @@ class Session:
         return account.stood[-1][1] if account and account.stood else ()
 
     def _failed(self) -> str:
-        """What has failed lately, the latest last."""
+        """What has failed lately, the latest last, or which robots stand."""
         world = self.simulation.world
         found = world.hooks.account.found if world.hooks.account else ()
-        return "; ".join(str(one) for one in found[-3:] if one.t > world.time - SAID)
+        told = [str(one) for one in found[-3:] if one.t > world.time - SAID]
+        standing = self._standing()
+        if standing and not told:
+            told = [f"{', '.join(standing)} stand{'s' * (len(standing) == 1)} still"]
+        return "; ".join(told)
 
     def _waits(self) -> str:
         """Which robots wait for what, where nothing has fired for a long time."""

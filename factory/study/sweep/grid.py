@@ -32,8 +32,15 @@ WHOLE: Mapping[str, tuple[int, int]] = {
 
 WORLDS = ("mujoco", "ideal")
 
-KEYS = ("seed", "jitter", "units", "wip", "world", *SETTINGS)
+FAULT_RATE = "fault_rate"
+"""The share of operations in which a robot drops what it carries, and of those that join in which
+an input has slipped. It may vary, and is in a database where it does; elsewhere nothing fails."""
+
+KEYS = ("seed", "jitter", "units", "wip", "world", FAULT_RATE, *SETTINGS)
 """All keys that may vary."""
+
+SHARES: Mapping[str, tuple[float, float]] = {"jitter": (0, 0.9), FAULT_RATE: (0, 0.5)}
+"""Keys whose values are shares, with the least and the greatest."""
 
 DEFAULTS: Mapping[str, Value] = {
     "seed": 0,
@@ -100,7 +107,7 @@ def check_value(key: str, value: Value) -> Diagnostic | None:
         hint = did_you_mean(str(value), WORLDS, "worlds")
         return Diagnostic("BadValue", f"there is no world '{value}'", None, hint)
     if isinstance(value, int | float):
-        low, high = (0, 0.9) if key == "jitter" else WHOLE[key]
+        low, high = SHARES[key] if key in SHARES else WHOLE[key]
         if not low <= value <= high:
             message = f"{key} = {value} is not between {low} and {high}"
             return Diagnostic("BadValue", message, None, f"for example {_example(key)}")
@@ -169,6 +176,7 @@ def _example(key: str) -> str:
     """An example of the values of a key."""
     words = {"seed": "0:100", "jitter": "0.1,0.3", "units": "4,8", "wip": "1:4"}
     words |= {"world": "ideal,mujoco", "timestep": "auto,0.002", "substeps": "1,5"}
+    words[FAULT_RATE] = "0,0.01,0.05"
     return f"--vary {key}={words.get(key) or getattr(Settings(), key, '')}"
 
 

@@ -14,9 +14,9 @@ from contextlib import closing, contextmanager
 from pathlib import Path
 from typing import Any
 
-from factory.study.sweep.grid import KEYS, WHOLE, Value
+from factory.study.sweep.grid import FAULT_RATE, KEYS, WHOLE, Value
 from factory.study.sweep.recipe import name_of
-from factory.study.sweep.work import FIGURES, Outcome
+from factory.study.sweep.work import FAILING_FIGURES, FIGURES, Outcome
 from factory.support.errors import Diagnostic, InputError
 from factory.support.resource import Closing
 from factory.support.settings import AUTO
@@ -25,7 +25,7 @@ COLUMNS: Mapping[str, str] = {
     "point": "TEXT PRIMARY KEY",
     "status": "TEXT NOT NULL",
     "reason": "TEXT",
-    **{key: "INTEGER" if key in WHOLE else "REAL" for key in KEYS},
+    **{key: "INTEGER" if key in WHOLE else "REAL" for key in KEYS if key != FAULT_RATE},
     "world": "TEXT",
     **FIGURES,
     "row_time_s": "REAL",
@@ -35,6 +35,9 @@ COLUMNS: Mapping[str, str] = {
 }
 """Of the table `runs`. `point`: the values of the keys that vary, as JSON; `status`: done or
 failed; then every key and figure; `row_time_s`: what the run took its worker in all [s]."""
+
+FAILING_COLUMNS: Mapping[str, str] = {FAULT_RATE: "REAL", **FAILING_FIGURES}
+"""Of a sweep in which the rate of faults varies."""
 
 APPLICATION = 0x4B4C4156
 """SQLite's application_id of such a database."""
@@ -56,6 +59,11 @@ CIRCUMSTANCES = (
     sqlite3.SQLITE_NOTADB,
 )
 """SQLite's codes of faults outside the contents of a database."""
+
+
+def columns_of(varied: Sequence[str]) -> Mapping[str, str]:
+    """The columns of a sweep in which these keys vary, with their types."""
+    return {**COLUMNS, **(FAILING_COLUMNS if FAULT_RATE in varied else {})}
 
 
 class Store(Closing):
@@ -122,7 +130,9 @@ class Store(Closing):
             self.connection.execute("ROLLBACK")
             _compare(self.path, kept, identity)
             return
-        columns = ", ".join(f"{name} {kind}" for name, kind in COLUMNS.items())
+        columns = ", ".join(
+            f"{name} {kind}" for name, kind in columns_of(identity["varied"]).items()
+        )
         rows = [(key, json.dumps(value)) for key, value in identity.items()]
         for statement in (
             f"PRAGMA application_id={APPLICATION}",
@@ -148,7 +158,8 @@ def reading(path: Path) -> Iterator[tuple[dict[str, Any], Iterator[Mapping[str, 
         if identity is None:
             raise InputError(_bad(path, "no sweep has written it", "give the -o of a sweep"))
         connection.row_factory = sqlite3.Row
-        yield identity, connection.execute(f"SELECT {','.join(COLUMNS)} FROM runs ORDER BY rowid")
+        names = ",".join(columns_of(identity["varied"]))
+        yield identity, connection.execute(f"SELECT {names} FROM runs ORDER BY rowid")
 
 
 def _connect(path: Path, mode: str = "rwc") -> sqlite3.Connection:
@@ -195,7 +206,7 @@ def _check_rows(connection: sqlite3.Connection, varied: Sequence[str]) -> None:
     where a value is not of the type of its column, which SQLite itself does not check."""
     faults = [f"{name} IS NULL" for name in ("point", "status", *varied)]
     faults.append("status NOT IN ('done', 'failed')")
-    for name, kind in COLUMNS.items():
+    for name, kind in columns_of(varied).items():
         types = "'text'" if kind.startswith("TEXT") else "'integer', 'real'"
         faults.append(f"typeof({name}) NOT IN ('null', {types}) AND {name} IS NOT '{AUTO}'")
     bad = connection.execute(f"SELECT rowid FROM runs WHERE {' OR '.join(faults)} LIMIT 1")

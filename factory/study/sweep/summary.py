@@ -16,14 +16,17 @@ from scipy.special import stdtrit
 
 from factory.study.sweep.grid import Value
 from factory.study.sweep.store import reading
-from factory.study.sweep.work import FIGURES
+from factory.study.sweep.work import FAILING_FIGURES, FIGURES
 
 CONFIDENCE = 0.95
 
 UNTOLD = ("wall_time_s", "physics_time_s", "supervisor_time_s", "refines_net")
 """Figures that do not depend on the factory."""
 
-SUMMED = tuple(key for key, kind in FIGURES.items() if kind != "TEXT" and key not in UNTOLD)
+SUMMED = (
+    *(key for key, kind in FIGURES.items() if kind != "TEXT" and key not in UNTOLD),
+    *FAILING_FIGURES,
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,8 +59,9 @@ class Group:
             self.failed += 1
             return
         self.done += 1
+        kept = row.keys()
         for key in SUMMED:
-            if row[key] is not None:
+            if key in kept and row[key] is not None:
                 self.columns.setdefault(key, array("d")).append(row[key])
 
     @cached_property

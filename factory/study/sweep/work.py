@@ -15,11 +15,12 @@ from factory.layout.layout import Layout
 from factory.mjcf.timestep import timed
 from factory.nets.verify import proved
 from factory.plant.fused_bodies import fusing_pays
+from factory.simulation.recovery import Campaign, WorldFault, recover
 from factory.simulation.request import RunRequest
 from factory.simulation.run import Run
 from factory.simulation.simulation import Compiled, Simulation, compiled
 from factory.simulation.watched import watched
-from factory.study.sweep.grid import SETTINGS, Point
+from factory.study.sweep.grid import FAULT_RATE, SETTINGS, Point
 from factory.study.sweep.recipe import Recipe
 from factory.support.errors import FactoryError
 from factory.support.settings import Settings
@@ -48,6 +49,15 @@ FIGURES: Mapping[str, str] = {
     "mating_force_max_n": "REAL",
 }
 """What a row keeps of a run, under the names of `run --json`, with its type in the database."""
+
+FAILING_FIGURES: Mapping[str, str] = {
+    "failures": "INTEGER",
+    "scrapped": "INTEGER",
+    "transitions_undone": "INTEGER",
+    "fault_contacts": "INTEGER",
+}
+"""What it keeps more where the rate of faults varies: how many failures were found, then as in
+`run --json`."""
 
 KEPT = 8
 """Number of layouts and models that a worker keeps: the grid puts points of one together."""
@@ -87,6 +97,9 @@ class Runner:
             run = self.run(point)
             reason, document = _reason(run), run.as_json()
             figures = {name: document[name] for name in FIGURES}
+            if run.failures is not None:
+                told = run.failures.as_json() | {"failures": len(run.failures.found)}
+                figures |= {name: told[name] for name in FAILING_FIGURES}
         except FactoryError as error:
             reason = "; ".join(f"{d.code} {d.message}" for d in error.diagnostics[:3])
         except Exception as error:
@@ -98,6 +111,7 @@ class Runner:
         values: dict[str, Any] = self.recipe.at(point)
         settings = Settings(**{name: values[name] for name in SETTINGS})
         layout, fuse = _or_raise(self._layout(settings)), self.recipe.fuse
+        rate = values.get(FAULT_RATE)
         if fuse is None:
             fuse = fusing_pays(layout.factory, layout.product)
         request = RunRequest(
@@ -107,11 +121,16 @@ class Runner:
             wip=values["wip"],
             fuse=fuse,
             shown=False,
+            recovers=rate is not None,
         )
         shared = _or_raise(self._compiled(settings, request))
         request = replace(request, seed=values["seed"], jitter=values["jitter"])
         simulation = Simulation(layout, request, shared)
-        return watched(simulation, max_time=self.recipe.max_time)
+        if rate is None:
+            return watched(simulation, max_time=self.recipe.max_time)
+        recovery = recover(simulation, _campaign(rate, values["seed"]))
+        run = watched(simulation, max_time=self.recipe.max_time)
+        return replace(run, failures=recovery.report())
 
     def _lay_out(self, settings: Settings) -> Layout | FactoryError:
         recipe = self.recipe
@@ -140,6 +159,11 @@ def _outcome(point: Point, reason: str, figures: Mapping[str, Any], took: float)
     worker = f"{socket.gethostname()}:{os.getpid()}"
     now = datetime.now(UTC).isoformat(timespec="seconds")
     return Outcome(point, reason, figures, took, worker, 1, now)
+
+
+def _campaign(rate: float, seed: int) -> Campaign:
+    """Things are dropped, and inputs have slipped, in such a share of operations."""
+    return Campaign(tuple(WorldFault(kind, rate=rate) for kind in ("drop", "bad_joint")), seed)
 
 
 def _reason(run: Run) -> str:

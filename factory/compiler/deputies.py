@@ -1,0 +1,232 @@
+"""Deputies: the robots of a factory that could take over the tours of one that dies.
+
+A *deputy* of a robot is a sibling: it delivers to the same carrier, never in the same operation, in
+the same way and from a side that both admit, as on a line of a fold (`folding`); and its type is
+fit for the tours, since a robot that is there keeps its type. What delivers to the dead robot must
+reach the deputy. So there are two kinds:
+
+* A *leaf*, to which no robot delivers: its tours alone are moved.
+* A robot of a branch that is there several times (`parallel`): the whole branch is moved to a
+  twin, robot by robot, and one branch fewer is there.
+
+The deputy does all its tours in the order in which its carrier asks for them (Theorem 2 of folds).
+Live (Theorem 1): the *postorder* of the operations, the pile first, depends on what is made, not on
+the robots that make it. So one order is the witness for every deputy: a net is live if each program
+ascends in it. Without a deputy a robot needs a spare.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import islice, pairwise, permutations
+from types import MappingProxyType
+
+from factory.compiler.folding import delivery, kind_of, mismatch, sides_at
+from factory.plant.factory import Factory, Operation
+from factory.problem.robot_types import Catalogue
+from factory.support.errors import Diagnostic, InputError
+
+MOST = 16
+"""The most deputies of one kind that are listed for a robot."""
+
+Moved = Mapping[int, int]
+"""For each robot that is no longer there the one that has its tours, carriers first (indices)."""
+
+
+def deputies(factory: Factory, catalogue: Catalogue) -> tuple[tuple[int, ...], ...]:
+    """For each robot (index) its deputies, in the order of their numbers; none for one that needs a
+    spare. `MOST` leaves, and robots of as many twins of a branch, are listed.
+
+    Each would give a live net. Near-linear.
+    """
+    siblings = Siblings(factory, catalogue)
+    if not all(siblings.ascends(robot.operations) for robot in factory.robots):
+        raise ValueError("the programs do not ascend in the postorder of the operations")
+    found = [set[int]() for _ in factory.robots]
+    for dead, deputy in siblings.pairs():
+        found[dead].add(deputy)
+    return tuple(tuple(sorted(row)) for row in found)
+
+
+def moved_to(factory: Factory, dead: int, deputy: int, catalogue: Catalogue) -> Moved:
+    """Which robots are no longer there if a deputy takes over for a robot (indices), and where
+    their tours are. Raises InputError (BadLine) where it is no deputy."""
+    siblings = Siblings(factory, catalogue)
+    top, twin = siblings.tops(dead, deputy)
+    message = siblings.refusal(top, twin)
+    found: Moved = {top: twin}
+    if not message and siblings.kids[top]:
+        found = siblings.twins(top, twin)
+        if found.get(dead) != deputy:
+            message = "what delivers to it cannot reach the other"
+    if not message:
+        return found
+    one, other = factory.robots[dead], factory.robots[deputy]
+    text = f"{other.name} cannot take over the tours of {one.name}: {message}"
+    hint = "`factory check --json` lists the deputies of each robot; one without needs a spare"
+    raise InputError(Diagnostic("BadLine", text, one.position, hint))
+
+
+def program_with(factory: Factory, robots: Iterable[int], when: Sequence[int]) -> tuple[int, ...]:
+    """The program of one robot that does the tours of several (indices), in the order in which
+    their carrier asks for them; `when`: the postorder."""
+    tours = (tour for robot in robots for tour in factory.tours[robot])
+    return tuple(n for tour in sorted(tours, key=lambda tour: when[tour[-1]]) for n in tour)
+
+
+def postorder(factory: Factory) -> list[int]:
+    """When each operation comes in the order in which one period is made, operation by operation,
+    what its carrier holds first. It does not depend on the robots' programs."""
+    found = [-1] * len(factory.operations)
+    count = len(found)
+    stack = [o.index for o in factory.dropoffs]
+    while stack:  # backwards: an operation, then the last that it waits for
+        number = stack.pop()
+        count -= 1
+        found[number] = count
+        stack += [
+            factory.by_label[label].index for label in _pile_first(factory.operations[number])
+        ]
+    return found
+
+
+def _pile_first(o: Operation) -> list[str]:
+    pile = o.before[o.template.carrier - 1]
+    return sorted(o.inputs, key=lambda label: label != pile)
+
+
+@dataclass(frozen=True)
+class Siblings:
+    """What robots of a factory that deliver to one carrier have in common."""
+
+    factory: Factory
+    catalogue: Catalogue
+
+    @cached_property
+    def when(self) -> list[int]:
+        """The witness: the postorder."""
+        return postorder(self.factory)
+
+    @cached_property
+    def kids(self) -> list[list[int]]:
+        """For each robot those that deliver to it, tools with them."""
+        found: list[list[int]] = [[] for _ in self.factory.robots]
+        for robot in self.factory.robots[1:]:
+            found[self._carrier(robot.index)].append(robot.index)
+        return found
+
+    @cached_property
+    def _deliveries(self) -> list[frozenset[int]]:
+        """The operations that each robot delivers in."""
+        return [frozenset(tour[-1] for tour in tours) for tours in self.factory.tours]
+
+    @cached_property
+    def _sides(self) -> list[frozenset[int]]:
+        """From which sides each robot may come, on all its tours."""
+        operations = self.factory.operations
+        return [
+            frozenset.intersection(
+                *(frozenset(sides_at(operations[number], robot)) for number in numbers)
+            )
+            for robot, numbers in enumerate(self._deliveries)
+        ]
+
+    def ascends(self, program: Sequence[int]) -> bool:
+        """Whether the operations of a program come one after the other in the witness."""
+        return all(self.when[one] < self.when[other] for one, other in pairwise(program))
+
+    def pairs(self) -> Iterator[tuple[int, int]]:
+        """Robots with their deputies, each of which gives a live net."""
+        for carried in self.kids:
+            yield from self._for_leaves(carried)
+            for top, twin in self._branches([robot for robot in carried if self.kids[robot]]):
+                yield from self.twins(top, twin).items()
+
+    def _for_leaves(self, robots: Sequence[int]) -> Iterator[tuple[int, int]]:
+        """The leaves among the robots of a carrier, with their deputies among all. Robots that are
+        alike in all but what they deliver in are judged once."""
+        alike: dict[tuple[object, ...], list[int]] = {}
+        for robot in robots:
+            key = kind_of(self.factory, robot), self.factory.robots[robot].type, self._sides[robot]
+            alike.setdefault(key, []).append(robot)
+        groups = list(alike.values())
+        fitting = [
+            [other for other in groups if not self._unlike(group[0], other[0])] for group in groups
+        ]
+        for group, others in zip(groups, fitting, strict=True):
+            for dead in (robot for robot in group if not self.kids[robot]):
+                deputies = (r for other in others for r in other if self._live(dead, r))
+                yield from ((dead, deputy) for deputy in islice(deputies, MOST))
+
+    def _branches(self, robots: Sequence[int]) -> Iterator[tuple[int, int]]:
+        """Of the carrier's robots to which others deliver: those at the top of twins."""
+        alike: dict[object, list[int]] = {}
+        for robot in robots:
+            alike.setdefault(self._signature(robot), []).append(robot)
+        for group in alike.values():
+            for top, twin in permutations(group[: MOST + 1], 2):
+                moved = self.twins(top, twin)
+                apart = not self.refusal(top, twin)
+                if apart and moved and all(self._live(*pair) for pair in moved.items()):
+                    yield top, twin
+
+    def _live(self, dead: int, deputy: int) -> bool:
+        """Whether a robot is never needed in an operation of the other, and its program with the
+        tours of both ascends in the witness."""
+        if dead == deputy or self._deliveries[dead] & self._deliveries[deputy]:
+            return False
+        return self.ascends(program_with(self.factory, (dead, deputy), self.when))
+
+    def refusal(self, dead: int, deputy: int) -> str:
+        """Why a robot cannot bring what another brings, in words, "" where it can."""
+        factory = self.factory
+        if dead == deputy:
+            return "it is the same robot"
+        message = self._unlike(dead, deputy)
+        both = self._deliveries[dead] & self._deliveries[deputy]
+        if not message and both:
+            message = f"'{factory.operations[min(both)].label}' needs both at once"
+        return message
+
+    def _unlike(self, dead: int, deputy: int) -> str:
+        """What of its kind, type and sides forbids that a robot stands in for another."""
+        factory = self.factory
+        types = factory.robots[dead].type, factory.robots[deputy].type
+        message = mismatch(factory, dead, deputy, range(len(factory.robots)), self.catalogue)
+        if not message and not self.catalogue.fits(types[1], types[0]):
+            message = f"it is a '{types[1]}', and a '{types[0]}' is needed"
+        if not message and not self._sides[dead] & self._sides[deputy]:
+            message = "they cannot come from one side"
+        return message
+
+    def twins(self, top: int, twin: int) -> Moved:
+        """For each robot of a branch, given by the one that brings what it makes, the robot that
+        does the same in a twin of it; empty where that is no twin."""
+        found, todo = dict[int, int](), [(top, twin)]
+        for one, other in todo:
+            pairs = [sorted(self.kids[robot], key=self._signature) for robot in (one, other)]
+            if self._signature(one) != self._signature(other) or len(pairs[0]) != len(pairs[1]):
+                return MappingProxyType({})
+            found[one] = other
+            todo += zip(*pairs, strict=True)
+        return MappingProxyType(found)
+
+    def tops(self, dead: int, deputy: int) -> tuple[int, int]:
+        """The robots at the top of the branches of two, which deliver to one carrier; the two
+        themselves where there are none."""
+        top, twin = dead, deputy
+        while 0 not in (top, twin):
+            if top == twin or self._carrier(top) == self._carrier(twin):
+                return top, twin
+            top, twin = self._carrier(top), self._carrier(twin)
+        return dead, deputy
+
+    def _carrier(self, robot: int) -> int:
+        return delivery(self.factory, robot).carrier
+
+    def _signature(self, robot: int) -> tuple[str, ...]:
+        """What robots in twins have in common: their type, and what they do, but for the unit."""
+        found = self.factory.robots[robot]
+        return (found.type, *(self.factory.operations[n].written for n in found.operations))

@@ -1,0 +1,115 @@
+"""Taking over: a robot dies, and its deputy does its tours from then on (Theorem 8, exchange).
+
+N' has the operations of N and a robot fewer, or a branch fewer; robots that stay keep their names.
+How often each transition has fired is the state, so N' goes on from the greatest counts n' <= n
+that lead to a marking of it, where what the robots that are gone had in hand is undone
+(`factory.nets.undo`).
+
+Guarantees: N' is a gear train, live, safe and reversible, and n' is reachable in it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+
+from factory.compiler.compiler import gear_net
+from factory.compiler.deputies import Moved, moved_to, postorder, program_with
+from factory.nets.petri import Marking
+from factory.nets.undo import exchange, marking_after
+from factory.nets.undone import Undone
+from factory.nets.verify import proved
+from factory.plant.factory import Factory, Operation
+from factory.plant.material import joins_of
+from factory.problem.pag import NOPART
+from factory.problem.robot_types import Catalogue
+
+
+@dataclass(frozen=True, slots=True)
+class Takeover:
+    """Robots of the factory `before` that are gone, `dead` (index) first among them, and the
+    factory `after`, in which others have their tours (`moved`)."""
+
+    before: Factory
+    after: Factory
+    dead: int
+    moved: Moved
+
+    def exchanged(self, fired: Sequence[int], t: float) -> tuple[tuple[int, ...], Undone]:
+        """n' of the counts n (`fired`, from m_0 on) that were reached at time t [s], and what the
+        record of the run says of it. Raises RunError (NotProved) where the net of `after` is not
+        live."""
+        net = self.after.net
+        proved(net)
+        asked = lost(self.before, fired, self.moved)
+        counts = exchange(net, fired, asked, joins_of(self.after))
+        robots = self.before.robots
+        dead, deputy = robots[self.dead], robots[self.moved[self.dead]]
+        at = _next(self.before, marking_after(self.before.net, fired), self.dead)
+        what = t, at.label, f"{dead.name} is dead, and {deputy.name} takes its tours"
+        return counts, Undone.between(net, what, asked, fired, counts, exchanged=True)
+
+
+def taken_over(factory: Factory, dead: int, deputy: int, catalogue: Catalogue) -> Takeover:
+    """What a factory becomes when a deputy takes over for a robot (indices). Raises InputError
+    (BadLine) where it is no deputy."""
+    moved = moved_to(factory, dead, deputy, catalogue)
+    return Takeover(factory, with_moved(factory, moved), dead, moved)
+
+
+def with_moved(factory: Factory, moved: Moved) -> Factory:
+    """The factory in which tours are moved, which is not checked."""
+    when, gone = postorder(factory), {*moved}
+    stay = [robot for robot in factory.robots if robot.index not in gone]
+    number = {robot.index: n for n, robot in enumerate(stay)}
+    number |= {robot: number[other] for robot, other in moved.items()}
+    took = {other: robot for robot, other in moved.items()}
+    robots = tuple(
+        replace(r, index=n, operations=program_with(factory, (r.index, took[r.index]), when))
+        if r.index in took
+        else replace(r, index=n)
+        for n, r in enumerate(stay)
+    )
+    operations = tuple(
+        replace(o, robots=tuple(number[robot] for robot in o.robots)) for o in factory.operations
+    )
+    return replace(
+        factory,
+        robots=robots,
+        operations=operations,
+        net=gear_net(robots, operations),
+        adjusted=frozenset(number[robot] for robot in factory.adjusted),
+    )
+
+
+def lost(factory: Factory, fired: Sequence[int], robots: Iterable[int]) -> tuple[int, ...]:
+    """The transitions that are undone with robots (indices) that are gone: all ends that made what
+    they hold, each as often as it is in their hands, or the start of what one is at with nothing.
+
+    The material rule counts what is in one pile. A part in a pile and another copy of it in the
+    next hand are two.
+    """
+    found, begun, marking = list[int](), set[int](), marking_after(factory.net, fired)
+    for robot in robots:
+        o = _next(factory, marking, robot)
+        label = o.before[o.robots.index(robot)]
+        if label != NOPART:
+            found += _ends_in(factory, label)
+        elif fired[o.start] > fired[o.end]:
+            begun.add(o.start)
+    return (*found, *sorted(begun))
+
+
+def _ends_in(factory: Factory, label: str) -> list[int]:
+    """The ends of the operations that made a label, the last first."""
+    made = [factory.by_label[label]]
+    for o in made:
+        made += [factory.by_label[label] for label in o.inputs]
+    return [o.end for o in made]
+
+
+def _next(factory: Factory, marking: Marking, robot: int) -> Operation:
+    """The operation that a robot is at, or waits for."""
+    gear = factory.net.gears[robot].places
+    step = next(step for step, place in enumerate(gear) if place in marking)
+    return factory.operations[factory.robots[robot].operations[step // 2]]

@@ -1,0 +1,65 @@
+"""Products whose trees are thrown away: what is planned is as good as what was written."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from factory.compiler.mating.mating import matings
+from factory.geometry.product import product_geometry
+from factory.pipeline import all_templates, read
+from factory.planning.plan import Planned, PlanOptions, plan
+from factory.planning.source.reading import SourceOptions, read_source
+from factory.planning.writing import planned_product
+from factory.timing.prediction import pace
+
+ROOT = Path(__file__).parents[1]
+EXAMPLES = ROOT / "examples"
+LDRAW = ROOT.parent / "shared" / "products" / "ldraw"
+TEMPLATES = all_templates()
+
+
+def planned(file: Path, options: PlanOptions) -> Planned:
+    found = plan(read_source(file, TEMPLATES, SourceOptions(replan=True)), options)
+    assert isinstance(found, Planned)
+    return found
+
+
+def blocked(file: Path, found: Planned) -> tuple[int, int]:
+    """How many operations `check` finds blocked: as written, and as planned."""
+    source = read_source(file, TEMPLATES, SourceOptions(replan=True))
+    made = planned_product(source, found.tree, found.orientation)
+    theirs = matings(made.pag, TEMPLATES, product_geometry(made.pag, made.files))
+    written = read(file).matings
+    assert written is not None and len(theirs.all) == len(written.all) == found.figures.operations
+    return len(written.of_kind("blocked")), len(theirs.of_kind("blocked"))
+
+
+SLOW = [pytest.param(name, marks=pytest.mark.slow) for name in ("gearbox", "chest", "truck")]
+
+
+@pytest.mark.parametrize("name", ["chair", *SLOW])
+def test_a_planned_example_is_no_slower_than_the_written_one(name: str) -> None:
+    written = read(EXAMPLES / f"{name}.pag")
+    found = planned(EXAMPLES / f"{name}.pag", PlanOptions(seconds=40.0))
+    figures = found.figures
+    assert figures.blocked == figures.through == figures.left_out == figures.apart == 0
+    assert figures.cycle is not None
+    assert figures.cycle <= pace(written.layout, written.settings)[0].seconds
+    assert figures.not_held is not None and figures.not_held <= len(written.no_grips)
+
+
+BRICKS = ["30023-1-Lighthouse", "6966-1-JediStarfighter-Mini"]
+MANY = [pytest.param("5935-1-IslandHopper", marks=pytest.mark.slow)]
+
+
+@pytest.mark.parametrize("name", [*BRICKS, *MANY])
+def test_bricks_without_their_steps_block_no_operation(name: str) -> None:
+    file = LDRAW / f"{name}.pag"
+    if not file.exists():
+        pytest.skip(f"{file} is missing: the shared products are not here")
+    found = planned(file, PlanOptions(seconds=2.0, lay_out=False))
+    steps, mine = blocked(file, found)
+    assert mine == found.figures.blocked == 0 <= steps
+    assert found.figures.apart == found.figures.left_out == 0
