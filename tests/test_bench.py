@@ -10,22 +10,24 @@ import pytest
 from tests.bench import floors, large, production, replaying
 from tests.bench.__main__ import REPORT
 from tests.bench.factories import laid_out, robots_at_least
+from tests.bench.faults.__main__ import REPORT as FAULTS
+from tests.reporting import Report
 
-KEPT = sorted(REPORT.folder.glob("*.json"))
+KEPT = [(report, file) for report in (REPORT, FAULTS) for file in report.folder.glob("*.json")]
 
 
-@pytest.mark.parametrize("file", KEPT, ids=lambda file: file.stem)
-def test_a_section_is_rendered_from_what_was_kept(file: Path) -> None:
-    assert file.stem in REPORT.sections
+@pytest.mark.parametrize(("report", "file"), KEPT, ids=lambda it: getattr(it, "stem", ""))
+def test_a_section_is_rendered_from_what_was_kept(report: Report, file: Path) -> None:
+    assert file.stem in report.sections
     kept = json.loads(file.read_text())
-    text = REPORT.module(file.stem).section(kept["results"])
+    text = report.module(file.stem).section(kept["results"])
     assert text.startswith("## ")
-    assert text in REPORT.path.read_text()
+    assert text in report.path.read_text()
 
 
-@pytest.mark.skipif(not KEPT, reason="nothing was measured")
-def test_the_report_is_that_of_all_that_was_kept() -> None:
-    assert REPORT.text() == REPORT.path.read_text()
+@pytest.mark.parametrize("report", [REPORT, FAULTS], ids=lambda report: report.path.stem)
+def test_the_report_is_that_of_all_that_was_kept(report: Report) -> None:
+    assert report.text() == report.path.read_text()
 
 
 @pytest.mark.parametrize(("asked", "robots"), [(1, 1), (10, 11), (41, 41), (100, 101)])

@@ -37,6 +37,9 @@ OF_FAULT: Mapping[str, type] = {
     "hidden": bool,
 }
 OF_SENSORS: Mapping[str, type] = {field.name: float for field in fields(Sensors)}
+MOST = 1e9
+"""The greatest number that a file may give."""
+
 WORDS = {int: "a whole number", float: "a number", str: "a text", bool: "true or false"}
 WORDS |= {dict: "a table", list: "a list of tables [[fault]]"}
 
@@ -75,8 +78,8 @@ class _Reader:
                 message = " ".join(filter(None, (f"unknown key '{key}'", where)))
                 hint = did_you_mean(key, [*known], "keys")
                 self.wrong.append(Diagnostic("UnknownParameter", message, at, hint))
-            elif not _is(value, known[key]) or (_is(value, float) and value < 0):
-                least = ", from 0 on" if known[key] in (int, float) else ""
+            elif not _is(value, known[key]) or (_is(value, float) and not 0 <= value <= MOST):
+                least = f" from 0 to {MOST:g}" if known[key] in (int, float) else ""
                 message = f"{key} must be {WORDS[known[key]]}{least}"
                 self.wrong.append(Diagnostic("BadValue", message, at, EXAMPLE))
 

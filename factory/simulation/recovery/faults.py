@@ -53,6 +53,8 @@ class WorldFault:
             raise ValueError("one of 'unit', 'at' and 'rate' is needed")
         if self.kind in OF_ROBOT and not self.robot:
             raise ValueError(f"'{self.kind}' needs a 'robot'")
+        if self.robot and self.kind not in {*OF_ROBOT, "drop"}:
+            raise ValueError(f"'{self.kind}' concerns no 'robot'")
         named = self.label or self.robot or self.kind == "blackout"
         if self.rate is None and not named:
             raise ValueError(f"'{self.kind}' needs a 'label'")

@@ -89,7 +89,7 @@ class Mishaps:
         mujoco.mju_mulQuat(pose, self._world.d.xquat[m.eq_obj1id[weld]], turn)
         m.eq_data[weld, 5] += fault.metres
         m.eq_data[weld, 6:10] = turn
-        parts.welds.turn(body, pose)
+        parts.welds.turn(body, pose, fault.metres)
         self._fallen.watch([body])
 
     def tick(self) -> None:

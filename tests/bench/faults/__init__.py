@@ -1,0 +1,1 @@
+"""What becomes of factories in which things go wrong."""

@@ -1,0 +1,66 @@
+"""Processes that are killed while they run, and go on from the log."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from random import Random
+from tempfile import TemporaryDirectory
+from typing import Any
+
+from factory.record.log.reader import read_log
+from tests.command_line import spawn
+from tests.tables import table
+from tests.test_resume import FACTORIES, killed_and_gone_on, ticks_of
+
+KILLS = 5
+
+
+def measure(quick: bool = False) -> Iterator[dict[str, Any]]:
+    """Kill a run of each factory again and again, as tests/test_resume.py does."""
+    rows = list[dict[str, Any]]()
+    for number, factory in enumerate(FACTORIES[:1] if quick else FACTORIES):
+        words, kills = (*factory, "--seed", number), 1 if quick else KILLS
+        with TemporaryDirectory() as folder:
+            whole = Path(folder) / "whole.log"
+            assert spawn("run", *words, "--log", whole, "-q").status == 0
+            size, chance = whole.stat().st_size, Random(number)
+            came = killed_and_gone_on(Path(folder), words, kills, chance, size)
+            rows.append(
+                {
+                    "run": " ".join(Path(str(word)).name for word in factory),
+                    "lasts_s": float(read_log(whole).time[-1]),
+                    "from_s": came,
+                    "same": ticks_of(Path(folder) / "run.log") == ticks_of(whole),
+                }
+            )
+        yield {"rows": rows}
+
+
+def section(results: dict[str, Any]) -> str:
+    """The report."""
+    rows = results["rows"]
+    kills = sum(len(row["from_s"]) for row in rows)
+    same = sum(row["same"] for row in rows)
+    return "\n\n".join(
+        [
+            "## Killed and gone on",
+            f"{kills} kills (`kill -9`) at random times of {len(rows)} runs, each gone on with by"
+            f" `factory run --resume`. All made their units, refine the net, touched nothing, and"
+            f" the monitor agrees; **{same} of {len(rows)}** logs are, tick by tick, that of a run"
+            " that was never killed.",
+            table(
+                ("factory run", "lasts [s]", "killed", "gone on from [s]", "the same log"),
+                [
+                    (
+                        f"`{row['run']}`",
+                        f"{row['lasts_s']:.2f}",
+                        len(row["from_s"]),
+                        ", ".join(f"{t:g}" for t in row["from_s"]),
+                        row["same"],
+                    )
+                    for row in rows
+                ],
+            ),
+        ]
+    )
