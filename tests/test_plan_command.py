@@ -110,11 +110,24 @@ def test_what_interlocks_is_said_and_drawn_and_nothing_else_is_written(
     (lock,) = done.json["interlocks"]
     assert lock["parts"] == ["a", "b", "c"]
     assert sorted(lock["circuits"]) == ["+x", "+y", "+z", "-x", "-y", "-z"]
-    assert all(set(way) <= {"a", "b", "c"} and len(way) > 1 for way in lock["circuits"].values())
+    assert all(set(way) == {"a", "b", "c"} for way in lock["circuits"].values())
     assert done.json["removal"]["smallest"] and len(done.json["removal"]["labels"]) == 1
     assert list(files_in(tmp_path / "out")) == ["puzzle-interlocked.png"]
     pixels = iio.imread(tmp_path / "out" / "puzzle-interlocked.png")
     assert all((pixels == paint).all(axis=2).any() for paint in PAINTS[:3])
+
+
+@pytest.mark.parametrize("parts", [pinwheel(), CHAIN])
+def test_a_circuit_is_a_proof(tmp_path: Path, parts: Parts) -> None:
+    """Each part of it may not go out past the next one, and all that interlock are in it."""
+    found = blocking(source(tmp_path, parts))
+    (lock,) = interlocks(found)
+    assert len(lock.circuits) == 6
+    for (axis, side), way in lock.circuits:
+        assert set(way) == set(lock.labels)
+        locks = found.locks[axis] if side > 0 else found.locks[axis].T
+        units = [found.labels.index(label) for label in (*way, way[0])]
+        assert all(locks[one, other] for one, other in pairwise(units))
 
 
 def test_what_interlocks_is_not_drawn_where_no_pictures_are_wanted(
