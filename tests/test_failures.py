@@ -213,7 +213,7 @@ def test_undos_pass_the_check_and_nothing_less_does(seed: int, data: st.DataObje
 
 
 def test_check_says_what_failures_cost(run: Terminal) -> None:
-    found = run("check", PAPER, "--json").json["failures"]
+    found = run("check", PAPER, "--failures", "--json").json["failures"]
     assert found["costed"]
     assert found["bound"] == {"retries": 6, "scraps": 20, "attempts": 60}
     tests = {(test["operation"], test["test"]): test for test in found["tests"]}

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from factory.simulation.failures import Failures
 
 import factory.simulation.recovery.responding as responding
 from factory.layout.layout import Layout
@@ -20,7 +21,6 @@ from factory.pipeline import read
 from factory.plant.factory import Factory
 from factory.plant.material import joins_of
 from factory.problem.template import Failure
-from factory.simulation.failures import Failures
 from factory.simulation.mujoco.failing.plant import MujocoPlant
 from factory.simulation.mujoco.failing.sensors import Senses
 from factory.simulation.recovery import Campaign, WorldFault, recover

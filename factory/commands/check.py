@@ -13,6 +13,7 @@ from factory.commands.options import HANDS, OUTPUT, PATH, RELAY, SOURCE, WIP, fo
 from factory.commands.outputs import writable, writable_folder
 from factory.commands.requests import OutputOptions, ProjectOptions
 from factory.commands.warnings import announced
+from factory.problem.shapes import is_shaped
 from factory.support.collector import collector_paused
 from factory.support.console import emit, say, table
 from factory.support.files import is_net
@@ -67,7 +68,7 @@ def check(
     writable_folder(clashes)
     project = None if is_net(file) else given.project(out.silent)
     with Waiting("reading the shapes and proving", out.silent):
-        asked = out.as_json or out.verbose
+        asked = out.verbose or (out.as_json and project is not None and is_shaped(project.pag))
         checked = (
             check_project(project, wip, failures or None, asked) if project else check_net(file)
         )

@@ -254,7 +254,7 @@ def _tell(
     ways = ", ".join(f"{count} {kind}" for kind, count in kinds if count)
     say(f"{project.file}: parts {parts}, operations {len(project.pag) - parts}; ways: {ways}")
     figures = planned.figures
-    best = "no tree is better" if planned.optimal else "the best that was found"
+    best = "none is better by estimate" if planned.optimal else "the best that was found"
     cycle = f", cycle time about {figures.cycle or figures.expected:.2f} s"
     say(f"{figures.robots} robots{cycle}; {best}")
     if out.verbose and matings:

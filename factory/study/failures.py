@@ -18,6 +18,7 @@ from factory.nets.marked import least_tokens, marked
 from factory.nets.undo import times_undone, undo
 from factory.plant.factory import Factory, Operation
 from factory.plant.material import joins_of
+from factory.problem.shapes import is_shaped
 from factory.problem.template import Failure
 from factory.timing.failing import (
     SCRAPS,
@@ -131,11 +132,11 @@ class FailureStudy:
 
 def failure_study(project: Project, costs: bool | None = None) -> FailureStudy:
     """The failures of a project's factory; with their costs if that is said, or where that is not
-    said of small factories only. Linear without costs."""
+    said of small factories only, whose parts have shapes. Linear without costs."""
     factory = project.factory
     pairs = [(o, failure) for o in factory.operations for failure in o.template.failures]
     if costs is None:
-        costs = len(factory.operations) <= COSTED
+        costs = len(factory.operations) <= COSTED and is_shaped(project.pag)
     if not costs:
         return FailureStudy(tuple(OperationFailure(*pair) for pair in pairs))
     found = _Costs(estimated_net(project))
