@@ -120,7 +120,6 @@ class InterlockedView:
     def _titles(self, ink: Ink, axis: int, x: float, y: float) -> None:
         """What is above the picture of an axis, or, for -1, of them all in place."""
         room = PANEL[0] - 2 * EDGES
-        lines: tuple[str, ...]
         if axis < 0:
             count = len(self.lock.labels)
             lines = [f"{count} parts interlock, where they are in the product"]
