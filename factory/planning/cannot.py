@@ -39,7 +39,8 @@ ROUNDS = 400
 @dataclass(frozen=True, slots=True)
 class Interlock:
     """Parts no two groups of which come apart: their `labels`, and for each of the six directions a
-    circuit of parts each of which, going out there, meets the next one (and the last the first)."""
+    circuit through all of them, each of which, going out there, meets the next one (and the last
+    the first), so that none can leave the others: a proof. A part may come by several times."""
 
     labels: tuple[str, ...]
     circuits: tuple[tuple[Direction, tuple[str, ...]], ...]
@@ -135,12 +136,17 @@ def _hitting(sets: Sequence[Units], count: int) -> Units:
 
 
 def _circuits(found: Blocking, core: Units) -> Iterator[tuple[Direction, tuple[str, ...]]]:
-    """For each direction the shortest circuit through the first unit of an interlocked set."""
+    """For each direction a closed walk through all units of an interlocked set, on to the nearest
+    one not yet visited."""
     import networkx as nx
 
     for axis, side in product(AXES, (+1, -1)):
         locks = found.locks[axis][np.ix_(core, core)]
         graph = nx.from_numpy_array(locks if side > 0 else locks.T, create_using=nx.DiGraph)
-        back = min(graph.predecessors(0), key=lambda n: nx.shortest_path_length(graph, 0, n))
-        way = nx.shortest_path(graph, 0, back)
-        yield (axis, side), tuple(found.labels[core[n]] for n in way)
+        walk, left = [0], set(range(1, len(core)))
+        while left:
+            ways = nx.single_source_shortest_path(graph, walk[-1])
+            walk += ways[min(left, key=lambda n, ways=ways: (len(ways[n]), n))][1:]  # type: ignore[misc]
+            left.difference_update(walk)
+        back = nx.shortest_path(graph, walk[-1], 0)[1:-1]
+        yield (axis, side), tuple(found.labels[core[n]] for n in (*walk, *back))

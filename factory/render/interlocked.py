@@ -30,6 +30,9 @@ PANEL: Size = (640, 360)
 HEAD, LINE, EDGES, POINTS, SMALL = 78, 34, 22, 18, 15
 """Heights above a picture and of a line of names, the margin [px], and sizes of words."""
 
+MET = 8
+"""So many names of those that meet each other are written."""
+
 AZIMUTH, ELEVATION = -58.0, 26.0
 """From where the camera looks [degrees]."""
 
@@ -83,9 +86,10 @@ class InterlockedView:
         return found
 
     def met(self, axis: int, side: int) -> str:
-        """Who meets whom, in words, on the way out to one side of an axis."""
+        """Who meets whom, in words, on the way out to one side of an axis: the first of them."""
         circuit = dict(self.lock.circuits)[axis, side]
-        return " meets ".join((*circuit, circuit[0]))
+        shown = (*circuit, circuit[0]) if len(circuit) < MET else (*circuit[:MET], "...")
+        return " meets ".join(shown)
 
     def colour(self, number: int) -> Colour:
         """The colour of an interlocked unit."""
@@ -113,17 +117,16 @@ class InterlockedView:
                 ink.words(left + 22, middle, name, POINTS, INK)
         write_still(path, pixels)
 
-    def _titles(self, ink: Ink, axis: int, x: int, y: int) -> None:
+    def _titles(self, ink: Ink, axis: int, x: float, y: float) -> None:
         """What is above the picture of an axis, or, for -1, of them all in place."""
         room = PANEL[0] - 2 * EDGES
-        lines: tuple[str, ...]
         if axis < 0:
             count = len(self.lock.labels)
-            lines = f"{count} parts interlock, where they are in the product", "", ""
+            lines = [f"{count} parts interlock, where they are in the product"]
         else:
             name = "xyz"[axis]
             ways = [f"to {sign}{name}: {self.met(axis, int(sign + '1'))}" for sign in "+-"]
-            lines = f"drawn out along {name}; going out", *ways
+            lines = [f"drawn out along {name}; going out", *ways]
         for n, words in enumerate(lines):
             points, colour = (SMALL, FAINT) if n else (POINTS, INK)
             ink.words(x, y + 18 + 22 * n, fitted(words, points, room), points, colour)

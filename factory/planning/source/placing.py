@@ -15,7 +15,8 @@ from factory.planning.source.alike import PartShape, shape_of
 from factory.problem.pag import PAG
 from factory.support.errors import Diagnostic
 
-DECOMPOSE = "pip install 'klavins-factory[decompose]': then it is decomposed into convex bodies"
+EXTRA = "pip install 'klavins-factory[decompose]'"
+DECOMPOSE = f"{EXTRA}: then it is decomposed into convex bodies"
 
 
 def placed(
@@ -41,7 +42,7 @@ def _hulls(parts: Sequence[PlacedPart]) -> list[Diagnostic]:
             continue
         if volume_of(mesh.vertices, mesh.faces) < FULL * mesh.hull.volume:
             message = f"{file} is not convex; its convex hull stands for it"
-            many = "meshes are not convex: their convex hulls stand for them"
+            many = f"meshes are not convex: their convex hulls stand for them ({EXTRA})"
             found[file] = Diagnostic("BadMesh", message, part.node.position, DECOMPOSE, many)
     return list(found.values())
 
