@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from factory.simulation.failures import Failures
 
 import factory.simulation.recovery.responding as responding
 from factory.layout.layout import Layout
@@ -21,6 +20,7 @@ from factory.pipeline import read
 from factory.plant.factory import Factory
 from factory.plant.material import joins_of
 from factory.problem.template import Failure
+from factory.record.failures import Failures
 from factory.simulation.mujoco.failing.plant import MujocoPlant
 from factory.simulation.mujoco.failing.sensors import Senses
 from factory.simulation.recovery import Campaign, WorldFault, recover
@@ -217,8 +217,8 @@ def test_what_no_test_looks_for_is_not_seen(world: Any) -> None:
 def test_again_twice_then_scrap(world: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     """A joint that always slips is tried three times, and its inputs are scrapped with the third;
     20 scraps on end stop the run, which names the label; in the engine 3, which is quicker."""
-    most = 3 if world == "mujoco" else responding.MOST_SCRAPPED
-    monkeypatch.setattr(responding, "MOST_SCRAPPED", most)
+    most = 3 if world == "mujoco" else responding.SCRAPS
+    monkeypatch.setattr(responding, "SCRAPS", most)
     run, failures = run_with(
         WorldFault("bad_joint", label="sub1", rate=1.0),
         world=world,
