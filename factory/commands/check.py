@@ -21,6 +21,7 @@ from factory.support.progress import Waiting
 
 if TYPE_CHECKING:
     from factory.compiler.mating.findings import Matings
+    from factory.pipeline import Project
     from factory.study.checking import Checked
     from factory.study.failures import FailureCost, FailureStudy
 
@@ -68,7 +69,7 @@ def check(
     writable_folder(clashes)
     project = None if is_net(file) else given.project(out.silent)
     with Waiting("reading the shapes and proving", out.silent):
-        asked = out.verbose or (out.as_json and project is not None and is_shaped(project.pag))
+        asked = out.verbose or (out.as_json and project is not None and _has_places(project))
         checked = (
             check_project(project, wip, failures or None, asked) if project else check_net(file)
         )
@@ -165,6 +166,13 @@ def _describe(checked: Checked, verbose: bool) -> None:
         _describe_approaches(checked.matings)
     if "deputies" in document:
         _describe_deputies(document["deputies"])
+
+
+def _has_places(project: Project) -> bool:
+    """Whether where robots come from is known without boxes, or matters: parts have shapes, or
+    robots serve several labels or branches."""
+    ground = project.ground
+    return is_shaped(project.pag) or bool(ground.lines or ground.parallel)
 
 
 def _describe_failures(study: FailureStudy, verbose: bool) -> None:
