@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -72,6 +73,12 @@ def traced(simulation: Simulation, ticks: int, until: float = LONG) -> Trace:
     return trace
 
 
+@cache
+def kept(name: str, ticks: int, **given: Any) -> Trace:
+    """The trace of a run that several tests look at."""
+    return traced(ready(name, **given), ticks)
+
+
 CASES: list[tuple[str, dict[str, Any]]] = [
     ("paper", {}),
     ("truck", {"fuse": True}),
@@ -92,17 +99,16 @@ CASES: list[tuple[str, dict[str, Any]]] = [
 def test_a_run_is_the_same_without_what_makes_it_faster(name: str, given: dict[str, Any]) -> None:
     """Events, gaps, residuals, forces, and the state wherever both are looked at."""
     plain = traced(ready(name, fast=False, **given), 1)
-    simulation = ready(name, **given)
-    fast = traced(simulation, MOST)
+    fast = kept(name, MOST, **given)
     assert len(plain.dropoffs) == 2 and fast.agrees(plain)
     assert plain.figures.handoff_gap_max_mm > 0.0 < plain.figures.weld_residual_max_mm
-    long = simulation.physical.model.settings.stride > 1
+    long = given.get("settings", FINE).stride > 1
     assert len(fast.states) < (0.7 if long else 1.01) * len(plain.states)
 
 
 @pytest.mark.parametrize(("name", "given"), [CASES[0], CASES[4], CASES[11]])
 def test_one_tick_a_call_or_many_is_the_same(name: str, given: dict[str, Any]) -> None:
-    singly, many = (traced(ready(name, **given), ticks) for ticks in (1, MOST))
+    singly, many = (kept(name, ticks, **given) for ticks in (1, MOST))
     assert many.agrees(singly)
 
 
@@ -356,21 +362,21 @@ def _may_be_gone(world: MujocoWorld) -> bool:
 
 def test_a_hand_that_goes_unseen_is_seen_late(monkeypatch: pytest.MonkeyPatch) -> None:
     """Planted fault: courses go on where a hand that is waited for may have gone."""
-    singly = traced(ready("chest"), 1)
+    singly = kept("chest", 1)
     monkeypatch.setattr(Follower, "until", lambda self, axis, least: self.left)
     assert not traced(ready("chest"), MOST).agrees(singly)
 
 
 def test_a_tray_that_comes_unseen_is_seen_late(monkeypatch: pytest.MonkeyPatch) -> None:
     """Planted fault: the tray's courses do not end where it may have come to its goal."""
-    singly = traced(ready("chest"), 1)
+    singly = kept("chest", 1)
     monkeypatch.setattr(outfeed, "CLOSE", 0.0)
     assert not traced(ready("chest"), MOST).agrees(singly)
 
 
 def test_a_goal_that_comes_unseen_is_seen_late(monkeypatch: pytest.MonkeyPatch) -> None:
     """Planted fault: courses go on where a mode may have come to its goal."""
-    singly = traced(ready("paper"), 1)
+    singly = kept("paper", 1)
     monkeypatch.setattr(Follower, "near", property(lambda self: not self.left))
     from factory.control.navigation import Bundle
 

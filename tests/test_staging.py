@@ -204,11 +204,11 @@ def test_changes_of_a_robot_change_its_ways(seed: int, shape: str) -> None:
 def test_it_runs_at_that_pace(
     distributed: bool, size: int, seed: int, shape: str, style: str
 ) -> None:
-    layout = random_layout(size, seed, shape, style)
+    layout, units = random_layout(size, seed, shape, style), 6 if distributed else 12
     record = Simulation(
         layout,
         RunRequest(
-            "ideal", units=12, seed=seed, jitter=0.2, settings=STAGED, distributed=distributed
+            "ideal", units=units, seed=seed, jitter=0.2, settings=STAGED, distributed=distributed
         ),
     ).run()
     assert record.trouble is None and record.refines_net
@@ -219,19 +219,21 @@ def test_it_runs_at_that_pace(
     else:
         still = Simulation(
             layout,
-            RunRequest("ideal", units=12, seed=seed, jitter=0.2, settings=STILL, distributed=True),
+            RunRequest(
+                "ideal", units=units, seed=seed, jitter=0.2, settings=STILL, distributed=True
+            ),
         ).run()
-        assert record.sim_time_s < still.sim_time_s + 12 * 0.1
+        assert record.sim_time_s < still.sim_time_s + units * 0.1
 
 
 @pytest.mark.parametrize("distributed", [False, True])
-@pytest.mark.parametrize("file", [PAPER, CHEST], ids=["paper", "chest"])
-def test_it_pays_in_mujoco(file: Path, distributed: bool) -> None:
+@pytest.mark.parametrize(("file", "units"), [(PAPER, 8), (CHEST, 4)], ids=["paper", "chest"])
+def test_it_pays_in_mujoco(file: Path, units: int, distributed: bool) -> None:
     layout = laid_out(file)
     found = {}
     for chosen in (STILL, STAGED):
         made = Simulation(
-            layout, RunRequest("mujoco", units=8, settings=chosen, distributed=distributed)
+            layout, RunRequest("mujoco", units=units, settings=chosen, distributed=distributed)
         )
         watcher = beside(made)
         record = found[chosen] = made.run([watcher.observe])
@@ -398,7 +400,7 @@ def test_run_and_its_log(run: Terminal, tmp_path: Path) -> None:
 
 
 def test_analyze_against_a_run(run: Terminal, tmp_path: Path) -> None:
-    words = ["--stage", "--units", 10, "--run", "--timestep", 0.002, "--json"]
+    words = ["--stage", "--units", 5, "--run", "--timestep", 0.002, "--json"]
     found = run("analyze", CHEST, *words).json
     critical = found["circuits"][0]
     assert critical["pace_s"] == found["cycle_time_s"]
