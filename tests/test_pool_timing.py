@@ -25,6 +25,7 @@ from factory.simulation.simulation import Simulation
 from factory.support.errors import InputError
 from factory.timing.cycle_time import cycle_time, marked_graph_cycle_time
 from factory.timing.pool import part_pool, with_wip
+from tests.examples import without_hands
 from tests.net_values import net_from
 from tests.pag_values import factories, factory_of, paper, random_pag
 
@@ -176,7 +177,7 @@ def test_only_live_marked_graphs_have_a_cycle_time(rows: list[tuple[str, str, in
 
 
 def test_a_pool_too_large_for_the_engine_bounds_the_units_inside(monkeypatch) -> None:
-    layout = factory.lay_out(factory.compile(factory.load_pag("examples/gearbox.pag")))
+    layout = without_hands("lamp")
     pool = part_pool(layout.factory)
     whole = physical_model(layout)
     assert whole.wip is None and whole.bodies == sum(pool.values()) + len(pool)

@@ -143,7 +143,7 @@ def test_everything_goes_where_it_went(size: int, seed: int, shape: str, style: 
 
 
 def test_a_source_line_is_kept() -> None:
-    layout, after = bare(32), cut_short(32)
+    after = cut_short(32)
     relays = [o for o in after.factory.operations if o.template.name == "relay"]
     assert relays
     for relay in relays:

@@ -7,7 +7,6 @@ import random
 import sqlite3
 from contextlib import closing
 from dataclasses import replace
-from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +15,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-import factory
 from factory.control.mode import Mode
 from factory.layout.bounds import cycle_time_bound
 from factory.layout.clearance import certify
@@ -45,6 +43,7 @@ from factory.support.settings import Settings
 from factory.timing.cycle_time import cycle_time
 from factory.timing.prediction import operation_delays, predict, ways_ahead
 from tests.command_line import PAPER, ROOT, Terminal
+from tests.examples import without_hands
 from tests.layout_values import STYLES, random_layout
 from tests.pag_values import SHAPES
 
@@ -56,9 +55,8 @@ shapes, styles = st.sampled_from(SHAPES), st.sampled_from(STYLES)
 worlds: Any = st.sampled_from(["ideal", "mujoco"])
 
 
-@cache
 def laid_out(file: Path) -> Layout:
-    return factory.lay_out(factory.compile(factory.load_pag(file)))
+    return without_hands(file.stem)
 
 
 @pytest.fixture(scope="module")
