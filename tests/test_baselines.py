@@ -180,7 +180,7 @@ FAULTS: dict[str, tuple[Alter, set[str]]] = {
 }
 
 
-@pytest.mark.parametrize("name", ["paper", "meshes"])
+@pytest.mark.parametrize("name", ["paper", pytest.param("meshes", marks=pytest.mark.slow)])
 @pytest.mark.parametrize("fault", FAULTS)
 def test_a_planted_fault_is_caught(name: str, fault: str) -> None:
     alter, expected = FAULTS[fault]

@@ -224,8 +224,15 @@ def test_it_runs_at_that_pace(
         assert record.sim_time_s < still.sim_time_s + units * 0.1
 
 
-@pytest.mark.parametrize("distributed", [False, True])
-@pytest.mark.parametrize(("file", "units"), [(PAPER, 8), (CHEST, 4)], ids=["paper", "chest"])
+@pytest.mark.parametrize(
+    ("file", "units", "distributed"),
+    [
+        (PAPER, 8, False),
+        (PAPER, 8, True),
+        (CHEST, 4, False),
+        pytest.param(CHEST, 4, True, marks=pytest.mark.slow),
+    ],
+)
 def test_it_pays_in_mujoco(file: Path, units: int, distributed: bool) -> None:
     layout = laid_out(file)
     found = {}
