@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -19,6 +20,7 @@ from factory.support.progress import StepBar, Waiting
 
 if TYPE_CHECKING:
     from factory.pipeline import Project
+    from factory.planning.hulls import Drawn
     from factory.planning.parts import InPlace
     from factory.planning.plan import CannotAssemble, Planned, PlannedJoin, PlanOptions
     from factory.planning.searching import Aim
@@ -56,6 +58,7 @@ KINDS: tuple[Kind, ...] = ("slide", "lower", "blocked")
     multiple=True,
     help="A part that may pass through others, where there is no other way (repeatable).",
 )
+@click.option("--hulls", is_flag=True, help="Plan with hulls, though they hide what goes in.")
 @click.option("--unit", type=click.Choice(UNITS), help="Of lengths; found out without.")
 @click.option("--library", type=PATH, envvar="LDRAWDIR", help="An LDraw parts library.")
 @click.option("--boxes", is_flag=True, help="LDraw parts whose shape is missing become boxes.")
@@ -77,6 +80,7 @@ def plan(
     keep: tuple[str, ...],
     replan: bool,
     allow: tuple[str, ...],
+    hulls: bool,
     unit: str | None,
     library: Path | None,
     boxes: bool,
@@ -102,7 +106,8 @@ def plan(
     if not out.silent:
         for note in found.notes:
             say(f"  {note}")
-    planned = _sought(found, PlanOptions(aim, seconds, allow, templates=templates), out)
+    asked = PlanOptions(aim, seconds, allow, hulls, templates=templates)
+    planned = _sought(found, asked, out)
     if isinstance(planned, CannotAssemble):
         return _refuse(found, planned, folder, look, out)
     made = planned_product(found, planned.tree, planned.orientation, source.name)
@@ -213,6 +218,7 @@ def _document(
     matings = project.matings
     labels = {id(join): label for label, join in _by_label(found, planned, project).items()}
     return {
+        **({"hulls": [asdict(pair) for pair in planned.hidden]} if planned.hidden else {}),
         "pag": str(project.file),
         "product": project.pag.root,
         "parts": len(found.parts),
@@ -252,6 +258,7 @@ def _tell(
     matings = project.matings
     kinds = [(kind, len(matings.of_kind(kind))) for kind in KINDS] if matings else []
     ways = ", ".join(f"{count} {kind}" for kind, count in kinds if count)
+    ways += _for_hulls(planned.hidden)
     say(f"{project.file}: parts {parts}, operations {len(project.pag) - parts}; ways: {ways}")
     figures = planned.figures
     best = "none is better by estimate" if planned.optimal else "the best that was found"
@@ -262,10 +269,29 @@ def _tell(
         for mating in matings.all:
             words = f"{mating.label}: {' + '.join(mating.inputs)}, {_way(mating.approach)}"
             join = joins.get(mating.label)
-            say(f"  {words}{f', {_room(join.clearance)}' if join else ''}")
+            if join:
+                words += f", {_room(join.clearance)}{_for_hulls(_hidden_at(join, found, planned))}"
+            say(f"  {words}")
     for path in files if out.verbose else files[-2:]:
         say(f"  {path}")
     say(f"  factory run {project.file} --units 3 --video {project.file.with_suffix('.mp4')}")
+
+
+def _hidden_at(join: PlannedJoin, found: InPlace, planned: Planned) -> list[Drawn]:
+    """The pairs of an operation of which hulls hide whether they overlap."""
+    units = {part.label: label for label, parts in found.units() for part in parts}
+    return [
+        pair
+        for pair in planned.hidden
+        for one, other in [(units[pair.one], units[pair.other])]
+        if (one in join.pile and other in join.come) or (other in join.pile and one in join.come)
+    ]
+
+
+def _for_hulls(pairs: Sequence[Drawn]) -> str:
+    """That ways were found for hulls, in words."""
+    some = "a pair overlaps" if len(pairs) == 1 else f"{len(pairs)} pairs overlap"
+    return f", for hulls only: {some}" if pairs else ""
 
 
 def _way(approach: Approach) -> str:
