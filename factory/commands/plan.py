@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from factory.planning.parts import InPlace
     from factory.planning.plan import CannotAssemble, Planned, PlannedJoin, PlanOptions
     from factory.planning.searching import Aim
-    from factory.plant.approaches import Approach, Kind
+    from factory.plant.approaches import Kind
 
 UNITS = ("m", "cm", "mm", "in", "ldu")
 """The names of units of length; `ldu` is that of LDraw, 0.4 mm."""
@@ -267,7 +267,7 @@ def _tell(
     if out.verbose and matings:
         joins = _by_label(found, planned, project)
         for mating in matings.all:
-            words = f"{mating.label}: {' + '.join(mating.inputs)}, {_way(mating.approach)}"
+            words = f"{mating.label}: {' + '.join(mating.inputs)}, {mating.approach.told}"
             join = joins.get(mating.label)
             if join:
                 words += f", {_room(join.clearance)}{_for_hulls(_hidden_at(join, found, planned))}"
@@ -292,14 +292,6 @@ def _for_hulls(pairs: Sequence[Drawn]) -> str:
     """That ways were found for hulls, in words."""
     some = "a pair overlaps" if len(pairs) == 1 else f"{len(pairs)} pairs overlap"
     return f", for hulls only: {some}" if pairs else ""
-
-
-def _way(approach: Approach) -> str:
-    """An approach in words."""
-    if approach.kind == "lower":
-        return f"{approach.lowered} is lowered {approach.stroke:g} m"
-    sides = " or ".join(f"{'-+'[side > 0]}{'xy'[approach.axis]}" for side in approach.sides)
-    return f"{'slides' if approach.kind == 'slide' else 'is blocked'} from {sides}"
 
 
 def _room(clearance: float) -> str:

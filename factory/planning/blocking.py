@@ -21,6 +21,7 @@ from factory.compiler.mating.bodies import ConvexBodies, bodies
 from factory.compiler.mating.meetings import Ints, Meeting, Meetings
 from factory.compiler.mating.overlaps import Finder, Overlaps
 from factory.compiler.mating.paths import TOLERANCE
+from factory.compiler.mating.rooms import AMPLE
 from factory.geometry.meshes import Array
 from factory.geometry.solids import Product
 from factory.planning.hulls import Drawn
@@ -39,9 +40,6 @@ what they were, and so much [m]: drawings are tenths of a millimetre off, doveta
 NEAR = 5e-4
 """Parts no further apart than this [m] touch; where that leaves the product in several pieces,
 the nearest parts of those touch as well."""
-
-AMPLE = 5e-3
-"""More room than this [m] is not measured."""
 
 WIDER = 2.0
 """Pieces are brought together by gaps that grow by this factor."""
@@ -132,7 +130,7 @@ def rooms(source: InPlace, axis: int) -> Array:
     moving, standing, depths = finder.passing(axis, AMPLE)
     one, other = unit[found.part[moving]], unit[found.part[standing]]
     apart = one != other
-    least = -np.maximum(depths.graze, np.where(depths.path > TOLERANCE, depths.path, -np.inf))
+    least = depths.room
     for column, at in enumerate(((other, one), (one, other))):
         np.minimum.at(room, (at[0][apart], at[1][apart]), least[apart, column])
     return np.where(room > AMPLE, np.inf, room)
