@@ -299,4 +299,4 @@ def _room(clearance: float) -> str:
     if clearance == float("inf"):
         return "nothing near"
     room = round(1e3 * clearance, 2)
-    return f"room {room:.2f} mm" if room >= 0 else f"drawn {-room:.2f} mm into each other"
+    return f"room {abs(room):.2f} mm" if room >= 0 else f"drawn {-room:.2f} mm into each other"
