@@ -75,6 +75,7 @@ def held_up(
     settle = settings.settle if world == "mujoco" else 0.0
     return {
         (stage.robot, stage.operation): settle
+        + settings.tick
         + mode_time(modes[stage.operation], begin, limits.of(axes), world)
         for stage, begin in gating(layout, modes, ahead)
         for axes in [layout.factory.axes[stage.operation]]

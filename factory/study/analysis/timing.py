@@ -90,8 +90,7 @@ class Timing:
         )
         for stage, begin in self._gating:
             key = stage.robot, stage.operation
-            whole = self._delay(stage.operation, begin, change) - self.settings.tick
-            found[key] = max(found[key], whole)
+            found[key] = max(found[key], self._delay(stage.operation, begin, change))
         return found
 
     @cached_property
