@@ -50,7 +50,11 @@ KINDS: tuple[Kind, ...] = ("slide", "lower", "blocked")
     default="cycle",
     help="What the tree is chosen for: a short cycle, few robots, a small floor.",
 )
-@click.option("--seconds", type=SECONDS, default=60.0, help="To look for a better tree [s].")
+@click.option(
+    "--seconds",
+    type=SECONDS,
+    help="To look for a better tree [s]: 30 for up to 16 parts, then 0.2 for each part.",
+)
 @click.option("--keep", multiple=True, help="A sub-tree of a PAG that stays (repeatable).")
 @click.option("--replan", is_flag=True, help="Throw the tree of a PAG away.")
 @click.option(
@@ -76,7 +80,7 @@ def plan(
     source: Path,
     output: Path | None,
     aim: Aim,
-    seconds: float,
+    seconds: float | None,
     keep: tuple[str, ...],
     replan: bool,
     allow: tuple[str, ...],
@@ -92,6 +96,7 @@ def plan(
     bodies (.glb, .3mf, .step), an LDraw model (.ldr, .mpd), or a PAG whose tree is thrown away."""
     from factory.pipeline import all_templates, read
     from factory.planning.plan import CannotAssemble, PlanOptions
+    from factory.planning.searching import usual_seconds
     from factory.planning.source.reading import SourceOptions, read_source
     from factory.planning.writing import planned_product
     from factory.support.files import own_names, write_all
@@ -106,6 +111,7 @@ def plan(
     if not out.silent:
         for note in found.notes:
             say(f"  {note}")
+    seconds = usual_seconds(len(found.units())) if seconds is None else seconds
     asked = PlanOptions(aim, seconds, allow, hulls, templates=templates)
     planned = _sought(found, asked, out)
     if isinstance(planned, CannotAssemble):
