@@ -24,7 +24,7 @@ from factory.layout.layout import Layout
 from factory.layout.optimising import first_feasible, optimised
 from factory.modes import staging
 from factory.modes.modes import operation_modes, robot_limits
-from factory.modes.staging import stages
+from factory.modes.staging import stages, stages_of
 from factory.nets.cycle_ratio import max_cycle_ratio
 from factory.nets.marked import MarkedNet
 from factory.nets.petri import PetriNet, Place, Transition
@@ -41,7 +41,7 @@ from factory.study.analysis.timed import timed_net
 from factory.study.analysis.timing import Change
 from factory.support.settings import Settings
 from factory.timing.cycle_time import cycle_time
-from factory.timing.prediction import operation_delays, predict, ways_ahead
+from factory.timing.prediction import held_up, operation_delays, predict, ways_ahead
 from tests.command_line import PAPER, ROOT, Terminal
 from tests.examples import without_hands
 from tests.layout_values import STYLES, random_layout
@@ -130,6 +130,22 @@ def test_slack_is_what_an_operation_may_take_longer(size: int, seed: int, shape:
             seconds[number] += more
             pace = max_cycle_ratio(net.net, seconds).seconds
             assert (pace > net.pace + 1e-6) == grows
+
+
+def test_a_carrier_that_is_waited_for_takes_as_long_as_all_of_its_operation() -> None:
+    """The hand of the stool's slowest carrier has to be there first: what it takes comes then."""
+    layout = laid_out(ROOT / "examples" / "stool.pag")
+    simulation = Simulation(layout, RunRequest("ideal", units=7))
+    settings, world = simulation.request.settings, simulation.request.world
+    ahead = stages_of(layout, simulation.modes, settings)
+    told = layout, simulation.modes, simulation.limits, settings, world, ahead
+    whole, alone = held_up(*told), ways_ahead(ahead, simulation.limits, settings, world)
+    longer = {key for key, seconds in whole.items() if seconds > alone[key] + 0.1}
+    run = simulation.run()
+    assert run.bottleneck in {layout.factory.robots[robot].name for robot, _ in longer}
+    assert run.predicted_cycle_time_s == pytest.approx(run.cycle_time_s, rel=0.01)
+    net = timed_net(Timing(layout, settings, world))
+    assert net.pace == pytest.approx(run.predicted_cycle_time_s)
 
 
 def test_tokens_may_be_ready_later() -> None:
