@@ -316,6 +316,9 @@ def say_failures(failures: Failures, verbose: bool) -> None:
         f" {failures.scrapped} scrapped, {failures.spares} spares used,"
         f" {failures.contacts} contacts with what fell"
     )
+    if failures.binned or failures.spilled:
+        spilled = ", ".join(failures.spilled)
+        say(f"{failures.binned} fell into bins; no bin for scrap of: {spilled or 'none'}")
     for one in failures.found if verbose else ():
         say(f"  {one.t:.2f} s: {one}")
 

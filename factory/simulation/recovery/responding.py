@@ -186,14 +186,14 @@ class Responding:
             if robot in scrap and (robot, scrap[robot]) in self._barred:
                 self._plant.let_go(robot, self._campaign.clear)
             elif robot in scrap:
-                goals, done = self.returning.home(robot), partial(self._bin, robot, rest)
+                goals, done = self.returning.home(robot), partial(self._bin, robot, scrap[robot], rest)
             first = after.get(robot, frozenset[int]())
             self.returning.send(robot, WayBack(goals, first, done, partial(self._is_up, robot)))
 
-    def _bin(self, robot: int, rest: list[Goal]) -> None:
+    def _bin(self, robot: int, label: str, rest: list[Goal]) -> None:
         """A robot at the B end of its guidepath lets scrap fall into the bin there, and goes to
         where it waits."""
-        self._plant.let_go(robot, BINNED)
+        self._plant.throw_away(robot, label, BINNED)
         self.returning.send(robot, WayBack(rest))
 
     def _is_up(self, robot: int) -> bool:
