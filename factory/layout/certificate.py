@@ -15,8 +15,10 @@ MILLI = 1000.0
 NAMES = ("carriages", "masts and arms", "payloads")
 """The layers' names."""
 
-KINDS = ("carriage", "mast", "arm", "payload", "post", "boom", "outfeed")
-KINDS += ("housing", "shed", "hand", "bin")
+KINDS = (
+    *("carriage", "mast", "arm", "payload", "post", "boom", "outfeed"),
+    *("housing", "shed", "hand", "bin"),
+)
 """What a region is swept by."""
 
 CARRIAGE_BODY, MAST_BODY, ARM_BODY, PAYLOAD_BODY, POST_BODY, BOOM, OUTFEED = range(7)

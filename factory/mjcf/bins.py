@@ -1,4 +1,4 @@
-"""Bins: open boxes of thin plates, for what is scrap."""
+"""Bins: open boxes of thin plates on the floor, for what is scrap."""
 
 from __future__ import annotations
 
@@ -10,6 +10,10 @@ from factory.layout.layout import Layout
 from factory.mjcf import names
 from factory.mjcf.elements import add, add_station
 
+DEEP = 0.1
+"""So far below the floor a bin's bottom goes on, unseen: nothing falls through it between two
+timesteps [m]."""
+
 RED = (0.62, 0.30, 0.27, 1.0)
 
 
@@ -20,8 +24,8 @@ def add_bins(world: Element, layout: Layout, bins: Iterable[Bin]) -> None:
         x, y = one.middle
         half = (one.box[1] - one.box[0]) / 2, (one.box[3] - one.box[2]) / 2
         body = add(world, "body", name=name, pos=(x, y, 0.0))
-        size = *half, PLATE / 2
-        add_station(body, f"{name}/bottom", pos=(0.0, 0.0, PLATE / 2), size=size, rgba=RED)
+        place = {"pos": (0.0, 0.0, (PLATE - DEEP) / 2), "size": (*half, (PLATE + DEEP) / 2)}
+        add_station(body, f"{name}/bottom", **place, rgba=RED)
         for axis, letter in enumerate("xy"):
             for side in (-1, 1):
                 high = SILL if side * one.near[axis] > 0 else TOP

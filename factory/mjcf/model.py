@@ -176,7 +176,8 @@ def build_model(
 ) -> Model:
     """The model of a laid-out factory, of one body a part unless other `bodies` are given; without
     what is only there to be `shown`, if it is not; with `bins`, if parts may be scrapped. The
-    `copies` are enough for `wip` units inside at once. Raises InputError where the MJCF of a robot type is unusable."""
+    `copies` are enough for `wip` units inside at once. Raises InputError where the MJCF of a robot
+    type is unusable."""
     factory, product = layout.factory, layout.product
     bodies = bodies or bodies_of(factory, product)
     masses = {

@@ -80,8 +80,8 @@ class Failures:
     `false_alarms`: failures that nothing caused; `undone`: how many transitions were fired
     backwards; `spares`: how many were used; `contacts`: of what fell, which are no unintended
     ones; `stood`: from when on [s] which robots stood, by name; `binned`: how often scrap has
-    fallen into a bin; `spilled`: the robots, by name, that have let some fall elsewhere, since there
-    is no room for a bin."""
+    fallen into a bin; `spilled`: the robots, by name, that have let some fall elsewhere, since
+    there is no room for a bin."""
 
     found: tuple[Failing, ...] = ()
     struck: Mapping[str, int] = field(default_factory=dict)

@@ -118,11 +118,12 @@ class Fallen:
             world.hooks.before_step.remove(_anything)
 
     def _is_in_bin(self, heap: Heap) -> bool:
-        """Whether all of a heap is in its bin."""
-        if heap.into is None:
-            return False
-        at = self._world.d.xipos[[*heap.bodies.values()]]
-        return bool((at[:, 2] < TOP).all()) and all(heap.into.holds((x, y)) for x, y, _ in at)
+        """Whether all of a heap is in its bin, or sinks into it."""
+        radius, d, into = self._world.model.carried.radius, self._world.d, heap.into
+        found = ((*d.xipos[body].tolist(), radius[label]) for label, body in heap.bodies.items())
+        return into is not None and all(
+            into.holds((x, y)) and z < TOP + far for x, y, z, far in found
+        )
 
     def _near(self) -> frozenset[int]:
         """The robots that could touch what lies about now."""
