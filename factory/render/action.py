@@ -24,8 +24,7 @@ Own = tuple[int, str]
 class Action:
     """What a picture of a factory has to show, as boxes (n, 8, 3) by their corners [m]: its
     `robots`, and what they carry, at both ends of their guidepaths; `beside` these the feeders that
-    parts hang from at first, bins, and the tray with a product, empty and where it goes into the
-    shed."""
+    parts hang from at first, and the tray with a product, empty and where it goes into the shed."""
 
     robots: Array
     beside: Array
@@ -52,7 +51,7 @@ def action_of(m: mujoco.MjModel, d: mujoco.MjData) -> Action:
 
 
 def _feeds(m: mujoco.MjModel, geom: int) -> bool:
-    return names.kind(m.geom(geom).name) in ("feeder", "bin")
+    return names.kind(m.geom(geom).name) == "feeder"
 
 
 def _bodies(m: mujoco.MjModel, d: mujoco.MjData) -> Iterator[tuple[Own, Array]]:

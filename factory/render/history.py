@@ -120,6 +120,16 @@ class History:
         before = bisect_right(self.standing, time - TIE, key=lambda pair: pair[0])
         return self.standing[before - 1][1] if before else frozenset()
 
+    def dead(self, time: float) -> frozenset[int]:
+        """The robots that are known to be dead at a time, and not yet replaced."""
+        names = {
+            one.robot
+            for one in self.failings
+            if one.test == "jammed"
+            and one.t < time - TIE < (inf if one.until is None else one.until)
+        }
+        return frozenset(r.index for r in self.factory.robots if r.name in names)
+
     def failed(self, since: float, time: float) -> list[Failing]:
         """What failed from one time and before another."""
         return [one for one in self.failings if since <= one.t < time - TIE]
