@@ -19,8 +19,8 @@ from factory.foreign_nets.general import analyse
 from factory.foreign_nets.pnml_reader import read_pnml
 from factory.nets.marked import marked
 from factory.nets.undo import marking_after, undo
-from factory.plant.failing_transitions import failing_transitions
 from factory.plant.factory import Factory
+from factory.plant.failing_transitions import failing_transitions
 from factory.plant.material import joins_of
 from factory.record.log import Log
 from tests.command_line import PAPER, Terminal

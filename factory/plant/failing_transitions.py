@@ -1,9 +1,10 @@
 """Failures as transitions of the net: those that are undone in the same way in every marking.
 
 An operation that is done again gives its robots back to where they waited for it. A part that is
-scrapped, before anything was joined to it, gives its robot back to where it waits for the next. Each
-takes one token and needs nothing else, so it fits a net with arcs of weight 1. What is undone where
-a pile is lost is not the same in every marking: all that its branch has begun since may be, or not.
+scrapped, before anything was joined to it, gives its robot back to where it waits for the next.
+Each takes one token and needs nothing else, so it fits a net with arcs of weight 1. What is undone
+where a pile is lost is not the same in every marking: all that its branch has begun since may be,
+or not.
 """
 
 from __future__ import annotations
