@@ -33,8 +33,8 @@ def watch_log(log: Log) -> tuple[Report, MonitorSubject]:
 
     Only when nothing is wrong with the states are the log's firings and markings looked at: whether
     they agree with those, and with each other. States alone do not tell what was undone: where
-    something failed, the states between failures are looked at (`calm`). Raises InputError (BadLog) for a log of
-    the ideal world, of an older version, or of another factory than its header says.
+    something failed, the states between failures are looked at (`calm`). Raises InputError (BadLog)
+    for a log of the ideal world, of an older version, or of another factory than its header says.
     """
     m = model_of(log)
     if log.ctrl is None or "monitor" not in log.header:
