@@ -257,3 +257,33 @@ def test_what_lies_about_has_a_zone_round_it(log: Log) -> None:
 def test_a_run_in_which_nothing_failed_has_no_marks(log: Log) -> None:
     fresh = History(recorded_subject(log.header))
     assert not marks_at(log, 3.0, fresh)
+
+
+# Robots that are exchanged.
+
+
+def test_a_history_tells_which_robots_were_exchanged(log: Log) -> None:
+    history = told(log)
+    death = next(one for one in history.failings if one.test == "jammed")
+    ((robot, start, end),) = history.exchanged()
+    assert (history.factory.robots[robot].name, start, end) == ("r2", death.t, death.until)
+
+
+def test_the_gantt_chart_has_a_dark_band_until_the_spare_comes(log: Log) -> None:
+    history = told(log)
+    ((robot, start, end),) = history.exchanged()
+    panel = GanttPanel(SIZE, 1.0, history, Rows(history, 300.0))
+    slides = np.zeros(len(history.factory.robots))
+    before, during = (panel.draw(t, slides, 0.0).astype(int).sum(axis=2) for t in (start, end))
+    assert (during < 480).mean() > (before < 480).mean() + 0.01
+
+
+def test_a_spare_is_told_of_when_it_comes(log: Log) -> None:
+    history, caption = told(log), Caption(SIZE)
+    ((_, _, end),) = history.exchanged()
+    dark = []
+    for time in (end - 0.05, end + 0.05):
+        pixels = np.full((SIZE[1], SIZE[0], 3), 255, np.uint8)
+        draw_notices(pixels, history, time, caption)
+        dark.append(reddish(pixels, DEAD, 8).any())
+    assert dark == [False, True]

@@ -12,6 +12,10 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import product
 
+import numpy as np
+import shapely
+from shapely import STRtree
+
 from factory.layout.certificate import BIN_BODY, PAYLOAD_BODY, STATIONS, Region
 from factory.layout.clearance import TOLERANCE, ClearanceSearch, separation
 from factory.layout.dimensions import ARMS, CARRIAGES, PAYLOADS
@@ -33,7 +37,7 @@ SLACK = 0.02
 STEP = 0.02
 """Places for a bin are tried so far apart [m]."""
 
-AHEAD, ASIDE = range(-4, 5), range(16)
+AHEAD, ASIDE = range(-1, 5), range(16)
 """So many places are tried along a guidepath, from B, and to each of its sides."""
 
 
@@ -63,17 +67,22 @@ def bins_of(layout: Layout) -> tuple[Bin, ...]:
     """The bins for which there is room, one a robot at most: for all that it can carry back to B
     or, where there is no room for that, for what is smallest."""
     found = piles(layout.factory, layout.product)
-    taken = regions(layout, found)
+    taken, added = regions(layout, found), list[Region]()
+    corners = np.array([region.box for region in taken])
+    tree = STRtree(shapely.box(*corners[:, [0, 2, 1, 3]].T))
     barred, made = not_carried_back(layout), list[Bin]()
     for robot in range(len(layout.guidepaths)):
         held = _held(layout, robot, found, barred)
         held.sort(key=lambda one: (_size(one[1].box), one[0]))
-        near = _near(layout, robot, held, taken)
+        if not held:
+            continue
+        far = _reached(layout, held)
+        near = [taken[n] for n in tree.query(shapely.box(*far)).tolist()] + added
         while held and not (bin_ := _placed(layout, robot, held, near)):
             held.pop()
         if held and bin_:
             made.append(bin_)
-            taken += _stands(bin_)
+            added += _stands(bin_)
     return tuple(made)
 
 
@@ -136,13 +145,12 @@ def _meet(search: ClearanceSearch, one: Region, other: Region) -> bool:
     return not search.settled(one, other)
 
 
-def _near(layout: Layout, robot: int, held: Held, taken: Sequence[Region]) -> list[Region]:
-    """The regions that a bin could come near."""
-    if not held:
-        return []
-    box = hull([pile.box for _, pile in held])
-    far = 2 * _size(box) + STEP * len(ASIDE) + 2 * (SLACK + PLATE) + layout.clearance
-    return [region for region in taken if separation(box, region.box) < far]
+def _reached(layout: Layout, held: Held) -> tuple[float, float, float, float]:
+    """Least x and y and greatest x and y of all that bins could come near [m]."""
+    xlo, xhi, ylo, yhi = hull([pile.box for _, pile in held])
+    far = 2 * _size((xlo, xhi, ylo, yhi)) + STEP * len(ASIDE) + 2 * (SLACK + PLATE)
+    far += layout.clearance
+    return xlo - far, ylo - far, xhi + far, yhi + far
 
 
 def _size(box: Box) -> float:
