@@ -15,7 +15,7 @@ from factory.study.analysis.failing import failing_net
 from factory.study.analysis.timed import timed_net
 from factory.study.analysis.timing import Timing
 from factory.timing.failing import Chance, Mishap, failing_run
-from tests.bench.faults.trials import JITTER, Trial, all_tried, is_good, project
+from tests.bench.faults.trials import JITTER, Kept, Trial, is_good, project, tried_so_far
 from tests.tables import table
 
 UNITS = 2000
@@ -47,19 +47,18 @@ def predicted(world: WorldName, units: int) -> float:
     return (dates[-1] - dates[0]) / (len(dates) - 1)
 
 
-def measure(quick: bool = False) -> Iterator[dict[str, Any]]:
+def measure(quick: bool = False, kept: Kept = None) -> Iterator[dict[str, Any]]:
     """Make them in both worlds, and predict each."""
     units = 50 if quick else UNITS
     trials = [
         Trial("paper", FAULTS, units, clear=clear, about=f"{clear:g}", world=world, max_time=1e5)
         for world, clear in ROWS
     ]
-    rows = list[dict[str, Any]]()
-    for row in all_tried(trials):
-        left = row.pop("dropoffs")
-        row["interval_s"] = (left[-1] - left[0]) / (len(left) - 1)
-        row["with_failures_s"] = predicted(row["world"], units)
-        rows.append(row)
+    for rows in tried_so_far(trials, kept):
+        for row in rows:
+            if left := row.pop("dropoffs", None):
+                row["interval_s"] = (left[-1] - left[0]) / (len(left) - 1)
+                row["with_failures_s"] = predicted(row["world"], units)
         yield {"rows": rows}
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from typing import Any
@@ -82,6 +82,20 @@ def tried(trial: Trial) -> dict[str, Any]:
         "predicted_s": run.predicted_cycle_time_s,
         "dropoffs": run.dropoffs,
     }
+
+
+Kept = Mapping[str, Any] | None
+"""The results of a section that is gone on with."""
+
+
+def tried_so_far(trials: Sequence[Trial], kept: Kept) -> Iterator[list[dict[str, Any]]]:
+    """What came of all so far, again after each; those that are `kept` are not tried again."""
+    rows = [*(kept or {}).get("rows", ())]
+    known = {(row["product"], row["world"], row["about"], row["seed"]) for row in rows}
+    left = [t for t in trials if (t.product, t.world, t.about, t.seed) not in known]
+    for row in all_tried(left):
+        rows.append(row)
+        yield rows
 
 
 def all_tried(trials: Sequence[Trial]) -> Iterator[dict[str, Any]]:
