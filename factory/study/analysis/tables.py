@@ -59,8 +59,9 @@ def failing_words(failing: FailingPace) -> str:
     pace = "no cycle time"
     if failing.cycle is not None and failing.loss is not None:
         pace = f"cycle time {failing.cycle:.3f} s ({100 * failing.loss:+.1f} %)"
+    lies = f", which lies for {failing.clear:g} s" if failing.clear and rates.lose else ""
     return (
-        f"{100 * rates.redo:g} % redone and {100 * rates.lose:g} % lost at each operation: {pace}; "
+        f"{100 * rates.redo:g} % redone and {100 * rates.lose:g} % lost at each operation{lies}: {pace}; "
         f"{failing.made} of {failing.units} made, {failing.redone} times again, {failing.scrapped} "
         f"scrapped{f'; stopped at {stopped}' if stopped else ''}"
     )

@@ -3,17 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
-from factory.control.mode import Array, Index
-from factory.layout.layout import Layout
-from factory.layout.sweeps import piles, regions
+from factory.layout.sweeping import SweptFloor
 from factory.simulation.mujoco.world import MujocoWorld
-
-APART = 0.02
-"""Robots keep so far from what lies about [m]."""
 
 SETTLES = 0.5
 """So long after the last thing has been cleared away nothing shakes any more [s]."""
@@ -29,35 +24,11 @@ class Heap:
     until: float
 
 
-@dataclass(frozen=True, eq=False, slots=True)
-class Swept:
-    """The rectangles (n, 4) [m] that robots (n,) and what they carry sweep, seen from above: least
-    and greatest x, least and greatest y."""
-
-    boxes: Array = field(repr=False)
-    robots: Index = field(repr=False)
-
-    @classmethod
-    def of(cls, layout: Layout) -> Swept:
-        """Those of a layout."""
-        found = regions(layout, piles(layout.factory, layout.product))
-        robots = np.array([region.robot for region in found], np.intp)
-        return cls(np.array([region.box for region in found]), robots)
-
-    def near(self, places: Array, radii: Array) -> frozenset[int]:
-        """The robots that come near to balls of some `radii` (k,) about `places` (k, 2) [m]."""
-        (x, y), box = places.T[:, :, None], self.boxes[None]
-        away = np.maximum(np.maximum(box[..., 0] - x, x - box[..., 1]), 0.0) ** 2
-        away += np.maximum(np.maximum(box[..., 2] - y, y - box[..., 3]), 0.0) ** 2
-        hit = (away < (radii[:, None] + APART) ** 2).any(axis=0)
-        return frozenset(self.robots[hit].tolist())
-
-
 class Fallen:
     """What lies about in a world: `heaps`; `closed`: the robots (index) that could touch it."""
 
     def __init__(self, world: MujocoWorld) -> None:
-        self._world, self._swept = world, Swept.of(world.model.layout)
+        self._world, self._swept = world, SweptFloor.of(world.model.layout)
         self._calm = 0.0
         self.heaps: list[Heap] = []
         self.closed = frozenset[int]()
