@@ -51,6 +51,4 @@ class _Floor:
         after = moment * timing.delays[number]
         x = float(places_after(timing.modes[number], timing.starts[number], limits, after)[slot])
         at = np.add(layout.guidepaths[robot].middle(x), layout.shift(robot, number))
-        return np.array(
-            [at + (product.solids[part].centre - product.middle)[:2] for part in parts]
-        )
+        return np.array([at + (product.solids[part].centre - product.middle)[:2] for part in parts])

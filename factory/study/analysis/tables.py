@@ -61,9 +61,9 @@ def failing_words(failing: FailingPace) -> str:
         pace = f"cycle time {failing.cycle:.3f} s ({100 * failing.loss:+.1f} %)"
     lies = f", which lies for {failing.clear:g} s" if failing.clear and rates.lose else ""
     return (
-        f"{100 * rates.redo:g} % redone and {100 * rates.lose:g} % lost at each operation{lies}: {pace}; "
-        f"{failing.made} of {failing.units} made, {failing.redone} times again, {failing.scrapped} "
-        f"scrapped{f'; stopped at {stopped}' if stopped else ''}"
+        f"{100 * rates.redo:g} % redone and {100 * rates.lose:g} % lost at each operation{lies}: "
+        f"{pace}; {failing.made} of {failing.units} made, {failing.redone} times again, "
+        f"{failing.scrapped} scrapped{f'; stopped at {stopped}' if stopped else ''}"
     )
 
 
