@@ -65,10 +65,10 @@ class AnalyzeOptions:
         from factory.simulation.recovery.faults import CLEAR
         from factory.timing.failing import Rates
 
+        if self.clear is not None and self.lose is None:
+            message = "--clear says how long what is lost lies, and nothing is"
+            raise InputError(Diagnostic("Usage", message, None, "give --lose too, as 0.01"))
         if self.redo is None and self.lose is None:
-            if self.clear is not None:
-                message = "--clear says how long what is lost lies, and nothing is"
-                raise InputError(Diagnostic("Usage", message, None, "give --lose too, as 0.01"))
             return None
         redo, lose = self.redo or 0.0, self.lose or 0.0
         if redo + lose > MOST:

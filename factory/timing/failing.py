@@ -241,10 +241,10 @@ class _Run:
         counts[number] = counts.get(number, 0) + 1
         inputs = lost or operation.inputs if kind == "scrap" else ()
         self.go_back(asked_by(self.subject.factory, operation, inputs), now)
-        clearing = self.subject.clearing
-        for label in lost if clearing else ():
-            near = clearing.near(operation, label, self.random.random())
-            self.stand(near, now, now + clearing.seconds)
+        if clearing := self.subject.clearing:
+            for label in lost:
+                near = clearing.near(operation, label, self.random.random())
+                self.stand(near, now, now + clearing.seconds)
         return kind
 
     def stand(self, robots: frozenset[int], now: float, until: float) -> None:
