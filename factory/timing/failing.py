@@ -10,7 +10,7 @@ what was lost stand until it is cleared away. Where nothing fails the dates are 
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from heapq import heappop, heappush
@@ -159,6 +159,32 @@ def checked(net: MarkedNet, before: Sequence[int], after: Sequence[int], rules: 
                 raise ValueError(f"the undo keeps {name}, of which the product is gone")
 
 
+class _Standing:
+    """Until when robots (index) stand."""
+
+    def __init__(self, clearing: Clearing | None) -> None:
+        self._clearing, self._until = clearing, dict[int, float]()
+        self._random = Random(clearing.seed if clearing else 0)
+
+    def drawn(
+        self, operation: Operation, lost: Iterable[str]
+    ) -> Iterator[tuple[frozenset[int], float]]:
+        """The robots that stand for each thing that is lost in an operation, and how long [s]."""
+        if clearing := self._clearing:
+            for label in lost:
+                share = self._random.random()
+                yield clearing.near(operation, label, share), clearing.seconds
+
+    def lengthen(self, robots: Iterable[int], until: float) -> None:
+        """Robots stand until then [s], if not longer."""
+        for robot in robots:
+            self._until[robot] = max(until, self._until.get(robot, 0.0))
+
+    def over(self, robots: Iterable[int], now: float) -> float:
+        """Until when some of these robots stand; `now` where none does [s]."""
+        return max([now, *(self._until.get(robot, now) for robot in robots)])
+
+
 class _Run:
     """A run under way: how often each transition has fired, and when each token is ready."""
 
@@ -176,8 +202,7 @@ class _Run:
         self.redone: dict[int, int] = {}
         self.scrapped: dict[int, int] = {}
         self.undone: dict[int, int] = {}
-        self.stand_until: dict[int, float] = {}
-        self.random = Random(subject.clearing.seed if subject.clearing else 0)
+        self.standing = _Standing(subject.clearing)
 
     def until(self, units: int) -> FailingRun:
         """Fire until so many products are dropped off."""
@@ -241,10 +266,8 @@ class _Run:
         counts[number] = counts.get(number, 0) + 1
         inputs = lost or operation.inputs if kind == "scrap" else ()
         self.go_back(asked_by(self.subject.factory, operation, inputs), now)
-        if clearing := self.subject.clearing:
-            for label in lost:
-                near = clearing.near(operation, label, self.random.random())
-                self.stand(near, now, now + clearing.seconds)
+        for near, seconds in self.standing.drawn(operation, lost):
+            self.stand(near, now, now + seconds)
         return kind
 
     def stand(self, robots: frozenset[int], now: float, until: float) -> None:
@@ -252,19 +275,14 @@ class _Run:
         later = set[int]()
         for place, own in self.subject.places.items():
             if self.tokens[place] and not robots.isdisjoint(own):
-                begin = self._stands(own, now)
+                begin = self.standing.over(own, now)
                 shift = max(until - begin, 0.0)
                 ready = (max(token, begin) + shift for token in self.tokens[place])
                 self.tokens[place] = deque(ready)
                 later.add(self.subject.net.right[place])
-        for robot in robots:
-            self.stand_until[robot] = max(until, self.stand_until.get(robot, 0.0))
+        self.standing.lengthen(robots, until)
         for event in sorted(later):
             self.schedule(event)
-
-    def _stands(self, robots: Iterable[int], now: float) -> float:
-        """Until when some of these robots stand; `now` where none does."""
-        return max([now, *(self.stand_until.get(robot, now) for robot in robots)])
 
     def go_back(self, asked: Mapping[int, int], now: float) -> None:
         """Undo transitions: their tokens are back when the robots are."""
@@ -283,7 +301,7 @@ class _Run:
         for place in sorted(near):
             own = slots[place] if place < len(slots) else tuple(longest)
             wait = max((longest.get(robot, 0.0) for robot in own), default=0.0)
-            self._set(place, gone, self._stands(subject.places.get(place, ()), now) + wait)
+            self._set(place, gone, self.standing.over(subject.places.get(place, ()), now) + wait)
         self.fired = list(left)
         for event in sorted({net.right[p] for p in near}):
             self.schedule(event)
