@@ -120,7 +120,9 @@ def _go_on(going: Resumed, asked: RunOptions, monitor: bool | None, out: OutputO
     made = going.simulation
     with going.trusted():
         record = carry_out(made, out.silent, asked.max_time, [going.writer], False)
-    if monitor is not False and made.model is not None:
+    if account := made.world.hooks.account:
+        record = replace(record, failures=account.report())
+    elif monitor is not False and made.model is not None:
         with Waiting("judging the whole run", out.silent):
             record = replace(record, monitor=watch_log(read_log(going.path))[0])
     status = _told(replace(record, lenient=asked.lenient), made.layout.factory, [], monitor, out)

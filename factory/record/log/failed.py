@@ -63,6 +63,11 @@ class Told:
     found: int = -1
     stood: int = 0
 
+    def goes_on(self, account: Account | None) -> None:
+        """All has been written."""
+        if account is not None:
+            self.found, self.stood = len(account.found), len(account.stood)
+
     def news(self, account: Account | None) -> bytes:
         """What is to be written now, nothing where there is nothing new."""
         if account is None or (self.found, self.stood) == (len(account.found), len(account.stood)):
@@ -70,7 +75,7 @@ class Told:
         told = account.report().as_json()
         news = zip(LISTS, (account.found, account.stood), (self.found, self.stood), strict=True)
         told |= {name: told[name][max(known, 0) :] for name, _, known in news}  # type: ignore[index]
-        self.found, self.stood = len(account.found), len(account.stood)
+        self.goes_on(account)
         return json.dumps(told).encode()
 
 

@@ -105,6 +105,8 @@ class LogWriter(Recorder):
         self.numbers = {t.name: n for n, t in enumerate(net.transitions)}
         self.most = max(1, round(1.0 / simulation.request.settings.tick))
         self.ticks, self.told = _Ticks(), Told(len(self.supervisor.events))
+        if going_on is not None and self.world.time:
+            self.told.goes_on(self.world.hooks.account)
         self.trouble: Diagnostic | None = None
         self.checkpoint = checkpoint
         self.file = self._begun(simulation, pag, command) if going_on is None else going_on
@@ -262,7 +264,7 @@ def _header(
 ) -> dict[str, Any]:
     layout, net = simulation.layout, simulation.layout.factory.net.threaded
     factory, plain = layout.factory, layout.plain or layout
-    given = plain.factory.pag if pag is None else pag
+    given, account = plain.factory.pag if pag is None else pag, simulation.world.hooks.account
     file = Path(given.file)
     written = file.is_file() and not layout.ground.get("formed")
     said = file.read_text("utf-8", errors="replace") if written else write_pag(given)
@@ -281,6 +283,7 @@ def _header(
             "wip": simulation.asked.wip is None,
         },
         "distributed": simulation.request.distributed,
+        **({} if account is None else {"faults": account.given}),
         "fuse": simulation.request.fuse,
         "start": sorted(simulation.start),
         "settings": asdict(simulation.request.settings),

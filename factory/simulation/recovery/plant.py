@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence, Set
 from typing import Protocol
 
 from factory.plant.factory import Operation
+from factory.simulation.keeping import Keeper
 from factory.simulation.recovery.faults import WorldFault
 
 
@@ -90,6 +91,13 @@ class Plant(Protocol):
     def lift_out(self, robot: int, at: Mapping[int, float]) -> None:
         """A dead robot and what it holds are taken away, and another is put in its place, with its
         axes at these places [m]."""
+
+    @property
+    def is_calm(self) -> bool:
+        """Whether everything is where it should be, as far as it can be."""
+
+    def keep(self, keeper: Keeper) -> None:
+        """What goes on beside the world, while all is calm."""
 
     @property
     def contacts(self) -> int:
