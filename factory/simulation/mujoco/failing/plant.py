@@ -252,6 +252,7 @@ class MujocoPlant:
         touched = sorted(pressing.touched)
         touched = keeper.rows("fallen.touched", touched, up_to(a_geom), up_to(a_geom))
         pressing.touched = {*touched}
+        back.fresh = {}  # of the parts that are shown where a run begins
         self._mishaps.keep(keeper)
         self._senses.keep(keeper)
 
