@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from factory.layout.sweeping import SweptFloor
-from factory.simulation.mujoco.world import MujocoWorld
+from factory.simulation.mujoco.world import MujocoWorld, anything
 
 SETTLES = 0.5
 """So long after the last thing has been cleared away nothing shakes any more [s]."""
@@ -59,8 +59,8 @@ class Fallen:
         """From now on bodies may come anywhere: all is looked at in every timestep."""
         world = self._world
         world.inspection.pressing.fallen.update(bodies)
-        if _anything not in world.hooks.before_step:
-            world.hooks.before_step.append(_anything)
+        if anything not in world.hooks.before_step:
+            world.hooks.before_step.append(anything)
 
     def calm(self, bodies: Iterable[int]) -> None:
         """Bodies are where they should be again, but for those that lie about."""
@@ -74,9 +74,9 @@ class Fallen:
         pressing.fallen -= {body for body in pressing.fallen if units[body] < 0}
         if pressing.fallen:
             self._calm = world.time + SETTLES
-        elif _anything in world.hooks.before_step and world.time >= self._calm:
+        elif anything in world.hooks.before_step and world.time >= self._calm:
             pressing.shaken.clear()
-            world.hooks.before_step.remove(_anything)
+            world.hooks.before_step.remove(anything)
 
     def _near(self) -> frozenset[int]:
         """The robots that could touch what lies about now."""
@@ -85,7 +85,3 @@ class Fallen:
         bodies, radii = np.array([body for body, _ in lie]), np.array([r for _, r in lie])
         address = m.jnt_qposadr[m.body_jntadr[bodies]][:, None] + np.arange(2)
         return self._swept.near(self._world.d.qpos[address], radii)
-
-
-def _anything() -> None:
-    """Before a timestep in which anything may come anywhere: that there is a hook is enough."""

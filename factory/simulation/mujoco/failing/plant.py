@@ -59,7 +59,11 @@ class MujocoPlant:
 
     def tick(self) -> None:
         """A tick is over."""
-        self._world.parts.strength.dropped = None
+        if self._world.parts.strength.dropped is not None:
+            self._world.parts.strength.dropped = None
+            hands = self._world.parts.hands.of
+            for robot in self._senses.unfelt():
+                self._fallen.watch(hands[robot].bodies.values())
         self._mishaps.tick()
         if self._fallen.tick():
             self.supplied()
