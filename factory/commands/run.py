@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from factory.commands.monitor import found_by, say_verdict, say_violations
+from factory.commands.monitor import found_by, say_failures, say_verdict, say_violations
 from factory.commands.options import (
     FAULTS,
     FLOOR,
@@ -41,7 +41,6 @@ from factory.support.progress import Progress, Waiting
 if TYPE_CHECKING:
     from factory.pipeline import Project
     from factory.plant.factory import Factory
-    from factory.record.failures import Failures
     from factory.record.observed import Recorder
     from factory.render import Film
     from factory.simulation.resuming import Resumed
@@ -306,20 +305,6 @@ def summarise(record: Run, factory: Factory, verbose: bool) -> None:
     table("Utilisation", ("robot", "type", "busy"), rows)
     if more := len(busy) - len(rows):
         say(f"... and {more} more robot{'s' if more > 1 else ''} (-v shows all)")
-
-
-def say_failures(failures: Failures, verbose: bool) -> None:
-    """What went wrong in a run, in a few lines."""
-    struck = ", ".join(f"{count} {kind}" for kind, count in failures.struck.items() if count)
-    missed, alarms = failures.missed, failures.false_alarms
-    say(f"faults: {struck or 'none'}; {missed} missed, {alarms} false alarms")
-    say(
-        f"{len(failures.found)} failures, {failures.undone} transitions undone,"
-        f" {failures.scrapped} scrapped, {failures.spares} spares used,"
-        f" {failures.contacts} contacts with what fell"
-    )
-    for one in failures.found if verbose else ():
-        say(f"  {one.t:.2f} s: {one}")
 
 
 def say_files(**files: Path | None) -> None:
