@@ -156,17 +156,6 @@ def test_a_log_that_is_cut_off_has_the_failures_so_far(kept: Path, tmp_path: Pat
     assert log.failures == whole.failures
 
 
-def test_the_monitor_tells_what_failed_in_a_run_that_was_killed(
-    kept: Path, tmp_path: Path, run: Terminal
-) -> None:
-    data = (kept / "run.log").read_bytes()
-    path = tmp_path / "cut.log"
-    path.write_bytes(data[: block_ends(data)[-2]])
-    told = run("monitor", path, "--json").json
-    assert told["failures"] == run("monitor", kept / "run.log", "--json").json["failures"]
-    assert f"{told['failures']['found']} failures" in run("monitor", path).out
-
-
 def test_logs_of_runs_without_faults_have_nothing_of_them(tmp_path: Path) -> None:
     for faulty in (False, True):
         more = ("--spares", 1) if faulty else ()
