@@ -15,6 +15,7 @@ from factory.support.console import emit, say
 
 if TYPE_CHECKING:
     from factory.record.ending import CutOff
+    from factory.record.failures import Failures
     from factory.record.monitor import Report
     from factory.record.verdict import RunVerdict
 
@@ -50,10 +51,13 @@ def monitor(file: Path, lenient: bool, out: OutputOptions) -> int:
             "refines_net": verdict.refines and report.refines_net,
             "monitor_time_s": report.time_s,
             "verdict": verdict.as_json(),
+            **({} if log.failures is None else {"failures": log.failures.as_json()}),
         }
         emit(document)
     elif not out.quiet:
         say(found_by(report, log.cut_off))
+        if log.failures is not None:
+            say_failures(log.failures, out.verbose)
         say_verdict(verdict)
         for firing in (*report.seen, *report.inferred) if out.verbose else ():
             how = "inferred" if firing.seen is None else "seen"
@@ -86,6 +90,23 @@ def found_by(report: Report, cut_off: CutOff | None) -> str:
     if report.calm_s is not None:
         judged += f" in the {report.calm_s:.1f} s in which nothing failed or was put right"
     return f"monitor: {counts}; {judged}" + (f", {cut_off}" if cut_off else "")
+
+
+def say_failures(failures: Failures, verbose: bool) -> None:
+    """What went wrong in a run, in a few lines."""
+    struck = ", ".join(f"{count} {kind}" for kind, count in failures.struck.items() if count)
+    missed, alarms = failures.missed, failures.false_alarms
+    say(f"faults: {struck or 'none'}; {missed} missed, {alarms} false alarms")
+    say(
+        f"{len(failures.found)} failures, {failures.undone} transitions undone,"
+        f" {failures.scrapped} scrapped, {failures.spares} spares used,"
+        f" {failures.contacts} contacts with what fell"
+    )
+    if failures.binned or failures.spilled:
+        spilled = ", ".join(failures.spilled)
+        say(f"{failures.binned} fell into bins; no bin for scrap of: {spilled or 'none'}")
+    for one in failures.found if verbose else ():
+        say(f"  {one.t:.2f} s: {one}")
 
 
 def say_violations(report: Report | None, shown: int = SHOWN) -> None:

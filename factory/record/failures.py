@@ -119,7 +119,10 @@ class Failures:
 
 class Account(Protocol):
     """What a run that goes on after failures tells of them: those that it has `found`, which robots
-    `stood` so far, and all of it."""
+    `stood` so far, and all of it; `given`: the faults that it was asked for, as values of JSON."""
+
+    @property
+    def given(self) -> Mapping[str, object]: ...
 
     @property
     def found(self) -> Sequence[Failing]: ...

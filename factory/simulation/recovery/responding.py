@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable, Sequence
+from dataclasses import astuple
 from functools import partial
 
 import numpy as np
@@ -19,6 +20,7 @@ from factory.plant.material import joins_of
 from factory.problem.pag import NOPART
 from factory.problem.template import Kind, Response
 from factory.record.failures import Failing
+from factory.simulation.keeping import LARGE, Keeper, is_size, is_text, one_of, some_of, up_to
 from factory.simulation.recovery.books import Books
 from factory.simulation.recovery.faults import Campaign
 from factory.simulation.recovery.plant import Plant
@@ -56,6 +58,30 @@ class Responding:
         self._tried: Counter[int] = Counter()
         self._scrapped: Counter[str] = Counter()
         self._wasting = Wasting(not_carried_back(simulation.layout))
+
+    @property
+    def is_calm(self) -> bool:
+        """Whether all robots are at work, or wait for it."""
+        return not (self.dead or self.returning.ways) and self.standing.is_calm
+
+    def keep(self, keeper: Keeper) -> None:
+        """What failed, and how often on end, while all is calm."""
+        factory, spares = self._books.factory, self._campaign.spares
+        labels, robots = {*factory.by_label}, {"", *(robot.name for robot in factory.robots)}
+        count = up_to(LARGE)
+        found = [astuple(one) for one in self.found]
+        tests = is_size, is_text, one_of(labels), one_of(robots), is_text, some_of(labels)
+        found = keeper.rows("failures", found, *tests, lambda v: v is None or is_size(v))
+        self.found = [
+            Failing(t, test, label, robot, response, tuple(things), until)
+            for t, test, label, robot, response, things, until in found
+        ]
+        self.used_spares = keeper.whole("spares", self.used_spares, 0, spares)
+        numbers, names = up_to(len(factory.operations)), one_of(labels)
+        tried = keeper.rows("failures.tried", self._tried.items(), numbers, count)
+        scrapped = keeper.rows("failures.scrapped", self._scrapped.items(), names, count)
+        self._tried, self._scrapped = Counter(dict(tried)), Counter(dict(scrapped))
+        self.standing.keep(keeper)
 
     def passed(self, operation: Operation) -> None:
         """An operation has come to its goal and is good."""

@@ -3,19 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
-from factory.control.mode import Array, Index
 from factory.layout.bins import TOP, Bin
-from factory.layout.layout import Layout
-from factory.layout.sweeps import piles, regions
+from factory.layout.sweeping import SweptFloor
 from factory.simulation.mujoco.failing.jets import Jets
-from factory.simulation.mujoco.world import MujocoWorld
-
-APART = 0.02
-"""Robots keep so far from what lies about [m]."""
+from factory.simulation.mujoco.world import MujocoWorld, anything
 
 SETTLES = 0.5
 """So long after the last thing has been cleared away nothing shakes any more [s]."""
@@ -32,36 +27,12 @@ class Heap:
     into: Bin | None = None
 
 
-@dataclass(frozen=True, eq=False, slots=True)
-class Swept:
-    """The rectangles (n, 4) [m] that robots (n,) and what they carry sweep, seen from above: least
-    and greatest x, least and greatest y."""
-
-    boxes: Array = field(repr=False)
-    robots: Index = field(repr=False)
-
-    @classmethod
-    def of(cls, layout: Layout) -> Swept:
-        """Those of a layout."""
-        found = regions(layout, piles(layout.factory, layout.product))
-        robots = np.array([region.robot for region in found], np.intp)
-        return cls(np.array([region.box for region in found]), robots)
-
-    def near(self, places: Array, radii: Array) -> frozenset[int]:
-        """The robots that come near to balls of some `radii` (k,) about `places` (k, 2) [m]."""
-        (x, y), box = places.T[:, :, None], self.boxes[None]
-        away = np.maximum(np.maximum(box[..., 0] - x, x - box[..., 1]), 0.0) ** 2
-        away += np.maximum(np.maximum(box[..., 2] - y, y - box[..., 3]), 0.0) ** 2
-        hit = (away < (radii[:, None] + APART) ** 2).any(axis=0)
-        return frozenset(self.robots[hit].tolist())
-
-
 class Fallen:
     """What lies about in a world: `heaps`; `closed`: the robots (index) that could touch it, but
     for what lies in its bin; `binned`: how often something has fallen into one."""
 
     def __init__(self, world: MujocoWorld) -> None:
-        self._world, self._swept = world, Swept.of(world.model.layout)
+        self._world, self._swept = world, SweptFloor.of(world.model.layout)
         self._calm, self._jets = 0.0, Jets(world)
         self.binned = 0
         self.heaps: list[Heap] = []
@@ -98,8 +69,8 @@ class Fallen:
         """From now on bodies may come anywhere: all is looked at in every timestep."""
         world = self._world
         world.inspection.pressing.fallen.update(bodies)
-        if _anything not in world.hooks.before_step:
-            world.hooks.before_step.append(_anything)
+        if anything not in world.hooks.before_step:
+            world.hooks.before_step.append(anything)
 
     def calm(self, bodies: Iterable[int]) -> None:
         """Bodies are where they should be again, but for those that lie about."""
@@ -113,9 +84,9 @@ class Fallen:
         pressing.fallen -= {body for body in pressing.fallen if units[body] < 0}
         if pressing.fallen:
             self._calm = world.time + SETTLES
-        elif _anything in world.hooks.before_step and world.time >= self._calm:
+        elif anything in world.hooks.before_step and world.time >= self._calm:
             pressing.shaken.clear()
-            world.hooks.before_step.remove(_anything)
+            world.hooks.before_step.remove(anything)
 
     def _is_in_bin(self, heap: Heap) -> bool:
         """Whether all of a heap is in its bin, or sinks into it."""
@@ -135,7 +106,3 @@ class Fallen:
         bodies, radii = np.array([body for body, _ in lie]), np.array([r for _, r in lie])
         address = m.jnt_qposadr[m.body_jntadr[bodies]][:, None] + np.arange(2)
         return self._swept.near(self._world.d.qpos[address], radii)
-
-
-def _anything() -> None:
-    """Before a timestep in which anything may come anywhere: that there is a hook is enough."""
