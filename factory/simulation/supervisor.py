@@ -17,6 +17,7 @@ from factory.control.navigation import Bundle
 from factory.modes.staging import HeadStart
 from factory.nets.petri import Marking
 from factory.nets.threads import Threads
+from factory.nets.undo import marking_after
 from factory.nets.undone import Undone
 from factory.plant.factory import Factory, Operation
 from factory.simulation.bundles import Bundles
@@ -95,8 +96,7 @@ class Supervisor:
         axes_of = [*factory.axes, *((stage.axis,) for stage in stages)]
         self.bundles = Bundles([*modes, *(stage.mode for stage in stages)], axes_of, limits)
         net = factory.net
-        starts = [operation.start for operation in factory.operations]
-        self.threads = Threads(net.threaded, net.threads_of(start), starts)
+        self.threads = self._threads_in(start)
         self.fired = [counts.get(number, 0) for number in range(len(net.threaded.transitions))]
         self.events: list[Event | Undone] = []
         self.ahead, self.active = Ahead(factory, stages), Active()
@@ -141,14 +141,36 @@ class Supervisor:
     ) -> None:
         """Go on from a marking, that of the counts `fired`: operations that are no longer marked
         are over, as are the stages of axes that are `free`."""
-        factory, active = self.factory, self.active
+        active = self.active
         self.fired[:] = fired
         self.events.append(undone)
-        starts = [operation.start for operation in factory.operations]
-        self.threads = Threads(factory.net.threaded, factory.net.threads_of(marking), starts)
-        self.enabled = True
+        self.threads, self.enabled = self._threads_in(marking), True
         self._activate([n for n in active.operations if self.marked[n]], active.ahead)
         self.recall(free)
+
+    def exchange(
+        self,
+        factory: Factory,
+        modes: Sequence[Mode],
+        stages: Sequence[HeadStart],
+        undone: Undone,
+        fired: Sequence[int],
+    ) -> None:
+        """Go on in another factory that has the same operations, robots by number and axes, from
+        the counts `fired`: what is under way goes on, robots that wait go ahead anew."""
+        axes_of = [*factory.axes, *((stage.axis,) for stage in stages)]
+        self.factory = factory
+        self.bundles = Bundles([*modes, *(stage.mode for stage in stages)], axes_of, self.limits)
+        self._activate(self.active.operations, ())
+        self.ahead, marking = Ahead(factory, stages), marking_after(factory.net, fired)
+        self.undo(undone, fired, marking, ())
+        self._activate(
+            self.active.operations, self.ahead.waiting(self.marked, self.world.sense()[0])
+        )
+
+    def _threads_in(self, marking: Marking) -> Threads:
+        net, starts = self.factory.net, [operation.start for operation in self.factory.operations]
+        return Threads(net.threaded, net.threads_of(marking), starts)
 
     def recall(self, axes: Container[int]) -> None:
         """The stages of axes are over, wherever those are."""
