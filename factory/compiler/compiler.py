@@ -310,9 +310,7 @@ def gear_net(robots: tuple[Robot, ...], operations: tuple[Operation, ...]) -> Ge
         gears.append(Gear(robot.name, robot.type, tuple(gear_places), tuple(gear_events)))
     redistribution: tuple[Redistribution, ...] = tuple(tuple(sorted(p)) for p in pairs)
     net = ThreadedNet(PetriNet(transitions, tuple(places)), redistribution)
-    return GearNet(
-        net, tuple(gears), tuple(g.places[0] for g in gears if g.places), tuple(slots)
-    )
+    return GearNet(net, tuple(gears), tuple(g.places[0] for g in gears if g.places), tuple(slots))
 
 
 def _wait_name(robot: Robot, label: str, onward: Operation, several: bool) -> str:

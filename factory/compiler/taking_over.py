@@ -10,15 +10,16 @@ Guarantees: N' is a gear train, live, safe and reversible, and n' is reachable i
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
 from factory.compiler.compiler import gear_net
 from factory.compiler.deputies import Moved, moved_to, postorder, program_with
+from factory.nets.gears import GearNet
 from factory.nets.petri import Marking
 from factory.nets.undo import exchange, marking_after
-from factory.nets.undone import Undone
+from factory.nets.undone import Entry, Undone
 from factory.nets.verify import proved
 from factory.plant.factory import Factory, Operation
 from factory.plant.material import joins_of
@@ -58,7 +59,8 @@ class Takeover:
         counts = exchange(net, fired, asked, joins_of(self.after))
         at = _next(self.before, marking_after(self.before.net, fired), self.dead)
         what = t, at.label, "{} is dead, and {} takes its tours".format(*self.names)
-        return counts, Undone.between(net, what, asked, fired, counts, exchanged=True)
+        undone = Undone.between(net, what, asked, fired, counts, exchanged=True)
+        return counts, replace(undone, robots=self.names)
 
 
 def taken_over(factory: Factory, dead: int, deputy: int, catalogue: Catalogue) -> Takeover:
@@ -66,6 +68,17 @@ def taken_over(factory: Factory, dead: int, deputy: int, catalogue: Catalogue) -
     (BadLine) where it is no deputy."""
     moved = moved_to(factory, dead, deputy, catalogue)
     return Takeover(factory, with_moved(factory, moved), dead, moved)
+
+
+def nets_after(factory: Factory, entries: Iterable[Entry]) -> Iterator[GearNet]:
+    """The nets in which a recorded run went on where robots were exchanged, in their order. They
+    are not proved."""
+    number = {robot.name: robot.index for robot in factory.robots}
+    for entry in entries:
+        if isinstance(entry, Undone) and len(entry.robots) == 2:
+            dead, deputy = (number[name] for name in entry.robots)
+            factory = crew_with(factory, {dead: deputy})
+            yield without_gone(factory).net
 
 
 def with_moved(factory: Factory, moved: Moved) -> Factory:

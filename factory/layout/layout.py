@@ -6,7 +6,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from types import MappingProxyType
-from typing import TYPE_CHECKING
 
 from factory.geometry.solids import Product
 from factory.layout.certificate import Certificate
@@ -26,9 +25,6 @@ from factory.layout.hands.mounted import Mount, grip_of
 from factory.plant.approaches import Overlap
 from factory.plant.factory import Factory, Operation
 from factory.problem.pag import NOPART
-
-if TYPE_CHECKING:
-    from factory.layout.standby import Standby
 
 BESIDE = 0.005
 """What is to be lowered stays this far short of its meeting point until the others stand [m]."""
@@ -60,8 +56,8 @@ class Layout:
     each robot and each of its tours how far the product's middle is, in the robot's frame (u, t)
     and upwards, from where it is on the first of them [m], nothing for no shifts
     (docs/decisions/hands.md, Lines);
-    `plain`: the layout without relays, None where this is one; `standby`: what deputies need that
-    may take over, of which this is a part, None where none may; `ground`: what it was made for, by
+    `plain`: the layout without relays, None where this is one; `standby`: that of which this is a
+    part, so that deputies can take over, None where none may; `ground`: what it was made for, by
     the names that `request.Ground` has.
     """
 
@@ -77,7 +73,7 @@ class Layout:
     floor: Box = (0.0, 0.0, 0.0, 0.0)
     certificate: Certificate | None = field(default=None, repr=False, compare=False)
     plain: Layout | None = field(default=None, repr=False, compare=False)
-    standby: Standby | None = field(default=None, repr=False, compare=False)
+    standby: Layout | None = field(default=None, repr=False, compare=False)
     ground: Mapping[str, object] = field(default_factory=dict, repr=False, compare=False)
 
     def __post_init__(self) -> None:
@@ -232,10 +228,7 @@ class Layout:
     @cached_property
     def strokes(self) -> Mapping[int, float]:
         """How far up the lift of each robot that has one goes (index) [m]."""
-        highest = {
-            robot: max((level.up for level in self._levels[robot]), default=0.0)
-            for robot in self.lifts
-        }
+        highest = {r: max((level.up for level in self._levels[r]), default=0.0) for r in self.lifts}
         return MappingProxyType({robot: max(up, LEAST) for robot, up in highest.items()})
 
     def elevation(self, robot: int, operation: int) -> float:

@@ -78,7 +78,7 @@ class Ground:
         """The layout of a factory, of all whose deputies as many as possible can take over."""
         from factory.compiler.deputies import deputies
         from factory.compiler.standing_by import Pair, chosen_pairs, standing_by
-        from factory.layout.standby import Standby, laid_out_for
+        from factory.layout.standby import laid_out_for, part_of
         from factory.problem.robot_types import load_catalogue
 
         plain = replace(self, deputies=False)
@@ -88,13 +88,11 @@ class Ground:
             return plain.lay_out(whole, product, settings, None if pairs else hands)
 
         found = chosen_pairs(deputies(factory, catalogue or load_catalogue()))
-        layout, pairs, refused = laid_out_for(found, lay_out)
-        standby = Standby(layout, pairs, refused)
-        robots = range(len(factory.robots))
-        base = replace(layout, product=product, standby=standby, ground=self.kept())
-        within = standby.within(base, factory, robots)
-        assert within is not None
-        return within
+        whole, robots = laid_out_for(found, lay_out), range(len(factory.robots))
+        known = replace(whole, product=product, standby=whole, ground=self.kept())
+        layout = part_of(known, factory, robots)
+        assert layout is not None, "its robots have their own tours"
+        return layout
 
     def kept(self) -> dict[str, object]:
         """What a log keeps: by name, without branches where there are none."""

@@ -25,6 +25,12 @@ class Exchange:
     crew: Factory = field(repr=False)
     cycle_time: float
 
+    def __str__(self) -> str:
+        return (
+            f"{self.deputy} takes over the tours of {self.dead} (deputy);"
+            f" predicted from then on: {self.cycle_time:.3f} s"
+        )
+
     def as_json(self) -> dict[str, object]:
         """As `run --json` prints it, the counts by the names of transitions."""
         names = (transition.name for transition in self.net.threaded.transitions)

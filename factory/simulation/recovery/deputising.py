@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from factory.compiler.taking_over import Takeover, present, with_moved
 from factory.layout.layout import Layout
 from factory.layout.scrapping import not_carried_back
+from factory.layout.standby import deputies_in, part_of
 from factory.modes.modes import operation_modes, robot_limits
 from factory.modes.staging import stages_of
 from factory.nets.undone import Undone
@@ -18,7 +19,7 @@ from factory.timing.prediction import all_ways, operation_delays, predict
 
 
 @dataclass(frozen=True, slots=True)
-class Change:
+class Successors:
     """A takeover, the `layout` of the crew that stays, in which robots keep their numbers, and that
     of these robots `alone`."""
 
@@ -48,31 +49,32 @@ class Deputising:
 
     def appoint(self, robot: int, dead: Container[int]) -> str:
         """A deputy is to take over for a robot (index): its name, "" where there is none, or it is
-        among the `dead`."""
-        standby = self._books.layout.standby
-        deputy = -1 if standby is None else standby.deputy(robot)
+        among the `dead`. Bodies are not handed over from one line's feeder to another's, so in the
+        engine there is none."""
+        if self._simulation.model is not None:
+            return ""
+        deputy = deputies_in(self._simulation.layout).get(robot, -1)
         if deputy < 0 or self._change(robot, deputy, dead) is None:
             return ""
         self.by_robot[robot] = deputy
         return self._books.factory.robots[deputy].name
 
-    def take_over(self, robot: int, dead: Container[int]) -> Change | None:
+    def take_over(self, robot: int, dead: Container[int]) -> Successors | None:
         """What changes as the deputy of a robot takes over; None where it cannot any more."""
         return self._change(robot, self.by_robot.pop(robot), dead)
 
-    def _change(self, robot: int, deputy: int, dead: Container[int]) -> Change | None:
+    def _change(self, robot: int, deputy: int, dead: Container[int]) -> Successors | None:
         books, factory = self._books, self._books.factory
-        standby = books.layout.standby
-        if standby is None or deputy in dead or not factory.robots[deputy].operations:
+        if deputy in dead or not factory.robots[deputy].operations:
             return None
         moved = {robot: deputy}
         takeover = Takeover(factory, with_moved(factory, moved), robot, moved)
         crew, every = takeover.crew, range(len(factory.robots))
-        layout = standby.within(books.layout, crew, every)
-        alone = standby.within(books.layout, takeover.after, present(crew))
-        return Change(takeover, layout, alone) if layout and alone else None
+        layout = part_of(books.layout, crew, every)
+        alone = part_of(books.layout, takeover.after, present(crew))
+        return Successors(takeover, layout, alone) if layout and alone else None
 
-    def exchange(self, change: Change, fired: tuple[int, ...], undone: Undone) -> None:
+    def exchange(self, change: Successors, fired: tuple[int, ...], undone: Undone) -> None:
         """The run goes on in another net from the counts `fired`. The modes are those of the robots
         that stay."""
         simulation, alone, takeover = self._simulation, change.alone, change.takeover
