@@ -11,7 +11,7 @@ REPORT = Report(
     " `make faults` (`python -m tests.bench.faults NAME` for one section) from what is kept in"
     " docs/faults/. The supervisor is told of no fault: it has what sensors measure, with their"
     " default noise.",
-    ("campaigns", "deaths", "production", "sensors", "kills"),
+    ("campaigns", "deaths", "takeovers", "production", "sensors", "kills"),
     DOCS / "faults.md",
     ("mujoco", "numpy", "scipy"),
 )
