@@ -8,8 +8,10 @@ from collections import Counter
 from collections.abc import Callable, Iterable
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
+import numpy as np
 import pytest
 from layout_values import random_layout
 
@@ -21,6 +23,8 @@ from factory.pipeline import all_templates
 from factory.record.log import Log, LogWriter, read_log
 from factory.record.monitor import MonitorSubject, Report, beside, subject_of
 from factory.record.monitor.explanation import SeenFirings
+from factory.record.monitor.motion import AxisMotion
+from factory.record.monitor.observation import Observation
 from factory.record.monitor.record import watch_log
 from factory.simulation.request import RunRequest
 from factory.simulation.simulation import Simulation
@@ -546,3 +550,29 @@ def test_a_faulty_run_fails(run: Terminal, tmp_path: Path, monkeypatch: pytest.M
     assert again.status == 1
     assert again.json["violations"] == done.json["monitor"]["violations"]
     assert "VIOLATIONS" in run("monitor", log).out
+
+
+def test_a_robot_seen_to_leave_first_as_operations_end_has_not_left_before() -> None:
+    """Within a tick of another look its setpoint is not counted: that it stood is all that is
+    known, however long it is that it came."""
+    every = np.arange(1)
+    anatomy = SimpleNamespace(slide=every, dof=every, drive=every)
+
+    def seen(time: float, at: float, at_end: bool = True) -> Observation:
+        return Observation(
+            time, np.array([at]), np.zeros(1), np.array([at]), np.empty((0, 3), np.intp), at_end
+        )
+
+    motion = AxisMotion(anatomy, Settings(), np.full(1, 1e-4), seen(0.0, 0.2, False))  # type: ignore[arg-type]
+    for time in (0.01, 0.02, 0.03):
+        left, _, _ = motion.look(seen(time, 0.2))
+        assert not len(left)
+    motion.look(seen(0.035, 0.19))
+    left, _, _ = motion.look(seen(0.045, 0.18))
+    assert left.tolist() == [0] and motion.begun(0) == 0.045
+    motion.leave(0, 0.1)
+    left, _, _ = motion.look(seen(0.5, 0.1, False))
+    motion.stand(0, 0.1)
+    motion.look(seen(0.6, 0.1, False))
+    left, _, _ = motion.look(seen(0.7, 0.05, False))
+    assert left.tolist() == [0] and motion.begun(0) == 0.7

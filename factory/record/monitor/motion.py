@@ -159,8 +159,10 @@ class AxisMotion:
 
     def begun(self, robot: int) -> float:
         """The time [s] by which a robot that leaves has begun to."""
-        stood = self.setpoints.still[robot] >= self.came[1, robot]
-        return float(self.setpoints.first[robot]) if stood else self.now.t
+        still, seen = self.setpoints.still[robot], self.setpoints.seen
+        # one that stood when setpoints were counted last has been seen to go off only now
+        known = self.came[1, robot] <= still < seen
+        return float(self.setpoints.first[robot]) if known else self.now.t
 
     def leave(self, robot: int, target: float) -> None:
         """A robot makes for a target, where it may be already."""

@@ -1,0 +1,25 @@
+"""What has gone wrong how often on end."""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import dataclass, field
+
+from factory.plant.factory import Factory
+from factory.simulation.keeping import LARGE, Keeper, one_of, up_to
+
+
+@dataclass(slots=True)
+class OnEnd:
+    """How often on end an operation (index) was `tried` again, and a label `scrapped`."""
+
+    tried: Counter[int] = field(default_factory=Counter)
+    scrapped: Counter[str] = field(default_factory=Counter)
+
+    def keep(self, keeper: Keeper, factory: Factory) -> None:
+        """Keep both counts, or take them up."""
+        numbers, names = up_to(len(factory.operations)), one_of({*factory.by_label})
+        count = up_to(LARGE)
+        tried = keeper.rows("failures.tried", self.tried.items(), numbers, count)
+        scrapped = keeper.rows("failures.scrapped", self.scrapped.items(), names, count)
+        self.tried, self.scrapped = Counter(dict(tried)), Counter(dict(scrapped))
