@@ -56,15 +56,22 @@ class Report:
             parser.error(f"no section {', '.join(sorted(unknown))}; there are {there}")
         return names or self.sections
 
-    def measure(self, name: str, quick: bool, only: Sequence[str] = ()) -> None:
+    def measure(
+        self, name: str, quick: bool, only: Sequence[str] = (), goes_on: bool = False
+    ) -> None:
         """Measure a section and keep what it found at once: one that takes long yields all that it
         has found so far, again and again. With `only` it measures these products, and the others
-        that are kept stay as they are."""
+        that are kept stay as they are; one that `goes_on` measures what is not kept yet."""
         begin = perf_counter()
         measure = self.module(name).measure
         file = self.folder / f"{name}.json"
-        kept = json.loads(file.read_text())["results"] if only and file.is_file() else None
-        found = measure(quick, only, kept) if only else measure(quick)
+        before = json.loads(file.read_text()) if (only or goes_on) and file.is_file() else {}
+        kept = before.get("results")
+        if goes_on:
+            begin -= before.get("seconds", 0.0)
+            found = measure(quick, kept)
+        else:
+            found = measure(quick, only, kept) if only else measure(quick)
         for results in [found] if isinstance(found, dict) else found:
             document = {
                 "section": name,

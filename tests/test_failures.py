@@ -14,6 +14,7 @@ from factory.nets.marked import marked
 from factory.nets.undo import times_undone, tokens_after, undo
 from factory.plant.factory import Factory, Operation
 from factory.plant.material import joins_of
+from factory.simulation.recovery.faults import CLEAR
 from factory.study.analysis import Timing
 from factory.study.analysis.failing import failing_net, failing_pace
 from factory.study.analysis.firing import earliest_firings
@@ -283,19 +284,27 @@ def test_a_template_of_ones_own(run: Terminal, tmp_path: Path) -> None:
 
 def test_analyze_foresees_the_pace_with_failures(run: Terminal) -> None:
     words = ("analyze", PAPER, "--redo", "0.05", "--lose", "0.01")
-    found = run(*words, "--json").json
+    standing = run(*words, "--json").json["failing"]
+    found = run(*words, "--clear", "0", "--json").json
     rate = found["failing"]
     assert (rate["made"], rate["units"], rate["stopped"]) == (2000, 2000, None)
     assert rate["cycle_time_s"] == pytest.approx(found["cycle_time_s"] * (1 + rate["loss"]))
     assert 0.05 < rate["loss"] < 0.2
     assert sum(one["redone"] for one in rate["operations"]) > 500
-    assert "5 % redone and 1 % lost at each operation: cycle time" in run(*words).out
+    assert (rate["clear_s"], standing["clear_s"]) == (0.0, CLEAR)
+    assert standing["loss"] > 2 * rate["loss"]
+    assert "1 % lost at each operation, which lies for 10 s: cycle time" in run(*words).out
+    assert "1 % lost at each operation: cycle time" in run(*words, "--world", "ideal").out
     assert "failing" not in run("analyze", PAPER, "--json").json
 
 
 @pytest.mark.parametrize(
     ("words", "message"),
-    [(("--redo", "0.4", "--lose", "0.2"), "more than 0.5 together"), (("--redo", "2"), "0.5")],
+    [
+        (("--redo", "0.4", "--lose", "0.2"), "more than 0.5 together"),
+        (("--redo", "2"), "0.5"),
+        (("--redo", "0.1", "--clear", "5"), "--clear says how long what is lost lies"),
+    ],
 )
 def test_rates_that_are_too_much(run: Terminal, words: tuple[str, ...], message: str) -> None:
     done = run("analyze", PAPER, *words)

@@ -19,6 +19,7 @@ from factory.simulation.request import RunRequest
 from factory.simulation.simulation import Simulation
 from tests.command_line import PAPER, Terminal
 from tests.failing_runs import FAULTS, failing, paper_layout
+from tests.test_log import block_ends
 
 
 @pytest.fixture(scope="module")
@@ -80,6 +81,13 @@ def test_from_the_command_line(run: Terminal, tmp_path: Path) -> None:
     found = run("run", PAPER, *words, "--json")
     assert found.status == 0 and len(found.json["failures"]["failures"]) >= 3
     assert run("report", log, "-o", out).status == 0
+    assert "r6 lost part2" in out.read_text()
+    data, failures = log.read_bytes(), found.json["failures"]
+    assert run("monitor", log, "--json").json["failures"] == failures
+    log.write_bytes(data[: block_ends(data)[-2]])  # killed before its end
+    assert run("monitor", log, "--json").json["failures"]["failures"] == failures["failures"]
+    assert f"{failures['found']} failures" in run("monitor", log).out
+    assert run("report", log, "-o", out).status == 1
     assert "r6 lost part2" in out.read_text()
 
 

@@ -19,6 +19,7 @@ from factory.record.monitor.record import recorded_subject, verdict_on, watch_lo
 from factory.study.analysis.recorded import logged_record
 from factory.support.errors import InputError
 from tests.command_line import PAPER, Terminal, spawn
+from tests.test_log import block_ends
 from tests.test_log_damage import put_together, taken_apart
 
 FAULTS = '[[fault]]\nkind = "bad_joint"\nrate = 0.2\n[[fault]]\nkind = "drop"\nrate = 0.1\n'
@@ -128,8 +129,47 @@ def test_the_monitor_on_a_log_with_failures(run: Terminal, tmp_path: Path) -> No
     assert log.undone
     found = run("monitor", tmp_path / "log", "--json").json
     assert found["refines_net"] and found["violations"] == []
-    assert "states not judged" in run("monitor", tmp_path / "log").out
+    assert "in which nothing failed" in run("monitor", tmp_path / "log").out
     after, undone = log.undone[0]
     less = replace(undone, transitions=undone.transitions[1:])
     report, _ = watch_log(replace(log, undone=((after, less), *log.undone[1:])))
     assert [v.code for v in report.violations] == ["Record"]
+
+
+# What failed, as it happens
+
+
+def test_a_log_that_is_cut_off_has_the_failures_so_far(kept: Path, tmp_path: Path) -> None:
+    """Whatever the block after which its run was killed; with all of them it has all."""
+    data, whole = (kept / "run.log").read_bytes(), read_log(kept / "run.log")
+    assert whole.failures is not None and len(whole.failures.found) > 5
+    path, counts = tmp_path / "cut.log", []
+    for end in block_ends(data)[1:-1]:
+        path.write_bytes(data[:end])
+        log = read_log(path)
+        assert log.failures is not None and not log.complete
+        until = float(log.time[-1]) + 1e-9
+        assert log.failures.found == tuple(f for f in whole.failures.found if f.t <= until)
+        assert log.failures.stood == tuple(s for s in whole.failures.stood if s[0] <= until)
+        counts.append(len(log.failures.found))
+    assert counts == sorted(counts) and 0 < counts[len(counts) // 2] < counts[-1]
+    assert log.failures == whole.failures
+
+
+def test_logs_of_runs_without_faults_have_nothing_of_them(tmp_path: Path) -> None:
+    for faulty in (False, True):
+        more = ("--spares", 1) if faulty else ()
+        spawn("run", PAPER, "--world", "ideal", "--units", 2, *more, "--log", tmp_path / "run.log")
+        _, found = taken_apart(tmp_path / "run.log")
+        has = [("failures" in arrays) for kind, arrays in found if kind == b"T"]
+        assert has == [faulty, *[False] * (len(has) - 1)]
+
+
+def test_what_is_no_news_of_failures_is_refused(kept: Path, tmp_path: Path) -> None:
+    header, found = taken_apart(kept / "run.log")
+    arrays = next(arrays for kind, arrays in found if kind == b"T" and "failures" in arrays)
+    arrays["failures"] = np.frombuffer(b'{"struck": 3}', "u1")
+    path = tmp_path / "bad.log"
+    put_together(path, header, [(k, a) for k, a in found if k != b"E"])
+    with pytest.raises(InputError, match="'struck' must be how many faults"):
+        read_log(path)

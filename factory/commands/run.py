@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from factory.commands.monitor import found_by, say_verdict, say_violations
+from factory.commands.monitor import found_by, say_failures, say_verdict, say_violations
 from factory.commands.options import (
     FAULTS,
     FLOOR,
@@ -41,7 +41,6 @@ from factory.support.progress import Progress, Waiting
 if TYPE_CHECKING:
     from factory.pipeline import Project
     from factory.plant.factory import Factory
-    from factory.record.failures import Failures
     from factory.record.observed import Recorder
     from factory.render import Film
     from factory.simulation.resuming import Resumed
@@ -124,7 +123,9 @@ def _go_on(going: Resumed, asked: RunOptions, monitor: bool | None, out: OutputO
     made = going.simulation
     with going.trusted():
         record = carry_out(made, out.silent, asked.max_time, [going.writer], False)
-    if monitor is not False and made.model is not None:
+    if account := made.world.hooks.account:
+        record = replace(record, failures=account.report())
+    elif monitor is not False and made.model is not None:
         with Waiting("judging the whole run", out.silent):
             record = replace(record, monitor=watch_log(read_log(going.path))[0])
     status = _told(replace(record, lenient=asked.lenient), made.layout.factory, [], monitor, out)
@@ -212,6 +213,12 @@ def run_project(
         recorders.append(lambda: film(made))
     record = carry_out(made, silent, asked.max_time, recorders, monitor)
     failures = None if recovery is None else recovery.report()
+    if failures is not None and log is not None and monitor is not False and made.model is not None:
+        from factory.record.log import read_log
+        from factory.record.monitor.record import watch_log
+
+        with Waiting("judging the run between failures", silent):
+            record = replace(record, monitor=watch_log(read_log(log))[0])
     return replace(record, lenient=asked.lenient, failures=failures)
 
 
@@ -310,20 +317,6 @@ def summarise(record: Run, factory: Factory, verbose: bool) -> None:
     table("Utilisation", ("robot", "type", "busy"), rows)
     if more := len(busy) - len(rows):
         say(f"... and {more} more robot{'s' if more > 1 else ''} (-v shows all)")
-
-
-def say_failures(failures: Failures, verbose: bool) -> None:
-    """What went wrong in a run, in a few lines."""
-    struck = ", ".join(f"{count} {kind}" for kind, count in failures.struck.items() if count)
-    missed, alarms = failures.missed, failures.false_alarms
-    say(f"faults: {struck or 'none'}; {missed} missed, {alarms} false alarms")
-    say(
-        f"{len(failures.found)} failures, {failures.undone} transitions undone,"
-        f" {failures.scrapped} scrapped, {failures.spares} spares used,"
-        f" {failures.contacts} contacts with what fell"
-    )
-    for one in failures.found if verbose else ():
-        say(f"  {one.t:.2f} s: {one}")
 
 
 def say_files(**files: Path | None) -> None:

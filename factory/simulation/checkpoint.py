@@ -3,18 +3,26 @@ is made anew and takes one up goes on from there to the last bit as the one that
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
+from factory.nets.undone import Undone
 from factory.record.log.blocks import Arrays
 from factory.record.log.reader import Log
 from factory.simulation.keeping import Keeper, Noting, TakingUp
+from factory.simulation.recovery.recovery import Recovery
 from factory.simulation.simulation import Simulation
 from factory.simulation.supervisor import Supervisor
 
 
 def checkpoint(simulation: Simulation) -> Arrays | None:
     """The state of a simulation after a tick. None where it has none that could be taken up: where
-    robots run their own programs, where others take part, or something has been dropped."""
-    hooks = simulation.world.hooks
-    if simulation.request.distributed or hooks.before_step or hooks.sensors or hooks.gates:
+    robots run their own programs, where others take part, or something has been dropped. A run that
+    goes on after failures has one whenever nothing is wrong."""
+    hooks, recovery = simulation.world.hooks, _recovery(simulation)
+    others = [len(found) > bool(recovery) for found in (hooks.sensors, hooks.gates)]
+    if simulation.request.distributed or hooks.before_step or any(others):
+        return None
+    if recovery is not None and not recovery.is_calm:
         return None
     keeper = Noting()
     _keep(simulation, keeper, ())
@@ -26,7 +34,11 @@ def take_up(simulation: Simulation, state: Arrays, log: Log) -> None:
     ValueError, or another of `record.log.kept.BROKEN`, where the two are not of one run of it."""
     world, times = simulation.world, log.fired_t.tolist()
     fired = [*zip(times, log.fired.tolist(), strict=True)]
-    _keep(simulation, TakingUp(state), fired)
+    past, begin = list[tuple[float, int] | Undone](), 0
+    for after, undone in log.undone:
+        past += [*fired[begin:after], undone]
+        begin = after
+    _keep(simulation, TakingUp(state), [*past, *fired[begin:]])
     if simulation.model is None:
         drops = {dropoff.end for dropoff in simulation.layout.factory.dropoffs}
         world.dropoffs.extend(t for t, event in fired if event in drops)
@@ -36,14 +48,21 @@ def take_up(simulation: Simulation, state: Arrays, log: Log) -> None:
     _check(simulation, log)
 
 
+def _recovery(simulation: Simulation) -> Recovery | None:
+    account = simulation.world.hooks.account
+    return account if isinstance(account, Recovery) else None
+
+
 def _keep(
-    simulation: Simulation, keeper: Keeper, fired: list[tuple[float, int]] | tuple[()]
+    simulation: Simulation, keeper: Keeper, past: Sequence[tuple[float, int] | Undone]
 ) -> None:
     supervisor = simulation.supervisor
     assert isinstance(supervisor, Supervisor)
-    supervisor.keep(keeper, fired)
+    supervisor.keep(keeper, past)
     active = supervisor.active
     simulation.world.keep(keeper, active.bundle, active.axes)
+    if (recovery := _recovery(simulation)) is not None:
+        recovery.keep(keeper)
 
 
 def _check(simulation: Simulation, log: Log) -> None:

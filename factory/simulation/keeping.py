@@ -153,6 +153,23 @@ class TakingUp:
         return self.value(name, value, lambda v: type(v) is int and low <= v <= high)
 
 
+def keep_draws(keeper: Keeper, name: str, draws: np.random.Generator) -> None:
+    """Where a generator of random numbers (PCG64) is."""
+    state: Any = draws.bit_generator.state
+    kept = [state["state"]["state"], state["state"]["inc"], state["has_uint32"], state["uinteger"]]
+    bounds = (1 << 128, 1 << 128, 2, 1 << 32)
+    found = keeper.rows(name, [(*kept,)], *map(up_to, bounds))
+    if len(found) != 1:
+        raise ValueError(f"'{name}' is {len(found)} states, not one")
+    at, inc, has, left = found[0]
+    draws.bit_generator.state = {
+        **state,
+        "state": {"state": at, "inc": inc | 1},
+        "has_uint32": has,
+        "uinteger": left,
+    }
+
+
 def up_to(count: float) -> Test:
     """Whether a value is a whole number from 0 to less than `count`."""
     return lambda v: type(v) is int and 0 <= v < count
@@ -161,6 +178,11 @@ def up_to(count: float) -> Test:
 def one_of(names: Container[str]) -> Test:
     """Whether a value is one of some names."""
     return lambda v: isinstance(v, str) and v in names
+
+
+def some_of(names: Container[str]) -> Test:
+    """Whether a value is a list of some names."""
+    return lambda v: isinstance(v, list | tuple) and all(map(one_of(names), v))
 
 
 def is_size(value: Any) -> bool:

@@ -20,13 +20,15 @@ from factory.record.log.recompiled import AGAIN, of_its_factory
 from factory.record.log.relaid import project_of
 from factory.record.log.writer import versions
 from factory.simulation.checkpoint import checkpoint, take_up
+from factory.simulation.recovery.faults import campaign_of
+from factory.simulation.recovery.recovery import recover
 from factory.simulation.request import RunRequest
 from factory.simulation.simulation import Simulation
 from factory.support.claim import claimed_again
 from factory.support.errors import Diagnostic, InputError
 from factory.support.settings import AUTO
 
-IN_ITSELF = ("Stalled", "Dropped", "Unstable")
+IN_ITSELF = ("Stalled", "Dropped", "Unstable", "Failed")
 """What ends a run that would end in the same way if it went on."""
 
 TRIES = 3
@@ -126,7 +128,8 @@ def _check(kept: KeptRun) -> None:
     if header.get("distributed"):
         words = "is of a run with --distributed, which has no checkpoints to go on from"
         raise InputError(_bad(kept.path, words, "leave out --distributed"))
-    if "chosen" not in header or (kept.ticks > 1 and not kept.checkpoints):
+    lacks = kept.ticks > 1 and not kept.checkpoints and "faults" not in header
+    if "chosen" not in header or lacks:
         raise InputError(_bad(kept.path, "has no checkpoints to go on from", AGAIN))
     for package in ("klavins-factory", "mujoco"):
         then, here = header["versions"].get(package, ""), now.get(package, "")
@@ -146,6 +149,7 @@ def _request(kept: KeptRun) -> RunRequest:
         frozenset(header["start"]),
         header["wip"],
         fuse=header["fuse"],
+        recovers="faults" in header,
     )
 
 
@@ -181,6 +185,8 @@ def _made(kept: KeptRun, project: Project, request: RunRequest) -> Simulation:
     with of_its_factory():
         made = Simulation(project.layout, request)
         made.asked = _asked(request, **header["chosen"])
+        if request.recovers:
+            recover(made, campaign_of(header["faults"]))
         factory = made.layout.factory
         net = factory.net.threaded
         names = [[x.name for x in found] for found in (net.transitions, net.places, factory.robots)]

@@ -96,7 +96,7 @@ class Supervisor:
         axes_of = [*factory.axes, *((stage.axis,) for stage in stages)]
         self.bundles = Bundles([*modes, *(stage.mode for stage in stages)], axes_of, limits)
         net = factory.net
-        self.threads = self._threads_in(start)
+        self._mark(start)
         self.fired = [counts.get(number, 0) for number in range(len(net.threaded.transitions))]
         self.events: list[Event | Undone] = []
         self.ahead, self.active = Ahead(factory, stages), Active()
@@ -144,7 +144,8 @@ class Supervisor:
         active = self.active
         self.fired[:] = fired
         self.events.append(undone)
-        self.threads, self.enabled = self._threads_in(marking), True
+        self._mark(marking)
+        self.enabled = True
         self._activate([n for n in active.operations if self.marked[n]], active.ahead)
         self.recall(free)
 
@@ -168,9 +169,18 @@ class Supervisor:
             self.active.operations, self.ahead.waiting(self.marked, self.world.sense()[0])
         )
 
-    def _threads_in(self, marking: Marking) -> Threads:
-        net, starts = self.factory.net, [operation.start for operation in self.factory.operations]
-        return Threads(net.threaded, net.threads_of(marking), starts)
+    def _take_back(self, undone: Undone) -> None:
+        """What was undone in a record that is taken up."""
+        net = self.factory.net
+        for name in undone.transitions:
+            self.fired[net.threaded.net.transition_index[name]] -= 1
+        self._mark(marking_after(net, self.fired))
+        self.events.append(undone)
+
+    def _mark(self, marking: Marking) -> None:
+        starts = [operation.start for operation in self.factory.operations]
+        net = self.factory.net
+        self.threads = Threads(net.threaded, net.threads_of(marking), starts)
 
     def recall(self, axes: Container[int]) -> None:
         """The stages of axes are over, wherever those are."""
@@ -195,9 +205,10 @@ class Supervisor:
         """The operations all of whose robots wait for them."""
         return [self.factory.operations[event // 2] for event in sorted(self.threads.possible)]
 
-    def keep(self, keeper: Keeper, past: Sequence[tuple[float, int]] = ()) -> None:
+    def keep(self, keeper: Keeper, past: Sequence[tuple[float, int] | Undone] = ()) -> None:
         """How often each transition has fired, and the modes under way; `past`: when each has [s],
-        and its number, where that is taken up. Raises ValueError where these are not of one run."""
+        and its number, and what was undone in between, where that is taken up. Raises ValueError
+        where these are not of one run."""
         fired = np.array(self.fired)
         keeper.array("fired", fired, 0)
         going = [(number,) for number in self.active.operations]
@@ -211,13 +222,17 @@ class Supervisor:
         enabled, near = keeper.flag("enabled", self.enabled), keeper.flag("near", self.near)
         if not keeper.takes_up:
             return
-        for _, event in past:
+        transitions = self.factory.net.threaded.transitions
+        for entry in past:
+            if isinstance(entry, Undone):
+                self._take_back(entry)
+                continue
+            t, event = entry
             self.threads.fire((event,))
             self.fired[event] += 1
+            self.events.append(Event(t, transitions[event].name))
         if self.fired != fired.tolist():
             raise ValueError("its counts of firings are not those of its record")
-        transitions = self.factory.net.threaded.transitions
-        self.events += [Event(t, transitions[event].name) for t, event in past]
         numbers = [number for (number,) in going]
         if sorted(numbers) != [o.index for o in self.factory.operations if self.marked[o.place]]:
             raise ValueError("its operations under way are not those of its marking")

@@ -2,14 +2,15 @@
 
 A transition fires as soon as every place before it has a token that is ready; the events are
 taken in the order of time. Where an operation fails at its end, transitions are undone as
-`factory.nets.undo` says, the robots go back, and all goes on from there. Where nothing fails the
-dates are those of `earliest_firings`.
+`factory.nets.undo` says, the robots go back, and all goes on from there. Robots that could touch
+what was lost stand until it is cleared away. Where nothing fails the dates are those of
+`earliest_firings`.
 """
 
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from heapq import heappop, heappush
@@ -67,11 +68,27 @@ def drawn(rates: Rates, seed: int) -> Chance:
     return chance
 
 
+Near = Callable[[Operation, str, float], frozenset[int]]
+"""The robots (index) that could touch a label that is lost in an operation, after a share of its
+time, from 0 to 1."""
+
+
+@dataclass(frozen=True, slots=True)
+class Clearing:
+    """What is lost lies for so many `seconds`, and the robots that are `near` stand so long; in
+    what share of its operation it was lost is drawn by the `seed`."""
+
+    near: Near = field(repr=False)
+    seconds: float
+    seed: int = 0
+
+
 @dataclass(frozen=True)
 class FailingNet:
     """A live timed marked graph whose first places and transitions are those of a factory, with the
     `seconds` of each place, and `first` and `ready` as `earliest_firings` has them. `back`: how
-    long the robots of each operation take to where they came from [s]."""
+    long the robots of each operation take to where they came from [s]; `ways`: the places of their
+    ways ahead, by robot and operation; `clearing` of what is lost."""
 
     factory: Factory
     net: MarkedNet
@@ -79,6 +96,16 @@ class FailingNet:
     back: Sequence[float] = field(repr=False)
     first: Mapping[int, float] = field(default_factory=lambda: MappingProxyType({}), repr=False)
     ready: Mapping[int, float] = field(default_factory=lambda: MappingProxyType({}), repr=False)
+    ways: Mapping[tuple[int, int], int] = field(
+        default_factory=lambda: MappingProxyType({}), repr=False
+    )
+    clearing: Clearing | None = None
+
+    @cached_property
+    def places(self) -> Mapping[int, frozenset[int]]:
+        """The robots (index) whose tokens each place holds, of those that hold any."""
+        own = {p: frozenset(robots) for p, robots in enumerate(self.factory.net.slots)}
+        return own | {place: frozenset({robot}) for (robot, _), place in self.ways.items()}
 
     @cached_property
     def joins(self) -> Joins:
@@ -132,6 +159,32 @@ def checked(net: MarkedNet, before: Sequence[int], after: Sequence[int], rules: 
                 raise ValueError(f"the undo keeps {name}, of which the product is gone")
 
 
+class _Standing:
+    """Until when robots (index) stand."""
+
+    def __init__(self, clearing: Clearing | None) -> None:
+        self._clearing, self._until = clearing, dict[int, float]()
+        self._random = Random(clearing.seed if clearing else 0)
+
+    def drawn(
+        self, operation: Operation, lost: Iterable[str]
+    ) -> Iterator[tuple[frozenset[int], float]]:
+        """The robots that stand for each thing that is lost in an operation, and how long [s]."""
+        if clearing := self._clearing:
+            for label in lost:
+                share = self._random.random()
+                yield clearing.near(operation, label, share), clearing.seconds
+
+    def lengthen(self, robots: Iterable[int], until: float) -> None:
+        """Robots stand until then [s], if not longer."""
+        for robot in robots:
+            self._until[robot] = max(until, self._until.get(robot, 0.0))
+
+    def over(self, robots: Iterable[int], now: float) -> float:
+        """Until when some of these robots stand; `now` where none does [s]."""
+        return max([now, *(self._until.get(robot, now) for robot in robots)])
+
+
 class _Run:
     """A run under way: how often each transition has fired, and when each token is ready."""
 
@@ -149,6 +202,7 @@ class _Run:
         self.redone: dict[int, int] = {}
         self.scrapped: dict[int, int] = {}
         self.undone: dict[int, int] = {}
+        self.standing = _Standing(subject.clearing)
 
     def until(self, units: int) -> FailingRun:
         """Fire until so many products are dropped off."""
@@ -212,7 +266,23 @@ class _Run:
         counts[number] = counts.get(number, 0) + 1
         inputs = lost or operation.inputs if kind == "scrap" else ()
         self.go_back(asked_by(self.subject.factory, operation, inputs), now)
+        for near, seconds in self.standing.drawn(operation, lost):
+            self.stand(near, now, now + seconds)
         return kind
+
+    def stand(self, robots: frozenset[int], now: float, until: float) -> None:
+        """Robots stand from now on: what they are doing, or would do, takes so much longer."""
+        later = set[int]()
+        for place, own in self.subject.places.items():
+            if self.tokens[place] and not robots.isdisjoint(own):
+                begin = self.standing.over(own, now)
+                shift = max(until - begin, 0.0)
+                ready = (max(token, begin) + shift for token in self.tokens[place])
+                self.tokens[place] = deque(ready)
+                later.add(self.subject.net.right[place])
+        self.standing.lengthen(robots, until)
+        for event in sorted(later):
+            self.schedule(event)
 
     def go_back(self, asked: Mapping[int, int], now: float) -> None:
         """Undo transitions: their tokens are back when the robots are."""
@@ -231,7 +301,7 @@ class _Run:
         for place in sorted(near):
             own = slots[place] if place < len(slots) else tuple(longest)
             wait = max((longest.get(robot, 0.0) for robot in own), default=0.0)
-            self._set(place, gone, now + wait)
+            self._set(place, gone, self.standing.over(subject.places.get(place, ()), now) + wait)
         self.fired = list(left)
         for event in sorted({net.right[p] for p in near}):
             self.schedule(event)

@@ -22,6 +22,9 @@ appended to.
        contact_dist                       their distances [m]
        fired_at, fired, fired_t           row, number and time [s] of the transitions fired
        ended_at                           the rows that are ends of operations, not ticks
+       undone, bytes                      what was undone, JSON, where anything was
+       failures, bytes                    what went wrong so far, JSON as in `run --json` with lists
+                                          of what is new, where anything is and the run goes on
     C  a checkpoint, about every simulated second: the state of the run where the ticks before it
        end, to be gone on with; see `simulation.checkpoint`. Readers of runs pass it over
     E  the end: the file was closed properly

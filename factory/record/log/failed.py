@@ -1,13 +1,15 @@
-"""What went wrong in a run, as a log keeps it: JSON in its last block, where the run goes on after
-failures."""
+"""What went wrong in a run, as a log keeps it, where the run goes on after failures: JSON in its
+last block, and in blocks of ticks so far as it was known then."""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
-from factory.record.failures import Failing, Failures, Stood
+from factory.record.failures import Account, Failing, Failures, Stood
+from factory.record.log.blocks import Arrays
 from factory.record.log.header import LARGE, Key, is_count, is_table, is_text, listed
 
 
@@ -33,6 +35,8 @@ _KEYS = (
         for name in ("missed", "false_alarms", "transitions_undone", "spares_used")
     ),
     Key("fault_contacts", _COUNT, is_count),
+    Key("binned", _COUNT, is_count, later=True),
+    Key("spilled", "a list of robots", listed(is_text), later=True),
     Key("standing", "a list of which robots stood", _is_listed),
     Key("failures", "a list of failures", _is_listed),
 )
@@ -49,10 +53,56 @@ _OF_FAILING = (
 )
 
 
+LISTS = "failures", "standing"
+"""What becomes longer: a block of ticks has what is new of it."""
+
+
+@dataclass(slots=True)
+class Told:
+    """How much of a run has been written: so many `events`; of its account so many failures `found`
+    and changes of which robots `stood`, -1 where nothing of it has."""
+
+    events: int
+    found: int = -1
+    stood: int = 0
+
+    def goes_on(self, account: Account | None) -> None:
+        """All has been written."""
+        if account is not None:
+            self.found, self.stood = len(account.found), len(account.stood)
+
+    def news(self, account: Account | None) -> bytes:
+        """What is to be written now, nothing where there is nothing new."""
+        if account is None or (self.found, self.stood) == (len(account.found), len(account.stood)):
+            return b""
+        told = account.report().as_json()
+        news = zip(LISTS, (account.found, account.stood), (self.found, self.stood), strict=True)
+        told |= {name: told[name][max(known, 0) :] for name, _, known in news}  # type: ignore[index]
+        self.goes_on(account)
+        return json.dumps(told).encode()
+
+
+def failures_so_far(ticks: Sequence[Arrays], robots: frozenset[str]) -> Failures | None:
+    """What went wrong up to the end of some blocks of ticks, None where these do not tell. Raises
+    ValueError where a text is not what `Told.news` gives."""
+    news = [json.loads(arrays["failures"].tobytes()) for arrays in ticks if "failures" in arrays]
+    if not news:
+        return None
+    told = dict(_checked(news[-1], _KEYS))
+    for name in LISTS:
+        told[name] = [one for new in news for one in _checked(new, _KEYS)[name]]
+    return failures_of(told, robots)
+
+
 def failures_in(content: bytes, robots: frozenset[str]) -> Failures:
     """What went wrong in the run of a log whose robots have these names. Raises ValueError where
     the text is not what `Failures.as_json` gives."""
-    told = _checked(json.loads(content), _KEYS)
+    return failures_of(json.loads(content), robots)
+
+
+def failures_of(content: Any, robots: frozenset[str]) -> Failures:
+    """The inverse of `Failures.as_json`. Raises ValueError."""
+    told = _checked(content, _KEYS)
     stood = tuple(_stood(_checked(entry, _OF_STOOD)) for entry in told["standing"])
     unknown = {name for _, names in stood for name in names} - robots
     if unknown:
@@ -66,6 +116,8 @@ def failures_in(content: bytes, robots: frozenset[str]) -> Failures:
         told["spares_used"],
         told["fault_contacts"],
         stood,
+        told.get("binned", 0),
+        tuple(told.get("spilled", ())),
     )
 
 

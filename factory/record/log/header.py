@@ -126,6 +126,7 @@ KEYS = (
     Key("fuse", "true or false", of(bool), later=True),
     Key("chosen", "true or false for timestep and wip", is_choice, later=True),
     Key("distributed", "true or false", of(bool), later=True),
+    Key("faults", "a table", of(dict), later=True),
     Key("start", "a list of numbers of places", listed(is_count), later=True),
     Key("settings", "a table of numbers", tabled(is_number)),
     Key("product", "a text", is_text),

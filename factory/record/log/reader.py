@@ -17,7 +17,7 @@ from factory.nets.undone import Entry, lasting
 from factory.record.ending import CutOff
 from factory.record.failures import Failures
 from factory.record.log.blocks import LENGTH, MAGIC, Arrays, bad_log, blocks, is_cut, unpack_rows
-from factory.record.log.failed import failures_in
+from factory.record.log.failed import failures_in, failures_so_far
 from factory.record.log.header import check_header
 from factory.record.log.ticks import check_block, check_course, state_bytes
 from factory.record.log.undone import Placed, undone_in
@@ -78,7 +78,8 @@ class Log:
     run came, None where all of its units were made and the log has all of it. `ends`: the state as
     operations ended, and `figures` of the bodies, as `kept_figures` gives them; None in the ideal
     world and in logs of older versions. `undone`: what was undone, each with how many transitions
-    had fired before it. `failures`: what went wrong, in a run that goes on when something does."""
+    had fired before it. `failures`: what went wrong, in a run that goes on when something does; of
+    one that was killed what was known as the last was found."""
 
     header: Mapping[str, Any] = field(repr=False)
     xml: str = field(repr=False)
@@ -235,7 +236,7 @@ def log_in(data: memoryview, written: bool = False) -> Log:
         else Ends(follows, time[at_end], qpos_ended, qvel_ended, ctrl_ended, active.chosen(at_end)),
         _figures(trouble["figures"]) if "figures" in trouble else None,
         undone_in(ticks, header),
-        _failures(trouble["failures"], header) if "failures" in trouble else None,
+        _failures(trouble, ticks, header),
     )
 
 
@@ -254,8 +255,12 @@ def _figures(content: NDArray[Any]) -> Mapping[str, Any]:
     return MappingProxyType(found)
 
 
-def _failures(content: NDArray[Any], header: Mapping[str, Any]) -> Failures:
-    return failures_in(content.tobytes(), frozenset(header["robots"]))
+def _failures(end: Arrays, ticks: Sequence[Arrays], header: Mapping[str, Any]) -> Failures | None:
+    """What went wrong: all, as the last block tells, or what was known as far as a log goes."""
+    robots = frozenset(header["robots"])
+    if "failures" in end:
+        return failures_in(end["failures"].tobytes(), robots)
+    return failures_so_far(ticks, robots)
 
 
 def _broken(data: memoryview, kept: int, written: bool) -> str:

@@ -21,6 +21,7 @@ from factory.lang import write_pag, write_template
 from factory.nets.undone import Undone
 from factory.problem.pag import PAG
 from factory.record.log.blocks import LENGTH, MAGIC, Arrays, bad_log, block, pack_rows
+from factory.record.log.failed import Told
 from factory.record.log.undone import undone_as_json
 from factory.record.monitor.observation import EngineView
 from factory.record.monitor.subject import subject_of_run
@@ -103,8 +104,9 @@ class LogWriter(Recorder):
         net = simulation.layout.factory.net.threaded
         self.numbers = {t.name: n for n, t in enumerate(net.transitions)}
         self.most = max(1, round(1.0 / simulation.request.settings.tick))
-        self.events = len(self.supervisor.events)
-        self.ticks = _Ticks()
+        self.ticks, self.told = _Ticks(), Told(len(self.supervisor.events))
+        if going_on is not None and self.world.time:
+            self.told.goes_on(self.world.hooks.account)
         self.trouble: Diagnostic | None = None
         self.checkpoint = checkpoint
         self.file = self._begun(simulation, pag, command) if going_on is None else going_on
@@ -164,19 +166,23 @@ class LogWriter(Recorder):
                 ticks.active.append((row, welds))
             if self.view.d.ncon:
                 ticks.contacts.append((row, contact.geom.copy(), contact.dist.copy()))
-        for number, event in enumerate(supervisor.events[self.events :], start=self.events):
+        for number, event in enumerate(
+            supervisor.events[self.told.events :], start=self.told.events
+        ):
             if isinstance(event, Undone):
                 before = sum(not isinstance(e, Undone) for e in supervisor.events[:number])
                 ticks.undone.append(undone_as_json(event, before))
                 continue
             ticks.fired.append((row, self.numbers[event.transition], event.t))
-        self.events = len(supervisor.events)
+        self.told.events = len(supervisor.events)
 
     def flush(self) -> None:
         """Write the ticks since the last block."""
         ticks, self.ticks = self.ticks, _Ticks()
         if ticks.time:
-            self._append(block(b"T", ticks.arrays()))
+            news = self.told.news(self.world.hooks.account)
+            failures = {"failures": np.frombuffer(news, "u1")} if news else {}
+            self._append(block(b"T", {**ticks.arrays(), **failures}))
 
     def end(self, trouble: Diagnostic | None) -> None:
         self.trouble = trouble
@@ -258,7 +264,7 @@ def _header(
 ) -> dict[str, Any]:
     layout, net = simulation.layout, simulation.layout.factory.net.threaded
     factory, plain = layout.factory, layout.plain or layout
-    given = plain.factory.pag if pag is None else pag
+    given, account = plain.factory.pag if pag is None else pag, simulation.world.hooks.account
     file = Path(given.file)
     written = file.is_file() and not layout.ground.get("formed")
     said = file.read_text("utf-8", errors="replace") if written else write_pag(given)
@@ -277,6 +283,7 @@ def _header(
             "wip": simulation.asked.wip is None,
         },
         "distributed": simulation.request.distributed,
+        **({} if account is None else {"faults": account.given}),
         "fuse": simulation.request.fuse,
         "start": sorted(simulation.start),
         "settings": asdict(simulation.request.settings),

@@ -201,8 +201,8 @@ class MujocoWorld:
     def _bear(self) -> None:
         """Hands whose load is more than they bear let go. What falls may come anywhere: from then
         on everything is looked at in every timestep."""
-        if self.parts.bear():
-            self.hooks.before_step.append(_anything)
+        if self.parts.bear() and anything not in self.hooks.before_step:
+            self.hooks.before_step.append(anything)
 
     def _look(self) -> None:
         """At what is looked at when other modes begin, and about once in a stride from then."""
@@ -244,5 +244,5 @@ class MujocoWorld:
         return self.inspection.figures(self.parts.welds, self.parts.strength.most)
 
 
-def _anything() -> None:
+def anything() -> None:
     """Before a timestep in which anything may come anywhere: that there is a hook is enough."""

@@ -86,7 +86,7 @@ class Deputising:
         modes = operation_modes(alone, settings.eps)
         stages = stages_of(alone, modes, settings)
         delays = operation_delays(alone, modes, limits, settings, world, stages)
-        ways = all_ways(alone, stages, delays, limits, settings, world)
+        ways = all_ways(alone, modes, stages, delays, limits, settings, world)
         predicted = predict(alone, delays, settings, world, request.wip, ways).seconds
         simulation.modes, simulation.delays, self._books.layout = modes, delays, change.layout
         own = [replace(s, robot=stay[s.robot], axis=axes[s.axis]) for s in stages]

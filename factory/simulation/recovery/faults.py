@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from math import isfinite
 from types import MappingProxyType
+from typing import Any
 
 KINDS: Mapping[str, str] = MappingProxyType(
     {
@@ -93,3 +94,10 @@ class Campaign:
     sensors: Sensors = field(default_factory=Sensors)
     spares: int = 0
     swap: float = SWAP
+
+
+def campaign_of(values: Mapping[str, Any]) -> Campaign:
+    """The inverse of `dataclasses.asdict`, from values that came through JSON. Raises ValueError,
+    TypeError or KeyError where they are no campaign."""
+    faults = tuple(WorldFault(**fault) for fault in values["faults"])
+    return Campaign(**{**values, "faults": faults, "sensors": Sensors(**values["sensors"])})

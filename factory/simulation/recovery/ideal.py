@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence, Set
 from factory.plant.factory import Operation
 from factory.problem.pag import NOPART
 from factory.simulation.ideal import IdealWorld
+from factory.simulation.keeping import LARGE, Keeper, one_of, up_to
 from factory.simulation.recovery.books import Books
 from factory.simulation.recovery.faults import WorldFault
 from factory.simulation.simulation import Simulation
@@ -15,7 +16,8 @@ from factory.simulation.simulation import Simulation
 class IdealPlant:
     """Parts are where their robots are, or nowhere."""
 
-    contacts = 0
+    contacts, binned = 0, 0
+    spilled: tuple[str, ...] = ()
 
     def __init__(self, simulation: Simulation, books: Books) -> None:
         self._simulation, self._books = simulation, books
@@ -115,6 +117,9 @@ class IdealPlant:
     def let_go(self, robot: int, seconds: float) -> None:
         """A robot lets scrap fall."""
 
+    def throw_away(self, robot: int, label: str, seconds: float) -> None:
+        """A robot lets scrap fall."""
+
     def takes_back(self, robot: int) -> bool:
         """Whether something goes back up in a robot's feeder."""
         return False
@@ -131,6 +136,16 @@ class IdealPlant:
     def closed(self) -> frozenset[int]:
         """Nothing is in the way."""
         return frozenset()
+
+    @property
+    def is_calm(self) -> bool:
+        """Whether robots hold what they should, and feeders show what is good."""
+        return not (self._gone or self._slipped or self._bad)
+
+    def keep(self, keeper: Keeper) -> None:
+        """What feeders show."""
+        labels = one_of({leaf.label for leaf in self._books.factory.leaves})
+        self._shown = dict(keeper.rows("shown", self._shown.items(), labels, up_to(LARGE)))
 
     def lift_out(self, robot: int, at: Mapping[int, float]) -> None:
         """A dead robot is taken away, and another is put in its place [m]."""

@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence, Set
 from typing import Protocol
 
 from factory.plant.factory import Operation
+from factory.simulation.keeping import Keeper
 from factory.simulation.recovery.faults import WorldFault
 
 
@@ -73,6 +74,10 @@ class Plant(Protocol):
     def let_go(self, robot: int, seconds: float) -> None:
         """A robot lets scrap fall, which lies for so long [s]."""
 
+    def throw_away(self, robot: int, label: str, seconds: float) -> None:
+        """A robot at its B end lets go of a label that is scrap, over its bin, where that is wide
+        enough; it lies for so long [s]."""
+
     def takes_back(self, robot: int) -> bool:
         """Whether something goes back up in a robot's feeder."""
 
@@ -90,6 +95,21 @@ class Plant(Protocol):
     def lift_out(self, robot: int, at: Mapping[int, float]) -> None:
         """A dead robot and what it holds are taken away, and another is put in its place, with its
         axes at these places [m]."""
+
+    @property
+    def binned(self) -> int:
+        """How often scrap has fallen into a bin."""
+
+    @property
+    def spilled(self) -> Sequence[str]:
+        """The robots, by name, that have let scrap fall where there is no bin for it."""
+
+    @property
+    def is_calm(self) -> bool:
+        """Whether everything is where it should be, as far as it can be."""
+
+    def keep(self, keeper: Keeper) -> None:
+        """What goes on beside the world, while all is calm."""
 
     @property
     def contacts(self) -> int:

@@ -3,7 +3,8 @@ what is done."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict
 
 import numpy as np
 
@@ -13,6 +14,7 @@ from factory.plant.factory import Factory, Operation
 from factory.problem.template import Failure
 from factory.record.exchange import Exchange
 from factory.record.failures import Failing, Failures, Stood
+from factory.simulation.keeping import Keeper
 from factory.simulation.recovery.books import Books
 from factory.simulation.recovery.counting import summed
 from factory.simulation.recovery.faults import Campaign, WorldFault
@@ -40,6 +42,7 @@ class Recovery:
         self.striking = Striking(campaign, plant, names, tuple(simulation.delays))
         self.responding = Responding(simulation, books, plant, campaign)
         self.pending: dict[int, str] = {}
+        self._campaign = campaign
         self._seen = 0
         hooks = simulation.world.hooks
         hooks.gates.append(self._admits)
@@ -181,6 +184,30 @@ class Recovery:
         ends += [now] * bool(respond.returning.ways) + [respond.standing.latest(now)]
         return max((end for end in ends if np.isfinite(end)), default=0.0)
 
+    @property
+    def given(self) -> Mapping[str, object]:
+        """The campaign, as values of JSON."""
+        return asdict(self._campaign)
+
+    @property
+    def is_calm(self) -> bool:
+        """Whether nothing is wrong now: all that `keep` keeps is what was."""
+        busy = self.pending or self.simulation.world.hooks.before_step
+        return not busy and all(one.is_calm for one in self._kept)
+
+    def keep(self, keeper: Keeper) -> None:
+        """What went wrong so far and what is drawn next, while all is calm, after the simulation.
+        Raises ValueError where what is taken up is no state of this run."""
+        hooks, events = self.simulation.world.hooks, self.books.supervisor.events
+        for one in self._kept:
+            one.keep(keeper)
+        self._seen = keeper.whole("recovery.seen", self._seen, 0, len(events))
+        hooks.busy = keeper.number("recovery.busy", hooks.busy, 0)
+
+    @property
+    def _kept(self) -> tuple[Striking, Responding, Plant]:
+        return self.striking, self.responding, self.plant
+
     def strike(self, fault: WorldFault) -> None:
         """A fault strikes as soon as it can, whatever it says of when."""
         self.striking.strike(fault, self._now)
@@ -195,6 +222,8 @@ class Recovery:
             self.responding.used_spares,
             self.plant.contacts,
             self.stood,
+            self.plant.binned,
+            tuple(dict.fromkeys(self.plant.spilled)),
         )
 
 

@@ -5,7 +5,8 @@ for any more."""
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
+from dataclasses import astuple
 from functools import partial
 
 import numpy as np
@@ -19,12 +20,14 @@ from factory.plant.material import joins_of
 from factory.problem.pag import NOPART
 from factory.problem.template import Kind, Response
 from factory.record.failures import Failing
+from factory.simulation.keeping import LARGE, Keeper, is_size, is_text, one_of, some_of, up_to
 from factory.simulation.recovery.books import Books
 from factory.simulation.recovery.deputising import Deputising
 from factory.simulation.recovery.faults import Campaign
 from factory.simulation.recovery.plant import Plant
 from factory.simulation.recovery.returning import Goal, Returning, WayBack, order_of
 from factory.simulation.recovery.standing import Standing, patience
+from factory.simulation.recovery.wasting import Wasting
 from factory.simulation.simulation import Simulation
 from factory.support.errors import Diagnostic
 from factory.timing.failing import SCRAPS
@@ -48,8 +51,8 @@ class Responding:
             campaign,
         )
         eps = simulation.request.settings.eps
-        barred = not_carried_back(simulation.layout)
-        self.returning = Returning(simulation.layout, books.supervisor, eps, barred)
+        wasting = Wasting(not_carried_back(simulation.layout))
+        self.returning = Returning(simulation.layout, books.supervisor, eps, wasting)
         self.standing = Standing(simulation)
         self.found: list[Failing] = []
         self.dead: dict[int, float] = {}
@@ -57,6 +60,31 @@ class Responding:
         self._tried: Counter[int] = Counter()
         self._scrapped: Counter[str] = Counter()
         self.deputising = Deputising(simulation, books)
+
+    @property
+    def is_calm(self) -> bool:
+        """Whether all robots are at work, or wait for it, in the net that the run began with."""
+        moved = self.dead or self.returning.ways or self.deputising.exchanges
+        return not moved and self.standing.is_calm
+
+    def keep(self, keeper: Keeper) -> None:
+        """What failed, and how often on end, while all is calm."""
+        factory, spares = self._books.factory, self._campaign.spares
+        labels, robots = {*factory.by_label}, {"", *(robot.name for robot in factory.robots)}
+        count = up_to(LARGE)
+        found = [astuple(one)[:7] for one in self.found]  # no deputy: that is not calm
+        tests = is_size, is_text, one_of(labels), one_of(robots), is_text, some_of(labels)
+        found = keeper.rows("failures", found, *tests, lambda v: v is None or is_size(v))
+        self.found = [
+            Failing(t, test, label, robot, response, tuple(things), until)
+            for t, test, label, robot, response, things, until in found
+        ]
+        self.used_spares = keeper.whole("spares", self.used_spares, 0, spares)
+        numbers, names = up_to(len(factory.operations)), one_of(labels)
+        tried = keeper.rows("failures.tried", self._tried.items(), numbers, count)
+        scrapped = keeper.rows("failures.scrapped", self._scrapped.items(), names, count)
+        self._tried, self._scrapped = Counter(dict(tried)), Counter(dict(scrapped))
+        self.standing.keep(keeper)
 
     def passed(self, operation: Operation) -> None:
         """An operation has come to its goal and is good."""
@@ -166,12 +194,13 @@ class Responding:
         self.deputising.exchange(change, fired, undone)
         eps = self._simulation.request.settings.eps
         ways = ((r, way) for r, way in self.returning.ways.items() if r not in self.dead)
-        self.returning = Returning(books.layout, supervisor, eps, change.barred, dict(ways))
+        wasting = Wasting(change.barred, self.returning.wasting.held)
+        self.returning = Returning(books.layout, supervisor, eps, wasting, dict(ways))
         self._plant.lift_out(robot, {})
         over = [books.factory.operations[n] for n in under_way if n not in marking]
-        wasted = {robot: held[robot] for robot in scrap}
+        wasting.waste(scrap, {robot: held[robot] for robot in scrap})
         supervisor.recall(self.standing.axes(going | scrap))
-        self._send_back(sorted(going | scrap), wasted, over, marking)
+        self._send_back(sorted(going | scrap), over, marking)
         return True
 
     def give_up(self) -> None:
@@ -200,20 +229,20 @@ class Responding:
         scrap = {*self._plant.undone(books.held(marking), fired, going)}
         supervisor.undo(undone, fired, marking, self.standing.axes(going | scrap))
         over = [factory.operations[n] for n in under_way if n not in marking]
-        wasted = {robot: books.holds(robot, before) for robot in scrap}
-        self._send_back(sorted(going | scrap), wasted, over, marking)
+        self.returning.wasting.waste(scrap, {robot: books.holds(robot, before) for robot in scrap})
+        self._send_back(sorted(going | scrap), over, marking)
         self._plant.supplied()
 
     def _send_back(
         self,
         robots: Iterable[int],
-        scrap: Mapping[int, str],
         over: Sequence[Operation],
         marking: Marking,
     ) -> None:
-        """Robots go to where they wait in a marking, by way of their B ends with `scrap`, given by
-        its label, or let it fall at once where they cannot carry it there; those of operations that
-        are `over` leave in the reverse order of their coming."""
+        """Robots go to where they wait in a marking, by way of their B ends with what is scrap, or
+        let it fall at once where they cannot carry it there; those of operations that are `over`
+        leave in the reverse order of their coming."""
+        scrap = self.returning.wasting.held
         after = dict[int, frozenset[int]]()
         for operation in over:
             came = order_of(self._simulation.modes[operation.index], operation.robots)
@@ -222,17 +251,20 @@ class Responding:
         for robot in robots:
             rest = self.returning.rest(robot, marking)
             goals, done = rest, partial(self._plant.came_back, robot)
-            if robot in scrap and (robot, scrap[robot]) in self.returning.barred:
+            if robot in scrap and self.returning.wasting.falls_here(robot):
                 self._plant.let_go(robot, self._campaign.clear)
             elif robot in scrap:
-                goals, done = self.returning.home(robot), partial(self._bin, robot, rest)
+                goals, done = (
+                    self.returning.home(robot),
+                    partial(self._bin, robot, scrap[robot], rest),
+                )
             first = after.get(robot, frozenset[int]())
             self.returning.send(robot, WayBack(goals, first, done, partial(self._is_up, robot)))
 
-    def _bin(self, robot: int, rest: list[Goal]) -> None:
+    def _bin(self, robot: int, label: str, rest: list[Goal]) -> None:
         """A robot at the B end of its guidepath lets scrap fall into the bin there, and goes to
         where it waits."""
-        self._plant.let_go(robot, BINNED)
+        self._plant.throw_away(robot, label, BINNED)
         self.returning.send(robot, WayBack(rest))
 
     def _is_up(self, robot: int) -> bool:

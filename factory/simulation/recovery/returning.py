@@ -17,6 +17,7 @@ from factory.layout.feeding import passing
 from factory.layout.layout import Layout
 from factory.nets.petri import Marking
 from factory.plant.factory import Operation
+from factory.simulation.recovery.wasting import Wasting
 from factory.simulation.starting import start_positions
 from factory.simulation.supervisor import Supervisor
 
@@ -45,19 +46,19 @@ class WayBack:
 
 
 class Returning:
-    """The robots (index) of a factory that are on their way back: `ways`. `barred`: robots, each
-    with what it cannot carry back to its B end. They begin with `ways` that have not begun."""
+    """The robots (index) of a factory that are on their way back: `ways`. `wasting`:
+    what they hold that is scrap. They begin with `ways` that have not begun."""
 
     def __init__(
         self,
         layout: Layout,
         supervisor: Supervisor,
         eps: float,
-        barred: frozenset[tuple[int, str]],
+        wasting: Wasting,
         ways: Mapping[int, WayBack] = MappingProxyType({}),
     ) -> None:
         self._layout, self._supervisor = layout, supervisor
-        self.barred = barred
+        self.wasting = wasting
         goals = [*dict.fromkeys(_goals(layout))]
         first = len(supervisor.bundles.modes)
         self._number = {goal: first + n for n, goal in enumerate(goals)}

@@ -11,6 +11,7 @@ from factory.control.mode import STILL, Limits
 from factory.control.navigation import Bundle
 from factory.plant.factory import Factory, Operation
 from factory.record.failures import Stood
+from factory.simulation.keeping import Keeper, is_size, some_of, up_to
 from factory.simulation.simulation import Simulation
 
 SLOWEST = 1e-9
@@ -51,6 +52,21 @@ class Standing:
         every = self._simulation.layout.factory.robots
         names = tuple(every[robot].name for robot in sorted(chosen))
         self.stood.append((self._simulation.world.time, names))
+
+    @property
+    def is_calm(self) -> bool:
+        """Whether no robot stands."""
+        return not self._now
+
+    def keep(self, keeper: Keeper) -> None:
+        """When operations began, and which robots stood, while none does."""
+        factory = self._simulation.layout.factory
+        begun, names = self._begun.items(), {robot.name for robot in factory.robots}
+        self._begun = dict(
+            keeper.rows("standing.begun", begun, up_to(len(factory.operations)), is_size)
+        )
+        stood = keeper.rows("standing.stood", self.stood, is_size, some_of(names))
+        self.stood = [(t, tuple(robots)) for t, robots in stood]
 
     def limit(self, limits: Limits) -> None:
         """From now on these are the limits of robots that do not stand."""

@@ -54,11 +54,12 @@ def analyse(
     wip: int | None = None,
     asked: tuple[str, Change] | None = None,
     record: RunRecord | None = None,
-    rates: Rates | None = None,
+    failures: tuple[Rates, float] | None = None,
 ) -> Analysis:
     """The analysis of a laid-out factory: of `units` products from the initial marking, with a
     bound `wip` on copies of each part, with a change that is `asked` about, in words, with the
-    `record` of a run to compare with, and with `rates` at which operations fail.
+    `record` of a run to compare with, and with `failures`: the rates at which operations fail, and
+    how long what is lost lies [s].
 
     Raises InputError where `wip` is below 1 or a mode cannot reach its goal.
     """
@@ -78,7 +79,7 @@ def analyse(
         made,
         wip_curve(timing),
         compare(timing, net, found, record) if record else None,
-        failing_pace(timing, net, rates) if rates else None,
+        failing_pace(timing, net, failures[0], clear=failures[1]) if failures else None,
     )
 
 

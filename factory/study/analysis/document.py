@@ -67,6 +67,7 @@ def _failing(found: Analysis, failing: FailingPace) -> dict[str, Any]:
     return {
         "redo": failing.rates.redo,
         "lose": failing.rates.lose,
+        "clear_s": failing.clear,
         "units": failing.units,
         "made": failing.made,
         "seed": failing.seed,

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from math import lcm
 
+from factory.study.analysis.clearing import clearing_of
 from factory.study.analysis.timed import LONGEST_PERIOD, SAME, TimedNet
 from factory.study.analysis.timing import Timing
 from factory.timing.failing import FailingNet, FailingRun, Rates, drawn, failing_run
@@ -21,11 +22,13 @@ LEAST = 200
 
 @dataclass(frozen=True)
 class FailingPace:
-    """The pace with some `rates` of failures, of a run of `units` with a `seed`: the mean interval
-    between products, the first tenth left out, `cycle` [s]; `loss`: the share by which that is
-    longer than without failures. Both are None where the run stopped too early to say."""
+    """The pace with some `rates` of failures, where what is lost lies for `clear` [s], of a run of
+    `units` with a `seed`: the mean interval between products, the first tenth left out, `cycle`
+    [s]; `loss`: the share by which that is longer than without failures. Both are None where the
+    run stopped too early to say."""
 
     rates: Rates
+    clear: float
     units: int
     seed: int
     cycle: float | None
@@ -48,22 +51,32 @@ class FailingPace:
         return sum(self.run.scrapped.values())
 
 
-def failing_net(timing: Timing, net: TimedNet) -> FailingNet:
+def failing_net(timing: Timing, net: TimedNet, clear: float = 0.0) -> FailingNet:
     """The timed net of a laid-out factory whose operations may fail. Robots take as long back as
-    they took for the operation, without its dwell."""
+    they took for the operation, without its dwell; what is lost lies for `clear` [s]."""
     pairs = zip(timing.delays, timing.modes, strict=True)
     back = [delay - mode.dwell for delay, mode in pairs]
-    return FailingNet(timing.factory, net.net, net.seconds, back, net.first, net.ready)
+    return FailingNet(
+        timing.factory,
+        net.net,
+        net.seconds,
+        back,
+        net.first,
+        net.ready,
+        net.ways,
+        clearing_of(timing, clear),
+    )
 
 
 def failing_pace(
-    timing: Timing, net: TimedNet, rates: Rates, units: int | None = None
+    timing: Timing, net: TimedNet, rates: Rates, units: int | None = None, clear: float = 0.0
 ) -> FailingPace:
     """The pace with some rates of failures; without any, that of the timed net once that has
-    settled. The seed is that of the timing."""
+    settled. The seed is that of the timing; what is lost lies for `clear` [s]."""
     if units is None:
         units = min(UNITS, max(LEAST, WORK // len(net.net.net.transitions)))
-    run = failing_run(failing_net(timing, net), drawn(rates, timing.seed), units)
+    subject = failing_net(timing, net, clear)
+    run = failing_run(subject, drawn(rates, timing.seed), units)
     turn = min(lcm(*(circuit.tokens for circuit in net.critical)), LONGEST_PERIOD) * net.units
     made = len(run.dates)
     count = (made - 1 - made // 10) // turn * turn
@@ -71,4 +84,5 @@ def failing_pace(
     loss = cycle / net.pace - 1 if cycle is not None and net.pace else None
     if loss is not None and abs(loss) < SAME:
         cycle, loss = net.pace, 0.0
-    return FailingPace(rates, units, timing.seed, cycle, loss, run)
+    lies = subject.clearing.seconds if subject.clearing else 0.0
+    return FailingPace(rates, lies, units, timing.seed, cycle, loss, run)

@@ -59,10 +59,11 @@ def failing_words(failing: FailingPace) -> str:
     pace = "no cycle time"
     if failing.cycle is not None and failing.loss is not None:
         pace = f"cycle time {failing.cycle:.3f} s ({100 * failing.loss:+.1f} %)"
+    lies = f", which lies for {failing.clear:g} s" if failing.clear and rates.lose else ""
     return (
-        f"{100 * rates.redo:g} % redone and {100 * rates.lose:g} % lost at each operation: {pace}; "
-        f"{failing.made} of {failing.units} made, {failing.redone} times again, {failing.scrapped} "
-        f"scrapped{f'; stopped at {stopped}' if stopped else ''}"
+        f"{100 * rates.redo:g} % redone and {100 * rates.lose:g} % lost at each operation{lies}: "
+        f"{pace}; {failing.made} of {failing.units} made, {failing.redone} times again, "
+        f"{failing.scrapped} scrapped{f'; stopped at {stopped}' if stopped else ''}"
     )
 
 

@@ -1,9 +1,12 @@
-"""`python -m tests.bench.faults [--quick] [NAME ...]`: measure all sections, or some, and write
-docs/faults.md."""
+"""`python -m tests.bench.faults [--quick] [--go-on] [NAME ...]`: measure all sections, or some, and
+write docs/faults.md."""
 
 from __future__ import annotations
 
 from tests.reporting import DOCS, Report
+
+RUNS = ("campaigns", "deaths", "production")
+"""The sections that are many runs, of which those that are kept need not be done again."""
 
 REPORT = Report(
     "tests.bench.faults",
@@ -11,7 +14,7 @@ REPORT = Report(
     " `make faults` (`python -m tests.bench.faults NAME` for one section) from what is kept in"
     " docs/faults/. The supervisor is told of no fault: it has what sensors measure, with their"
     " default noise.",
-    ("campaigns", "deaths", "takeovers", "production", "sensors", "kills"),
+    (*RUNS, "takeovers", "sensors", "kills"),
     DOCS / "faults.md",
     ("mujoco", "numpy", "scipy"),
 )
@@ -20,10 +23,11 @@ REPORT = Report(
 def main() -> None:
     """Measure, and write the report after each section."""
     parser = REPORT.parser(__doc__)
+    parser.add_argument("--go-on", action="store_true", help="only runs that are not kept yet")
     given = parser.parse_args()
     for name in REPORT.chosen(parser, given.names):
         print(f"{name} ...", flush=True)
-        REPORT.measure(name, given.quick)
+        REPORT.measure(name, given.quick, goes_on=given.go_on and name in RUNS)
         REPORT.write()
 
 

@@ -8,7 +8,7 @@ from typing import Any
 
 from factory.plant.factory import Factory
 from factory.simulation.recovery import WorldFault
-from tests.bench.faults.trials import JITTER, Trial, all_tried, is_good, project
+from tests.bench.faults.trials import JITTER, Kept, Trial, is_good, project, tried_so_far
 from tests.tables import table
 
 PRODUCTS = ("paper", "truck", "chest")
@@ -46,13 +46,11 @@ def trial(product: str, kind: str, seed: int) -> Trial:
     return Trial(product, faults, UNITS, seed, kind)
 
 
-def measure(quick: bool = False) -> Iterator[dict[str, Any]]:
+def measure(quick: bool = False, kept: Kept = None) -> Iterator[dict[str, Any]]:
     """Run all, and tell after each what has been found so far."""
     products, seeds = (PRODUCTS[:1], 1) if quick else (PRODUCTS, SEEDS)
     trials = [trial(p, k, seed) for seed in range(seeds) for p in products for k in KINDS]
-    rows = list[dict[str, Any]]()
-    for row in all_tried(trials):
-        rows.append(row)
+    for rows in tried_so_far(trials, kept):
         yield {"rows": rows}
 
 

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from bisect import bisect_right
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from typing import Any
 
 from factory.pipeline import Project, read
+from factory.plant.factory import Factory
+from factory.record.failures import Failing
 from factory.simulation.recovery import Campaign, Sensors, WorldFault, recover
 from factory.simulation.request import RunRequest, WorldName
+from factory.simulation.run import Event, Run
 from factory.simulation.simulation import Simulation
 from factory.study.pool import cores, over_processes
 from tests.fidelity.products import EXAMPLES
@@ -20,7 +24,8 @@ JITTER = 0.3
 
 @dataclass(frozen=True)
 class Trial:
-    """A run of a `product` of the examples, of at most `max_time` [s], and what it is `about`."""
+    """A run of a `product` of the examples, of at most `max_time` [s], and what it is `about`;
+    `tells` which attempts at operations failed."""
 
     product: str
     faults: tuple[WorldFault, ...]
@@ -33,6 +38,7 @@ class Trial:
     noise: float = Sensors().noise
     max_time: float = 300.0
     world: WorldName = "mujoco"
+    tells: bool = False
 
 
 @cache
@@ -57,7 +63,9 @@ def tried(trial: Trial) -> dict[str, Any]:
     recovery = recover(simulation, campaign)
     run = simulation.run(max_time=trial.max_time)
     failures, physics = recovery.report(), run.physics
+    told = {"failed": failed(made.factory, run, failures.found)} if trial.tells else {}
     return {
+        **told,
         "product": trial.product,
         "world": trial.world,
         "about": trial.about,
@@ -82,6 +90,38 @@ def tried(trial: Trial) -> dict[str, Any]:
         "predicted_s": run.predicted_cycle_time_s,
         "dropoffs": run.dropoffs,
     }
+
+
+def failed(
+    factory: Factory, run: Run, found: Sequence[Failing]
+) -> list[tuple[int, int, tuple[str, ...]]]:
+    """The attempts that failed: the operation (index), how many attempts at it were before, and
+    what was lost, () where it was not good."""
+    index = factory.net.threaded.net.transition_index
+    starts: dict[int, list[float]] = {o.start: [] for o in factory.operations}
+    for event in run.events:
+        if isinstance(event, Event) and (number := index[event.transition]) in starts:
+            starts[number].append(event.t)
+    rows = []
+    for one in found:
+        operation = factory.by_label[one.operation]
+        attempt = bisect_right(starts[operation.start], one.t) - 1
+        rows.append((operation.index, attempt, one.scrapped if one.test == "lost" else ()))
+    return rows
+
+
+Kept = Mapping[str, Any] | None
+"""The results of a section that is gone on with."""
+
+
+def tried_so_far(trials: Sequence[Trial], kept: Kept) -> Iterator[list[dict[str, Any]]]:
+    """What came of all so far, again after each; those that are `kept` are not tried again."""
+    rows = [*(kept or {}).get("rows", ())]
+    known = {(row["product"], row["world"], row["about"], row["seed"]) for row in rows}
+    left = [t for t in trials if (t.product, t.world, t.about, t.seed) not in known]
+    for row in all_tried(left):
+        rows.append(row)
+        yield rows
 
 
 def all_tried(trials: Sequence[Trial]) -> Iterator[dict[str, Any]]:

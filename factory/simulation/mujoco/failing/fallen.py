@@ -3,17 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
-from factory.control.mode import Array, Index
-from factory.layout.layout import Layout
-from factory.layout.sweeps import piles, regions
-from factory.simulation.mujoco.world import MujocoWorld
-
-APART = 0.02
-"""Robots keep so far from what lies about [m]."""
+from factory.layout.bins import TOP, Bin
+from factory.layout.sweeping import SweptFloor
+from factory.simulation.mujoco.failing.jets import Jets
+from factory.simulation.mujoco.world import MujocoWorld, anything
 
 SETTLES = 0.5
 """So long after the last thing has been cleared away nothing shakes any more [s]."""
@@ -22,51 +19,33 @@ SETTLES = 0.5
 @dataclass(frozen=True, slots=True)
 class Heap:
     """The `bodies` of something that has fallen, by label, which count for a `unit` of scrap, and
-    `until` when they lie [s]."""
+    `until` when they lie [s]; `into`: the bin that they are to fall into."""
 
     unit: int
     bodies: Mapping[str, int]
     until: float
-
-
-@dataclass(frozen=True, eq=False, slots=True)
-class Swept:
-    """The rectangles (n, 4) [m] that robots (n,) and what they carry sweep, seen from above: least
-    and greatest x, least and greatest y."""
-
-    boxes: Array = field(repr=False)
-    robots: Index = field(repr=False)
-
-    @classmethod
-    def of(cls, layout: Layout) -> Swept:
-        """Those of a layout."""
-        found = regions(layout, piles(layout.factory, layout.product))
-        robots = np.array([region.robot for region in found], np.intp)
-        return cls(np.array([region.box for region in found]), robots)
-
-    def near(self, places: Array, radii: Array) -> frozenset[int]:
-        """The robots that come near to balls of some `radii` (k,) about `places` (k, 2) [m]."""
-        (x, y), box = places.T[:, :, None], self.boxes[None]
-        away = np.maximum(np.maximum(box[..., 0] - x, x - box[..., 1]), 0.0) ** 2
-        away += np.maximum(np.maximum(box[..., 2] - y, y - box[..., 3]), 0.0) ** 2
-        hit = (away < (radii[:, None] + APART) ** 2).any(axis=0)
-        return frozenset(self.robots[hit].tolist())
+    into: Bin | None = None
 
 
 class Fallen:
-    """What lies about in a world: `heaps`; `closed`: the robots (index) that could touch it."""
+    """What lies about in a world: `heaps`; `closed`: the robots (index) that could touch it, but
+    for what lies in its bin; `binned`: how often something has fallen into one."""
 
     def __init__(self, world: MujocoWorld) -> None:
-        self._world, self._swept = world, Swept.of(world.model.layout)
-        self._calm = 0.0
+        self._world, self._swept = world, SweptFloor.of(world.model.layout)
+        self._calm, self._jets = 0.0, Jets(world)
+        self.binned = 0
         self.heaps: list[Heap] = []
         self.closed = frozenset[int]()
 
-    def let_fall(self, robot: int, seconds: float) -> None:
-        """A robot lets go of all that it holds, which lies for so long [s]."""
+    def let_fall(self, robot: int, seconds: float, into: Bin | None = None) -> None:
+        """A robot lets go of all that it holds, which lies for so long [s], in a bin where one is
+        given."""
         world = self._world
         hand = world.parts.hands.let_go(robot)
-        self.heaps.append(Heap(hand.unit, dict(hand.bodies), world.time + seconds))
+        self.heaps.append(Heap(hand.unit, dict(hand.bodies), world.time + seconds, into))
+        if into is not None:
+            self._jets.blow(hand.bodies.values(), into)
         self.watch(hand.bodies.values())
         world.motion.load([robot], [0.0])
         self.closed |= self._near()
@@ -74,9 +53,11 @@ class Fallen:
     def tick(self) -> bool:
         """A tick is over: what has lain long enough is cleared away. Whether anything was."""
         parts, now = self._world.parts, self._world.time
+        self._jets.tick()
         over = [heap for heap in self.heaps if heap.until <= now]
         for heap in over:
             self.heaps.remove(heap)
+            self.binned += self._is_in_bin(heap)
             parts.feeders.retire(heap.bodies, heap.unit)
         if over:
             parts.welds.write()
@@ -88,8 +69,8 @@ class Fallen:
         """From now on bodies may come anywhere: all is looked at in every timestep."""
         world = self._world
         world.inspection.pressing.fallen.update(bodies)
-        if _anything not in world.hooks.before_step:
-            world.hooks.before_step.append(_anything)
+        if anything not in world.hooks.before_step:
+            world.hooks.before_step.append(anything)
 
     def calm(self, bodies: Iterable[int]) -> None:
         """Bodies are where they should be again, but for those that lie about."""
@@ -103,18 +84,25 @@ class Fallen:
         pressing.fallen -= {body for body in pressing.fallen if units[body] < 0}
         if pressing.fallen:
             self._calm = world.time + SETTLES
-        elif _anything in world.hooks.before_step and world.time >= self._calm:
+        elif anything in world.hooks.before_step and world.time >= self._calm:
             pressing.shaken.clear()
-            world.hooks.before_step.remove(_anything)
+            world.hooks.before_step.remove(anything)
+
+    def _is_in_bin(self, heap: Heap) -> bool:
+        """Whether all of a heap is in its bin, or sinks into it."""
+        radius, d, into = self._world.model.carried.radius, self._world.d, heap.into
+        found = ((*d.xipos[body].tolist(), radius[label]) for label, body in heap.bodies.items())
+        return into is not None and all(
+            into.holds((x, y)) and z < TOP + far for x, y, z, far in found
+        )
 
     def _near(self) -> frozenset[int]:
         """The robots that could touch what lies about now."""
         m, radius = self._world.m, self._world.model.carried.radius
-        lie = [(body, radius[label]) for h in self.heaps for label, body in h.bodies.items()]
+        about = [heap for heap in self.heaps if not self._is_in_bin(heap)]
+        lie = [(body, radius[label]) for h in about for label, body in h.bodies.items()]
+        if not lie:
+            return frozenset()
         bodies, radii = np.array([body for body, _ in lie]), np.array([r for _, r in lie])
         address = m.jnt_qposadr[m.body_jntadr[bodies]][:, None] + np.arange(2)
         return self._swept.near(self._world.d.qpos[address], radii)
-
-
-def _anything() -> None:
-    """Before a timestep in which anything may come anywhere: that there is a hook is enough."""

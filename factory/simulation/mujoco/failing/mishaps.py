@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from factory.plant.factory import Operation
+from factory.simulation.keeping import Keeper
 from factory.simulation.mujoco.failing.fallen import Fallen
 from factory.simulation.mujoco.world import MujocoWorld
 from factory.simulation.recovery.faults import WorldFault
@@ -41,6 +42,19 @@ class Mishaps:
         self.bad: dict[int, bool] = {}
         self.unseen: dict[int, str] = {}
         self.gone: list[str] = []
+
+    @property
+    def is_calm(self) -> bool:
+        """Whether nothing has slipped or is no good."""
+        slipped = self.slips or self._settling or self.opened
+        return not (slipped or self.bad or self.unseen or self.gone)
+
+    def keep(self, keeper: Keeper) -> None:
+        """How feeders hold what they show, or have shown last."""
+        welds = [*self._world.parts.feeders.welds.values()]
+        held = self._world.m.eq_data[welds]
+        keeper.array("feeders.held", held)
+        self._world.m.eq_data[welds] = held
 
     def open(self, robot: int) -> None:
         """A robot's hand opens."""

@@ -6,8 +6,10 @@ from collections.abc import Mapping, Sequence, Set
 
 import numpy as np
 
+from factory.layout.bins import Bin
 from factory.plant.factory import Operation
 from factory.problem.pag import NOPART
+from factory.simulation.keeping import Keeper, one_of, up_to
 from factory.simulation.mujoco.failing.fallen import Fallen
 from factory.simulation.mujoco.failing.mishaps import Mishaps
 from factory.simulation.mujoco.failing.sensors import Senses
@@ -25,7 +27,7 @@ class MujocoPlant:
         self._world, self._factory, self._clear = world, world.model.factory, campaign.clear
         self._fallen = Fallen(world)
         self._mishaps, self._senses = Mishaps(world, self._fallen), Senses(world, campaign)
-        self._scrapped = SCRAP
+        self._scrapped, self.spilled = SCRAP, list[str]()
 
     def lose(self, robot: int) -> bool:
         """A robot's hand opens, and nothing tells; whether it held anything."""
@@ -58,7 +60,11 @@ class MujocoPlant:
 
     def tick(self) -> None:
         """A tick is over."""
-        self._world.parts.strength.dropped = None
+        if self._world.parts.strength.dropped is not None:
+            self._world.parts.strength.dropped = None
+            hands = self._world.parts.hands.of
+            for robot in self._senses.unfelt():
+                self._fallen.watch(hands[robot].bodies.values())
         self._mishaps.tick()
         if self._fallen.tick():
             self.supplied()
@@ -197,16 +203,25 @@ class MujocoPlant:
                         self._mishaps.take_back(self._world.parts.copies[label, shown[label]])
                         feeders.take_back(label, self._next_scrap())
 
-    def let_go(self, robot: int, seconds: float) -> None:
-        """A robot lets scrap fall, which lies for so long [s]."""
-        self._let_fall(robot, seconds)
+    def let_go(self, robot: int, seconds: float, into: Bin | None = None) -> None:
+        """A robot lets scrap fall, which lies for so long [s], into a bin where one is given."""
+        self._let_fall(robot, seconds, into)
         self._world.parts.welds.write()
         self.came_back(robot)
         self._world.parts.feeders.stay_clear(robot)
 
-    def _let_fall(self, robot: int, seconds: float) -> None:
+    def _let_fall(self, robot: int, seconds: float, into: Bin | None = None) -> None:
         self._mishaps.opened.discard(robot)
-        self._fallen.let_fall(robot, seconds)
+        self._fallen.let_fall(robot, seconds, into)
+
+    def throw_away(self, robot: int, label: str, seconds: float) -> None:
+        """A robot at its B end lets go of a label that is scrap, over its bin, where that is wide
+        enough; it lies for so long [s]."""
+        found = (one for one in self._world.model.bins if one.robot == robot)
+        into = next((one for one in found if label in one.labels), None)
+        if into is None:
+            self.spilled.append(self._factory.robots[robot].name)
+        self.let_go(robot, seconds, into)
 
     def takes_back(self, robot: int) -> bool:
         """Whether something goes back up in a robot's feeder."""
@@ -229,9 +244,40 @@ class MujocoPlant:
         return self._fallen.closed
 
     @property
+    def binned(self) -> int:
+        """How often scrap has fallen into a bin."""
+        return self._fallen.binned
+
+    @property
     def contacts(self) -> int:
         """Pairs of things that touched of which one had fallen, or lay askew."""
         return len(self._world.inspection.pressing.touched)
+
+    @property
+    def is_calm(self) -> bool:
+        """Whether nothing has fallen or slipped, is askew or taken back."""
+        back, pressing = self._world.parts.feeders.back, self._world.inspection.pressing
+        about = self._fallen.heaps or pressing.fallen or pressing.shaken
+        taken = back.parts or back.fresh or back.awaited
+        return not (about or taken) and self._mishaps.is_calm and self._senses.is_calm
+
+    def keep(self, keeper: Keeper) -> None:
+        """What was scrapped and touched, what feeders' cameras have seen, and noise to come."""
+        world, leaves = self._world, {leaf.label for leaf in self._factory.leaves}
+        back, pressing, a_geom = world.parts.feeders.back, world.inspection.pressing, world.m.ngeom
+        robots = {robot.name for robot in self._factory.robots}
+        self._scrapped = keeper.whole("scrap", self._scrapped, SCRAP)
+        self._fallen.binned = keeper.whole("binned", self._fallen.binned)
+        spilled = [(name,) for name in self.spilled]
+        self.spilled = [name for (name,) in keeper.rows("spilled", spilled, one_of(robots))]
+        good = [(label,) for label in sorted(back.good)]
+        back.good = {label for (label,) in keeper.rows("feeders.good", good, one_of(leaves))}
+        touched = sorted(pressing.touched)
+        touched = keeper.rows("fallen.touched", touched, up_to(a_geom), up_to(a_geom))
+        pressing.touched = {*touched}
+        back.fresh = {}  # of the parts that are shown where a run begins
+        self._mishaps.keep(keeper)
+        self._senses.keep(keeper)
 
     def lift_out(self, robot: int, at: Mapping[int, float]) -> None:
         """A dead robot and what it holds are taken away, and another is put in its place, with its
