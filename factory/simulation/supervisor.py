@@ -178,8 +178,7 @@ class Supervisor:
         self.events.append(undone)
 
     def _mark(self, marking: Marking) -> None:
-        starts = [operation.start for operation in self.factory.operations]
-        net = self.factory.net
+        net, starts = self.factory.net, [operation.start for operation in self.factory.operations]
         self.threads = Threads(net.threaded, net.threads_of(marking), starts)
 
     def recall(self, axes: Container[int]) -> None:
