@@ -46,8 +46,8 @@ class WayBack:
 
 
 class Returning:
-    """The robots (index) of a factory that are on their way back: `ways`. `wasting`:
-    what they hold that is scrap. They begin with `ways` that have not begun."""
+    """The robots (index) of a factory that are on their way back: `ways`; those that are given have
+    not begun. `wasting`: what robots hold that is scrap."""
 
     def __init__(
         self,
