@@ -95,9 +95,10 @@ class Supervisor:
         self.factory, self.world, self.tick = factory, world, tick
         axes_of = [*factory.axes, *((stage.axis,) for stage in stages)]
         self.bundles = Bundles([*modes, *(stage.mode for stage in stages)], axes_of, limits)
-        net = factory.net
         self._mark(start)
-        self.fired = [counts.get(number, 0) for number in range(len(net.threaded.transitions))]
+        self.fired = [
+            counts.get(number, 0) for number in range(len(factory.net.threaded.transitions))
+        ]
         self.events: list[Event | Undone] = []
         self.ahead, self.active = Ahead(factory, stages), Active()
         self.near = self.enabled = True

@@ -51,30 +51,36 @@ class Responding:
             campaign,
         )
         eps = simulation.request.settings.eps
-        wasting = Wasting(not_carried_back(simulation.layout))
-        self.returning = Returning(simulation.layout, books.supervisor, eps, wasting)
+        self.returning = Returning(simulation.layout, books.supervisor, eps)
         self.standing = Standing(simulation)
         self.found: list[Failing] = []
         self.dead: dict[int, float] = {}
         self.used_spares = 0
-        self._tried: Counter[int] = Counter()
-        self._scrapped: Counter[str] = Counter()
+        self._on_end = OnEnd()
+        self._wasting = Wasting(not_carried_back(simulation.layout))
         self.deputising = Deputising(simulation, books)
 
     @property
     def is_calm(self) -> bool:
         """Whether all robots are at work, or wait for it, in the net that the run began with."""
-        moved = self.dead or self.returning.ways or self.deputising.exchanges
-        return not moved and self.standing.is_calm
+        changed = self.dead or self.returning.ways or self.deputising.exchanges
+        return not changed and self.standing.is_calm
 
     def keep(self, keeper: Keeper) -> None:
         """What failed, and how often on end, while all is calm."""
         factory, spares = self._books.factory, self._campaign.spares
         labels, robots = {*factory.by_label}, {"", *(robot.name for robot in factory.robots)}
-        count = up_to(LARGE)
-        found = [astuple(one)[:7] for one in self.found]  # no deputy: that is not calm
-        tests = is_size, is_text, one_of(labels), one_of(robots), is_text, some_of(labels)
-        found = keeper.rows("failures", found, *tests, lambda v: v is None or is_size(v))
+        found = [astuple(one) for one in self.found]
+        tests = (
+            is_size,
+            is_text,
+            one_of(labels),
+            one_of(robots),
+            is_text,
+            some_of(labels),
+            _is_until,
+        )
+        found = keeper.rows("failures", found, *tests, one_of(robots))
         self.found = [
             Failing(t, test, label, robot, response, tuple(things), until, deputy)
             for t, test, label, robot, response, things, until, deputy in found
@@ -191,11 +197,11 @@ class Responding:
         self.deputising.exchange(change, fired, undone)
         eps = self._simulation.request.settings.eps
         ways = ((r, way) for r, way in self.returning.ways.items() if r not in self.dead)
-        wasting = Wasting(change.barred, self.returning.wasting.held)
-        self.returning = Returning(books.layout, supervisor, eps, wasting, dict(ways))
+        self.returning = Returning(books.layout, supervisor, eps, dict(ways))
         self._plant.lift_out(robot, {})
         over = [books.factory.operations[n] for n in under_way if n not in marking]
-        wasting.waste(scrap, {robot: held[robot] for robot in scrap})
+        self._wasting.barred = change.barred
+        self._wasting.waste(scrap, {robot: held[robot] for robot in scrap})
         supervisor.recall(self.standing.axes(going | scrap))
         self._send_back(sorted(going | scrap), over, marking)
         return True
@@ -226,7 +232,7 @@ class Responding:
         scrap = {*self._plant.undone(books.held(marking), fired, going)}
         supervisor.undo(undone, fired, marking, self.standing.axes(going | scrap))
         over = [factory.operations[n] for n in under_way if n not in marking]
-        self.returning.wasting.waste(scrap, {robot: books.holds(robot, before) for robot in scrap})
+        self._wasting.waste(scrap, {robot: books.holds(robot, before) for robot in scrap})
         self._send_back(sorted(going | scrap), over, marking)
         self._plant.supplied()
 
@@ -239,7 +245,7 @@ class Responding:
         """Robots go to where they wait in a marking, by way of their B ends with what is scrap, or
         let it fall at once where they cannot carry it there; those of operations that are `over`
         leave in the reverse order of their coming."""
-        scrap = self.returning.wasting.held
+        scrap = self._wasting.held
         after = dict[int, frozenset[int]]()
         for operation in over:
             came = order_of(self._simulation.modes[operation.index], operation.robots)
@@ -248,7 +254,7 @@ class Responding:
         for robot in robots:
             rest = self.returning.rest(robot, marking)
             goals, done = rest, partial(self._plant.came_back, robot)
-            if robot in scrap and self.returning.wasting.falls_here(robot):
+            if robot in scrap and self._wasting.falls_here(robot):
                 self._plant.let_go(robot, self._campaign.clear)
             elif robot in scrap:
                 goals, done = (

@@ -17,7 +17,6 @@ from factory.layout.feeding import passing
 from factory.layout.layout import Layout
 from factory.nets.petri import Marking
 from factory.plant.factory import Operation
-from factory.simulation.recovery.wasting import Wasting
 from factory.simulation.starting import start_positions
 from factory.simulation.supervisor import Supervisor
 
@@ -46,19 +45,17 @@ class WayBack:
 
 
 class Returning:
-    """The robots (index) of a factory that are on their way back: `ways`; those that are given have
-    not begun. `wasting`: what robots hold that is scrap."""
+    """The robots (index) of a factory that are on their way back: `ways`. They begin with `ways`
+    that have not begun."""
 
     def __init__(
         self,
         layout: Layout,
         supervisor: Supervisor,
         eps: float,
-        wasting: Wasting,
         ways: Mapping[int, WayBack] = MappingProxyType({}),
     ) -> None:
         self._layout, self._supervisor = layout, supervisor
-        self.wasting = wasting
         goals = [*dict.fromkeys(_goals(layout))]
         first = len(supervisor.bundles.modes)
         self._number = {goal: first + n for n, goal in enumerate(goals)}

@@ -14,7 +14,7 @@ REPORT = Report(
     " `make faults` (`python -m tests.bench.faults NAME` for one section) from what is kept in"
     " docs/faults/. The supervisor is told of no fault: it has what sensors measure, with their"
     " default noise.",
-    (*RUNS, "takeovers", "sensors", "kills"),
+    (*RUNS, "sensors", "kills"),
     DOCS / "faults.md",
     ("mujoco", "numpy", "scipy"),
 )
