@@ -36,6 +36,7 @@ from factory.support.errors import Diagnostic, RunError
 from tests.bench.faults.takeovers import PAPER as INSERTS
 from tests.command_line import ROOT, Terminal
 from tests.fold_values import swapped
+from tests.good_runs import assert_good
 from tests.pag_values import catalogue
 from tests.test_deputies import made, randoms, seeds
 
@@ -266,7 +267,8 @@ def test_what_does_not_go_with_it(
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["truck", "chest"])
 def test_products(name: str) -> None:
-    """All robots with deputies of an example, in layouts that are certified."""
+    """All robots with deputies of an example, in layouts that are certified, and hold in MuJoCo,
+    though no deputy takes over while that runs."""
     layout = read(ROOT / "examples" / f"{name}.pag", ground=Ground(deputies=True)).layout
     assert certify(layout).holds
     for dead, deputy in deputies_in(layout).items():
@@ -274,3 +276,5 @@ def test_products(name: str) -> None:
         found = Takeover(layout.factory, with_moved(layout.factory, moved), dead, moved)
         part = part_of(layout, found.after, present(found.crew))
         assert part is not None and certify(part).holds
+    assert part is not None
+    assert_good(Simulation(part, RunRequest("mujoco", 2)).run())
