@@ -30,10 +30,10 @@ demo: setup
 	@echo "see renders/paper.mp4 and renders/paper.png"
 
 test: setup
-	$(PY) -m pytest -q -n 2 -m "not slow" $(ARGS)
+	$(PY) -m pytest -q -n 2 --dist worksteal -m "not slow" $(ARGS)
 
 test-all: setup oracles
-	$(PY) -m pytest -q -n 2 $(ARGS)
+	$(PY) -m pytest -q -n 2 --dist worksteal $(ARGS)
 
 bench: setup
 	$(PY) -m tests.bench $(ARGS)

@@ -10,7 +10,7 @@ import graphlib
 from collections import Counter
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property
 from itertools import chain
 from pathlib import Path
 
@@ -289,3 +289,9 @@ def lines(house: House) -> Counter[str]:
     for module in house.modules.values():
         found[module.room] += len(module.text.splitlines())
     return found
+
+
+@cache
+def this_house() -> House:
+    """The source tree that these tests are in."""
+    return House(Path(__file__).resolve().parent.parent)

@@ -26,17 +26,10 @@ from factory.support.settings import Settings
 from tests.bench.factories import balanced
 from tests.bench.factories import laid_out as floor_of
 from tests.command_line import ROOT
+from tests.examples import without_hands
 
-FENCE = """root = cup; cup = mate(bowl, ball, lid); bowl = mate(floor, wall1, wall2, wall3, wall4);
-floor = atomic(box = (0.1, 0.1, 0.01), pos = (0, 0, 0.005));
-wall1 = atomic(box = (0.01, 0.1, 0.03), pos = (0.045, 0, 0.0252));
-wall2 = atomic(box = (0.01, 0.1, 0.03), pos = (-0.045, 0, 0.0252));
-wall3 = atomic(box = (0.0796, 0.01, 0.03), pos = (0, 0.045, 0.0252));
-wall4 = atomic(box = (0.0796, 0.01, 0.03), pos = (0, -0.045, 0.0252));
-ball = atomic(sphere = 0.012, pos = (0, 0, 0.0224));
-lid = atomic(box = (0.1, 0.1, 0.005), pos = (0, 0, 0.0429))"""
-"""A ball that can only be lowered into its box; walls 3 and 4 come along x and fit between the
-others, so they are lowered too."""
+FENCE = (ROOT / "tests" / "baselines" / "fence.pag").read_text("utf-8")
+"""A small product with lifts."""
 
 
 @cache
@@ -58,8 +51,7 @@ def layout_of(name: str) -> Layout:
         return floor_of(balanced(int(name)))
     if name == "fence":
         return laid_out_with_lifts(FENCE)
-    file = ROOT / "examples" / f"{name}.pag"
-    return factory.lay_out(factory.compile(factory.load_pag(file)))
+    return without_hands(name)
 
 
 FINE = Settings(timestep=0.002, substeps=5)

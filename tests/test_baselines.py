@@ -27,7 +27,10 @@ EXAMPLES = FOLDER.parent.parent / "examples"
 PRODUCTS = {
     "paper": EXAMPLES / "paper.pag",
     "gearbox": EXAMPLES / "gearbox.pag",
-    **{name: FOLDER / f"{name}.pag" for name in ("chain", "tree", "unary", "kary", "meshes")},
+    **{
+        name: FOLDER / f"{name}.pag"
+        for name in ("chain", "tree", "unary", "kary", "meshes", "fence")
+    },
 }
 SEED, JITTER, DIGITS = 1, 0.3, 9
 SETTINGS = Settings(timestep=0.002)
@@ -96,7 +99,10 @@ def kept(name: str) -> Mapping[str, float | None]:
     return dict(json.loads(path.read_text("utf-8"))["figures"])
 
 
-@pytest.mark.parametrize("name", PRODUCTS)
+LARGE = {"gearbox": pytest.param("gearbox", marks=pytest.mark.slow)}
+
+
+@pytest.mark.parametrize("name", [LARGE.get(name, name) for name in PRODUCTS])
 def test_figures_stay_within_tolerance(name: str, request: pytest.FixtureRequest) -> None:
     found = {key: rounded(value) for key, value in figures(name).items()}
     if request.config.getoption("--update-golden"):
@@ -174,7 +180,7 @@ FAULTS: dict[str, tuple[Alter, set[str]]] = {
 }
 
 
-@pytest.mark.parametrize("name", ["paper", "meshes"])
+@pytest.mark.parametrize("name", ["paper", pytest.param("meshes", marks=pytest.mark.slow)])
 @pytest.mark.parametrize("fault", FAULTS)
 def test_a_planted_fault_is_caught(name: str, fault: str) -> None:
     alter, expected = FAULTS[fault]

@@ -61,9 +61,10 @@ def test_any_clearance_can_be_had(clearance: float) -> None:
         assert again.certificate.clearance == clearance
 
 
-@pytest.mark.parametrize("layout", many_layouts(16, range(10)))
-def test_looking_at_every_pair_finds_the_same(layout: Layout) -> None:
+@pytest.mark.parametrize("seed", range(10))
+def test_looking_at_every_pair_finds_the_same(seed: int) -> None:
     """The document alone, checked by comparing all regions with all others."""
+    (layout,) = many_layouts(16, range(seed, seed + 1))
     for changed in (layout, shortened(layout, 0, 0.03), with_path(layout, 0, arm=-0.3)):
         found = certify(changed)
         document = json.loads(json.dumps(found.as_json()))
@@ -281,7 +282,8 @@ def test_most_guidepaths_cannot_be_5_mm_shorter() -> None:
 
 def test_work_grows_with_the_number_of_robots() -> None:
     for shape in SHAPES:
-        small, large = (certify(random_layout(n, 1, shape, "plain")) for n in (250, 1000))
+        small, large = (random_layout(n, 1, shape, "plain").certificate for n in (60, 240))
+        assert small and large
         robots = len(large.robots) / len(small.robots)
         assert len(large.regions) <= 1.3 * robots * len(small.regions)
         assert large.pairs <= 1.3 * robots * small.pairs

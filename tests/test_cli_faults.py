@@ -17,6 +17,8 @@ from tests.pag_texts import MATE
 
 BROKEN = sorted((ROOT / "tests" / "broken").glob("*.pag"))
 TEMPLATES = sorted((ROOT / "tests" / "broken").glob("*.op"))
+SMALL = ["--size", "64x48", "--fps", "5"]
+"""Films that are soon taken."""
 
 
 def commands(folder: Path) -> list[list[object]]:
@@ -24,8 +26,8 @@ def commands(folder: Path) -> list[list[object]]:
     return [
         ["check", "--certificate", folder / "proof.json"],
         ["build", "--mjcf", folder / "model.xml", "-o", folder / "all"],
-        ["run", "--log", folder / "run.log", "--video", folder / "run.mp4"],
-        ["render", "-o", folder / "film.mp4"],
+        ["run", "--log", folder / "run.log", "--video", folder / "run.mp4", *SMALL],
+        ["render", "-o", folder / "film.mp4", *SMALL],
         ["programs"],
         ["export", "--format", "dot", "-o", folder / "net.dot"],
     ]
@@ -65,6 +67,20 @@ def test_broken_templates_write_nothing(run: Terminal, out: Path, file: Path) ->
 OWN = MATE.replace("mate =", "op =")
 
 
+@pytest.fixture
+def own(out: Path) -> Path:
+    """A folder with a product of an operation of its own, and that operation."""
+    (out / "op.op").write_text(OWN)
+    (out / "p.pag").write_text("root = c; c = op(a, b); a = atomic(); b = atomic();")
+    return out
+
+
+def test_operations_of_ones_own_are_compiled(run: Terminal, own: Path) -> None:
+    (own / "x").mkdir()
+    for command, *options in commands(own / "x"):
+        assert run(command, own / "p.pag", "--templates", own, *options).status == 0
+
+
 @pytest.mark.parametrize(
     ("right", "wrong", "code"),
     [
@@ -78,22 +94,17 @@ OWN = MATE.replace("mate =", "op =")
     ],
 )
 def test_operations_without_a_mode_are_refused_when_compiled(
-    run: Terminal, out: Path, right: str, wrong: str, code: str
+    run: Terminal, own: Path, right: str, wrong: str, code: str
 ) -> None:
-    (out / "op.op").write_text(OWN)
-    (out / "p.pag").write_text("root = c; c = op(a, b); a = atomic(); b = atomic();")
-    for command, *options in commands(out / "x"):
-        (out / "x").mkdir(exist_ok=True)
-        assert run(command, out / "p.pag", "--templates", out, *options).status == 0
     assert right in OWN
-    (out / "op.op").write_text(OWN.replace(right, wrong))
-    for command, *options in commands(out / "y"):
-        (out / "y").mkdir(exist_ok=True)
-        done = run(command, out / "p.pag", "--templates", out, *options, "--json")
+    (own / "op.op").write_text(OWN.replace(right, wrong))
+    (own / "y").mkdir()
+    for command, *options in commands(own / "y"):
+        done = run(command, own / "p.pag", "--templates", own, *options, "--json")
         assert done.status == 2 and done.codes == [code], command
         (error,) = done.json["errors"]
         assert (Path(error["file"]).name, error["line"]) == ("op.op", 6)
-    assert files_in(out / "y") == {}
+    assert files_in(own / "y") == {}
 
 
 def garbage() -> dict[str, bytes]:

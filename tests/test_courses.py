@@ -243,7 +243,7 @@ def test_a_course_that_goes_on_is_noticed(monkeypatch: pytest.MonkeyPatch) -> No
         assert abs(before[robot]) - abs(after[robot]) > 0.5 * FINE.acceleration * FINE.tick
 
 
-@pytest.mark.parametrize("name", ["paper", "20"])
+@pytest.mark.parametrize("name", ["paper", pytest.param("20", marks=pytest.mark.slow)])
 @pytest.mark.parametrize("eps", [2e-4, 5e-3])
 def test_no_robot_comes_to_a_goal_before_its_reference_rests(
     name: str, eps: float, monkeypatch: pytest.MonkeyPatch

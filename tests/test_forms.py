@@ -192,6 +192,7 @@ def templates() -> dict[str, Template]:
     return {name: replace(t, instead="") for name, t in TEMPLATES.items()}
 
 
+@pytest.mark.slow
 def test_forms_leave_no_robot_without_a_hand() -> None:
     project = read(EXAMPLES / "truck.pag")
     assert not project.no_grips

@@ -150,7 +150,12 @@ def test_turns_are_those_of_the_engine() -> None:
         assert np.allclose(found, matrix, rtol=0, atol=1e-15)
 
 
-@pytest.mark.parametrize(("name", "least"), [("paper", 1e-6), ("lamp", 1e-5), ("gearbox", 1e-4)])
+GEARBOX = pytest.param("gearbox", 1e-4, marks=pytest.mark.slow)
+
+
+@pytest.mark.parametrize(
+    ("name", "least"), [("paper", 1e-6), ("lamp", 1e-5), ("fence", 1e-6), GEARBOX]
+)
 def test_a_fused_run_agrees_with_the_unfused(name: str, least: float) -> None:
     """What is rounded away is some of it, `least` [mm]: by the lamp's seeds 0.5e-4 to 1.8e-4."""
     fine = Settings(timestep=0.002)

@@ -19,6 +19,7 @@ from tests.house import (
     engine_writes,
     long_modules,
     strangers,
+    this_house,
     twins,
     unexplained,
     upward_imports,
@@ -130,7 +131,7 @@ BREACHES: tuple[tuple[Law, dict[str, str], str], ...] = (
 
 @pytest.fixture(scope="module")
 def house() -> House:
-    return House(ROOT)
+    return this_house()
 
 
 @pytest.mark.parametrize("law", LAWS, ids=lambda law: law.__name__)

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from tests.command_line import PAPER, ROOT
-from tests.house import House
+from tests.house import this_house
 
 ASIDE = ("foreign_nets", "networkx")
 """What the main road does without."""
@@ -62,7 +62,7 @@ def test_a_planted_import_shows() -> None:
 
 
 def test_which_rooms_import_it() -> None:
-    house = House(ROOT)
+    house = this_house()
     rooms = {
         module.room
         for module in house.modules.values()

@@ -29,6 +29,7 @@ from factory.support.errors import InputError
 from factory.support.files import write_all
 from factory.support.settings import Settings
 from tests.command_line import PAPER, ROOT, Terminal, files_in
+from tests.examples import without_hands
 
 KARY = """root = s; s = mate(a, b, c, t); t = mate(e, f); c = inspect(d, dwell = 0.2);
 a = atomic(); b = atomic(); d = atomic(); e = atomic(); f = atomic()"""
@@ -57,7 +58,7 @@ def compiled(model: Model, folder: Path) -> mujoco.MjModel:
 
 @pytest.fixture(scope="module")
 def paper() -> Layout:
-    return factory.lay_out(factory.compile(factory.load_pag(PAPER)))
+    return without_hands("paper")
 
 
 @pytest.fixture(scope="module")
@@ -186,7 +187,7 @@ def principal_axis(m: mujoco.MjModel, seen: np.ndarray) -> np.ndarray:
 
 @pytest.mark.parametrize("name", ["paper", "stool", "gearbox"])
 def test_the_broad_phase_sweeps_along_the_floor(name: str, tmp_path: Path) -> None:
-    layout = factory.lay_out(factory.compile(factory.load_pag(ROOT / f"examples/{name}.pag")))
+    layout = without_hands(name)
     m = compiled(physical_model(layout), tmp_path)
     xlo, xhi, ylo, yhi = layout.floor
     compass = m.geom_bodyid == m.body(names.COMPASS).id

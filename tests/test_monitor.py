@@ -17,7 +17,7 @@ import factory
 from factory.lang import read_pag
 from factory.layout.layout import Layout
 from factory.nets.history import legal_marking
-from factory.pipeline import all_templates, read
+from factory.pipeline import all_templates
 from factory.record.log import Log, LogWriter, read_log
 from factory.record.monitor import MonitorSubject, Report, beside, subject_of
 from factory.record.monitor.explanation import SeenFirings
@@ -27,6 +27,7 @@ from factory.simulation.simulation import Simulation
 from factory.support.errors import InputError
 from factory.support.settings import Settings
 from tests.command_line import PAPER, ROOT, Terminal
+from tests.examples import with_hands
 from tests.good_runs import random_marking
 from tests.pag_texts import PRODUCTS, UNARY, laid_out
 
@@ -141,7 +142,7 @@ def test_setpoints_are_two_ticks_old_at_most_though_something_ends_in_every_tick
 
 
 def test_robots_that_lower_what_they_bring_are_explained() -> None:
-    layout = factory.lay_out(read(ROOT / "examples" / "gearbox.pag").plain)
+    layout = with_hands("lamp")
     lifts = [r for r in layout.factory.robots if r.type == "lift"]
     assert lifts
     simulation = Simulation(layout, RunRequest(units=1, seed=2, jitter=0.3))

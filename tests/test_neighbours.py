@@ -137,7 +137,7 @@ def test_much_of_a_factory_is_left_out() -> None:
     """Where so many robots are that any is left out without being told to."""
     simulation = ready("40", units=9)
     shares = []
-    for _ in range(1600):
+    for _ in range(1100):
         simulation.supervisor.step()
         shares.append(looked_at(simulation))
     assert np.mean(shares[400:]) < 0.85 and min(shares) < 0.6

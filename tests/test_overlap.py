@@ -32,7 +32,8 @@ from factory.simulation.request import RunRequest
 from factory.simulation.simulation import Simulation
 from factory.support.engine import mujoco
 from factory.support.settings import Settings
-from tests.command_line import ROOT, Terminal
+from tests.command_line import Terminal
+from tests.examples import with_hands
 from tests.pag_texts import TEMPLATES, laid_out
 from tests.simulation_values import ready
 
@@ -143,7 +144,7 @@ def test_what_is_too_thin_to_become_smaller_is_left_out() -> None:
 
 @pytest.mark.parametrize("name", ["paper", "stool", "truck"])
 def test_products_without_overlaps_are_the_same_to_the_byte(name: str) -> None:
-    layout = read(ROOT / "examples" / f"{name}.pag").layout
+    layout = with_hands(name)
     one, other = model_of(layout, 0.0), model_of(layout)
     assert one.xml == other.xml and one.files == other.files
 

@@ -17,25 +17,26 @@ import mujoco
 import numpy as np
 import pytest
 import trimesh
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from layout_values import table_pag
 
 import factory
 from factory.geometry import decomposition
-from factory.geometry.decomposition import in_pieces
-from factory.geometry.meshes import Array, Mesh, is_closed
+from factory.geometry.meshes import Array, Indices, Mesh, is_closed
 from factory.geometry.pieces import (
     MOST_PIECES,
     ROUND,
     box_piece,
+    closed_bodies,
     components,
-    convex_bodies,
     cylinder_piece,
+    is_convex,
     sphere_piece,
 )
 from factory.geometry.product import product_geometry
 from factory.geometry.solids import Solid
+from factory.geometry.touching import bodies
 from factory.mjcf import names
 from factory.mjcf.model import model_files
 from factory.problem.pag import PAG
@@ -177,7 +178,7 @@ def test_components_are_numbered_as_their_triangles_come() -> None:
     assert components(30, faces).tolist() == [0, 1, 2] * 12
     vertices = np.random.default_rng(0).normal(size=(30, 3))
     vertices[8:16], vertices[:8], vertices[20:28] = box.vertices, box.vertices + 3, box.vertices + 6
-    bodies = convex_bodies(vertices, faces)
+    bodies = closed_bodies(vertices, faces)
     assert [body[0].min() for body in bodies] == [-0.5, 2.5, 5.5]
     assert all(np.array_equal(body[1], box.faces) for body in bodies)
 
@@ -187,15 +188,61 @@ def test_very_many_bodies_are_only_counted() -> None:
     tetrahedron = np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])
     faces = (tetrahedron + 4 * np.arange(40_000)[:, None, None]).reshape(-1, 3)
     begin = process_time()
-    assert convex_bodies(corners, faces) == []
+    assert closed_bodies(corners, faces) == []
     assert process_time() - begin < 2
 
 
-def test_a_file_is_read_again_only_where_it_has_to_be(tmp_path: Path) -> None:
-    boxes = [trimesh.creation.box((0.1, 0.1, 0.1)).apply_translation((x, 0, 0)) for x in (0, 0.2)]
-    apart = trimesh.util.concatenate(boxes)
-    mesh = Mesh("m", np.asarray(apart.vertices), np.asarray(apart.faces))
-    assert len(in_pieces(mesh, lambda: pytest.fail("read again")).pieces) == 2
+# --- bodies that touch ---------------------------------------------------------------------------
+
+
+def _soup(*bodies: trimesh.Trimesh) -> tuple[Array, Indices]:
+    """Bodies as an STL file has them, one vertex at a place."""
+    mesh = trimesh.util.concatenate(bodies)
+    mesh.merge_vertices()
+    return np.asarray(mesh.vertices), np.asarray(mesh.faces)
+
+
+def _boxes(*cells: tuple[int, int, int]) -> list[trimesh.Trimesh]:
+    return [trimesh.creation.box((1, 1, 1)).apply_translation(cell) for cell in cells]
+
+
+@given(
+    st.sets(st.tuples(*[st.integers(0, 2)] * 3), min_size=1, max_size=27),
+    st.integers(0, 2**32 - 1),
+)
+@settings(max_examples=60, deadline=None)
+def test_boxes_that_share_sides_edges_and_corners_are_told_apart(
+    cells: set[tuple[int, int, int]], seed: int
+) -> None:
+    """Whatever way the whole is turned, and in whatever order its triangles come."""
+    rng, boxes = np.random.default_rng(seed), _boxes(*sorted(cells))
+    vertices, faces = _soup(*boxes)
+    turn = trimesh.transformations.random_rotation_matrix(rng.random(3))[:3, :3]
+    order = rng.permutation(len(faces))
+    number = bodies(vertices @ turn.T, faces[order])
+    assert number.max() + 1 == len(cells)
+    middles = vertices[faces[order]].mean(axis=1)
+    for body in range(len(cells)):
+        mine = middles[number == body]
+        assert len(mine) == 12 and (np.ptp(mine, axis=0) < 1 + 1e-9).all()
+    assert all(is_convex(*body) for body in closed_bodies(vertices @ turn.T, faces[order]))
+
+
+def test_bodies_of_a_file_without_common_vertices_are_exact(tmp_path: Path) -> None:
+    """An STL file writes each triangle's corners by themselves."""
+    wedges = trimesh.util.concatenate(ring())
+    solid = solid_of(tmp_path, wedges, "stl")
+    assert len(solid.pieces) == 24
+    assert sum(map(hull_volume, solid.pieces)) == pytest.approx(wedges.volume, rel=1e-5)
+
+
+def test_a_body_with_corners_inwards_stays_one() -> None:
+    """Edges of two triangles join them, whatever their angle."""
+    tube = trimesh.creation.annulus(0.5, 1, 1, sections=12)
+    beside = trimesh.creation.box((1, 1, 1)).apply_translation((5, 0, 0))
+    vertices, faces = _soup(tube, beside)
+    number = bodies(vertices, faces)
+    assert np.bincount(number).tolist() == [len(tube.faces), 12]
 
 
 # --- decomposition --------------------------------------------------------------------------------
@@ -258,6 +305,33 @@ def test_a_library_that_fails_leaves_the_hull(
 ) -> None:
     monkeypatch.setattr(sys.modules["coacd"], "run_coacd", lambda *_, **__: 1 / 0)
     assert len(solid_of(tmp_path, trimesh.creation.annulus(0.05, 0.1, 0.1)).pieces) == 1
+
+
+def test_each_body_is_decomposed_by_itself(tmp_path: Path, library: list[int]) -> None:
+    """What touches would be a mesh that intersects itself, which the library puts on a grid."""
+    tube = trimesh.creation.annulus(0.05, 0.1, 0.1)
+    top = trimesh.creation.annulus(0.05, 0.1, 0.1).apply_translation((0, 0, 0.1))
+    foot = trimesh.creation.box((0.1, 0.1, 0.1)).apply_translation((1, 0, 0))
+    assert len(solid_of(tmp_path, trimesh.util.concatenate([tube, top, foot])).pieces) == 5
+    assert len(library) == 1 + 1  # two tubes, and the box as it is
+
+
+def test_bodies_that_reach_out_of_their_mesh_count_where_they_collide(
+    tmp_path: Path, library: list[int], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def run_coacd(mesh: object, **_: object) -> list[tuple[Array, Array]]:
+        low, high = mesh[0].min(axis=0), mesh[0].max(axis=0)  # type: ignore[index]
+        boxes = [trimesh.creation.box(high - low + 0.002) for _ in range(2)]
+        return [(np.asarray(b.vertices), np.asarray(b.faces)) for b in boxes]
+
+    monkeypatch.setattr(sys.modules["coacd"], "run_coacd", run_coacd)
+    tube = trimesh.creation.annulus(0.05, 0.1, 0.1)
+    tube.export(tmp_path / "wide.obj")
+    pag = table_pag("p", ("p", "atomic", "", {"mesh": "wide.obj"}))
+    product = product_geometry(PAG(pag.root, pag.nodes, folder=str(tmp_path)))
+    assert np.ptp([product.low, product.high], axis=0) == pytest.approx([0.202, 0.202, 0.102])
+    (warning,) = product.warnings
+    assert "reach 1 mm too far" in warning.message
 
 
 def test_nearly_convex_meshes_are_not_decomposed(tmp_path: Path, library: list[int]) -> None:

@@ -92,6 +92,23 @@ def test_each_operation_has_its_room(
         assert line.endswith("nothing near" if room is None else f"room {1e3 * room:.2f} mm")
 
 
+@pytest.mark.parametrize("drawn", [False, True])
+def test_the_report_has_the_way_and_the_room_of_an_operation(
+    planning: Planning, terminal: Terminal, tmp_path: Path, drawn: bool
+) -> None:
+    """That of the plan; and that a pair is left out that is drawn into each other."""
+    wall = (-20, -20, 0.2), (-4.97 if drawn else -5.2, 20, 30.2)
+    done = planning({**PEG, "cap": [*PEG["cap"][1:], wall]}, "--no-look")
+    (join,), to = done.json["joins"], tmp_path / "report.html"
+    assert terminal("report", done.json["pag"], "--units", 1, "-o", to).status == 0
+    text = to.read_text().partition("How parts come together")[2].partition("</table>")[0]
+    (row,) = [row for row in text.split("<tr>") if f">{join['label']}<" in row]
+    assert "<td>peg + cap</td><td>slides from " in row
+    room = f"{1e3 * abs(join['clearance']):.2f} mm"
+    assert (f">drawn {room} into each other<" if drawn else f">{room}<") in row
+    assert (">cap - peg<" if drawn else ">none<") in row
+
+
 def labels_of(pag: Path) -> set[str]:
     matings = read(pag).matings
     assert matings is not None

@@ -17,12 +17,12 @@ from types import SimpleNamespace
 
 import pytest
 
-import factory
 from factory.simulation.request import RunRequest
 from factory.simulation.simulation import Simulation
 from factory.support import progress
 from factory.support.interruption import awaited, side_by_side
 from factory.support.progress import Progress, Waiting
+from tests.examples import without_hands
 
 
 class Terminal(io.StringIO):
@@ -91,7 +91,7 @@ def until(holds: Callable[[], bool]) -> None:
 
 @pytest.mark.parametrize("name", ["paper", "gearbox", "chest"])
 def test_a_run_takes_no_longer_than_expected(name: str) -> None:
-    layout = factory.lay_out(factory.compile(factory.load_pag(f"examples/{name}.pag")))
+    layout = without_hands(name)
     for units in (1, 4):
         made = Simulation(layout, RunRequest("ideal", units))
         assert made.run().sim_time_s <= made.duration <= 2 * made.run().sim_time_s + 5

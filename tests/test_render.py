@@ -149,7 +149,7 @@ def test_nothing_is_left_of_a_film_without_frames(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("ending", [".mp4", ".mkv"])
-@pytest.mark.parametrize("fps", [4, 10, 30])
+@pytest.mark.parametrize("fps", [10, *(pytest.param(n, marks=pytest.mark.slow) for n in (4, 30))])
 def test_a_killed_process_leaves_all_but_the_last_second(
     tmp_path: Path, fps: int, ending: str
 ) -> None:

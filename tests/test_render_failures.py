@@ -9,18 +9,22 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from factory.mjcf.replica import Replica
 from factory.nets.undo import marking_after, undo
 from factory.nets.undone import Undone
 from factory.plant.material import joins_of
 from factory.record.failures import Failing
 from factory.record.log import Log
+from factory.record.log.model import model_of
 from factory.record.monitor.record import recorded_subject
 from factory.record.monitor.subject import subject_of
 from factory.render.caption import Caption
-from factory.render.colours import AMBER, FLASH
+from factory.render.colours import AMBER, DEAD, FLASH
+from factory.render.film import moment_of
 from factory.render.gantt_panel import GanttPanel
 from factory.render.history import History
 from factory.render.ink import Ink
+from factory.render.marks import Mark, Marks
 from factory.render.net_panel import NetPanel
 from factory.render.notices import SHOWN, draw_notices
 from factory.render.rows import Rows
@@ -210,3 +214,76 @@ def test_a_log_keeps_what_went_wrong(log: Log, tmp_path: Path) -> None:
     dead = next(one for one in failures.found if one.test == "jammed")
     assert dead.until == pytest.approx(dead.t + 3.0)
     assert failures.spares == 1 and failures.stood
+
+
+# Marks on the floor.
+
+
+def marks_at(log: Log, time: float, history: History | None = None) -> list[Mark]:
+    replica = Replica(model_of(log))
+    moment = moment_of(log, log.row_at(time))
+    replica.place(moment.shown.qpos)
+    return [*Marks(replica, history or told(log)).at(moment.shown, moment.time)]
+
+
+def test_robots_that_stand_are_marked_where_they_are(log: Log) -> None:
+    assert log.failures is not None
+    history, slid = told(log), 0
+    for (start, names), (end, _) in zip(log.failures.stood, log.failures.stood[1:], strict=False):
+        time = (start + end) / 2
+        found = [mark for mark in marks_at(log, time) if mark.colour in (AMBER, DEAD)]
+        assert len(found) == len(history.stands(time) | history.dead(time)) >= len(names)
+        slid += len(found)
+    assert slid
+
+
+def test_a_dead_robot_is_dark_until_it_is_replaced(log: Log) -> None:
+    history = told(log)
+    death = next(one for one in history.failings if one.test == "jammed")
+    assert death.until is not None
+    for time, count in ((death.t - 0.1, 0), (death.t + 0.1, 1), (death.until + 0.1, 0)):
+        assert [mark.colour for mark in marks_at(log, time)].count(DEAD) == count
+
+
+def test_what_lies_about_has_a_zone_round_it(log: Log) -> None:
+    history = told(log)
+    drop = next(one for one in history.failings if one.test == "lost")
+    zones = [mark for mark in marks_at(log, drop.t + 1.0) if mark.colour == FLASH]
+    assert len(zones) == 1 and zones[0].radius > 0.02
+    cleared = drop.t + 3.0  # it lies for 2 s
+    assert FLASH not in [mark.colour for mark in marks_at(log, cleared)]
+
+
+def test_a_run_in_which_nothing_failed_has_no_marks(log: Log) -> None:
+    fresh = History(recorded_subject(log.header))
+    assert not marks_at(log, 3.0, fresh)
+
+
+# Robots that are exchanged.
+
+
+def test_a_history_tells_which_robots_were_exchanged(log: Log) -> None:
+    history = told(log)
+    death = next(one for one in history.failings if one.test == "jammed")
+    ((robot, start, end),) = history.exchanged()
+    assert (history.factory.robots[robot].name, start, end) == ("r2", death.t, death.until)
+
+
+def test_the_gantt_chart_has_a_dark_band_until_the_spare_comes(log: Log) -> None:
+    history = told(log)
+    ((robot, start, end),) = history.exchanged()
+    panel = GanttPanel(SIZE, 1.0, history, Rows(history, 300.0))
+    slides = np.zeros(len(history.factory.robots))
+    before, during = (panel.draw(t, slides, 0.0).astype(int).sum(axis=2) for t in (start, end))
+    assert (during < 480).mean() > (before < 480).mean() + 0.01
+
+
+def test_a_spare_is_told_of_when_it_comes(log: Log) -> None:
+    history, caption = told(log), Caption(SIZE)
+    ((_, _, end),) = history.exchanged()
+    dark = []
+    for time in (end - 0.05, end + 0.05):
+        pixels = np.full((SIZE[1], SIZE[0], 3), 255, np.uint8)
+        draw_notices(pixels, history, time, caption)
+        dark.append(reddish(pixels, DEAD, 8).any())
+    assert dark == [False, True]

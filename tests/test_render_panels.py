@@ -34,6 +34,7 @@ from factory.simulation.request import RunRequest
 from factory.simulation.simulation import Simulation
 from factory.support.errors import InputError
 from tests.command_line import PAPER, Terminal, files_in
+from tests.examples import without_hands
 from tests.opengl import needs_gl
 from tests.pag_texts import TEMPLATES
 from tests.strategies import random_pag_text
@@ -43,7 +44,7 @@ SIZE = (560, 360)
 
 
 def laid_out(name: str):
-    return factory.lay_out(factory.compile(factory.load_pag(EXAMPLES / f"{name}.pag")))
+    return without_hands(name)
 
 
 def kept(layout, path: Path, world: str = "mujoco", units: int = 2, **options) -> Log:

@@ -7,7 +7,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import factory
 from factory.mjcf import names
 from factory.mjcf.replica import Replica
 from factory.problem.pag import NOPART
@@ -24,6 +23,7 @@ from factory.render.subject import placed
 from factory.simulation.request import RunRequest
 from factory.simulation.simulation import Simulation
 from factory.support.engine import mujoco
+from tests.examples import without_hands
 from tests.pag_texts import laid_out
 
 EXAMPLES = Path(__file__).parent.parent / "examples"
@@ -35,7 +35,7 @@ WIDE, BESIDE_PANELS = Framing(16 / 9, below=0.1), Framing(716 / 720, below=0.1)
 def log(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Log:
     """The log of a factory without lifts, and of one with."""
     path = tmp_path_factory.mktemp("log") / "run.log"
-    layout = factory.lay_out(factory.compile(factory.load_pag(EXAMPLES / f"{request.param}.pag")))
+    layout = without_hands(request.param)
     simulation = Simulation(layout, RunRequest("mujoco", units=2))
     with LogWriter(path, simulation) as writer:
         simulation.run([writer.observe])

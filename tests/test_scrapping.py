@@ -9,17 +9,16 @@ import pytest
 from factory.layout.clearance import separation
 from factory.layout.scrapping import not_carried_back
 from factory.layout.sweeps import piles
-from factory.pipeline import read
-from tests.fidelity.products import EXAMPLES
+from tests.examples import with_hands
 
 
 @pytest.mark.parametrize("name", ["paper", "balanced", "lamp"])
 def test_most_piles_can_be_carried_back(name: str) -> None:
-    assert not_carried_back(read(EXAMPLES / f"{name}.pag").layout) == frozenset()
+    assert not_carried_back(with_hands(name)) == frozenset()
 
 
 def test_the_finished_chest_would_hit_a_post() -> None:
-    layout = read(EXAMPLES / "chest.pag").layout
+    layout = with_hands("chest")
     assert not_carried_back(layout) == {(0, "chest")}
     path, label = layout.guidepaths[0], "chest"
     pile = piles(layout.factory, layout.product)[label]
@@ -29,7 +28,7 @@ def test_the_finished_chest_would_hit_a_post() -> None:
 
 
 def test_a_wider_clearance_bars_more() -> None:
-    layout = read(EXAMPLES / "truck.pag").layout
+    layout = with_hands("truck")
     found = not_carried_back(layout)
     assert {label for _, label in found} == {"rear", "rear_set"}
     assert found < not_carried_back(replace(layout, clearance=2 * layout.clearance))

@@ -7,7 +7,6 @@ import random
 import sqlite3
 from contextlib import closing
 from dataclasses import replace
-from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +15,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-import factory
 from factory.control.mode import Mode
 from factory.layout.bounds import cycle_time_bound
 from factory.layout.clearance import certify
@@ -26,7 +24,7 @@ from factory.layout.layout import Layout
 from factory.layout.optimising import first_feasible, optimised
 from factory.modes import staging
 from factory.modes.modes import operation_modes, robot_limits
-from factory.modes.staging import stages
+from factory.modes.staging import stages, stages_of
 from factory.nets.cycle_ratio import max_cycle_ratio
 from factory.nets.marked import MarkedNet
 from factory.nets.petri import PetriNet, Place, Transition
@@ -43,8 +41,9 @@ from factory.study.analysis.timed import timed_net
 from factory.study.analysis.timing import Change
 from factory.support.settings import Settings
 from factory.timing.cycle_time import cycle_time
-from factory.timing.prediction import operation_delays, predict, ways_ahead
+from factory.timing.prediction import held_up, operation_delays, predict, ways_ahead
 from tests.command_line import PAPER, ROOT, Terminal
+from tests.examples import without_hands
 from tests.layout_values import STYLES, random_layout
 from tests.pag_values import SHAPES
 
@@ -56,9 +55,8 @@ shapes, styles = st.sampled_from(SHAPES), st.sampled_from(STYLES)
 worlds: Any = st.sampled_from(["ideal", "mujoco"])
 
 
-@cache
 def laid_out(file: Path) -> Layout:
-    return factory.lay_out(factory.compile(factory.load_pag(file)))
+    return without_hands(file.stem)
 
 
 @pytest.fixture(scope="module")
@@ -134,6 +132,22 @@ def test_slack_is_what_an_operation_may_take_longer(size: int, seed: int, shape:
             assert (pace > net.pace + 1e-6) == grows
 
 
+def test_a_carrier_that_is_waited_for_takes_as_long_as_all_of_its_operation() -> None:
+    """The hand of the stool's slowest carrier has to be there first: what it takes comes then."""
+    layout = laid_out(ROOT / "examples" / "stool.pag")
+    simulation = Simulation(layout, RunRequest("ideal", units=7))
+    settings, world = simulation.request.settings, simulation.request.world
+    ahead = stages_of(layout, simulation.modes, settings)
+    told = layout, simulation.modes, simulation.limits, settings, world, ahead
+    whole, alone = held_up(*told), ways_ahead(ahead, simulation.limits, settings, world)
+    longer = {key for key, seconds in whole.items() if seconds > alone[key] + 0.1}
+    run = simulation.run()
+    assert run.bottleneck in {layout.factory.robots[robot].name for robot, _ in longer}
+    assert run.predicted_cycle_time_s == pytest.approx(run.cycle_time_s, rel=0.01)
+    net = timed_net(Timing(layout, settings, world))
+    assert net.pace == pytest.approx(run.predicted_cycle_time_s)
+
+
 def test_tokens_may_be_ready_later() -> None:
     """A ring of two places, one token: it is ready after 3 s, and then comes round every 2 s."""
     places = (Place("p", (1,), (0,)), Place("q", (0,), (1,)))
@@ -204,11 +218,11 @@ def test_changes_of_a_robot_change_its_ways(seed: int, shape: str) -> None:
 def test_it_runs_at_that_pace(
     distributed: bool, size: int, seed: int, shape: str, style: str
 ) -> None:
-    layout = random_layout(size, seed, shape, style)
+    layout, units = random_layout(size, seed, shape, style), 6 if distributed else 12
     record = Simulation(
         layout,
         RunRequest(
-            "ideal", units=12, seed=seed, jitter=0.2, settings=STAGED, distributed=distributed
+            "ideal", units=units, seed=seed, jitter=0.2, settings=STAGED, distributed=distributed
         ),
     ).run()
     assert record.trouble is None and record.refines_net
@@ -219,19 +233,28 @@ def test_it_runs_at_that_pace(
     else:
         still = Simulation(
             layout,
-            RunRequest("ideal", units=12, seed=seed, jitter=0.2, settings=STILL, distributed=True),
+            RunRequest(
+                "ideal", units=units, seed=seed, jitter=0.2, settings=STILL, distributed=True
+            ),
         ).run()
-        assert record.sim_time_s < still.sim_time_s + 12 * 0.1
+        assert record.sim_time_s < still.sim_time_s + units * 0.1
 
 
-@pytest.mark.parametrize("distributed", [False, True])
-@pytest.mark.parametrize("file", [PAPER, CHEST], ids=["paper", "chest"])
-def test_it_pays_in_mujoco(file: Path, distributed: bool) -> None:
+@pytest.mark.parametrize(
+    ("file", "units", "distributed"),
+    [
+        (PAPER, 8, False),
+        (PAPER, 8, True),
+        (CHEST, 4, False),
+        pytest.param(CHEST, 4, True, marks=pytest.mark.slow),
+    ],
+)
+def test_it_pays_in_mujoco(file: Path, units: int, distributed: bool) -> None:
     layout = laid_out(file)
     found = {}
     for chosen in (STILL, STAGED):
         made = Simulation(
-            layout, RunRequest("mujoco", units=8, settings=chosen, distributed=distributed)
+            layout, RunRequest("mujoco", units=units, settings=chosen, distributed=distributed)
         )
         watcher = beside(made)
         record = found[chosen] = made.run([watcher.observe])
@@ -398,7 +421,7 @@ def test_run_and_its_log(run: Terminal, tmp_path: Path) -> None:
 
 
 def test_analyze_against_a_run(run: Terminal, tmp_path: Path) -> None:
-    words = ["--stage", "--units", 10, "--run", "--timestep", 0.002, "--json"]
+    words = ["--stage", "--units", 5, "--run", "--timestep", 0.002, "--json"]
     found = run("analyze", CHEST, *words).json
     critical = found["circuits"][0]
     assert critical["pace_s"] == found["cycle_time_s"]

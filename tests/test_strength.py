@@ -361,5 +361,6 @@ def test_a_run_says_how_much_is_used(run: Terminal, tmp_path: Path) -> None:
     assert figures["grip_strength_share_max"] == pytest.approx(0.306, abs=0.01)
     assert run("report", log, "-o", page).status == 0
     assert "strength share max" in page.read_text("utf-8")
-    words = "fidelity", EXAMPLES / "paper.pag", "--seeds", 1, "--json"
+    (tmp_path / "p.pag").write_text("root = s; s = mate(a, b); a = atomic(); b = atomic()")
+    words = "fidelity", tmp_path / "p.pag", "--seeds", 1, "--json"
     assert "grip_strength_share_max" in str(run(*words).json)

@@ -19,10 +19,10 @@ from factory.support.settings import Settings
 from tests.pag_texts import KARY, laid_out
 from tests.simulation_values import layout_of
 
-RUNS: list[tuple[str, dict[str, Any]]] = [
+RUNS: list[Any] = [
     ("paper", {}),
-    ("chest", {"settings": Settings(stage=1)}),
-    ("truck", {"fuse": True}),
+    pytest.param("chest", {"settings": Settings(stage=1)}, marks=pytest.mark.slow),
+    pytest.param("truck", {"fuse": True}, marks=pytest.mark.slow),
     ("20", {"wip": 2}),
     ("20", {"wip": 1, "fuse": True}),
     ("paper", {"settings": Settings(outfeed=0.05)}),

@@ -207,7 +207,7 @@ def test_it_is_the_longest_that_is_good(
 
 
 @pytest.mark.parametrize("name", ["paper", "truck", "gearbox", "chest"])
-@pytest.mark.parametrize("seed", [0, 1])
+@pytest.mark.parametrize("seed", [0, pytest.param(1, marks=pytest.mark.slow)])
 def test_products_keep_half_their_limits(name: str, seed: int) -> None:
     simulation = Simulation(layout(name), RunRequest(units=2, seed=seed, jitter=0.3))
     found = measured(simulation)
@@ -217,7 +217,8 @@ def test_products_keep_half_their_limits(name: str, seed: int) -> None:
     assert max(found.values()) < error < 1e3 * ALLOWED
 
 
-SEEDS = range(24)
+SEEDS = range(12, 24)
+ALL = [SEEDS, pytest.param(range(24), marks=pytest.mark.slow)]
 
 
 def outcomes(seeds: range = SEEDS, touching: bool = False) -> list[tuple[float, float, float]]:
@@ -243,10 +244,11 @@ def outcomes(seeds: range = SEEDS, touching: bool = False) -> list[tuple[float, 
     return found
 
 
-def test_random_products_with_random_settings_keep_their_limits() -> None:
+@pytest.mark.parametrize("seeds", ALL, ids=len)
+def test_random_products_with_random_settings_keep_their_limits(seeds: range) -> None:
     """All half of them; and hardly one is farther off than it was predicted to be."""
-    found = outcomes()
-    assert len(found) >= len(SEEDS) / 2
+    found = outcomes(seeds)
+    assert len(found) >= len(seeds) / 2
     assert {step for step, *_ in found} >= {0.01, 0.005}
     assert max(most for *_, most in found) < 1e3 * ALLOWED
     assert sum(most > error for _, error, most in found) <= len(found) / 10

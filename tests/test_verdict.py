@@ -37,6 +37,7 @@ from factory.support.errors import Diagnostic
 from factory.support.settings import Settings
 from tests.bench.factories import balanced
 from tests.command_line import PAPER, ROOT, Terminal
+from tests.examples import with_hands
 from tests.good_runs import random_marking
 from tests.pag_texts import laid_out
 
@@ -96,9 +97,11 @@ def failed(run: Terminal, log: Path, *more: object) -> set[str]:
 
 
 @pytest.mark.parametrize("name", EXAMPLES)
-@pytest.mark.parametrize(("seed", "fuse"), [(0, False), (1, False), (1, True)])
+@pytest.mark.parametrize(
+    ("seed", "fuse"), [*(pytest.param(n, False, marks=pytest.mark.slow) for n in (0, 1)), (1, True)]
+)
 def test_an_honest_run_of_an_example_succeeds(name: str, seed: int, fuse: bool) -> None:
-    layout = read(ROOT / "examples" / f"{name}.pag").layout
+    layout = with_hands(name)
     asked = RunRequest(units=2, seed=seed, jitter=0.3, fuse=fuse, shown=False)
     run = watched(Simulation(layout, asked))
     assert run.succeeded, run.verdict.failures
@@ -106,7 +109,7 @@ def test_an_honest_run_of_an_example_succeeds(name: str, seed: int, fuse: bool) 
     assert len(run.monitor.seen) + len(run.monitor.inferred) == len(run.events)
 
 
-@pytest.mark.parametrize("name", ["paper", "chair", "chest"])
+@pytest.mark.parametrize("name", ["paper", "chair", pytest.param("chest", marks=pytest.mark.slow)])
 def test_an_honest_run_with_relays_succeeds(name: str) -> None:
     layout = read(ROOT / "examples" / f"{name}.pag", ground=Ground(relay=True)).layout
     for fuse in (False, True):

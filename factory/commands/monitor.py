@@ -29,7 +29,7 @@ SHOWN = 8
 @OUTPUT
 def monitor(file: Path, lenient: bool, out: OutputOptions) -> int:
     """Judge the run in a LOG that `run --log` has kept against its net, from its states; where
-    something failed and was undone, from its firings and markings alone.
+    something failed, from those between failures, and from what fired and was undone.
 
     The status is 1 for a run that does not follow its net, in which bodies did otherwise than the
     net says, or that was cut off before its units were made, and 2 for a LOG that ends before there
@@ -55,7 +55,7 @@ def monitor(file: Path, lenient: bool, out: OutputOptions) -> int:
         }
         emit(document)
     elif not out.quiet:
-        say(without_states(report) if log.undone else found_by(report, log.cut_off))
+        say(found_by(report, log.cut_off))
         if log.failures is not None:
             say_failures(log.failures, out.verbose)
         say_verdict(verdict)
@@ -87,14 +87,9 @@ def found_by(report: Report, cut_off: CutOff | None) -> str:
     judged = f"{len(report.violations)} VIOLATIONS"
     if report.refines_net:
         judged = f"they explain the run{' as far as it goes' if cut_off else ''}"
+    if report.calm_s is not None:
+        judged += f" in the {report.calm_s:.1f} s in which nothing failed or was put right"
     return f"monitor: {counts}; {judged}" + (f", {cut_off}" if cut_off else "")
-
-
-def without_states(report: Report) -> str:
-    """What was found where something was undone, in a line for people."""
-    judged = "lead" if report.refines_net else "DO NOT LEAD"
-    words = "states not judged, for they do not tell what was undone"
-    return f"monitor: {words}; what fired and was undone {judged} to the markings"
 
 
 def say_failures(failures: Failures, verbose: bool) -> None:
@@ -107,6 +102,9 @@ def say_failures(failures: Failures, verbose: bool) -> None:
         f" {failures.scrapped} scrapped, {failures.spares} spares used,"
         f" {failures.contacts} contacts with what fell"
     )
+    if failures.binned or failures.spilled:
+        spilled = ", ".join(failures.spilled)
+        say(f"{failures.binned} fell into bins; no bin for scrap of: {spilled or 'none'}")
     for one in failures.found if verbose else ():
         say(f"  {one.t:.2f} s: {one}")
 

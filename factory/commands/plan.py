@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -19,10 +20,11 @@ from factory.support.progress import StepBar, Waiting
 
 if TYPE_CHECKING:
     from factory.pipeline import Project
+    from factory.planning.hulls import Drawn
     from factory.planning.parts import InPlace
     from factory.planning.plan import CannotAssemble, Planned, PlannedJoin, PlanOptions
     from factory.planning.searching import Aim
-    from factory.plant.approaches import Approach, Kind
+    from factory.plant.approaches import Kind
 
 UNITS = ("m", "cm", "mm", "in", "ldu")
 """The names of units of length; `ldu` is that of LDraw, 0.4 mm."""
@@ -48,7 +50,11 @@ KINDS: tuple[Kind, ...] = ("slide", "lower", "blocked")
     default="cycle",
     help="What the tree is chosen for: a short cycle, few robots, a small floor.",
 )
-@click.option("--seconds", type=SECONDS, default=60.0, help="To look for a better tree [s].")
+@click.option(
+    "--seconds",
+    type=SECONDS,
+    help="To look for a better tree [s]: 30 for up to 16 parts, then 0.2 for each part.",
+)
 @click.option("--keep", multiple=True, help="A sub-tree of a PAG that stays (repeatable).")
 @click.option("--replan", is_flag=True, help="Throw the tree of a PAG away.")
 @click.option(
@@ -56,6 +62,7 @@ KINDS: tuple[Kind, ...] = ("slide", "lower", "blocked")
     multiple=True,
     help="A part that may pass through others, where there is no other way (repeatable).",
 )
+@click.option("--hulls", is_flag=True, help="Plan with hulls, though they hide what goes in.")
 @click.option("--unit", type=click.Choice(UNITS), help="Of lengths; found out without.")
 @click.option("--library", type=PATH, envvar="LDRAWDIR", help="An LDraw parts library.")
 @click.option("--boxes", is_flag=True, help="LDraw parts whose shape is missing become boxes.")
@@ -73,10 +80,11 @@ def plan(
     source: Path,
     output: Path | None,
     aim: Aim,
-    seconds: float,
+    seconds: float | None,
     keep: tuple[str, ...],
     replan: bool,
     allow: tuple[str, ...],
+    hulls: bool,
     unit: str | None,
     library: Path | None,
     boxes: bool,
@@ -88,6 +96,7 @@ def plan(
     bodies (.glb, .3mf, .step), an LDraw model (.ldr, .mpd), or a PAG whose tree is thrown away."""
     from factory.pipeline import all_templates, read
     from factory.planning.plan import CannotAssemble, PlanOptions
+    from factory.planning.searching import usual_seconds
     from factory.planning.source.reading import SourceOptions, read_source
     from factory.planning.writing import planned_product
     from factory.support.files import own_names, write_all
@@ -102,7 +111,9 @@ def plan(
     if not out.silent:
         for note in found.notes:
             say(f"  {note}")
-    planned = _sought(found, PlanOptions(aim, seconds, allow, templates=templates), out)
+    seconds = usual_seconds(len(found.units())) if seconds is None else seconds
+    asked = PlanOptions(aim, seconds, allow, hulls, templates=templates)
+    planned = _sought(found, asked, out)
     if isinstance(planned, CannotAssemble):
         return _refuse(found, planned, folder, look, out)
     made = planned_product(found, planned.tree, planned.orientation, source.name)
@@ -213,6 +224,7 @@ def _document(
     matings = project.matings
     labels = {id(join): label for label, join in _by_label(found, planned, project).items()}
     return {
+        **({"hulls": [asdict(pair) for pair in planned.hidden]} if planned.hidden else {}),
         "pag": str(project.file),
         "product": project.pag.root,
         "parts": len(found.parts),
@@ -252,6 +264,7 @@ def _tell(
     matings = project.matings
     kinds = [(kind, len(matings.of_kind(kind))) for kind in KINDS] if matings else []
     ways = ", ".join(f"{count} {kind}" for kind, count in kinds if count)
+    ways += _for_hulls(planned.hidden)
     say(f"{project.file}: parts {parts}, operations {len(project.pag) - parts}; ways: {ways}")
     figures = planned.figures
     best = "none is better by estimate" if planned.optimal else "the best that was found"
@@ -260,20 +273,31 @@ def _tell(
     if out.verbose and matings:
         joins = _by_label(found, planned, project)
         for mating in matings.all:
-            words = f"{mating.label}: {' + '.join(mating.inputs)}, {_way(mating.approach)}"
+            words = f"{mating.label}: {' + '.join(mating.inputs)}, {mating.approach.told}"
             join = joins.get(mating.label)
-            say(f"  {words}{f', {_room(join.clearance)}' if join else ''}")
+            if join:
+                words += f", {_room(join.clearance)}{_for_hulls(_hidden_at(join, found, planned))}"
+            say(f"  {words}")
     for path in files if out.verbose else files[-2:]:
         say(f"  {path}")
     say(f"  factory run {project.file} --units 3 --video {project.file.with_suffix('.mp4')}")
 
 
-def _way(approach: Approach) -> str:
-    """An approach in words."""
-    if approach.kind == "lower":
-        return f"{approach.lowered} is lowered {approach.stroke:g} m"
-    sides = " or ".join(f"{'-+'[side > 0]}{'xy'[approach.axis]}" for side in approach.sides)
-    return f"{'slides' if approach.kind == 'slide' else 'is blocked'} from {sides}"
+def _hidden_at(join: PlannedJoin, found: InPlace, planned: Planned) -> list[Drawn]:
+    """The pairs of an operation of which hulls hide whether they overlap."""
+    units = {part.label: label for label, parts in found.units() for part in parts}
+    return [
+        pair
+        for pair in planned.hidden
+        for one, other in [(units[pair.one], units[pair.other])]
+        if (one in join.pile and other in join.come) or (other in join.pile and one in join.come)
+    ]
+
+
+def _for_hulls(pairs: Sequence[Drawn]) -> str:
+    """That ways were found for hulls, in words."""
+    some = "a pair overlaps" if len(pairs) == 1 else f"{len(pairs)} pairs overlap"
+    return f", for hulls only: {some}" if pairs else ""
 
 
 def _room(clearance: float) -> str:
@@ -281,4 +305,4 @@ def _room(clearance: float) -> str:
     if clearance == float("inf"):
         return "nothing near"
     room = round(1e3 * clearance, 2)
-    return f"room {room:.2f} mm" if room >= 0 else f"drawn {-room:.2f} mm into each other"
+    return f"room {abs(room):.2f} mm" if room >= 0 else f"drawn {-room:.2f} mm into each other"

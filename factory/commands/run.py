@@ -209,6 +209,12 @@ def run_project(
         recorders.append(lambda: film(made))
     record = carry_out(made, silent, asked.max_time, recorders, monitor)
     failures = None if recovery is None else recovery.report()
+    if failures is not None and log is not None and monitor is not False and made.model is not None:
+        from factory.record.log import read_log
+        from factory.record.monitor.record import watch_log
+
+        with Waiting("judging the run between failures", silent):
+            record = replace(record, monitor=watch_log(read_log(log))[0])
     return replace(record, lenient=asked.lenient, failures=failures)
 
 

@@ -1,4 +1,5 @@
-"""The events of a log as rows of a table: what fired when, of which operation, on which line."""
+"""The events of a log as rows of a table: what fired when, of which operation, on which line, and
+what of that was undone when something failed."""
 
 from __future__ import annotations
 
@@ -6,14 +7,17 @@ from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
 
+from factory.nets.undone import Undone
+from factory.plant.factory import Factory
 from factory.record.log import Log
 from factory.record.log.recompiled import factory_of
 
 
 @dataclass(frozen=True, slots=True)
 class EventRow:
-    """A transition that fired: at `time_s` [s]; `kind` is start or end; `operation` the label it
-    makes; `unit` how often it has fired by then; `robots` those of the operation."""
+    """A transition that fired, or was undone: at `time_s` [s]; `kind` is start or end, or one of
+    these undone; `operation` the label it makes; `unit` how often it has fired by then, without
+    what was undone before; `robots` those of the operation."""
 
     time_s: float
     transition: str
@@ -33,23 +37,36 @@ COLUMNS = tuple(EventRow.__dataclass_fields__)
 
 
 def rows(log: Log) -> Iterator[EventRow]:
-    """The events in the order in which they were recorded. Raises InputError (BadLog) where the log
-    is not of the factory that its header describes."""
+    """The events in the order in which they were recorded: a row for each time that a transition
+    fires, and one for each that is undone. Raises InputError (BadLog) where the log is not of the
+    factory that its header describes."""
     factory, units = factory_of(log.header), Counter[int]()
-    for time, number in zip(log.fired_t.tolist(), log.fired.tolist(), strict=True):
+    numbers = factory.net.threaded.net.transition_index
+    for time, entry in log.timed_entries:
+        if isinstance(entry, Undone):
+            for name in entry.transitions:
+                number = numbers[name]
+                yield _row(factory, time, number, units[number], " undone")
+                units[number] -= 1
+            continue
+        number = numbers[entry]
         units[number] += 1
-        operation = factory.operations[number // 2]
-        at = operation.position
-        yield EventRow(
-            round(time, 9),
-            factory.net.threaded.transitions[number].name,
-            "end" if number % 2 else "start",
-            operation.label,
-            operation.template.name,
-            units[number],
-            factory.robots[operation.carrier].name,
-            tuple(factory.robots[r].name for r in operation.robots),
-            at.file if at else "",
-            at.line if at else 0,
-            at.column if at else 0,
-        )
+        yield _row(factory, time, number, units[number])
+
+
+def _row(factory: Factory, time: float, number: int, unit: int, undone: str = "") -> EventRow:
+    operation = factory.operations[number // 2]
+    at = operation.position
+    return EventRow(
+        round(time, 9),
+        factory.net.threaded.transitions[number].name,
+        ("end" if number % 2 else "start") + undone,
+        operation.label,
+        operation.template.name,
+        unit,
+        factory.robots[operation.carrier].name,
+        tuple(factory.robots[r].name for r in operation.robots),
+        at.file if at else "",
+        at.line if at else 0,
+        at.column if at else 0,
+    )

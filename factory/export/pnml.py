@@ -8,7 +8,7 @@ version 1. What `foreign_nets.pnml_reader` reads of a legally marked gear net is
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from xml.sax.saxutils import escape, quoteattr
 
 from factory.export.subject import Subject
@@ -18,9 +18,12 @@ from factory.nets.gears import Gear, GearNet
 from factory.nets.marked import MarkedNet, marked
 from factory.nets.petri import Place, Transition
 from factory.nets.threaded import Redistribution
+from factory.pipeline import Project
+from factory.plant.failing_transitions import FailingTransition, failing_transitions
 from factory.support.errors import Position
 
 FORMAT, TAKES = "pnml", "net"
+OF = "net or, of a PAG, failures"
 
 PNML = "http://www.pnml.org/version-2009/grammar/pnml"
 NET_TYPE = "http://www.pnml.org/version-2009/grammar/ptnet"
@@ -31,29 +34,38 @@ BELOW, ABOVE = (0.0, 22.0), (0.0, -26.0)
 ROUND, BAR = (24.0, 24.0), 6.0
 """Size of a place, width of a transition's bar."""
 
+ASIDE = 40.0
+"""How far below the start of its operation a failure is drawn."""
+
 _ILLEGAL = re.compile("[^\t\n\r\u0020-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 
 
 def export(subject: Subject) -> str:
-    """The net as PNML."""
-    return write_pnml(subject.net)
+    """The net as PNML; with `failures`, failures that are the same in every marking are transitions
+    of it. Raises InputError (Usage)."""
+    wanted = ["net", "failures"] if isinstance(subject.source, Project) else ["net"]
+    if subject.choose(wanted, "choices") == "net":
+        return write_pnml(subject.net)
+    factory = subject.project.factory
+    return write_pnml(factory.net, tuple(failing_transitions(factory)))
 
 
-def write_pnml(net: GearNet | MarkedNet) -> str:
-    """The net and its initial marking as a PNML document, the same bytes for the same net."""
-    return "\n".join(_lines(net)) + "\n"
+def write_pnml(net: GearNet | MarkedNet, failing: Sequence[FailingTransition] = ()) -> str:
+    """The net and its initial marking as a PNML document, the same bytes for the same net. With
+    failures as transitions it has choice, so no gears are claimed."""
+    return "\n".join(_lines(net, failing)) + "\n"
 
 
-def _lines(net: GearNet | MarkedNet) -> Iterator[str]:
+def _lines(net: GearNet | MarkedNet, failing: Sequence[FailingTransition]) -> Iterator[str]:
     subject = marked(net)
     at = swimlanes(subject)
     moves: tuple[Redistribution, ...] = ()
-    if isinstance(net, GearNet):
+    if isinstance(net, GearNet) and not failing:
         moves = net.threaded.redistribution
     yield '<?xml version="1.0" encoding="UTF-8"?>'
     yield f"<pnml xmlns={quoteattr(PNML)}>"
     yield f'<net id="net" type={quoteattr(NET_TYPE)}>'
-    if subject.gears:
+    if subject.gears and not failing:
         yield _tool(_gear(gear) for gear in subject.gears)
     yield '<page id="page">'
     for index, place in enumerate(subject.net.places):
@@ -63,7 +75,12 @@ def _lines(net: GearNet | MarkedNet) -> Iterator[str]:
         low, high = at.spans[index]
         graphics = _drawn(at.middle(index), (BAR, high - low))
         yield from _transition(index, transition, move, graphics)
-    yield from _arcs(subject)
+    for number, failure in enumerate(failing, len(subject.net.transitions)):
+        low, high = at.spans[failure.operation.start]
+        x, y = at.middle(failure.operation.start)
+        transition = Transition(failure.name, failure.operation.position)
+        yield from _transition(number, transition, None, _drawn((x, y + ASIDE), (BAR, high - low)))
+    yield from _arcs(subject, failing)
     yield "</page>\n</net>\n</pnml>"
 
 
@@ -136,11 +153,17 @@ def _transition(
     yield f'<transition id="t{index}">{name}{graphics}{extra}</transition>'
 
 
-def _arcs(net: MarkedNet) -> Iterator[str]:
+def _arcs(net: MarkedNet, failing: Sequence[FailingTransition]) -> Iterator[str]:
     number = 0
     for index, place in enumerate(net.net.places):
         pairs = [(f"t{e}", f"p{index}") for e in place.left]
         pairs += [(f"p{index}", f"t{e}") for e in place.right]
+        for source, target in pairs:
+            yield f'<arc id="a{number}" source="{source}" target="{target}"/>'
+            number += 1
+    for event, failure in enumerate(failing, len(net.net.transitions)):
+        pairs = [(f"p{failure.takes}", f"t{event}")]
+        pairs += [(f"t{event}", f"p{place}") for place in failure.gives]
         for source, target in pairs:
             yield f'<arc id="a{number}" source="{source}" target="{target}"/>'
             number += 1

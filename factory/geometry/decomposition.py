@@ -1,22 +1,21 @@
 """A mesh that is not convex, as convex bodies that collide in its place.
 
-What is open, or convex but for a fiftieth of its hull, keeps its hull. A file that holds several
-closed convex bodies (a plate with a hole, written as wedges that touch) is exactly these bodies.
-What else is closed is decomposed by CoACD, where that is installed (the extra `decompose`), else it
-has its hull. Its results are kept in the user's cache.
+What is open, or convex but for a fiftieth of its hull, keeps its hull. A mesh of several closed
+convex bodies (a plate with a hole, written as wedges that touch) is exactly these bodies. What else
+is closed is decomposed by CoACD, body by body, where that is installed (the extra `decompose`),
+else it has its hull. Its results are kept in the user's cache.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 from threading import Lock
 from typing import Any
 
 import numpy as np
 
-from factory.geometry.meshes import Array, Indices, Mesh, is_closed, volume_of
-from factory.geometry.pieces import FLATNESS, convex_bodies, joined
+from factory.geometry.meshes import Array, Mesh, is_closed, volume_of
+from factory.geometry.pieces import FLATNESS, closed_bodies, is_convex, joined
 from factory.support.array_cache import PACKED, digest, find, keep, packed, unpacked
 from factory.support.environment import environment
 from factory.support.version import release
@@ -47,18 +46,20 @@ SLIVER = 1e-6
 """A body of less than this share of the mesh's volume is left out: the engine refuses flat ones."""
 
 
-def in_pieces(mesh: Mesh, as_written: Callable[[], tuple[Array, Indices]]) -> Mesh:
-    """The mesh with its convex bodies, where it is found to have several. `as_written` gives it
-    with vertices that lie in the same place kept apart, as bodies that touch need."""
+def in_pieces(mesh: Mesh) -> Mesh:
+    """The mesh with its convex bodies, where it is found to have several."""
     if not is_closed(mesh.faces) or _share_of_hull(mesh) >= 1 - FLATNESS:
         return mesh
-    bodies = convex_bodies(mesh.vertices, mesh.faces) or convex_bodies(*as_written())
-    if bodies:
-        return _of_bodies(mesh.name, bodies)
-    if _share_of_hull(mesh) >= FULL:
+    bodies = closed_bodies(mesh.vertices, mesh.faces)
+    if len(bodies) > 1 and all(is_convex(*body) for body in bodies):
+        return Mesh(mesh.name, *joined(bodies), tuple(vertices for vertices, _ in bodies))
+    if _share_of_hull(mesh) >= FULL or not release("coacd"):
         return mesh
-    pieces = _decomposed(mesh)
-    return replace(mesh, pieces=pieces) if pieces else mesh
+    alone = [Mesh(mesh.name, *body) for body in bodies]
+    if any(volume_of(body.vertices, body.faces) <= 0 for body in alone):
+        alone = [mesh]  # a cavity is no body
+    pieces = tuple(piece for body in alone or [mesh] for piece in _decomposed(body))
+    return replace(mesh, pieces=pieces) if len(pieces) > 1 else mesh
 
 
 def _share_of_hull(mesh: Mesh) -> float:
@@ -67,23 +68,18 @@ def _share_of_hull(mesh: Mesh) -> float:
     return volume / mesh.hull.volume if volume > 0 else 1.0
 
 
-def _of_bodies(name: str, bodies: list[tuple[Array, Indices]]) -> Mesh:
-    """One mesh of bodies that share no vertex, so that each is closed and mass adds up."""
-    return Mesh(name, *joined(bodies), tuple(vertices for vertices, _ in bodies))
-
-
 def _decomposed(mesh: Mesh) -> tuple[Array, ...]:
-    """The bodies that CoACD makes of a mesh, from the cache if it did so before; none where it is
-    not installed or fails, or finds that one will do."""
-    if not release("coacd"):
-        return ()
+    """The bodies that CoACD makes of a mesh, from the cache if it did so before; the mesh itself
+    where it is convex, or CoACD fails."""
+    if _share_of_hull(mesh) >= FULL:
+        return (mesh.vertices,)
     parameters = sorted(_parameters(mesh).items())
     name = digest(release("coacd"), parameters, SLIVER, mesh.vertices, mesh.faces)
     kept = find(FOLDER, name, PACKED)
     found = _run_coacd(mesh) if kept is None else unpacked(kept)
     if kept is None:
         keep(FOLDER, name, packed(found))
-    return found if len(found) > 1 else ()
+    return found or (mesh.vertices,)
 
 
 def _run_coacd(mesh: Mesh) -> tuple[Array, ...]:

@@ -18,7 +18,7 @@ from math import isfinite
 
 import numpy as np
 
-from factory.geometry.meshes import Array, Indices, is_closed
+from factory.geometry.meshes import Array, Indices
 from factory.geometry.pieces import joined
 
 EXPECTED = {
@@ -54,12 +54,6 @@ class MeshFile:
         """All triangles, with one vertex at a place; those with fewer than three corners are left
         out, if any others are there."""
         return _merged(*joined(self.bodies))
-
-    def apart(self) -> tuple[Array, Indices]:
-        """All triangles, with vertices in the same place kept apart as in the file, unless that
-        opens a body that is closed once they are one."""
-        every = [body if is_closed(body[1]) else _merged(*body) for body in self.bodies]
-        return joined(every)
 
 
 def read_mesh(content: bytes, suffix: str) -> MeshFile:

@@ -25,6 +25,9 @@ LEAST_BOX = 1e-12
 LEAST_MASS, LEAST_INERTIA = 1e-9, 1e-12
 """Bodies have at least this mass [kg] and principal moments [kg m²], or the engine refuses them."""
 
+TOO_FAR = 1e-5
+"""Pieces of a mesh that reach no further out of it count as reaching to its surface [m]."""
+
 MARGIN = 1e-8
 """Any two principal moments exceed the third by this share of it, or digits that an MJCF leaves out
 may turn a sheet or a rod into what cannot be a body."""
@@ -44,6 +47,16 @@ class Mesh:
     def hull(self) -> Hull:
         """Its convex hull, computed once: that of a fine mesh takes as long as all the rest."""
         return hull_of(self.vertices)
+
+    @cached_property
+    def reach(self) -> float:
+        """How far its pieces reach out of its box [m]: more than nothing where what makes them puts
+        a mesh that intersects itself on a grid."""
+        if not self.pieces:
+            return 0.0
+        points = np.concatenate(self.pieces)
+        out = self.vertices.min(axis=0) - points.min(axis=0), points.max(axis=0)
+        return float(max(out[0].max(), (out[1] - self.vertices.max(axis=0)).max()))
 
 
 @dataclass(frozen=True, slots=True)
@@ -118,6 +131,15 @@ def mend_remark(was: str) -> Remark:
     return Remark(f"{was}; it is mended", "meshes were mended: closed, or turned outwards")
 
 
+def too_far_remark(reach: float) -> Remark:
+    """That the bodies which collide for a mesh are larger than it."""
+    return Remark(
+        f"intersects itself: the bodies that collide for it reach {1000 * reach:.2g} mm too far",
+        "meshes intersect themselves: the bodies that collide for them reach too far",
+        "join what intersects, or write it as bodies that are closed",
+    )
+
+
 def usable(name: str, vertices: Array, faces: Indices) -> tuple[Mesh, Remark | None]:
     """A mesh that the engine accepts, and why it is not the one given (None if it is)."""
     for axes in (np.eye(3), _principal_axes(vertices)):
@@ -184,7 +206,8 @@ def is_closed(faces: Indices) -> bool:
 
 def measured(mesh: Mesh, remark: Remark | None = None) -> MassProperties:
     """Volume, centre of mass, inertia for unit density, vertices of the hull. A mesh that is open,
-    or bounds no volume, has those of its convex hull."""
+    or bounds no volume, has those of its convex hull. Where its pieces reach too far out of it, the
+    hull is theirs, as they collide."""
     import trimesh
 
     body = trimesh.Trimesh(mesh.vertices, mesh.faces, process=False)
@@ -198,8 +221,12 @@ def measured(mesh: Mesh, remark: Remark | None = None) -> MassProperties:
             break
     if solid is not body and (closed or remark is None):
         remark = HOLLOW if closed else OPEN
+    hull = mesh.hull
+    if mesh.reach > TOO_FAR:
+        hull = hull_of(np.concatenate(mesh.pieces))
+        remark = remark or too_far_remark(mesh.reach)
     centre, volume = np.asarray(properties.center_mass), float(properties.volume)
-    return MassProperties(mesh, remark, volume, centre, inertia, mesh.hull.corners)
+    return MassProperties(mesh, remark, volume, centre, inertia, hull.corners)
 
 
 def _body_or_hull(body: trimesh.Trimesh) -> Iterator[trimesh.Trimesh]:

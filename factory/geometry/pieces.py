@@ -3,7 +3,7 @@
 A box has its eight corners. A cylinder and a sphere have a polytope *around* them, so that what is
 clear of the polytope is clear of the body; it reaches at most ROUND [m] too far, or, where that
 would take too many corners, 0.0075 % of the radius of a cylinder and 0.46 % of that of a sphere. A
-mesh has its convex hull, unless it is found to be made of several bodies: see `convex_bodies` here
+mesh has its convex hull, unless it is found to be made of several bodies: see `closed_bodies` here
 and `factory.geometry.decomposition`.
 """
 
@@ -16,6 +16,7 @@ from itertools import combinations
 import numpy as np
 
 from factory.geometry.meshes import Array, Indices, hull_of
+from factory.geometry.touching import bodies
 
 ROUND = 5e-6
 """How far the polytope round a round body may reach outside it [m]."""
@@ -126,14 +127,11 @@ def joined(bodies: Sequence[tuple[Array, Indices]]) -> tuple[Array, Indices]:
     return np.concatenate([vertices for vertices, _ in bodies]), np.concatenate(faces)
 
 
-def convex_bodies(vertices: Array, faces: Indices) -> list[tuple[Array, Indices]]:
-    """The components of a mesh if there are several, no more than MOST_PIECES, and all are closed
-    and convex, else none."""
-    number = components(len(vertices), faces)
-    if not 1 <= number.max() < MOST_PIECES:
-        return []
-    found = _split(vertices, faces, number)
-    return found if all(is_convex(*body) for body in found) else []
+def closed_bodies(vertices: Array, faces: Indices) -> list[tuple[Array, Indices]]:
+    """The bodies of a closed mesh, told apart where they touch; none where they are more than
+    MOST_PIECES."""
+    number = bodies(vertices, faces)
+    return _split(vertices, faces, number) if number.max(initial=0) < MOST_PIECES else []
 
 
 def is_convex(vertices: Array, faces: Indices) -> bool:

@@ -28,7 +28,7 @@ from factory.geometry.limits import (
     value_position,
 )
 from factory.geometry.mending import mended
-from factory.geometry.mesh_reader import ANEW, MeshFile, UnreadableMesh, read_mesh
+from factory.geometry.mesh_reader import ANEW, UnreadableMesh, read_mesh
 from factory.geometry.meshes import (
     Array,
     Indices,
@@ -178,7 +178,7 @@ class _Reader:
         vertices, faces = file.merged()
         if not np.abs(vertices).max() * scale <= FURTHEST:
             return f"{path} {scale}", partial(too_far, node, "scale", "mesh")
-        return key, partial(_finished, key, file, scale, vertices * scale, faces)
+        return key, partial(_finished, key, vertices * scale, faces)
 
 
 def _named(found: MassProperties | Diagnostic, name: str) -> MassProperties | Diagnostic:
@@ -193,22 +193,14 @@ def _file(node: Assembly) -> tuple[str, float]:
 
 
 @np.errstate(all="ignore")
-def _finished(
-    key: str, file: MeshFile, scale: float, vertices: Array, faces: Indices
-) -> MassProperties:
+def _finished(key: str, vertices: Array, faces: Indices) -> MassProperties:
     """The mesh of a file, its vertices in one place made one, as the engine can use it."""
     mesh, remark = usable(kept_meshes.UNNAMED, vertices, faces)
     if remark is None:
         vertices, faces, was = mended(mesh.vertices, mesh.faces)
         remark = mend_remark(was) if was else None
-        mesh = in_pieces(Mesh(mesh.name, vertices, faces), lambda: _apart(file, scale))
+        mesh = in_pieces(Mesh(mesh.name, vertices, faces))
     return kept_meshes.keep(key, measured(mesh, remark))
-
-
-def _apart(file: MeshFile, scale: float) -> tuple[Array, Indices]:
-    """The mesh of a file with bodies kept apart, each turned outwards."""
-    vertices, faces = file.apart()
-    return mended(vertices * scale, faces)[:2]
 
 
 def _half(kind: str, given: Array) -> Array:

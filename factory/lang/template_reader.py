@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator, Mapping, Sequence
+from functools import lru_cache
 from pathlib import Path
 from types import MappingProxyType
 
@@ -22,9 +23,10 @@ from factory.support.errors import Diagnostic, InputError, Position, did_you_mea
 Folder = str | os.PathLike[str]
 
 
+@lru_cache(maxsize=256)
 def read_template(text: str, file: str = "<text>") -> Template:
     """The template of a text. Raises InputError with every error of the text. `load_templates`
-    checks the templates named by `further` and `instead`."""
+    checks the templates named by `further` and `instead`. A text is parsed once a process."""
     findings = Findings(source_of(text, file))
     template = TemplateMaker(read_clauses(findings), findings).make()
     findings.raise_if_any()

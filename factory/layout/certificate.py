@@ -15,12 +15,15 @@ MILLI = 1000.0
 NAMES = ("carriages", "masts and arms", "payloads")
 """The layers' names."""
 
-KINDS = ("carriage", "mast", "arm", "payload", "post", "boom", "outfeed", "housing", "shed", "hand")
+KINDS = (
+    *("carriage", "mast", "arm", "payload", "post", "boom", "outfeed"),
+    *("housing", "shed", "hand", "bin"),
+)
 """What a region is swept by."""
 
 CARRIAGE_BODY, MAST_BODY, ARM_BODY, PAYLOAD_BODY, POST_BODY, BOOM, OUTFEED = range(7)
-HOUSING, SHED, HAND_BODY = range(7, len(KINDS))
-STATIONS = (POST_BODY, BOOM, OUTFEED, HOUSING, SHED)
+HOUSING, SHED, HAND_BODY, BIN_BODY = range(7, len(KINDS))
+STATIONS = (POST_BODY, BOOM, OUTFEED, HOUSING, SHED, BIN_BODY)
 RAISED = (BOOM, HOUSING)
 """Stations that stand clear of the floor: payloads go below them."""
 
@@ -49,7 +52,7 @@ class Region:
         """What is there, in words."""
         if self.kind in (OUTFEED, SHED):
             return "the outfeed" if self.kind == OUTFEED else "the outfeed's shed"
-        if self.kind in STATIONS:
+        if self.kind in STATIONS and self.kind != BIN_BODY:
             return f"the {KINDS[self.kind]} of '{self.label}''s feeder"
         label = f" '{self.label}'" if self.label else ""
         return f"{factory.robots[self.robot].name}'s {KINDS[self.kind]}{label}"

@@ -18,9 +18,11 @@ from xml.etree.ElementTree import Element
 from xml.sax.saxutils import quoteattr
 
 from factory.control.profile import SpeedProfile
+from factory.layout.bins import Bin
 from factory.layout.feeding import feeder_of
 from factory.layout.layout import Layout
 from factory.mjcf import names
+from factory.mjcf.bins import add_bins
 from factory.mjcf.elements import add, fill
 from factory.mjcf.feeders import SLIDER_MASS, add_feeders
 from factory.mjcf.hanging import Hanging
@@ -94,7 +96,8 @@ class Model:
     `carried`: what bodies there are, `copies`: how many of each; `masses`: of each label carried
     [kg]; `drives`: of each robot; `insets`: what is taken from the shapes that collide; `wip`: the
     most units inside at once that they are enough for, None where more never are; `apart`: the
-    pairs of parts that are `excluded`, each part with the body that brings it to the other.
+    pairs of parts that are `excluded`, each part with the body that brings it to the other; `bins`:
+    those for scrap.
     """
 
     layout: Layout
@@ -110,6 +113,7 @@ class Model:
     welds: int = 0
     wip: int | None = None
     apart: tuple[tuple[Inside, Inside], ...] = ()
+    bins: tuple[Bin, ...] = ()
 
     def __post_init__(self) -> None:
         for name in ("copies", "masses", "files"):
@@ -168,10 +172,12 @@ def build_model(
     bodies: FusedBodies | None = None,
     shown: bool = True,
     wip: int | None = None,
+    bins: tuple[Bin, ...] = (),
 ) -> Model:
     """The model of a laid-out factory, of one body a part unless other `bodies` are given; without
-    what is only there to be `shown`, if it is not. The `copies` are enough for `wip` units inside
-    at once. Raises InputError where the MJCF of a robot type is unusable."""
+    what is only there to be `shown`, if it is not; with `bins`, if parts may be scrapped. The
+    `copies` are enough for `wip` units inside at once. Raises InputError where the MJCF of a robot
+    type is unusable."""
     factory, product = layout.factory, layout.product
     bodies = bodies or bodies_of(factory, product)
     masses = {
@@ -203,6 +209,7 @@ def build_model(
     hanging = Hanging.of(layout)
     sliders = _sliders(layout, hanging, masses, settings)
     add_feeders(world, actuator, layout, hanging, sliders)
+    add_bins(world, layout, bins)
     add_parts(world, layout, hanging, copies, insets)
     add_wholes(world, layout, bodies, copies, insets, {inside for both in apart for inside in both})
     add_welds(equality, layout, hanging, bodies, copies)
@@ -219,7 +226,7 @@ def build_model(
     xml = ElementTree.tostring(root, encoding="unicode") + "\n"
     joints = len(factory.robots) + len(hoists) + 2 + len(sliders) + sum(copies.values())
     made = Model(layout, settings, bodies, copies, masses, drives, insets, xml, files)
-    return replace(made, joints=joints, welds=len(equality), wip=wip, apart=apart)
+    return replace(made, joints=joints, welds=len(equality), wip=wip, apart=apart, bins=bins)
 
 
 def _broad_phase(root: Element) -> int:

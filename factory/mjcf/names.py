@@ -86,6 +86,11 @@ def pad(label: str) -> str:
     return f"feeder/{label}/pad"
 
 
+def bin_of(robot: str) -> str:
+    """The static body of a robot's bin, `bin/r3`; its geoms are `bin/r3/bottom` and so on."""
+    return f"bin/{robot}"
+
+
 def hold(label: str) -> str:
     """The weld by which the outfeed's tray holds a part of a finished product, `hold/part2`; it is
     aimed at the copy it holds."""

@@ -19,10 +19,12 @@ from scipy.sparse.csgraph import connected_components
 
 from factory.compiler.mating.bodies import ConvexBodies, bodies
 from factory.compiler.mating.meetings import Ints, Meeting, Meetings
-from factory.compiler.mating.overlaps import Finder
+from factory.compiler.mating.overlaps import Finder, Overlaps
 from factory.compiler.mating.paths import TOLERANCE
+from factory.compiler.mating.rooms import AMPLE
 from factory.geometry.meshes import Array
 from factory.geometry.solids import Product
+from factory.planning.hulls import Drawn
 from factory.planning.parts import InPlace
 
 FREE, SCRAPES, DEEPER, LOCKED, CLASHES = range(5)
@@ -39,9 +41,6 @@ NEAR = 5e-4
 """Parts no further apart than this [m] touch; where that leaves the product in several pieces,
 the nearest parts of those touch as well."""
 
-AMPLE = 5e-3
-"""More room than this [m] is not measured."""
-
 WIDER = 2.0
 """Pieces are brought together by gaps that grow by this factor."""
 
@@ -55,7 +54,8 @@ class Blocking:
 
     `levels` (3, n, n): how much j is in the way of i that goes out along +x, +y or +z; what goes
     the other way has the transpose. `locks` (3, n, n): whether it may not go out past j. `touch`
-    (n, n): which units touch. `low`, `high` (n, 3): their boxes [m].
+    (n, n): which units touch. `low`, `high` (n, 3): their boxes [m]. `drawn`: the parts of two
+    units that overlap when finished.
     """
 
     labels: tuple[str, ...]
@@ -64,6 +64,7 @@ class Blocking:
     touch: NDArray[np.bool_] = field(repr=False)
     low: Array = field(repr=False)
     high: Array = field(repr=False)
+    drawn: tuple[Drawn, ...] = field(default=(), repr=False)
 
     def __post_init__(self) -> None:
         for array in (self.levels, self.locks, self.touch, self.low, self.high):
@@ -109,13 +110,15 @@ def blocking(source: InPlace) -> Blocking:
     count = len(units)
     levels = np.zeros((3, count, count), np.int8)
     for axis in AXES:
-        _along(finder, axis, unit, levels[axis])
+        overlaps = finder.along(axis, np.ones(1, bool))
+        _enter(overlaps, unit, levels[axis])
     bounds = np.full((count, 3), np.inf), np.full((count, 3), -np.inf)
     np.minimum.at(bounds[0], unit[found.part], found.low)
     np.maximum.at(bounds[1], unit[found.part], found.high)
     labels = tuple(label for label, _ in units)
     touch = _touching(finder, found, unit, count)
-    return Blocking(labels, levels, levels >= LOCKED, touch, *bounds)
+    drawn = _drawn(overlaps, unit, [part.label for _, members in units for part in members])
+    return Blocking(labels, levels, levels >= LOCKED, touch, *bounds, drawn)
 
 
 def rooms(source: InPlace, axis: int) -> Array:
@@ -127,7 +130,7 @@ def rooms(source: InPlace, axis: int) -> Array:
     moving, standing, depths = finder.passing(axis, AMPLE)
     one, other = unit[found.part[moving]], unit[found.part[standing]]
     apart = one != other
-    least = -np.maximum(depths.graze, np.where(depths.path > TOLERANCE, depths.path, -np.inf))
+    least = depths.room
     for column, at in enumerate(((other, one), (one, other))):
         np.minimum.at(room, (at[0][apart], at[1][apart]), least[apart, column])
     return np.where(room > AMPLE, np.inf, room)
@@ -150,10 +153,18 @@ def _one_meeting(parts: tuple[str, ...]) -> Meetings:
     return Meetings(parts, (meeting,), np.zeros(len(parts) - 1, np.int64), np.zeros(1, np.int64))
 
 
-def _along(finder: Finder, axis: int, unit: Ints, levels: NDArray[np.int8]) -> None:
+def _drawn(found: Overlaps, unit: Ints, labels: Sequence[str]) -> tuple[Drawn, ...]:
+    """The parts of two units that overlap when finished: those that do are found along any axis."""
+    finished = found.depths.finished
+    rows = np.flatnonzero((finished > TOLERANCE) & (unit[found.one] != unit[found.other]))
+    one, other = (array[rows].tolist() for array in (found.one, found.other))
+    pairs = zip(one, other, finished[rows].tolist(), strict=True)
+    return tuple(Drawn(labels[one], labels[other], depth) for one, other, depth in pairs)
+
+
+def _enter(found: Overlaps, unit: Ints, levels: NDArray[np.int8]) -> None:
     """Enters what is in the way along an axis. The later part of a pair comes from the lower side,
     so goes out there, and the earlier one goes to the upper side; or the other way about."""
-    found = finder.along(axis, np.ones(1, bool))
     one, other, depths = unit[found.one], unit[found.other], found.depths
     finished, path = depths.finished[:, None], depths.path
     more = path > finished + TOLERANCE

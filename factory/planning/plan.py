@@ -13,6 +13,7 @@ from factory.pipeline import Project, all_templates
 from factory.planning.blocking import CLASHES, DEEPER, LOCKED, SCRAPES, Blocking, blocking, rooms
 from factory.planning.cannot import Interlock, Removal, interlocks, removal
 from factory.planning.estimate import Expected
+from factory.planning.hulls import Drawn, hidden, refuse_hidden
 from factory.planning.judging import Join, Judged
 from factory.planning.kept import KeptPrices
 from factory.planning.laying import LaidOut, Layouts
@@ -27,13 +28,15 @@ from factory.support.settings import Settings
 @dataclass(frozen=True)
 class PlanOptions:
     """`aim`: what the tree is chosen for; `seconds` to search; `allow`: units that may pass through
-    others; `lay_out`: whether layouts decide, or estimates alone; `settings` and `templates` of the
-    factory, None for those shipped; `told` hears what goes on, and how many of how many are done;
-    `stopped` says that the best so far is wanted at once."""
+    others; `hulls`: whether hulls may hide what goes into them; `lay_out`: whether layouts decide,
+    or estimates alone; `settings` and `templates` of the factory, None for those shipped; `told`
+    hears what goes on, and how many of how many are done; `stopped` says that the best so far is
+    wanted at once."""
 
     aim: Aim = "cycle"
     seconds: float = 60.0
     allow: tuple[str, ...] = ()
+    hulls: bool = False
     lay_out: bool = True
     settings: Settings = field(default_factory=Settings)
     templates: Mapping[str, Template] | None = field(default=None, repr=False)
@@ -85,7 +88,8 @@ class Planned:
     """A tree of labels, as `writing.planned_product` takes it, with the rotation (3, 3) of the
     product onto the floor, its operations, its figures, the laid-out `project` (None where
     estimates alone decided); `optimal`: whether it is proved that no tree costs less, by what is
-    in the way and by the expected cycle."""
+    in the way and by the expected cycle; `hidden`: where hulls were accepted, the pairs that
+    overlap, though their meshes may not."""
 
     tree: Tree = field(repr=False)
     orientation: Array
@@ -93,6 +97,7 @@ class Planned:
     figures: PlanFigures
     optimal: bool
     project: Project | None = field(default=None, repr=False, compare=False)
+    hidden: tuple[Drawn, ...] = field(default=(), repr=False)
 
 
 @dataclass(frozen=True)
@@ -106,17 +111,20 @@ class CannotAssemble:
 
 def plan(source: InPlace, options: PlanOptions | None = None) -> Planned | CannotAssemble:
     """The best tree for a source's parts, or why there is none. Raises InputError where `allow`
-    names nothing that is planned."""
+    names nothing that is planned (Usage), or where hulls hide what is in the way (Hulls)."""
     asked = options or PlanOptions()
     budget = Budget(asked.seconds, stopped=asked.stopped)
     asked.told("looking for what is in the way", 0, None, "")
     found = blocking(source)
     _check_allowed(asked.allow, found)
+    pairs = hidden(source, found.drawn)
+    if not asked.hulls:
+        refuse_hidden(source, pairs)
     found = found.allowing(asked.allow)
     stuck = interlocks(found)
     if stuck:
         return CannotAssemble(stuck, removal(found))
-    return _planned(source, found, asked, budget)
+    return replace(_planned(source, found, asked, budget), hidden=pairs if asked.hulls else ())
 
 
 def _planned(source: InPlace, found: Blocking, asked: PlanOptions, budget: Budget) -> Planned:

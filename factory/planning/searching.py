@@ -38,6 +38,10 @@ SEVERAL = 3
 EVEN = (1.0, 0.3, 0.0)
 """Many units are divided in about equal halves first, then less evenly."""
 
+PROOF, EACH = 30.0, 0.2
+"""The usual times to search [s]: of up to MOST units, whose trees may be proved; for each of
+more."""
+
 SURE = 12
 """The trees of so many units are proved, however long it takes, unless the search is stopped."""
 
@@ -47,6 +51,11 @@ need the rest."""
 
 Given = Callable[[Stance], Array]
 """The price (2, n) of each unit in a stance if its own inputs come along x or y of the floor."""
+
+
+def usual_seconds(units: int) -> float:
+    """How long trees of so many units are sought where nothing else is asked for [s]."""
+    return PROOF if units <= MOST else EACH * units
 
 
 @dataclass(frozen=True)

@@ -44,3 +44,11 @@ class Approach:
     lowered: str = ""
     stroke: float = 0.0
     overlaps: tuple[tuple[Overlap, ...], ...] = ((), ())
+
+    @property
+    def told(self) -> str:
+        """In words: "lid is lowered 0.057 m", "slides from -x or +x"."""
+        if self.kind == "lower":
+            return f"{self.lowered} is lowered {self.stroke:g} m"
+        sides = " or ".join(f"{'-+'[side > 0]}{'xy'[self.axis]}" for side in self.sides)
+        return f"{'slides' if self.kind == 'slide' else 'is blocked'} from {sides}"

@@ -79,7 +79,9 @@ class Failures:
     """All of a run. `struck`: faults of the world, by kind; `missed`: those that no sensor told of;
     `false_alarms`: failures that nothing caused; `undone`: how many transitions were fired
     backwards; `spares`: how many were used; `contacts`: of what fell, which are no unintended
-    ones; `stood`: from when on [s] which robots stood, by name."""
+    ones; `stood`: from when on [s] which robots stood, by name; `binned`: how often scrap has
+    fallen into a bin; `spilled`: the robots, by name, that have let some fall elsewhere, since
+    there is no room for a bin."""
 
     found: tuple[Failing, ...] = ()
     struck: Mapping[str, int] = field(default_factory=dict)
@@ -89,6 +91,8 @@ class Failures:
     spares: int = 0
     contacts: int = 0
     stood: tuple[Stood, ...] = ()
+    binned: int = 0
+    spilled: tuple[str, ...] = ()
 
     @property
     def scrapped(self) -> int:
@@ -106,6 +110,8 @@ class Failures:
             "scrapped": self.scrapped,
             "spares_used": self.spares,
             "fault_contacts": self.contacts,
+            "binned": self.binned,
+            "spilled": list(self.spilled),
             "standing": [{"t": round(t, 6), "robots": list(robots)} for t, robots in self.stood],
             "failures": [one.as_json() for one in self.found],
         }

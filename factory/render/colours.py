@@ -18,6 +18,9 @@ EDGE, FLASH = (222, 224, 229), (232, 60, 48)
 AMBER = (214, 148, 22)
 """Robots that stand."""
 
+DEAD = (40, 40, 44)
+"""Robots that are dead, until they are replaced."""
+
 WHITE = (255, 255, 255)
 
 TEMPLATES = {

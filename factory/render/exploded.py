@@ -36,7 +36,7 @@ BEFORE, AFTER, SLOWEST, LONGEST = 1.2, 1.8, 0.7, 10.0
 """Parts stand apart and the product stands for these times; an operation takes at most the third,
 and all together the fourth [s]."""
 
-MANY = 30_000
+MANY = 10_000
 """A film of more triangles has half the frames, and no shadows: these cost a second pass."""
 
 AROUND = 3.0

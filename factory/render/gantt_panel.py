@@ -7,6 +7,7 @@ from math import ceil
 from factory.control.mode import Array
 from factory.render.colours import (
     AMBER,
+    DEAD,
     FAINT,
     FLASH,
     LINE,
@@ -73,6 +74,7 @@ class GanttPanel:
         x, y, small = self.right, 20 * self.sheet.scale, self.sheet.points - 2
         colours = template_colours(self.factory)
         colours |= {"stands": AMBER} if self.history.standing else {}
+        colours |= {"dead": DEAD} if self.history.exchanged() else {}
         colours |= {"undone": FLASH} if self.history.undone else {}
         for name, colour in reversed(colours.items()):
             if x - width(name, small) < self.sheet.size[0] / 3:
@@ -95,11 +97,19 @@ class GanttPanel:
         ink.words(self.right, y, "now", small, FLASH, "r")
 
     def _stands(self, ink: Ink, row: PanelRow, now: float) -> None:
-        """A band where a robot stood."""
+        """A band where a robot stood, a dark one where it was dead, to where another took its
+        place."""
         y, half = self.sheet.height(row), 0.5 * self.sheet.pitch
         for start, end in self.history.stood(row.robot, now - self.window, now):
             left, right = max(self.at(start, now), self.left), self.at(end, now)
             ink.box(left, y - half, right, y + half, AMBER, 0.3 * row.alpha)
+        for robot, start, end in self.history.exchanged():
+            if robot != row.robot or start > now or end < now - self.window:
+                continue
+            left, right = max(self.at(start, now), self.left), self.at(min(end, now), now)
+            ink.box(left, y - half, right, y + half, DEAD, 0.45 * row.alpha)
+            if end <= now:  # another robot goes on from here
+                ink.box(right - self.sheet.scale, y - half, right, y + half, DEAD, row.alpha)
 
     def _spell(self, ink: Ink, row: PanelRow, spell: Spell, now: float) -> None:
         """A bar for an operation, hatched where that was undone, a thin one where a robot

@@ -120,6 +120,20 @@ class History:
         before = bisect_right(self.standing, time - TIE, key=lambda pair: pair[0])
         return self.standing[before - 1][1] if before else frozenset()
 
+    def exchanged(self) -> list[tuple[int, float, float]]:
+        """The robots that were known to be dead, each from when on and until another took its
+        place [s], inf where none did."""
+        index = {robot.name: robot.index for robot in self.factory.robots}
+        return [
+            (index[one.robot], one.t, inf if one.until is None else one.until)
+            for one in self.failings
+            if one.test == "jammed"
+        ]
+
+    def dead(self, time: float) -> frozenset[int]:
+        """The robots that are known to be dead at a time, and not yet replaced."""
+        return frozenset(r for r, start, end in self.exchanged() if start < time - TIE < end)
+
     def failed(self, since: float, time: float) -> list[Failing]:
         """What failed from one time and before another."""
         return [one for one in self.failings if since <= one.t < time - TIE]

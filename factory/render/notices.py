@@ -6,7 +6,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from factory.render.caption import Caption
-from factory.render.colours import AMBER, FLASH, INK, WHITE
+from factory.render.colours import AMBER, DEAD, FLASH, INK, WHITE
 from factory.render.history import History
 from factory.render.ink import Colour, Ink, Pixels, fitted, width
 
@@ -42,6 +42,10 @@ def _notices(history: History, time: float) -> Iterator[tuple[str, Colour, float
         more = f" and {len(names) - NAMED} more" if len(names) > NAMED else ""
         listed = ", ".join(names[:NAMED]) + more
         yield f"{listed} stand{'s' if len(names) == 1 else ''} still", AMBER, 1.0
+    for robot, _, until in history.exchanged():
+        if until < time < until + SHOWN + FADES:
+            alpha = min(1.0, (until + SHOWN + FADES - time) / FADES)
+            yield f"a spare is in the place of {history.factory.robots[robot].name}", DEAD, alpha
     for failing in history.failed(time - SHOWN - FADES, time)[: -MOST - 1 : -1]:
         alpha = min(1.0, (failing.t + SHOWN + FADES - time) / FADES)
         yield str(failing), FLASH, alpha

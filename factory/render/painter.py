@@ -13,6 +13,7 @@ from factory.render.camera import Array, Camera, Framing, View
 from factory.render.fading import Fading
 from factory.render.following import Viewpoint
 from factory.render.ink import Pixels
+from factory.render.marks import Mark, Marks
 from factory.render.picture import Size
 from factory.render.subject import Snapshot
 from factory.support import gl
@@ -65,10 +66,17 @@ class Painter(Closing):
         """Gives the GL context back."""
         self.renderer.close()
 
-    def paint(self, shown: Snapshot, elapsed: float = 0.0, time: float = 0.0) -> Pixels:
-        """One picture (height, width, 3) at a time [s]. `elapsed` [s] since the last one: a camera
-        that follows glides; with 0 it is at its goal at once."""
+    def paint(
+        self,
+        shown: Snapshot,
+        elapsed: float = 0.0,
+        time: float = 0.0,
+        marks: Marks | None = None,
+    ) -> Pixels:
+        """One picture (height, width, 3) at a time [s], with `marks` on the floor. `elapsed` [s]
+        since the last one: a camera that follows glides; with 0 it is at its goal at once."""
         self.replica.place(shown.qpos)
+        self.renderer.marks = [] if marks is None else [*marks.at(shown, time)]
         mujoco.mj_camlight(self.replica.m, self.replica.d)
         view = self.viewpoint.view(shown, elapsed, time)
         self.fading.fade(view, self.viewpoint.watched)
@@ -90,6 +98,7 @@ class Renderer(Closing):
         mujoco.mjv_defaultFreeCamera(m, self.free)
         self.rectangle = mujoco.MjrRect(0, 0, *size)
         self.pixels = np.empty((size[1], size[0], 3), np.uint8)
+        self.marks: list[Mark] = []
 
     def close(self) -> None:
         """Gives the GL context back."""
@@ -104,6 +113,8 @@ class Renderer(Closing):
         scene, everything = self.scene, mujoco.mjtCatBit.mjCAT_ALL.value
         m, d, nothing = self.replica.m, self.replica.d, None
         mujoco.mjv_updateScene(m, d, self.options, nothing, self.free, everything, scene)
+        for mark in self.marks:
+            mark.add_to(scene)
         flags = mujoco.mjtRndFlag
         scene.flags[flags.mjRND_SHADOW], scene.flags[flags.mjRND_SKYBOX] = shadows, view.has_sky
         for unused in (flags.mjRND_REFLECTION, flags.mjRND_HAZE, flags.mjRND_POST_PROCESSING):

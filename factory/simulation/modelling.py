@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
+from factory.layout.bins import Bin, bins_of
 from factory.layout.layout import Layout
 from factory.mjcf.timestep import timed
 from factory.plant.fused_bodies import FusedBodies, bodies_of, fused_copies
@@ -27,10 +28,12 @@ def modelled(layout: Layout, request: RunRequest, under_way: Mapping[str, int]) 
 
     bodies = bodies_of(layout.factory, layout.product, request.fuse)
     copies, wip = _copies(layout, bodies, request.units, request.wip, under_way)
+    bins: tuple[Bin, ...] = ()
     if request.recovers:
         copies = {label: count + SPARE for label, count in copies.items()}
+        bins = bins_of(layout)
     catalogue, settings = request.catalogue or load_catalogue(), timed(request.settings, layout)
-    return build_model(layout, catalogue, copies, settings, bodies, request.shown, wip)
+    return build_model(layout, catalogue, copies, settings, bodies, request.shown, wip, bins)
 
 
 def physical_model(

@@ -84,7 +84,8 @@ class Simulation:
         self.limits, gains = robot_limits(layout, settings, request.seed, request.jitter)
         stages = stages_of(layout, self.modes, settings)
         self.delays = operation_delays(layout, self.modes, self.limits, settings, world, stages)
-        self.ways = all_ways(layout, stages, self.delays, self.limits, settings, world)
+        told = self.delays, self.limits, settings, world
+        self.ways = all_ways(layout, self.modes, stages, *told)
         self.counts = firings(net, self.start)
         self.model: Model | None = None
         self.world: World

@@ -20,7 +20,7 @@ def watched(
     """`simulation.run`, with a monitor where there are bodies. It looks where operations end, where
     a weld is switched, and at times; with `every_tick` after every tick, and so it does where
     robots run their own programs, which stop within ticks. A run that goes on where something fails
-    has none: it is the states alone that a monitor judges, and these do not tell what was undone.
+    has none: states alone do not tell what was undone, and its log is judged (`monitor.calm`).
     """
     if simulation.model is None or simulation.request.recovers:
         return simulation.run(observers, max_time, glances)

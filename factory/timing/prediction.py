@@ -7,13 +7,14 @@ the drives settle within eps besides.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from types import MappingProxyType
 
 import numpy as np
 
 from factory.control.mode import Limits, Mode
 from factory.control.profile import SpeedProfile, World, mode_time
+from factory.geometry.meshes import Array
 from factory.layout.hands.leaving import Leaving, going_on, raised
 from factory.layout.hands.limbs import rises_first
 from factory.layout.layout import Layout
@@ -60,6 +61,40 @@ def ways_ahead(
     )
 
 
+def held_up(
+    layout: Layout,
+    modes: Sequence[Mode],
+    limits: Limits,
+    settings: Settings,
+    world: World,
+    ahead: Sequence[HeadStart],
+) -> dict[tuple[int, int], float]:
+    """The time [s] from the end of a robot's operation to that of the one it goes ahead to, if that
+    begins at once, where others wait for it (`Mode.gate`): they go on when it stands. By the robot
+    and the operation to come."""
+    settle = settings.settle if world == "mujoco" else 0.0
+    return {
+        (stage.robot, stage.operation): settle
+        + settings.tick
+        + mode_time(modes[stage.operation], begin, limits.of(axes), world)
+        for stage, begin in gating(layout, modes, ahead)
+        for axes in [layout.factory.axes[stage.operation]]
+    }
+
+
+def gating(
+    layout: Layout, modes: Sequence[Mode], ahead: Sequence[HeadStart]
+) -> Iterator[tuple[HeadStart, Array]]:
+    """The ways ahead of robots for which others wait, each with where the axes of its operation are
+    if it has not gone ahead."""
+    starts = staged(operation_starts(layout), ahead)
+    for stage in ahead:
+        if stage.axis == stage.robot and stage.slot in modes[stage.operation].gate:
+            begin = starts[stage.operation].copy()
+            begin[stage.slot] = stage.start
+            yield stage, begin
+
+
 def one_after_the_other(
     ways: Iterable[tuple[HeadStart, float]],
 ) -> dict[tuple[int, int], float]:
@@ -97,14 +132,19 @@ def _gone(layout: Layout, leaving: Leaving, limits: Limits) -> float:
 
 def all_ways(
     layout: Layout,
+    modes: Sequence[Mode],
     stages: Sequence[HeadStart],
     delays: Sequence[float],
     limits: Limits,
     settings: Settings,
     world: World,
 ) -> dict[tuple[int, int], float]:
-    """The ways ahead, and in MuJoCo the waits for hands, which the ideal world has not."""
-    found = ways_ahead(stages, limits, settings, world)
+    """The ways ahead, with what waits for these robots, and in MuJoCo the waits for hands, which
+    the ideal world has not."""
+    found = longer(
+        ways_ahead(stages, limits, settings, world),
+        held_up(layout, modes, limits, settings, world, stages),
+    )
     if world == "mujoco":
         for key, seconds in waits_for_hands(layout, limits).items():
             found[key] = max(seconds + delays[key[1]], found.get(key, 0.0))
@@ -168,5 +208,5 @@ def pace(layout: Layout, settings: Settings) -> tuple[CycleTime, list[float]]:
     modes, (limits, _) = operation_modes(layout, settings.eps), robot_limits(layout, settings)
     stages = stages_of(layout, modes, settings)
     delays = operation_delays(layout, modes, limits, settings, "mujoco", stages)
-    ways = all_ways(layout, stages, delays, limits, settings, "mujoco")
+    ways = all_ways(layout, modes, stages, delays, limits, settings, "mujoco")
     return predict(layout, delays, settings, "mujoco", None, ways), delays

@@ -47,6 +47,13 @@ class Depths:
         return np.asarray((self.path > TOLERANCE) | (self.graze > -CLEAR))
 
     @property
+    def room(self) -> Array:
+        """The least room (n, 2) on the way from either side but for the last bit of it [m], less
+        than 0 where the two overlap, there or anywhere."""
+        deep = np.where(self.path > TOLERANCE, self.path, -np.inf)
+        return np.asarray(-np.maximum(self.graze, deep))
+
+    @property
     def receding(self) -> Array:
         """How far (n, 2) the two must recede from each other [m], or be made smaller together, so
         that they neither overlap nor scrape on the way from either side."""

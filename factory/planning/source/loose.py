@@ -113,7 +113,7 @@ def _assembled(
         if kind == index:
             low, high = shapes[index].vertices.min(axis=0), shapes[index].vertices.max(axis=0)
             origins[kind] = np.round((low + high) / 2, 6)
-            vertices, faces = _scaled(body.mesh.apart(), unit)
+            vertices, faces = _scaled(body.mesh.merged(), unit)
             content = obj_of(vertices - origins[kind], faces)
             meshes[kind] = store.add(_name(body, index), ".obj", content)
         at = motion.turn @ origins[kind] + motion.shift

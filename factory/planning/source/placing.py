@@ -6,16 +6,15 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from factory.geometry.decomposition import FULL
-from factory.geometry.meshes import Array, Indices, hull_mesh, is_closed, volume_of
+from factory.geometry.meshes import Array, Indices, hull_mesh
 from factory.geometry.product import product_geometry
 from factory.geometry.solids import Solid, rotation
+from factory.planning.hulls import EXTRA, hull_stands
 from factory.planning.parts import PlacedPart
 from factory.planning.source.alike import PartShape, shape_of
 from factory.problem.pag import PAG
 from factory.support.errors import Diagnostic
 
-EXTRA = "pip install 'klavins-factory[decompose]'"
 DECOMPOSE = f"{EXTRA}: then it is decomposed into convex bodies"
 
 
@@ -37,10 +36,8 @@ def _hulls(parts: Sequence[PlacedPart]) -> list[Diagnostic]:
     into it, or through it, seems to overlap with it."""
     found = {}
     for part in parts:
-        mesh, file = part.solid.mesh, str(part.node.parameter("mesh"))
-        if mesh is None or mesh.pieces or file in found or not is_closed(mesh.faces):
-            continue
-        if volume_of(mesh.vertices, mesh.faces) < FULL * mesh.hull.volume:
+        file = str(part.node.parameter("mesh"))
+        if file not in found and hull_stands(part.solid.mesh):
             message = f"{file} is not convex; its convex hull stands for it"
             many = f"meshes are not convex: their convex hulls stand for them ({EXTRA})"
             found[file] = Diagnostic("BadMesh", message, part.node.position, DECOMPOSE, many)

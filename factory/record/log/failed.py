@@ -35,6 +35,8 @@ _KEYS = (
         for name in ("missed", "false_alarms", "transitions_undone", "spares_used")
     ),
     Key("fault_contacts", _COUNT, is_count),
+    Key("binned", _COUNT, is_count, later=True),
+    Key("spilled", "a list of robots", listed(is_text), later=True),
     Key("standing", "a list of which robots stood", _is_listed),
     Key("failures", "a list of failures", _is_listed),
 )
@@ -113,6 +115,8 @@ def failures_of(content: Any, robots: frozenset[str]) -> Failures:
         told["spares_used"],
         told["fault_contacts"],
         stood,
+        told.get("binned", 0),
+        tuple(told.get("spilled", ())),
     )
 
 

@@ -12,12 +12,14 @@ from factory.nets.gears import GearNet
 from factory.nets.replay import replay
 from factory.plant.factory import Factory
 from factory.plant.material import joins_of
+from factory.record.failures import Failures
 from factory.record.log.header import settings_of
 from factory.record.log.model import model_of
 from factory.record.log.reader import Ends, Log
 from factory.record.log.recompiled import AGAIN, factory_of, of_its_factory
 from factory.record.monitor.agreement import contradictions
 from factory.record.monitor.anatomy import Anatomy
+from factory.record.monitor.calm import judge_calm
 from factory.record.monitor.monitor import Monitor
 from factory.record.monitor.observation import Observation
 from factory.record.monitor.report import Report
@@ -31,8 +33,8 @@ def watch_log(log: Log) -> tuple[Report, MonitorSubject]:
 
     Only when nothing is wrong with the states are the log's firings and markings looked at: whether
     they agree with those, and with each other. States alone do not tell what was undone: where
-    something was, only firings and markings are looked at. Raises InputError (BadLog) for a log of
-    the ideal world, of an older version, or of another factory than its header says.
+    something failed, the states between failures are looked at (`calm`). Raises InputError (BadLog)
+    for a log of the ideal world, of an older version, or of another factory than its header says.
     """
     m = model_of(log)
     if log.ctrl is None or "monitor" not in log.header:
@@ -40,7 +42,10 @@ def watch_log(log: Log) -> tuple[Report, MonitorSubject]:
         raise InputError(Diagnostic("BadLog", message, None, AGAIN))
     with of_its_factory():
         subject = recorded_subject(log.header)
-        report = Report((), (), ()) if log.undone else _seen(log, subject, m)
+        if log.failures is not None and log.failures != Failures():
+            report = judge_calm(log, subject, m, [*observations(log)])
+        else:
+            report = _seen(log, subject, m)
         if report.refines_net:
             found = contradictions(subject, log.timed_entries, _markings(log))
             report = replace(report, violations=tuple(found))

@@ -59,12 +59,14 @@ class Firing:
 
 @dataclass(frozen=True, slots=True)
 class Report:
-    """The verdict of a monitor. `time_s`: what the monitor itself took [s]."""
+    """The verdict of a monitor. `time_s`: what the monitor itself took [s]; `calm_s`: how long the
+    spells of the run were that it has judged [s], None where it has judged all of it."""
 
     seen: tuple[Firing, ...] = field(repr=False)
     inferred: tuple[Firing, ...] = field(repr=False)
     violations: tuple[Violation, ...]
     time_s: float = 0.0
+    calm_s: float | None = None
 
     @property
     def refines_net(self) -> bool:
@@ -79,4 +81,5 @@ class Report:
             "firings_seen": [f.as_json() for f in self.seen],
             "firings_inferred": [f.as_json() for f in self.inferred],
             "violations": [v.as_json() for v in self.violations],
+            **({} if self.calm_s is None else {"judged_s": round(self.calm_s, 6)}),
         }

@@ -9,7 +9,10 @@ from typing import Any
 from factory.record.failures import Failing, Failures
 from factory.show.report.recording import Recording
 
-LEGEND = "Robots over time: hatched is what was undone; in a band a robot stands still."
+LEGEND = (
+    "Robots over time: hatched is what was undone; in a band a robot stands still, in a dark one it"
+    " is dead, until another is in its place."
+)
 
 COLUMNS = ("Time", "What failed", "What was done", "Undone", "Scrapped")
 
@@ -32,6 +35,7 @@ def failures_section(recording: Recording) -> str:
 
 def failures_data(recording: Recording) -> dict[str, Any]:
     """What the page draws of it: `undone`, after how many firings, when [s] and which transitions;
+    `dead`, which robots were, from when on and until when [s], null where none took their place;
     `stood`, from when on [s] which robots stood."""
     log, net = recording.log, recording.factory.net.threaded.net.transition_index
     if log.failures is None:
@@ -41,6 +45,11 @@ def failures_data(recording: Recording) -> dict[str, Any]:
         "undone": [
             [after, round(undone.t, 4), [net[name] for name in undone.transitions]]
             for after, undone in log.undone
+        ],
+        "dead": [
+            [robots[one.robot], round(one.t, 4), None if one.until is None else round(one.until, 4)]
+            for one in log.failures.found
+            if one.test == "jammed"
         ],
         "stood": [
             [round(t, 4), [robots[name] for name in names]] for t, names in log.failures.stood

@@ -10,6 +10,7 @@ from importlib.resources import files
 from typing import Any
 
 from factory.plant.factory import Factory
+from factory.show.report.approaches import approaches_section
 from factory.show.report.drawings import floor_plan, net_drawing
 from factory.show.report.failures import failures_data, failures_section
 from factory.show.report.fidelity import fidelity
@@ -76,6 +77,7 @@ def page(recording: Recording) -> str:
         "tree": assembly_tree(recording.factory.pag, labels),
         "floor": floor_plan(recording.stage, labels),
         "net": net_drawing(recording.factory, recording.stage.roles),
+        "approaches": approaches_section(recording, labels),
         "failures": failures_section(recording),
         "pace": pace(recording, run, plan),
         "utilisation": utilisation(recording, run, plan),

@@ -25,6 +25,8 @@ def summed(
     spares: int,
     contacts: int,
     stood: Sequence[Stood],
+    binned: int = 0,
+    spilled: tuple[str, ...] = (),
 ) -> Failures:
     """All failures of a run. A robot that is dead and never asked to move is not missed."""
     tests, wanted = Counter(one.test for one in found), Counter[str]()
@@ -42,4 +44,6 @@ def summed(
         spares,
         contacts,
         tuple(stood),
+        binned,
+        spilled,
     )

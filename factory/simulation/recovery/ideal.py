@@ -16,7 +16,8 @@ from factory.simulation.simulation import Simulation
 class IdealPlant:
     """Parts are where their robots are, or nowhere."""
 
-    contacts = 0
+    contacts, binned = 0, 0
+    spilled: tuple[str, ...] = ()
 
     def __init__(self, simulation: Simulation, books: Books) -> None:
         self._simulation, self._books = simulation, books
@@ -114,6 +115,9 @@ class IdealPlant:
         return [robot for robot in changed if robot not in gone]
 
     def let_go(self, robot: int, seconds: float) -> None:
+        """A robot lets scrap fall."""
+
+    def throw_away(self, robot: int, label: str, seconds: float) -> None:
         """A robot lets scrap fall."""
 
     def takes_back(self, robot: int) -> bool:

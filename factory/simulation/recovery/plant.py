@@ -74,6 +74,10 @@ class Plant(Protocol):
     def let_go(self, robot: int, seconds: float) -> None:
         """A robot lets scrap fall, which lies for so long [s]."""
 
+    def throw_away(self, robot: int, label: str, seconds: float) -> None:
+        """A robot at its B end lets go of a label that is scrap, over its bin, where that is wide
+        enough; it lies for so long [s]."""
+
     def takes_back(self, robot: int) -> bool:
         """Whether something goes back up in a robot's feeder."""
 
@@ -98,6 +102,14 @@ class Plant(Protocol):
 
     def keep(self, keeper: Keeper) -> None:
         """What goes on beside the world, while all is calm."""
+
+    @property
+    def binned(self) -> int:
+        """How often scrap has fallen into a bin."""
+
+    @property
+    def spilled(self) -> Sequence[str]:
+        """The robots, by name, that have let scrap fall where there is no bin for it."""
 
     @property
     def contacts(self) -> int:

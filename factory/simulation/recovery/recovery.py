@@ -216,6 +216,8 @@ class Recovery:
             self.responding.used_spares,
             self.plant.contacts,
             self.stood,
+            self.plant.binned,
+            tuple(dict.fromkeys(self.plant.spilled)),
         )
 
 

@@ -5,7 +5,7 @@ for any more."""
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import astuple
 from functools import partial
 
@@ -26,6 +26,7 @@ from factory.simulation.recovery.faults import Campaign
 from factory.simulation.recovery.plant import Plant
 from factory.simulation.recovery.returning import Goal, Returning, WayBack, order_of
 from factory.simulation.recovery.standing import Standing, patience
+from factory.simulation.recovery.wasting import Wasting
 from factory.simulation.simulation import Simulation
 from factory.support.errors import Diagnostic
 from factory.timing.failing import SCRAPS
@@ -56,7 +57,7 @@ class Responding:
         self.used_spares = 0
         self._tried: Counter[int] = Counter()
         self._scrapped: Counter[str] = Counter()
-        self._barred = not_carried_back(simulation.layout)
+        self._wasting = Wasting(not_carried_back(simulation.layout))
 
     @property
     def is_calm(self) -> bool:
@@ -80,6 +81,10 @@ class Responding:
         tried = keeper.rows("failures.tried", self._tried.items(), numbers, count)
         scrapped = keeper.rows("failures.scrapped", self._scrapped.items(), names, count)
         self._tried, self._scrapped = Counter(dict(tried)), Counter(dict(scrapped))
+        held = self._wasting.held.items()
+        self._wasting.held = dict(
+            keeper.rows("scrap.held", held, up_to(len(factory.robots)), is_text)
+        )
         self.standing.keep(keeper)
 
     def passed(self, operation: Operation) -> None:
@@ -187,20 +192,20 @@ class Responding:
         scrap = {*self._plant.undone(books.held(marking), fired, going)}
         supervisor.undo(undone, fired, marking, self.standing.axes(going | scrap))
         over = [factory.operations[n] for n in under_way if n not in marking]
-        wasted = {robot: books.holds(robot, before) for robot in scrap}
-        self._send_back(sorted(going | scrap), wasted, over, marking)
+        self._wasting.waste(scrap, {robot: books.holds(robot, before) for robot in scrap})
+        self._send_back(sorted(going | scrap), over, marking)
         self._plant.supplied()
 
     def _send_back(
         self,
         robots: Iterable[int],
-        scrap: Mapping[int, str],
         over: Sequence[Operation],
         marking: Marking,
     ) -> None:
-        """Robots go to where they wait in a marking, by way of their B ends with `scrap`, given by
-        its label, or let it fall at once where they cannot carry it there; those of operations that
-        are `over` leave in the reverse order of their coming."""
+        """Robots go to where they wait in a marking, by way of their B ends with what is scrap, or
+        let it fall at once where they cannot carry it there; those of operations that are `over`
+        leave in the reverse order of their coming."""
+        scrap = self._wasting.held
         after = dict[int, frozenset[int]]()
         for operation in over:
             came = order_of(self._simulation.modes[operation.index], operation.robots)
@@ -209,17 +214,20 @@ class Responding:
         for robot in robots:
             rest = self.returning.rest(robot, marking)
             goals, done = rest, partial(self._plant.came_back, robot)
-            if robot in scrap and (robot, scrap[robot]) in self._barred:
+            if robot in scrap and self._wasting.falls_here(robot):
                 self._plant.let_go(robot, self._campaign.clear)
             elif robot in scrap:
-                goals, done = self.returning.home(robot), partial(self._bin, robot, rest)
+                goals, done = (
+                    self.returning.home(robot),
+                    partial(self._bin, robot, scrap[robot], rest),
+                )
             first = after.get(robot, frozenset[int]())
             self.returning.send(robot, WayBack(goals, first, done, partial(self._is_up, robot)))
 
-    def _bin(self, robot: int, rest: list[Goal]) -> None:
+    def _bin(self, robot: int, label: str, rest: list[Goal]) -> None:
         """A robot at the B end of its guidepath lets scrap fall into the bin there, and goes to
         where it waits."""
-        self._plant.let_go(robot, BINNED)
+        self._plant.throw_away(robot, label, BINNED)
         self.returning.send(robot, WayBack(rest))
 
     def _is_up(self, robot: int) -> bool:

@@ -18,7 +18,7 @@ from factory.modes.staging import HeadStart, staged, stages_of
 from factory.plant.factory import Factory
 from factory.simulation.starting import start_positions
 from factory.support.settings import Settings
-from factory.timing.prediction import one_after_the_other, waits_for_hands, way_time
+from factory.timing.prediction import gating, one_after_the_other, waits_for_hands, way_time
 
 AT_ONCE = 1e6
 """A factor on a speed that leaves only the acceleration as a bound."""
@@ -85,9 +85,18 @@ class Timing:
 
     def ways(self, change: Change = AS_IT_IS) -> dict[tuple[int, int], float]:
         """The time [s] of a robot to go ahead to an operation, by (robot, operation)."""
-        return one_after_the_other(
+        found = one_after_the_other(
             (stage, self._way(stage, stage.start, change)) for stage in self.stages
         )
+        for stage, begin in self._gating:
+            key = stage.robot, stage.operation
+            found[key] = max(found[key], self._delay(stage.operation, begin, change))
+        return found
+
+    @cached_property
+    def _gating(self) -> tuple[tuple[HeadStart, Array], ...]:
+        """The ways ahead of robots for which others wait, and where all are before them."""
+        return tuple(gating(self.layout, self.modes, self.stages))
 
     def waits(self, change: Change = AS_IT_IS) -> dict[tuple[int, int], float]:
         """How long a carrier waits at least, for hands that have delivered to it to be gone [s], by

@@ -46,7 +46,11 @@ class Measurement:
         self._steps = Steps(m, d, simulation.request.settings.steps)
 
     def run(self, max_time: float | None = None) -> Run:
-        """Run the simulation, measuring, with a monitor beside it."""
+        """Run the simulation, measuring, with a monitor beside it; without, where it recovers: the
+        monitor then judges its log (`record.monitor.calm`)."""
+        if self.simulation.request.recovers:
+            with self._steps:
+                return self.simulation.run([self.observe], max_time)
         watcher = beside(self.simulation)
         with self._steps:
             run = self.simulation.run([self.observe, watcher.observe], max_time)

@@ -53,6 +53,23 @@ function unpackedFrame(buffer) {
   return [JSON.parse(text), new Float32Array(buffer, 4 + length)];
 }
 
+// Robots that stand glow in the 3-D view, but for what is selected or faded.
+function glow(replay, standing) {
+  const stands = new Set(standing);
+  for (const mesh of replay.meshes) {
+    const { robot, shape, state = 'plain' } = mesh.userData;
+    if (robot === undefined || state !== 'plain') continue;
+    const plain = replay.paints.of(DATA.scene.alphas[shape], 'plain');
+    const isLit = stands.has(DATA.robots[robot]);
+    if (isLit && !plain.userData.standing) {
+      plain.userData.standing = plain.clone();
+      plain.userData.standing.emissive.setHex(0xd69416);
+      plain.userData.standing.emissiveIntensity = 0.55;
+    }
+    mesh.material = isLit ? plain.userData.standing : plain;
+  }
+}
+
 // What can be done to what is selected.
 class Acts {
   constructor(panel, selection, send) {
@@ -260,6 +277,7 @@ class Live {
     document.getElementById('rhythm').textContent = rhythm ? `${rhythm.toFixed(2)} s after the one before` : products ? 'the first' : 'none yet';
     this.note(note);
     this.acts.take(this.frame);
+    if (this.views.replay) glow(this.views.replay, this.frame.standing);
     Object.values(this.views).forEach((view) => view.show(time));
   }
 

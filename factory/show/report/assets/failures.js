@@ -48,19 +48,22 @@ Gantt.prototype.draw = function drawWithUndone(page) {
       bar.classList.toggle('undone', span.undone);
       if (span.undone) bar.title += ', undone';
     }
-  DATA.stood.forEach(([start, robots], n) => {
-    const end = n + 1 < DATA.stood.length ? DATA.stood[n + 1][0] : DATA.end;
+  const band = (robot, name, words, start, end) => {
     const [left, right] = [Math.max(start, this.from), Math.min(end, to)];
     if (right <= left) return;
-    for (const robot of robots) {
-      const band = document.createElement('div');
-      band.className = 'stood';
-      band.style.left = `${((100 * (left - this.from)) / this.width).toFixed(3)}%`;
-      band.style.width = `${((100 * (right - left)) / this.width).toFixed(3)}%`;
-      band.title = `stands still: ${start.toFixed(2)} to ${end.toFixed(2)} s`;
-      this.tracks[robot].prepend(band);
-    }
+    const made = document.createElement('div');
+    made.className = name;
+    made.style.left = `${((100 * (left - this.from)) / this.width).toFixed(3)}%`;
+    made.style.width = `${((100 * (right - left)) / this.width).toFixed(3)}%`;
+    made.title = `${words}: ${start.toFixed(2)} to ${end.toFixed(2)} s`;
+    this.tracks[robot].prepend(made);
+  };
+  DATA.stood.forEach(([start, robots], n) => {
+    const end = n + 1 < DATA.stood.length ? DATA.stood[n + 1][0] : DATA.end;
+    robots.forEach((robot) => band(robot, 'stood', 'stands still', start, end));
   });
+  DATA.dead.forEach(([robot, start, end]) =>
+    band(robot, 'stood dead', end === null ? 'is dead' : 'is dead, then a spare is in its place', start, end ?? DATA.end));
 };
 
 Game.prototype.rewind = function rewind() {

@@ -7,7 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from factory.layout.bins import TOP, Bin
 from factory.layout.sweeping import SweptFloor
+from factory.simulation.mujoco.failing.jets import Jets
 from factory.simulation.mujoco.world import MujocoWorld, anything
 
 SETTLES = 0.5
@@ -17,27 +19,33 @@ SETTLES = 0.5
 @dataclass(frozen=True, slots=True)
 class Heap:
     """The `bodies` of something that has fallen, by label, which count for a `unit` of scrap, and
-    `until` when they lie [s]."""
+    `until` when they lie [s]; `into`: the bin that they are to fall into."""
 
     unit: int
     bodies: Mapping[str, int]
     until: float
+    into: Bin | None = None
 
 
 class Fallen:
-    """What lies about in a world: `heaps`; `closed`: the robots (index) that could touch it."""
+    """What lies about in a world: `heaps`; `closed`: the robots (index) that could touch it, but
+    for what lies in its bin; `binned`: how often something has fallen into one."""
 
     def __init__(self, world: MujocoWorld) -> None:
         self._world, self._swept = world, SweptFloor.of(world.model.layout)
-        self._calm = 0.0
+        self._calm, self._jets = 0.0, Jets(world)
+        self.binned = 0
         self.heaps: list[Heap] = []
         self.closed = frozenset[int]()
 
-    def let_fall(self, robot: int, seconds: float) -> None:
-        """A robot lets go of all that it holds, which lies for so long [s]."""
+    def let_fall(self, robot: int, seconds: float, into: Bin | None = None) -> None:
+        """A robot lets go of all that it holds, which lies for so long [s], in a bin where one is
+        given."""
         world = self._world
         hand = world.parts.hands.let_go(robot)
-        self.heaps.append(Heap(hand.unit, dict(hand.bodies), world.time + seconds))
+        self.heaps.append(Heap(hand.unit, dict(hand.bodies), world.time + seconds, into))
+        if into is not None:
+            self._jets.blow(hand.bodies.values(), into)
         self.watch(hand.bodies.values())
         world.motion.load([robot], [0.0])
         self.closed |= self._near()
@@ -45,9 +53,11 @@ class Fallen:
     def tick(self) -> bool:
         """A tick is over: what has lain long enough is cleared away. Whether anything was."""
         parts, now = self._world.parts, self._world.time
+        self._jets.tick()
         over = [heap for heap in self.heaps if heap.until <= now]
         for heap in over:
             self.heaps.remove(heap)
+            self.binned += self._is_in_bin(heap)
             parts.feeders.retire(heap.bodies, heap.unit)
         if over:
             parts.welds.write()
@@ -78,10 +88,21 @@ class Fallen:
             pressing.shaken.clear()
             world.hooks.before_step.remove(anything)
 
+    def _is_in_bin(self, heap: Heap) -> bool:
+        """Whether all of a heap is in its bin, or sinks into it."""
+        radius, d, into = self._world.model.carried.radius, self._world.d, heap.into
+        found = ((*d.xipos[body].tolist(), radius[label]) for label, body in heap.bodies.items())
+        return into is not None and all(
+            into.holds((x, y)) and z < TOP + far for x, y, z, far in found
+        )
+
     def _near(self) -> frozenset[int]:
         """The robots that could touch what lies about now."""
         m, radius = self._world.m, self._world.model.carried.radius
-        lie = [(body, radius[label]) for h in self.heaps for label, body in h.bodies.items()]
+        about = [heap for heap in self.heaps if not self._is_in_bin(heap)]
+        lie = [(body, radius[label]) for h in about for label, body in h.bodies.items()]
+        if not lie:
+            return frozenset()
         bodies, radii = np.array([body for body, _ in lie]), np.array([r for _, r in lie])
         address = m.jnt_qposadr[m.body_jntadr[bodies]][:, None] + np.arange(2)
         return self._swept.near(self._world.d.qpos[address], radii)

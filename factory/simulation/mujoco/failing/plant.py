@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence, Set
 
 import numpy as np
 
+from factory.layout.bins import Bin
 from factory.plant.factory import Operation
 from factory.problem.pag import NOPART
 from factory.simulation.keeping import Keeper, one_of, up_to
@@ -26,7 +27,7 @@ class MujocoPlant:
         self._world, self._factory, self._clear = world, world.model.factory, campaign.clear
         self._fallen = Fallen(world)
         self._mishaps, self._senses = Mishaps(world, self._fallen), Senses(world, campaign)
-        self._scrapped = SCRAP
+        self._scrapped, self.spilled = SCRAP, list[str]()
 
     def lose(self, robot: int) -> bool:
         """A robot's hand opens, and nothing tells; whether it held anything."""
@@ -202,16 +203,25 @@ class MujocoPlant:
                         self._mishaps.take_back(self._world.parts.copies[label, shown[label]])
                         feeders.take_back(label, self._next_scrap())
 
-    def let_go(self, robot: int, seconds: float) -> None:
-        """A robot lets scrap fall, which lies for so long [s]."""
-        self._let_fall(robot, seconds)
+    def let_go(self, robot: int, seconds: float, into: Bin | None = None) -> None:
+        """A robot lets scrap fall, which lies for so long [s], into a bin where one is given."""
+        self._let_fall(robot, seconds, into)
         self._world.parts.welds.write()
         self.came_back(robot)
         self._world.parts.feeders.stay_clear(robot)
 
-    def _let_fall(self, robot: int, seconds: float) -> None:
+    def _let_fall(self, robot: int, seconds: float, into: Bin | None = None) -> None:
         self._mishaps.opened.discard(robot)
-        self._fallen.let_fall(robot, seconds)
+        self._fallen.let_fall(robot, seconds, into)
+
+    def throw_away(self, robot: int, label: str, seconds: float) -> None:
+        """A robot at its B end lets go of a label that is scrap, over its bin, where that is wide
+        enough; it lies for so long [s]."""
+        found = (one for one in self._world.model.bins if one.robot == robot)
+        into = next((one for one in found if label in one.labels), None)
+        if into is None:
+            self.spilled.append(self._factory.robots[robot].name)
+        self.let_go(robot, seconds, into)
 
     def takes_back(self, robot: int) -> bool:
         """Whether something goes back up in a robot's feeder."""
@@ -234,6 +244,11 @@ class MujocoPlant:
         return self._fallen.closed
 
     @property
+    def binned(self) -> int:
+        """How often scrap has fallen into a bin."""
+        return self._fallen.binned
+
+    @property
     def contacts(self) -> int:
         """Pairs of things that touched of which one had fallen, or lay askew."""
         return len(self._world.inspection.pressing.touched)
@@ -251,6 +266,10 @@ class MujocoPlant:
         world, leaves = self._world, {leaf.label for leaf in self._factory.leaves}
         back, pressing, a_geom = world.parts.feeders.back, world.inspection.pressing, world.m.ngeom
         self._scrapped = keeper.whole("scrap", self._scrapped, SCRAP)
+        self._fallen.binned = keeper.whole("scrap.binned", self._fallen.binned)
+        robots = one_of({robot.name for robot in self._factory.robots})
+        spilled = keeper.rows("scrap.spilled", [(name,) for name in self.spilled], robots)
+        self.spilled = [name for (name,) in spilled]
         good = [(label,) for label in sorted(back.good)]
         back.good = {label for (label,) in keeper.rows("feeders.good", good, one_of(leaves))}
         touched = sorted(pressing.touched)

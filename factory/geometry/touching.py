@@ -1,0 +1,72 @@
+"""The bodies of a closed mesh, told apart where they touch.
+
+Bodies that share a side have four or more triangles at its edges once their vertices are one, as in
+every STL file. Round such an edge the space is cut into wedges, solid and empty by turns: the two
+triangles that bound one solid wedge are of one body.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from factory.geometry.meshes import Array, Indices
+
+Mask = NDArray[np.bool_]
+
+SAME = 1e-4
+"""Triangles round an edge whose angles differ by no more lie on each other [rad]."""
+
+
+def bodies(vertices: Array, faces: Indices) -> Indices:
+    """The number of the body that each triangle (m, 3) of a closed mesh bounds, turned outwards, in
+    the order of their first triangle. Triangles are of one body where an edge joins them: the two
+    at an edge, or those on both sides of a solid wedge where there are more."""
+    from scipy.sparse import csr_matrix
+    from scipy.sparse.csgraph import connected_components
+
+    pairs = _pairs(vertices, faces)
+    shape = (len(faces), len(faces))
+    graph = csr_matrix((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=shape)
+    label = connected_components(graph, directed=False)[1]
+    _, first, inverse = np.unique(label, return_index=True, return_inverse=True)
+    return np.asarray(np.argsort(np.argsort(first))[inverse])
+
+
+def _pairs(vertices: Array, faces: Indices) -> Indices:
+    """The triangles (n, 2) that an edge joins, two by two."""
+    start, end = faces.ravel(), np.roll(faces, -1, axis=1).ravel()
+    low, high = np.minimum(start, end), np.maximum(start, end)
+    order = np.lexsort((start < end, high, low))
+    edge = np.flatnonzero(np.diff(low[order], prepend=-1) | np.diff(high[order], prepend=-1))
+    count = np.diff(edge, append=len(order))
+    plain = edge[count == 2]
+    found = [np.column_stack([order[plain], order[plain + 1]]) // 3]
+    for first, many in zip(edge[count > 2], count[count > 2], strict=True):
+        sides = order[first : first + many]
+        found.append(_wedges(vertices, faces, sides, start[sides] < end[sides]))
+    return np.concatenate(found)
+
+
+def _wedges(vertices: Array, faces: Indices, sides: Indices, ends: Mask) -> Indices:
+    """The triangles (n, 2) that bound the solid wedges round one edge, given where their sides of
+    it are in the faces written in a row. Seen against the edge's direction a wedge goes
+    anticlockwise from a triangle that passes the edge backwards to one (`ends`) that passes it
+    forwards; where two lie on each other a wedge ends before the next begins."""
+    triangle, corner = np.divmod(sides, 3)
+    a, b = faces[triangle, corner], faces[triangle, (corner + 1) % 3]
+    origin, along = vertices[min(a[0], b[0])], vertices[max(a[0], b[0])]
+    along = (along - origin) / np.linalg.norm(along - origin)
+    across = np.cross(along, np.eye(3)[np.abs(along).argmin()])
+    third = vertices[faces[triangle, (corner + 2) % 3]] - origin
+    angle = np.arctan2(third @ np.cross(along, across), third @ across)
+    turn = np.argsort(angle)
+    # Angles as steps, so that those of triangles that lie on each other are the same number.
+    gaps = np.append(np.diff(angle[turn]), angle[turn[0]] + 2 * np.pi - angle[turn[-1]])
+    turn = np.roll(turn, -1 - int(gaps.argmax()))
+    step = np.cumsum(np.append(0, np.roll(gaps, -1 - int(gaps.argmax()))[:-1] > SAME))
+    turn = turn[np.lexsort((~ends[turn], step))]
+    open_wedges = np.cumsum(np.where(ends[turn], -1, 1))
+    turn = np.roll(turn, -1 - int(open_wedges.argmin()))
+    begun, ended = turn[~ends[turn]], turn[ends[turn]]
+    return np.column_stack([triangle[begun], triangle[ended]])

@@ -1,0 +1,173 @@
+"""Bins: where what is scrap falls, beside the B end of a guidepath.
+
+The carriage passes under the place where its payload is at B, so a bin stands beside its lane, low
+enough for payloads to pass over it. A robot at B opens its hand and a jet of air blows what it held
+over there (`failing/jets.py`). A bin stands clear of all regions of the clearance certificate, and
+so is the way from hand to bin. Where there is no room for one there is none.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+import shapely
+from shapely import STRtree
+
+from factory.layout.certificate import BIN_BODY, PAYLOAD_BODY, STATIONS, Region
+from factory.layout.clearance import TOLERANCE, ClearanceSearch, separation
+from factory.layout.dimensions import ARMS, CARRIAGES, PAYLOADS
+from factory.layout.guidepath import Box, Point2, hull, moved
+from factory.layout.layout import Layout
+from factory.layout.scrapping import not_carried_back
+from factory.layout.sweeps import Pile, piles, regions
+from factory.problem.pag import NOPART
+
+PLATE = 0.002
+"""Thickness of a bin's plates [m]."""
+
+TOP, SILL = 0.06, 0.03
+"""How high a bin's plates are, and the one over which things come in [m]."""
+
+SLACK = 0.02
+"""How much wider than what falls into it a bin is, on each side [m]."""
+
+STEP = 0.02
+"""Places for a bin are tried so far apart [m]."""
+
+AHEAD, ASIDE = range(-1, 5), range(16)
+"""So many places are tried along a guidepath, from B, and to each of its sides."""
+
+
+@dataclass(frozen=True, slots=True)
+class Bin:
+    """The bin of a robot (index): its outer `box`, and the `labels` that it is wide enough for.
+    `near`: the side over which things come in, a unit vector from the bin to the lane."""
+
+    robot: int
+    box: Box
+    labels: frozenset[str]
+    near: Point2
+
+    @property
+    def middle(self) -> Point2:
+        """(x, y) [m]."""
+        xlo, xhi, ylo, yhi = self.box
+        return (xlo + xhi) / 2, (ylo + yhi) / 2
+
+    def holds(self, at: Point2) -> bool:
+        """Whether a point is over it."""
+        xlo, xhi, ylo, yhi = self.box
+        return xlo <= at[0] <= xhi and ylo <= at[1] <= yhi
+
+
+def bins_of(layout: Layout) -> tuple[Bin, ...]:
+    """The bins for which there is room, one a robot at most: for all that it can carry back to B
+    or, where there is no room for that, for what is smallest."""
+    found = piles(layout.factory, layout.product)
+    taken, added = regions(layout, found), list[Region]()
+    corners = np.array([region.box for region in taken])
+    tree = STRtree(shapely.box(*corners[:, [0, 2, 1, 3]].T))
+    barred, made = not_carried_back(layout), list[Bin]()
+    for robot in range(len(layout.guidepaths)):
+        held = _held(layout, robot, found, barred)
+        held.sort(key=lambda one: (_size(one[1].box), one[0]))
+        if not held:
+            continue
+        far = _reached(layout, held)
+        near = [taken[n] for n in tree.query(shapely.box(*far)).tolist()] + added
+        while held and not (bin_ := _placed(layout, robot, held, near)):
+            held.pop()
+        if held and bin_:
+            made.append(bin_)
+            added += _stands(bin_)
+    return tuple(made)
+
+
+def bin_regions(layout: Layout, bins: Iterable[Bin]) -> list[Region]:
+    """What bins take of the floor, and what flies into them."""
+    found = piles(layout.factory, layout.product)
+    result = list[Region]()
+    for one in bins:
+        held = _held(layout, one.robot, found, frozenset())
+        flown = [each for each in held if each[0] in one.labels]
+        result += [*_stands(one), *_flights(one, flown)]
+    return result
+
+
+Held = list[tuple[str, Pile]]
+"""What a robot holds, by label, and where that is when the robot is at B."""
+
+
+def _held(
+    layout: Layout, robot: int, found: dict[str, Pile], barred: frozenset[tuple[int, str]]
+) -> Held:
+    path, result = layout.guidepaths[robot], dict[str, Pile]()
+    for number in layout.factory.robots[robot].operations:
+        operation = layout.factory.operations[number]
+        label = operation.after[operation.robots.index(robot)]
+        if label == NOPART or (robot, label) in barred:
+            continue
+        pile = found[label].raised(layout.elevation(robot, number))
+        x, y = layout.shift(robot, number)
+        at = path.middle(path.length)
+        result[label] = pile.moved((x + at[0], y + at[1]))
+    return [*result.items()]
+
+
+def _placed(layout: Layout, robot: int, held: Held, near: Sequence[Region]) -> Bin | None:
+    """The first bin for what is held that is clear of all that is near: the one nearest to B."""
+    path, labels = layout.guidepaths[robot], frozenset(label for label, _ in held)
+    (ux, uy), (tx, ty) = path.heading, path.side
+    search, boxes = ClearanceSearch(layout, []), [pile.box for _, pile in held]
+    half = [max(box[k + 1] - box[k] for box in boxes) / 2 + SLACK + PLATE for k in (0, 2)]
+    xlo, xhi, ylo, yhi = hull(boxes)
+    x, y = (xlo + xhi) / 2, (ylo + yhi) / 2
+    wide = abs(tx) * half[0] + abs(ty) * half[1]
+    for aside, ahead, side in product(ASIDE, sorted(AHEAD, key=abs), (-1, 1)):
+        across, along = side * (wide + STEP * aside), STEP * ahead
+        at = x + ux * along + tx * across, y + uy * along + ty * across
+        box = at[0] - half[0], at[0] + half[0], at[1] - half[1], at[1] + half[1]
+        one = Bin(robot, box, labels, (-side * tx, -side * ty))
+        mine = [*_stands(one), *_flights(one, held)]
+        if not any(_meet(search, a, b) for a in mine for b in near if a.layer == b.layer):
+            return one
+    return None
+
+
+def _meet(search: ClearanceSearch, one: Region, other: Region) -> bool:
+    """Whether two regions in one layer are nearer than the certificate lets them."""
+    is_own = one.robot == other.robot and (one.kind in STATIONS) == (other.kind in STATIONS)
+    if is_own or separation(one.box, other.box) >= search.layout.clearance - TOLERANCE:
+        return False
+    return not search.settled(one, other)
+
+
+def _reached(layout: Layout, held: Held) -> tuple[float, float, float, float]:
+    """Least x and y and greatest x and y of all that bins could come near [m]."""
+    xlo, xhi, ylo, yhi = hull([pile.box for _, pile in held])
+    far = 2 * _size((xlo, xhi, ylo, yhi)) + STEP * len(ASIDE) + 2 * (SLACK + PLATE)
+    far += layout.clearance
+    return xlo - far, ylo - far, xhi + far, yhi + far
+
+
+def _size(box: Box) -> float:
+    return max(box[1] - box[0], box[3] - box[2])
+
+
+def _stands(one: Bin) -> list[Region]:
+    return [
+        Region(one.robot, layer, BIN_BODY, one.box, (0.0, TOP), min(one.labels))
+        for layer in (CARRIAGES, ARMS)
+    ]
+
+
+def _flights(one: Bin, held: Held) -> Iterator[Region]:
+    """The way of everything from where its robot has it at B to over the bin."""
+    for label, pile in held:
+        xlo, xhi, ylo, yhi = pile.box
+        by = one.middle[0] - (xlo + xhi) / 2, one.middle[1] - (ylo + yhi) / 2
+        way = hull([pile.box, moved(pile.box, by)])
+        yield Region(one.robot, PAYLOADS, PAYLOAD_BODY, way, pile.z, label)

@@ -1,0 +1,158 @@
+"""The monitor on a log in which something failed: judging what lies between failures.
+
+States alone do not tell what was undone, so each *spell* of a run is judged by itself, from the
+marking in which it begins. What a spell leaves out: from when that began which failed until every
+robot that was sent back has fired again, nothing lies about, and none stands. Whether what was
+undone is the least that had to be is judged apart, from the record (`factory.nets.replay`).
+"""
+
+from __future__ import annotations
+
+from bisect import bisect_left
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from factory.mjcf import names
+from factory.nets.history import firings
+from factory.nets.petri import Marking
+from factory.plant.factory import Factory
+from factory.record.log.reader import Log
+from factory.record.monitor.agreement import ROUNDING
+from factory.record.monitor.anatomy import Anatomy
+from factory.record.monitor.monitor import MOST, Monitor
+from factory.record.monitor.observation import Observation
+from factory.record.monitor.report import Firing, Report
+from factory.record.monitor.subject import MonitorSubject
+
+SHORT = 0.2
+"""Nothing is judged in a spell that is shorter [s]."""
+
+FELT = 1.0
+"""What failed began so long before it was found, or when its operation did, if that is earlier
+[s]."""
+
+Span = tuple[float, float]
+
+
+def judge_calm(log: Log, subject: MonitorSubject, m: Any, seen: Sequence[Observation]) -> Report:
+    """The verdict of a monitor on each spell of a run whose observations these are, all in one."""
+    rows, times = [], log.time
+    for begin, end in spells(log, subject.factory, m):
+        first, last = (int(np.searchsorted(times, t - ROUNDING)) for t in (begin, end))
+        if last - first > 1 and times[last - 1] - times[first] >= SHORT:
+            rows.append((first, last))
+    reports = [_judged(log, subject, m, seen, span) for span in rows]
+    return Report(
+        tuple(f for one in reports for f in one.seen),
+        tuple(f for one in reports for f in one.inferred),
+        tuple(v for one in reports for v in one.violations)[:MOST],
+        sum(one.time_s for one in reports),
+        sum(float(times[last - 1] - times[first]) for first, last in rows),
+    )
+
+
+def _judged(
+    log: Log, subject: MonitorSubject, m: Any, seen: Sequence[Observation], span: tuple[int, int]
+) -> Report:
+    begin, end = (float(log.time[row]) for row in (span[0], span[1] - 1))
+    at = [bisect_left(seen, t, key=lambda o: o.time) for t in (begin - ROUNDING, end + ROUNDING)]
+    inside = [*seen[at[0] : at[1]]]
+    while inside[0].at_end:
+        del inside[0]
+    while inside[-1].at_end:
+        del inside[-1]
+    start: Marking = frozenset(log.marking[span[0]].tolist())
+    here = replace(subject, start=start, wip=None)
+    monitor = Monitor(here, Anatomy.of(m, subject.factory), inside[0])
+    monitor.motion.came[:] = -np.inf  # whoever is there may have come long ago
+    for observation in inside[1:]:
+        monitor.see(observation)
+    recorded = [(t, name) for t, name in log.events if begin - ROUNDING <= t < end - ROUNDING]
+    found = monitor.report(recorded)
+    offset = _offset(log, subject, start, begin)
+
+    def counted(one: Firing) -> Firing:
+        return replace(one, unit=one.unit + offset)
+
+    return replace(
+        found,
+        seen=tuple(counted(one) for one in found.seen),
+        inferred=tuple(counted(one) for one in found.inferred),
+    )
+
+
+def _offset(log: Log, subject: MonitorSubject, start: Marking, begin: float) -> int:
+    """How many units more have been made when a spell begins than its marking tells."""
+    first = subject.factory.net.threaded.transitions[0].name
+    fired = subject.counts.get(0, 0)
+    for t, entry in log.timed_entries:
+        if t < begin - ROUNDING:
+            fired += (entry == first) if isinstance(entry, str) else -entry.transitions.count(first)
+    return fired - firings(subject.factory.net, start).get(0, 0)
+
+
+def spells(log: Log, factory: Factory, m: Any) -> Iterator[Span]:
+    """From when to when nothing fails and nothing is put right [s], in order."""
+    troubles, now = sorted(_troubles(log, factory, m)), 0.0
+    for begin, end in troubles:
+        if begin > now:
+            yield now, begin
+        now = max(now, end)
+    if now < float(log.time[-1]):
+        yield now, float(log.time[-1]) + ROUNDING
+
+
+def _troubles(log: Log, factory: Factory, m: Any) -> Iterator[Span]:
+    """From when to when something fails or is put right [s]."""
+    end = float(log.time[-1])
+    by_robot = {robot.name: robot.index for robot in factory.robots}
+    number = factory.net.threaded.net.transition_index
+    for _, undone in log.undone:
+        back = {factory.operations[number[name] // 2] for name in undone.transitions}
+        robots = {robot for operation in back for robot in operation.robots}
+        yield _since(log, undone.t, undone.operation), _gone_on(log, factory, robots, undone.t, end)
+    failures = log.failures
+    for one in failures.found if failures else ():
+        robots = {*factory.by_label[one.operation].robots}
+        robots |= {by_robot[one.robot]} if one.robot else set()
+        until = _gone_on(log, factory, robots, one.t, end)
+        yield _since(log, one.t, one.operation), max(until, min(one.until or 0.0, end))
+    stood = failures.stood if failures else ()
+    for place, (t, robots_standing) in enumerate(stood):
+        if robots_standing:
+            until = stood[place + 1][0] if place + 1 < len(stood) else end
+            yield (
+                t - FELT,
+                _gone_on(log, factory, {by_robot[r] for r in robots_standing}, until, end),
+            )
+    yield from _lying(log, m)
+
+
+def _since(log: Log, t: float, label: str) -> float:
+    """When that began which was found to fail at t [s]: with the last that fired of the operation
+    before, so that what a feeder shows is left out from the beginning."""
+    own = (f"{label}_s", f"{label}_e")
+    fired = [when for when, name in log.events if when < t and name in own]
+    return min(t - FELT, fired[-1] if fired else 0.0) - ROUNDING
+
+
+def _gone_on(log: Log, factory: Factory, robots: set[int], t: float, end: float) -> float:
+    """When each of the robots has fired again after t [s]."""
+    number, left = factory.net.threaded.net.transition_index, set(robots)
+    for when, name in log.events:
+        if when > t:
+            left -= {*factory.operations[number[name] // 2].robots}
+            if not left:
+                return when + FELT
+    return end + FELT
+
+
+def _lying(log: Log, m: Any) -> Iterator[Span]:
+    """When parts are held by nothing [s]."""
+    parts = {b for b in range(m.nbody) if names.kind(m.body(b).name) == "part" and m.body_dofnum[b]}
+    for row in range(len(log)):
+        if not parts <= {*log.active[row][:, 2].tolist()}:
+            yield float(log.time[row]) - FELT, float(log.time[row]) + FELT

@@ -1,0 +1,92 @@
+"""How the inputs of each operation come together, as HTML."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from html import escape
+
+from factory.compiler.mating.rooms import AMPLE, rooms
+from factory.plant.approaches import Approach, Pair
+from factory.plant.factory import Operation
+from factory.show.report.recording import Recording
+
+COLUMNS = ("Operation", "Inputs", "Way", "Room on the way", "Left out")
+
+LEGEND = (
+    "Room: the least between what comes and what stands on the way, but for its last millimetre. "
+    "Left out: pairs of parts that overlap or scrape there, so have no contact in the run."
+)
+
+NAMED = 100
+"""So many pairs of an operation, at most, are named."""
+
+
+def approaches_section(recording: Recording, labels: Mapping[str, int]) -> str:
+    """The section of a product whose approaches were judged; nothing of one of default boxes."""
+    operations = [o for o in recording.factory.operations if o.approach is not None]
+    if not operations:
+        return ""
+    chosen = {o.label: _taken(recording, o) for o in operations}
+    room = _rooms(recording, chosen)
+    rows = "".join(_row(o, chosen[o.label], room.get(o.label), labels) for o in operations)
+    head = "".join(f"<th>{name}</th>" for name in COLUMNS)
+    return (
+        '\n<section class="panel wide approaches" aria-labelledby="h-approaches">\n'
+        '<div class="bar"><h2 id="h-approaches">How parts come together</h2></div>'
+        f'<div class="text"><table><thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table>'
+        f"<p class='note'>{LEGEND}</p></div>\n</section>"
+    )
+
+
+def _taken(recording: Recording, operation: Operation) -> Approach:
+    """The approach of an operation, from the side that its layout has chosen where that is
+    known."""
+    approach = operation.approach
+    assert approach is not None
+    if recording.layout is None or approach.kind == "lower" or not any(approach.overlaps):
+        return approach
+    side = recording.layout.side(operation)
+    overlaps = approach.overlaps[approach.sides.index(side)]
+    return replace(approach, sides=(side,), overlaps=(overlaps,))
+
+
+def _rooms(recording: Recording, chosen: Mapping[str, Approach]) -> Mapping[str, float]:
+    """The room on each way by label; nothing where the meshes are gone."""
+    if recording.layout is None:
+        return {}
+    factory = recording.factory
+    templates = {o.template.name: o.template for o in factory.operations}
+    return rooms(factory.pag, templates, recording.layout.product, chosen)
+
+
+def _row(o: Operation, approach: Approach, room: float | None, labels: Mapping[str, int]) -> str:
+    pairs = {overlap.parts for side in approach.overlaps for overlap in side}
+    name, number = escape(o.label), labels.get(o.label)
+    if number is not None:
+        name = f'<button class="link" data-label="{number}">{name}</button>'
+    bad = ' class="bad"' if approach.kind == "blocked" else ""
+    return (
+        f"<tr{bad}><td>{name}</td><td>{escape(' + '.join(o.inputs))}</td>"
+        f"<td>{escape(approach.told)}</td><td>{_room(room)}</td><td>{_left_out(pairs)}</td></tr>"
+    )
+
+
+def _room(room: float | None) -> str:
+    """A room in words [mm]."""
+    if room is None:
+        return "–"
+    if room == float("inf"):
+        return f"more than {1e3 * AMPLE:g} mm"
+    found = round(1e3 * room, 2)
+    return f"{abs(found):.2f} mm" if found >= 0 else f"drawn {-found:.2f} mm into each other"
+
+
+def _left_out(pairs: set[Pair]) -> str:
+    """How many pairs, and which."""
+    if not pairs:
+        return "none"
+    named = [escape(f"{one} - {other}") for one, other in sorted(pairs)[:NAMED]]
+    more = [f"and {len(pairs) - NAMED} more"] if len(pairs) > NAMED else []
+    listed = "".join(f"<li>{words}</li>" for words in (*named, *more))
+    return f"<details><summary>{len(pairs)}</summary><ul>{listed}</ul></details>"
