@@ -31,8 +31,6 @@ class SweptFloor:
 
     def near(self, places: Array, radii: Array) -> frozenset[int]:
         """The robots that come near to balls of some `radii` (k,) about `places` (k, 2) [m]."""
-        if not len(places):
-            return frozenset()
         least, most = places.min(axis=0), places.max(axis=0)
         far = float(radii.max()) + APART + ROUNDING
         about = (self.boxes[:, [1, 3]] > least - far) & (self.boxes[:, [0, 2]] < most + far)
