@@ -163,7 +163,8 @@ class Project:
     def layout(self) -> Layout:
         """The factory laid out, with relays where its ground asks for them. Raises InputError,
         RunError (Layout) where there is no room."""
-        return self.ground.lay_out(self.plain, self.product, self.settings, self._hands)
+        given = self.plain, self.product, self.settings, self._hands, self.catalogue
+        return self.ground.lay_out(*given)
 
     @property
     def factory(self) -> Factory:

@@ -359,6 +359,7 @@ def test_the_record() -> None:
         "operation": "sub1",
         "reason": f"{one} is dead, and {other} takes its tours",
         "exchanged": True,
+        "robots": [one, other],
     }
 
 

@@ -271,7 +271,7 @@ def test_a_history_tells_which_robots_were_exchanged(log: Log) -> None:
 
 def test_the_gantt_chart_has_a_dark_band_until_the_spare_comes(log: Log) -> None:
     history = told(log)
-    ((robot, start, end),) = history.exchanged()
+    ((_, start, end),) = history.exchanged()
     panel = GanttPanel(SIZE, 1.0, history, Rows(history, 300.0))
     slides = np.zeros(len(history.factory.robots))
     before, during = (panel.draw(t, slides, 0.0).astype(int).sum(axis=2) for t in (start, end))

@@ -69,7 +69,11 @@ def check(
     writable_folder(clashes)
     project = None if is_net(file) else given.project(out.silent)
     with Waiting("reading the shapes and proving", out.silent):
-        asked = out.verbose or (out.as_json and project is not None and _has_places(project))
+        asked = (
+            out.verbose
+            or given.deputies
+            or (out.as_json and project is not None and _has_places(project))
+        )
         checked = (
             check_project(project, wip, failures or None, asked) if project else check_net(file)
         )

@@ -235,6 +235,9 @@ RELAY = options(
         help="So many branches make and bring a label in turn, as sub2=3 (repeatable).",
     ),
     click.option(
+        "--deputies", is_flag=True, help="Robots can take over for others, where there is room."
+    ),
+    click.option(
         "--seconds", "effort", type=SECONDS, help="To look for few robots [s]; 60 by default."
     ),
 )

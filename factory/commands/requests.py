@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import count
 from pathlib import Path
@@ -58,6 +59,7 @@ class ProjectOptions:
     robots: int | Literal["least"] | None = None
     effort: float | None = None
     parallel: tuple[tuple[str, int], ...] = ()
+    deputies: bool = False
 
     def settings(self) -> Settings:
         """Options before the environment, that before the `factory.toml` beside the PAG or in the
@@ -81,17 +83,23 @@ class ProjectOptions:
         kept = defaults_for(self.file)
         branches = {**kept.parallel(), **dict(self.parallel)}
         several = tuple((label, k) for label, k in branches.items() if k > 1)
+        pace = {"--relay": self.relay, "--cycle": self.cycle}
         if several:
-            self._alone()
-        return Ground(floor, self.relay, self.cycle, kept.lines(), parallel=several)
+            hint = "leave it out, or leave out --parallel and [parallel] in factory.toml"
+            self._alone("parallel branches", {**pace, "--robots": self.robots}, hint)
+        if self.deputies:
+            given = {**pace, "--parallel": several}
+            self._alone("--deputies", given, "leave out one of the two")
+        lines = kept.lines()
+        return Ground(
+            floor, self.relay, self.cycle, lines, parallel=several, deputies=self.deputies
+        )
 
-    def _alone(self) -> None:
-        """Raises InputError (BadValue) for options that parallel branches do not go with."""
-        given = {"--relay": self.relay, "--cycle": self.cycle, "--robots": self.robots}
-        for option, value in given.items():
+    def _alone(self, what: str, others: Mapping[str, object], hint: str) -> None:
+        """Raises InputError (BadValue) for options that something does not go with."""
+        for option, value in others.items():
             if value:
-                message = f"{option} does not go with parallel branches"
-                hint = "leave it out, or leave out --parallel and [parallel] in factory.toml"
+                message = f"{option} does not go with {what}"
                 raise InputError(Diagnostic("BadValue", message, None, hint))
 
     def project(self, silent: bool = True, settings: Settings | None = None) -> Project:

@@ -102,6 +102,10 @@ def run(
     shown.area()
     if asked.world == "ideal":
         check_ideal(asked.fuse, bool(monitor))
+    elif given.deputies and asked.recovers:
+        message = "deputies take over in the ideal world alone"
+        hint = "add --world ideal, or leave out --deputies and give --spares"
+        raise InputError(Diagnostic("Usage", message, None, hint))
     film = _film(project, asked, video, shown)
     record = run_project(project, asked, out.silent, log, film, monitor)
     status = _told(record, layout.factory, warnings, monitor, out)
@@ -303,6 +307,8 @@ def summarise(record: Run, factory: Factory, verbose: bool) -> None:
             say("parts joined for good are one rigid body (--no-fuse keeps them apart)")
     if record.failures is not None:
         say_failures(record.failures, verbose)
+    for exchange in record.exchanges:
+        say(f"{exchange.t:.2f} s: {exchange}")
     if record.monitor is not None:
         say(found_by(record.monitor, record.cut_off))
     say_verdict(record.verdict)

@@ -256,7 +256,8 @@ def _arguments(before: tuple[str, ...]) -> tuple[int, ...]:
 def gear_net(robots: tuple[Robot, ...], operations: tuple[Operation, ...]) -> GearNet:
     """N: for each operation a start, an end and a place; for each robot a gear through them.
 
-    Operation i has transitions 2i and 2i + 1 and place i; the wait places follow, robot by robot.
+    Operation i has transitions 2i and 2i + 1 and place i; the wait places follow, robot by robot. A
+    robot that is gone has no operations, and a gear without places.
     """
     transitions = tuple(
         Transition(f"{o.label}_{end}", o.position) for o in operations for end in ("s", "e")
@@ -309,7 +310,7 @@ def gear_net(robots: tuple[Robot, ...], operations: tuple[Operation, ...]) -> Ge
         gears.append(Gear(robot.name, robot.type, tuple(gear_places), tuple(gear_events)))
     redistribution: tuple[Redistribution, ...] = tuple(tuple(sorted(p)) for p in pairs)
     net = ThreadedNet(PetriNet(transitions, tuple(places)), redistribution)
-    return GearNet(net, tuple(gears), tuple(g.places[0] for g in gears), tuple(slots))
+    return GearNet(net, tuple(gears), tuple(g.places[0] for g in gears if g.places), tuple(slots))
 
 
 def _wait_name(robot: Robot, label: str, onward: Operation, several: bool) -> str:

@@ -59,7 +59,7 @@ def _unrolled(factory: Factory, lines: Sequence[int], period: int) -> Factory:
         return period * count + turn if drops else turn * count + operation
 
     operations = [
-        _for_unit(
+        for_unit(
             o,
             number(o.index, turn),
             turn,
@@ -95,7 +95,7 @@ def _unrolled(factory: Factory, lines: Sequence[int], period: int) -> Factory:
     )
 
 
-def _for_unit(o: Operation, index: int, turn: int, robots: tuple[int, ...]) -> Operation:
+def for_unit(o: Operation, index: int, turn: int, robots: tuple[int, ...]) -> Operation:
     """An operation for a unit of a period."""
 
     def named(label: str) -> str:

@@ -10,14 +10,16 @@ Guarantees: N' is a gear train, live, safe and reversible, and n' is reachable i
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 from factory.compiler.compiler import gear_net
 from factory.compiler.deputies import Moved, moved_to, postorder, program_with
+from factory.nets.gears import GearNet
 from factory.nets.petri import Marking
 from factory.nets.undo import exchange, marking_after
-from factory.nets.undone import Undone
+from factory.nets.undone import Entry, Undone
 from factory.nets.verify import proved
 from factory.plant.factory import Factory, Operation
 from factory.plant.material import joins_of
@@ -25,7 +27,7 @@ from factory.problem.pag import NOPART
 from factory.problem.robot_types import Catalogue
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Takeover:
     """Robots of the factory `before` that are gone, `dead` (index) first among them, and the
     factory `after`, in which others have their tours (`moved`)."""
@@ -35,6 +37,18 @@ class Takeover:
     dead: int
     moved: Moved
 
+    @cached_property
+    def crew(self) -> Factory:
+        """`after`, where all robots keep the numbers that they have before: those that are gone
+        have no operations. Its net has the places of that of `after`, in their order."""
+        return crew_with(self.before, self.moved)
+
+    @property
+    def names(self) -> tuple[str, str]:
+        """The robot that is dead, and its deputy."""
+        robots = self.before.robots
+        return robots[self.dead].name, robots[self.moved[self.dead]].name
+
     def exchanged(self, fired: Sequence[int], t: float) -> tuple[tuple[int, ...], Undone]:
         """n' of the counts n (`fired`, from m_0 on) that were reached at time t [s], and what the
         record of the run says of it. Raises RunError (NotProved) where the net of `after` is not
@@ -43,11 +57,10 @@ class Takeover:
         proved(net)
         asked = lost(self.before, fired, self.moved)
         counts = exchange(net, fired, asked, joins_of(self.after))
-        robots = self.before.robots
-        dead, deputy = robots[self.dead], robots[self.moved[self.dead]]
         at = _next(self.before, marking_after(self.before.net, fired), self.dead)
-        what = t, at.label, f"{dead.name} is dead, and {deputy.name} takes its tours"
-        return counts, Undone.between(net, what, asked, fired, counts, exchanged=True)
+        what = t, at.label, "{} is dead, and {} takes its tours".format(*self.names)
+        undone = Undone.between(net, what, asked, fired, counts, exchanged=True)
+        return counts, replace(undone, robots=self.names)
 
 
 def taken_over(factory: Factory, dead: int, deputy: int, catalogue: Catalogue) -> Takeover:
@@ -57,29 +70,65 @@ def taken_over(factory: Factory, dead: int, deputy: int, catalogue: Catalogue) -
     return Takeover(factory, with_moved(factory, moved), dead, moved)
 
 
+def nets_after(factory: Factory, entries: Iterable[Entry]) -> Iterator[GearNet]:
+    """The nets in which a recorded run went on where robots were exchanged, in their order. They
+    are not proved."""
+    number = {robot.name: robot.index for robot in factory.robots}
+    for entry in entries:
+        if isinstance(entry, Undone) and len(entry.robots) == 2:
+            dead, deputy = (number[name] for name in entry.robots)
+            factory = crew_with(factory, {dead: deputy})
+            yield without_gone(factory).net
+
+
 def with_moved(factory: Factory, moved: Moved) -> Factory:
     """The factory in which tours are moved, which is not checked."""
-    when, gone = postorder(factory), {*moved}
-    stay = [robot for robot in factory.robots if robot.index not in gone]
-    number = {robot.index: n for n, robot in enumerate(stay)}
-    number |= {robot: number[other] for robot, other in moved.items()}
-    took = {other: robot for robot, other in moved.items()}
+    return without_gone(crew_with(factory, moved))
+
+
+def crew_with(factory: Factory, moved: Moved) -> Factory:
+    """The factory in which tours are moved, which is not checked, with all its robots; those that
+    are gone have no operations, and their lifts stay where they are."""
+    when, took = postorder(factory), dict[int, list[int]]()
+    for robot, other in moved.items():
+        took.setdefault(other, [other]).append(robot)
+
+    def program(robot: int) -> tuple[int, ...]:
+        return () if robot in moved else program_with(factory, took[robot], when)
+
     robots = tuple(
-        replace(r, index=n, operations=program_with(factory, (r.index, took[r.index]), when))
-        if r.index in took
-        else replace(r, index=n)
-        for n, r in enumerate(stay)
+        replace(r, operations=program(r.index)) if r.index in moved or r.index in took else r
+        for r in factory.robots
     )
     operations = tuple(
-        replace(o, robots=tuple(number[robot] for robot in o.robots)) for o in factory.operations
+        replace(o, robots=tuple(moved.get(robot, robot) for robot in o.robots))
+        for o in factory.operations
     )
     return replace(
         factory,
         robots=robots,
         operations=operations,
         net=gear_net(robots, operations),
-        adjusted=frozenset(number[robot] for robot in factory.adjusted),
+        adjusted=factory.adjusted | (factory.strokes.keys() & moved.keys()),
     )
+
+
+def without_gone(factory: Factory) -> Factory:
+    """The factory without robots that have no operations; those that stay keep their names."""
+    stay = present(factory)
+    number = {robot: n for n, robot in enumerate(stay)}
+    robots = tuple(replace(factory.robots[robot], index=n) for robot, n in number.items())
+    operations = tuple(
+        replace(o, robots=tuple(number[robot] for robot in o.robots)) for o in factory.operations
+    )
+    adjusted = frozenset(number[robot] for robot in factory.adjusted if robot in number)
+    net = gear_net(robots, operations)
+    return replace(factory, robots=robots, operations=operations, net=net, adjusted=adjusted)
+
+
+def present(factory: Factory) -> list[int]:
+    """The robots (index) that have operations."""
+    return [robot.index for robot in factory.robots if robot.operations]
 
 
 def lost(factory: Factory, fired: Sequence[int], robots: Iterable[int]) -> tuple[int, ...]:

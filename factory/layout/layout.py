@@ -56,7 +56,8 @@ class Layout:
     each robot and each of its tours how far the product's middle is, in the robot's frame (u, t)
     and upwards, from where it is on the first of them [m], nothing for no shifts
     (docs/decisions/hands.md, Lines);
-    `plain`: the layout without relays, None where this is one; `ground`: what it was made for, by
+    `plain`: the layout without relays, None where this is one; `standby`: that of which this is a
+    part, so that deputies can take over, None where none may; `ground`: what it was made for, by
     the names that `request.Ground` has.
     """
 
@@ -72,6 +73,7 @@ class Layout:
     floor: Box = (0.0, 0.0, 0.0, 0.0)
     certificate: Certificate | None = field(default=None, repr=False, compare=False)
     plain: Layout | None = field(default=None, repr=False, compare=False)
+    standby: Layout | None = field(default=None, repr=False, compare=False)
     ground: Mapping[str, object] = field(default_factory=dict, repr=False, compare=False)
 
     def __post_init__(self) -> None:
@@ -226,7 +228,7 @@ class Layout:
     @cached_property
     def strokes(self) -> Mapping[int, float]:
         """How far up the lift of each robot that has one goes (index) [m]."""
-        highest = {robot: max(level.up for level in self._levels[robot]) for robot in self.lifts}
+        highest = {r: max((level.up for level in self._levels[r]), default=0.0) for r in self.lifts}
         return MappingProxyType({robot: max(up, LEAST) for robot, up in highest.items()})
 
     def elevation(self, robot: int, operation: int) -> float:

@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from factory.geometry.solids import Product
     from factory.layout.hands.choosing import Hands
     from factory.layout.layout import Layout
+    from factory.problem.robot_types import Catalogue
 
 
 @dataclass(frozen=True, slots=True)
@@ -20,7 +21,8 @@ class Ground:
     much as it takes; whether guidepaths are shared among `relay` robots, or the `cycle` time [s]
     that those are to reach, None for the shortest; `lines`: labels that share a robot, line by
     line; whether the forms of operations were chosen, so that the PAG is not as it was written
-    (`formed`); `parallel`: labels, and how often the branch that brings each is there."""
+    (`formed`); `parallel`: labels, and how often the branch that brings each is there; `deputies`:
+    whether robots can take over for others."""
 
     floor: tuple[float, float] | None = None
     relay: bool = False
@@ -28,6 +30,7 @@ class Ground:
     lines: tuple[tuple[str, ...], ...] = ()
     formed: bool = False
     parallel: tuple[tuple[str, int], ...] = ()
+    deputies: bool = False
 
     @property
     def relays(self) -> bool:
@@ -40,9 +43,11 @@ class Ground:
         product: Product,
         settings: Settings,
         hands: Hands | None = None,
+        catalogue: Catalogue | None = None,
     ) -> Layout:
-        """The layout of a compiled factory; `hands`: those to choose from, where they are known.
-        Raises RunError (Layout) where there is no room."""
+        """The layout of a compiled factory; `hands`: those to choose from, where they are known;
+        `catalogue`: of the types of robots, the shipped one where None. Raises RunError (Layout)
+        where there is no room."""
         from factory.compiler.mating.mating import judged
         from factory.layout.durations import Pace
         from factory.layout.embedding import lay_out
@@ -51,6 +56,8 @@ class Ground:
 
         pace = Pace.of(settings)
         factory, product = judged(factory, product), repeated(product, factory)
+        if self.deputies:
+            return self._with_deputies(factory, product, settings, hands, catalogue)
         if settings.hands and hands is None:
             hands = Hands(factory, product, settings.acceleration)
         layout = lay_out(factory, product, settings.clearance, self.floor, pace, hands)
@@ -60,9 +67,37 @@ class Ground:
             layout = relayed(layout, settings, self.cycle, self.floor, hands)
         return replace(layout, ground=self.kept())
 
+    def _with_deputies(
+        self,
+        factory: Factory,
+        product: Product,
+        settings: Settings,
+        hands: Hands | None,
+        catalogue: Catalogue | None,
+    ) -> Layout:
+        """The layout of a factory, of all whose deputies as many as possible can take over."""
+        from factory.compiler.deputies import deputies
+        from factory.compiler.standing_by import Pair, chosen_pairs, standing_by
+        from factory.layout.standby import laid_out_for, part_of
+        from factory.problem.robot_types import load_catalogue
+
+        plain = replace(self, deputies=False)
+
+        def lay_out(pairs: tuple[Pair, ...]) -> Layout:
+            whole = standing_by(factory, pairs)
+            return plain.lay_out(whole, product, settings, None if pairs else hands)
+
+        found = chosen_pairs(deputies(factory, catalogue or load_catalogue()))
+        whole, robots = laid_out_for(found, lay_out), range(len(factory.robots))
+        known = replace(whole, product=product, standby=whole, ground=self.kept())
+        layout = part_of(known, factory, robots)
+        assert layout is not None, "its robots have their own tours"
+        return layout
+
     def kept(self) -> dict[str, object]:
         """What a log keeps: by name, without branches where there are none."""
         found = asdict(self)
-        if not self.parallel:
-            del found["parallel"]
+        for name in ("parallel", "deputies"):
+            if not found[name]:
+                del found[name]
         return found

@@ -20,7 +20,8 @@ class Undone:
     `operation`: the label of the operation that failed; `reason`: why, in words; `asked`: the
     transitions that had to be undone for that; `transitions`: all that were, in the order of their
     numbers. Each name stands there as often as it is undone. `exchanged`: the run went on in the
-    next of its nets; then nothing need be undone. `factory.nets.undo` has the definition.
+    next of its nets; then nothing need be undone. `robots`: that which is dead, and its deputy.
+    `factory.nets.undo` has the definition.
     """
 
     t: float
@@ -29,6 +30,7 @@ class Undone:
     asked: tuple[str, ...]
     transitions: tuple[str, ...]
     exchanged: bool = False
+    robots: tuple[str, ...] = ()
 
     @classmethod
     def between(
@@ -55,6 +57,7 @@ class Undone:
             "operation": self.operation,
             "reason": self.reason,
             **({"exchanged": True} if self.exchanged else {}),
+            **({"robots": list(self.robots)} if self.robots else {}),
         }
 
 

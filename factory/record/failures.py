@@ -7,12 +7,15 @@ from dataclasses import dataclass, field
 from math import isfinite
 from typing import Protocol
 
+from factory.record.exchange import Exchange
+
 
 @dataclass(frozen=True, slots=True)
 class Failing:
     """A failure that was found at `t` [s]: the `test` that failed, in which `operation` (its
     label), of which `robot`, "" for none; the `response`, and what was `scrapped`, by label.
-    `until`: when a dead robot is replaced [s], None where none is."""
+    `until`: when a dead robot is replaced [s], None where none is; `deputy`: the robot that then
+    takes over its tours, "" for none."""
 
     t: float
     test: str
@@ -21,6 +24,7 @@ class Failing:
     response: str
     scrapped: tuple[str, ...] = ()
     until: float | None = None
+    deputy: str = ""
 
     def as_json(self) -> dict[str, object]:
         """As `run --json` prints it."""
@@ -32,6 +36,7 @@ class Failing:
             "response": self.response,
             "scrapped": list(self.scrapped),
             **({"until": round(self.until, 6)} if self.until is not None else {}),
+            **({"deputy": self.deputy} if self.deputy else {}),
         }
 
     @property
@@ -58,7 +63,10 @@ class Failing:
         if self.test == "jammed":
             if self.until is None or not isfinite(self.until):
                 return "a spare comes" if self.response == "spare" else "there is no spare"
-            return f"a spare comes in {self.until - self.t:.0f} s"
+            after = f"in {self.until - self.t:.0f} s"
+            if self.deputy:
+                return f"{self.deputy} takes over the tours of {self.robot} (deputy) {after}"
+            return f"a spare comes {after}"
         if self.response == "again":
             return "done again"
         if self.scrapped == (self.operation,) and self.test in ("rejected", "misplaced"):
@@ -119,7 +127,8 @@ class Failures:
 
 class Account(Protocol):
     """What a run that goes on after failures tells of them: those that it has `found`, which robots
-    `stood` so far, and all of it; `given`: the faults that it was asked for, as values of JSON."""
+    `stood` and were exchanged so far, and all of it; `given`: the faults that it was asked for, as
+    values of JSON."""
 
     @property
     def given(self) -> Mapping[str, object]: ...
@@ -128,4 +137,6 @@ class Account(Protocol):
     def found(self) -> Sequence[Failing]: ...
     @property
     def stood(self) -> Sequence[Stood]: ...
+    @property
+    def exchanges(self) -> Sequence[Exchange]: ...
     def report(self) -> Failures: ...

@@ -11,6 +11,7 @@ from factory.nets.undone import Entry, Undone, lasting
 from factory.plant.approaches import Pair
 from factory.plant.factory import Factory
 from factory.record.ending import CutOff
+from factory.record.exchange import Exchange
 from factory.record.failures import Failures
 from factory.record.monitor.report import Report
 from factory.record.verdict import RunVerdict, judged, kept_figures
@@ -48,12 +49,20 @@ def mean_interval(left: Sequence[float], period: int = 1) -> float | None:
     return (tail[-1] - tail[-1 - count]) / count
 
 
-def busy_times(factory: Factory, events: Iterable[Event | Undone]) -> tuple[float, ...]:
+def busy_times(
+    factory: Factory, events: Iterable[Event | Undone], after: Iterable[Factory] = ()
+) -> tuple[float, ...]:
     """How long each robot was in operations that have ended [s]; one without a start among the
-    events was under way from the beginning, time 0."""
+    events was under way from the beginning, time 0. `after`: the factories in which the run went on
+    where robots were exchanged."""
     numbers = {t.name: number for number, t in enumerate(factory.net.threaded.transitions)}
     begun, spent = dict[int, float](), [0.0] * len(factory.robots)
-    for t, transition in (e for e in events if isinstance(e, Event)):
+    onward = iter(after)
+    for event in events:
+        if isinstance(event, Undone):
+            factory = next(onward) if event.exchanged else factory
+            continue
+        t, transition = event
         operation, is_end = divmod(numbers[transition], 2)
         if not is_end:
             begun[operation] = t
@@ -118,7 +127,7 @@ class Run:
     run of the net; `trouble` is None for a run that reached its end; `monitor` is what a monitor
     reports that watched it, if one did. `lenient`: what is wrong with the bodies does not count;
     `period`: how many units come in a cycle of the net; `failures`: what went wrong, in a run that
-    goes on when something does."""
+    goes on when something does; `exchanges`: the nets that it went on in."""
 
     world: str
     units: int
@@ -142,6 +151,7 @@ class Run:
     lenient: bool = False
     period: int = 1
     failures: Failures | None = None
+    exchanges: tuple[Exchange, ...] = ()
 
     @property
     def fired(self) -> int:
@@ -243,6 +253,7 @@ class Run:
             "excluded": [list(pair) for pair in physics.excluded] if physics else None,
             **watched,
             **({"failures": self.failures.as_json()} if self.failures else {}),
+            **({"exchanges": [x.as_json() for x in self.exchanges]} if self.exchanges else {}),
             "verdict": self.verdict.as_json(),
             "events": [event.as_json() for event in self.events],
         }

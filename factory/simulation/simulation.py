@@ -240,7 +240,9 @@ class Simulation:
         request, physics, figures = self.request, world.physics_time, world.figures()
         predicted = self.cycle
         entries = entries_of(supervisor.events)
-        verdict = replay(factory.net, entries, self.start, joins_of(factory))
+        exchanges = tuple(world.hooks.account.exchanges) if world.hooks.account else ()
+        nets = [exchange.net for exchange in exchanges]
+        verdict = replay(factory.net, entries, self.start, joins_of(factory), nets)
         return Run(
             request.world,
             request.units,
@@ -255,7 +257,7 @@ class Simulation:
             verdict.refines,
             tuple(supervisor.events),
             tuple(world.dropoffs),
-            busy_times(factory, supervisor.events),
+            busy_times(factory, supervisor.events, [exchange.crew for exchange in exchanges]),
             figures
             and replace(
                 figures,
@@ -266,12 +268,13 @@ class Simulation:
             request.jitter,
             trouble,
             period=factory.period,
+            exchanges=exchanges,
         )
 
     def _trouble(self, code: str, what: str, hint: str) -> Diagnostic:
         """Names the robots that are in an operation, or else those that wait for one that cannot
         start."""
-        factory, supervisor = self.layout.factory, self.supervisor
+        factory, supervisor = self.supervisor.factory, self.supervisor
         numbers = supervisor.active.operations or tuple(o.index for o in supervisor.awaited())
         places = [factory.operations[n] for n in numbers[:3]]
         robots = ", ".join(

@@ -12,11 +12,13 @@ from factory.nets.petri import Marking
 def start_positions(layout: Layout, marking: Marking) -> np.ndarray:
     """Every axis in a marking: a robot where its last operation left it, or at its B end where it
     waits with no part at the beginning of its cycle, and then its lift may still be down, unless
-    its hand is above what it takes."""
+    its hand is above what it takes; 0 for one that is gone."""
     factory, net = layout.factory, layout.factory.net
     positions = np.zeros(len(factory.robots) + len(layout.lifts))
     lifts = {robot: len(factory.robots) + n for n, robot in enumerate(layout.lifts)}
     for robot, gear in zip(factory.robots, net.gears, strict=True):
+        if not robot.operations:
+            continue
         step = next(i for i, place in enumerate(gear.places) if place in marking) // 2
         positions[robot.index] = layout.home(robot.index, robot.operations[step])
         always = robot.index in factory.adjusted or rises_first(layout, robot.index)

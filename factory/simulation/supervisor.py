@@ -95,10 +95,10 @@ class Supervisor:
         self.factory, self.world, self.tick = factory, world, tick
         axes_of = [*factory.axes, *((stage.axis,) for stage in stages)]
         self.bundles = Bundles([*modes, *(stage.mode for stage in stages)], axes_of, limits)
-        net = factory.net
-        starts = [operation.start for operation in factory.operations]
-        self.threads = Threads(net.threaded, net.threads_of(start), starts)
-        self.fired = [counts.get(number, 0) for number in range(len(net.threaded.transitions))]
+        self._mark(start)
+        self.fired = [
+            counts.get(number, 0) for number in range(len(factory.net.threaded.transitions))
+        ]
         self.events: list[Event | Undone] = []
         self.ahead, self.active = Ahead(factory, stages), Active()
         self.near = self.enabled = True
@@ -150,6 +150,26 @@ class Supervisor:
         self._activate([n for n in active.operations if self.marked[n]], active.ahead)
         self.recall(free)
 
+    def exchange(
+        self,
+        factory: Factory,
+        modes: Sequence[Mode],
+        stages: Sequence[HeadStart],
+        undone: Undone,
+        fired: Sequence[int],
+    ) -> None:
+        """Go on in another factory that has the same operations, robots by number and axes, from
+        the counts `fired`: what is under way goes on, robots that wait go ahead anew."""
+        axes_of = [*factory.axes, *((stage.axis,) for stage in stages)]
+        self.factory = factory
+        self.bundles = Bundles([*modes, *(stage.mode for stage in stages)], axes_of, self.limits)
+        self._activate(self.active.operations, ())
+        self.ahead, marking = Ahead(factory, stages), marking_after(factory.net, fired)
+        self.undo(undone, fired, marking, ())
+        self._activate(
+            self.active.operations, self.ahead.waiting(self.marked, self.world.sense()[0])
+        )
+
     def _take_back(self, undone: Undone) -> None:
         """What was undone in a record that is taken up."""
         net = self.factory.net
@@ -159,8 +179,7 @@ class Supervisor:
         self.events.append(undone)
 
     def _mark(self, marking: Marking) -> None:
-        starts = [operation.start for operation in self.factory.operations]
-        net = self.factory.net
+        net, starts = self.factory.net, [operation.start for operation in self.factory.operations]
         self.threads = Threads(net.threaded, net.threads_of(marking), starts)
 
     def recall(self, axes: Container[int]) -> None:

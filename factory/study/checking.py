@@ -113,7 +113,8 @@ def check_project(
 ) -> Checked:
     """Check a PAG, with at most `wip` units inside at once, find the `costs` of failures if that is
     said, or the factory is small and live, and look for `deputies`, which asks how boxes come
-    together. Raises InputError."""
+    together; where the project is laid out for them, they are those that can take over. Raises
+    InputError."""
     factory = project.factory
     sources = {r.name: r.position for r in factory.robots if r.position}
     verdict = verify(factory.net, sources)
@@ -138,6 +139,11 @@ def _deputies(project: Project, factory: Factory) -> tuple[tuple[int, ...], ...]
     from factory.compiler.deputies import deputies
     from factory.compiler.mating.mating import judged
 
+    if project.ground.deputies:
+        from factory.layout.standby import deputies_in
+
+        chosen = deputies_in(project.layout)
+        return tuple((chosen[r],) if r in chosen else () for r in range(len(factory.robots)))
     return deputies(judged(factory, project.product), project.catalogue)
 
 

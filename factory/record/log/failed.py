@@ -49,6 +49,7 @@ _OF_FAILING = (
     Key("robot", "a text, or null", lambda v: v is None or is_text(v)),
     Key("scrapped", "a list of labels", listed(is_text)),
     Key("until", _TIME, _is_time, later=True),
+    Key("deputy", "a robot", is_text, later=True),
 )
 
 
@@ -134,4 +135,5 @@ def _stood(entry: Mapping[str, Any]) -> Stood:
 
 def _failing(entry: Mapping[str, Any]) -> Failing:
     names = entry["test"], entry["operation"], entry["robot"] or "", entry["response"]
-    return Failing(float(entry["t"]), *names, tuple(entry["scrapped"]), entry.get("until"))
+    more = tuple(entry["scrapped"]), entry.get("until"), entry.get("deputy", "")
+    return Failing(float(entry["t"]), *names, *more)

@@ -143,6 +143,7 @@ KEYS = (
     Key("ground.lines", "lists of labels", listed(listed(is_text)), later=True),
     Key("ground.parallel", "pairs of a label and a number", listed(is_branch), later=True),
     Key("ground.formed", "true or false", of(bool), later=True),
+    Key("ground.deputies", "true or false", of(bool), later=True),
     Key("monitor", "a table", is_table, later=True),
     Key("monitor.goals", "lists of numbers", listed(listed(is_number)), later=True),
     Key("monitor.radii", "a list of numbers", listed(is_number), later=True),

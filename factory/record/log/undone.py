@@ -23,6 +23,7 @@ _KEYS = (
     Key("asked", "a list of transitions", listed(is_text)),
     Key("transitions", "a list of transitions", listed(is_text)),
     Key("exchanged", "true or false", lambda v: isinstance(v, bool), later=True),
+    Key("robots", "a list of robots", listed(is_text), later=True),
 )
 
 
@@ -36,6 +37,7 @@ def undone_as_json(undone: Undone, after: int) -> dict[str, object]:
         "asked": list(undone.asked),
         "transitions": list(undone.transitions),
         **({"exchanged": True} if undone.exchanged else {}),
+        **({"robots": list(undone.robots)} if undone.robots else {}),
     }
 
 
@@ -44,11 +46,13 @@ def undone_in(ticks: Sequence[Arrays], header: Mapping[str, Any]) -> tuple[Place
     transition that is not there, or does not come after the one before."""
     found = tuple(_placed(entry) for arrays in ticks for entry in _entries(arrays))
     fired = sum(len(arrays["fired"]) for arrays in ticks)
-    known, last = {*header["transitions"]}, 0
+    known, robots, last = {*header["transitions"]}, {*header["robots"]}, 0
     for after, undone in found:
         unknown = {*undone.asked, *undone.transitions} - known
         if unknown:
             raise ValueError(f"'{min(unknown)}' is undone, which is no transition")
+        if strange := {*undone.robots} - robots:
+            raise ValueError(f"'{min(strange)}' is exchanged, which is no robot")
         if not last <= after <= fired:
             raise ValueError(f"something is undone after {after} firings, not {last} to {fired}")
         last = after
@@ -70,4 +74,5 @@ def _placed(entry: Any) -> Placed:
         key.check(entry)
     names = tuple(entry["asked"]), tuple(entry["transitions"])
     what = float(entry["t"]), entry["operation"], entry["reason"]
-    return entry["after"], Undone(*what, *names, entry.get("exchanged", False))
+    more = entry.get("exchanged", False), tuple(entry.get("robots", ()))
+    return entry["after"], Undone(*what, *names, *more)

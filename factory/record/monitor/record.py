@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
-from factory.nets.gears import GearNet
+from factory.compiler.taking_over import nets_after
 from factory.nets.replay import replay
 from factory.plant.factory import Factory
 from factory.plant.material import joins_of
@@ -61,12 +61,11 @@ def _seen(log: Log, subject: MonitorSubject, m: Any) -> Report:
     return monitor.report(log.events)
 
 
-def verdict_on(
-    log: Log, factory: Factory, report: Report | None, after: Sequence[GearNet] = ()
-) -> RunVerdict:
+def verdict_on(log: Log, factory: Factory, report: Report | None) -> RunVerdict:
     """The verdict on a run of a factory that is recorded in a log, with a monitor's report on that
-    where there is one; `after`: the nets in which it went on where robots were exchanged."""
+    where there is one."""
     cut, start = log.cut_off, frozenset(log.header["start"])
+    after = [*nets_after(factory, log.entries)]
     refines = replay(factory.net, log.entries, start, joins_of(factory), after).refines
     trouble = None if cut is None else cut.failure
     return judged(trouble, refines, log.figures, report)

@@ -2,16 +2,24 @@
 
 from __future__ import annotations
 
+from factory.layout.layout import Layout
 from factory.nets.petri import Marking
 from factory.plant.factory import Factory, Operation
+from factory.problem.pag import NOPART
 from factory.simulation.supervisor import Supervisor
 
 
 class Books:
-    """Those of a supervisor, as they are now or in another marking."""
+    """Those of a supervisor, as they are now or in another marking, in the `layout` of now. A robot
+    that is gone holds nothing."""
 
-    def __init__(self, factory: Factory, supervisor: Supervisor) -> None:
-        self.factory, self.supervisor = factory, supervisor
+    def __init__(self, layout: Layout, supervisor: Supervisor) -> None:
+        self.layout, self.supervisor = layout, supervisor
+
+    @property
+    def factory(self) -> Factory:
+        """The factory of now."""
+        return self.layout.factory
 
     @property
     def marking(self) -> Marking:
@@ -32,8 +40,14 @@ class Books:
 
     def holds(self, robot: int, marking: Marking | None = None) -> str:
         """The label that a robot (index) holds, NOPART for nothing."""
+        if not self.factory.robots[robot].operations:
+            return NOPART
         operation = self.operation_of(robot, marking)
         return operation.before[operation.robots.index(robot)]
+
+    def place_of(self, robot: int, marking: Marking | None = None) -> tuple[int, bool]:
+        """Which operation (index) a robot is in, or waits for, and whether it is in it."""
+        return self.operation_of(robot, marking).index, bool(self.step_of(robot, marking) % 2)
 
     def held(self, marking: Marking | None = None) -> list[str]:
         """The label that each robot holds, NOPART for nothing."""

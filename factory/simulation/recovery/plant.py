@@ -97,19 +97,19 @@ class Plant(Protocol):
         axes at these places [m]."""
 
     @property
-    def is_calm(self) -> bool:
-        """Whether everything is where it should be, as far as it can be."""
-
-    def keep(self, keeper: Keeper) -> None:
-        """What goes on beside the world, while all is calm."""
-
-    @property
     def binned(self) -> int:
         """How often scrap has fallen into a bin."""
 
     @property
     def spilled(self) -> Sequence[str]:
         """The robots, by name, that have let scrap fall where there is no bin for it."""
+
+    @property
+    def is_calm(self) -> bool:
+        """Whether everything is where it should be, as far as it can be."""
+
+    def keep(self, keeper: Keeper) -> None:
+        """What goes on beside the world, while all is calm."""
 
     @property
     def contacts(self) -> int:

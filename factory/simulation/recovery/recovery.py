@@ -12,6 +12,7 @@ from factory.control.mode import Array
 from factory.nets.undone import Undone
 from factory.plant.factory import Factory, Operation
 from factory.problem.template import Failure
+from factory.record.exchange import Exchange
 from factory.record.failures import Failing, Failures, Stood
 from factory.simulation.keeping import Keeper
 from factory.simulation.recovery.books import Books
@@ -61,8 +62,13 @@ class Recovery:
         return self.responding.standing.stood
 
     @property
+    def exchanges(self) -> Sequence[Exchange]:
+        """The deputies that have taken over so far."""
+        return self.responding.deputising.exchanges
+
+    @property
     def _factory(self) -> Factory:
-        return self.simulation.layout.factory
+        return self.books.factory
 
     @property
     def _now(self) -> float:
@@ -232,7 +238,7 @@ def recover(simulation: Simulation, campaign: Campaign = Campaign()) -> Recovery
     if not isinstance(supervisor, Supervisor):
         message = "robots that run their own programs do not recover"
         raise InputError(Diagnostic("BadFault", message, None, "leave out --distributed"))
-    books = Books(simulation.layout.factory, supervisor)
+    books = Books(simulation.layout, supervisor)
     plant: Plant
     if simulation.model is None:
         from factory.simulation.recovery.ideal import IdealPlant

@@ -22,6 +22,7 @@ from factory.problem.template import Kind, Response
 from factory.record.failures import Failing
 from factory.simulation.keeping import LARGE, Keeper, is_size, is_text, one_of, some_of, up_to
 from factory.simulation.recovery.books import Books
+from factory.simulation.recovery.deputising import Deputising
 from factory.simulation.recovery.faults import Campaign
 from factory.simulation.recovery.plant import Plant
 from factory.simulation.recovery.returning import Goal, Returning, WayBack, order_of
@@ -37,8 +38,8 @@ BINNED = 1.0
 
 class Responding:
     """`found`: every failure. `dead`: robots (index) that are known to be dead, and when they are
-    replaced [s], never without a spare. `returning`: robots on their way back. `standing`: robots
-    that stand."""
+    replaced [s], never without a spare or a deputy. `returning`: robots on their way back.
+    `standing`: robots that stand. `deputising`: deputies that take over."""
 
     def __init__(
         self, simulation: Simulation, books: Books, plant: Plant, campaign: Campaign
@@ -54,29 +55,35 @@ class Responding:
         self.standing = Standing(simulation)
         self.found: list[Failing] = []
         self.dead: dict[int, float] = {}
-        self.used_spares = 0
         self._tried: Counter[int] = Counter()
         self._scrapped: Counter[str] = Counter()
         self._wasting = Wasting(not_carried_back(simulation.layout))
+        self.deputising = Deputising(simulation, books)
+
+    @property
+    def used_spares(self) -> int:
+        """How many robots have come from the depot, or are on their way."""
+        return sum(one.response == "spare" for one in self.found)
 
     @property
     def is_calm(self) -> bool:
-        """Whether all robots are at work, or wait for it."""
-        return not (self.dead or self.returning.ways) and self.standing.is_calm
+        """Whether all robots are at work, or wait for it, in the net that the run began with."""
+        changed = self.dead or self.returning.ways or self.deputising.exchanges
+        return not changed and self.standing.is_calm
 
     def keep(self, keeper: Keeper) -> None:
         """What failed, and how often on end, while all is calm."""
-        factory, spares = self._books.factory, self._campaign.spares
+        factory = self._books.factory
         labels, robots = {*factory.by_label}, {"", *(robot.name for robot in factory.robots)}
         count = up_to(LARGE)
         found = [astuple(one) for one in self.found]
         tests = is_size, is_text, one_of(labels), one_of(robots), is_text, some_of(labels)
-        found = keeper.rows("failures", found, *tests, lambda v: v is None or is_size(v))
+        when = lambda v: v is None or is_size(v)  # noqa: E731
+        found = keeper.rows("failures", found, *tests, when, one_of(robots))
         self.found = [
-            Failing(t, test, label, robot, response, tuple(things), until)
-            for t, test, label, robot, response, things, until in found
+            Failing(t, test, label, robot, response, tuple(things), until, deputy)
+            for t, test, label, robot, response, things, until, deputy in found
         ]
-        self.used_spares = keeper.whole("spares", self.used_spares, 0, spares)
         numbers, names = up_to(len(factory.operations)), one_of(labels)
         tried = keeper.rows("failures.tried", self._tried.items(), numbers, count)
         scrapped = keeper.rows("failures.scrapped", self._scrapped.items(), names, count)
@@ -139,32 +146,69 @@ class Responding:
         return [*self.standing.jammed(now, excused), *slow]
 
     def died(self, robot: int) -> None:
-        """A robot makes no progress. One from the depot takes its place after some time; what it
-        held is lost with it."""
+        """A robot makes no progress. After some time it is taken away, and one from the depot takes
+        its place, or a deputy its tours; what it held is lost with it."""
         label, operation = self._books.holds(robot), self._books.operation_of(robot)
-        if self.used_spares == self._campaign.spares:
+        spare, deputy = self.used_spares < self._campaign.spares, ""
+        if not spare and not (deputy := self.deputising.appoint(robot, self.dead)):
             self.dead[robot] = np.inf
             self._note("jammed", operation, robot, "no spare")
             return
-        self.used_spares += 1
         self.dead[robot] = self._now + self._campaign.swap
         held = () if label == NOPART else (label,)
-        self._note("jammed", operation, robot, "spare", held, self.dead[robot])
+        response = "spare" if spare else "deputy"
+        self._note("jammed", operation, robot, response, held, self.dead[robot], deputy)
         ends = tuple(self._books.factory.by_label[label].end for label in held)
         begun = operation.index in self._books.supervisor.active.operations
         if asked := ends or (operation.start,) * begun:
             self._undo(asked, operation, "jammed")
 
     def replaced(self, now: float) -> list[int]:
-        """The robots that are replaced now [s], and stand where they wait."""
-        found = [robot for robot, until in self.dead.items() if until <= now]
+        """The robots that are replaced now [s], and stand where they wait, or that are gone. A
+        deputy takes over when no robot is on its way back."""
+        due, appointed = (r for r, until in self.dead.items() if until <= now), self.deputising
+        settled = self.returning.halted(self.dead)
+        found = [robot for robot in due if settled or robot not in appointed.by_robot]
         for robot in found:
-            del self.dead[robot]
-            self.returning.ways.pop(robot, None)
-            at = self.returning.rest(robot, self._books.marking)
-            self._plant.lift_out(robot, dict(at))
-            self._plant.supplied()
+            if self._replaced(robot):
+                del self.dead[robot]
+                self._plant.supplied()
         return found
+
+    def _replaced(self, robot: int) -> bool:
+        """Whether a dead robot is replaced now: its deputy may be dead too."""
+        if robot in self.deputising.by_robot:
+            return self._take_over(robot)
+        self.returning.ways.pop(robot, None)
+        at = self.returning.rest(robot, self._books.marking)
+        self._plant.lift_out(robot, dict(at))
+        return True
+
+    def _take_over(self, robot: int) -> bool:
+        """The deputy of a dead robot takes over its tours: the net is exchanged."""
+        change = self.deputising.take_over(robot, self.dead)
+        if change is None:
+            self.dead[robot] = np.inf
+            return False
+        books, supervisor = self._books, self._books.supervisor
+        fired, undone = change.takeover.exchanged(supervisor.fired, self._now)
+        before, held, under_way = books.marking, books.held(), supervisor.active.operations
+        marking = marking_after(change.layout.factory.net, fired)
+        after = Books(change.layout, supervisor)
+        stay = (r.index for r in change.layout.factory.robots if r.operations)
+        going = {r for r in stay if books.place_of(r, before) != after.place_of(r, marking)}
+        scrap = {*self._plant.undone(after.held(marking), fired, going)}
+        self.deputising.exchange(change, fired, undone)
+        eps = self._simulation.request.settings.eps
+        ways = ((r, way) for r, way in self.returning.ways.items() if r not in self.dead)
+        self.returning = Returning(books.layout, supervisor, eps, dict(ways))
+        self._plant.lift_out(robot, {})
+        over = [books.factory.operations[n] for n in under_way if n not in marking]
+        self._wasting.barred = change.barred
+        self._wasting.waste(scrap, {robot: held[robot] for robot in scrap})
+        supervisor.recall(self.standing.axes(going | scrap))
+        self._send_back(sorted(going | scrap), over, marking)
+        return True
 
     def give_up(self) -> None:
         """What can be finished without the robots that are dead is: the run ends."""
@@ -256,9 +300,10 @@ class Responding:
         response: str,
         scrapped: tuple[str, ...] = (),
         until: float | None = None,
+        deputy: str = "",
     ) -> None:
         name = "" if robot < 0 else self._name(robot)
-        what = self._now, test, operation.label, name, response, scrapped, until
+        what = self._now, test, operation.label, name, response, scrapped, until, deputy
         self.found.append(Failing(*what))
 
     def _name(self, robot: int) -> str:

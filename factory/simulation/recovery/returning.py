@@ -6,8 +6,9 @@ leave in the reverse order of their coming, one after the other; so each goes ba
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from types import MappingProxyType
 
 import numpy as np
 
@@ -44,16 +45,23 @@ class WayBack:
 
 
 class Returning:
-    """The robots (index) of a factory that are on their way back: `ways`."""
+    """The robots (index) of a factory that are on their way back: `ways`. They begin with `ways`
+    that have not begun."""
 
-    def __init__(self, layout: Layout, supervisor: Supervisor, eps: float) -> None:
+    def __init__(
+        self,
+        layout: Layout,
+        supervisor: Supervisor,
+        eps: float,
+        ways: Mapping[int, WayBack] = MappingProxyType({}),
+    ) -> None:
         self._layout, self._supervisor = layout, supervisor
         goals = [*dict.fromkeys(_goals(layout))]
         first = len(supervisor.bundles.modes)
         self._number = {goal: first + n for n, goal in enumerate(goals)}
         modes = [_mode(layout, axis, at, eps) for axis, at in goals]
         supervisor.bundles = supervisor.bundles.with_more(modes, [(axis,) for axis, _ in goals])
-        self.ways: dict[int, WayBack] = {}
+        self.ways = dict(ways)
 
     def send(self, robot: int, way: WayBack) -> None:
         """A robot is to go a way, in place of any that it goes."""
@@ -78,6 +86,11 @@ class Returning:
                 way.done()
         if begun:
             self._supervisor.send(begun)
+
+    def halted(self, dead: Iterable[int]) -> bool:
+        """Whether all that are on their way back are `dead`, or wait for such before they begin."""
+        stuck = {*dead}
+        return all(r in stuck or not stuck.isdisjoint(w.after) for r, w in self.ways.items())
 
     def late(self, before: float) -> list[int]:
         """The robots that have done the same since before some time [s]."""
@@ -144,7 +157,7 @@ def _goals(layout: Layout) -> Iterable[Goal]:
     """Every goal that a robot may be sent to."""
     factory = layout.factory
     lifts = {robot: len(factory.robots) + n for n, robot in enumerate(layout.lifts)}
-    for robot in factory.robots:
+    for robot in (robot for robot in factory.robots if robot.operations):
         yield _rounded((robot.index, layout.guidepaths[robot.index].length))
         for step, number in enumerate(robot.operations):
             yield _rounded((robot.index, _waiting(layout, robot.index, step)))

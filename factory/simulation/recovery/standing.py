@@ -90,7 +90,7 @@ class Standing:
     def jammed(self, now: float, excused: frozenset[int]) -> list[int]:
         """The robots of operations that are late which are asked to move and do not, but for those
         that are `excused`, as are all in their operations."""
-        factory, supervisor = self._simulation.layout.factory, self._simulation.supervisor
+        factory, supervisor = self._simulation.supervisor.factory, self._simulation.supervisor
         found = list[int]()
         for number in supervisor.active.operations:
             operation = factory.operations[number]

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from tests.reporting import DOCS, Report
 
-RUNS = ("campaigns", "deaths", "production")
+RUNS = ("campaigns", "deaths", "takeovers", "production")
 """The sections that are many runs, of which those that are kept need not be done again."""
 
 REPORT = Report(

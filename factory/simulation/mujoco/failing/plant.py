@@ -265,11 +265,11 @@ class MujocoPlant:
         """What was scrapped and touched, what feeders' cameras have seen, and noise to come."""
         world, leaves = self._world, {leaf.label for leaf in self._factory.leaves}
         back, pressing, a_geom = world.parts.feeders.back, world.inspection.pressing, world.m.ngeom
+        robots = {robot.name for robot in self._factory.robots}
         self._scrapped = keeper.whole("scrap", self._scrapped, SCRAP)
-        self._fallen.binned = keeper.whole("scrap.binned", self._fallen.binned)
-        robots = one_of({robot.name for robot in self._factory.robots})
-        spilled = keeper.rows("scrap.spilled", [(name,) for name in self.spilled], robots)
-        self.spilled = [name for (name,) in spilled]
+        self._fallen.binned = keeper.whole("binned", self._fallen.binned)
+        spilled = [(name,) for name in self.spilled]
+        self.spilled = [name for (name,) in keeper.rows("spilled", spilled, one_of(robots))]
         good = [(label,) for label in sorted(back.good)]
         back.good = {label for (label,) in keeper.rows("feeders.good", good, one_of(leaves))}
         touched = sorted(pressing.touched)
