@@ -4,7 +4,6 @@ for any more."""
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import astuple
 from functools import partial
@@ -20,10 +19,11 @@ from factory.plant.material import joins_of
 from factory.problem.pag import NOPART
 from factory.problem.template import Kind, Response
 from factory.record.failures import Failing
-from factory.simulation.keeping import LARGE, Keeper, is_size, is_text, one_of, some_of, up_to
+from factory.simulation.keeping import Keeper, is_size, is_text, one_of, some_of, up_to
 from factory.simulation.recovery.books import Books
 from factory.simulation.recovery.deputising import Deputising
 from factory.simulation.recovery.faults import Campaign
+from factory.simulation.recovery.on_end import OnEnd
 from factory.simulation.recovery.plant import Plant
 from factory.simulation.recovery.returning import Goal, Returning, WayBack, order_of
 from factory.simulation.recovery.standing import Standing, patience
@@ -55,15 +55,10 @@ class Responding:
         self.standing = Standing(simulation)
         self.found: list[Failing] = []
         self.dead: dict[int, float] = {}
-        self._tried: Counter[int] = Counter()
-        self._scrapped: Counter[str] = Counter()
+        self.used_spares = 0
+        self._on_end = OnEnd()
         self._wasting = Wasting(not_carried_back(simulation.layout))
         self.deputising = Deputising(simulation, books)
-
-    @property
-    def used_spares(self) -> int:
-        """How many robots have come from the depot, or are on their way."""
-        return sum(one.response == "spare" for one in self.found)
 
     @property
     def is_calm(self) -> bool:
@@ -73,34 +68,36 @@ class Responding:
 
     def keep(self, keeper: Keeper) -> None:
         """What failed, and how often on end, while all is calm."""
-        factory = self._books.factory
+        factory, spares = self._books.factory, self._campaign.spares
         labels, robots = {*factory.by_label}, {"", *(robot.name for robot in factory.robots)}
-        count = up_to(LARGE)
         found = [astuple(one) for one in self.found]
-        tests = is_size, is_text, one_of(labels), one_of(robots), is_text, some_of(labels)
-        when = lambda v: v is None or is_size(v)  # noqa: E731
-        found = keeper.rows("failures", found, *tests, when, one_of(robots))
+        tests = (
+            is_size,
+            is_text,
+            one_of(labels),
+            one_of(robots),
+            is_text,
+            some_of(labels),
+            _is_until,
+        )
+        found = keeper.rows("failures", found, *tests, one_of(robots))
         self.found = [
             Failing(t, test, label, robot, response, tuple(things), until, deputy)
             for t, test, label, robot, response, things, until, deputy in found
         ]
-        numbers, names = up_to(len(factory.operations)), one_of(labels)
-        tried = keeper.rows("failures.tried", self._tried.items(), numbers, count)
-        scrapped = keeper.rows("failures.scrapped", self._scrapped.items(), names, count)
-        self._tried, self._scrapped = Counter(dict(tried)), Counter(dict(scrapped))
-        held = self._wasting.held.items()
-        self._wasting.held = dict(
-            keeper.rows("scrap.held", held, up_to(len(factory.robots)), is_text)
-        )
+        self.used_spares = keeper.whole("spares", self.used_spares, 0, spares)
+        self._on_end.keep(keeper, factory)
+        held = up_to(len(factory.robots)), is_text
+        self._wasting.held = dict(keeper.rows("scrap.held", self._wasting.held.items(), *held))
         self.standing.keep(keeper)
 
     def passed(self, operation: Operation) -> None:
         """An operation has come to its goal and is good."""
-        self._tried[operation.index] = 0
+        self._on_end.tried[operation.index] = 0
 
     def used(self, label: str) -> None:
         """Something has been joined, and was not scrapped."""
-        self._scrapped[label] = 0
+        self._on_end.scrapped[label] = 0
 
     def refused(self, leaf: Operation, test: str) -> None:
         """A feeder takes a part back: its robot gets out of the way of the next."""
@@ -129,13 +126,13 @@ class Responding:
         join is made again."""
         response, by_label = self._response(operation, test), self._books.factory.by_label
         if response == "again":
-            self._tried[operation.index] += 1
+            self._on_end.tried[operation.index] += 1
             self._note(test, operation, -1, response)
             self._undo((operation.start,), operation, test)
         elif response == "stop":
             self._stop(f"'{operation.label}' fails the test '{test}'", operation)
         else:
-            self._tried[operation.index] = 0
+            self._on_end.tried[operation.index] = 0
             self._scrap(test, operation, -1, operation.inputs)
             ends = tuple(by_label[label].end for label in operation.inputs)
             self._undo(ends, operation, test)
@@ -154,6 +151,7 @@ class Responding:
             self.dead[robot] = np.inf
             self._note("jammed", operation, robot, "no spare")
             return
+        self.used_spares += spare
         self.dead[robot] = self._now + self._campaign.swap
         held = () if label == NOPART else (label,)
         response = "spare" if spare else "deputy"
@@ -218,7 +216,7 @@ class Responding:
 
     def _response(self, operation: Operation, test: str) -> Kind:
         """What is done about a failure of an operation that has been tried so often."""
-        tried, none = self._tried[operation.index], tuple[Response, ...]()
+        tried, none = self._on_end.tried[operation.index], tuple[Response, ...]()
         failures = operation.template.failures
         responses = next((f.responses for f in failures if f.test == test), none)
         left = (r for r in responses if r.kind != "again" or tried < r.times)
@@ -282,8 +280,8 @@ class Responding:
         """Things are scrapped; one too often on end, and the run stops."""
         self._note(test, operation, robot, "scrap", labels)
         for label in labels:
-            self._scrapped[label] += 1
-            if self._scrapped[label] >= SCRAPS:
+            self._on_end.scrapped[label] += 1
+            if self._on_end.scrapped[label] >= SCRAPS:
                 what = f"'{label}' was scrapped {SCRAPS} times on end"
                 self._stop(what, self._books.factory.by_label[label])
 
@@ -312,3 +310,7 @@ class Responding:
     @property
     def _now(self) -> float:
         return float(self._simulation.world.time)
+
+
+def _is_until(value: object) -> bool:
+    return value is None or is_size(value)
