@@ -19,7 +19,7 @@ from factory.plant.material import joins_of
 from factory.problem.pag import NOPART
 from factory.problem.template import Kind, Response
 from factory.record.failures import Failing
-from factory.simulation.keeping import Keeper, is_size, is_text, one_of, some_of
+from factory.simulation.keeping import Keeper, is_size, is_text, one_of, some_of, up_to
 from factory.simulation.recovery.books import Books
 from factory.simulation.recovery.deputising import Deputising
 from factory.simulation.recovery.faults import Campaign
@@ -87,6 +87,8 @@ class Responding:
         ]
         self.used_spares = keeper.whole("spares", self.used_spares, 0, spares)
         self._on_end.keep(keeper, factory)
+        held = up_to(len(factory.robots)), is_text
+        self._wasting.held = dict(keeper.rows("scrap.held", self._wasting.held.items(), *held))
         self.standing.keep(keeper)
 
     def passed(self, operation: Operation) -> None:
