@@ -98,8 +98,8 @@ def is_refused(path: Path, words: str = "") -> bool:
         ("words", "product pag.file pag.sha256 pag.plain"),
         (None, "wip pag.plain ground.floor ground.cycle"),
         ([10**6], "monitor.radii"),
-        ({"a": "abc"}, "versions ground monitor"),
-        ({}, "versions settings ground monitor monitor.places"),
+        ({"a": "abc"}, "versions faults ground monitor"),
+        ({}, "versions faults settings ground monitor monitor.places"),
     ],
     ids=["infinity", "negative", "huge", "text", "null", "numbers", "table", "nothing"],
 )
