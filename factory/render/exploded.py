@@ -32,7 +32,7 @@ FILM: tuple[Size, Size] = (960, 540), (600, 800)
 AZIMUTH, ELEVATION, TURN = -58.0, 31.0, 40.0
 """From where the camera looks, and how far round it goes in a film [degrees]."""
 
-BEFORE, AFTER, SLOWEST, LONGEST = 1.2, 1.8, 0.7, 10.0
+BEFORE, AFTER, SLOWEST, LONGEST = 1.2, 1.8, 0.7, 8.0
 """Parts stand apart and the product stands for these times; an operation takes at most the third,
 and all together the fourth [s]."""
 
