@@ -48,12 +48,12 @@ SLIVER = 1e-6
 
 def in_pieces(mesh: Mesh) -> Mesh:
     """The mesh with its convex bodies, where it is found to have several."""
-    if not is_closed(mesh.faces) or _share_of_hull(mesh) >= 1 - FLATNESS:
+    if not is_closed(mesh.faces) or _fills(mesh, 1 - FLATNESS):
         return mesh
     bodies = closed_bodies(mesh.vertices, mesh.faces)
     if len(bodies) > 1 and all(is_convex(*body) for body in bodies):
         return Mesh(mesh.name, *joined(bodies), tuple(vertices for vertices, _ in bodies))
-    if _share_of_hull(mesh) >= FULL or not release("coacd"):
+    if _fills(mesh, FULL) or not release("coacd"):
         return mesh
     alone = [Mesh(mesh.name, *body) for body in bodies]
     if any(volume_of(body.vertices, body.faces) <= 0 for body in alone):
@@ -62,16 +62,15 @@ def in_pieces(mesh: Mesh) -> Mesh:
     return replace(mesh, pieces=pieces) if len(pieces) > 1 else mesh
 
 
-def _share_of_hull(mesh: Mesh) -> float:
-    """The volume of a mesh in that of its hull; 1 where it has none."""
-    volume = volume_of(mesh.vertices, mesh.faces)
-    return volume / mesh.hull.volume if volume > 0 else 1.0
+def _fills(mesh: Mesh, share: float) -> bool:
+    """Whether a mesh is at least such a share of its hull, or bounds no volume."""
+    return mesh.share >= share or mesh.share <= 0
 
 
 def _decomposed(mesh: Mesh) -> tuple[Array, ...]:
     """The bodies that CoACD makes of a mesh, from the cache if it did so before; the mesh itself
     where it is convex, or CoACD fails."""
-    if _share_of_hull(mesh) >= FULL:
+    if _fills(mesh, FULL):
         return (mesh.vertices,)
     parameters = sorted(_parameters(mesh).items())
     name = digest(release("coacd"), parameters, SLIVER, mesh.vertices, mesh.faces)

@@ -55,8 +55,14 @@ class Mesh:
         if not self.pieces:
             return 0.0
         points = np.concatenate(self.pieces)
-        out = self.vertices.min(axis=0) - points.min(axis=0), points.max(axis=0)
-        return float(max(out[0].max(), (out[1] - self.vertices.max(axis=0)).max()))
+        below = self.vertices.min(axis=0) - points.min(axis=0)
+        above = points.max(axis=0) - self.vertices.max(axis=0)
+        return float(np.maximum(below, above).max())
+
+    @cached_property
+    def share(self) -> float:
+        """The volume of a closed mesh in that of its hull; not above 0 where it bounds none."""
+        return volume_of(self.vertices, self.faces) / self.hull.volume
 
 
 @dataclass(frozen=True, slots=True)

@@ -16,7 +16,7 @@ from itertools import combinations
 import numpy as np
 
 from factory.geometry.meshes import Array, Indices, hull_of
-from factory.geometry.touching import bodies
+from factory.geometry.touching import as_they_come, bodies, connected
 
 ROUND = 5e-6
 """How far the polytope round a round body may reach outside it [m]."""
@@ -99,14 +99,8 @@ def _unit(vector: Array) -> Array:
 def components(count: int, faces: Indices) -> Indices:
     """The number of the connected part that each face (m, 3) of `count` vertices is of, in the
     order of their first triangle: triangles that use a vertex in common are connected."""
-    from scipy.sparse import csr_matrix
-    from scipy.sparse.csgraph import connected_components
-
-    rows, columns = faces[:, [0, 1]].T.ravel(), faces[:, [1, 2]].T.ravel()
-    graph = csr_matrix((np.ones(len(rows)), (rows, columns)), shape=(count, count))
-    label = connected_components(graph, directed=False)[1][faces[:, 0]]
-    _, first, inverse = np.unique(label, return_index=True, return_inverse=True)
-    return np.asarray(np.argsort(np.argsort(first))[inverse])
+    pairs = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]]])
+    return as_they_come(connected(pairs, count)[faces[:, 0]])
 
 
 def _split(vertices: Array, faces: Indices, number: Indices) -> list[tuple[Array, Indices]]:

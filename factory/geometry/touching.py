@@ -22,14 +22,22 @@ def bodies(vertices: Array, faces: Indices) -> Indices:
     """The number of the body that each triangle (m, 3) of a closed mesh bounds, turned outwards, in
     the order of their first triangle. Triangles are of one body where an edge joins them: the two
     at an edge, or those on both sides of a solid wedge where there are more."""
+    return as_they_come(connected(_pairs(vertices, faces), len(faces)))
+
+
+def connected(pairs: Indices, count: int) -> Indices:
+    """A number (count,) for the connected part that each of `count` things is of, some pairs (n, 2)
+    of which are connected."""
     from scipy.sparse import csr_matrix
     from scipy.sparse.csgraph import connected_components
 
-    pairs = _pairs(vertices, faces)
-    shape = (len(faces), len(faces))
-    graph = csr_matrix((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=shape)
-    label = connected_components(graph, directed=False)[1]
-    _, first, inverse = np.unique(label, return_index=True, return_inverse=True)
+    graph = csr_matrix((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(count, count))
+    return np.asarray(connected_components(graph, directed=False)[1])
+
+
+def as_they_come(labels: Indices) -> Indices:
+    """Labels (n,) as numbers from 0, in the order of their first places."""
+    _, first, inverse = np.unique(labels, return_index=True, return_inverse=True)
     return np.asarray(np.argsort(np.argsort(first))[inverse])
 
 
@@ -63,8 +71,9 @@ def _wedges(vertices: Array, faces: Indices, sides: Indices, ends: Mask) -> Indi
     turn = np.argsort(angle)
     # Angles as steps, so that those of triangles that lie on each other are the same number.
     gaps = np.append(np.diff(angle[turn]), angle[turn[0]] + 2 * np.pi - angle[turn[-1]])
-    turn = np.roll(turn, -1 - int(gaps.argmax()))
-    step = np.cumsum(np.append(0, np.roll(gaps, -1 - int(gaps.argmax()))[:-1] > SAME))
+    widest = int(gaps.argmax())
+    turn, gaps = np.roll(turn, -1 - widest), np.roll(gaps, -1 - widest)
+    step = np.cumsum(np.append(0, gaps[:-1] > SAME))
     turn = turn[np.lexsort((~ends[turn], step))]
     open_wedges = np.cumsum(np.where(ends[turn], -1, 1))
     turn = np.roll(turn, -1 - int(open_wedges.argmin()))

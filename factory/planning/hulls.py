@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from factory.geometry.decomposition import FULL
-from factory.geometry.meshes import Mesh, is_closed, volume_of
+from factory.geometry.meshes import Mesh, is_closed
 from factory.nets.verdict import listing
 from factory.planning.parts import InPlace
 from factory.support.errors import Diagnostic, InputError
@@ -32,11 +32,7 @@ def hull_stands(mesh: Mesh | None) -> bool:
     """Whether a hull stands for a closed mesh that is notably less than it."""
     if mesh is None or mesh.pieces or not is_closed(mesh.faces):
         return False
-    return _share(mesh) < FULL
-
-
-def _share(mesh: Mesh) -> float:
-    return volume_of(mesh.vertices, mesh.faces) / mesh.hull.volume
+    return mesh.share < FULL
 
 
 def hidden(source: InPlace, drawn: Sequence[Drawn]) -> tuple[Drawn, ...]:
@@ -63,7 +59,7 @@ def refuse_hidden(source: InPlace, pairs: Sequence[Drawn]) -> None:
             if label in (pair.one, pair.other)
         ]
         if mesh is not None and others and hull_stands(mesh):
-            filled = f"'{label}' fills {_share(mesh):.0%} of its hull"
+            filled = f"'{label}' fills {mesh.share:.0%} of its hull"
             message = f"{filled}, which overlaps {listing(others, NAMED)}"
             faults.append(Diagnostic("Hulls", message))
     raise InputError([*faults[:-1], replace(faults[-1], hint=_help())])

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from factory.layout.sweeping import APART
 from factory.mjcf import names
 from factory.mjcf.replica import Replica
 from factory.render.colours import AMBER, DEAD, FLASH
@@ -18,9 +19,6 @@ from factory.support.engine import mujoco
 
 ROBOT = 0.062
 """Radius of the mark under a robot [m]: it shows on all sides of its carriage."""
-
-APART = 0.02
-"""Robots keep so far from what lies about [m]."""
 
 THIN = 1e-3
 """How thick a mark is [m]."""

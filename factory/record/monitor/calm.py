@@ -11,6 +11,7 @@ from __future__ import annotations
 from bisect import bisect_left
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from itertools import islice
 from typing import Any
 
 import numpy as np
@@ -70,7 +71,8 @@ def _judged(
     monitor.motion.came[:] = -np.inf  # whoever is there may have come long ago
     for observation in inside[1:]:
         monitor.see(observation)
-    recorded = [(t, name) for t, name in log.events if begin - ROUNDING <= t < end - ROUNDING]
+    first, last = np.searchsorted(log.fired_t, [begin - ROUNDING, end - ROUNDING]).tolist()
+    recorded = [*log.events[first:last]]
     found = monitor.report(recorded)
     offset = _offset(log, subject, start, begin)
 
@@ -135,18 +137,17 @@ def _since(log: Log, t: float, label: str) -> float:
     """When that began which was found to fail at t [s]: with the last that fired of the operation
     before, so that what a feeder shows is left out from the beginning."""
     own = (f"{label}_s", f"{label}_e")
-    fired = [when for when, name in log.events if when < t and name in own]
-    return min(t - FELT, fired[-1] if fired else 0.0) - ROUNDING
+    before = reversed(log.events[: int(np.searchsorted(log.fired_t, t))])
+    return min(t - FELT, next((when for when, name in before if name in own), 0.0)) - ROUNDING
 
 
 def _gone_on(log: Log, factory: Factory, robots: set[int], t: float, end: float) -> float:
     """When each of the robots has fired again after t [s]."""
     number, left = factory.net.threaded.net.transition_index, set(robots)
-    for when, name in log.events:
-        if when > t:
-            left -= {*factory.operations[number[name] // 2].robots}
-            if not left:
-                return when + FELT
+    for when, name in islice(log.events, int(np.searchsorted(log.fired_t, t, "right")), None):
+        left -= {*factory.operations[number[name] // 2].robots}
+        if not left:
+            return when + FELT
     return end + FELT
 
 
