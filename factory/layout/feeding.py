@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from math import hypot
 
 from factory.layout.dimensions import (
@@ -19,14 +20,63 @@ from factory.layout.dimensions import (
 from factory.layout.guidepath import Extent, Feeder, hull
 from factory.layout.hands.hand import BEAM
 from factory.layout.layout import Layout
+from factory.layout.standby import Repertoire
 from factory.plant.factory import Operation
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Outlet:
+    """Where the feeder of a robot (index) shows the parts of a `label`: its `name` in a model, that
+    of the label where the robot takes it unless another dies; the operation in which it is taken
+    (`leaf`) in a `layout` that has it."""
+
+    name: str
+    label: str
+    robot: int
+    layout: Layout
+    leaf: Operation
+
+    @property
+    def feeder(self) -> Feeder:
+        """Its feeder."""
+        return feeder_of(self.layout, self.leaf.label)
+
+    @property
+    def elevation(self) -> float:
+        """How far above its place in the product the part is taken [m]."""
+        return self.layout.elevation(self.robot, self.leaf.index)
+
+
+def outlets_of(layout: Layout) -> tuple[Outlet, ...]:
+    """The outlets of a layout's feeders: of its parts, in the order of the factory's labels, and
+    then of those that deputies may have to take."""
+    whole, factory = Repertoire.of(layout), layout.factory
+    found: dict[tuple[str, int], Outlet] = {}
+    for leaf in whole.layout.factory.leaves:
+        label, robot = whole.names[leaf.label], leaf.carrier
+        own = factory.by_label[label].carrier == robot
+        name = label if own else f"{label}@{factory.robots[robot].name}"
+        found.setdefault((label, robot), Outlet(name, label, robot, whole.layout, leaf))
+    return tuple(found.values())
+
+
+def lines_of(layout: Layout) -> tuple[tuple[Outlet, ...], ...]:
+    """The outlets of each robot's feeder (by index), in the order of all that it may do."""
+    by_leaf = {outlet.leaf.label: outlet for outlet in outlets_of(layout)}
+    whole, robots = Repertoire.of(layout).layout, range(len(layout.factory.robots))
+    return tuple(
+        tuple(by_leaf[label] for label in whole.magazine(robot) if label in by_leaf)
+        for robot in robots
+    )
 
 
 def feeder_of(layout: Layout, label: str) -> Feeder:
     """The feeder of a part: a housing over the place where it is presented, and the post that
     carries it, behind the rear stop of the robot that it serves. Parts of one line have one
-    housing, in which they hang with their tops at one height."""
-    operation, room = layout.factory.by_label[label], Clearance(layout.clearance).room
+    housing, in which they hang with their tops at one height; so have those that the robot takes as
+    a deputy."""
+    layout, operation = _with_all(layout, layout.factory.by_label[label])
+    label, room = operation.label, Clearance(layout.clearance).room
     robot, by_label = operation.carrier, layout.factory.by_label
     path, shown = layout.guidepaths[robot], layout.magazine(robot)
     middle = path.middle(layout.goal(operation.index, operation.template.carrier - 1))
@@ -72,6 +122,7 @@ def feeder_of(layout: Layout, label: str) -> Feeder:
 def passing(layout: Layout, leaf: Operation) -> float:
     """How far the robot of a feeder goes until all that it ever carries is clear of any part that
     comes down next [m]."""
+    layout, leaf = _with_all(layout, leaf)
     robot, factory = leaf.carrier, layout.factory
     path = layout.guidepaths[robot]
     rear = min(
@@ -80,6 +131,14 @@ def passing(layout: Layout, leaf: Operation) -> float:
         if factory.operations[number].carrier == robot and not factory.drops(number)
     )
     return _shown(layout, robot)[1] - rear + layout.clearance
+
+
+def _with_all(layout: Layout, leaf: Operation) -> tuple[Layout, Operation]:
+    """An operation in which a part is taken, in the layout of all that its robot may do."""
+    if layout.standby is None:
+        return layout, leaf
+    whole = layout.standby
+    return whole, whole.fed[leaf.written, layout.factory.robots[leaf.carrier].name]
 
 
 def _shown(layout: Layout, robot: int) -> Extent:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from types import MappingProxyType
@@ -22,27 +22,13 @@ from factory.layout.dimensions import (
 from factory.layout.guidepath import Box, Extent, Feeder, Guidepath, Point2, moved
 from factory.layout.hands.hand import Hand, Point3
 from factory.layout.hands.mounted import Mount, grip_of
+from factory.layout.level import LEAST, Level
 from factory.plant.approaches import Overlap
 from factory.plant.factory import Factory, Operation
 from factory.problem.pag import NOPART
 
 BESIDE = 0.005
 """What is to be lowered stays this far short of its meeting point until the others stand [m]."""
-
-
-LEAST = 0.001
-"""A lift goes up by so much at least [m]."""
-
-
-@dataclass(frozen=True, slots=True)
-class Level:
-    """How high a robot holds what it brings on one of its tours [m]: how far up its lift is where
-    it delivers (`down`), and before that (`up`), and how far above its place in the product it
-    carries that (`elevation`)."""
-
-    down: float
-    up: float
-    elevation: float
 
 
 @dataclass(frozen=True)
@@ -56,6 +42,7 @@ class Layout:
     each robot and each of its tours how far the product's middle is, in the robot's frame (u, t)
     and upwards, from where it is on the first of them [m], nothing for no shifts
     (docs/decisions/hands.md, Lines);
+    `given`: the levels of robots on their tours, None where they follow from these;
     `plain`: the layout without relays, None where this is one; `standby`: that of which this is a
     part, so that deputies can take over, None where none may; `ground`: what it was made for, by
     the names that `request.Ground` has.
@@ -70,6 +57,7 @@ class Layout:
     outfeed: Box = (0.0, 0.0, 0.0, 0.0)
     hands: tuple[Hand | None, ...] = field(default=(), repr=False)
     shifts: tuple[tuple[Point3, ...], ...] = field(default=(), repr=False)
+    given: tuple[tuple[Level, ...], ...] | None = field(default=None, repr=False)
     floor: Box = (0.0, 0.0, 0.0, 0.0)
     certificate: Certificate | None = field(default=None, repr=False, compare=False)
     plain: Layout | None = field(default=None, repr=False, compare=False)
@@ -201,9 +189,11 @@ class Layout:
         return tuple(self.factory.strokes)
 
     @cached_property
-    def _levels(self) -> list[list[Level]]:
-        """For each robot those of its tours."""
+    def levels(self) -> Sequence[Sequence[Level]]:
+        """For each robot those of its tours, as `given` if they are."""
         factory, found = self.factory, list[list[Level]]()
+        if self.given is not None:
+            return self.given
         for robot, tours in enumerate(factory.tours):
             ends = [factory.operations[tour[-1]] for tour in tours]
             below = [0.0] * len(ends)
@@ -223,12 +213,12 @@ class Layout:
 
     def level(self, robot: int, operation: int) -> Level:
         """How high a robot holds what it brings, on the tour that an operation (index) is in."""
-        return self._levels[robot][self.factory.turns[operation, robot]]
+        return self.levels[robot][self.factory.turns[operation, robot]]
 
     @cached_property
     def strokes(self) -> Mapping[int, float]:
         """How far up the lift of each robot that has one goes (index) [m]."""
-        highest = {r: max((level.up for level in self._levels[r]), default=0.0) for r in self.lifts}
+        highest = {r: max((level.up for level in self.levels[r]), default=0.0) for r in self.lifts}
         return MappingProxyType({robot: max(up, LEAST) for robot, up in highest.items()})
 
     def elevation(self, robot: int, operation: int) -> float:
@@ -265,6 +255,13 @@ class Layout:
         if self.factory.begins(robot, operation):
             return self.guidepaths[robot].length
         return self.legs[operation, robot][0]
+
+    @cached_property
+    def fed(self) -> Mapping[tuple[str, str], Operation]:
+        """The first operation in which each robot takes each part from its feeder, by what the part
+        is written as and the robot's name."""
+        robots, leaves = self.factory.robots, reversed(self.factory.leaves)
+        return {(leaf.written, robots[leaf.carrier].name): leaf for leaf in leaves}
 
     def magazine(self, robot: int) -> tuple[str, ...]:
         """The parts that the feeder of a robot shows, in the order of its program; none without."""

@@ -4,12 +4,34 @@ deputies do the same tours in turn (`compiler.standing_by`)."""
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 from factory.compiler.standing_by import Pair
 from factory.layout.layout import Layout
 from factory.plant.factory import Factory
 from factory.support.errors import FactoryError
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Repertoire:
+    """All that the robots of a factory can do, tours with it that they take over as deputies: a
+    `layout` of all of it, in which robots have the numbers that they have in the factory, and what
+    its labels are called there (`names`)."""
+
+    layout: Layout
+    names: Mapping[str, str]
+
+    @classmethod
+    def of(cls, layout: Layout) -> Repertoire:
+        """That of a layout whose robots are all there."""
+        if layout.standby is None:
+            return cls(layout, {label: label for label in layout.factory.by_label})
+        making = layout.standby.factory.making
+        return cls(layout.standby, {o.label: o.written for o in making})
+
+    def delivered(self, robot: int) -> list[str]:
+        """What a robot (index) may ever deliver, as it is called in the factory."""
+        return [self.names[label] for label in self.layout.factory.deliveries(robot)]
 
 
 def deputies_in(layout: Layout) -> Mapping[int, int]:
@@ -38,10 +60,8 @@ def part_of(layout: Layout, factory: Factory, robots: Sequence[int]) -> Layout |
     found = [known.get((o.label, o.robots), -1) for o in factory.operations]
     if -1 in found:
         return None
-    shifts = (
-        tuple(whole.shifts[r][every.turns[found[tour[-1]], r]] for tour in factory.tours[n])
-        for n, r in enumerate(robots if whole.shifts else ())
-    )
+    turns = [[every.turns[found[t[-1]], r] for t in factory.tours[n]] for n, r in enumerate(robots)]
+    tours = [*zip(robots, turns, strict=True)]
     return replace(
         layout,
         factory=factory,
@@ -49,7 +69,8 @@ def part_of(layout: Layout, factory: Factory, robots: Sequence[int]) -> Layout |
         stations=tuple(whole.stations[n] for n in found),
         payloads={x: box for x, box in whole.payloads.items() if x in factory.by_label},
         hands=tuple(whole.hands[robot] for robot in robots) if whole.hands else (),
-        shifts=tuple(shifts),
+        shifts=tuple(tuple(whole.shifts[r][n] for n in own) for r, own in tours if whole.shifts),
+        given=tuple(tuple(whole.levels[r][n] for n in own) for r, own in tours),
     )
 
 

@@ -10,7 +10,7 @@ from xml.etree.ElementTree import Element
 
 from factory.geometry.suction import PadPlace
 from factory.layout.dimensions import BOOM, BOOM_HEIGHT, PAD, POST, WALL
-from factory.layout.feeding import feeder_of
+from factory.layout.feeding import lines_of, outlets_of
 from factory.layout.guidepath import Feeder
 from factory.layout.layout import Layout
 from factory.mjcf import names
@@ -41,32 +41,32 @@ def add_feeders(
     hanging: Hanging,
     drives: Mapping[str, Drive],
 ) -> None:
-    """The feeders of a layout, with their sliders and the drives of these. Sliders of one line
-    share the housing of its first part."""
-    codes = feeder_codes(layout.factory)
-    for operation in layout.factory.leaves:
-        label, found = operation.label, feeder_of(layout, operation.label)
-        first = label == layout.magazine(operation.carrier)[0]
-        if not (first or label in hanging.places):
+    """The feeders of a layout, with their sliders and the drives of these, by the names of outlets.
+    Sliders of one line share the housing of its first part."""
+    outlets = outlets_of(layout)
+    codes = feeder_codes(layout.factory, outlets)
+    housed = {line[0].name for line in lines_of(layout) if line}
+    for outlet in outlets:
+        at, found = outlet.name, outlet.feeder
+        if not (at in housed or at in hanging.places):
             continue
-        path = layout.guidepaths[operation.carrier]
-        x, y = layout.meeting(operation)
+        path = layout.guidepaths[outlet.robot]
+        x, y = outlet.layout.meeting(outlet.leaf)
         body = add(
             world,
             "body",
-            name=names.feeder(label),
+            name=names.feeder(at),
             pos=(x, y, 0.0),
             quat=heading_quaternion(path),
         )
-        if first:
-            _add_housing(body, names.feeder(label), found, path.left)
-        if label not in hanging.places:
+        if at in housed:
+            _add_housing(body, names.feeder(at), found, path.left)
+        if at not in hanging.places:
             continue
-        stops = lift_stops(found.stroke, layout.clearance, hanging.lowest(label))
-        place, code, drive = hanging.places[label], codes[label], drives[label]
-        _add_slider(body, label, found.high + OVER, place, code, drive, stops)
-        gains = drives[label].attributes()
-        name = names.slider(label)
+        stops = lift_stops(found.stroke, layout.clearance, hanging.lowest(at))
+        place, code, drive = hanging.places[at], codes[outlet.robot], drives[at]
+        _add_slider(body, at, found.high + OVER, place, code, drive, stops)
+        gains, name = drive.attributes(), names.slider(at)
         add(actuator, "pid", name=name, joint=name, input="pos vel ff", **gains)
 
 
@@ -105,18 +105,18 @@ def _add_housing(body: Element, name: str, found: Feeder, left: float) -> None:
 
 def _add_slider(
     feeder: Element,
-    label: str,
+    outlet: str,
     end: float,
     at: PadPlace,
     code: int,
     drive: Drive,
     stops: Stops,
 ) -> None:
-    """The slider, down where it presents the part that it is named after; its joint goes up from
-    there, and its rod to the height `end` [m]. The pad touches the
-    part by design, and the rod its bearing in the lid: the one is masked as what the feeder holds,
-    the other is only shown."""
-    name = names.slider(label)
+    """The slider, down where it presents the part of the outlet that it is named after; its joint
+    goes up from there, and its rod to the height `end` [m]. The pad touches the part by design, and
+    the rod its bearing in the lid: the one is masked as what the feeder holds, the other is only
+    shown."""
+    name = names.slider(outlet)
     body = add(feeder, "body", name=name, pos="0 0 0", sleep="allowed")
     slide = {"type": "slide", "axis": "0 0 1", "armature": MOTOR, "frictionloss": 0.2}
     joint = add(body, "joint", name=name, **slide)
@@ -127,7 +127,7 @@ def _add_slider(
     add(
         body,
         "geom",
-        name=names.pad(label),
+        name=names.pad(outlet),
         type="cylinder",
         pos=(x, y, z + PAD / 2),
         size=(at.radius, PAD / 2),
@@ -136,7 +136,7 @@ def _add_slider(
         conaffinity=conaffinity,
         rgba=RUBBER,
     )
-    rod = f"{names.feeder(label)}/rod"
+    rod = f"{names.feeder(outlet)}/rod"
     add_shown(
         add(body, "body", name=rod),
         rod,

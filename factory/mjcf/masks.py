@@ -7,6 +7,9 @@ their codes differ. The lowest bit is that of robots and stations, which collide
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
+from factory.layout.feeding import Outlet
 from factory.plant.factory import Factory
 
 NOBODY = 0
@@ -32,9 +35,7 @@ def tray_code(factory: Factory) -> int:
     return len(factory.robots) + 1
 
 
-def feeder_codes(factory: Factory) -> dict[str, int]:
-    """The code of each feeder, by its labels: those of one line have one feeder."""
-    first = tray_code(factory) + 1
-    fed = dict.fromkeys(leaf.carrier for leaf in factory.leaves)
-    codes = {robot: first + n for n, robot in enumerate(fed)}
-    return {leaf.label: codes[leaf.carrier] for leaf in factory.leaves}
+def feeder_codes(factory: Factory, outlets: Iterable[Outlet]) -> dict[int, int]:
+    """The code of the feeder of each robot (index) that has one, by the outlets of feeders."""
+    fed = dict.fromkeys(outlet.robot for outlet in outlets)
+    return {robot: n for n, robot in enumerate(fed, tray_code(factory) + 1)}

@@ -19,8 +19,9 @@ from xml.sax.saxutils import quoteattr
 
 from factory.control.profile import SpeedProfile
 from factory.layout.bins import Bin
-from factory.layout.feeding import feeder_of
+from factory.layout.feeding import outlets_of
 from factory.layout.layout import Layout
+from factory.layout.standby import Repertoire
 from factory.mjcf import names
 from factory.mjcf.bins import add_bins
 from factory.mjcf.elements import add, fill
@@ -40,7 +41,7 @@ from factory.mjcf.stops import lift_stops
 from factory.mjcf.unseen import leave_out_what_is_shown
 from factory.mjcf.welds import add_exclusions, add_welds
 from factory.plant.approaches import Pair
-from factory.plant.factory import Factory, Robot
+from factory.plant.factory import Factory
 from factory.plant.fused_bodies import FusedBodies, Inside, bodies_of
 from factory.problem.robot_types import Catalogue
 from factory.support.settings import Settings
@@ -184,8 +185,8 @@ def build_model(
         label: sum(bodies.mass[body] for body in found) for label, found in bodies.carried.items()
     }
     drives = tuple(
-        drive_for(CARRIAGE_MASS, heaviest(factory, robot, masses), settings.acceleration, settings)
-        for robot in factory.robots
+        drive_for(CARRIAGE_MASS, load, settings.acceleration, settings)
+        for load in heaviest(layout, masses)
     )
     root = ElementTree.parse(SKELETON).getroot()
     root.set("model", product_name(factory))
@@ -198,7 +199,7 @@ def build_model(
     files = add_meshes(section["asset"], product, insets)
     add_scene(world, section["statistic"], layout)
     hoists = _hoists(layout, masses, settings)
-    add_robots(layout, catalogue, drives, hoists, section)
+    add_robots(Repertoire.of(layout).layout, catalogue, drives, hoists, section)
     load = masses[factory.pag.root]
     fast = settings.outfeed_acceleration
     tray = drive_for(TRAY_MASS, load, fast, settings)
@@ -216,7 +217,11 @@ def build_model(
     add_exclusions(section["contact"], apart, copies)
     if not len(section["contact"]):
         root.remove(section["contact"])
-    weights = {names.slider(label): SLIDER_MASS + masses[label] for label in sliders}
+    weights = {
+        names.slider(outlet.name): SLIDER_MASS + masses[outlet.label]
+        for outlet in outlets_of(layout)
+        if outlet.name in sliders
+    }
     weights[names.SHUTTER] = SHUTTER_MASS
     _home(section["keyframe"], layout, actuator, weights)
     if not shown:
@@ -250,10 +255,18 @@ def model_files(model: Model, path: Path) -> dict[Path, bytes]:
     return {path: xml.encode(errors="surrogateescape"), **meshes}
 
 
-def heaviest(factory: Factory, robot: Robot, masses: Mapping[str, float]) -> float:
-    """The heaviest load that a robot carries [kg]."""
-    operations = (factory.operations[number] for number in robot.operations)
-    return max(masses.get(o.after[o.robots.index(robot.index)], 0.0) for o in operations)
+def heaviest(layout: Layout, masses: Mapping[str, float]) -> list[float]:
+    """The heaviest load that each robot carries [kg], by what labels weigh."""
+    whole = Repertoire.of(layout)
+    weights = {label: masses[name] for label, name in whole.names.items() if name in masses}
+    operations, robots = whole.layout.factory.operations, whole.layout.factory.robots
+    return [
+        max(
+            weights.get(o.after[o.robots.index(robot.index)], 0.0)
+            for o in (operations[number] for number in robot.operations)
+        )
+        for robot in robots
+    ]
 
 
 def drive_for(
@@ -276,9 +289,9 @@ def drive_for(
 
 def _hoists(layout: Layout, masses: Mapping[str, float], settings: Settings) -> dict[int, Hoist]:
     """The lifts, for the heaviest load of each: what it delivers."""
-    factory, found = layout.factory, {}
-    for robot, stroke in layout.strokes.items():
-        load = max(masses[label] for label in factory.deliveries(robot))
+    whole, found = Repertoire.of(layout), {}
+    for robot, stroke in whole.layout.strokes.items():
+        load = max(masses[label] for label in whole.delivered(robot))
         most = settings.acceleration + GRAVITY
         drive = drive_for(HOIST_MASS, load, most, settings, HOIST_STIFFNESS)
         found[robot] = Hoist(stroke, drive, lift_stops(stroke, layout.clearance))
@@ -294,9 +307,9 @@ def _sliders(
     most = settings.feeder_limits[1] + GRAVITY
     samples = (stroke_ticks(layout, settings) + 2 * settings.stride) * settings.steps + 2
     loads: dict[str, float] = {}
-    for leaf in layout.factory.leaves:
-        slider = hanging.slider[leaf.label]
-        loads[slider] = max(loads.get(slider, 0.0), masses[leaf.label])
+    for outlet in outlets_of(layout):
+        slider = hanging.slider[outlet.name]
+        loads[slider] = max(loads.get(slider, 0.0), masses[outlet.label])
     return {
         slider: replace(
             drive_for(HOIST_MASS, load, most, settings, HOIST_STIFFNESS), samples=samples
@@ -308,7 +321,7 @@ def _sliders(
 def stroke_ticks(layout: Layout, settings: Settings) -> int:
     """No stroke of a feeder's slider takes more ticks."""
     profile = SpeedProfile(*settings.feeder_limits)
-    strokes = (feeder_of(layout, leaf.label).stroke for leaf in layout.factory.leaves)
+    strokes = (outlet.feeder.stroke for outlet in outlets_of(layout))
     return ceil(profile.rest(max(strokes)) / settings.tick) + 4
 
 

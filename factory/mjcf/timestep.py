@@ -14,6 +14,7 @@ from math import inf, sqrt
 
 from factory.control.profile import World
 from factory.layout.layout import Layout
+from factory.layout.standby import Repertoire
 from factory.mjcf.model import (
     CARRIAGE_MASS,
     GRAVITY,
@@ -148,9 +149,10 @@ def _axes(settings: Settings, layout: Layout, jitter: float) -> Iterator[DrivenA
     for operation in reversed(factory.making):
         inputs = [masses[label] for label in operation.inputs]
         masses[operation.label] = sum(inputs) if inputs else solids[operation.label].mass
-    for load in sorted({heaviest(factory, robot, masses) for robot in factory.robots}):
+    for load in sorted({*heaviest(layout, masses)}):
         yield DrivenAxis.loaded(CARRIAGE_MASS, load, a, gain=1 - jitter, room=room)
-    lifted = [[masses[x] for x in factory.deliveries(robot)] for robot in factory.strokes]
+    whole = Repertoire.of(layout)
+    lifted = [[masses[x] for x in whole.delivered(robot)] for robot in factory.strokes]
     for load in sorted({max(loads) for loads in lifted}):
         held = 2 * FRICTION + SLACK * (HEAD_MASS + load) * GRAVITY
         push, stiff = a + GRAVITY, HOIST_STIFFNESS

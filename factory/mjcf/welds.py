@@ -5,9 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from xml.etree.ElementTree import Element
 
+from factory.layout.feeding import outlets_of
 from factory.layout.layout import Layout
 from factory.mjcf import names
 from factory.mjcf.elements import add, numbers
+from factory.mjcf.grips import grips_of, turned
 from factory.mjcf.hanging import Hanging
 from factory.mjcf.parts import parked_at, place_in
 from factory.mjcf.robots import heading_quaternion
@@ -23,25 +25,24 @@ def add_welds(
 ) -> None:
     """Grips, feeders, parking places, and the star that holds a finished product together."""
     factory = layout.factory
-    for robot, path in zip(factory.robots, layout.guidepaths, strict=True):
+    for grip in grips_of(layout, bodies):
+        robot = factory.robots[grip.robot]
+        w, _, _, z = heading_quaternion(layout.guidepaths[grip.robot])
+        holder = names.head if grip.robot in factory.strokes else names.carriage
+        name, body = names.grip(robot.name, grip.label), names.part(grip.label, 1)
+        _weld(equality, name, holder(robot.name), body, (*grip.position, w, 0, 0, -z))
+    outlets = {outlet.name: outlet for outlet in outlets_of(layout)}
+    for outlet in outlets.values():
+        path, slider = layout.guidepaths[outlet.robot], hanging.slider[outlet.name]
         w, _, _, z = heading_quaternion(path)
-        holder = names.head if robot.index in factory.strokes else names.carriage
-        for label in bodies.handled(factory, robot.index):
-            pose = (*grip_position(layout, bodies, robot.index, label), w, 0, 0, -z)
-            grip, body = names.grip(robot.name, label), names.part(label, 1)
-            _weld(equality, grip, holder(robot.name), body, pose)
-    for operation in factory.leaves:
-        label = operation.label
-        path = layout.guidepaths[operation.carrier]
-        w, _, _, z = heading_quaternion(path)
-        slider = hanging.slider[label]
-        (x, y), (u, v) = layout.meeting(operation), layout.meeting(factory.by_label[slider])
-        height = layout.elevation(operation.carrier, operation.index) - hanging.raised[label]
-        offset = place_in(layout.product, bodies.centre[label], (x - u, y - v), height)
-        pose = (*_turned(offset, path.heading), w, 0, 0, -z)
-        shown, body = label == slider, names.part(label, 1)
-        _weld(equality, names.feed(label), names.slider(slider), body, pose, shown)
-        _park(equality, layout, label, copies[label], int(shown))
+        (x, y), (u, v) = (o.layout.meeting(o.leaf) for o in (outlet, outlets[slider]))
+        height = outlet.elevation - hanging.raised[outlet.name]
+        centre, shown = bodies.centre[outlet.label], outlet.name == slider == outlet.label
+        offset = place_in(layout.product, centre, (x - u, y - v), height)
+        pose, body = (*turned(offset, path.heading), w, 0, 0, -z), names.part(outlet.label, 1)
+        _weld(equality, names.feed(outlet.name), names.slider(slider), body, pose, shown)
+        if outlet.name == outlet.label:
+            _park(equality, layout, outlet.label, copies[outlet.label], int(shown))
     for label in bodies.wholes:
         _park(equality, layout, label, copies[label], 0)
     for label in (body for product in factory.products for body in bodies.carried[product]):
@@ -66,29 +67,6 @@ def add_exclusions(
             pair = names.solid(one, n, part), names.solid(other, n, partner)
             name = names.exclusion(part, partner, n)
             add(contact, "exclude", name=name, body1=pair[0], body2=pair[1])
-
-
-def grip_position(
-    layout: Layout, bodies: FusedBodies, robot: int, label: str
-) -> tuple[float, float, float]:
-    """Where a robot holds a body's centre of mass, in the frame of its carriage, or of its head
-    [m]."""
-    path = layout.guidepaths[robot]
-    at = path.middle(0.0)
-    foot = path.carriage(0.0)
-    begins, *_ = layout.factory.tours[robot][layout.factory.tour_with(robot, label)]
-    more = layout.shift(robot, begins)
-    middle = (at[0] + more[0] - foot[0], at[1] + more[1] - foot[1])
-    x, y, z = place_in(layout.product, bodies.centre[label], middle, layout.held_at(robot, begins))
-    return _turned((x, y, z), path.heading)
-
-
-def _turned(
-    v: tuple[float, float, float], heading: tuple[float, float]
-) -> tuple[float, float, float]:
-    """A vector of the world in a frame whose x is the heading."""
-    u, w = heading
-    return (v[0] * u + v[1] * w, -v[0] * w + v[1] * u, v[2])
 
 
 def _weld(

@@ -9,12 +9,12 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
 
 import numpy as np
 
 from factory.control.mode import Index, Truth
-from factory.layout.feeding import feeder_of
+from factory.layout.feeding import Outlet, outlets_of
+from factory.layout.layout import Layout
 from factory.mjcf import names
 from factory.mjcf.masks import feeder_codes
 from factory.mjcf.model import Model
@@ -32,10 +32,12 @@ from factory.support.engine import mujoco
 
 @dataclass(frozen=True, slots=True)
 class Station:
-    """A feeder: the label of its parts, the weld by which it holds one, its code, and where the
-    part is while the slider is down, and up."""
+    """An outlet of a feeder: the label of its parts, the robot (index) that takes them, the weld by
+    which it holds one, its feeder's code, and where the part is while the slider is down, and
+    up."""
 
     label: str
+    robot: int
     weld: int
     code: int
     down: Place
@@ -89,11 +91,11 @@ class TakenBack:
 
 
 class Feeders:
-    """The feeders of a factory (n,), in the order of their labels. `counts`: how often each
-    transition has fired where the run starts.
+    """The feeders of a factory, by their outlets (n,). `counts`: how often each transition has
+    fired where the run starts.
 
-    `due`: when a part that a robot has asked for too early comes soon enough [s]. `back`: what is
-    taken back.
+    `due`: when a part that a robot has
+    asked for too early comes soon enough [s]. `back`: what is taken back.
     """
 
     def __init__(
@@ -108,20 +110,36 @@ class Feeders:
     ) -> None:
         self._copies, self._welds, self._sliders = copies, welds, sliders
         self._passing, self.supply = passing, supply
-        self._stations = [
-            _station(m, model, label, code) for label, code in feeder_codes(model.factory).items()
-        ]
+        outlets = outlets_of(model.layout)
+        codes = feeder_codes(model.factory, outlets)
+        self._stations = [_station(m, outlet, codes[outlet.robot]) for outlet in outlets]
         self.back = TakenBack()
-        self._number = {station.label: n for n, station in enumerate(self._stations)}
         self._shown: dict[str, int] = {}
         self._asked: set[int] = set()
         self.due = NEVER
-        self._turns = Turns(model.layout, supply.rounds())
+        self._turns = Turns([station.label for station in self._stations])
+        self._serve(model.layout, supply.rounds())
 
-    @cached_property
+    def _serve(self, layout: Layout, rounds: Mapping[str, int]) -> None:
+        """From now on robots take parts as in a layout, after so many rounds."""
+        by_label = layout.factory.by_label
+        self._number = {
+            station.label: n
+            for n, station in enumerate(self._stations)
+            if by_label[station.label].carrier == station.robot
+        }
+        robots = range(len(layout.factory.robots))
+        lines = [[self._number[label] for label in layout.magazine(robot)] for robot in robots]
+        self._turns.serve([line for line in lines if line], rounds)
+
+    def serves(self, label: str) -> bool:
+        """Whether robots take such things from feeders."""
+        return label in self._number
+
+    @property
     def welds(self) -> dict[str, int]:
         """What holds the part that a feeder presents, by label."""
-        return {station.label: station.weld for station in self._stations}
+        return {label: self._stations[n].weld for label, n in self._number.items()}
 
     @property
     def trees(self) -> dict[int, int]:
@@ -159,7 +177,7 @@ class Feeders:
         number = self._number[label]
         del self._shown[label]
         self._welds.loose([self._stations[number].weld])
-        self._passing.took(self._turns.lines[number])
+        self._passing.holding(self._stations[number].robot)
         self._turns.vacant[self._turns.taken(number)] = True
 
     def end(self, operations: Sequence[Operation]) -> None:
@@ -235,6 +253,22 @@ class Feeders:
             waits = label not in self._shown and number not in self.back.parts
             self._turns.vacant[number] = self._turns.now[number] and waits
 
+    def exchange(self, layout: Layout) -> None:
+        """From now on robots take parts as in a layout with one fewer of them, after rounds that
+        `undone` will say. What is shown elsewhere has been taken back (`elsewhere`)."""
+        self._asked.clear()
+        self._serve(layout, self.supply.rounds())
+
+    def elsewhere(self, layout: Layout) -> list[str]:
+        """The labels of parts that are shown where they are not taken in a layout."""
+        by_label = layout.factory.by_label
+        robots = ((x, self._stations[self._number[x]].robot) for x in self._shown)
+        return [label for label, robot in robots if by_label[label].carrier != robot]
+
+    def gone(self, robot: int) -> None:
+        """A robot (index) is never in the way of its feeder again."""
+        self._passing.gone(robot)
+
     def stay_clear(self, robot: int) -> None:
         """The next part for a robot (index) comes down when that is out of the way."""
         self._passing.come_clear(robot)
@@ -303,7 +337,7 @@ class Feeders:
         return bool(self._copies.free[label]) and self.supply.wants(label)
 
 
-def _station(m: mujoco.MjModel, model: Model, label: str, code: int) -> Station:
-    x, y, z = presented_at(model.layout, label)
-    up = x, y, z + feeder_of(model.layout, label).stroke
-    return Station(label, m.equality(names.feed(label)).id, code, (x, y, z), up)
+def _station(m: mujoco.MjModel, outlet: Outlet, code: int) -> Station:
+    x, y, z = presented_at(outlet.layout, outlet.leaf.label)
+    up, weld = (x, y, z + outlet.feeder.stroke), m.equality(names.feed(outlet.name)).id
+    return Station(outlet.label, outlet.robot, weld, code, (x, y, z), up)

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from math import inf
 
 from factory.mjcf import names
+from factory.mjcf.grips import grips_of
 from factory.mjcf.model import Model
 from factory.simulation.keeping import Keeper, is_text, up_to
 from factory.simulation.mujoco.copies import Copies
@@ -30,10 +31,10 @@ class Grasps:
         self.of: dict[int, Grasp] = {}
         self.changes = 0
         self._welds, self._mass = welds, model.carried.mass
+        robots = model.factory.robots
         self.grip = {
-            (robot.index, label): m.equality(names.grip(robot.name, label)).id
-            for robot in model.factory.robots
-            for label in model.carried.handled(model.factory, robot.index)
+            (grip.robot, grip.label): m.equality(names.grip(robots[grip.robot].name, grip.label)).id
+            for grip in grips_of(model.layout, model.carried)
         }
 
     def take(self, robot: int, unit: int, bodies: Mapping[str, int]) -> None:

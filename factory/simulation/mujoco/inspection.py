@@ -36,7 +36,7 @@ class Inspection:
     ) -> None:
         self._m, self._d, self._model, self._masks = m, d, model, masks
         self._product = ProductError(model)
-        self.pressing = Pressing(m, model.factory, masks)
+        self.pressing = Pressing(m, model, masks)
         self._touching: frozenset[tuple[int, int]] = frozenset()
         self.joining: dict[int, int] = {}
         self.force: dict[str, float] = {}

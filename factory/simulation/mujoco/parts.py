@@ -63,7 +63,7 @@ class Parts:
         self.strength = Strength(m, d, model, self.hands.grip)
         self.joining = Joining(model, self.hands, self.copies, self.feeders, self.welds)
         self.joining.weigh(m, d)
-        self.welds.loose([*self.feeders.welds.values(), *self.hold.values()])
+        self.welds.loose([*(weld for weld, _ in self.feeders.grips()), *self.hold.values()])
         mujoco.mj_kinematics(m, d)
         for label, unit, robot in self._under_way(counts, passing):
             self._give(m, label, unit, robot)

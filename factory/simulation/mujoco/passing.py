@@ -9,10 +9,10 @@ import numpy as np
 
 from factory.control.mode import STILL, Array, Index, Truth
 from factory.control.profile import SpeedProfile
-from factory.layout.feeding import passing
+from factory.layout.feeding import Outlet, outlets_of, passing
 from factory.mjcf import names
 from factory.mjcf.model import Model
-from factory.plant.factory import Operation
+from factory.plant.factory import Factory, Operation
 from factory.problem.pag import NOPART
 from factory.simulation.keeping import Keeper
 from factory.simulation.request import RunRequest
@@ -27,7 +27,7 @@ HOME = 1e-3
 
 @dataclass(frozen=True, eq=False, slots=True)
 class _Lifts:
-    """The lifts that are set for each label: the `numbers` (k,) of those labels, the `address` (k,)
+    """The lifts that are set for each part: the `numbers` (k,) of those outlets, the `address` (k,)
     of each lift's position, and where it is to be (`level`) [m]."""
 
     numbers: Index
@@ -35,40 +35,40 @@ class _Lifts:
     level: Array
 
     @classmethod
-    def of(cls, m: mujoco.MjModel, model: Model) -> _Lifts:
+    def of(cls, m: mujoco.MjModel, factory: Factory, outlets: Sequence[Outlet]) -> _Lifts:
         """Those of a model."""
-        factory, layout = model.factory, model.layout
-        leaves = [(n, o) for n, o in enumerate(factory.leaves) if o.carrier in factory.adjusted]
-        lifts = [m.joint(names.lift(factory.robots[o.carrier].name)).id for _, o in leaves]
-        level = [layout.level(o.carrier, o.index).up for _, o in leaves]
-        numbers = np.array([n for n, _ in leaves], np.intp)
+        chosen = [(n, o) for n, o in enumerate(outlets) if o.robot in factory.adjusted]
+        lifts = [m.joint(names.lift(factory.robots[o.robot].name)).id for _, o in chosen]
+        level = [o.layout.level(o.robot, o.leaf.index).up for _, o in chosen]
+        numbers = np.array([n for n, _ in chosen], np.intp)
         return cls(numbers, m.jnt_qposadr[np.array(lifts, np.intp)], np.array(level))
 
     def narrow(self, home: Truth, d: mujoco.MjData) -> None:
-        """Robots are at home for a label (n,) only where their lifts are at its height."""
+        """Robots are at home for a part (n,) only where their lifts are at its height."""
         home[self.numbers] &= np.abs(d.qpos[self.address] - self.level) < LEVEL
 
 
 class Passing:
-    """The robots that take parts from feeders (n,), in the order of the labels. `holds` (n,): it
-    has yet to deliver the part that it took last."""
+    """The robots that take parts from feeders, by outlets (n,). `holds` (n,): it has yet to deliver
+    the part that it took last."""
 
     def __init__(
         self, m: mujoco.MjModel, d: mujoco.MjData, model: Model, request: RunRequest
     ) -> None:
         factory, layout = model.factory, model.layout
-        carriers = [leaf.carrier for leaf in factory.leaves]
+        outlets = outlets_of(layout)
+        carriers = [outlet.robot for outlet in outlets]
         joints = [m.joint(names.slide(factory.robots[robot].name)).id for robot in carriers]
         self._d, self._address, self._dof = d, m.jnt_qposadr[joints], m.jnt_dofadr[joints]
         self._home = np.array([layout.guidepaths[robot].length for robot in carriers])
-        self._clear = self._home - [passing(layout, leaf) for leaf in factory.leaves]
+        self._clear = self._home - [passing(outlet.layout, outlet.leaf) for outlet in outlets]
         hands = [layout.hand(robot) for robot in carriers]
         self._kinds = ["none" if hand is None else hand.kind for hand in hands]
         self._first = np.array([hand is not None and hand.first for hand in hands], bool)
         settings = request.settings
         fastest = settings.speed * (1 + request.jitter)
         self._fastest = SpeedProfile(fastest, settings.acceleration)
-        self._lifts = _Lifts.of(m, model)
+        self._lifts = _Lifts.of(m, factory, outlets)
         self._fed: dict[int, list[int]] = {}
         for number, robot in enumerate(carriers):
             self._fed.setdefault(robot, []).append(number)
@@ -80,13 +80,13 @@ class Passing:
             if robot in self._fed and label == NOPART:
                 self.holds[self._fed[robot]] = False
 
-    def took(self, numbers: Sequence[int]) -> None:
-        """The robot of these feeders has taken a part."""
-        self.holds[numbers] = True
-
     def holding(self, robot: int) -> None:
-        """A robot (index) has taken a part from one of its feeders."""
-        self.took(self._fed[robot])
+        """A robot (index) has taken a part from its feeder."""
+        self.holds[self._fed[robot]] = True
+
+    def gone(self, robot: int) -> None:
+        """A robot (index) has been taken away for good."""
+        self._clear[self._fed.get(robot, [])] = np.inf
 
     def come_clear(self, robot: int) -> None:
         """A robot (index) holds nothing, and the next part comes down once it is out of the way, or

@@ -7,10 +7,12 @@ from collections.abc import Iterable
 
 import numpy as np
 
+from factory.layout.feeding import outlets_of
 from factory.layout.hands.holding import held
 from factory.mjcf import names
+from factory.mjcf.grips import grips_of
 from factory.mjcf.masks import NOBODY
-from factory.plant.factory import Factory
+from factory.mjcf.model import Model
 from factory.simulation.mujoco.contacts import ContactMasks
 from factory.support.engine import mujoco
 
@@ -26,15 +28,19 @@ class Pressing:
     feeder shows askew; `shaken`: those that such a body has touched since, with all that is in the
     same hands; `touched`: the pairs of geoms of which one was of any of these."""
 
-    def __init__(self, m: mujoco.MjModel, factory: Factory, masks: ContactMasks) -> None:
+    def __init__(self, m: mujoco.MjModel, model: Model, masks: ContactMasks) -> None:
+        factory, layout = model.factory, model.layout
         self._m, self._contents, self._masks = m, factory.contents, masks
         self.fallen: set[int] = set()
         self.shaken: set[int] = set()
         self.touched: set[tuple[int, int]] = set()
         self._holds = {r.name: {held(factory, r.index, at_last=True)} for r in factory.robots}
-        for leaf in factory.leaves:
-            slider = m.body(int(m.eq_obj1id[m.equality(names.feed(leaf.label)).id])).name
-            self._holds.setdefault(slider.rpartition("/")[0], set()).add(leaf.label)
+        if layout.standby is not None:
+            for grip in grips_of(layout, model.carried):
+                self._holds[factory.robots[grip.robot].name].add(grip.label)
+        for outlet in outlets_of(layout):
+            slider = m.body(int(m.eq_obj1id[m.equality(names.feed(outlet.name)).id])).name
+            self._holds.setdefault(slider.rpartition("/")[0], set()).add(outlet.label)
 
     def meant(self, one: int, other: int, apart: float) -> bool:
         """Whether of two geoms, so far `apart` [m], one is a pad and the other what that is to

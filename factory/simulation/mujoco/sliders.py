@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from factory.control.mode import Array, Index
-from factory.layout.feeding import feeder_of
+from factory.layout.feeding import outlets_of
 from factory.mjcf import names
 from factory.mjcf.feeders import SLIDER_MASS
 from factory.mjcf.model import GRAVITY, Model, stroke_ticks
@@ -67,16 +67,16 @@ class Strokes:
 
 
 class Sliders:
-    """The sliders of the feeders (n,), in the order of the labels that hang from them: one from
-    which several hang is there for each, and has at most one of them at a time.
+    """The sliders of the feeders (n,), in the order of their outlets: one from which the parts of
+    several hang is there for each, and has at most one of them at a time.
 
     `ends` (n,): when each that is under way comes to the end of its way [s], NEVER for others.
     `trees` (n,): their kinematic trees.
     """
 
     def __init__(self, m: mujoco.MjModel, d: mujoco.MjData, model: Model, sleep: Sleep) -> None:
-        labels = [leaf.label for leaf in model.factory.leaves]
-        feeds = [m.equality(names.feed(label)).id for label in labels]
+        outlets = outlets_of(model.layout)
+        feeds = [m.equality(names.feed(outlet.name)).id for outlet in outlets]
         self._body, settings = m.eq_obj1id[feeds], model.settings
         sliders = [m.body(body).name for body in self._body.tolist()]
         joint = m.body_jntadr[self._body]
@@ -85,15 +85,15 @@ class Sliders:
         self._d, self._step, self._address = d, settings.step, m.jnt_qposadr[joint]
         own = m.body_subtreemass[self._body] + m.dof_armature[m.jnt_dofadr[joint]]
         self._drives, self._sleep = Drives(m, d, drives, own.round(9)), sleep
-        self._loads = np.array([model.masses[label] for label in labels])
-        lengths = np.array([feeder_of(model.layout, label).stroke for label in labels])
-        named = {names.slider(label): number for number, label in enumerate(labels)}
+        self._loads = np.array([model.masses[outlet.label] for outlet in outlets])
+        lengths = np.array([outlet.feeder.stroke for outlet in outlets])
+        named = {names.slider(outlet.name): number for number, outlet in enumerate(outlets)}
         high = lengths[[named[slider] for slider in sliders]]
         ends = high - lengths, high
         ticks = stroke_ticks(model.layout, settings)
         self._strokes = Strokes.of(self._drives, self._loads, ends, ticks, settings)
-        self._begun, self.ends = np.zeros(len(labels)), np.full(len(labels), NEVER)
-        self._down = np.zeros(len(labels), np.intp)
+        self._begun, self.ends = np.zeros(len(outlets)), np.full(len(outlets), NEVER)
+        self._down = np.zeros(len(outlets), np.intp)
 
     def _load(self, chosen: Index, loaded: bool) -> None:
         """Sliders carry their loads, or nothing."""

@@ -17,15 +17,13 @@ from factory.control.mode import Array, Index
 from factory.layout.hands.gauges import gauge, middle
 from factory.layout.hands.hand import Hand
 from factory.layout.hands.tips import TERMS, shares
+from factory.mjcf.grips import grips_of
 from factory.mjcf.model import Model
 from factory.mjcf.weld_frames import ROWS
 from factory.simulation.keeping import Keeper, is_size
 from factory.simulation.world import Drop
 from factory.support.engine import mujoco
 from factory.support.errors import Diagnostic
-
-Grip = tuple[int, str]
-"""A robot (index) and the label of a body that it holds."""
 
 OFTEN = 0.09
 """Hands are not measured more often than once in this time [s]: a robot gains and loses its speed
@@ -59,7 +57,11 @@ class Strength:
     """
 
     def __init__(
-        self, m: mujoco.MjModel, d: mujoco.MjData, model: Model, welds: Mapping[Grip, int]
+        self,
+        m: mujoco.MjModel,
+        d: mujoco.MjData,
+        model: Model,
+        welds: Mapping[tuple[int, str], int],
     ) -> None:
         self.most: StrengthUse | None = None
         self.dropped: Drop | None = None
@@ -126,14 +128,15 @@ class Strength:
         they are the load as it acts at the body's centre of mass. Bodies keep the axes of the
         world."""
         found = np.zeros((len(self._grips) + 1, TERMS, ROWS))
-        centre, layout = self._model.carried.centre, self._model.layout
-        for number, ((robot, label), _) in enumerate(self._grips):
-            hand, load = self._hands[robot], np.diag([1.0, 1.0, 1.0, 0.5, 0.5, 0.5])
-            tour = layout.factory.tours[robot][layout.factory.tour_with(robot, label)]
-            at = centre[label] - middle(hand)
-            at[:2] += layout.shift(robot, tour[0])
+        layout = self._model.layout
+        grips = {(grip.robot, grip.label): grip for grip in grips_of(layout, self._model.carried)}
+        for number, (key, _) in enumerate(self._grips):
+            grip, hand = grips[key], self._hands[key[0]]
+            load = np.diag([1.0, 1.0, 1.0, 0.5, 0.5, 0.5])
+            at = grip.centre - middle(hand)
+            at[:2] += grip.layout.shift(grip.robot, grip.begins)
             load[3:, :3] = np.cross(at, np.eye(3)).T
-            found[number] = gauge(hand, layout.guidepaths[robot].heading) @ load
+            found[number] = gauge(hand, layout.guidepaths[grip.robot].heading) @ load
         return found
 
     def _use(self, number: int, share: float, grips: Index) -> StrengthUse:

@@ -2,29 +2,31 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
 from factory.control.mode import Truth
-from factory.layout.layout import Layout
 from factory.simulation.keeping import Keeper
 
 
 class Turns:
-    """The turns of feeders (n,), in the order of their labels, when so many parts of each label
-    have been taken (`counts`). `now` (n,): whether it is the turn of each; that of a feeder which
-    shares its robot with no other always is. `vacant` (n,): whether it has nothing to show on its
-    turn. `lines`: the numbers of all that share its robot, by number, in the order of the robot's
-    program."""
+    """The turns of feeders (n,) with these `labels`. `now` (n,): whether it is the turn of each;
+    that of a feeder which shares its robot with no other always is. `vacant` (n,): whether it has
+    nothing to show on its turn. `lines`: the numbers of all that share its robot, by number, in the
+    order of the robot's program; none where no robot takes anything."""
 
-    def __init__(self, layout: Layout, counts: Mapping[str, int]) -> None:
-        leaves = layout.factory.leaves
-        numbers = {leaf.label: n for n, leaf in enumerate(leaves)}
-        shown = [layout.magazine(leaf.carrier) for leaf in leaves]
-        self.lines = [[numbers[label] for label in line] for line in shown]
-        self._labels = [leaf.label for leaf in leaves]
-        self._line = np.array([line[0] for line in self.lines], np.intp)
+    def __init__(self, labels: Sequence[str]) -> None:
+        self._labels = labels
+
+    def serve(self, lines: Sequence[Sequence[int]], counts: Mapping[str, int]) -> None:
+        """From now on robots take from these feeders (numbers), each from those of a line, and so
+        many parts of each label have been taken. Those whose turn it is have nothing to show."""
+        self.lines: list[Sequence[int]] = [() for _ in self._labels]
+        self._line = np.arange(len(self._labels))
+        for line in lines:
+            for number in line:
+                self.lines[number], self._line[number] = line, line[0]
         self.recount(counts)
         self.vacant = self.now.copy()
 
@@ -34,7 +36,7 @@ class Turns:
         self.now = np.zeros(len(self._labels), bool)
         for number, line in enumerate(self.lines):
             taken = [counts[self._labels[n]] for n in line]
-            self.now[number] = number == line[taken.index(min(taken))]
+            self.now[number] = bool(line) and number == line[taken.index(min(taken))]
 
     def taken(self, number: int) -> int:
         """The part of a feeder has been taken; gives the one whose turn it is then."""

@@ -100,7 +100,7 @@ class MujocoWorld:
         """A feeder presents the part of that unit; the outfeed has room for a product."""
         if not self.hooks.admit(operation, unit) or self._away.hold_up(operation):
             return False
-        if operation.label in self.parts.feeders.welds:
+        if self.parts.feeders.serves(operation.label):
             now = self.time + ROUNDED * self.model.settings.tick
             return self.parts.feeders.presents(operation.label, unit, now)
         if not self.model.factory.drops(operation.index):

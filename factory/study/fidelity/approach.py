@@ -15,6 +15,7 @@ import numpy as np
 
 from factory.control.mode import Array, Index, Truth
 from factory.layout.clearance import certify
+from factory.layout.feeding import outlets_of
 from factory.layout.layout import Layout, carriers
 from factory.mjcf import names
 from factory.mjcf.shells import trunks
@@ -73,7 +74,7 @@ class Approaches:
         self.certified, self.trunk = certified(layout), trunks(m)
         words = [m.body(i).name for i in range(m.nbody)]
         kinds = [names.kind(word) for word in words]
-        sliders = {names.slider(leaf.label) for leaf in layout.factory.leaves}
+        sliders = {names.slider(outlet.name) for outlet in outlets_of(layout)}
         self.kind = np.array(
             [
                 KINDS.index(k) if k in KINDS and word not in sliders else NONE
@@ -172,7 +173,7 @@ def _served(bodies: list[str], layout: Layout) -> Index:
     """The index of the robot of each body, or that a feeder or the tray serves; that after the last
     for none."""
     factory = layout.factory
-    stations = {names.feeder(leaf.label): leaf.carrier for leaf in factory.leaves}
+    stations = {names.feeder(outlet.name): outlet.robot for outlet in outlets_of(layout)}
     stations[names.OUTFEED_TRAY] = 0
     found = _robots(bodies, [robot.name for robot in factory.robots])
     for number, body in enumerate(bodies):
