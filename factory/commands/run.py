@@ -102,10 +102,6 @@ def run(
     shown.area()
     if asked.world == "ideal":
         check_ideal(asked.fuse, bool(monitor))
-    elif given.deputies and asked.recovers:
-        message = "deputies take over in the ideal world alone"
-        hint = "add --world ideal, or leave out --deputies and give --spares"
-        raise InputError(Diagnostic("Usage", message, None, hint))
     film = _film(project, asked, video, shown)
     record = run_project(project, asked, out.silent, log, film, monitor)
     status = _told(record, layout.factory, warnings, monitor, out)

@@ -9,7 +9,7 @@ so is the way from hand to bin. Where there is no room for one there is none.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import product
 
 import numpy as np
@@ -22,6 +22,7 @@ from factory.layout.dimensions import ARMS, CARRIAGES, PAYLOADS
 from factory.layout.guidepath import Box, Point2, hull, moved
 from factory.layout.layout import Layout
 from factory.layout.scrapping import not_carried_back
+from factory.layout.standby import Repertoire
 from factory.layout.sweeps import Pile, piles, regions
 from factory.problem.pag import NOPART
 
@@ -66,6 +67,8 @@ class Bin:
 def bins_of(layout: Layout) -> tuple[Bin, ...]:
     """The bins for which there is room, one a robot at most: for all that it can carry back to B
     or, where there is no room for that, for what is smallest."""
+    whole = Repertoire.of(layout)
+    layout = whole.layout
     found = piles(layout.factory, layout.product)
     taken, added = regions(layout, found), list[Region]()
     corners = np.array([region.box for region in taken])
@@ -83,16 +86,18 @@ def bins_of(layout: Layout) -> tuple[Bin, ...]:
         if held and bin_:
             made.append(bin_)
             added += _stands(bin_)
-    return tuple(made)
+    named = (frozenset(whole.names[label] for label in one.labels) for one in made)
+    return tuple(replace(one, labels=labels) for one, labels in zip(made, named, strict=True))
 
 
 def bin_regions(layout: Layout, bins: Iterable[Bin]) -> list[Region]:
     """What bins take of the floor, and what flies into them."""
-    found = piles(layout.factory, layout.product)
+    whole = Repertoire.of(layout)
+    found = piles(whole.layout.factory, whole.layout.product)
     result = list[Region]()
     for one in bins:
-        held = _held(layout, one.robot, found, frozenset())
-        flown = [each for each in held if each[0] in one.labels]
+        held = _held(whole.layout, one.robot, found, frozenset())
+        flown = [each for each in held if whole.names[each[0]] in one.labels]
         result += [*_stands(one), *_flights(one, flown)]
     return result
 

@@ -96,6 +96,14 @@ class ContactMasks:
             m.body_contype[with_geoms], m.body_conaffinity[with_geoms] = contype, conaffinity
             m.geom_contype[geoms], m.geom_conaffinity[geoms] = contype, conaffinity
 
+    def remove(self, bodies: Sequence[int]) -> None:
+        """Bodies that are no parts touch nothing any more."""
+        m = self._m
+        for body in bodies:
+            geoms = m.body_geomadr[body] + np.arange(m.body_geomnum[body])
+            m.geom_contype[geoms] = m.geom_conaffinity[geoms] = 0
+            self._masks[:, body] = m.body_contype[body] = m.body_conaffinity[body] = 0
+
     def enter(self, label: str, unit: int, body: int) -> None:
         """A part's body comes into the factory, for a unit."""
         self.unit[self._own[body]] = unit

@@ -253,9 +253,10 @@ class Feeders:
             waits = label not in self._shown and number not in self.back.parts
             self._turns.vacant[number] = self._turns.now[number] and waits
 
-    def exchange(self, layout: Layout) -> None:
-        """From now on robots take parts as in a layout with one fewer of them, after rounds that
-        `undone` will say. What is shown elsewhere has been taken back (`elsewhere`)."""
+    def exchange(self, robot: int, layout: Layout) -> None:
+        """A robot (index) is gone, and others take parts as in a layout. What is shown `elsewhere`
+        has been taken back, and `undone` will say whose turn it is."""
+        self._passing.gone(robot)
         self._asked.clear()
         self._serve(layout, self.supply.rounds())
 
@@ -264,10 +265,6 @@ class Feeders:
         by_label = layout.factory.by_label
         robots = ((x, self._stations[self._number[x]].robot) for x in self._shown)
         return [label for label, robot in robots if by_label[label].carrier != robot]
-
-    def gone(self, robot: int) -> None:
-        """A robot (index) is never in the way of its feeder again."""
-        self._passing.gone(robot)
 
     def stay_clear(self, robot: int) -> None:
         """The next part for a robot (index) comes down when that is out of the way."""

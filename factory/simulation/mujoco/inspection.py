@@ -9,7 +9,6 @@ import numpy as np
 
 from factory.mjcf.model import Model
 from factory.mjcf.weld_frames import residuals
-from factory.plant.factory import Operation
 from factory.simulation.keeping import Keeper, is_size, is_text, one_of, up_to
 from factory.simulation.mujoco.contacts import ContactMasks
 from factory.simulation.mujoco.pressing import Pressing
@@ -26,7 +25,8 @@ MOST_ONSETS = 10**7
 class Inspection:
     """Keeps the worst figures of a run. Contacts are looked at after every step of the engine.
 
-    `joining`: for each operation under way (index) the unit whose inputs it joins. `unintended`:
+    `factory`: whose robots do what now. `joining`: for each operation under way (index) the unit
+    whose inputs it joins. `unintended`:
     onsets of contact that nothing intends, by the names of geoms; `pressing`: what is no such
     contact. `residual` [m]: the largest of a weld's position. `error` [m]: that of a product.
     """
@@ -35,6 +35,7 @@ class Inspection:
         self, m: mujoco.MjModel, d: mujoco.MjData, model: Model, masks: ContactMasks
     ) -> None:
         self._m, self._d, self._model, self._masks = m, d, model, masks
+        self.factory = model.factory
         self._product = ProductError(model)
         self.pressing = Pressing(m, model, masks)
         self._touching: frozenset[tuple[int, int]] = frozenset()
@@ -97,7 +98,7 @@ class Inspection:
         if unit[a] < 0 or unit[a] != unit[b]:
             return None
         for number, worked_on in self.joining.items():
-            operation: Operation = self._model.factory.operations[number]
+            operation = self.factory.operations[number]
             if unit[a] == worked_on and {code[a] - 1, code[b] - 1} <= {*operation.robots}:
                 return operation.label
         return None

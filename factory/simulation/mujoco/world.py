@@ -11,8 +11,11 @@ from collections.abc import Mapping, Sequence
 from copy import copy
 from math import ceil
 
+import numpy as np
+
 from factory.control.mode import Array, Index
 from factory.control.navigation import Bundle
+from factory.layout.layout import Layout
 from factory.mjcf.loading import load
 from factory.mjcf.model import Model
 from factory.plant.factory import Operation
@@ -161,6 +164,16 @@ class MujocoWorld:
     def advance(self, steps: int) -> None:
         """Some timesteps, the axes as `move` has set them going."""
         self.motion.stepping.advance(steps)
+
+    def exchange(self, robot: int, layout: Layout) -> None:
+        """A robot (index) has been taken away for good; the others go on as in a `layout`, where
+        all have their numbers. What it held, and what is shown where nobody takes it now, are put
+        away before."""
+        tree = self.motion.axes.tree[robot]
+        self.parts.masks.remove(np.flatnonzero(self.m.body_treeid == tree).tolist())
+        self.parts.feeders.exchange(robot, layout)
+        self.inspection.factory = layout.factory
+        self._away = HandsAway(self.d, layout, self.motion.axes.qpos)
 
     def settle(self) -> None:
         """A tick's timesteps are over, and the tray's next tick begins."""

@@ -49,10 +49,7 @@ class Deputising:
 
     def appoint(self, robot: int, dead: Container[int]) -> str:
         """A deputy is to take over for a robot (index): its name, "" where there is none, or it is
-        among the `dead`. Bodies are not handed over from one line's feeder to another's, so in the
-        engine there is none."""
-        if self._simulation.model is not None:
-            return ""
+        among the `dead`."""
         deputy = deputies_in(self._simulation.layout).get(robot, -1)
         if deputy < 0 or self._change(robot, deputy, dead) is None:
             return ""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence, Set
 
+from factory.layout.layout import Layout
 from factory.plant.factory import Operation
 from factory.problem.pag import NOPART
 from factory.simulation.ideal import IdealWorld
@@ -146,6 +147,9 @@ class IdealPlant:
         """What feeders show."""
         labels = one_of({leaf.label for leaf in self._books.factory.leaves})
         self._shown = dict(keeper.rows("shown", self._shown.items(), labels, up_to(LARGE)))
+
+    def exchange(self, robot: int, layout: Layout) -> None:
+        """A dead robot is taken away for good."""
 
     def lift_out(self, robot: int, at: Mapping[int, float]) -> None:
         """A dead robot is taken away, and another is put in its place [m]."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence, Set
 from typing import Protocol
 
+from factory.layout.layout import Layout
 from factory.plant.factory import Operation
 from factory.simulation.keeping import Keeper
 from factory.simulation.recovery.faults import WorldFault
@@ -95,6 +96,10 @@ class Plant(Protocol):
     def lift_out(self, robot: int, at: Mapping[int, float]) -> None:
         """A dead robot and what it holds are taken away, and another is put in its place, with its
         axes at these places [m]."""
+
+    def exchange(self, robot: int, layout: Layout) -> None:
+        """A dead robot and what it holds are taken away for good, and what its feeder shows goes
+        back; the others go on as in a `layout`, where all have their numbers."""
 
     @property
     def binned(self) -> int:

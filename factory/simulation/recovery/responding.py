@@ -195,12 +195,12 @@ class Responding:
         after = Books(change.layout, supervisor)
         stay = (r.index for r in change.layout.factory.robots if r.operations)
         going = {r for r in stay if books.place_of(r, before) != after.place_of(r, marking)}
+        self._plant.exchange(robot, change.layout)
         scrap = {*self._plant.undone(after.held(marking), fired, going)}
         self.deputising.exchange(change, fired, undone)
         eps = self._simulation.request.settings.eps
         ways = ((r, way) for r, way in self.returning.ways.items() if r not in self.dead)
         self.returning = Returning(books.layout, supervisor, eps, dict(ways))
-        self._plant.lift_out(robot, {})
         over = [books.factory.operations[n] for n in under_way if n not in marking]
         self._wasting.barred = change.barred
         self._wasting.waste(scrap, {robot: held[robot] for robot in scrap})

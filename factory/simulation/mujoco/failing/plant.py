@@ -7,7 +7,8 @@ from collections.abc import Mapping, Sequence, Set
 import numpy as np
 
 from factory.layout.bins import Bin
-from factory.plant.factory import Operation
+from factory.layout.layout import Layout
+from factory.plant.factory import Factory, Operation
 from factory.problem.pag import NOPART
 from factory.simulation.keeping import Keeper, one_of, up_to
 from factory.simulation.mujoco.failing.fallen import Fallen
@@ -24,10 +25,14 @@ class MujocoPlant:
     """What recovery asks of a `MujocoWorld`, and does to it."""
 
     def __init__(self, world: MujocoWorld, campaign: Campaign) -> None:
-        self._world, self._factory, self._clear = world, world.model.factory, campaign.clear
+        self._world, self._layout, self._clear = world, world.model.layout, campaign.clear
         self._fallen = Fallen(world)
         self._mishaps, self._senses = Mishaps(world, self._fallen), Senses(world, campaign)
         self._scrapped, self.spilled = SCRAP, list[str]()
+
+    @property
+    def _factory(self) -> Factory:
+        return self._layout.factory
 
     def lose(self, robot: int) -> bool:
         """A robot's hand opens, and nothing tells; whether it held anything."""
@@ -197,11 +202,10 @@ class MujocoPlant:
                 if leaf.carrier in going:
                     feeders.stay_clear(leaf.carrier)
             elif leaf.carrier in scrap or (leaf.carrier in going and leaf.label in hand.bodies):
-                for label in self._world.model.layout.magazine(leaf.carrier):
+                for label in self._layout.magazine(leaf.carrier):
                     feeders.back.awaited.add(label)
-                    if label in (shown := feeders.shown()):
-                        self._mishaps.take_back(self._world.parts.copies[label, shown[label]])
-                        feeders.take_back(label, self._next_scrap())
+                    if label in feeders.shown():
+                        self._take_back(label)
 
     def let_go(self, robot: int, seconds: float, into: Bin | None = None) -> None:
         """A robot lets scrap fall, which lies for so long [s], into a bin where one is given."""
@@ -225,13 +229,13 @@ class MujocoPlant:
 
     def takes_back(self, robot: int) -> bool:
         """Whether something goes back up in a robot's feeder."""
-        labels = self._world.model.layout.magazine(robot)
+        labels = self._layout.magazine(robot)
         return not {*labels}.isdisjoint(self._world.parts.feeders.served())
 
     def came_back(self, robot: int) -> None:
         """A robot is where it waits."""
         feeders = self._world.parts.feeders
-        feeders.back.awaited.difference_update(self._world.model.layout.magazine(robot))
+        feeders.back.awaited.difference_update(self._layout.magazine(robot))
 
     @property
     def lying(self) -> Sequence[float]:
@@ -282,15 +286,35 @@ class MujocoPlant:
     def lift_out(self, robot: int, at: Mapping[int, float]) -> None:
         """A dead robot and what it holds are taken away, and another is put in its place, with its
         axes at these places [m]."""
-        world, feeders = self._world, self._world.parts.feeders
+        self._empty(robot)
+        self._world.motion.put(at)
+        self.came_back(robot)
+        self._world.parts.feeders.stay_clear(robot)
+
+    def _empty(self, robot: int) -> None:
+        """What a robot that is taken away holds is put out of sight."""
+        world = self._world
         if robot in world.parts.hands.of:
             hand = world.parts.hands.let_go(robot)
-            feeders.retire(hand.bodies, hand.unit)
+            world.parts.feeders.retire(hand.bodies, hand.unit)
         world.parts.welds.write()
         world.motion.load([robot], [0.0])
-        world.motion.put(at)
+
+    def exchange(self, robot: int, layout: Layout) -> None:
+        """A dead robot and what it holds are taken away for good, and what its feeder shows goes
+        back; the others go on as in a `layout`, where all have their numbers."""
+        self._empty(robot)
         self.came_back(robot)
-        feeders.stay_clear(robot)
+        for label in self._world.parts.feeders.elsewhere(layout):
+            self._take_back(label)
+        self._world.exchange(robot, layout)
+        self._layout = layout
+
+    def _take_back(self, label: str) -> None:
+        """What is shown of a label goes back into its feeder."""
+        feeders = self._world.parts.feeders
+        self._mishaps.take_back(self._world.parts.copies[label, feeders.shown()[label]])
+        feeders.take_back(label, self._next_scrap())
 
     def _next_scrap(self, count: int = 1) -> int:
         self._scrapped += count
