@@ -73,12 +73,18 @@ def taken_over(factory: Factory, dead: int, deputy: int, catalogue: Catalogue) -
 def nets_after(factory: Factory, entries: Iterable[Entry]) -> Iterator[GearNet]:
     """The nets in which a recorded run went on where robots were exchanged, in their order. They
     are not proved."""
+    return (without_gone(crew).net for crew in crews_after(factory, entries))
+
+
+def crews_after(factory: Factory, entries: Iterable[Entry]) -> Iterator[Factory]:
+    """The factories in which a recorded run went on where robots were exchanged, in their order,
+    with all robots (`crew_with`)."""
     number = {robot.name: robot.index for robot in factory.robots}
     for entry in entries:
         if isinstance(entry, Undone) and len(entry.robots) == 2:
             dead, deputy = (number[name] for name in entry.robots)
             factory = crew_with(factory, {dead: deputy})
-            yield without_gone(factory).net
+            yield factory
 
 
 def with_moved(factory: Factory, moved: Moved) -> Factory:

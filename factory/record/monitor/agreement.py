@@ -5,7 +5,9 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Iterable, Iterator, Sequence
 
+from factory.compiler.taking_over import nets_after
 from factory.nets.petri import PetriNet
+from factory.nets.undo import tokens_after
 from factory.nets.undone import Entry, Undone
 from factory.record.monitor.report import Firing, Violation
 from factory.record.monitor.subject import MonitorSubject
@@ -54,20 +56,22 @@ def contradictions(
 ) -> Iterator[Violation]:
     """The first marking in a log that its own entries do not lead to: what fired, and what was
     undone. Each marking is given with the time [s] of its tick; what was undone after that tick is
-    in it. Where robots were exchanged the net is another one from then on, and nothing is said."""
-    net = subject.factory.net.threaded
-    tokens = [int(place in subject.start) for place in range(len(net.places))]
-    left = deque(entries)
+    in it. Where robots were exchanged the net is another one from then on."""
+    left, gears = deque(entries), subject.factory.net
+    nets = nets_after(subject.factory, [entry for _, entry in left])
+    tokens = [int(place in subject.start) for place in range(len(gears.threaded.places))]
+    fired = [subject.counts.get(event, 0) for event in range(len(gears.threaded.transitions))]
     for time, marking in markings:
         while left and left[0][0] < time + (ROUNDING if _is_undone(left[0][1]) else -ROUNDING):
             _, entry = left.popleft()
+            _play(gears.threaded.net, tokens, fired, entry)
             if isinstance(entry, Undone) and entry.exchanged:
-                return
-            _play(net.net, tokens, entry)
+                gears = next(nets)
+                tokens = [*tokens_after(gears, fired)]
         marked = {place for place, count in enumerate(tokens) if count}
         if marked != set(marking):
             places = sorted(marked.symmetric_difference(marking))
-            names = ", ".join(net.places[place].name for place in places[:4])
+            names = ", ".join(gears.threaded.places[place].name for place in places[:4])
             words = f"its firings do not lead to the marking of that time: {names}"
             yield _violation(subject, time, "", words)
             return
@@ -77,11 +81,12 @@ def _is_undone(entry: Entry) -> bool:
     return isinstance(entry, Undone)
 
 
-def _play(net: PetriNet, tokens: list[int], entry: Entry) -> None:
-    """Fire a transition, or fire what was undone backwards."""
+def _play(net: PetriNet, tokens: list[int], fired: list[int], entry: Entry) -> None:
+    """Fire a transition, or fire what was undone backwards, and count it."""
     names, sign = (entry.transitions, -1) if isinstance(entry, Undone) else ((entry,), 1)
     for name in names:
         event = net.transition_index[name]
+        fired[event] += sign
         for place in net.preset[event]:
             tokens[place] -= sign
         for place in net.postset[event]:

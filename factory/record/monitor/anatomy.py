@@ -15,7 +15,7 @@ from factory.plant.factory import Factory
 from factory.record.monitor.observation import Index
 
 Holder = tuple[int, int]
-"""Kind and, for a grip, the robot's index; -1 for others."""
+"""Kind and, for a grip, the robot's index; -1 for others, and for a robot that is gone."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,10 +86,12 @@ def _holder(words: list[str], robots: dict[str, int]) -> Holder | None:
     kind = KINDS.get(words[0])
     if kind is None:
         return None
-    return (kind, robots[words[1]]) if kind == GRIP else (kind, -1)
+    return (kind, robots.get(words[1], -1)) if kind == GRIP else (kind, -1)
 
 
 def _part(words: list[str]) -> str:
-    """The label in a weld's name: `grip/r3/part1`, `park/part1#2`."""
+    """The label in a weld's name: `grip/r3/part1`, `park/part1#2`, `feed/part1@r3`."""
     label = words[-1] if words[0] == "grip" else "/".join(words[1:])
+    if words[0] == "feed":
+        return names.shown(label)
     return label.rpartition("#")[0] if words[0] == "park" else label

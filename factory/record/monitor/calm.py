@@ -16,8 +16,8 @@ from typing import Any
 
 import numpy as np
 
+from factory.compiler.taking_over import crews_after
 from factory.mjcf import names
-from factory.nets.history import firings
 from factory.nets.petri import Marking
 from factory.plant.factory import Factory
 from factory.record.log.reader import Log
@@ -38,14 +38,36 @@ FELT = 1.0
 Span = tuple[float, float]
 
 
+class Crews:
+    """The subjects of a run, in which deputies may have taken over, and their factories with all
+    robots: one from each exchange on."""
+
+    def __init__(self, log: Log, subject: MonitorSubject) -> None:
+        exchanges = [one for _, one in log.undone if one.robots]
+        crews = [*crews_after(subject.factory, exchanges)]
+        self._since = [one.t for one in exchanges]
+        self._subjects = [subject, *map(subject.after, crews)]
+        self._factories = [subject.factory, *crews]
+
+    def subject(self, t: float) -> MonitorSubject:
+        """What is under watch at a time [s]."""
+        return self._subjects[bisect_left(self._since, t + ROUNDING)]
+
+    def factory(self, t: float) -> Factory:
+        """Its factory, with all robots."""
+        return self._factories[bisect_left(self._since, t + ROUNDING)]
+
+
 def judge_calm(log: Log, subject: MonitorSubject, m: Any, seen: Sequence[Observation]) -> Report:
     """The verdict of a monitor on each spell of a run whose observations these are, all in one."""
     rows, times = [], log.time
-    for begin, end in spells(log, subject.factory, m):
+    crews, units = Crews(log, subject), _Units(log, subject)
+    for begin, end in spells(log, crews, m):
         first, last = (int(np.searchsorted(times, t - ROUNDING)) for t in (begin, end))
         if last - first > 1 and times[last - 1] - times[first] >= SHORT:
             rows.append((first, last))
-    reports = [_judged(log, subject, m, seen, span) for span in rows]
+    at = ((span, crews.subject(float(times[span[0]]))) for span in rows)
+    reports = [_judged(log, subject, m, seen, units, span) for span, subject in at]
     return Report(
         tuple(f for one in reports for f in one.seen),
         tuple(f for one in reports for f in one.inferred),
@@ -56,7 +78,12 @@ def judge_calm(log: Log, subject: MonitorSubject, m: Any, seen: Sequence[Observa
 
 
 def _judged(
-    log: Log, subject: MonitorSubject, m: Any, seen: Sequence[Observation], span: tuple[int, int]
+    log: Log,
+    subject: MonitorSubject,
+    m: Any,
+    seen: Sequence[Observation],
+    units: _Units,
+    span: tuple[int, int],
 ) -> Report:
     begin, end = (float(log.time[row]) for row in (span[0], span[1] - 1))
     at = [bisect_left(seen, t, key=lambda o: o.time) for t in (begin - ROUNDING, end + ROUNDING)]
@@ -74,7 +101,7 @@ def _judged(
     first, last = np.searchsorted(log.fired_t, [begin - ROUNDING, end - ROUNDING]).tolist()
     recorded = [*log.events[first:last]]
     found = monitor.report(recorded)
-    offset = _offset(log, subject, start, begin)
+    offset = units.more(here, begin)
 
     def counted(one: Firing) -> Firing:
         return replace(one, unit=one.unit + offset)
@@ -86,19 +113,28 @@ def _judged(
     )
 
 
-def _offset(log: Log, subject: MonitorSubject, start: Marking, begin: float) -> int:
-    """How many units more have been made when a spell begins than its marking tells."""
-    first = subject.factory.net.threaded.transitions[0].name
-    fired = subject.counts.get(0, 0)
-    for t, entry in log.timed_entries:
-        if t < begin - ROUNDING:
-            fired += (entry == first) if isinstance(entry, str) else -entry.transitions.count(first)
-    return fired - firings(subject.factory.net, start).get(0, 0)
+class _Units:
+    """How many units have been begun, by the record of a run: the first transition fires once for
+    each."""
+
+    def __init__(self, log: Log, subject: MonitorSubject) -> None:
+        first = subject.factory.net.threaded.transitions[0].name
+        self._times, self._begun = list[float](), [subject.counts.get(0, 0)]
+        for t, entry in log.timed_entries:
+            more = (entry == first) if isinstance(entry, str) else -entry.transitions.count(first)
+            if more:
+                self._times.append(t)
+                self._begun.append(self._begun[-1] + more)
+
+    def more(self, subject: MonitorSubject, begin: float) -> int:
+        """How many more a spell begins with [s] than its first marking tells."""
+        at = bisect_left(self._times, begin - ROUNDING)
+        return self._begun[at] - subject.counts.get(0, 0)
 
 
-def spells(log: Log, factory: Factory, m: Any) -> Iterator[Span]:
+def spells(log: Log, crews: Crews, m: Any) -> Iterator[Span]:
     """From when to when nothing fails and nothing is put right [s], in order."""
-    troubles, now = sorted(_troubles(log, factory, m)), 0.0
+    troubles, now = sorted(_troubles(log, crews, m)), 0.0
     for begin, end in troubles:
         if begin > now:
             yield now, begin
@@ -107,29 +143,28 @@ def spells(log: Log, factory: Factory, m: Any) -> Iterator[Span]:
         yield now, float(log.time[-1]) + ROUNDING
 
 
-def _troubles(log: Log, factory: Factory, m: Any) -> Iterator[Span]:
+def _troubles(log: Log, crews: Crews, m: Any) -> Iterator[Span]:
     """From when to when something fails or is put right [s]."""
-    end = float(log.time[-1])
+    end, factory = float(log.time[-1]), crews.factory(0.0)
     by_robot = {robot.name: robot.index for robot in factory.robots}
     number = factory.net.threaded.net.transition_index
     for _, undone in log.undone:
-        back = {factory.operations[number[name] // 2] for name in undone.transitions}
+        operations = crews.factory(undone.t).operations
+        back = {operations[number[name] // 2] for name in undone.transitions}
         robots = {robot for operation in back for robot in operation.robots}
-        yield _since(log, undone.t, undone.operation), _gone_on(log, factory, robots, undone.t, end)
+        robots |= {by_robot[name] for name in undone.robots}
+        yield _since(log, undone.t, undone.operation), _gone_on(log, crews, robots, undone.t, end)
     failures = log.failures
     for one in failures.found if failures else ():
-        robots = {*factory.by_label[one.operation].robots}
+        robots = {*crews.factory(one.t).by_label[one.operation].robots}
         robots |= {by_robot[one.robot]} if one.robot else set()
-        until = _gone_on(log, factory, robots, one.t, end)
+        until = _gone_on(log, crews, robots, one.t, end)
         yield _since(log, one.t, one.operation), max(until, min(one.until or 0.0, end))
     stood = failures.stood if failures else ()
-    for place, (t, robots_standing) in enumerate(stood):
-        if robots_standing:
+    for place, (t, names_) in enumerate(stood):
+        if names_:
             until = stood[place + 1][0] if place + 1 < len(stood) else end
-            yield (
-                t - FELT,
-                _gone_on(log, factory, {by_robot[r] for r in robots_standing}, until, end),
-            )
+            yield t - FELT, _gone_on(log, crews, {by_robot[r] for r in names_}, until, end)
     yield from _lying(log, m)
 
 
@@ -141,11 +176,13 @@ def _since(log: Log, t: float, label: str) -> float:
     return min(t - FELT, next((when for when, name in before if name in own), 0.0)) - ROUNDING
 
 
-def _gone_on(log: Log, factory: Factory, robots: set[int], t: float, end: float) -> float:
-    """When each of the robots has fired again after t [s]."""
-    number, left = factory.net.threaded.net.transition_index, set(robots)
+def _gone_on(log: Log, crews: Crews, robots: set[int], t: float, end: float) -> float:
+    """When each of the robots has fired again after t [s], or is gone."""
+    number, left = crews.factory(t).net.threaded.net.transition_index, set(robots)
     for when, name in islice(log.events, int(np.searchsorted(log.fired_t, t, "right")), None):
+        factory = crews.factory(when)
         left -= {*factory.operations[number[name] // 2].robots}
+        left = {robot for robot in left if factory.robots[robot].operations}
         if not left:
             return when + FELT
     return end + FELT

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -161,11 +161,16 @@ def misplaced(
     anatomy: Anatomy, factory: Factory, places: dict[str, Array], tolerance: float = 1e-6
 ) -> list[int]:
     """The welds (by number) that do not keep a part in its place in the product, relative to the
-    others that the same holder keeps, a robot on one tour."""
+    others that the same holder keeps, a robot on one tour. Those by which robots hold nothing in
+    this factory, but may as deputies, are left out."""
     first: dict[tuple[int, ...], tuple[Array, Array]] = {}
+    inside, robots = factory.contents, range(len(factory.robots))
+    brought = [{part for x in factory.deliveries(r) for part in inside[x]} for r in robots]
     found = []
     for weld, holder in enumerate(anatomy.holder):
         if holder is None or holder[0] not in (GRIP, HOLD):
+            continue
+        if holder[0] == GRIP and not _brings(brought, holder[1], inside[anatomy.part[weld]]):
             continue
         base, place = anatomy.frames.base[weld], places[anatomy.part[weld]]
         tour = factory.tour_with(holder[1], anatomy.part[weld]) if holder[0] == GRIP else 0
@@ -173,3 +178,8 @@ def misplaced(
         if np.abs((base - anchor) - (place - middle)).max() > tolerance:
             found.append(weld)
     return found
+
+
+def _brings(brought: Sequence[set[str]], robot: int, parts: Iterable[str]) -> bool:
+    """Whether a robot, -1 for one that is gone, ever brings parts."""
+    return robot >= 0 and brought[robot].issuperset(parts)

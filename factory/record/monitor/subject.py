@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from types import MappingProxyType
 from typing import Any
 
+from factory.compiler.taking_over import present, without_gone
 from factory.layout.hands.leaving import goes_early
 from factory.layout.layout import Layout
 from factory.nets.history import firings
@@ -21,6 +22,10 @@ PATIENCE = 4.0
 """A run stalls when nothing happens for this many times the longest time of an operation."""
 
 
+Manned = tuple[int, tuple[int, ...]]
+"""An operation and the robots that take part in it (indices)."""
+
+
 @dataclass(frozen=True)
 class MonitorSubject:
     """The factory under watch.
@@ -29,7 +34,8 @@ class MonitorSubject:
     [m]; `places[label]`: the centre of mass of a part, or a sub-assembly that is one body, in the
     frame of the product [m]; `start`: the marking in which the run begins; `wip`: the bound on
     what is let in; `patience` [s]; `early`: (operation, robot) where a robot goes ahead whatever
-    the settings, since its hand has to be gone.
+    the settings, since its hand has to be gone; `others`: the goals of operations (index) in which
+    other robots take part once a deputy has taken over.
     """
 
     factory: Factory
@@ -41,9 +47,20 @@ class MonitorSubject:
     patience: float
     wip: int | None = None
     early: frozenset[tuple[int, int]] = frozenset()
+    others: Mapping[Manned, tuple[float, ...]] = field(default_factory=dict, repr=False)
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "places", MappingProxyType(dict(self.places)))
+        for name in ("places", "others"):
+            object.__setattr__(self, name, MappingProxyType(dict(getattr(self, name))))
+
+    def after(self, crew: Factory) -> MonitorSubject:
+        """What is under watch when robots are gone and others have their tours: a `crew` in which
+        robots have the numbers that they have here."""
+        number = {robot: n for n, robot in enumerate(present(crew))}
+        own = zip(crew.operations, self.goals, strict=True)
+        goals = tuple(self.others.get((o.index, o.robots), goals) for o, goals in own)
+        early = frozenset((o, number[robot]) for o, robot in self.early if robot in number)
+        return replace(self, factory=without_gone(crew), goals=goals, early=early, others={})
 
     @cached_property
     def counts(self) -> Mapping[int, int]:
@@ -94,6 +111,9 @@ class MonitorSubject:
         """The name of an operation in messages: `mate(sub1)`."""
         return f"{operation.template.name}({operation.label})"
 
+    def _others(self) -> list[list[Any]]:
+        return [[number, [*robots], [*goals]] for (number, robots), goals in self.others.items()]
+
     def as_json(self) -> dict[str, Any]:
         """What a log keeps beside the PAG and the settings."""
         return {
@@ -102,6 +122,7 @@ class MonitorSubject:
             "places": {part: list(place) for part, place in self.places.items()},
             "patience": self.patience,
             "early": sorted(list(pair) for pair in self.early),
+            **({"others": self._others()} if self.others else {}),
         }
 
 
@@ -133,7 +154,21 @@ def subject_of(
     travel += layout.outfeed_way / settings.outfeed + max(o.dwell for o in factory.operations)
     marking = factory.net.initial_marking if start is None else start
     patience, early = round(PATIENCE * travel, 6), frozenset(goes_early(layout))
-    return MonitorSubject(factory, goals, radii, places, settings, marking, patience, wip, early)
+    subject = MonitorSubject(factory, goals, radii, places, settings, marking, patience, wip, early)
+    return subject if layout.standby is None else _with_others(subject, layout.standby)
+
+
+def _with_others(subject: MonitorSubject, whole: Layout) -> MonitorSubject:
+    """A subject that knows of deputies: of all that their robots may do."""
+    number = {o.label: o.index for o in subject.factory.operations}
+    own = {(o.index, o.robots) for o in subject.factory.operations}
+    every, others = whole.factory.operations, dict[Manned, tuple[float, ...]]()
+    for o in every:
+        if (key := (number[o.written], o.robots)) not in own:
+            goals = (whole.goal(o.index, slot) for slot in range(len(o.robots)))
+            others.setdefault(key, tuple(goals))
+    early = {(number[every[o].written], robot) for o, robot in goes_early(whole)}
+    return replace(subject, others=others, early=subject.early | early)
 
 
 def subject_of_run(simulation: Observed) -> MonitorSubject:
@@ -166,4 +201,6 @@ def subject_from(
     patience = float(kept["patience"])
     early = frozenset((int(o), int(r)) for o, r in kept.get("early", ()))
     marking = frozenset(start)
-    return MonitorSubject(factory, goals, radii, places, settings, marking, patience, wip, early)
+    others = {(int(o), tuple(robots)): tuple(row) for o, robots, row in kept.get("others", ())}
+    given = goals, radii, places, settings, marking, patience, wip, early, others
+    return MonitorSubject(factory, *given)

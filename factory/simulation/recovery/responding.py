@@ -193,8 +193,9 @@ class Responding:
         before, held, under_way = books.marking, books.held(), supervisor.active.operations
         marking = marking_after(change.layout.factory.net, fired)
         after = Books(change.layout, supervisor)
-        stay = (r.index for r in change.layout.factory.robots if r.operations)
-        going = {r for r in stay if books.place_of(r, before) != after.place_of(r, marking)}
+        going = {
+            r for r in after.present if books.place_of(r, before) != after.place_of(r, marking)
+        }
         self._plant.exchange(robot, change.layout)
         scrap = {*self._plant.undone(after.held(marking), fired, going)}
         self.deputising.exchange(change, fired, undone)
@@ -227,7 +228,7 @@ class Responding:
         books, supervisor, factory = self._books, self._books.supervisor, self._books.factory
         before, under_way = books.marking, supervisor.active.operations
         fired = undo(factory.net, supervisor.fired, asked, joins_of(factory))
-        marking, robots = marking_after(factory.net, fired), range(len(factory.robots))
+        marking, robots = marking_after(factory.net, fired), books.present
         going = {r for r in robots if books.step_of(r, before) != books.step_of(r, marking)}
         what = self._now, operation.label, reason
         undone = Undone.between(factory.net, what, asked, supervisor.fired, fired)
