@@ -47,7 +47,8 @@ class Station:
 class Supply:
     """Which units need a part of each label: as many as are requested beside those that have been
     `released` to the outfeed, or were begun where the run starts, at most `wip` at once. The `next`
-    unit that needs one comes a `period` of units after the one before."""
+    unit that needs one comes a `period` of units after the one before. `recovers`: the run goes on
+    where something fails."""
 
     def __init__(self, model: Model, request: RunRequest, counts: Mapping[int, int]) -> None:
         factory, leaves = model.factory, model.factory.leaves
@@ -56,6 +57,7 @@ class Supply:
         self._begun = {o.label: factory.unit(o, counts.get(o.start, 0) - 1) + 1 for o in leaves}
         self.released = factory.units(counts)
         self._units, self._wip = self.released + request.units, request.wip
+        self.recovers = request.recovers
 
     def rounds(self) -> dict[str, int]:
         """How many parts of each label have been taken."""
@@ -82,12 +84,14 @@ class TakenBack:
     """What goes wrong with parts that are shown. `parts`: those on their way back, with the unit
     that they count for, by feeder; `fresh`: those that have begun to be shown, with their unit, by
     label; `good`: labels whose part has been looked at and is good; `awaited`: labels of which none
-    is to come yet."""
+    is to come yet; `late`: feeders that had nothing to show on their turn, so that their robots may
+    be home before the next part comes down."""
 
     parts: dict[int, int] = field(default_factory=dict)
     fresh: dict[str, int] = field(default_factory=dict)
     good: set[str] = field(default_factory=set)
     awaited: set[str] = field(default_factory=set)
+    late: set[int] = field(default_factory=set)
 
 
 class Feeders:
@@ -203,6 +207,7 @@ class Feeders:
             self._take_back()
         busy = self._turns.any_of((self._sliders.ends < NEVER) | self._held_back())
         free = self._turns.vacant & ~busy & self._passing.clear()
+        free[self._obstructed()] = False
         if not np.count_nonzero(free):
             return False
         loaded = self._load(free.nonzero()[0])
@@ -266,6 +271,16 @@ class Feeders:
         robots = ((x, self._stations[self._number[x]].robot) for x in self._shown)
         return [label for label, robot in robots if by_label[label].carrier != robot]
 
+    def in_the_way(self) -> set[int]:
+        """The robots (index) under which a part comes late that they wait for."""
+        return {self._stations[n].robot for n in self._obstructed() if self._turns.vacant[n]}
+
+    def _obstructed(self) -> list[int]:
+        """Feeders that are late, whose robots stand where the next part comes down. That robots are
+        in time for it, unless something fails, is in the layout."""
+        late = self.back.late if self.supply.recovers else ()
+        return [n for n in late if not self._passing.is_aside(n)]
+
     def stay_clear(self, robot: int) -> None:
         """The next part for a robot (index) comes down when that is out of the way."""
         self._passing.come_clear(robot)
@@ -304,6 +319,10 @@ class Feeders:
         asked = [(number,) for number in sorted(self._asked)]
         asked = keeper.rows("feeders.asked", asked, up_to(len(self._stations)))
         self.due = keeper.number("feeders.due", self.due, high=NEVER)
+        if self.supply.recovers:
+            late = [(number,) for number in sorted(self.back.late)]
+            late = keeper.rows("feeders.late", late, up_to(len(self._stations)))
+            self.back.late = {number for (number,) in late}
         self._shown = dict(shown)
         self._asked = {number for (number,) in asked}
         if any(part not in self._copies for part in shown):
@@ -318,6 +337,7 @@ class Feeders:
         them; where not, they are looked for again when one has become free. Gives which."""
         self._turns.vacant[numbers] = False
         loaded = [n for n in numbers.tolist() if self._supplied(self._stations[n].label)]
+        self.back.late = self.back.late.union(numbers.tolist()).difference(loaded)
         for number in loaded:
             station, supply = self._stations[number], self.supply
             unit = self._shown[station.label] = supply.next[station.label]

@@ -121,6 +121,10 @@ class IdealPlant:
     def throw_away(self, robot: int, label: str, seconds: float) -> None:
         """A robot lets scrap fall."""
 
+    def in_the_way(self) -> Set[int]:
+        """No robot is in the way of a part."""
+        return frozenset()
+
     def takes_back(self, robot: int) -> bool:
         """Whether something goes back up in a robot's feeder."""
         return False

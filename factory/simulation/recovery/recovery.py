@@ -167,6 +167,7 @@ class Recovery:
         respond = self.responding
         for robot in respond.replaced(now):
             self.striking.standing.pop(robot, None)
+        respond.make_way()
         closed = self.plant.closed
         respond.standing.let_stand({*closed, *self.striking.standing, *respond.dead})
         respond.returning.tick({*closed, *respond.dead}, now)

@@ -112,6 +112,16 @@ class Responding:
         back = partial(self.returning.send, robot, WayBack(waits, ready=is_up))
         self.returning.send(robot, WayBack(self.returning.aside(robot, leaf), done=back))
 
+    def make_way(self) -> None:
+        """Robots that wait at their feeders, and are in the way of what comes late there, go out of
+        its way."""
+        books = self._books
+        for robot in self._plant.in_the_way() - self.returning.ways.keys() - self.dead.keys():
+            if books.step_of(robot) % 2 or books.operation_of(robot).inputs:
+                continue
+            books.supervisor.recall(self.standing.axes([robot]))
+            self.returning.send(robot, WayBack(self.returning.rest(robot, books.marking)))
+
     def lost(self, robot: int) -> None:
         """A robot has lost what it held: that is made again."""
         label, operation = self._books.holds(robot), self._books.operation_of(robot)

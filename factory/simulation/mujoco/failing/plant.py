@@ -227,6 +227,10 @@ class MujocoPlant:
             self.spilled.append(self._factory.robots[robot].name)
         self.let_go(robot, seconds, into)
 
+    def in_the_way(self) -> Set[int]:
+        """The robots under which a part comes late that they wait for."""
+        return self._world.parts.feeders.in_the_way()
+
     def takes_back(self, robot: int) -> bool:
         """Whether something goes back up in a robot's feeder."""
         labels = self._layout.magazine(robot)
