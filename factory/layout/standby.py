@@ -23,11 +23,10 @@ class Repertoire:
 
     @classmethod
     def of(cls, layout: Layout) -> Repertoire:
-        """That of a layout whose robots are all there."""
-        if layout.standby is None:
+        """That of a layout; nothing more where deputies cannot take over."""
+        if (whole := _whole(layout)) is None:
             return cls(layout, {label: label for label in layout.factory.by_label})
-        making = layout.standby.factory.making
-        return cls(layout.standby, {o.label: o.written for o in making})
+        return cls(whole, {o.label: o.written for o in whole.factory.making})
 
     def delivered(self, robot: int) -> list[str]:
         """What a robot (index) may ever deliver, as it is called in the factory."""
@@ -36,13 +35,20 @@ class Repertoire:
 
 def deputies_in(layout: Layout) -> Mapping[int, int]:
     """The robots of a layout for which a deputy can take over, and that (indices)."""
-    if layout.standby is None:
+    if (whole := _whole(layout)) is None:
         return {}
     first, found = layout.factory.by_label, dict[int, int]()
-    for o in layout.standby.factory.operations:
-        pairs = zip(layout.standby.factory.by_label[o.written].robots, o.robots, strict=True)
+    for o in whole.factory.operations:
+        pairs = zip(whole.factory.by_label[o.written].robots, o.robots, strict=True)
         found |= {robot: other for robot, other in pairs if robot != other and o.written in first}
     return found
+
+
+def _whole(layout: Layout) -> Layout | None:
+    """The layout of all that robots and their deputies may do, None where there is none, or some of
+    its robots are gone."""
+    whole, count = layout.standby, len(layout.factory.robots)
+    return whole if whole and len(whole.factory.robots) == count else None
 
 
 def part_of(layout: Layout, factory: Factory, robots: Sequence[int]) -> Layout | None:

@@ -235,10 +235,11 @@ class Feeders:
         self.back.good.discard(label)
 
     def served(self) -> Iterator[str]:
-        """The labels of feeders that take a part back."""
+        """The labels of feeders that take a part back, but for those whose robots are in its way:
+        it waits for them."""
         for number in self.back.parts:
-            line = self._turns.lines[number]
-            yield from (self._stations[n].label for n in line)
+            if self._passing.is_aside(number):
+                yield from (self._stations[n].label for n in self._turns.lines[number])
 
     def shown(self) -> dict[str, int]:
         """The unit of the part that is shown of each label."""
@@ -273,7 +274,8 @@ class Feeders:
 
     def in_the_way(self) -> set[int]:
         """The robots (index) under which a part comes late that they wait for."""
-        return {self._stations[n].robot for n in self._obstructed() if self._turns.vacant[n]}
+        due = (self._stations[n] for n in self._obstructed() if self._turns.vacant[n])
+        return {station.robot for station in due if self._supplied(station.label)}
 
     def _obstructed(self) -> list[int]:
         """Feeders that are late, whose robots stand where the next part comes down. That robots are

@@ -83,7 +83,7 @@ class Plant(Protocol):
         """The robots under which a part comes late that they wait for."""
 
     def takes_back(self, robot: int) -> bool:
-        """Whether something goes back up in a robot's feeder."""
+        """Whether something goes back up in a robot's feeder, and the robot is out of its way."""
 
     def came_back(self, robot: int) -> None:
         """A robot is where it waits."""

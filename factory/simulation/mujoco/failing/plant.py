@@ -232,7 +232,7 @@ class MujocoPlant:
         return self._world.parts.feeders.in_the_way()
 
     def takes_back(self, robot: int) -> bool:
-        """Whether something goes back up in a robot's feeder."""
+        """Whether something goes back up in a robot's feeder, and the robot is out of its way."""
         labels = self._layout.magazine(robot)
         return not {*labels}.isdisjoint(self._world.parts.feeders.served())
 

@@ -1,0 +1,257 @@
+"""A deputy takes over in the engine: the dead robot is lifted out, its parts come from the deputy's
+feeder, and the monitor judges what follows with the crew of then."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import numpy as np
+import pytest
+
+from factory.layout import standby
+from factory.layout.bins import bins_of
+from factory.layout.feeding import feeder_of, lines_of, outlets_of
+from factory.layout.layout import Layout
+from factory.layout.request import Ground
+from factory.layout.standby import Repertoire, deputies_in, part_of
+from factory.mjcf import names
+from factory.pipeline import read
+from factory.record.log import read_log
+from factory.record.monitor.record import watch_log
+from factory.record.monitor.subject import MonitorSubject
+from factory.simulation.modelling import physical_model
+from factory.simulation.mujoco.contacts import ContactMasks
+from factory.simulation.mujoco.failing.plant import MujocoPlant
+from factory.simulation.mujoco.feeders import Feeders
+from factory.simulation.recovery import Campaign, Recovery, WorldFault, deputising, recover
+from factory.simulation.request import RunRequest
+from factory.simulation.run import Run
+from factory.simulation.simulation import Simulation
+from tests.bench.faults.takeovers import PAPER as INSERTS
+from tests.command_line import ROOT, Terminal
+
+STEPS = """root = s2; s1 = insert ( base, a ); s2 = insert ( s1, b );
+base = atomic ( box = ( 0.16, 0.1, 0.02 ), pos = ( 0, 0, 0.01 ) );
+a = atomic ( box = ( 0.03, 0.03, 0.02 ), pos = ( -0.04, 0, 0.03 ) );
+b = atomic ( box = ( 0.03, 0.03, 0.03 ), pos = ( 0.04, 0, 0.035 ) )"""
+"""Two robots with lifts put parts of two heights onto a base; each can do the other's."""
+
+DEATH = '[[fault]]\nkind = "dead"\nrobot = "r4"\nat = 7\n'
+
+
+@cache
+def laid_out(text: str, with_deputies: bool = True) -> Layout:
+    """The layout of a product."""
+    with TemporaryDirectory() as folder:
+        file = Path(folder) / "product.pag"
+        file.write_text(text)
+        return read(file, ground=Ground(deputies=with_deputies)).layout
+
+
+def simulated(
+    text: str, robot: str, at: float, more: tuple[WorldFault, ...] = (), **asked: Any
+) -> tuple[Simulation, Recovery]:
+    """A run in which a robot dies and no spare is there."""
+    simulation = Simulation(laid_out(text), RunRequest("mujoco", 10, recovers=True, **asked))
+    faults = (WorldFault("dead", robot=robot, at=at), *more)
+    return simulation, recover(simulation, Campaign(faults, swap=4.0))
+
+
+def figures(run: Run) -> tuple[int, int, float]:
+    """Onsets of contact, products, and the largest residual of a weld [mm]."""
+    assert run.physics is not None
+    return run.physics.unintended_contacts, run.products, run.physics.weld_residual_max_mm
+
+
+# --- runs -----------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("fuse", [False, True])
+@pytest.mark.parametrize(("dead", "deputy"), [("r2", "r4"), ("r4", "r2")])
+def test_all_units_are_made(dead: str, deputy: str, fuse: bool) -> None:
+    """At the pace that is predicted for N', and nothing touches."""
+    simulation, _ = simulated(INSERTS, dead, 7.0, fuse=fuse)
+    run = simulation.run(max_time=150.0)
+    assert (run.products, run.trouble, run.refines_net) == (10, None, True)
+    (change,) = run.exchanges
+    assert (change.dead, change.deputy) == (dead, deputy)
+    left = [t for t in run.dropoffs if t > change.t][2:]
+    interval = (left[-1] - left[0]) / (len(left) - 1)
+    assert interval == pytest.approx(change.cycle_time, rel=0.03)
+    contacts, _, residual = figures(run)
+    assert not contacts and residual < 0.1
+    assert run.physics is not None and (run.physics.product_error_max_mm or 0.0) < 0.1
+
+
+@pytest.mark.parametrize("dead", ["r2", "r3"])
+def test_parts_of_two_heights(dead: str) -> None:
+    """The deputy's lift goes as far as either of the tours asks for, from the beginning."""
+    layout = laid_out(STEPS)
+    assert layout.factory.strokes == {1: 0.04, 2: 0.02} and deputies_in(layout) == {1: 2, 2: 1}
+    assert {layout.level(robot, robot).up for robot in (1, 2)} == {0.041}
+    run = simulated(STEPS, dead, 5.0)[0].run(max_time=150.0)
+    contacts, products, residual = figures(run)
+    assert (contacts, products, len(run.exchanges)) == (0, 10, 1) and residual < 0.1
+
+
+def test_other_faults_go_on() -> None:
+    """What is dropped and rejected before and after is made again."""
+    more = WorldFault("drop", rate=0.05), WorldFault("bad_part", rate=0.05)
+    simulation, recovery = simulated(INSERTS, "r4", 7.0, more)
+    run = simulation.run(max_time=300.0)
+    assert (run.products, run.trouble, run.refines_net) == (10, None, True)
+    assert figures(run)[0] == 0 and len(run.exchanges) == 1
+    after = [one for one in recovery.found if one.t > run.exchanges[0].t]
+    assert {one.test for one in after} >= {"lost"}
+
+
+# --- the model ------------------------------------------------------------------------------------
+
+
+def test_the_model_has_what_deputies_need() -> None:
+    """For each part a weld more in the feeder of its deputy, and one in its hand; and no more than
+    that without deputies."""
+    layout = laid_out(INSERTS)
+    outlets = outlets_of(layout)
+    assert [outlet.name for outlet in outlets] == ["part1", "part2", "part3", "part3@r4", "part2@r2"]
+    assert [names.shown(outlet.name) for outlet in outlets] == [o.label for o in outlets]
+    assert [len(line) for line in lines_of(layout)] == [1, 2, 0, 2]
+    for line in lines_of(layout):
+        assert len({outlet.feeder.housing for outlet in line}) <= 1
+    xml = physical_model(layout, 3).xml
+    plain = physical_model(laid_out(INSERTS, False), 3).xml
+    for found in ("feed/part2@r2", "feed/part3@r4", "grip/r2/part2", "grip/r4/part3"):
+        assert f'name="{found}"' in xml and f'name="{found}"' not in plain
+    whole = Repertoire.of(layout)
+    assert whole.layout is layout.standby and {*whole.names.values()} == {
+        *layout.factory.by_label
+    }
+    assert {*bins_of(layout)[-1].labels} <= {*layout.factory.by_label}
+
+
+def test_a_part_alone_has_its_own_tours() -> None:
+    """What is left when a robot is gone is a layout of its own, with the feeders of the whole."""
+    layout = laid_out(INSERTS)
+    after = deputising.with_moved(layout.factory, {1: 3})
+    alone = part_of(layout, after, (0, 2, 3))
+    assert alone is not None and not deputies_in(alone)
+    assert Repertoire.of(alone).layout is alone and len(outlets_of(alone)) == 3
+    assert feeder_of(alone, "part2") == feeder_of(layout, "part2")
+
+
+# --- planted faults -------------------------------------------------------------------------------
+
+
+def test_levels_of_the_first_factory_do_not_fit_the_deputy(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Planted: each factory has the levels that its own tours ask for."""
+    layout = replace(laid_out(STEPS), given=None)
+    found = standby.part_of
+
+    def ungiven(*args: Any) -> Layout | None:
+        part = found(*args)
+        return part and replace(part, given=None)
+
+    monkeypatch.setattr(deputising, "part_of", ungiven)
+    simulation = Simulation(layout, RunRequest("mujoco", 10, recovers=True))
+    recover(simulation, Campaign((WorldFault("dead", robot="r2", at=5.0),), swap=4.0))
+    assert figures(simulation.run(max_time=150.0))[2] > 1.0, "a weld pulls its part into place"
+
+
+def test_a_dead_robot_that_stays_is_in_the_way(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Planted: it is not lifted out. Its robot dies with its part at the station."""
+    monkeypatch.setattr(ContactMasks, "remove", lambda masks, bodies: None)
+    simulation, _ = simulated(INSERTS, "r4", 7.0)
+    run = simulation.run(max_time=60.0)
+    assert len(run.exchanges) == 1 and figures(run)[0] > 0
+
+
+def test_what_a_dead_robots_feeder_shows_goes_back(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Planted: it does not."""
+    monkeypatch.setattr(Feeders, "elsewhere", lambda feeders, layout: [])
+    simulation, _ = simulated(INSERTS, "r4", 7.0)
+    run = simulation.run(max_time=60.0)
+    assert run.products < 10 or figures(run)[0] or figures(run)[2] > 1.0
+
+
+def test_a_part_that_comes_late_waits_for_its_robot(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The last product is lost when no feeder has anything to show any more, and robots are home:
+    they go out of the way of what comes then. Planted: they do not."""
+    layout = read(ROOT / "examples" / "truck.pag").layout
+    for is_kept in (True, False):
+        if not is_kept:
+            monkeypatch.setattr(Feeders, "_obstructed", lambda feeders: [])
+        simulation = Simulation(layout, RunRequest("mujoco", 2, recovers=True))
+        recovery = recover(simulation, Campaign())
+        lost: list[float] = []
+
+        def lose(world: Any, supervisor: Any, lost: list[float] = lost, by: Any = recovery) -> None:
+            settled = not supervisor.active.ahead and {1} == {
+                supervisor.fired[o.end] - supervisor.fired[layout.factory.dropoff.end]
+                for o in layout.factory.making
+            }
+            if not lost and settled and world.dropoffs and by.plant.lose(0):
+                lost.append(world.time)
+
+        run = simulation.run([lose], max_time=120.0)
+        assert lost and run.products == 2
+        assert (figures(run)[0] == 0) == is_kept
+
+
+# --- the command and the monitor ------------------------------------------------------------------
+
+
+def test_end_to_end(run: Terminal, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The run succeeds, and so says the monitor of its log, which knows where the deputy goes.
+    Planted: it does not."""
+    pag, faults, log = (tmp_path / name for name in ("inserts.pag", "faults.toml", "run.log"))
+    pag.write_text(INSERTS)
+    faults.write_text(DEATH)
+    words = ("run", pag, "--units", 8, "--faults", faults, "--swap", 4, "--deputies")
+    done = run(*words, "--log", log, "--json")
+    assert done.status == 0, done.err
+    (change,) = done.json["exchanges"]
+    assert (change["dead"], change["deputy"]) == ("r4", "r2")
+    assert done.json["unintended_contacts"] == 0
+    judged = run("monitor", log)
+    assert judged.status == 0 and "they explain the run" in judged.out
+    report, subject = watch_log(read_log(log))
+    assert not report.violations and {(o, r) for o, r in subject.others} == {
+        (o.index, o.robots) for o in subject.factory.operations
+    } - {(o.index, o.robots) for o in subject.factory.operations} | {*subject.others}
+    later = [one for one in report.seen if one.seen and one.seen > change["t"]]
+    assert {one.transition for one in later} >= {"part2_e", "part3_e", "sub1_e", "sub3_e"}
+    after = MonitorSubject.after
+
+    def strange(subject: MonitorSubject, crew: Any) -> MonitorSubject:
+        return after(replace(subject, others={}), crew)
+
+    monkeypatch.setattr(MonitorSubject, "after", strange)
+    assert watch_log(read_log(log))[0].violations
+
+
+def test_a_record_that_hides_the_exchange_is_refused(run: Terminal, tmp_path: Path) -> None:
+    """Planted: a log whose robots are said to be others."""
+    pag, faults, log = (tmp_path / name for name in ("inserts.pag", "faults.toml", "run.log"))
+    pag.write_text(INSERTS)
+    faults.write_text(DEATH)
+    words = ("run", pag, "--units", 6, "--faults", faults, "--swap", 4, "--deputies")
+    assert run(*words, "--log", log).status == 0
+    content = log.read_bytes()
+    assert content.count(b'["r4", "r2"]') == 1
+    log.write_bytes(content.replace(b'["r4", "r2"]', b'["r2", "r4"]'))
+    assert run("monitor", log).status != 0
+
+
+def test_plants_are_told_apart() -> None:
+    """The plant follows the crew: after an exchange the deputy's feeder serves both."""
+    simulation, recovery = simulated(INSERTS, "r4", 7.0)
+    simulation.run(max_time=40.0)
+    plant = recovery.plant
+    assert isinstance(plant, MujocoPlant)
+    feeders = simulation.physical.parts.feeders
+    assert np.unique([*feeders.welds.values()]).size == 3
+    assert not plant.takes_back(3)
