@@ -60,6 +60,10 @@ class Ahead:
                 self.after[gear[step - 1]].append(number)
             self.place[number] = factory.net.gears[stage.robot].places[2 * step]
 
+    def going(self, active: Iterable[int]) -> dict[int, HeadStart]:
+        """The stages among what is under way beside operations, by number."""
+        return {n: self._stages[n] for n in active if n in self._stages}
+
     def waiting(self, marked: bytearray, x: Array) -> list[int]:
         """Those of robots that wait where a run starts, with its axes at `x`, and have a way to
         go."""

@@ -281,7 +281,7 @@ class Feeders:
         """Feeders that are late, whose robots stand where the next part comes down. That robots are
         in time for it, unless something fails, is in the layout."""
         late = self.back.late if self.supply.recovers else ()
-        return [n for n in late if not self._passing.is_aside(n)]
+        return [n for n in late if self._passing.is_under(n)]
 
     def stay_clear(self, robot: int) -> None:
         """The next part for a robot (index) comes down when that is out of the way."""

@@ -32,6 +32,10 @@ class HandsAway:
             self._held.pop(operation.index, None)
         return bool(left)
 
+    def awaited(self, operations: Iterable[int]) -> set[int]:
+        """The axes of hands that operations (index) have waited for, and need to stay away."""
+        return {one.axis for number in operations for one in self._leavings.get(number, ())}
+
     def soonest(self, robots: Follower) -> int:
         """How many ticks of their course are to come until one that was held up may go on; where
         none of them may, all, and at least one. 0 where none was held up."""

@@ -100,6 +100,11 @@ class Passing:
         at = self._d.qpos[self._address[number]]
         return bool(self._first[number] or at <= self._clear[number])
 
+    def is_under(self, number: int) -> bool:
+        """Whether a robot's hand, which has nothing to hold, is where the next part comes down: one
+        that holds from above comes when that is down."""
+        return self._kinds[number] == "above" and not self.is_aside(number)
+
     def keep(self, keeper: Keeper) -> None:
         """Which robots have yet to deliver."""
         keeper.array("passing.holds", self.holds, 0, 1)

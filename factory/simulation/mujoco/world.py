@@ -7,7 +7,7 @@ sight.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from copy import copy
 from math import ceil
 
@@ -174,6 +174,15 @@ class MujocoWorld:
         self.parts.feeders.exchange(robot, layout)
         self.inspection.factory = layout.factory
         self._away = HandsAway(self.d, layout, self.motion.axes.qpos)
+
+    def in_the_way(self, under_way: Iterable[int]) -> set[int]:
+        """The robots (index) that stand where a part comes late that they wait for, but for those
+        whose hands have gone out of the way of operations (index) that are under way."""
+        robots = self.parts.feeders.in_the_way()
+        if not robots:
+            return robots
+        away = self._away.awaited(under_way)
+        return {r for r in robots if away.isdisjoint({r, self.motion.axes.lift.get(r, r)})}
 
     def settle(self) -> None:
         """A tick's timesteps are over, and the tray's next tick begins."""

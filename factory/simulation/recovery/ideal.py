@@ -121,7 +121,7 @@ class IdealPlant:
     def throw_away(self, robot: int, label: str, seconds: float) -> None:
         """A robot lets scrap fall."""
 
-    def in_the_way(self) -> Set[int]:
+    def in_the_way(self, under_way: Sequence[int]) -> Set[int]:
         """No robot is in the way of a part."""
         return frozenset()
 

@@ -52,7 +52,7 @@ class Responding:
         )
         eps = simulation.request.settings.eps
         self.returning = Returning(simulation.layout, books.supervisor, eps)
-        self.standing = Standing(simulation)
+        self.standing = Standing(simulation, books.supervisor)
         self.found: list[Failing] = []
         self.dead: dict[int, float] = {}
         self.used_spares = 0
@@ -116,7 +116,8 @@ class Responding:
         """Robots that wait at their feeders, and are in the way of what comes late there, go out of
         its way."""
         books = self._books
-        for robot in self._plant.in_the_way() - self.returning.ways.keys() - self.dead.keys():
+        found = self._plant.in_the_way(books.supervisor.active.operations)
+        for robot in found - self.returning.ways.keys() - self.dead.keys():
             if books.step_of(robot) % 2 or books.operation_of(robot).inputs:
                 continue
             books.supervisor.recall(self.standing.axes([robot]))
@@ -188,8 +189,11 @@ class Responding:
         if robot in self.deputising.by_robot:
             return self._take_over(robot)
         self.returning.ways.pop(robot, None)
-        at = self.returning.rest(robot, self._books.marking)
-        self._plant.lift_out(robot, dict(at))
+        supervisor = self._books.supervisor
+        stages = supervisor.ahead.going(supervisor.active.ahead).values()
+        ahead = {stage.axis: stage.goal for stage in stages if stage.robot == robot}
+        at = ahead or dict(self.returning.rest(robot, self._books.marking))
+        self._plant.lift_out(robot, at)
         return True
 
     def _take_over(self, robot: int) -> bool:

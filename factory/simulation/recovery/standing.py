@@ -7,12 +7,13 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from factory.control.mode import STILL, Limits
+from factory.control.mode import STILL, Limits, Mode
 from factory.control.navigation import Bundle
-from factory.plant.factory import Factory, Operation
+from factory.plant.factory import Operation
 from factory.record.failures import Stood
-from factory.simulation.keeping import Keeper, is_size, some_of, up_to
+from factory.simulation.keeping import LARGE, Keeper, is_size, some_of, up_to
 from factory.simulation.simulation import Simulation
+from factory.simulation.supervisor import Supervisor
 
 SLOWEST = 1e-9
 """The speed limit of a robot that stands [m/s]."""
@@ -33,14 +34,16 @@ class Standing:
     """Lets robots (index) of a simulation stand, each under a limit of its own on its speed;
     `stood`: which of them did, from when on."""
 
-    def __init__(self, simulation: Simulation) -> None:
+    def __init__(self, simulation: Simulation, supervisor: Supervisor) -> None:
         self._simulation, self._limits = simulation, simulation.limits
+        self._supervisor = supervisor
         self._now: frozenset[int] = frozenset()
         self.stood: list[Stood] = []
         factory = simulation.layout.factory
         lifts = {r: len(factory.robots) + n for n, r in enumerate(simulation.layout.lifts)}
         self._axes = [[r, lifts[r]] if r in lifts else [r] for r in range(len(factory.robots))]
         self._begun: dict[int, float] = {}
+        self._went: dict[int, float] = {}
 
     def let_stand(self, robots: Iterable[int]) -> None:
         """From now on these robots stand, and no others: they brake as they always do."""
@@ -59,12 +62,14 @@ class Standing:
         return not self._now
 
     def keep(self, keeper: Keeper) -> None:
-        """When operations began, and which robots stood, while none does."""
+        """When operations began, and robots went ahead, and which stood, while none does."""
         factory = self._simulation.layout.factory
         begun, names = self._begun.items(), {robot.name for robot in factory.robots}
         self._begun = dict(
             keeper.rows("standing.begun", begun, up_to(len(factory.operations)), is_size)
         )
+        went = keeper.rows("standing.went", self._went.items(), up_to(LARGE), is_size)
+        self._went = dict(went)
         stood = keeper.rows("standing.stood", self.stood, is_size, some_of(names))
         self.stood = [(t, tuple(robots)) for t, robots in stood]
 
@@ -88,31 +93,42 @@ class Standing:
         self._begun[operation.index] = now
 
     def jammed(self, now: float, excused: frozenset[int]) -> list[int]:
-        """The robots of operations that are late which are asked to move and do not, but for those
-        that are `excused`, as are all in their operations."""
-        factory, supervisor = self._simulation.supervisor.factory, self._simulation.supervisor
-        found = list[int]()
+        """The robots of operations that are late, and those that go ahead and are late, which are
+        asked to move and do not, but for those that are `excused`, as are all in their
+        operations."""
+        supervisor, factory = self._supervisor, self._supervisor.factory
+        found, modes = list[int](), supervisor.bundles
         for number in supervisor.active.operations:
             operation = factory.operations[number]
             if not excused.isdisjoint(operation.robots):
                 self.begun(operation, now)
-                continue
-            if now > self._late(number, now):
-                found += self._at_fault(factory, operation)
+            elif now > self._late(number, now):
+                found += self._at_fault(modes.modes[number], [*factory.axes[number]])
+        going = supervisor.ahead.going(supervisor.active.ahead)
+        went = {n: self._went.get(n, now) for n in going}
+        self._went = {n: now if going[n].robot in excused else t for n, t in went.items()}
+        for number, since in self._went.items():
+            if now > since + self._longest:
+                found += self._at_fault(modes.modes[number], [going[number].axis])
         return found
 
     def latest(self, now: float) -> float:
-        """When the last of the operations under way is late [s]."""
-        active = self._simulation.supervisor.active.operations
-        return max((self._late(number, now) for number in active), default=0.0)
+        """When the last of what is under way is late [s]."""
+        active = self._supervisor.active.operations
+        ends = [self._late(number, now) for number in active]
+        return max([*ends, *(since + self._longest for since in self._went.values())], default=0.0)
+
+    @property
+    def _longest(self) -> float:
+        return patience(max(self._simulation.delays))
 
     def _late(self, number: int, now: float) -> float:
         begun = self._begun.setdefault(number, now)
         return begun + patience(self._simulation.delays[number])
 
-    def _at_fault(self, factory: Factory, operation: Operation) -> list[int]:
-        simulation, axes = self._simulation, [*factory.axes[operation.index]]
-        mode = simulation.modes[operation.index]
+    def _at_fault(self, mode: Mode, axes: list[int]) -> list[int]:
+        """The robots whose axes a mode asks to move, and that do not."""
+        simulation = self._simulation
         x, v = simulation.world.sense()
         bundle = Bundle.of([mode], [self._limits.of(axes)])
         asked = np.abs(bundle.field(x[axes], simulation.request.settings.tick)) > MOVES
