@@ -108,7 +108,7 @@ def test_a_session_tells_what_failed_and_begins_anew(running: Running) -> None:
     send(Command("drop", robot=5))
     failed = running.until(lambda f: "r6 lost part2: made again" in f.note)
     assert failed.run == 0 and session.fails
-    running.until(lambda f: f.products > failed.products + 2 and not f.standing)
+    running.until(lambda f: f.products > failed.products + 2 and not f.outages.standing)
     account = session.simulation.world.hooks.account
     assert account is not None and any("r6" in robots for _, robots in account.stood)
     told = session.fired(0, 0, session.frame.count)
@@ -120,7 +120,7 @@ def test_a_session_tells_what_failed_and_begins_anew(running: Running) -> None:
     net, joins = paper_layout().factory.net, joins_of(paper_layout().factory)
     assert replay(net, entries_of([*events]), joins=joins).refines
     send(Command("restart"))
-    running.until(lambda f: f.run == 1 and not f.standing and f.time > 0.1)
+    running.until(lambda f: f.run == 1 and not f.outages.standing and f.time > 0.1)
     assert session.fails
 
 
@@ -142,7 +142,7 @@ def test_watchers_make_it_fail(running: Running) -> None:
         with websockets.connect(address, proxy=None) as watcher:
             watcher.send('{"do": "down", "robot": 3}')
             frame: dict = {}
-            while "r4" not in frame.get("standing", ()):
+            while "r4" not in frame.get("outages", {}).get("standing", ()):
                 message = watcher.recv(10)
                 frame = json.loads(message[4 : 4 + int.from_bytes(message[:4], "little")])
 

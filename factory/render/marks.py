@@ -8,13 +8,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from factory.layout.sweeping import APART
 from factory.mjcf import names
 from factory.mjcf.replica import Replica
 from factory.render.colours import AMBER, DEAD, FLASH
 from factory.render.history import History
 from factory.render.ink import Colour
 from factory.render.subject import Snapshot
+from factory.render.zones import Zones
 from factory.support.engine import mujoco
 
 ROBOT = 0.062
@@ -52,13 +52,7 @@ class Marks:
         self.replica, self.history, m = replica, history, replica.m
         robots = history.factory.robots
         self.carriages = [m.body(names.carriage(robot.name)).id for robot in robots]
-        bodies = np.arange(m.nbody)
-        loose = [names.kind(m.body(b).name) == "part" and m.body_dofnum[b] > 0 for b in bodies]
-        self.parts = bodies[np.array(loose, bool)]
-        self.radii = np.zeros(m.nbody)
-        far = np.linalg.norm(m.geom_pos, axis=1) + m.geom_rbound
-        np.maximum.at(self.radii, m.geom_bodyid, far)
-        self.bins = [b for b in bodies.tolist() if names.kind(m.body(b).name) == "bin"]
+        self.zones = Zones(m)
 
     def at(self, shown: Snapshot, time: float) -> Iterator[Mark]:
         """All at a time [s], with the replica as it is then."""
@@ -69,13 +63,5 @@ class Marks:
         for robot in sorted(history.stands(time) | dead):
             x, y, _ = self.replica.d.xpos[self.carriages[robot]].tolist()
             yield Mark((x, y), ROBOT, DEAD if robot in dead else AMBER, 1.0)
-        for body in np.setdiff1d(self.parts, shown.body2).tolist():
-            x, y, z = self.replica.d.xpos[body].tolist()
-            if z > 0.0 and not any(self._is_over(one, x, y) for one in self.bins):
-                yield Mark((x, y), float(self.radii[body]) + APART, FLASH, 0.35)
-
-    def _is_over(self, bin_: int, x: float, y: float) -> bool:
-        """Whether a place is over a bin, by its bottom plate."""
-        bottom = int(self.replica.m.body_geomadr[bin_])
-        half, at = self.replica.m.geom_size[bottom], self.replica.d.geom_xpos[bottom]
-        return bool(abs(x - at[0]) <= half[0] and abs(y - at[1]) <= half[1])
+        for x, y, radius in self.zones.at(self.replica.d, shown.body2):
+            yield Mark((x, y), radius, FLASH, 0.35)

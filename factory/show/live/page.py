@@ -30,6 +30,7 @@ SCRIPTS = (
     "report/replay.js",
     "report/wiring.js",
     "live/rolling.js",
+    "live/outages.js",
     "live/live.js",
 )
 """In the order in which they run."""

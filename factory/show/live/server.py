@@ -176,7 +176,7 @@ def _silent() -> logging.Logger:
 def packed(frame: LiveFrame, fired: list[Told]) -> bytes:
     """A frame as the page reads it: the length of a JSON text (4 bytes, little-endian), the text,
     padded to a multiple of 4, and the poses."""
-    told = {**asdict(frame), "fired": fired}
+    told = {**asdict(frame), "outages": frame.outages.as_json(), "fired": fired}
     del told["number"], told["poses"]
     text = json.dumps(told, separators=(",", ":")).encode()
     text += b" " * (-len(text) % 4)

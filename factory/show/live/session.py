@@ -12,11 +12,14 @@ from time import perf_counter
 import numpy as np
 from numpy.typing import NDArray
 
+from factory.nets.undo import marking_after
 from factory.nets.undone import Undone
 from factory.show.live.commands import DOWN, PUSH, Command
+from factory.show.live.outages import Outages, Watch
 from factory.simulation.disturbance.interventions import Interventions
 from factory.simulation.recovery import Campaign
 from factory.simulation.simulation import FALL, Observer, Simulation
+from factory.simulation.supervisor import Supervisor
 
 RATE = 30.0
 """Frames a second."""
@@ -43,8 +46,8 @@ class LiveFrame:
     """The state at an instant, as the page is told it. `number`: of the frame; `run`: number of
     restarts; `poses`: positions [m] and quaternions (bodies, 7) as float32; `marked` places;
     `count`: how often something has fired, or was undone; `rhythm`: between the last two products
-    [s]; `pace`: simulated seconds in a second; `standing`: robots that stand; `note`: what is
-    wrong, if anything."""
+    [s]; `pace`: simulated seconds in a second; `outages`: what is out of order; `note`: what has
+    just gone wrong, if anything."""
 
     number: int
     run: int
@@ -59,7 +62,7 @@ class LiveFrame:
     pace: float
     slowed: dict[int, float]
     blocked: tuple[str, ...]
-    standing: tuple[str, ...]
+    outages: Outages
     note: str
 
 
@@ -113,7 +116,8 @@ class Session:
 
     def _begin(self) -> None:
         self.interventions = self._make()
-        self.simulation = self.interventions.simulation
+        self.simulation, recovery = self.interventions.simulation, self.interventions.recovery
+        self._watch = Watch(recovery) if recovery else None
         self._trouble = ""
         self._clock.start(self.simulation.world.time)
 
@@ -255,7 +259,7 @@ class Session:
             self._runs,
             round(world.time, 4),
             poses.astype("<f4").tobytes(),
-            tuple(np.flatnonzero(np.frombuffer(supervisor.marked, np.uint8)).tolist()),
+            self._marked(),
             len(supervisor.events),
             world.delivered(),
             round(left[-1] - left[-2], 4) if len(left) > 1 else None,
@@ -264,26 +268,28 @@ class Session:
             round(self._clock.pace, 3),
             dict(self.interventions.slowed),
             tuple(sorted(self.interventions.blocked)),
-            self._standing(),
+            self._watch.now() if self._watch else Outages(),
             self._trouble or self._failed() or self._waits(),
         )
         with self._changed:
             self.frame = frame
             self._changed.notify_all()
 
-    def _standing(self) -> tuple[str, ...]:
-        account = self.simulation.world.hooks.account
-        return account.stood[-1][1] if account and account.stood else ()
+    def _marked(self) -> tuple[int, ...]:
+        """The places of the net that the page draws: that which the run began with. A deputy does
+        the tours of a robot that is gone in their order, so the counts lead to a marking of it,
+        with a token for either robot's tours."""
+        supervisor, account = self.simulation.supervisor, self.simulation.world.hooks.account
+        if not (account and account.exchanges and isinstance(supervisor, Supervisor)):
+            return tuple(np.flatnonzero(np.frombuffer(supervisor.marked, np.uint8)).tolist())
+        net = self.simulation.layout.factory.net
+        return tuple(sorted(marking_after(net, supervisor.fired)))
 
     def _failed(self) -> str:
-        """What has failed lately, the latest last, or which robots stand."""
+        """What has failed lately, the latest last."""
         world = self.simulation.world
         found = world.hooks.account.found if world.hooks.account else ()
-        told = [str(one) for one in found[-3:] if one.t > world.time - SAID]
-        standing = self._standing()
-        if standing and not told:
-            told = [f"{', '.join(standing)} stand{'s' * (len(standing) == 1)} still"]
-        return "; ".join(told)
+        return "; ".join(str(one) for one in found[-3:] if one.t > world.time - SAID)
 
     def _waits(self) -> str:
         """Which robots wait for what, where nothing has fired for a long time."""

@@ -53,34 +53,15 @@ function unpackedFrame(buffer) {
   return [JSON.parse(text), new Float32Array(buffer, 4 + length)];
 }
 
-// Robots that stand glow in the 3-D view, but for what is selected or faded.
-function glow(replay, standing) {
-  const stands = new Set(standing);
-  for (const mesh of replay.meshes) {
-    const { robot, shape, state = 'plain' } = mesh.userData;
-    if (robot === undefined || state !== 'plain') continue;
-    const plain = replay.paints.of(DATA.scene.alphas[shape], 'plain');
-    const isLit = stands.has(DATA.robots[robot]);
-    if (isLit && !plain.userData.standing) {
-      plain.userData.standing = plain.clone();
-      plain.userData.standing.emissive.setHex(0xd69416);
-      plain.userData.standing.emissiveIntensity = 0.55;
-    }
-    mesh.material = isLit ? plain.userData.standing : plain;
-  }
-}
-
 // What can be done to what is selected.
 class Acts {
-  constructor(panel, selection, send) {
-    Object.assign(this, { panel, selection, send, slowed: {}, blocked: [] });
+  constructor(panel, selection, send, outages) {
+    Object.assign(this, { panel, selection, send, outages, slowed: {}, blocked: [] });
     selection.listeners.push(() => this.draw());
     this.draw();
   }
 
-  take({ slowed, blocked, standing }) {
-    const stands = new Set(standing);
-    document.querySelectorAll('[data-robot]').forEach((e) => e.classList.toggle('standing', stands.has(DATA.robots[e.dataset.robot])));
+  take({ slowed, blocked }) {
     const same = JSON.stringify([slowed, blocked]) === JSON.stringify([this.slowed, this.blocked]);
     if (same) return;
     Object.assign(this, { slowed, blocked });
@@ -206,7 +187,9 @@ class Live {
   constructor(selection, views) {
     Object.assign(this, { selection, views, run: -1, frame: null });
     this.motion = views.floor.motion;
-    this.acts = new Acts(document.getElementById('acts'), selection, (command) => this.send(command));
+    this.outages = new Outages(document.getElementById('outages'), views);
+    views.gantt.doer = (robot, time) => this.outages.doer(robot, time);
+    this.acts = new Acts(document.getElementById('acts'), selection, (command) => this.send(command), this.outages);
     this.said = new Said(document.getElementById('said'));
     this.play = document.getElementById('play');
     this.speed = document.getElementById('speed');
@@ -254,6 +237,7 @@ class Live {
       this.views.gantt.clear();
       document.getElementById('said').replaceChildren();
     }
+    this.outages.take(frame.outages);
     this.views.gantt.fire(frame.fired);
     this.said.take(frame.fired);
     this.frame = frame;
@@ -277,7 +261,7 @@ class Live {
     document.getElementById('rhythm').textContent = rhythm ? `${rhythm.toFixed(2)} s after the one before` : products ? 'the first' : 'none yet';
     this.note(note);
     this.acts.take(this.frame);
-    if (this.views.replay) glow(this.views.replay, this.frame.standing);
+    this.outages.draw();
     Object.values(this.views).forEach((view) => view.show(time));
   }
 

@@ -212,7 +212,7 @@ class Replay {
     const point = new THREE.Vector2((2 * (x - box.left)) / box.width - 1, 1 - (2 * (y - box.top)) / box.height);
     const ray = new THREE.Raycaster();
     ray.setFromCamera(point, this.camera);
-    const seen = this.meshes.filter((mesh) => this.bodies[mesh.userData.body].visible);
+    const seen = this.meshes.filter((mesh) => mesh.visible && this.bodies[mesh.userData.body].visible);
     const hit = ray.intersectObjects(seen, false)[0];
     return hit ? hit.object.userData : null;
   }
@@ -252,6 +252,12 @@ class Replay {
       const [w, x, y, z] = this.motion.quaternion(body, frame);
       this.bodies[body].quaternion.set(x, y, z, w).normalize();
     }
+    this.draw();
+  }
+
+  // Robots that are gone are not drawn, but for what of them stands on the floor.
+  leaveOut(robots) {
+    for (const mesh of this.meshes) mesh.visible = !(mesh.userData.body && robots.has(mesh.userData.robot));
     this.draw();
   }
 

@@ -1,0 +1,113 @@
+'use strict';
+// What is out of order now: robots that stand, are dead or gone, and where none may come; as marks
+// in all views, and in words.
+
+const STATES = ['standing', 'closed', 'dead'];
+const ZONE = 0xe83c30;
+
+// How a robot in a state looks in the 3-D view: it glows, or is dark.
+const LOOKS = {
+  standing: (paint) => glowing(paint, 0xe08a00, 0.75),
+  closed: (paint) => glowing(paint, ZONE, 0.7),
+  dead: (paint) => paint.color.setHex(0x30303a),
+};
+
+function glowing(paint, colour, strength) {
+  paint.emissive.setHex(colour);
+  paint.emissiveIntensity = strength;
+}
+
+// A flat disc of radius 1.
+function round(corners = 48) {
+  const disc = new THREE.BufferGeometry();
+  const rim = [...Array(corners).keys()].map((k) => (2 * Math.PI * k) / corners);
+  const points = [0, 0, 0, ...rim.flatMap((angle) => [Math.cos(angle), Math.sin(angle), 0])];
+  disc.setAttribute('position', new THREE.BufferAttribute(new Float32Array(points), 3));
+  const faces = rim.flatMap((_, k) => [0, k + 1, ((k + 1) % corners) + 1]);
+  disc.setIndex(new THREE.BufferAttribute(new Uint16Array(faces), 1));
+  disc.computeVertexNormals();
+  return disc;
+}
+
+class Outages {
+  constructor(list, views) {
+    Object.assign(this, { list, views, now: { dead: [], closed: [], standing: [], gone: {}, zones: [], told: [] } });
+    this.drawn = '';
+  }
+
+  // The robot that does a robot's tours at a time: itself, or after it is gone its deputy.
+  doer(robot, time) {
+    const [deputy, since] = this.now.gone[DATA.robots[robot]] || [];
+    return deputy !== undefined && time >= since ? this.doer(DATA.robots.indexOf(deputy), time) : robot;
+  }
+
+  take(now) {
+    this.now = now;
+  }
+
+  draw() {
+    const { now, views } = this;
+    const { replay, floor } = views;
+    if (replay) this.paint(replay);
+    const drawn = JSON.stringify(now);
+    if (drawn === this.drawn && replay === this.replay) return;
+    Object.assign(this, { drawn, replay });
+    const gone = new Set(Object.keys(now.gone).map((name) => DATA.robots.indexOf(name)));
+    [replay, floor].forEach((view) => view && view.leaveOut(gone));
+    for (const state of [...STATES, 'gone']) {
+      const names = state === 'gone' ? Object.keys(now.gone) : now[state];
+      document.querySelectorAll('[data-robot]').forEach((e) => e.classList.toggle(state, names.includes(DATA.robots[e.dataset.robot])));
+    }
+    this.tell();
+    this.onFloor(floor.svg);
+    if (replay) this.inSpace(replay);
+  }
+
+  tell() {
+    this.list.replaceChildren(...this.now.told.map(([state, words]) => {
+      const row = document.createElement('li');
+      row.className = state;
+      row.append(document.createElement('i'), words);
+      return row;
+    }));
+    this.list.hidden = !this.now.told.length;
+  }
+
+  // Selected and faded robots look as they always do.
+  paint(replay) {
+    const state = new Map(STATES.flatMap((name) => this.now[name].map((robot) => [robot, name])));
+    for (const mesh of replay.meshes) {
+      const { robot, shape, state: selected = 'plain' } = mesh.userData;
+      if (robot === undefined || selected !== 'plain') continue;
+      const plain = replay.paints.of(DATA.scene.alphas[shape], 'plain');
+      const look = state.get(DATA.robots[robot]);
+      const made = (plain.userData.looks ||= {});
+      if (look && !made[look]) LOOKS[look]((made[look] = plain.clone()));
+      mesh.material = look ? made[look] : plain;
+    }
+  }
+
+  // Discs of red on the floor, of the plan and of the 3-D view.
+  onFloor(svg) {
+    svg.querySelectorAll('.zone').forEach((zone) => zone.remove());
+    for (const [x, y, radius] of this.now.zones) {
+      const zone = document.createElementNS('http://www.w3.org/2000/svg', 'circle');
+      zone.setAttribute('class', 'zone');
+      Object.entries({ cx: 1000 * x, cy: -1000 * y, r: 1000 * radius }).forEach(([key, v]) => zone.setAttribute(key, v.toFixed(1)));
+      svg.querySelector('.static').after(zone);
+    }
+  }
+
+  inSpace(replay) {
+    replay.scene.remove(...(this.discs || []));
+    this.red ||= new THREE.MeshLambertMaterial({ color: 0, emissive: ZONE, transparent: true, opacity: 0.4, depthWrite: false });
+    this.round ||= round();
+    this.discs = this.now.zones.map(([x, y, radius]) => {
+      const disc = new THREE.Mesh(this.round, this.red);
+      disc.position.set(x, y, 0.0015);
+      disc.scale.setScalar(radius);
+      return disc;
+    });
+    if (this.discs.length) replay.scene.add(...this.discs);
+  }
+}

@@ -1,0 +1,100 @@
+"""What is out of order in a factory that goes on after failures, at an instant: as the page marks
+it, and in words."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from math import ceil, isfinite
+
+import numpy as np
+
+from factory.nets.verdict import listing
+from factory.render.zones import Zone, Zones
+from factory.simulation.recovery import Recovery
+
+Told = tuple[str, str]
+"""A mark of the page, `dead`, `closed`, `standing` or `gone`, and what it says now, in words."""
+
+
+@dataclass(frozen=True, slots=True)
+class Outages:
+    """Robots, by name: those that are known to be `dead`, each with how long still [s], inf where
+    nothing takes its place, and the deputy that then does its tours, "" for a spare; `closed`,
+    which may not move while something lies near, for so long still [s], `lying`; `standing` for
+    another reason; `gone`, lifted out for good, each with its deputy and when that took over [s].
+    `zones`: where no robot may come, round what lies about."""
+
+    dead: Mapping[str, tuple[float, str]] = field(default_factory=dict)
+    closed: tuple[str, ...] = ()
+    lying: float = 0.0
+    standing: tuple[str, ...] = ()
+    gone: Mapping[str, tuple[str, float]] = field(default_factory=dict)
+    zones: tuple[Zone, ...] = ()
+
+    def told(self) -> Iterator[Told]:
+        """All this in words."""
+        for robot, (left, deputy) in self.dead.items():
+            then = f"{deputy} does its tours" if deputy else "a spare comes"
+            when = f"{then} {_in(left)}" if isfinite(left) else "nothing takes its place"
+            yield "dead", f"{robot} is dead: {when}"
+        if self.closed:
+            stand = f"{listing(self.closed)} stand{_s(self.closed)} still"
+            yield "closed", f"{stand}: what lies near is cleared away {_in(self.lying)}"
+        elif self.zones:
+            yield "closed", f"something lies about, and is cleared away {_in(self.lying)}"
+        if self.standing:
+            yield "standing", f"{listing(self.standing)} stand{_s(self.standing)} still"
+        for robot, (deputy, _) in self.gone.items():
+            yield "gone", f"{robot} is gone: {deputy} does its tours"
+
+    def as_json(self) -> dict[str, object]:
+        """As the page is told it."""
+        return {
+            "dead": [*self.dead],
+            "closed": self.closed,
+            "standing": self.standing,
+            "gone": dict(self.gone),
+            "zones": [[round(v, 4) for v in zone] for zone in self.zones],
+            "told": [*self.told()],
+        }
+
+
+class Watch:
+    """Tells what is out of order, as a recovery knows it. One whose world has bodies."""
+
+    def __init__(self, recovery: Recovery) -> None:
+        self._recovery, self._world = recovery, recovery.simulation.physical
+        self._zones = Zones(self._world.m)
+
+    def now(self) -> Outages:
+        """What is now."""
+        recovery, world = self._recovery, self._world
+        dead, closed, lying = recovery.responding.dead, recovery.plant.closed, recovery.plant.lying
+        deputies, time = recovery.responding.deputising.by_robot, world.time
+        names = [robot.name for robot in recovery.simulation.layout.factory.robots]
+        kept = tuple(names[robot] for robot in sorted(closed - dead.keys()))
+        held = world.m.eq_obj2id[np.flatnonzero(world.d.eq_active)]
+        stood = recovery.stood[-1][1] if recovery.stood else ()
+        by_name = {
+            names[robot]: (until - time, names[deputies[robot]] if robot in deputies else "")
+            for robot, until in sorted(dead.items())
+        }
+        return Outages(
+            by_name,
+            kept,
+            max(lying, default=time) - time,
+            tuple(name for name in stood if name not in by_name and name not in kept),
+            {one.dead: (one.deputy, one.t) for one in recovery.exchanges},
+            tuple(self._zones.at(world.d, held)) if lying else (),
+        )
+
+
+def _in(seconds: float) -> str:
+    """When something is that is so far off."""
+    return f"in {ceil(seconds)} s" if seconds > 0 else "soon"
+
+
+def _s(robots: tuple[str, ...]) -> str:
+    """The ending of what one robot does."""
+    return "s" if len(robots) == 1 else ""
