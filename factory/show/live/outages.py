@@ -32,15 +32,19 @@ class Outages:
     gone: Mapping[str, tuple[str, float]] = field(default_factory=dict)
     zones: tuple[Zone, ...] = ()
 
-    def told(self) -> Iterator[Told]:
+    @property
+    def told(self) -> list[Told]:
         """All this in words."""
+        return [*self._told()]
+
+    def _told(self) -> Iterator[Told]:
         for robot, (left, deputy) in self.dead.items():
             then = f"{deputy} does its tours" if deputy else "a spare comes"
             when = f"{then} {_in(left)}" if isfinite(left) else "nothing takes its place"
             yield "dead", f"{robot} is dead: {when}"
         if self.closed:
             stand = f"{listing(self.closed)} stand{_s(self.closed)} still"
-            yield "closed", f"{stand}: what lies near is cleared away {_in(self.lying)}"
+            yield "closed", f"{stand}: something lies near, and is cleared away {_in(self.lying)}"
         elif self.zones:
             yield "closed", f"something lies about, and is cleared away {_in(self.lying)}"
         if self.standing:
@@ -56,7 +60,7 @@ class Outages:
             "standing": self.standing,
             "gone": dict(self.gone),
             "zones": [[round(v, 4) for v in zone] for zone in self.zones],
-            "told": [*self.told()],
+            "told": self.told,
         }
 
 

@@ -252,7 +252,7 @@ class Session:
         # shells follow one step after the body that has been put somewhere
         whole = world.parts.masks.trunk[bodies]
         poses = np.hstack([world.d.xpos[whole], world.d.xquat[whole]])
-        left = world.dropoffs
+        left, outages = world.dropoffs, self._watch.now() if self._watch else Outages()
         self._number += 1
         frame = LiveFrame(
             self._number,
@@ -268,8 +268,8 @@ class Session:
             round(self._clock.pace, 3),
             dict(self.interventions.slowed),
             tuple(sorted(self.interventions.blocked)),
-            self._watch.now() if self._watch else Outages(),
-            self._trouble or self._failed() or self._waits(),
+            outages,
+            self._trouble or self._failed() or ("" if outages.told else self._waits()),
         )
         with self._changed:
             self.frame = frame
@@ -286,10 +286,10 @@ class Session:
         return tuple(sorted(marking_after(net, supervisor.fired)))
 
     def _failed(self) -> str:
-        """What has failed lately, the latest last."""
+        """What has failed lately, and when, the latest last."""
         world = self.simulation.world
         found = world.hooks.account.found if world.hooks.account else ()
-        return "; ".join(str(one) for one in found[-3:] if one.t > world.time - SAID)
+        return "; ".join(f"{o.t:.2f} s: {o}" for o in found[-3:] if o.t > world.time - SAID)
 
     def _waits(self) -> str:
         """Which robots wait for what, where nothing has fired for a long time."""

@@ -85,7 +85,10 @@ class Acts {
   draw() {
     const { robot, part } = this.meant;
     const made = [];
-    if (robot !== undefined) {
+    const name = DATA.robots[robot];
+    if (robot !== undefined && name in this.outages.now.gone) {
+      made.push(this.words('h3', `Robot ${name}`), this.words('p', `It has been lifted out: ${this.outages.now.gone[name][0]} does its tours.`));
+    } else if (robot !== undefined) {
       const now = this.slowed[robot] || 1;
       made.push(this.words('h3', `Robot ${DATA.robots[robot]}`));
       made.push(this.group('Push', [
@@ -97,7 +100,7 @@ class Acts {
       made.push(this.group('Speed', [...DATA.factors].reverse().map((factor) =>
         [factor === 1 ? 'full' : `${100 * factor} %`, { do: 'slow', robot, factor }, factor === now])));
     }
-    if (robot !== undefined && DATA.fails)
+    if (robot !== undefined && DATA.fails && !(name in this.outages.now.gone))
       made.push(this.group('Let it', [
         ['drop what it holds', { do: 'drop', robot }],
         ['stand for 5 s', { do: 'down', robot }],
@@ -112,7 +115,7 @@ class Acts {
       ]));
       if (DATA.fails) made.push(this.group('Next', [['is no good', { do: 'spoil', part }]]));
     }
-    if (!made.length) made.push(this.words('p', 'Choose a robot to push it or slow it down, or a part to block its feeder: in the picture, the net, the plan or the tree.'));
+    if (!made.length) made.push(this.words('p', `Choose a robot to push it${DATA.fails ? ', slow it down or let it fail' : ' or slow it down'}, or a part to block its feeder${DATA.fails ? ' or let the next be no good' : ''}: in the picture, the net, the plan or the tree.`));
     const changes = [
       ...Object.entries(this.slowed).map(([n, factor]) => [`${DATA.robots[n]} at ${100 * factor} % ✕`, { do: 'slow', robot: Number(n), factor: 1 }]),
       ...this.blocked.map((label) => [`${label} blocked ✕`, { do: 'block', part: label, blocked: false }]),
@@ -262,6 +265,7 @@ class Live {
     this.note(note);
     this.acts.take(this.frame);
     this.outages.draw();
+    this.views.gantt.stand(this.outages.states, time);
     Object.values(this.views).forEach((view) => view.show(time));
   }
 

@@ -4,17 +4,15 @@
 
 const STATES = ['standing', 'closed', 'dead'];
 const ZONE = 0xe83c30;
+const TAG = 0.1;
 
-// How a robot in a state looks in the 3-D view: it glows, or is dark.
-const LOOKS = {
-  standing: (paint) => glowing(paint, 0xe08a00, 0.75),
-  closed: (paint) => glowing(paint, ZONE, 0.7),
-  dead: (paint) => paint.color.setHex(0x30303a),
-};
-
-function glowing(paint, colour, strength) {
-  paint.emissive.setHex(colour);
-  paint.emissiveIntensity = strength;
+// How a robot in a state looks in the 3-D view: amber where it stands, dark where it is dead.
+function looking(paint, state) {
+  const made = paint.clone();
+  made.color.setHex(state === 'dead' ? 0x30303a : 0x8a6420);
+  made.emissive.setHex(state === 'dead' ? 0x000000 : 0xd69416);
+  made.emissiveIntensity = 0.7;
+  return made;
 }
 
 // A flat disc of radius 1.
@@ -33,12 +31,18 @@ class Outages {
   constructor(list, views) {
     Object.assign(this, { list, views, now: { dead: [], closed: [], standing: [], gone: {}, zones: [], told: [] } });
     this.drawn = '';
+    document.getElementById('failing').hidden = !DATA.fails;
   }
 
   // The robot that does a robot's tours at a time: itself, or after it is gone its deputy.
   doer(robot, time) {
     const [deputy, since] = this.now.gone[DATA.robots[robot]] || [];
     return deputy !== undefined && time >= since ? this.doer(DATA.robots.indexOf(deputy), time) : robot;
+  }
+
+  // The state of each robot, by number, that does not move.
+  get states() {
+    return new Map(STATES.flatMap((state) => this.now[state].map((name) => [DATA.robots.indexOf(name), state])));
   }
 
   take(now) {
@@ -48,9 +52,13 @@ class Outages {
   draw() {
     const { now, views } = this;
     const { replay, floor } = views;
-    if (replay) this.paint(replay);
+    if (replay) {
+      this.paint(replay);
+      this.tag(replay);
+    }
     const drawn = JSON.stringify(now);
     if (drawn === this.drawn && replay === this.replay) return;
+    if (replay !== this.replay) replay.controls.addEventListener('change', () => this.tag(replay));
     Object.assign(this, { drawn, replay });
     const gone = new Set(Object.keys(now.gone).map((name) => DATA.robots.indexOf(name)));
     [replay, floor].forEach((view) => view && view.leaveOut(gone));
@@ -75,16 +83,31 @@ class Outages {
 
   // Selected and faded robots look as they always do.
   paint(replay) {
-    const state = new Map(STATES.flatMap((name) => this.now[name].map((robot) => [robot, name])));
+    const { states } = this;
     for (const mesh of replay.meshes) {
       const { robot, shape, state: selected = 'plain' } = mesh.userData;
       if (robot === undefined || selected !== 'plain') continue;
       const plain = replay.paints.of(DATA.scene.alphas[shape], 'plain');
-      const look = state.get(DATA.robots[robot]);
+      const look = states.get(robot);
       const made = (plain.userData.looks ||= {});
-      if (look && !made[look]) LOOKS[look]((made[look] = plain.clone()));
-      mesh.material = look ? made[look] : plain;
+      mesh.material = look ? (made[look] ||= looking(plain, look)) : plain;
     }
+  }
+
+  // The names of robots that do not move, over them in the 3-D view, whatever they are behind.
+  tag({ camera, meshes, bodies }) {
+    camera.updateMatrixWorld();
+    const tags = [...this.states].map(([robot, state]) => {
+      const { body } = meshes.find(({ userData }) => userData.robot === robot && userData.body).userData;
+      const { x, y, z } = bodies[body].position.clone().setZ(TAG).project(camera);
+      const tag = document.createElement('span');
+      tag.className = state;
+      tag.textContent = state === 'dead' ? `${DATA.robots[robot]} is dead` : DATA.robots[robot];
+      Object.assign(tag.style, { left: `${50 + 50 * x}%`, top: `${50 - 50 * y}%` });
+      tag.hidden = z > 1;
+      return tag;
+    });
+    document.getElementById('tags').replaceChildren(...tags);
   }
 
   // Discs of red on the floor, of the plan and of the 3-D view.

@@ -95,20 +95,39 @@ class Rolling {
       this.tracks[robot].append(element);
       return element;
     });
-    const bar = { operation, from: time, to: null, elements };
-    this.bars.push(bar);
-    this.open.set(operation, bar);
-    this.place(bar);
+    this.keep(operation, { operation, from: time, to: null, elements });
     this.fresh = true;
   }
 
-  end(operation, time) {
-    const bar = this.open.get(operation);
+  keep(key, bar) {
+    this.bars.push(bar);
+    this.open.set(key, bar);
+    this.place(bar);
+  }
+
+  end(key, time) {
+    const bar = this.open.get(key);
     if (!bar) return;
     bar.to = time;
     bar.elements.forEach((element) => (element.title += `, ${bar.from.toFixed(2)} to ${time.toFixed(2)} s`));
-    this.open.delete(operation);
+    this.open.delete(key);
     this.place(bar);
+  }
+
+  // From now on robots are in these states, by number, and in no others: bands behind the bars.
+  stand(states, now) {
+    DATA.robots.forEach((_, robot) => {
+      const [key, state] = [`robot ${robot}`, states.get(robot)];
+      const band = this.open.get(key);
+      if (band && band.state === state) return;
+      this.end(key, now);
+      if (!state) return;
+      const element = document.createElement('div');
+      element.className = `stood ${state}`;
+      element.title = state === 'dead' ? 'is dead' : 'stands still';
+      this.tracks[robot].append(element);
+      this.keep(key, { state, from: now, to: null, elements: [element] });
+    });
   }
 
   // Strips are as wide as the track and move to the left by what time has gone by.
