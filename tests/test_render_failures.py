@@ -13,6 +13,7 @@ from factory.mjcf.replica import Replica
 from factory.nets.undo import marking_after, undo
 from factory.nets.undone import Undone
 from factory.plant.material import joins_of
+from factory.record.deaths import Death
 from factory.record.failures import Failing
 from factory.record.log import Log
 from factory.record.log.model import model_of
@@ -265,22 +266,23 @@ def test_a_run_in_which_nothing_failed_has_no_marks(log: Log) -> None:
 def test_a_history_tells_which_robots_were_exchanged(log: Log) -> None:
     history = told(log)
     death = next(one for one in history.failings if one.test == "jammed")
-    ((robot, start, end),) = history.exchanged()
-    assert (history.factory.robots[robot].name, start, end) == ("r2", death.t, death.until)
+    assert history.deaths() == [Death("r2", death.t, death.until)]
 
 
 def test_the_gantt_chart_has_a_dark_band_until_the_spare_comes(log: Log) -> None:
     history = told(log)
-    ((_, start, end),) = history.exchanged()
+    (one,) = history.deaths()
     panel = GanttPanel(SIZE, 1.0, history, Rows(history, 300.0))
     slides = np.zeros(len(history.factory.robots))
-    before, during = (panel.draw(t, slides, 0.0).astype(int).sum(axis=2) for t in (start, end))
+    before, during = (
+        panel.draw(t, slides, 0.0).astype(int).sum(axis=2) for t in (one.start, one.end)
+    )
     assert (during < 480).mean() > (before < 480).mean() + 0.01
 
 
 def test_a_spare_is_told_of_when_it_comes(log: Log) -> None:
     history, caption = told(log), Caption(SIZE)
-    ((_, _, end),) = history.exchanged()
+    end = history.deaths()[0].end
     dark = []
     for time in (end - 0.05, end + 0.05):
         pixels = np.full((SIZE[1], SIZE[0], 3), 255, np.uint8)

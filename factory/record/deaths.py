@@ -21,6 +21,13 @@ class Death:
     deputy: str = ""
 
 
+def instead_of(robot: str, deputy: str) -> str:
+    """What is so when a robot is no longer dead, in words; `deputy`: "" for a spare."""
+    if deputy:
+        return f"{robot} is gone: {deputy} does its tours"
+    return f"a spare is in the place of {robot}"
+
+
 def gone(entries: Iterable[Entry], time: float = inf) -> dict[str, str]:
     """The robots that have been lifted out for good by a time [s], each with the deputy that does
     its tours from then on, by name: those that the entries of a record up to then exchange."""

@@ -16,6 +16,7 @@ from factory.render.caption import Caption, draw_title
 from factory.render.gantt_panel import GanttPanel
 from factory.render.history import History
 from factory.render.ink import Pixels
+from factory.render.left_out import LeftOut
 from factory.render.marks import Marks
 from factory.render.net_panel import NetPanel
 from factory.render.notices import draw_notices
@@ -83,10 +84,12 @@ class Camerawork(Closing):
         share = self.caption.share if self.caption else 0.0
         self.painter = Painter(take.m, size, picture.camera, take.subject, share, samples)
         self.marks = Marks(self.painter.replica, take.history)
+        self.left_out = LeftOut(self.painter.replica, take.history)
 
     def picture(self, moment: Moment, elapsed: float = 0.0) -> Pixels:
         """One picture; `elapsed` [s] since the last."""
         take, time = self.take, moment.time
+        self.left_out.at(time)
         pixels = self.painter.paint(moment.shown, elapsed, time, self.marks)
         if self.caption is not None:
             pixels = self.caption.draw(pixels, take.product, moment.made, take.units, time)

@@ -58,11 +58,11 @@ class GanttPanel:
         self._lines(ink, time, bottom)
         for row in self.rows.shown:
             self._stands(ink, row, time)
-            for spell in self.history.since(row.robot, time - self.window):
-                self._spell(ink, row, spell, time)
+            for tour, spell in self.history.done(row.robot, time - self.window):
+                self._spell(ink, row, spell, tour, time)
         thin = self.sheet.scale
         ink.box(self.right - thin, self.sheet.top, self.right + thin, bottom, FLASH)
-        self.sheet.names(ink, self.history.stands(time))
+        self.sheet.names(ink, self.history.stands(time), self.history.gone(time))
         return ink.pixels
 
     def at(self, time: float, now: float) -> float:
@@ -74,7 +74,7 @@ class GanttPanel:
         x, y, small = self.right, 20 * self.sheet.scale, self.sheet.points - 2
         colours = template_colours(self.factory)
         colours |= {"stands": AMBER} if self.history.standing else {}
-        colours |= {"dead": DEAD} if self.history.exchanged() else {}
+        colours |= {"dead": DEAD} if self.history.deaths() else {}
         colours |= {"undone": FLASH} if self.history.undone else {}
         for name, colour in reversed(colours.items()):
             if x - width(name, small) < self.sheet.size[0] / 3:
@@ -103,23 +103,25 @@ class GanttPanel:
         for start, end in self.history.stood(row.robot, now - self.window, now):
             left, right = max(self.at(start, now), self.left), self.at(end, now)
             ink.box(left, y - half, right, y + half, AMBER, 0.3 * row.alpha)
-        for robot, start, end in self.history.exchanged():
-            if robot != row.robot or start > now or end < now - self.window:
+        for death in self.history.deaths():
+            past = death.start > now or death.end < now - self.window
+            if self.history.index[death.robot] != row.robot or past:
                 continue
-            left, right = max(self.at(start, now), self.left), self.at(min(end, now), now)
+            left = max(self.at(death.start, now), self.left)
+            right = self.at(min(death.end, now), now)
             ink.box(left, y - half, right, y + half, DEAD, 0.45 * row.alpha)
-            if end <= now:  # another robot goes on from here
+            if death.end <= now:  # another robot goes on from here
                 ink.box(right - self.sheet.scale, y - half, right, y + half, DEAD, row.alpha)
 
-    def _spell(self, ink: Ink, row: PanelRow, spell: Spell, now: float) -> None:
-        """A bar for an operation, hatched where that was undone, a thin one where a robot
-        waits with a part; empty-handed it has none."""
+    def _spell(self, ink: Ink, row: PanelRow, spell: Spell, tour: int, now: float) -> None:
+        """A bar for an operation of a robot's tour, hatched where that was undone, a thin one
+        where it waits with a part; empty-handed it has none."""
         if spell.start > now or not spell.step:
             return
         is_undone = spell.undone < now - TIE
         left = max(self.at(spell.start, now), self.left)
         right = self.at(min(spell.end, now), now)
-        y, gear = self.sheet.height(row), self.factory.robots[row.robot].operations
+        y, gear = self.sheet.height(row), self.factory.robots[tour].operations
         if not spell.operation:
             before = FLASH if is_undone else self.colours[gear[spell.step // 2 - 1]]
             thin = 1.6 * self.sheet.scale

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from bisect import bisect_right
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from math import inf
@@ -13,6 +13,7 @@ from factory.control.mode import Array
 from factory.layout.durations import Pace
 from factory.nets.undone import Entry, Undone
 from factory.plant.factory import Factory, Operation
+from factory.record.deaths import Death, deaths, gone
 from factory.record.failures import Failing, Stood
 from factory.record.monitor.subject import MonitorSubject
 
@@ -43,8 +44,8 @@ class History:
     fires at a time shows after it, as in a log, whose state at a time is before what fires then.
 
     `events`: what has fired, each at one of `times` [s]; `undone`: what of that was undone, and
-    when; `taken`: how many entries. `failings`: what failed; `standing`: from when on [s] which
-    robots (index) stand.
+    when; `taken`: how many entries. `exchanges`: those that exchange robots; `failings`: what
+    failed; `standing`: from when on [s] which robots (index) stand.
     """
 
     def __init__(self, subject: MonitorSubject) -> None:
@@ -59,6 +60,7 @@ class History:
         self.undone: list[tuple[float, int]] = []
         self.fired = Counter(subject.counts)
         self.taken = 0
+        self.exchanges: list[Undone] = []
         self.failings: list[Failing] = []
         self.standing: list[tuple[float, frozenset[int]]] = []
 
@@ -68,6 +70,7 @@ class History:
         number = self.factory.net.threaded.net.transition_index
         if isinstance(entry, Undone):
             self.undo(time - 2 * TIE, [number[name] for name in entry.transitions])
+            self.exchanges += [entry] if entry.robots else []
         else:
             self.fire(time, number[entry])
 
@@ -102,9 +105,13 @@ class History:
 
     def stand(self, stood: Sequence[Stood]) -> None:
         """Which robots stood up to now."""
-        index = {robot.name: robot.index for robot in self.factory.robots}
         for start, names in stood[len(self.standing) :]:
-            self.standing.append((start, frozenset(index[name] for name in names)))
+            self.standing.append((start, frozenset(self.index[name] for name in names)))
+
+    @cached_property
+    def index(self) -> Mapping[str, int]:
+        """The number of each robot."""
+        return {robot.name: robot.index for robot in self.factory.robots}
 
     def stood(self, robot: int, since: float, time: float) -> list[tuple[float, float]]:
         """From when to when a robot stood, between two times [s]."""
@@ -120,19 +127,35 @@ class History:
         before = bisect_right(self.standing, time - TIE, key=lambda pair: pair[0])
         return self.standing[before - 1][1] if before else frozenset()
 
-    def exchanged(self) -> list[tuple[int, float, float]]:
-        """The robots that were known to be dead, each from when on and until another took its
-        place [s], inf where none did."""
-        index = {robot.name: robot.index for robot in self.factory.robots}
-        return [
-            (index[one.robot], one.t, inf if one.until is None else one.until)
-            for one in self.failings
-            if one.test == "jammed"
-        ]
+    def deaths(self) -> list[Death]:
+        """All that are known."""
+        return deaths(self.failings, self.exchanges)
 
     def dead(self, time: float) -> frozenset[int]:
         """The robots that are known to be dead at a time, and not yet replaced."""
-        return frozenset(r for r, start, end in self.exchanged() if start < time - TIE < end)
+        return frozenset(
+            self.index[one.robot] for one in self.deaths() if one.start < time - TIE < one.end
+        )
+
+    def gone(self, time: float) -> frozenset[int]:
+        """The robots that have been lifted out for good by a time."""
+        return frozenset(self.index[robot] for robot in gone(self.exchanges, time + TIE))
+
+    def doer(self, robot: int, time: float) -> int:
+        """The robot that does the tours of a robot at a time: itself, or its deputy."""
+        for entry in self.exchanges:
+            dead, deputy = (self.index[name] for name in entry.robots)
+            if robot == dead and entry.t <= time + 3 * TIE:  # it is undone a little before
+                robot = deputy
+        return robot
+
+    def done(self, robot: int, since: float) -> Iterator[tuple[int, Spell]]:
+        """The spells in which a robot did tours, and had not ended by a time [s], each with the
+        robot whose tours they are."""
+        for tour in range(len(self.spells)) if self.exchanges else (robot,):
+            for spell in self.since(tour, since):
+                if self.doer(tour, spell.start) == robot:
+                    yield tour, spell
 
     def failed(self, since: float, time: float) -> list[Failing]:
         """What failed from one time and before another."""

@@ -5,6 +5,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from factory.nets.verdict import listing
+from factory.record.deaths import instead_of
 from factory.render.caption import Caption
 from factory.render.colours import AMBER, DEAD, FLASH, INK, WHITE
 from factory.render.history import History
@@ -15,9 +17,6 @@ SHOWN, FADES = 4.0, 0.6
 
 MOST = 3
 """At most so many failures are told at once, the latest."""
-
-NAMED = 6
-"""So many robots that stand are named."""
 
 
 def draw_notices(pixels: Pixels, history: History, time: float, caption: Caption) -> None:
@@ -37,15 +36,17 @@ def draw_notices(pixels: Pixels, history: History, time: float, caption: Caption
 
 def _notices(history: History, time: float) -> Iterator[tuple[str, Colour, float]]:
     """Words, their colour and how much of them is to be seen, the lowest first."""
-    if robots := sorted(history.stands(time)):
-        names = [history.factory.robots[robot].name for robot in robots]
-        more = f" and {len(names) - NAMED} more" if len(names) > NAMED else ""
-        listed = ", ".join(names[:NAMED]) + more
-        yield f"{listed} stand{'s' if len(names) == 1 else ''} still", AMBER, 1.0
-    for robot, _, until in history.exchanged():
-        if until < time < until + SHOWN + FADES:
-            alpha = min(1.0, (until + SHOWN + FADES - time) / FADES)
-            yield f"a spare is in the place of {history.factory.robots[robot].name}", DEAD, alpha
+    dead, robots = history.dead(time), history.factory.robots
+    if stands := sorted(history.stands(time) - dead):
+        names = listing(robots[robot].name for robot in stands)
+        yield f"{names} stand{'s' if len(stands) == 1 else ''} still", AMBER, 1.0
+    if dead:
+        names = listing(robots[robot].name for robot in sorted(dead))
+        yield f"{names} {'is' if len(dead) == 1 else 'are'} dead", DEAD, 1.0
+    for death in history.deaths():
+        if death.end < time < death.end + SHOWN + FADES:
+            alpha = min(1.0, (death.end + SHOWN + FADES - time) / FADES)
+            yield instead_of(death.robot, death.deputy), DEAD, alpha
     for failing in history.failed(time - SHOWN - FADES, time)[: -MOST - 1 : -1]:
         alpha = min(1.0, (failing.t + SHOWN + FADES - time) / FADES)
         yield str(failing), FLASH, alpha

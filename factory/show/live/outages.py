@@ -10,6 +10,7 @@ from math import ceil, isfinite
 import numpy as np
 
 from factory.nets.verdict import listing
+from factory.record.deaths import instead_of
 from factory.render.zones import Zone, Zones
 from factory.simulation.recovery import Recovery
 
@@ -50,7 +51,7 @@ class Outages:
         if self.standing:
             yield "standing", f"{listing(self.standing)} stand{_s(self.standing)} still"
         for robot, (deputy, _) in self.gone.items():
-            yield "gone", f"{robot} is gone: {deputy} does its tours"
+            yield "gone", instead_of(robot, deputy)
 
     def as_json(self) -> dict[str, object]:
         """As the page is told it."""
