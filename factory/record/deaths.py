@@ -20,12 +20,12 @@ class Death:
     end: float
     deputy: str = ""
 
-
-def instead_of(robot: str, deputy: str) -> str:
-    """What is so when a robot is no longer dead, in words; `deputy`: "" for a spare."""
-    if deputy:
-        return f"{robot} is gone: {deputy} does its tours"
-    return f"a spare is in the place of {robot}"
+    @property
+    def then(self) -> str:
+        """What is so from its end on, in words."""
+        if self.deputy:
+            return f"{self.robot} is gone: {self.deputy} does its tours"
+        return f"a spare is in the place of {self.robot}"
 
 
 def gone(entries: Iterable[Entry], time: float = inf) -> dict[str, str]:

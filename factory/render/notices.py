@@ -6,7 +6,6 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from factory.nets.verdict import listing
-from factory.record.deaths import instead_of
 from factory.render.caption import Caption
 from factory.render.colours import AMBER, DEAD, FLASH, INK, WHITE
 from factory.render.history import History
@@ -46,7 +45,7 @@ def _notices(history: History, time: float) -> Iterator[tuple[str, Colour, float
     for death in history.deaths():
         if death.end < time < death.end + SHOWN + FADES:
             alpha = min(1.0, (death.end + SHOWN + FADES - time) / FADES)
-            yield instead_of(death.robot, death.deputy), DEAD, alpha
+            yield death.then, DEAD, alpha
     for failing in history.failed(time - SHOWN - FADES, time)[: -MOST - 1 : -1]:
         alpha = min(1.0, (failing.t + SHOWN + FADES - time) / FADES)
         yield str(failing), FLASH, alpha

@@ -10,7 +10,6 @@ from math import ceil, isfinite
 import numpy as np
 
 from factory.nets.verdict import listing
-from factory.record.deaths import instead_of
 from factory.render.zones import Zone, Zones
 from factory.simulation.recovery import Recovery
 
@@ -51,7 +50,7 @@ class Outages:
         if self.standing:
             yield "standing", f"{listing(self.standing)} stand{_s(self.standing)} still"
         for robot, (deputy, _) in self.gone.items():
-            yield "gone", instead_of(robot, deputy)
+            yield "gone", f"{robot} is gone: {deputy} does its tours"
 
     def as_json(self) -> dict[str, object]:
         """As the page is told it."""
@@ -59,7 +58,7 @@ class Outages:
             "dead": [*self.dead],
             "closed": self.closed,
             "standing": self.standing,
-            "gone": dict(self.gone),
+            "gone": [[robot, t, deputy] for robot, (deputy, t) in self.gone.items()],
             "zones": [[round(v, 4) for v in zone] for zone in self.zones],
             "told": self.told,
         }

@@ -4,14 +4,16 @@ from __future__ import annotations
 
 from collections import Counter
 from html import escape
+from math import isfinite
 from typing import Any
 
+from factory.record.deaths import Death, deaths
 from factory.record.failures import Failing, Failures
 from factory.show.report.recording import Recording
 
 LEGEND = (
     "Robots over time: hatched is what was undone; in a band a robot stands still, in a dark one it"
-    " is dead, until another is in its place."
+    " is dead, until another is in its place, or does its tours."
 )
 
 COLUMNS = ("Time", "What failed", "What was done", "Undone", "Scrapped")
@@ -35,26 +37,33 @@ def failures_section(recording: Recording) -> str:
 
 def failures_data(recording: Recording) -> dict[str, Any]:
     """What the page draws of it: `undone`, after how many firings, when [s] and which transitions;
-    `dead`, which robots were, from when on and until when [s], null where none took their place;
+    `dead`, which robots were, from when on and until when [s], null where none took their place,
+    and what was then; `gone`, which were lifted out for good, when [s], and their deputies;
     `stood`, from when on [s] which robots stood."""
     log, net = recording.log, recording.factory.net.threaded.net.transition_index
     if log.failures is None:
         return {}
     robots = {robot.name: robot.index for robot in recording.factory.robots}
+    entries = [undone for _, undone in log.undone]
     return {
         "undone": [
             [after, round(undone.t, 4), [net[name] for name in undone.transitions]]
             for after, undone in log.undone
         ],
-        "dead": [
-            [robots[one.robot], round(one.t, 4), None if one.until is None else round(one.until, 4)]
-            for one in log.failures.found
-            if one.test == "jammed"
+        "dead": [_dead(robots[one.robot], one) for one in deaths(log.failures.found, entries)],
+        "gone": [
+            [robots[e.robots[0]], round(e.t, 4), robots[e.robots[1]]] for e in entries if e.robots
         ],
         "stood": [
             [round(t, 4), [robots[name] for name in names]] for t, names in log.failures.stood
         ],
     }
+
+
+def _dead(robot: int, death: Death) -> list[Any]:
+    """A death, as the page draws it."""
+    start, end = round(death.start, 4), round(death.end, 4) if isfinite(death.end) else None
+    return [robot, start, end, f", then {death.then}" if end is not None else ""]
 
 
 def _summary(found: Failures) -> str:

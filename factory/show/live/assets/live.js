@@ -55,8 +55,8 @@ function unpackedFrame(buffer) {
 
 // What can be done to what is selected.
 class Acts {
-  constructor(panel, selection, send, outages) {
-    Object.assign(this, { panel, selection, send, outages, slowed: {}, blocked: [] });
+  constructor(panel, selection, send) {
+    Object.assign(this, { panel, selection, send, slowed: {}, blocked: [] });
     selection.listeners.push(() => this.draw());
     this.draw();
   }
@@ -86,11 +86,12 @@ class Acts {
     const { robot, part } = this.meant;
     const made = [];
     const name = DATA.robots[robot];
-    if (robot !== undefined && name in this.outages.now.gone) {
-      made.push(this.words('h3', `Robot ${name}`), this.words('p', `It has been lifted out: ${this.outages.now.gone[name][0]} does its tours.`));
+    const deputy = robot === undefined ? robot : doer(robot, Infinity);
+    if (deputy !== robot) {
+      made.push(this.words('h3', `Robot ${name}`), this.words('p', `It has been lifted out: ${DATA.robots[deputy]} does its tours.`));
     } else if (robot !== undefined) {
       const now = this.slowed[robot] || 1;
-      made.push(this.words('h3', `Robot ${DATA.robots[robot]}`));
+      made.push(this.words('h3', `Robot ${name}`));
       made.push(this.group('Push', [
         ['◂◂ back', { do: 'push', robot, share: -1 }],
         ['◂', { do: 'push', robot, share: -0.5 }],
@@ -100,7 +101,7 @@ class Acts {
       made.push(this.group('Speed', [...DATA.factors].reverse().map((factor) =>
         [factor === 1 ? 'full' : `${100 * factor} %`, { do: 'slow', robot, factor }, factor === now])));
     }
-    if (robot !== undefined && DATA.fails && !(name in this.outages.now.gone))
+    if (robot !== undefined && deputy === robot && DATA.fails)
       made.push(this.group('Let it', [
         ['drop what it holds', { do: 'drop', robot }],
         ['stand for 5 s', { do: 'down', robot }],
@@ -191,8 +192,7 @@ class Live {
     Object.assign(this, { selection, views, run: -1, frame: null });
     this.motion = views.floor.motion;
     this.outages = new Outages(document.getElementById('outages'), views);
-    views.gantt.doer = (robot, time) => this.outages.doer(robot, time);
-    this.acts = new Acts(document.getElementById('acts'), selection, (command) => this.send(command), this.outages);
+    this.acts = new Acts(document.getElementById('acts'), selection, (command) => this.send(command));
     this.said = new Said(document.getElementById('said'));
     this.play = document.getElementById('play');
     this.speed = document.getElementById('speed');

@@ -29,15 +29,9 @@ function round(corners = 48) {
 
 class Outages {
   constructor(list, views) {
-    Object.assign(this, { list, views, now: { dead: [], closed: [], standing: [], gone: {}, zones: [], told: [] } });
+    Object.assign(this, { list, views, now: { dead: [], closed: [], standing: [], gone: [], zones: [], told: [] } });
     this.drawn = '';
     document.getElementById('failing').hidden = !DATA.fails;
-  }
-
-  // The robot that does a robot's tours at a time: itself, or after it is gone its deputy.
-  doer(robot, time) {
-    const [deputy, since] = this.now.gone[DATA.robots[robot]] || [];
-    return deputy !== undefined && time >= since ? this.doer(DATA.robots.indexOf(deputy), time) : robot;
   }
 
   // The state of each robot, by number, that does not move.
@@ -47,6 +41,8 @@ class Outages {
 
   take(now) {
     this.now = now;
+    const number = (name) => DATA.robots.indexOf(name);
+    TAKEOVERS.splice(0, Infinity, ...now.gone.map(([dead, since, deputy]) => [number(dead), since, number(deputy)]));
   }
 
   draw() {
@@ -60,11 +56,12 @@ class Outages {
     if (drawn === this.drawn && replay === this.replay) return;
     if (replay !== this.replay) replay.controls.addEventListener('change', () => this.tag(replay));
     Object.assign(this, { drawn, replay });
-    const gone = new Set(Object.keys(now.gone).map((name) => DATA.robots.indexOf(name)));
+    const [gone, { states }] = [goneBy(Infinity), this];
     [replay, floor].forEach((view) => view && view.leaveOut(gone));
-    for (const state of [...STATES, 'gone']) {
-      const names = state === 'gone' ? Object.keys(now.gone) : now[state];
-      document.querySelectorAll('[data-robot]').forEach((e) => e.classList.toggle(state, names.includes(DATA.robots[e.dataset.robot])));
+    for (const element of document.querySelectorAll('[data-robot]')) {
+      const robot = Number(element.dataset.robot);
+      STATES.forEach((state) => element.classList.toggle(state, states.get(robot) === state));
+      element.classList.toggle('gone', gone.has(robot));
     }
     this.tell();
     this.onFloor(floor.svg);

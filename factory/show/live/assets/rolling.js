@@ -86,7 +86,7 @@ class Rolling {
     const { name, robots } = DATA.operations[operation];
     const odd = this.units[operation]++ % 2 ? ' odd' : '';
     const elements = robots.map((tour) => {
-      const robot = this.doer(tour, time);
+      const robot = doer(tour, time);
       const element = document.createElement('div');
       element.className = `op ${DATA.roles[robot]}${odd}`;
       element.dataset.operation = operation;

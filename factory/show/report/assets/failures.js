@@ -43,7 +43,8 @@ Gantt.prototype.draw = function drawWithUndone(page) {
   const to = this.from + this.width;
   const next = this.tracks.map(() => 0);
   for (const span of this.spans.filter((s) => s.from < to && s.to > this.from))
-    for (const robot of DATA.operations[span.operation].robots) {
+    for (const tour of DATA.operations[span.operation].robots) {
+      const robot = doer(tour, span.from);
       const bar = this.tracks[robot].children[next[robot]++];
       bar.classList.toggle('undone', span.undone);
       if (span.undone) bar.title += ', undone';
@@ -62,9 +63,18 @@ Gantt.prototype.draw = function drawWithUndone(page) {
     const end = n + 1 < DATA.stood.length ? DATA.stood[n + 1][0] : DATA.end;
     robots.forEach((robot) => band(robot, 'stood', 'stands still', start, end));
   });
-  DATA.dead.forEach(([robot, start, end]) =>
-    band(robot, 'stood dead', end === null ? 'is dead' : 'is dead, then a spare is in its place', start, end ?? DATA.end));
+  DATA.dead.forEach(([robot, start, end, then]) => band(robot, 'stood dead', `is dead${then}`, start, end ?? DATA.end));
 };
+
+// Robots whose deputies took over are left out from then on.
+if (TAKEOVERS.length)
+  for (const { prototype } of [Replay, Floor]) {
+    const plainShow = prototype.show;
+    prototype.show = function showWhoIsThere(time) {
+      this.leaveOut(goneBy(time));
+      plainShow.call(this, time);
+    };
+  }
 
 Game.prototype.rewind = function rewind() {
   this.next = 0;
