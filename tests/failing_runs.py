@@ -57,10 +57,15 @@ def paper_layout() -> Layout:
 
 
 def failing(
-    path: Path, world: WorldName = "mujoco", units: int = 4, campaign: Campaign = CAMPAIGN
+    path: Path,
+    world: WorldName = "mujoco",
+    units: int = 4,
+    campaign: Campaign = CAMPAIGN,
+    layout: Layout | None = None,
 ) -> Log:
     """The log of a run in which all of a campaign happens."""
-    made = Simulation(paper_layout(), RunRequest(world, units=units, recovers=True))
+    request = RunRequest(world, units=units, recovers=True)
+    made = Simulation(layout or paper_layout(), request)
     recover(made, campaign)
     with LogWriter(path, made) as log:
         made.run([log.observe])

@@ -8,6 +8,7 @@ from typing import Any
 
 import pytest
 
+from factory.layout.layout import Layout
 from factory.show.live import LiveFrame, Session
 from factory.simulation.recovery import Campaign
 from factory.simulation.request import RunRequest
@@ -19,17 +20,25 @@ class Stopped(Exception):
     """Ends a session."""
 
 
-def a_session(playing: bool, campaign: Campaign | None = None) -> Session:
-    """A session of the paper's example, without end; it does not run yet."""
+def a_session(
+    playing: bool, campaign: Campaign | None = None, layout: Layout | None = None
+) -> Session:
+    """A session of the paper's example, or of another layout, without end; it does not run yet."""
     request = RunRequest(units=10**9, recovers=campaign is not None)
-    return Session(lambda: Simulation(paper_layout(), request), playing, campaign)
+    found = layout or paper_layout()
+    return Session(lambda: Simulation(found, request), playing, campaign)
 
 
 class Running:
     """A session that runs in a thread of its own."""
 
-    def __init__(self, playing: bool = True, campaign: Campaign | None = None) -> None:
-        self.session = a_session(playing, campaign)
+    def __init__(
+        self,
+        playing: bool = True,
+        campaign: Campaign | None = None,
+        layout: Layout | None = None,
+    ) -> None:
+        self.session = a_session(playing, campaign, layout)
         self.over = False
         self.thread = Thread(target=self._run, daemon=True)
         self.thread.start()

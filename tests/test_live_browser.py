@@ -9,9 +9,12 @@ from typing import Any
 
 import pytest
 
+from factory.layout.layout import Layout
 from factory.show.live import Server
 from factory.show.live.page import page
+from factory.simulation.recovery import Campaign
 from tests.live_sessions import Running, a_session
+from tests.test_takeovers import laid_out
 
 LONG = 20.0
 """Time limit for a browser that draws in software [s]."""
@@ -20,9 +23,15 @@ LONG = 20.0
 class Watched:
     """A running factory with a page open on it."""
 
-    def __init__(self, browser: Any, **options: Any) -> None:
-        self.running = Running()
-        self.server = Server(self.running.session, page(a_session(False)))
+    def __init__(
+        self,
+        browser: Any,
+        campaign: Campaign | None = None,
+        layout: Layout | None = None,
+        **options: Any,
+    ) -> None:
+        self.running = Running(True, campaign, layout)
+        self.server = Server(self.running.session, page(a_session(False, campaign, layout)))
         self.context = browser.new_context(viewport={"width": 1400, "height": 900}, **options)
         self.page = self.context.new_page()
         self.trouble: list[str] = []
@@ -114,6 +123,75 @@ def test_buttons_step_slow_push_and_block(watched: Watched) -> None:
     watched.until("!f.note")
     watched.press("Begin anew")
     watched.until("f.run === 1")
+    assert watched.trouble == []
+
+
+def marks(watched: Watched, state: str) -> list[str]:
+    """The robots that have a mark in the chart, in the plan, and over them in the 3-D view."""
+    return watched.page.evaluate(
+        """state => [
+            ...document.querySelectorAll(`#gantt button.${state}`),
+            ...document.querySelectorAll(`.floor [data-body].${state}`),
+            ...document.querySelectorAll(`#tags .${state}`),
+        ].map(e => e.textContent || `robot ${e.dataset.robot}`)""",
+        state,
+    )
+
+
+def test_what_is_out_of_order_is_marked_and_said(browser: Any) -> None:
+    watched = Watched(browser, Campaign(clear=4.0, spares=1, swap=200.0))
+    watched.until("f.products > 0")
+    watched.page.locator("#gantt button[data-robot='5']").click()
+    watched.press("drop what it holds")
+    watched.until("f.outages.zones.length && f.outages.closed.includes('r6')")
+    watched.seen("n => n === 1", "factoryView.zones")
+    assert watched.page.locator(".floor .zone").count() == 1
+    assert watched.page.locator("#outages .closed").inner_text().endswith(" s")
+    assert {"r6", "robot 5"} <= {*marks(watched, "closed")}
+    watched.page.locator("#speed").select_option("0")
+    watched.until("f.outages.told.length === 0")
+    watched.seen("n => n === 0", "factoryView.zones")
+    assert watched.page.locator("#outages").is_hidden()
+    watched.page.locator("#gantt button[data-robot='1']").click()
+    watched.press("die")
+    watched.until("f.outages.dead.length")
+    watched.press("Pause")
+    watched.until("!f.playing")
+    watched.page.wait_for_timeout(200)
+    assert marks(watched, "dead") == ["r2", "robot 1", "r2 is dead"]
+    said = watched.page.locator("#outages .dead").inner_text()
+    assert said.startswith("r2 is dead: a spare comes in ")
+    assert watched.page.locator("#gantt .stood.dead").count() == 1
+    watched.press("Play")
+    watched.until("!f.outages.dead.length")
+    assert marks(watched, "dead") == []
+    watched.close()
+    assert watched.trouble == []
+
+
+def test_a_robot_whose_deputy_took_over_is_not_drawn(browser: Any) -> None:
+    watched = Watched(browser, Campaign(swap=2.0), laid_out())
+    watched.page.locator("#speed").select_option("0")
+    watched.until("f.products > 1")
+    assert watched.page.evaluate("factoryView.isDrawn(3)")
+    watched.page.locator("#gantt button[data-robot='3']").click()
+    watched.press("die")
+    watched.until("f.outages.gone.length")
+    watched.seen("drawn => !drawn", "factoryView.isDrawn(3)")
+    assert watched.page.evaluate("factoryView.isDrawn(1)")
+    plan = watched.page.locator(".floor [data-robot='3'][data-body]")
+    assert plan.count() == 1 and plan.is_hidden()
+    assert watched.page.locator("#outages").inner_text() == "r4 is gone: r2 does its tours"
+    watched.page.locator("#speed").select_option("5")
+    made = watched.page.evaluate("factoryView.frame.products")
+    watched.until(f"f.products > {made + 2}")
+    bars = "document.querySelectorAll('.rolling .row')[{}].querySelectorAll('.op').length"
+    watched.seen("n => n === 0", bars.format(4))
+    assert watched.page.evaluate(bars.format(2)) > 0
+    watched.press("Begin anew")
+    watched.until("f.run === 1")
+    watched.seen("drawn => drawn", "factoryView.isDrawn(3)")
+    watched.close()
     assert watched.trouble == []
 
 

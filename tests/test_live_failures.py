@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator
+from math import inf
 
+import numpy as np
 import pytest
 
 from factory.nets.replay import replay
@@ -12,6 +14,7 @@ from factory.nets.undone import Undone
 from factory.plant.material import joins_of
 from factory.show.live import Server
 from factory.show.live.commands import FAILURES, Command, command_of
+from factory.show.live.outages import Outages
 from factory.show.live.page import page
 from factory.simulation.disturbance.interventions import Interventions
 from factory.simulation.recovery import Campaign
@@ -21,6 +24,7 @@ from factory.simulation.simulation import Simulation
 from factory.support.errors import InputError
 from tests.layout_values import paper_layout
 from tests.live_sessions import Running, a_session
+from tests.test_takeovers import laid_out
 
 websockets = pytest.importorskip("websockets.sync.client", reason="pip install websockets")
 
@@ -122,6 +126,79 @@ def test_a_session_tells_what_failed_and_begins_anew(running: Running) -> None:
     send(Command("restart"))
     running.until(lambda f: f.run == 1 and not f.outages.standing and f.time > 0.1)
     assert session.fails
+
+
+def test_a_session_tells_what_is_out_of_order(running: Running) -> None:
+    session, send = running.session, running.session.send
+    assert session.frame.outages == Outages()
+    send(Command("speed", factor=0.0))
+    running.until(lambda f: f.products > 0)
+    send(Command("drop", robot=5))
+    lies = running.until(lambda f: f.outages.zones and f.outages.closed).outages
+    (x, y, radius), world = lies.zones[0], session.simulation.physical
+    assert "r6" in lies.closed and not lies.dead and 0.0 < lies.lying <= CAMPAIGN.clear
+    assert min(np.hypot(*(world.d.xpos[:, :2] - (x, y)).T)) < radius
+    running.until(lambda f: f.outages == Outages())
+    send(Command("dead", robot=1))
+    stands = running.until(lambda f: bool(f.outages.standing)).outages
+    assert (stands.standing, stands.dead) == (("r2",), {}), "nothing has told of it"
+    dead = running.until(lambda f: bool(f.outages.dead)).outages
+    assert [*dead.dead] == ["r2"] and dead.standing == ()
+    left, deputy = dead.dead["r2"]
+    assert 0.0 < left <= CAMPAIGN.swap and deputy == ""
+    running.until(lambda f: f.outages == Outages())
+
+
+def test_a_robot_whose_deputy_took_over_is_gone() -> None:
+    running = Running(campaign=Campaign(swap=2.0), layout=laid_out())
+    try:
+        running.session.send(Command("speed", factor=0.0))
+        running.until(lambda f: f.products > 1)
+        running.session.send(Command("dead", robot=3))
+        dead = running.until(lambda f: bool(f.outages.dead)).outages.dead
+        assert dead["r4"][1] == "r2"
+        frame = running.until(lambda f: bool(f.outages.gone))
+        ((deputy, since),) = frame.outages.gone.values()
+        assert deputy == "r2" and since <= frame.time and not frame.outages.dead
+        later = running.until(lambda f: f.products > frame.products + 2)
+        net = running.session.simulation.layout.factory.net
+        for gear in net.gears:
+            assert sum(place in later.marked for place in gear.places) == 1
+        running.session.send(Command("restart"))
+        running.until(lambda f: f.run == 1 and f.outages == Outages() and f.products > 0)
+    finally:
+        running.close()
+
+
+@pytest.mark.parametrize(
+    ("outages", "told"),
+    [
+        (Outages(), []),
+        (
+            Outages(dead={"r1": (6.2, ""), "r2": (1.0, "r3"), "r4": (inf, "")}),
+            [
+                ("dead", "r1 is dead: a spare comes in 7 s"),
+                ("dead", "r2 is dead: r3 does its tours in 1 s"),
+                ("dead", "r4 is dead: nothing takes its place"),
+            ],
+        ),
+        (
+            Outages(closed=("r1",), lying=2.5, zones=((0.0, 0.0, 0.1),)),
+            [("closed", "r1 stands still: something lies near, and is cleared away in 3 s")],
+        ),
+        (
+            Outages(lying=0.0, zones=((0.0, 0.0, 0.1),), standing=("r1", "r2")),
+            [
+                ("closed", "something lies about, and is cleared away soon"),
+                ("standing", "r1, r2 stand still"),
+            ],
+        ),
+        (Outages(gone={"r1": ("r2", 7.0)}), [("gone", "r1 is gone: r2 does its tours")]),
+    ],
+)
+def test_what_is_out_of_order_in_words(outages: Outages, told: list[tuple[str, str]]) -> None:
+    assert outages.told == told
+    json.dumps(outages.as_json(), allow_nan=False)
 
 
 def test_no_spare_ends_the_run_until_it_begins_anew() -> None:

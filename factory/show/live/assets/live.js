@@ -300,6 +300,11 @@ window.factoryView = (() => {
     ready,
     get frame() { return live.frame; },
     get has3d() { return Boolean(live.views.replay); },
+    // Whether a robot is drawn in the 3-D view, and how many zones are.
+    isDrawn(number) {
+      return live.views.replay.meshes.some((m) => m.userData.robot === number && m.userData.body && m.visible);
+    },
+    get zones() { return (live.outages.discs || []).length; },
     // Where a robot is in the 3-D view [m].
     robot(number) {
       const mesh = live.views.replay.meshes.find((m) => m.userData.robot === number && m.userData.body);
