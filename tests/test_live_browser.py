@@ -139,7 +139,7 @@ def marks(watched: Watched, state: str) -> list[str]:
 
 
 def test_what_is_out_of_order_is_marked_and_said(browser: Any) -> None:
-    watched = Watched(browser, Campaign(clear=4.0, spares=1, swap=200.0))
+    watched = Watched(browser, Campaign(clear=4.0, spares=1, swap=60.0))
     watched.until("f.products > 0")
     watched.page.locator("#gantt button[data-robot='5']").click()
     watched.press("drop what it holds")
