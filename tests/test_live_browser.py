@@ -126,16 +126,12 @@ def test_buttons_step_slow_push_and_block(watched: Watched) -> None:
     assert watched.trouble == []
 
 
-def marks(watched: Watched, state: str) -> list[str]:
-    """The robots that have a mark in the chart, in the plan, and over them in the 3-D view."""
-    return watched.page.evaluate(
-        """state => [
-            ...document.querySelectorAll(`#gantt button.${state}`),
-            ...document.querySelectorAll(`.floor [data-body].${state}`),
-            ...document.querySelectorAll(`#tags .${state}`),
-        ].map(e => e.textContent || `robot ${e.dataset.robot}`)""",
-        state,
-    )
+def assert_marked(watched: Watched, state: str, *marks: str) -> None:
+    """Exactly these are marked: names in the chart, robots in the plan, tags over the 3-D view."""
+    places = ("#gantt button", ".floor [data-body]", "#tags ")
+    found = ", ".join(f"...document.querySelectorAll('{place}.{state}')" for place in places)
+    words = f"[{found}].map(e => e.textContent || e.dataset.robot).join()"
+    watched.seen(f"found => found === '{','.join(marks)}'", words)
 
 
 def test_what_is_out_of_order_is_marked_and_said(browser: Any) -> None:
@@ -147,7 +143,9 @@ def test_what_is_out_of_order_is_marked_and_said(browser: Any) -> None:
     watched.seen("n => n === 1", "factoryView.zones")
     assert watched.page.locator(".floor .zone").count() == 1
     assert watched.page.locator("#outages .closed").inner_text().endswith(" s")
-    assert {"r6", "robot 5"} <= {*marks(watched, "closed")}
+    closed = watched.page.evaluate("factoryView.frame.outages.closed")
+    numbers = [str(int(name.removeprefix("r")) - 1) for name in closed]
+    assert_marked(watched, "closed", *closed, *numbers, *closed)
     watched.page.locator("#speed").select_option("0")
     watched.until("f.outages.told.length === 0")
     watched.seen("n => n === 0", "factoryView.zones")
@@ -157,14 +155,13 @@ def test_what_is_out_of_order_is_marked_and_said(browser: Any) -> None:
     watched.until("f.outages.dead.length")
     watched.press("Pause")
     watched.until("!f.playing")
-    watched.page.wait_for_timeout(200)
-    assert marks(watched, "dead") == ["r2", "robot 1", "r2 is dead"]
+    assert_marked(watched, "dead", "r2", "1", "r2 is dead")
     said = watched.page.locator("#outages .dead").inner_text()
     assert said.startswith("r2 is dead: a spare comes in ")
     assert watched.page.locator("#gantt .stood.dead").count() == 1
     watched.press("Play")
     watched.until("!f.outages.dead.length")
-    assert marks(watched, "dead") == []
+    assert_marked(watched, "dead")
     watched.close()
     assert watched.trouble == []
 

@@ -159,7 +159,7 @@ def test_a_robot_whose_deputy_took_over_is_gone() -> None:
         assert dead["r4"][1] == "r2"
         frame = running.until(lambda f: bool(f.outages.gone))
         ((deputy, since),) = frame.outages.gone.values()
-        assert deputy == "r2" and since <= frame.time and not frame.outages.dead
+        assert deputy == "r2" and since <= frame.time + 1e-4 and not frame.outages.dead
         later = running.until(lambda f: f.products > frame.products + 2)
         net = running.session.simulation.layout.factory.net
         for gear in net.gears:

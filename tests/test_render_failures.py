@@ -282,10 +282,10 @@ def test_the_gantt_chart_has_a_dark_band_until_the_spare_comes(log: Log) -> None
 
 def test_a_spare_is_told_of_when_it_comes(log: Log) -> None:
     history, caption = told(log), Caption(SIZE)
-    end = history.deaths()[0].end
-    dark = []
-    for time in (end - 0.05, end + 0.05):
+    (one,), told_of = history.deaths(), {}
+    for time in (one.start - 0.05, one.end - 0.05, one.end + 0.05, one.end + SHOWN + 1.0):
         pixels = np.full((SIZE[1], SIZE[0], 3), 255, np.uint8)
         draw_notices(pixels, history, time, caption)
-        dark.append(reddish(pixels, DEAD, 8).any())
-    assert dark == [False, True]
+        told_of[time] = (pixels[reddish(pixels, DEAD, 8).any(axis=1)] < 255).any(axis=(0, 2)).sum()
+    before, is_dead, spare, after = told_of.values()
+    assert before == after == 0 < is_dead < spare, "'r2 is dead' is shorter"

@@ -58,7 +58,7 @@ class Outages:
             "dead": [*self.dead],
             "closed": self.closed,
             "standing": self.standing,
-            "gone": [[robot, t, deputy] for robot, (deputy, t) in self.gone.items()],
+            "gone": [[robot, round(t, 4), deputy] for robot, (deputy, t) in self.gone.items()],
             "zones": [[round(v, 4) for v in zone] for zone in self.zones],
             "told": self.told,
         }

@@ -116,10 +116,15 @@ class Session:
 
     def _begin(self) -> None:
         self.interventions = self._make()
-        self.simulation, recovery = self.interventions.simulation, self.interventions.recovery
+        recovery = self.interventions.recovery
         self._watch = Watch(recovery) if recovery else None
         self._trouble = ""
         self._clock.start(self.simulation.world.time)
+
+    @property
+    def simulation(self) -> Simulation:
+        """What runs."""
+        return self.interventions.simulation
 
     @property
     def fails(self) -> bool:
