@@ -24,7 +24,9 @@ from factory.render.caption import Caption
 from factory.render.colours import DEAD
 from factory.render.history import History
 from factory.render.left_out import LeftOut
+from factory.render.net_panel import NetPanel
 from factory.render.notices import draw_notices
+from factory.render.rows import Rows
 from factory.show.report.failures import failures_data
 from factory.show.report.recording import recording_of
 from factory.simulation.recovery import Campaign, WorldFault
@@ -136,6 +138,21 @@ def test_tours_are_shown_with_the_robot_that_does_them(log: Log, history: Histor
         (spell.start, spell.end) for _, spell in history.done(deputy, late) if spell.operation
     )
     assert all(one[1] <= then[0] + 1e-6 for one, then in pairwise(busy))
+
+
+def test_tokens_go_on_with_the_deputy(log: Log, history: History) -> None:
+    """An operation of a robot that is gone is done where its deputy is."""
+    (change,), net = history.exchanges, NetPanel((900, 700), 1.0, history, Rows(history))
+    dead = history.index["r4"]
+    slides = [model_of(log).joint(f"r{n + 1}/slide").qposadr[0] for n in range(4)]
+    ends = []
+    for spell in history.since(dead, change.t + 1.0):
+        if spell.operation and spell.end < log.time[-1]:
+            row = log.row_at(spell.end - 0.005)
+            active = dict(net._active(float(log.time[row]), log.qpos[row][slides]))
+            number = history.factory.robots[dead].operations[spell.step // 2]
+            ends.append(active[number][0])
+    assert len(ends) > 3 and min(ends) > 0.95
 
 
 def drawn(replica: Replica) -> set[str]:

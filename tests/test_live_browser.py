@@ -156,6 +156,8 @@ def test_what_is_out_of_order_is_marked_and_said(browser: Any) -> None:
     watched.press("Pause")
     watched.until("!f.playing")
     assert_marked(watched, "dead", "r2", "1", "r2 is dead")
+    told = watched.page.locator("#said .failed span").all_inner_texts()
+    assert [words.partition(": ")[0] for words in told] == ["r2 is dead", "r6 lost part2"]
     said = watched.page.locator("#outages .dead").inner_text()
     assert said.startswith("r2 is dead: a spare comes in ")
     assert watched.page.locator("#gantt .stood.dead").count() == 1

@@ -3,8 +3,12 @@
 from __future__ import annotations
 
 import json
+import signal
 from collections.abc import Iterator
 from math import inf
+from pathlib import Path
+from subprocess import PIPE
+from typing import Any
 
 import numpy as np
 import pytest
@@ -22,6 +26,8 @@ from factory.simulation.request import RunRequest
 from factory.simulation.run import entries_of
 from factory.simulation.simulation import Simulation
 from factory.support.errors import InputError
+from tests.bench.faults.takeovers import PAPER as INSERTS
+from tests.command_line import started
 from tests.layout_values import paper_layout
 from tests.live_sessions import Running, a_session
 from tests.test_takeovers import laid_out
@@ -29,6 +35,7 @@ from tests.test_takeovers import laid_out
 websockets = pytest.importorskip("websockets.sync.client", reason="pip install websockets")
 
 PARTS = ("part1", "part2", "part3")
+LOST = "r6 lost part2: made again"
 CAMPAIGN = Campaign(clear=1.0, spares=1, swap=2.0)
 
 
@@ -110,12 +117,14 @@ def test_a_session_tells_what_failed_and_begins_anew(running: Running) -> None:
     send(Command("speed", factor=0.0))
     running.until(lambda f: f.products > 0)
     send(Command("drop", robot=5))
-    failed = running.until(lambda f: "r6 lost part2: made again" in f.note)
+    failed = running.until(lambda f: LOST in f.note)
     assert failed.run == 0 and session.fails
     running.until(lambda f: f.products > failed.products + 2 and not f.outages.standing)
     account = session.simulation.world.hooks.account
     assert account is not None and any("r6" in robots for _, robots in account.stood)
     told = session.fired(0, 0, session.frame.count)
+    assert session.failed(0, 0, failed.failed) == [(pytest.approx(failed.time, 1.0), LOST)]
+    assert session.failed(0, failed.failed, failed.failed) == session.failed(1, 0, 1) == []
     undone = [event for _, event in told if isinstance(event, list)]
     assert len(undone) == 1
     events = session.simulation.supervisor.events
@@ -213,15 +222,45 @@ def test_no_spare_ends_the_run_until_it_begins_anew() -> None:
         running.close()
 
 
+def received(watcher: Any) -> dict[str, Any]:
+    """The next frame that a watcher gets."""
+    message = watcher.recv(10)
+    return json.loads(message[4 : 4 + int.from_bytes(message[:4], "little")])
+
+
 def test_watchers_make_it_fail(running: Running) -> None:
     with Server(running.session, b"") as server:
         address = server.address.replace("http", "ws") + "live"
         with websockets.connect(address, proxy=None) as watcher:
             watcher.send('{"do": "down", "robot": 3}')
-            frame: dict = {}
-            while "r4" not in frame.get("outages", {}).get("standing", ()):
-                message = watcher.recv(10)
-                frame = json.loads(message[4 : 4 + int.from_bytes(message[:4], "little")])
+            while "r4" not in received(watcher)["outages"]["standing"]:
+                pass
+            watcher.send('{"do": "speed", "factor": 0}')
+            watcher.send('{"do": "drop", "robot": 5}')
+            told: list[list[Any]] = []
+            while not told or not any(isinstance(event, list) for _, event in told[-1]):
+                told.append(received(watcher)["fired"])
+            events = [event for _, event in told[-1]]
+            assert LOST in events and all(
+                not isinstance(e, str) for row in told[:-1] for _, e in row
+            )
+            assert [t for t, _ in told[-1]] == sorted(t for t, _ in told[-1])
+
+
+def test_with_deputies_robots_can_die(tmp_path: Path) -> None:
+    file = tmp_path / "inserts.pag"
+    file.write_text(INSERTS)
+    words = ("view", file, "--deputies", "--swap", 1, "--port", 0, "--json")
+    with started(*words, stdout=PIPE, stderr=PIPE, text=True) as process:
+        address = json.loads(process.stdout.readline())["address"].replace("http", "ws") + "live"
+        with websockets.connect(address, proxy=None) as watcher:
+            watcher.send('{"do": "speed", "factor": 0}')
+            watcher.send('{"do": "dead", "robot": 3}')
+            while not (gone := received(watcher)["outages"]["gone"]):
+                pass
+            assert [(dead, deputy) for dead, _, deputy in gone] == [("r4", "r2")]
+        process.send_signal(signal.SIGINT)
+        assert process.wait(20) == 130
 
 
 def test_the_page_has_the_buttons_only_where_it_can_fail() -> None:

@@ -45,8 +45,8 @@ def view(
 ) -> int:
     """Run FILE.pag for ever and show it in a browser: pause it, push robots, block feeders.
 
-    With --spares or --faults it goes on after failures: let robots drop things and die, and parts
-    be no good."""
+    With --spares, --deputies or --faults it goes on after failures: let robots drop things and die,
+    and parts be no good."""
     from factory.nets.verify import proved
     from factory.show.live import Server, Session
     from factory.show.live.page import page
@@ -59,8 +59,10 @@ def view(
     layout = project.layout
     proved(layout.factory.net)
     warnings = announced(layout.product.warnings, out)
-    request = replace(asked, units=FOR_EVER, fuse=False).request(project)
-    campaign = asked.campaign(layout.factory) if asked.recovers else None
+    fails = asked.recovers or given.deputies
+    endless = replace(asked, units=FOR_EVER, fuse=False).request(project)
+    request = replace(endless, recovers=fails)
+    campaign = asked.campaign(layout.factory) if fails else None
     session = Session(lambda: Simulation(layout, request), not paused, campaign)
     with Interruption() as stop, Server(session, page(session), host, port, expose) as server:
         if out.as_json:

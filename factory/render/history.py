@@ -210,11 +210,15 @@ class OperationProgress:
         self.subject, self.factory = subject, subject.factory
         self.pace = Pace.of(subject.settings)
 
-    def of(self, operation: Operation, x: Array, elapsed: float) -> float:
+    def of(
+        self, operation: Operation, x: Array, elapsed: float, robots: tuple[int, ...] = ()
+    ) -> float:
         """The share of an operation that is done, with robots at `x` [m] so long after its start
-        [s]."""
-        way = self.ways[operation.index]
-        left = max(abs(self.subject.goal(operation, r) - x[r]) for r in operation.robots)
+        [s]; `robots`: those that take part in it, where deputies do."""
+        way, robots = self.ways[operation.index], robots or operation.robots
+        own = self.subject.goals[operation.index]
+        goals = self.subject.others.get((operation.index, robots), own)
+        left = max(abs(goal - x[r]) for goal, r in zip(goals, robots, strict=True))
         gone = 1.0 - min(left / way, 1.0) if way else 1.0
         travel = self.pace.rest(way)
         if not operation.dwell:

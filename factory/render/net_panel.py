@@ -89,7 +89,8 @@ class NetPanel:
             if spell.operation:
                 operation = self.factory.operations[self._operation(row.robot, spell)]
                 age = time - spell.start
-                yield operation.index, (self.progress.of(operation, x, age), age)
+                robots = tuple(self.history.doer(robot, time) for robot in operation.robots)
+                yield operation.index, (self.progress.of(operation, x, age, robots), age)
 
     def _ground(self) -> Pixels:
         rows = self.rows

@@ -135,14 +135,15 @@ class Server(Closing):
         self._watchers += 1
         try:
             hearing.start()
-            number, run, told = 0, -1, 0
+            number, run, told, known = 0, -1, 0, 0
             while True:
                 frame = self._session.wait(number, PATIENCE)
                 if frame.run != run:
-                    run, told = frame.run, max(0, frame.count - RECENT)
+                    run, told, known = frame.run, max(0, frame.count - RECENT), 0
                 fired = self._session.fired(run, told, frame.count)
-                connection.send(packed(frame, fired))
-                number, told = frame.number, frame.count
+                failed = self._session.failed(run, known, frame.failed)
+                connection.send(packed(frame, sorted([*failed, *fired], key=lambda one: one[0])))
+                number, told, known = frame.number, frame.count, frame.failed
         except ConnectionClosed:
             pass
         finally:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from queue import Empty, SimpleQueue
 from threading import Condition
@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from factory.nets.undo import marking_after
 from factory.nets.undone import Undone
+from factory.record.failures import Failing
 from factory.show.live.commands import DOWN, PUSH, Command
 from factory.show.live.outages import Outages, Watch
 from factory.simulation.disturbance.interventions import Interventions
@@ -37,17 +38,17 @@ LOOK = 0.05
 SAID = 6.0
 """How long a failure is told [s]."""
 
-Told = tuple[float, int | list[int]]
-"""When [s], and which transition fired, or which were undone."""
+Told = tuple[float, int | list[int] | str]
+"""When [s], and which transition fired, or which were undone, or what failed, in words."""
 
 
 @dataclass(frozen=True, slots=True)
 class LiveFrame:
     """The state at an instant, as the page is told it. `number`: of the frame; `run`: number of
     restarts; `poses`: positions [m] and quaternions (bodies, 7) as float32; `marked` places;
-    `count`: how often something has fired, or was undone; `rhythm`: between the last two products
-    [s]; `pace`: simulated seconds in a second; `outages`: what is out of order; `note`: what has
-    just gone wrong, if anything."""
+    `count`: how often something has fired, or was undone; `failed`: how often something has failed;
+    `rhythm`: between the last two products [s]; `pace`: simulated seconds in a second; `outages`:
+    what is out of order; `note`: what has just gone wrong, if anything."""
 
     number: int
     run: int
@@ -55,6 +56,7 @@ class LiveFrame:
     poses: bytes = field(repr=False)
     marked: tuple[int, ...] = field(repr=False)
     count: int
+    failed: int
     products: int
     rhythm: float | None
     playing: bool
@@ -158,6 +160,16 @@ class Session:
             else (round(e.t, 4), numbers[e.transition])
             for e in events
         ]
+
+    def failed(self, run: int, since: int, until: int) -> list[Told]:
+        """What failed in a run, some of it; nothing of a run that is over."""
+        found = self._found[since:until] if run == self._runs else ()
+        return [(round(one.t, 4), str(one)) for one in found]
+
+    @property
+    def _found(self) -> Sequence[Failing]:
+        account = self.simulation.world.hooks.account
+        return account.found if account else ()
 
     def run(self, observe: Observer) -> None:
         """Run for ever; `observe` is called after every tick, and repeatedly while it is paused."""
@@ -266,6 +278,7 @@ class Session:
             poses.astype("<f4").tobytes(),
             self._marked(),
             len(supervisor.events),
+            len(self._found),
             world.delivered(),
             round(left[-1] - left[-2], 4) if len(left) > 1 else None,
             self._playing or self._stepping,
@@ -292,9 +305,8 @@ class Session:
 
     def _failed(self) -> str:
         """What has failed lately, and when, the latest last."""
-        world = self.simulation.world
-        found = world.hooks.account.found if world.hooks.account else ()
-        return "; ".join(f"{o.t:.2f} s: {o}" for o in found[-3:] if o.t > world.time - SAID)
+        late = self.simulation.world.time - SAID
+        return "; ".join(f"{one.t:.2f} s: {one}" for one in self._found[-3:] if one.t > late)
 
     def _waits(self) -> str:
         """Which robots wait for what, where nothing has fired for a long time."""

@@ -164,26 +164,33 @@ class Acts {
   }
 }
 
-// The last transitions, the newest first.
+const LINES = 11;
+const FAILURES = 4;
+
+// The last transitions, the newest first; the last failures among them stay longer.
 class Said {
   constructor(list) {
     this.list = list;
   }
 
   take(fired) {
-    const rows = fired.slice(-14).map(([time, event]) => {
+    const late = fired.filter(([, event], n) => typeof event === 'string' || n >= fired.length - LINES);
+    const rows = late.map(([time, event]) => {
       const row = document.createElement('li');
       const [at, name] = [document.createElement('time'), document.createElement('span')];
       at.textContent = `${time.toFixed(2)} s`;
-      const isUndone = Array.isArray(event);
-      name.textContent = isUndone ? `undone: ${event.map((e) => DATA.transitions[e]).join(', ')}` : DATA.transitions[event];
-      if (isUndone) name.className = 'bad';
-      else name.dataset.transition = event;
+      const fires = typeof event === 'number';
+      const undone = () => `undone: ${event.map((e) => DATA.transitions[e]).join(', ')}`;
+      name.textContent = fires ? DATA.transitions[event] : typeof event === 'string' ? event : undone();
+      if (fires) name.dataset.transition = event;
+      else name.className = 'bad';
+      row.classList.toggle('failed', typeof event === 'string');
       row.append(at, name);
       return row;
     });
     this.list.prepend(...rows.reverse());
-    while (this.list.children.length > 14) this.list.lastChild.remove();
+    const [failed, others] = [true, false].map((is) => [...this.list.children].filter((row) => row.classList.contains('failed') === is));
+    [...failed.slice(FAILURES), ...others.slice(LINES - Math.min(failed.length, FAILURES))].forEach((row) => row.remove());
   }
 }
 

@@ -31,7 +31,7 @@ class Outages {
   constructor(list, views) {
     Object.assign(this, { list, views, now: { dead: [], closed: [], standing: [], gone: [], zones: [], told: [] } });
     this.drawn = '';
-    document.getElementById('failing').hidden = !DATA.fails;
+    ['failing', 'failing-legend'].forEach((id) => (document.getElementById(id).hidden = !DATA.fails));
   }
 
   // The state of each robot, by number, that does not move.

@@ -53,9 +53,9 @@ class Rolling {
     this.show(this.now);
   }
 
-  // Transitions that have fired: [[time, event], ...]. `open` are the operations under way.
+  // What has fired and was undone: [[time, event], ...], with what failed, in words. `open` are the operations under way.
   fire(fired) {
-    for (const [time, event] of fired) {
+    for (const [time, event] of fired.filter(([, told]) => typeof told !== 'string')) {
       if (Array.isArray(event)) {
         this.undo(event, time);
         continue;
@@ -125,7 +125,7 @@ class Rolling {
       const element = document.createElement('div');
       element.className = `stood ${state}`;
       element.title = state === 'dead' ? 'is dead' : 'stands still';
-      this.tracks[robot].append(element);
+      this.tracks[robot].prepend(element);
       this.keep(key, { state, from: now, to: null, elements: [element] });
     });
   }
