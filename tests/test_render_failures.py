@@ -282,10 +282,25 @@ def test_the_gantt_chart_has_a_dark_band_until_the_spare_comes(log: Log) -> None
 
 def test_a_spare_is_told_of_when_it_comes(log: Log) -> None:
     history, caption = told(log), Caption(SIZE)
-    (one,), told_of = history.deaths(), {}
-    for time in (one.start - 0.05, one.end - 0.05, one.end + 0.05, one.end + SHOWN + 1.0):
+    (death,) = history.deaths()
+    dark = []
+    for time in (death.end - 0.05, death.end + 0.05):
         pixels = np.full((SIZE[1], SIZE[0], 3), 255, np.uint8)
         draw_notices(pixels, history, time, caption)
-        told_of[time] = (pixels[reddish(pixels, DEAD, 8).any(axis=1)] < 255).any(axis=(0, 2)).sum()
-    before, is_dead, spare, after = told_of.values()
-    assert before == after == 0 < is_dead < spare, "'r2 is dead' is shorter"
+        dark.append(reddish(pixels, DEAD, 8).any())
+    assert dark == [False, True]
+
+
+def test_a_robot_is_said_to_be_dead_for_as_long_as_it_is(subject) -> None:
+    history, caption, seen = History(subject), Caption(SIZE), []
+    history.failings.append(Failing(2.0, "jammed", "sub1", "r6", "spare", (), 30.0))
+    history.stand([(1.0, ("r6",))])
+    for time in (1.5, 2.5, 20.0, 30.1, 40.0):
+        pixels = np.full((SIZE[1], SIZE[0], 3), 255, np.uint8)
+        draw_notices(pixels, history, time, caption)
+        found = (FLASH, AMBER, DEAD)
+        seen.append([bool((pixels == colour).all(axis=-1).any()) for colour in found])
+    told, stands, dead = zip(*seen, strict=True)
+    assert told == (False, True, False, False, False)
+    assert stands == (True, False, False, True, True), "what is dead does not merely stand"
+    assert dead == (False, False, True, True, False)

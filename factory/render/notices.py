@@ -39,13 +39,14 @@ def _notices(history: History, time: float) -> Iterator[tuple[str, Colour, float
     if stands := sorted(history.stands(time) - dead):
         names = listing(robots[robot].name for robot in stands)
         yield f"{names} stand{'s' if len(stands) == 1 else ''} still", AMBER, 1.0
-    if dead:
-        names = listing(robots[robot].name for robot in sorted(dead))
-        yield f"{names} {'is' if len(dead) == 1 else 'are'} dead", DEAD, 1.0
+    failed = history.failed(time - SHOWN - FADES, time)
+    told = {one.robot for one in failed if one.test == "jammed"}
+    if silent := [robots[robot].name for robot in sorted(dead) if robots[robot].name not in told]:
+        yield f"{listing(silent)} {'is' if len(silent) == 1 else 'are'} dead", DEAD, 1.0
     for death in history.deaths():
         if death.end < time < death.end + SHOWN + FADES:
             alpha = min(1.0, (death.end + SHOWN + FADES - time) / FADES)
             yield death.then, DEAD, alpha
-    for failing in history.failed(time - SHOWN - FADES, time)[: -MOST - 1 : -1]:
+    for failing in failed[: -MOST - 1 : -1]:
         alpha = min(1.0, (failing.t + SHOWN + FADES - time) / FADES)
         yield str(failing), FLASH, alpha
