@@ -135,17 +135,20 @@ def assert_marked(watched: Watched, state: str, *marks: str) -> None:
 
 
 def test_what_is_out_of_order_is_marked_and_said(browser: Any) -> None:
-    watched = Watched(browser, Campaign(clear=4.0, spares=1, swap=60.0))
+    watched = Watched(browser, Campaign(clear=10.0, spares=1, swap=60.0))
     watched.until("f.products > 0")
     watched.page.locator("#gantt button[data-robot='5']").click()
     watched.press("drop what it holds")
     watched.until("f.outages.zones.length && f.outages.closed.includes('r6')")
+    watched.press("Pause")
+    watched.until("!f.playing")
     watched.seen("n => n === 1", "factoryView.zones")
     assert watched.page.locator(".floor .zone").count() == 1
     assert watched.page.locator("#outages .closed").inner_text().endswith(" s")
     closed = watched.page.evaluate("factoryView.frame.outages.closed")
     numbers = [str(int(name.removeprefix("r")) - 1) for name in closed]
     assert_marked(watched, "closed", *closed, *numbers, *closed)
+    watched.press("Play")
     watched.page.locator("#speed").select_option("0")
     watched.until("f.outages.told.length === 0")
     watched.seen("n => n === 0", "factoryView.zones")
