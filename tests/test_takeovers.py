@@ -254,7 +254,6 @@ def test_check_lists_those_laid_out(pag: Path, run: Terminal) -> None:
         (("--relay",), "BadValue"),
         (("--cycle", 3), "BadValue"),
         (("--parallel", "part2=2"), "BadValue"),
-        (("--spares", 1), "Usage"),
     ],
 )
 def test_what_does_not_go_with_it(
@@ -267,8 +266,8 @@ def test_what_does_not_go_with_it(
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["truck", "chest"])
 def test_products(name: str) -> None:
-    """All robots with deputies of an example, in layouts that are certified, and hold in MuJoCo,
-    though no deputy takes over while that runs."""
+    """All robots with deputies of an example, in layouts that are certified; what is left when one
+    is gone holds in MuJoCo from its beginning, too."""
     layout = read(ROOT / "examples" / f"{name}.pag", ground=Ground(deputies=True)).layout
     assert certify(layout).holds
     for dead, deputy in deputies_in(layout).items():

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections import Counter
+from dataclasses import replace
 from math import comb
 
 import numpy as np
 
+from factory.layout.layout import Layout
 from factory.mjcf.model import Model
 from factory.mjcf.weld_frames import residuals
 from factory.simulation.keeping import Keeper, is_size, is_text, one_of, up_to
@@ -25,8 +27,7 @@ MOST_ONSETS = 10**7
 class Inspection:
     """Keeps the worst figures of a run. Contacts are looked at after every step of the engine.
 
-    `factory`: whose robots do what now. `joining`: for each operation under way (index) the unit
-    whose inputs it joins. `unintended`:
+    `joining`: for each operation under way (index) the unit whose inputs it joins. `unintended`:
     onsets of contact that nothing intends, by the names of geoms; `pressing`: what is no such
     contact. `residual` [m]: the largest of a weld's position. `error` [m]: that of a product.
     """
@@ -35,7 +36,6 @@ class Inspection:
         self, m: mujoco.MjModel, d: mujoco.MjData, model: Model, masks: ContactMasks
     ) -> None:
         self._m, self._d, self._model, self._masks = m, d, model, masks
-        self.factory = model.factory
         self._product = ProductError(model)
         self.pressing = Pressing(m, model, masks)
         self._touching: frozenset[tuple[int, int]] = frozenset()
@@ -44,6 +44,10 @@ class Inspection:
         self.residual = 0.0
         self.error: float | None = None
         self.unintended: list[tuple[str, str]] = []
+
+    def exchange(self, layout: Layout) -> None:
+        """From now on robots do what a layout says."""
+        self._model = replace(self._model, layout=layout)
 
     def welds(self) -> None:
         """Keep the largest residual of the active welds' positions."""
@@ -98,7 +102,7 @@ class Inspection:
         if unit[a] < 0 or unit[a] != unit[b]:
             return None
         for number, worked_on in self.joining.items():
-            operation = self.factory.operations[number]
+            operation = self._model.factory.operations[number]
             if unit[a] == worked_on and {code[a] - 1, code[b] - 1} <= {*operation.robots}:
                 return operation.label
         return None

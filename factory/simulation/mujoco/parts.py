@@ -14,12 +14,13 @@ from factory.plant.factory import Operation
 from factory.simulation.keeping import Keeper, up_to
 from factory.simulation.mujoco.contacts import ContactMasks
 from factory.simulation.mujoco.copies import Copies, copies_of
-from factory.simulation.mujoco.feeders import Feeders, Supply
+from factory.simulation.mujoco.feeders import Feeders
 from factory.simulation.mujoco.hands import Grasps
 from factory.simulation.mujoco.joining import Joining
 from factory.simulation.mujoco.motion import Motion
 from factory.simulation.mujoco.passing import Passing
 from factory.simulation.mujoco.strength import Strength
+from factory.simulation.mujoco.supply import Supply
 from factory.simulation.mujoco.welds import Welds
 from factory.simulation.request import RunRequest
 from factory.support.engine import mujoco

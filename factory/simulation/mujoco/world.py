@@ -172,7 +172,7 @@ class MujocoWorld:
         tree = self.motion.axes.tree[robot]
         self.parts.masks.remove(np.flatnonzero(self.m.body_treeid == tree).tolist())
         self.parts.feeders.exchange(robot, layout)
-        self.inspection.factory = layout.factory
+        self.inspection.exchange(layout)
         self._away = HandsAway(self.d, layout, self.motion.axes.qpos)
 
     def in_the_way(self, under_way: Iterable[int]) -> set[int]:

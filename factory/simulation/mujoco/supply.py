@@ -1,0 +1,62 @@
+"""What feeders have to show: the units that need parts, and parts that go back."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from factory.mjcf.model import Model
+from factory.simulation.keeping import Keeper
+from factory.simulation.request import RunRequest
+
+
+class Supply:
+    """Which units need a part of each label: as many as are requested beside those that have been
+    `released` to the outfeed, or were begun where the run starts, at most `wip` at once. The `next`
+    unit that needs one comes a `period` of units after the one before. `recovers`: the run goes on
+    where something fails."""
+
+    def __init__(self, model: Model, request: RunRequest, counts: Mapping[int, int]) -> None:
+        factory, leaves = model.factory, model.factory.leaves
+        self.period = factory.period
+        self.next = {o.label: factory.unit(o, counts.get(o.end, 0)) for o in leaves}
+        self._begun = {o.label: factory.unit(o, counts.get(o.start, 0) - 1) + 1 for o in leaves}
+        self.released = factory.units(counts)
+        self._units, self._wip = self.released + request.units, request.wip
+        self.recovers = request.recovers
+
+    def rounds(self) -> dict[str, int]:
+        """How many parts of each label have been taken."""
+        return {label: unit // self.period for label, unit in self.next.items()}
+
+    def keep(self, keeper: Keeper) -> None:
+        """Which units come next."""
+        self.released = keeper.whole("supply.released", self.released)
+        rounds = np.array([*self.next.values()])
+        keeper.array("supply.next", rounds, 0)
+        self.next = dict(zip(self.next, rounds.tolist(), strict=True))
+
+    def wants(self, label: str) -> bool:
+        """Whether some unit has yet to get its part."""
+        return self.next[label] < max(self._units, self._begun[label])
+
+    def admits(self, unit: int) -> bool:
+        """Whether a unit may be let in."""
+        return self._wip is None or unit < self.released + self._wip
+
+
+@dataclass(slots=True)
+class TakenBack:
+    """What goes wrong with parts that are shown. `parts`: those on their way back, with the unit
+    that they count for, by feeder; `fresh`: those that have begun to be shown, with their unit, by
+    label; `good`: labels whose part has been looked at and is good; `awaited`: labels of which none
+    is to come yet; `late`: feeders that had nothing to show on their turn, so that their robots may
+    be home before the next part comes down."""
+
+    parts: dict[int, int] = field(default_factory=dict)
+    fresh: dict[str, int] = field(default_factory=dict)
+    good: set[str] = field(default_factory=set)
+    awaited: set[str] = field(default_factory=set)
+    late: set[int] = field(default_factory=set)
