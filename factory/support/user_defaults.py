@@ -27,6 +27,7 @@ OPTIONS: Mapping[str, object] = {
     "floor": "4x3",
     "robots": 12,
     "cycle": 4.0,
+    "deputies": True,
     "templates": ["mine"],
     "size": "1280x720",
     "fps": 30,
