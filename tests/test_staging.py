@@ -20,6 +20,7 @@ from factory.layout.bounds import cycle_time_bound
 from factory.layout.clearance import certify
 from factory.layout.dimensions import Clearance
 from factory.layout.durations import Pace, gear_times, operation_times
+from factory.layout.hands.limbs import rises_first
 from factory.layout.layout import Layout
 from factory.layout.optimising import first_feasible, optimised
 from factory.modes import staging
@@ -28,6 +29,7 @@ from factory.modes.staging import stages, stages_of
 from factory.nets.cycle_ratio import max_cycle_ratio
 from factory.nets.marked import MarkedNet
 from factory.nets.petri import PetriNet, Place, Transition
+from factory.pipeline import read
 from factory.problem.pag import NOPART
 from factory.record.monitor import beside
 from factory.simulation import simulation as simulations
@@ -49,6 +51,13 @@ from tests.pag_values import SHAPES
 
 STAGED, STILL = Settings(stage=1), Settings()
 CHEST = ROOT / "examples" / "chest.pag"
+ABOVE = """root = s6; s6 = insert ( s0, s5 ); s5 = weld ( s4 ); s4 = weld ( s3 ); s3 = weld ( s2 );
+s2 = mate ( a, b ); s0 = insert ( base, wall );
+base = atomic ( box = ( 0.2, 0.2, 0.02 ), pos = ( 0, 0, 0.01 ) );
+wall = atomic ( box = ( 0.2, 0.02, 0.06 ), pos = ( 0, 0.09, 0.05 ) );
+a = atomic ( box = ( 0.12, 0.05, 0.02 ), pos = ( 0, 0.025, 0.03 ) );
+b = atomic ( box = ( 0.12, 0.05, 0.02 ), pos = ( 0, -0.025, 0.03 ) )"""
+"""What is put beside the wall is held from above by a robot to which two others bring it."""
 
 sizes, seeds = st.integers(2, 20), st.integers(0, 10_000)
 shapes, styles = st.sampled_from(SHAPES), st.sampled_from(STYLES)
@@ -146,6 +155,18 @@ def test_a_carrier_that_is_waited_for_takes_as_long_as_all_of_its_operation() ->
     assert run.predicted_cycle_time_s == pytest.approx(run.cycle_time_s, rel=0.01)
     net = timed_net(Timing(layout, settings, world))
     assert net.pace == pytest.approx(run.predicted_cycle_time_s)
+
+
+def test_a_hand_above_rises_before_its_carrier_goes_home(tmp_path: Path) -> None:
+    """What it lets go of is under it. So the carrier's next tour begins later, where others bring
+    it something, too."""
+    file = tmp_path / "above.pag"
+    file.write_text(ABOVE)
+    layout = read(file).layout
+    assert rises_first(layout, 1) and not layout.magazine(1)
+    run = Simulation(layout, RunRequest("mujoco", units=6)).run()
+    assert run.bottleneck == "r2"
+    assert run.predicted_cycle_time_s == pytest.approx(run.cycle_time_s, rel=0.01)
 
 
 def test_tokens_may_be_ready_later() -> None:

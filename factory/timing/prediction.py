@@ -109,12 +109,21 @@ def one_after_the_other(
 def waits_for_hands(layout: Layout, limits: Limits) -> dict[tuple[int, int], float]:
     """The time [s] from the end of a carrier's operation to the start of its next one, where that
     waits for hands to be clear of what they have delivered, by the carrier and the operation to
-    come. They set out at once; the tick after the end is that of the delay before."""
-    return {
+    come. They set out at once; the tick after the end is that of the delay before. A carrier whose
+    own hand is above what it has let go waits for that, too (where it then takes a part:
+    `serving`)."""
+    factory = layout.factory
+    found = {
         (robot.index, number): max(_gone(layout, one, limits) for one in leaving)
-        for robot in layout.factory.robots
+        for robot in factory.robots
         for number, leaving in going_on(layout, robot.index, later=False).items()
     }
+    for robot, tours in enumerate(factory.tours):
+        firsts = (tour[0] for tour in tours if factory.operations[tour[0]].inputs)
+        for number in firsts if rises_first(layout, robot) else ():
+            up = _gone(layout, raised(layout, robot), limits)
+            found[robot, number] = max(up, found.get((robot, number), 0.0))
+    return found
 
 
 def _gone(layout: Layout, leaving: Leaving, limits: Limits) -> float:
