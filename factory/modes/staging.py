@@ -15,6 +15,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from factory.control.mode import ROUNDING, Array, Mode
+from factory.control.profile import World
 from factory.layout.hands.leaving import awaited_positions
 from factory.layout.hands.limbs import rises_first
 from factory.layout.layout import Layout
@@ -121,6 +122,14 @@ def stages_of(layout: Layout, modes: Sequence[Mode], settings: Settings) -> tupl
         return found
     awaited = awaited_positions(layout)
     return tuple(stage for stage in found if stage.axis in awaited or stage.axis != stage.robot)
+
+
+def with_time(layout: Layout, ahead: Sequence[HeadStart], world: World) -> tuple[HeadStart, ...]:
+    """Those of ways ahead for which robots have the time. In the ideal world none waits for a
+    feeder, or for its own hand to be away: it takes the next part at once, and its operation moves
+    all of it together."""
+    operations = layout.factory.operations
+    return tuple(s for s in ahead if world == "mujoco" or operations[s.operation].inputs)
 
 
 def staged(starts: Sequence[Array], ahead: Sequence[HeadStart]) -> list[Array]:

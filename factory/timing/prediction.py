@@ -19,7 +19,7 @@ from factory.layout.hands.leaving import Leaving, going_on, raised
 from factory.layout.hands.limbs import rises_first
 from factory.layout.layout import Layout
 from factory.modes.modes import operation_modes, operation_starts, robot_limits
-from factory.modes.staging import HeadStart, staged, stages_of
+from factory.modes.staging import HeadStart, staged, stages_of, with_time
 from factory.nets.ways import with_ways
 from factory.support.settings import Settings
 from factory.timing.cycle_time import (
@@ -43,7 +43,7 @@ def operation_delays(
     `ahead`: the ways that robots go while they wait."""
     factory = layout.factory
     settle = settings.settle if world == "mujoco" else 0.0
-    starts = staged(operation_starts(layout), ahead)
+    starts = staged(operation_starts(layout), with_time(layout, ahead, world))
     return [
         mode_time(mode, start, limits.of(axes), world) + settle + settings.tick
         for axes, mode, start in zip(factory.axes, modes, starts, strict=True)
@@ -150,6 +150,7 @@ def all_ways(
 ) -> dict[tuple[int, int], float]:
     """The ways ahead, with what waits for these robots, and in MuJoCo the waits for hands, which
     the ideal world has not."""
+    stages = with_time(layout, stages, world)
     found = longer(
         ways_ahead(stages, limits, settings, world),
         held_up(layout, modes, limits, settings, world, stages),

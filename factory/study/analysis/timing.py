@@ -14,7 +14,7 @@ from factory.control.profile import SpeedProfile, World, mode_time
 from factory.layout.layout import Layout
 from factory.layout.outfeed import away, leaving
 from factory.modes.modes import operation_modes, operation_starts, robot_limits
-from factory.modes.staging import HeadStart, staged, stages_of
+from factory.modes.staging import HeadStart, staged, stages_of, with_time
 from factory.plant.factory import Factory
 from factory.simulation.starting import start_positions
 from factory.support.settings import Settings
@@ -70,7 +70,8 @@ class Timing:
     @cached_property
     def stages(self) -> tuple[HeadStart, ...]:
         """The ways that robots go ahead of operations while they wait, if they are to."""
-        return stages_of(self.layout, self.modes, self.settings)
+        found = stages_of(self.layout, self.modes, self.settings)
+        return with_time(self.layout, found, self.world)
 
     @cached_property
     def left(self) -> list[Array]:
