@@ -232,7 +232,7 @@ def test_changes_of_a_robot_change_its_ways(seed: int, shape: str) -> None:
         net = timed_net(timing, change)
         assert net.pace == pytest.approx(max_cycle_ratio(net.net, net.seconds).seconds)
         # one that comes sooner may have to wait for others where it turns, and take longer
-        pairs = zip(net.seconds, before.seconds, strict=True)
+        pairs = zip(timing.changed(change), timing.delays, strict=True)
         longer = sum(max(0.0, now - was) for now, was in pairs)
         assert net.pace <= before.pace + longer + 1e-9
 
