@@ -245,17 +245,18 @@ def test_what_a_dead_robots_feeder_shows_goes_back(monkeypatch: pytest.MonkeyPat
 def test_what_a_robot_that_is_gone_stood_under_goes_back() -> None:
     """It is in nobody's way any more."""
     layout = laid_out(INSERTS)
-    simulation = Simulation(layout, RunRequest("mujoco", 3, recovers=True))
+    simulation = Simulation(layout, RunRequest("mujoco", 4, recovers=True))
     recovery = recover(simulation, Campaign(swap=4.0))
     length, standing = layout.guidepaths[3].length, recovery.striking.standing
 
     def stop(world: Any, _: Any) -> None:
         is_there = "part2" in world.parts.feeders.shown() and world.sense()[0][3] > length - 0.07
-        if not recovery.found and is_there and 3 not in world.parts.hands.of:
+        is_new = world.time > 3.0 and not recovery.found
+        if is_new and is_there and 3 not in world.parts.hands.of:
             standing[3] = 1e6
 
     run = simulation.run([stop], max_time=60.0)
-    assert figures(run)[:2] == (0, 3) and len(run.exchanges) == 1
+    assert figures(run)[:2] == (0, 4) and len(run.exchanges) == 1
     assert not simulation.world.parts.feeders.back.parts
 
 
@@ -280,6 +281,25 @@ def test_a_part_that_comes_late_waits_for_its_robot(monkeypatch: pytest.MonkeyPa
         run = simulation.run([lose], max_time=120.0)
         assert run.products == 1 and {one.test for one in recovery.found} == {"lost"}
         assert (figures(run)[0] == 0) == is_kept
+
+
+def test_what_the_crew_that_stays_cannot_carry_back(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Falls where the deputy is as it takes over. Planted: that is all that robots ever bring."""
+
+    def every(alone: Layout) -> frozenset[tuple[int, str]]:
+        robots = range(len(alone.factory.robots))
+        return frozenset((robot, label) for robot in robots for label in ("part2", "part3"))
+
+    for binned in (1, 0):
+        if not binned:
+            monkeypatch.setattr(deputising, "not_carried_back", every)
+        simulation = Simulation(laid_out(INSERTS), RunRequest("mujoco", 3, recovers=True))
+        recovery = recover(
+            simulation, Campaign((WorldFault("dead", robot="r4", at=5.0),), swap=4.0)
+        )
+        run = simulation.run(max_time=60.0)
+        assert figures(run)[:2] == (0, 3) and len(run.exchanges) == 1
+        assert recovery.plant.binned == binned
 
 
 # --- the command and the monitor ------------------------------------------------------------------
