@@ -171,6 +171,16 @@ def test_the_deputy_dies_too() -> None:
     assert run.trouble.message == "r4 is dead, and there is no spare"
 
 
+def test_a_deputy_that_is_dead_takes_nothing_over() -> None:
+    """It is found dead, too, before it has taken over."""
+    simulation = Simulation(laid_out(), RunRequest("ideal", 12, recovers=True))
+    both = tuple(WorldFault("dead", robot=r, at=t) for r, t in (("r2", 6.0), ("r4", 7.0)))
+    recovery = recover(simulation, Campaign(both, swap=40.0))
+    run = simulation.run(max_time=300.0)
+    assert [one.deputy for one in recovery.found] == ["r2", ""]
+    assert not run.exchanges and run.trouble is not None
+
+
 def test_spares_come_first() -> None:
     simulation = Simulation(laid_out(), RunRequest("ideal", 6, recovers=True))
     fault = WorldFault("dead", robot="r2", at=6.0)

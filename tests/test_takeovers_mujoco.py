@@ -11,9 +11,11 @@ from typing import Any
 
 import pytest
 
+from factory.compiler.taking_over import Takeover
 from factory.layout import standby
 from factory.layout.bins import bins_of
 from factory.layout.feeding import feeder_of, lines_of, outlets_of
+from factory.layout.hands.leaving import goes_early
 from factory.layout.layout import Layout
 from factory.layout.request import Ground
 from factory.layout.standby import Repertoire, deputies_in, part_of
@@ -21,13 +23,15 @@ from factory.mjcf import names
 from factory.pipeline import read
 from factory.record.log import read_log
 from factory.record.monitor.record import watch_log
-from factory.record.monitor.subject import MonitorSubject
+from factory.record.monitor.subject import MonitorSubject, subject_of
 from factory.simulation.modelling import physical_model
 from factory.simulation.mujoco.feeders import Feeders
 from factory.simulation.recovery import Campaign, Recovery, WorldFault, deputising, recover
 from factory.simulation.request import RunRequest
 from factory.simulation.run import Run
 from factory.simulation.simulation import Simulation
+from factory.support.engine import mujoco
+from factory.support.settings import Settings
 from tests.bench.faults.takeovers import PAPER as INSERTS
 from tests.command_line import ROOT, Terminal
 
@@ -96,14 +100,52 @@ def test_parts_of_two_heights(dead: str) -> None:
 
 
 def test_other_faults_go_on() -> None:
-    """What is dropped before and after is made again."""
+    """What is dropped before and after is made again; what is dropped just before a deputy takes
+    over first: it waits for all that are on their way back. What has slipped in its hand is joined
+    again, and kept."""
     more = tuple(WorldFault("drop", label="part2", unit=unit) for unit in (1, 9))
-    simulation, recovery = simulated(INSERTS, "r4", 7.0, more)
-    run = simulation.run(max_time=300.0)
+    slip = WorldFault("bad_joint", label="sub1", unit=7, metres=3e-3)
+    simulation, recovery = simulated(INSERTS, "r4", 7.0, (*more, slip))
+    respond, late = recovery.responding, list[float]()
+
+    def lose(world: Any, _: Any) -> None:
+        if not late and any(until < world.time + 0.25 for until in respond.dead.values()):
+            late.extend([world.time] * recovery.plant.lose(0))
+
+    run = simulation.run([lose], max_time=300.0)
     assert (run.products, run.trouble, run.refines_net) == (10, None, True)
-    assert figures(run)[0] == 0 and len(run.exchanges) == 1
-    lost = [one.t > run.exchanges[0].t for one in recovery.found if one.test == "lost"]
-    assert {*lost} == {True, False}
+    assert figures(run)[0] == 0
+    (change,) = run.exchanges
+    assert change.t > late[0] + 1.0
+    told = [(one.test, one.t > change.t) for one in recovery.found]
+    before = [("lost", False), ("jammed", False), ("lost", False)]
+    assert told == [*before, ("residual", True), ("lost", True)]
+
+
+def test_inputs_that_a_deputy_joins_may_touch() -> None:
+    """Each other, and its pad what it now holds."""
+    simulation, recovery = simulated(INSERTS, "r4", 7.0)
+    made = laid_out(INSERTS).factory.by_label["sub1"]
+    found = list[bool]()
+
+    def touch(world: Any, supervisor: Any) -> None:
+        hands, m, d = world.parts.hands.of, world.m, world.d
+        if not recovery.exchanges or found or made.index not in supervisor.active.operations:
+            return
+        inputs = hands[0].bodies["part1"], hands[1].bodies["part2"]
+        a, b = (m.jnt_qposadr[m.body_jntadr[body]] for body in inputs)
+        place = d.qpos[b : b + 3].copy()
+        d.qpos[b : b + 3] = d.qpos[a : a + 3]
+        mujoco.mj_forward(m, d)
+        world.inspection.contacts()
+        d.qpos[b : b + 3] = place
+        mujoco.mj_forward(m, d)
+        pad, part = m.geom("r2/pad").id, int(m.body_geomadr[inputs[1]])
+        found.append(world.inspection.pressing.meant(pad, part, 0.0))
+
+    run = simulation.run([touch], max_time=40.0)
+    assert found == [True] and run.physics is not None
+    assert not run.physics.unintended_contacts and {*run.physics.mating_forces} == {"sub1"}
 
 
 # --- the model ------------------------------------------------------------------------------------
@@ -143,6 +185,18 @@ def test_a_part_alone_has_its_own_tours() -> None:
     assert alone is not None and not deputies_in(alone)
     assert Repertoire.of(alone).layout is alone and len(outlets_of(alone)) == 3
     assert feeder_of(alone, "part2") == feeder_of(layout, "part2")
+    assert [*alone.hands] == [layout.hand(robot) for robot in (0, 2, 3)]
+
+
+def test_a_monitor_knows_who_goes_ahead() -> None:
+    """By the numbers that robots have in the crew that stays."""
+    layout = laid_out(STEPS)
+    moved = {1: 2}
+    found = Takeover(layout.factory, deputising.with_moved(layout.factory, moved), 1, moved)
+    alone = part_of(layout, found.after, (0, 2))
+    assert alone is not None
+    early = {*goes_early(alone)}
+    assert early and early <= subject_of(layout, Settings()).after(found.crew).early
 
 
 # --- planted faults -------------------------------------------------------------------------------
@@ -188,6 +242,24 @@ def test_what_a_dead_robots_feeder_shows_goes_back(monkeypatch: pytest.MonkeyPat
     assert len(run.exchanges) == 1 and figures(run)[2] > 1.0
 
 
+def test_what_a_robot_that_is_gone_stood_under_goes_back() -> None:
+    """It is in nobody's way any more."""
+    layout = laid_out(INSERTS)
+    simulation = Simulation(layout, RunRequest("mujoco", 4, recovers=True))
+    recovery = recover(simulation, Campaign(swap=4.0))
+    length, standing = layout.guidepaths[3].length, recovery.striking.standing
+
+    def stop(world: Any, _: Any) -> None:
+        is_there = "part2" in world.parts.feeders.shown() and world.sense()[0][3] > length - 0.07
+        is_new = world.time > 3.0 and not recovery.found
+        if is_new and is_there and 3 not in world.parts.hands.of:
+            standing[3] = 1e6
+
+    run = simulation.run([stop], max_time=60.0)
+    assert figures(run)[:2] == (0, 4) and len(run.exchanges) == 1
+    assert not simulation.world.parts.feeders.back.parts
+
+
 def test_a_part_that_comes_late_waits_for_its_robot(monkeypatch: pytest.MonkeyPatch) -> None:
     """The last product is lost when feeders have nothing to show any more, and a robot whose hand
     holds from above has gone where its next part would come down: it makes way. Planted: it does
@@ -209,6 +281,25 @@ def test_a_part_that_comes_late_waits_for_its_robot(monkeypatch: pytest.MonkeyPa
         run = simulation.run([lose], max_time=120.0)
         assert run.products == 1 and {one.test for one in recovery.found} == {"lost"}
         assert (figures(run)[0] == 0) == is_kept
+
+
+def test_what_the_crew_that_stays_cannot_carry_back(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Falls where the deputy is as it takes over. Planted: that is all that robots ever bring."""
+
+    def every(alone: Layout) -> frozenset[tuple[int, str]]:
+        robots = range(len(alone.factory.robots))
+        return frozenset((robot, label) for robot in robots for label in ("part2", "part3"))
+
+    for binned in (1, 0):
+        if not binned:
+            monkeypatch.setattr(deputising, "not_carried_back", every)
+        simulation = Simulation(laid_out(INSERTS), RunRequest("mujoco", 3, recovers=True))
+        recovery = recover(
+            simulation, Campaign((WorldFault("dead", robot="r4", at=5.0),), swap=4.0)
+        )
+        run = simulation.run(max_time=60.0)
+        assert figures(run)[:2] == (0, 3) and len(run.exchanges) == 1
+        assert recovery.plant.binned == binned
 
 
 # --- the command and the monitor ------------------------------------------------------------------
