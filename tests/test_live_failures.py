@@ -32,6 +32,9 @@ from tests.layout_values import paper_layout
 from tests.live_sessions import Running, a_session
 from tests.test_takeovers import laid_out
 
+WATCHED = 4.0
+"""So many times as fast as real time a session runs in which what lasts a second is to be seen."""
+
 websockets = pytest.importorskip("websockets.sync.client", reason="pip install websockets")
 
 PARTS = ("part1", "part2", "part3")
@@ -140,7 +143,7 @@ def test_a_session_tells_what_failed_and_begins_anew(running: Running) -> None:
 def test_a_session_tells_what_is_out_of_order(running: Running) -> None:
     session, send = running.session, running.session.send
     assert session.frame.outages == Outages()
-    send(Command("speed", factor=0.0))
+    send(Command("speed", factor=WATCHED))
     running.until(lambda f: f.products > 0)
     send(Command("drop", robot=5))
     lies = running.until(lambda f: f.outages.zones and f.outages.closed).outages
@@ -161,7 +164,7 @@ def test_a_session_tells_what_is_out_of_order(running: Running) -> None:
 def test_a_robot_whose_deputy_took_over_is_gone() -> None:
     running = Running(campaign=Campaign(swap=2.0), layout=laid_out())
     try:
-        running.session.send(Command("speed", factor=0.0))
+        running.session.send(Command("speed", factor=WATCHED))
         running.until(lambda f: f.products > 1)
         running.session.send(Command("dead", robot=3))
         dead = running.until(lambda f: bool(f.outages.dead)).outages.dead
