@@ -78,12 +78,12 @@ class Waiting(ProgressBar):
     def __init__(self, what: str, quiet: bool = False) -> None:
         super().__init__(quiet)
         self.what = what
-        self.over = Event()
+        self.over, self._teller = Event(), Thread(target=self._tell, daemon=True)
 
     def __enter__(self) -> Self:
         super().__enter__()
         if self.told:
-            Thread(target=self._tell, daemon=True).start()
+            self._teller.start()
         return self
 
     def drawn(self) -> tuple[Bar, TaskID]:
@@ -95,8 +95,10 @@ class Waiting(ProgressBar):
         return bar, bar.add_task(self.what)
 
     def close(self) -> None:
-        """Remove the spinner."""
+        """Remove the spinner; nothing is said any more."""
         self.over.set()
+        if self._teller.is_alive():
+            self._teller.join()
         super().close()
 
     def _tell(self) -> None:
