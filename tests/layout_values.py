@@ -8,14 +8,13 @@ from collections import defaultdict
 from dataclasses import replace
 from functools import cache
 
-from pag_values import SHAPES, factory_of, paper, random_pag
-
 from factory.geometry.product import product_geometry
 from factory.geometry.solids import Product, Solid
 from factory.layout.embedding import lay_out
 from factory.layout.layout import Layout, carriers
 from factory.layout.shapes import is_tool
 from factory.problem.pag import PAG, Assembly, Parameter, Value
+from tests.pag_values import SHAPES, factory_of, paper, random_pag
 
 STYLES = ("plain", "small", "medium", "large", "far", "mixed")
 """How large parts are, and how far from the middle of the product."""
