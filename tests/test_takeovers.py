@@ -34,6 +34,7 @@ from factory.simulation.run import Run, entries_of
 from factory.simulation.simulation import Simulation
 from factory.support.errors import Diagnostic, RunError
 from tests.bench.faults.takeovers import PAPER as INSERTS
+from tests.bench.faults.takeovers import interval_after
 from tests.command_line import ROOT, Terminal
 from tests.fold_values import swapped
 from tests.good_runs import assert_good
@@ -142,9 +143,7 @@ def test_all_units_are_made(dead: str, deputy: str, at: float) -> None:
     assert (run.products, run.trouble, run.refines_net) == (12, None, True)
     (change,) = run.exchanges
     assert (change.dead, change.deputy) == (dead, deputy)
-    left = [t for t in run.dropoffs if t > change.t][2:]
-    interval = (left[-1] - left[0]) / (len(left) - 1)
-    assert interval == pytest.approx(change.cycle_time, rel=0.03)
+    assert interval_after(run) == pytest.approx(change.cycle_time, rel=0.03)
     entries = [*entries_of(run.events)]
     factory = laid_out().factory
     nets = [*nets_after(factory, entries)]

@@ -33,6 +33,7 @@ from factory.simulation.simulation import Simulation
 from factory.support.engine import mujoco
 from factory.support.settings import Settings
 from tests.bench.faults.takeovers import PAPER as INSERTS
+from tests.bench.faults.takeovers import interval_after
 from tests.command_line import ROOT, Terminal
 
 STEPS = """root = s2; s1 = insert ( base, a ); s2 = insert ( s1, b );
@@ -80,9 +81,7 @@ def test_all_units_are_made(dead: str, deputy: str, fuse: bool) -> None:
     assert (run.products, run.trouble, run.refines_net) == (10, None, True)
     (change,) = run.exchanges
     assert (change.dead, change.deputy) == (dead, deputy)
-    left = [t for t in run.dropoffs if t > change.t][2:]
-    interval = (left[-1] - left[0]) / (len(left) - 1)
-    assert interval == pytest.approx(change.cycle_time, rel=0.03)
+    assert interval_after(run) == pytest.approx(change.cycle_time, rel=0.03)
     contacts, _, residual = figures(run)
     assert not contacts and residual < 0.1
     assert run.physics is not None and (run.physics.product_error_max_mm or 0.0) < 0.1

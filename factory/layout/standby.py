@@ -14,9 +14,9 @@ from factory.support.errors import FactoryError
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Repertoire:
-    """All that the robots of a factory can do, tours with it that they take over as deputies: a
-    `layout` of all of it, in which robots have the numbers that they have in the factory, and what
-    its labels are called there (`names`)."""
+    """All tours that the robots of a factory may do, with those that they take over as deputies: a
+    `layout` of all of them, in which robots have the numbers that they have in the factory, and
+    what its labels are called there (`names`)."""
 
     layout: Layout
     names: Mapping[str, str]

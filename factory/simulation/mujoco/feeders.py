@@ -48,8 +48,8 @@ class Feeders:
     """The feeders of a factory, by their outlets (n,). `counts`: how often each transition has
     fired where the run starts.
 
-    `due`: when a part that a robot has
-    asked for too early comes soon enough [s]. `back`: what is taken back.
+    `due`: when a part that a robot has asked for too early comes soon enough [s]. `back`: what is
+    taken back.
     """
 
     def __init__(

@@ -59,7 +59,6 @@ def tried(product: str, world: WorldName, dead: int, deputy: int, at: float) -> 
     recovery = recover(simulation, Campaign((WorldFault("dead", robot=name, at=at),), swap=SWAP))
     with TemporaryDirectory() as folder:
         run, judged = _run(simulation, Path(folder) / "run.log")
-    left = [t for t in run.dropoffs if run.exchanges and t > run.exchanges[0].t][FIRST:]
     physics = run.physics
     return {
         "product": product,
@@ -79,8 +78,15 @@ def tried(product: str, world: WorldName, dead: int, deputy: int, at: float) -> 
         "undone": recovery.report().undone,
         "predicted_s": run.exchanges[0].cycle_time if run.exchanges else None,
         "before_s": run.predicted_cycle_time_s,
-        "interval_s": (left[-1] - left[0]) / (len(left) - 1) if len(left) > 1 else None,
+        "interval_s": interval_after(run),
     }
+
+
+def interval_after(run: Run) -> float | None:
+    """The mean interval between products after a deputy took over, but for the first [s]; None for
+    none."""
+    left = [t for t in run.dropoffs if run.exchanges and t > run.exchanges[0].t][FIRST:]
+    return (left[-1] - left[0]) / (len(left) - 1) if len(left) > 1 else None
 
 
 def _run(simulation: Simulation, file: Path) -> tuple[Run, bool]:
