@@ -19,7 +19,7 @@ from factory.compiler.deputies import Moved, moved_to, postorder, program_with
 from factory.nets.gears import GearNet
 from factory.nets.petri import Marking
 from factory.nets.undo import exchange, marking_after
-from factory.nets.undone import Entry, Undone
+from factory.nets.undone import Entry, Undone, exchanges
 from factory.nets.verify import proved
 from factory.plant.factory import Factory, Operation
 from factory.plant.material import joins_of
@@ -80,11 +80,10 @@ def crews_after(factory: Factory, entries: Iterable[Entry]) -> Iterator[Factory]
     """The factories in which a recorded run went on where robots were exchanged, in their order,
     with all robots (`crew_with`)."""
     number = {robot.name: robot.index for robot in factory.robots}
-    for entry in entries:
-        if isinstance(entry, Undone) and len(entry.robots) == 2:
-            dead, deputy = (number[name] for name in entry.robots)
-            factory = crew_with(factory, {dead: deputy})
-            yield factory
+    for entry in exchanges(entries):
+        dead, deputy = (number[name] for name in entry.robots)
+        factory = crew_with(factory, {dead: deputy})
+        yield factory
 
 
 def with_moved(factory: Factory, moved: Moved) -> Factory:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import chain
 
@@ -63,6 +63,11 @@ class Undone:
 
 Entry = str | Undone
 """A transition that fired, by its name, or what was undone."""
+
+
+def exchanges(entries: Iterable[Entry]) -> Iterator[Undone]:
+    """The entries in which a robot that is dead was exchanged for its deputy."""
+    return (e for e in entries if isinstance(e, Undone) and len(e.robots) == 2)
 
 
 def lasting(entries: Iterable[Entry]) -> list[int]:

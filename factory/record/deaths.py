@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from math import inf
 
-from factory.nets.undone import Entry, Undone
+from factory.nets.undone import Entry, exchanges
 from factory.record.failures import Failing
 
 
@@ -31,18 +31,13 @@ class Death:
 def gone(entries: Iterable[Entry], time: float = inf) -> dict[str, str]:
     """The robots that have been lifted out for good by a time [s], each with the deputy that does
     its tours from then on, by name: those that the entries of a record up to then exchange."""
-    return {
-        entry.robots[0]: entry.robots[1]
-        for entry in entries
-        if isinstance(entry, Undone) and len(entry.robots) == 2 and entry.t <= time
-    }
+    return {one.robots[0]: one.robots[1] for one in exchanges(entries) if one.t <= time}
 
 
 def deaths(found: Iterable[Failing], entries: Iterable[Entry]) -> list[Death]:
     """All deaths among the failures that a record tells of. One with a deputy ends when an entry
     exchanges the two: a deputy that dies before that never takes over."""
-    pairs = ((e.robots, e.t) for e in entries if isinstance(e, Undone) and e.robots)
-    exchanged = dict(pairs)
+    exchanged = {one.robots: one.t for one in exchanges(entries)}
     return [
         Death(one.robot, one.t, _end(one, exchanged), one.deputy)
         for one in found

@@ -19,6 +19,7 @@ import numpy as np
 from factory.compiler.taking_over import crews_after
 from factory.mjcf import names
 from factory.nets.petri import Marking
+from factory.nets.undone import exchanges
 from factory.plant.factory import Factory
 from factory.record.log.reader import Log
 from factory.record.monitor.agreement import ROUNDING
@@ -43,9 +44,9 @@ class Crews:
     robots: one from each exchange on."""
 
     def __init__(self, log: Log, subject: MonitorSubject) -> None:
-        exchanges = [one for _, one in log.undone if one.robots]
-        crews = [*crews_after(subject.factory, exchanges)]
-        self._since = [one.t for one in exchanges]
+        undone = [one for _, one in log.undone]
+        crews = [*crews_after(subject.factory, undone)]
+        self._since = [one.t for one in exchanges(undone)]
         self._subjects = [subject, *map(subject.after, crews)]
         self._factories = [subject.factory, *crews]
 
