@@ -9,6 +9,8 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
@@ -48,18 +50,29 @@ def layout():
     return factory.lay_out(factory.compile(factory.load_pag(PAPER)))
 
 
+@contextmanager
+def drawn() -> Iterator[list[np.ndarray]]:
+    """The pictures of films as they are drawn, before they are encoded."""
+    found: list[np.ndarray] = []
+    write = VideoFile.write
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(VideoFile, "write", lambda film, p: (found.append(p), write(film, p)))
+        yield found
+
+
 @pytest.fixture(scope="module")
 def taken(layout, tmp_path_factory: pytest.TempPathFactory):
-    """A run filmed, logged, and with a still of its finished product."""
+    """A run filmed, logged, and with a still of its finished product; and the film's pictures."""
     folder = tmp_path_factory.mktemp("taken")
     simulation = Simulation(layout, RunRequest("mujoco", units=1))
     with (
+        drawn() as pictures,
         LogWriter(folder / "run.log", simulation) as log,
         Film(simulation, folder / "run.mp4", SMALL, FPS) as film,
         Still(simulation, folder / "end.png", PRODUCT) as end,
     ):
         run = simulation.run([log.observe, film.observe, end.observe])
-    return folder, run, film, simulation
+    return folder, run, film, pictures
 
 
 def film_of(path: Path) -> np.ndarray:
@@ -115,10 +128,12 @@ def test_the_same_pictures_are_encoded_the_same_every_time(taken, tmp_path: Path
 def test_a_log_gives_the_same_pictures_as_its_run(taken, tmp_path: Path) -> None:
     folder = taken[0]
     log = read_log(folder / "run.log")
-    count = render_log(log, tmp_path / "log.mp4", SMALL, FPS)
-    one, other = film_of(folder / "run.mp4"), film_of(tmp_path / "log.mp4")
-    assert count == len(one) == len(other)
+    with drawn() as pictures:
+        count = render_log(log, tmp_path / "log.mp4", SMALL, FPS)
+    one, other = np.array(taken[3]), np.array(pictures)
+    assert one.shape == other.shape == (count, SIZE[1], SIZE[0], 3)
     assert np.abs(one.astype(int) - other).max() <= 2
+    assert len(film_of(tmp_path / "log.mp4")) == count
     assert render_log(log, tmp_path / "log.png", PRODUCT) == 1
     pictures = [iio.imread(p).astype(int) for p in (folder / "end.png", tmp_path / "log.png")]
     assert np.abs(pictures[0] - pictures[1]).max() <= 2

@@ -98,13 +98,13 @@ class VideoFile(Closing):
         codec.color_range, codec.colorspace = 1, 1
         codec.color_primaries, codec.color_trc = 1, 1
         ahead = min(8, int(fps / 8))
-        codec.thread_type = "SLICE"
+        codec.thread_count = 1
         codec.options = {"crf": "19", "preset": "fast", "rc-lookahead": str(ahead), "bf": "0"}
 
     def write(self, pixels: Pixels) -> None:
         """Add a frame (height, width, 3). It is encoded on a thread of its own while the next is
-        drawn. On the thread that draws, one encoding in five came out different from the same
-        pictures (measured, not explained: the floating-point state is untouched)."""
+        drawn, and by that one alone: more are no faster, and the same pictures must give the same
+        film (docs/decisions/films.md)."""
         with self._room():
             self._wait()
         self.pending = self.coder.submit(self._encode, pixels)
