@@ -3,6 +3,7 @@ feeder, and the monitor judges what follows with the crew of then."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -12,6 +13,8 @@ from typing import Any
 import pytest
 
 from factory.compiler.taking_over import Takeover
+from factory.export import Subject, exporters
+from factory.export.motion import motion_of
 from factory.layout import standby
 from factory.layout.bins import bins_of
 from factory.layout.feeding import feeder_of, lines_of, outlets_of
@@ -21,9 +24,11 @@ from factory.layout.request import Ground
 from factory.layout.standby import Repertoire, deputies_in, part_of
 from factory.mjcf import names
 from factory.pipeline import read
-from factory.record.log import read_log
+from factory.record.log import LogWriter, read_log
 from factory.record.monitor.record import watch_log
 from factory.record.monitor.subject import MonitorSubject, subject_of
+from factory.show.report.pace import measured
+from factory.show.report.recording import recording_of
 from factory.simulation.modelling import physical_model
 from factory.simulation.mujoco.feeders import Feeders
 from factory.simulation.recovery import Campaign, Recovery, WorldFault, deputising, recover
@@ -329,3 +334,55 @@ def test_end_to_end(run: Terminal, tmp_path: Path, monkeypatch: pytest.MonkeyPat
 
     monkeypatch.setattr(MonitorSubject, "after", strange)
     assert watch_log(read_log(log))[0].violations
+
+
+# --- what is shown of it --------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def recorded(tmp_path_factory: pytest.TempPathFactory) -> tuple[Run, Path]:
+    """A run in which r2 takes over for r4, and its log."""
+    path = tmp_path_factory.mktemp("taken_over") / "run.log"
+    simulation = Simulation(laid_out(INSERTS), RunRequest("mujoco", 5, recovers=True))
+    recover(simulation, Campaign((WorldFault("dead", robot="r4", at=5.0),), swap=4.0))
+    with LogWriter(path, simulation) as log:
+        return simulation.run([log.observe]), path
+
+
+def test_the_report_counts_work_for_the_robot_that_did_it(recorded: tuple[Run, Path]) -> None:
+    run, path = recorded
+    busy = measured(recording_of(path, laid_out(INSERTS))).busy
+    assert busy == pytest.approx(run.utilisation, abs=1e-6)
+    r2, r4 = busy[1], busy[3]
+    assert r4 * run.sim_time_s < run.exchanges[0].t and r2 > 2 * r4
+
+
+def test_exports_of_motion_leave_out_the_robot_that_is_gone(recorded: tuple[Run, Path]) -> None:
+    run, path = recorded
+    log, t = read_log(path), run.exchanges[0].t
+    motion = motion_of(log)
+    unseen, late = motion.unseen(), log.time[motion.rows] >= t
+    carriage = motion.m.body(names.carriage("r4")).id
+    assert (unseen[:, carriage] == late).all() and late.any() and not late.all()
+    assert not unseen[:, motion.m.body(names.carriage("r2")).id].any()
+
+
+def test_usd_leaves_out_the_robot_that_is_gone(recorded: tuple[Run, Path], tmp_path: Path) -> None:
+    pytest.importorskip("pxr", reason="the extra `usd` is not installed")
+    from pxr import Usd, UsdGeom
+
+    run, path = recorded
+    log = read_log(path)
+    files = exporters()["usd"].export(Subject(path, log, name="x.usd"))
+    assert isinstance(files, Mapping)
+    (tmp_path / "x.usd").write_bytes(files[""])
+    stage = Usd.Stage.Open(str(tmp_path / "x.usd"))
+    motion = motion_of(log)
+    times = log.time[motion.rows]
+    drawn = {prim.GetName(): prim for prim in stage.Traverse()}
+    for robot, goes in (("r4", True), ("r2", False)):
+        geom = motion.m.geom(names.carriage(robot)).id
+        prim = UsdGeom.Imageable(drawn[f"Mesh_Xform_{robot}_carriage_id{geom}_geom"])
+        for frame in range(0, len(times), 7):
+            seen = prim.ComputeVisibility(frame) != "invisible"
+            assert seen == (not goes or times[frame] < run.exchanges[0].t), (robot, times[frame])

@@ -54,14 +54,14 @@ class _Recorder:
 
     def record(self, events: list[EventRow]) -> None:
         """Everything."""
-        parked, coming = self.motion.parked(), deque(events)
-        before = np.ones(parked.shape[1], bool)
+        unseen, coming = self.motion.unseen(), deque(events)
+        before = np.ones(unseen.shape[1], bool)
         for frame, bodies in enumerate(self.motion.shown()):
             time = float(self.log.time[self.motion.rows[frame]])
             while coming and coming[0].time_s <= time:
                 self._event(coming.popleft())
-            self._scene(time, before, parked[frame])
-            before = parked[frame]
+            self._scene(time, before, unseen[frame])
+            before = unseen[frame]
             self._transforms(time, frame, bodies)
             self._joints(time, int(self.motion.rows[frame]))
         for late in coming:

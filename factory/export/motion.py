@@ -11,6 +11,7 @@ import numpy as np
 from factory.control.mode import Truth
 from factory.geometry.meshes import Array, Indices
 from factory.mjcf.parts import HIDDEN
+from factory.nets.undone import exchanges
 from factory.record.log import Log
 
 if TYPE_CHECKING:
@@ -26,12 +27,14 @@ STILL = 1e-6
 @dataclass(frozen=True)
 class BodyMotion:
     """A log's motion: `rows` of the log that are frames; for each its bodies' positions (n, bodies,
-    3) [m] and quaternions (n, bodies, 4), each relative to its parent."""
+    3) [m] and quaternions (n, bodies, 4), each relative to its parent. `gone` (n, bodies): which
+    are of robots that a deputy has taken over for."""
 
     m: mujoco.MjModel
     rows: Indices
     position: Array = field(repr=False)
     quaternion: Array = field(repr=False)
+    gone: Truth = field(repr=False)
 
     def name(self, body: int) -> str:
         """The name of a body."""
@@ -52,14 +55,15 @@ class BodyMotion:
         for frame in needed:
             yield [int(body) for body in np.flatnonzero(frame) if body]
 
-    def parked(self) -> Truth:
-        """For each frame and body whether it is a spare one, out of sight under the floor."""
-        return np.asarray(self.position[:, :, 2] < HIDDEN)
+    def unseen(self) -> Truth:
+        """For each frame and body whether it is out of sight: a spare one, under the floor, or of a
+        robot that is gone."""
+        return np.asarray((self.position[:, :, 2] < HIDDEN) | self.gone)
 
 
 def motion_of(log: Log) -> BodyMotion:
     """The motion of a log. Raises InputError for a log of the ideal world or one without a tick."""
-    from factory.mjcf.replica import Replica
+    from factory.mjcf.replica import Replica, bodies_of
     from factory.record.log.model import model_of
 
     m = model_of(log)
@@ -73,7 +77,10 @@ def motion_of(log: Log) -> BodyMotion:
         for body in np.flatnonzero(m.body_parentid):
             place = position[frame, body], quaternion[frame, body]
             _relative(d, int(m.body_parentid[body]), int(body), *place)
-    return BodyMotion(m, rows, position, quaternion)
+    gone = np.zeros((len(rows), m.nbody), bool)
+    for entry in exchanges(log.entries):
+        gone |= np.outer(log.time[rows] >= entry.t, bodies_of(m, entry.robots[:1]))
+    return BodyMotion(m, rows, position, quaternion, gone)
 
 
 def _relative(d: mujoco.MjData, parent: int, body: int, position: Array, turn: Array) -> None:

@@ -37,7 +37,7 @@ def export(subject: Subject) -> Mapping[str, bytes]:
 
 def _record(motion: BodyMotion, log: Log, folder: str) -> None:
     """Every frame, by MuJoCo's exporter."""
-    from factory.mjcf.replica import Replica
+    from factory.mjcf.replica import SHOWN, Replica
     from factory.support.engine import mujoco
 
     exporter = optional("mujoco.usd.exporter", "usd-core", "USD", "usd")
@@ -46,8 +46,10 @@ def _record(motion: BodyMotion, log: Log, folder: str) -> None:
     scene = exporter.USDExporter(
         model=m, output_directory=NAME, output_directory_root=folder, verbose=False
     )
-    for row in motion.rows:
+    groups = m.geom_group.copy()
+    for row, gone in zip(motion.rows, motion.gone, strict=True):
         replica.place(log.qpos[row])
+        m.geom_group[:] = np.where(gone[m.geom_bodyid], SHOWN, groups)
         mujoco.mj_comPos(m, d)
         mujoco.mj_camlight(m, d)
         scene.update_scene(d)

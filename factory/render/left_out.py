@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from factory.mjcf import names
-from factory.mjcf.replica import SHOWN, Replica
+from factory.mjcf.replica import SHOWN, Replica, bodies_of
 from factory.render.history import History
 
 
@@ -22,6 +21,5 @@ class LeftOut:
         if gone == self.now:
             return
         self.now, m, every = gone, self.m, self.history.factory.robots
-        carriages = [m.body(names.carriage(every[robot].name)).id for robot in gone]
-        theirs = np.isin(m.body_rootid[m.geom_bodyid], carriages)
+        theirs = bodies_of(m, (every[robot].name for robot in gone))[m.geom_bodyid]
         m.geom_group[:] = np.where(theirs, np.maximum(self.groups, SHOWN), self.groups)

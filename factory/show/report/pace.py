@@ -7,11 +7,13 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from factory.compiler.taking_over import crews_after
+from factory.nets.undone import Undone
 from factory.show.report.recording import Recording
-from factory.simulation.run import mean_interval
+from factory.simulation.run import Event, busy_times, mean_interval
 from factory.study.analysis import Timing
 from factory.study.analysis.flow import busy_until, flow, lasting
-from factory.study.analysis.measured import dropoff_times, operation_times, robot_times
+from factory.study.analysis.measured import dropoff_times, operation_times
 from factory.study.analysis.recorded import conditions
 from factory.study.analysis.timed import timed_net
 
@@ -44,12 +46,13 @@ def measured(recording: Recording) -> MeasuredPace:
     durations = [sum(times) / len(times) if times else None for times in counted]
     dropoffs = dropoff_times(log.time, log.delivered)
     gears = [sum(durations[o] or 0.0 for o in robot.operations) for robot in factory.robots]
-    total = recording.end or 1.0
+    events = (e if isinstance(e, Undone) else Event(t, e) for t, e in log.timed_entries)
+    busy, total = busy_times(factory, events, crews_after(factory, log.entries)), recording.end
     return MeasuredPace(
         dropoffs,
         mean_interval(dropoffs, factory.period),
         tuple(durations),
-        tuple(busy / total for busy in robot_times(factory, spent)),
+        tuple(spent / (total or 1.0) for spent in busy),
         tuple(gears),
     )
 
