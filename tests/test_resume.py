@@ -118,7 +118,9 @@ def test_a_run_that_goes_on_is_the_same_to_the_last_bit(name: str, ticks: int, s
     other, keeper = made(name), TakingUp(found)
     net = one.layout.factory.net.threaded
     numbers = {t.name: n for n, t in enumerate(net.transitions)}
-    other.supervisor.keep(keeper, [(e.t, numbers[e.transition]) for e in one.supervisor.events])
+    past = [(e.t, numbers[e.transition]) for e in one.supervisor.events]
+    other.supervisor.go_over(past, pytest.fail)
+    other.supervisor.keep(keeper)
     active = other.supervisor.active
     other.world.keep(keeper, active.bundle, active.axes)
     other.world.dropoffs.extend(one.world.dropoffs)

@@ -4,7 +4,7 @@ bit as if nothing had happened."""
 from __future__ import annotations
 
 import sys
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from json import dumps, loads
 from pathlib import Path
 from random import Random
@@ -13,18 +13,21 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from factory.record.log import LogWriter
-from factory.record.log.kept import kept_run
+from factory.record.log import Log, LogWriter
+from factory.record.log.blocks import Arrays
+from factory.record.log.kept import KeptRun, kept_run
 from factory.simulation.checkpoint import checkpoint, take_up
 from factory.simulation.recovery import Campaign, Recovery, Sensors, WorldFault, recover
 from factory.simulation.recovery.faults import KINDS, OF_ROBOT, campaign_of
 from factory.simulation.request import RunRequest, WorldName
 from factory.simulation.simulation import Simulation
-from tests.command_line import PAPER, ROOT, Terminal, spawn
+from tests.bench.faults.takeovers import PAPER as INSERTS
+from tests.command_line import PAPER, Terminal, spawn
 from tests.layout_values import paper_layout
 from tests.test_log import block_ends
 from tests.test_log_damage import put_together, taken_apart
-from tests.test_resume import killed_and_gone_on, ticks_of
+from tests.test_resume import EXAMPLES, killed_and_gone_on, ticks_of
+from tests.test_takeovers_mujoco import laid_out
 
 FAULTS = """
 clear = 2
@@ -70,21 +73,67 @@ def made(world: WorldName, seed: int) -> tuple[Simulation, Recovery]:
 def test_a_run_with_faults_goes_on_the_same(tmp_path: Path, world: WorldName, seed: int) -> None:
     """From some checkpoints of it: what it notes down at its end is the same, and what failed."""
     whole, recovery = made(world, seed)
-    with LogWriter(tmp_path / "log", whole, checkpoint=lambda: checkpoint(whole)) as writer:
-        whole.run([writer.observe])
+    kept = kept_of(whole, tmp_path)
     assert len(recovery.found) > 3 and recovery.report().spares == 1
-    kept = kept_run(tmp_path / "log")
     assert 2 < len(kept.checkpoints) < kept.ticks
     for end, state in Random(seed).sample(kept.checkpoints, 2):
-        simulation, other = made(world, seed)
-        take_up(simulation, state, kept.until(end))
-        again = checkpoint(simulation)
-        assert again is not None and again.keys() == state.keys()
-        assert all(again[key].tobytes() == state[key].tobytes() for key in state)
-        simulation.run()
-        assert other.report() == recovery.report()
-        assert simulation.supervisor.events == whole.supervisor.events
-        assert simulation.world.sense()[0].tobytes() == whole.world.sense()[0].tobytes()
+        check_going_on(*made(world, seed), state, kept.until(end), whole)
+
+
+def kept_of(simulation: Simulation, folder: Path) -> KeptRun:
+    """What is kept of a whole run."""
+    path = folder / "run.log"
+    with LogWriter(path, simulation, checkpoint=lambda: checkpoint(simulation)) as writer:
+        simulation.run([writer.observe])
+    return kept_run(path)
+
+
+def check_going_on(
+    simulation: Simulation, recovery: Recovery, state: Arrays, log: Log, whole: Simulation
+) -> None:
+    """From a checkpoint, with which a log ends, a run comes to the same end as when it was
+    whole."""
+    take_up(simulation, state, log)
+    again = checkpoint(simulation)
+    assert again is not None and again.keys() == state.keys()
+    assert all(again[key].tobytes() == state[key].tobytes() for key in state)
+    run, first = simulation.run(), whole.world.hooks.account
+    assert first is not None
+    assert recovery.report() == first.report() and recovery.exchanges == first.exchanges
+    assert run.replays and simulation.supervisor.events == whole.supervisor.events
+    assert simulation.world.sense()[0].tobytes() == whole.world.sense()[0].tobytes()
+
+
+def with_deputies(world: WorldName, seed: int) -> tuple[Simulation, Recovery]:
+    """A run in which r2 takes over for r4, while things are dropped."""
+    request = RunRequest(world, units=8, seed=seed, jitter=0.3, recovers=True)
+    simulation = Simulation(laid_out(INSERTS), request)
+    faults = (WorldFault("dead", robot="r4", at=3.0), WorldFault("drop", rate=0.03))
+    return simulation, recover(simulation, Campaign(faults, seed, clear=2.0, swap=2.0))
+
+
+@pytest.mark.parametrize("world", ["ideal", "mujoco"])
+def test_a_run_goes_on_the_same_after_a_deputy_took_over(tmp_path: Path, world: WorldName) -> None:
+    """From checkpoints of before that and after it: in the net of then. Planted: a record in which
+    another robot takes over, or none may."""
+    whole, recovery = with_deputies(world, 3)
+    kept = kept_of(whole, tmp_path)
+    (change,) = recovery.exchanges
+    logs = [(state, kept.until(end)) for end, state in kept.checkpoints]
+    late = [pair for pair in logs if pair[1].time[-1] > change.t]
+    assert len(late) > 9 and len(late) < len(logs)
+    for state, log in (logs[1], late[0], *Random(3).sample(late, 2)):
+        check_going_on(*with_deputies(world, 3), state, log, whole)
+    state, log = late[0]
+    for robots in (("r4", "r1"), ("r2", "r4"), ("r4",)):
+        wrong = [
+            (n, replace(one, robots=robots) if one.exchanged else one) for n, one in log.undone
+        ]
+        with pytest.raises(ValueError):
+            take_up(with_deputies(world, 3)[0], state, replace(log, undone=tuple(wrong)))
+    alone = Simulation(laid_out(INSERTS), replace(whole.request, recovers=False))
+    with pytest.raises(ValueError, match="does not recover"):
+        take_up(alone, state, log)
 
 
 def test_there_is_no_checkpoint_while_something_is_wrong() -> None:
@@ -175,11 +224,28 @@ def test_a_run_that_ended_in_itself_is_not_gone_on_with(tmp_path: Path, run: Ter
     assert done.status == 2 and "would end again as it did" in done.err
 
 
-FACTORIES: tuple[tuple[object, ...], ...] = (
-    (PAPER, "--units", 40, "--jitter", 0.3),
-    (ROOT / "examples" / "truck.pag", "--units", 4),
-    (ROOT / "examples" / "chest.pag", "--units", 4, "--jitter", 0.2),
+DEATH = """
+clear = 2
+[[fault]]
+kind = "dead"
+robot = "{}"
+at = 10
+[[fault]]
+kind = "drop"
+rate = 0.01
+"""
+
+SPARE = "--spares", 1, "--swap", 4
+DEPUTY = "--deputies", "--swap", 4
+
+FACTORIES: tuple[tuple[tuple[object, ...], str], ...] = (
+    ((PAPER, "--units", 40, "--jitter", 0.3, *SPARE), FAULTS),
+    ((EXAMPLES / "truck.pag", "--units", 4, *SPARE), FAULTS),
+    ((EXAMPLES / "chest.pag", "--units", 4, "--jitter", 0.2, *SPARE), FAULTS),
+    ((EXAMPLES / "truck.pag", "--units", 8, "--jitter", 0.2, *DEPUTY), DEATH.format("r4")),
+    ((EXAMPLES / "chest.pag", "--units", 8, *DEPUTY), DEATH.format("r15")),
 )
+"""Runs with faults, in MuJoCo: their words, and the file of their faults."""
 
 
 @pytest.mark.slow
@@ -187,9 +253,9 @@ FACTORIES: tuple[tuple[object, ...], ...] = (
 @pytest.mark.parametrize("number", range(len(FACTORIES)))
 def test_kills_of_runs_with_faults(tmp_path: Path, number: int) -> None:
     """Three in a row of one run each in MuJoCo, at random times, and each is gone on with."""
-    file = tmp_path / "faults.toml"
-    file.write_text(FAULTS)
-    words = (*FACTORIES[number], "--seed", number, "--faults", file, "--spares", 1, "--swap", 4)
+    file, (words, faults) = tmp_path / "faults.toml", FACTORIES[number]
+    file.write_text(faults)
+    words = (*words, "--seed", number, "--faults", file)
     whole = tmp_path / "whole.log"
     assert spawn("run", *words, "--log", whole, "-q").status == 0
     killed_and_gone_on(tmp_path, words, 3, Random(number), whole.stat().st_size)

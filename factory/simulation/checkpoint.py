@@ -3,8 +3,6 @@ is made anew and takes one up goes on from there to the last bit as the one that
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 from factory.nets.undone import Undone
 from factory.record.log.blocks import Arrays
 from factory.record.log.reader import Log
@@ -25,7 +23,7 @@ def checkpoint(simulation: Simulation) -> Arrays | None:
     if recovery is not None and not recovery.is_calm:
         return None
     keeper = Noting()
-    _keep(simulation, keeper, ())
+    _keep(simulation, keeper)
     return keeper.arrays
 
 
@@ -38,7 +36,12 @@ def take_up(simulation: Simulation, state: Arrays, log: Log) -> None:
     for after, undone in log.undone:
         past += [*fired[begin:after], undone]
         begin = after
-    _keep(simulation, TakingUp(state), [*past, *fired[begin:]])
+    supervisor, recovery = simulation.supervisor, _recovery(simulation)
+    assert isinstance(supervisor, Supervisor)
+    supervisor.go_over(
+        [*past, *fired[begin:]], recovery.exchange_again if recovery else _no_exchange
+    )
+    _keep(simulation, TakingUp(state))
     if simulation.model is None:
         drops = {dropoff.end for dropoff in simulation.layout.factory.dropoffs}
         world.dropoffs.extend(t for t, event in fired if event in drops)
@@ -53,12 +56,14 @@ def _recovery(simulation: Simulation) -> Recovery | None:
     return account if isinstance(account, Recovery) else None
 
 
-def _keep(
-    simulation: Simulation, keeper: Keeper, past: Sequence[tuple[float, int] | Undone]
-) -> None:
+def _no_exchange(undone: Undone) -> None:
+    raise ValueError(f"{' and '.join(undone.robots)} are exchanged in a run that does not recover")
+
+
+def _keep(simulation: Simulation, keeper: Keeper) -> None:
     supervisor = simulation.supervisor
     assert isinstance(supervisor, Supervisor)
-    supervisor.keep(keeper, past)
+    supervisor.keep(keeper)
     active = supervisor.active
     simulation.world.keep(keeper, active.bundle, active.axes)
     if (recovery := _recovery(simulation)) is not None:

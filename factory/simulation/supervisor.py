@@ -7,7 +7,7 @@ robot costs nothing.
 
 from __future__ import annotations
 
-from collections.abc import Container, Iterable, Mapping, Sequence
+from collections.abc import Callable, Container, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -174,14 +174,6 @@ class Supervisor:
             self.active.operations, self.ahead.waiting(self.marked, self.world.sense()[0])
         )
 
-    def _take_back(self, undone: Undone) -> None:
-        """What was undone in a record that is taken up."""
-        net = self.factory.net
-        for name in undone.transitions:
-            self.fired[net.threaded.net.transition_index[name]] -= 1
-        self._mark(marking_after(net, self.fired))
-        self.events.append(undone)
-
     def _mark(self, marking: Marking) -> None:
         net, starts = self.factory.net, [operation.start for operation in self.factory.operations]
         self.threads = Threads(net.threaded, net.threads_of(marking), starts)
@@ -209,10 +201,36 @@ class Supervisor:
         """The operations all of whose robots wait for them."""
         return [self.factory.operations[event // 2] for event in sorted(self.threads.possible)]
 
-    def keep(self, keeper: Keeper, past: Sequence[tuple[float, int] | Undone] = ()) -> None:
-        """How often each transition has fired, and the modes under way; `past`: when each has [s],
-        and its number, and what was undone in between, where that is taken up. Raises ValueError
-        where these are not of one run."""
+    def go_over(
+        self, past: Iterable[tuple[float, int] | Undone], exchange: Callable[[Undone], None]
+    ) -> None:
+        """Take over what a record says that fired, when [s] and which by number, and what was
+        undone in between; `exchange` takes over an exchange of robots. What is under way, `keep`
+        has to take up."""
+        for entry in past:
+            if not isinstance(entry, Undone):
+                t, event = entry
+                self.threads.fire((event,))
+                self.fired[event] += 1
+                name = self.factory.net.threaded.transitions[event].name
+                self.events.append(Event(t, name))
+            elif entry.exchanged:
+                exchange(entry)
+            else:
+                self.fired[:] = self.before(entry)
+                self._mark(marking_after(self.factory.net, self.fired))
+                self.events.append(entry)
+
+    def before(self, undone: Undone) -> tuple[int, ...]:
+        """How often each transition has fired once that is undone."""
+        number, fired = self.factory.net.threaded.net.transition_index, [*self.fired]
+        for name in undone.transitions:
+            fired[number[name]] -= 1
+        return tuple(fired)
+
+    def keep(self, keeper: Keeper) -> None:
+        """How often each transition has fired, and the modes under way. Raises ValueError where
+        these are not of the run whose record has been gone over."""
         fired = np.array(self.fired)
         keeper.array("fired", fired, 0)
         going = [(number,) for number in self.active.operations]
@@ -226,15 +244,6 @@ class Supervisor:
         enabled, near = keeper.flag("enabled", self.enabled), keeper.flag("near", self.near)
         if not keeper.takes_up:
             return
-        transitions = self.factory.net.threaded.transitions
-        for entry in past:
-            if isinstance(entry, Undone):
-                self._take_back(entry)
-                continue
-            t, event = entry
-            self.threads.fire((event,))
-            self.fired[event] += 1
-            self.events.append(Event(t, transitions[event].name))
         if self.fired != fired.tolist():
             raise ValueError("its counts of firings are not those of its record")
         numbers = [number for (number,) in going]

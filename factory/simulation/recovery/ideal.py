@@ -152,8 +152,11 @@ class IdealPlant:
         labels = one_of({leaf.label for leaf in self._books.factory.leaves})
         self._shown = dict(keeper.rows("shown", self._shown.items(), labels, up_to(LARGE)))
 
-    def exchange(self, robot: int, layout: Layout) -> None:
+    def clear_out(self, robot: int, layout: Layout) -> None:
         """A dead robot is taken away for good."""
+
+    def exchange(self, robot: int, layout: Layout) -> None:
+        """Feeders have no robots."""
 
     def lift_out(self, robot: int, at: Mapping[int, float]) -> None:
         """A dead robot is taken away, and another is put in its place [m]."""

@@ -101,9 +101,13 @@ class Plant(Protocol):
         """A dead robot and what it holds are taken away, and another is put in its place, with its
         axes at these places [m]."""
 
+    def clear_out(self, robot: int, layout: Layout) -> None:
+        """A dead robot is taken away for good: what it holds is too, and what is shown where nobody
+        takes it in a `layout` goes back."""
+
     def exchange(self, robot: int, layout: Layout) -> None:
-        """A dead robot and what it holds are taken away for good, and what its feeder shows goes
-        back; the others go on as in a `layout`, where all have their numbers."""
+        """A dead robot is gone, and the others go on as in a `layout`, where all have their
+        numbers."""
 
     @property
     def binned(self) -> int:

@@ -196,6 +196,11 @@ class Recovery:
         busy = self.pending or self.simulation.world.hooks.before_step
         return not busy and all(one.is_calm for one in self._kept)
 
+    def exchange_again(self, undone: Undone) -> None:
+        """Take over an exchange of robots in the record of this run. Raises ValueError where it can
+        be none of it."""
+        self.responding.exchange_again(undone)
+
     def keep(self, keeper: Keeper) -> None:
         """What went wrong so far and what is drawn next, while all is calm, after the simulation.
         Raises ValueError where what is taken up is no state of this run."""

@@ -21,7 +21,7 @@ from factory.problem.template import Kind, Response
 from factory.record.failures import Failing
 from factory.simulation.keeping import Keeper, is_size, is_text, one_of, some_of, up_to
 from factory.simulation.recovery.books import Books
-from factory.simulation.recovery.deputising import Deputising
+from factory.simulation.recovery.deputising import Deputising, Successors
 from factory.simulation.recovery.faults import Campaign
 from factory.simulation.recovery.on_end import OnEnd
 from factory.simulation.recovery.plant import Plant
@@ -62,9 +62,8 @@ class Responding:
 
     @property
     def is_calm(self) -> bool:
-        """Whether all robots are at work, or wait for it, in the net that the run began with."""
-        changed = self.dead or self.returning.ways or self.deputising.exchanges
-        return not changed and self.standing.is_calm
+        """Whether all robots are at work, or wait for it."""
+        return not (self.dead or self.returning.ways) and self.standing.is_calm
 
     def keep(self, keeper: Keeper) -> None:
         """What failed, and how often on end, while all is calm."""
@@ -210,18 +209,29 @@ class Responding:
         going = {
             r for r in after.present if books.place_of(r, before) != after.place_of(r, marking)
         }
+        self._plant.clear_out(robot, change.layout)
         self._plant.exchange(robot, change.layout)
         scrap = {*self._plant.undone(after.held(marking), fired, going)}
-        self.deputising.exchange(change, fired, undone)
-        eps = self._simulation.request.settings.eps
-        ways = ((r, way) for r, way in self.returning.ways.items() if r not in self.dead)
-        self.returning = Returning(books.layout, supervisor, eps, dict(ways))
+        self._exchange(change, fired, undone)
         over = [books.factory.operations[n] for n in under_way if n not in marking]
-        self._wasting.barred = change.barred
         self._wasting.waste(scrap, {robot: held[robot] for robot in scrap})
         supervisor.recall(self.standing.axes(going | scrap))
         self._send_back(sorted(going | scrap), over, marking)
         return True
+
+    def exchange_again(self, undone: Undone) -> None:
+        """Take over an exchange of robots in the record of this run."""
+        change, fired = self.deputising.again(undone), self._books.supervisor.before(undone)
+        self._plant.exchange(change.takeover.dead, change.layout)
+        self._exchange(change, fired, undone)
+
+    def _exchange(self, change: Successors, fired: tuple[int, ...], undone: Undone) -> None:
+        """The net and all that is derived from it are exchanged."""
+        self.deputising.exchange(change, fired, undone)
+        eps, books = self._simulation.request.settings.eps, self._books
+        ways = ((r, way) for r, way in self.returning.ways.items() if r not in self.dead)
+        self.returning = Returning(books.layout, books.supervisor, eps, dict(ways))
+        self._wasting.barred = change.barred
 
     def give_up(self) -> None:
         """What can be finished without the robots that are dead is: the run ends."""

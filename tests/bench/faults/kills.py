@@ -12,23 +12,31 @@ from factory.record.log.reader import read_log
 from tests.command_line import spawn
 from tests.tables import table
 from tests.test_resume import FACTORIES, killed_and_gone_on, ticks_of
+from tests.test_resume_faults import FACTORIES as FAILING
 
 KILLS = 5
 
+RUNS = (*((words, "") for words in FACTORIES), *FAILING)
+"""The words of each run, and the file of its faults, "" for none."""
+
 
 def measure(quick: bool = False) -> Iterator[dict[str, Any]]:
-    """Kill a run of each factory again and again, as tests/test_resume.py does."""
+    """Kill each run again and again, as tests/test_resume.py and test_resume_faults.py do."""
     rows = list[dict[str, Any]]()
-    for number, factory in enumerate(FACTORIES[:1] if quick else FACTORIES):
-        words, kills = (*factory, "--seed", number), 1 if quick else KILLS
+    for number, (given, faults) in enumerate(RUNS[:1] if quick else RUNS):
+        kills = 1 if quick else KILLS
         with TemporaryDirectory() as folder:
+            file = Path(folder) / "faults.toml"
+            file.write_text(faults)
+            shown = (*given, "--faults", file) if faults else given
+            words = *shown, "--seed", number
             whole = Path(folder) / "whole.log"
             assert spawn("run", *words, "--log", whole, "-q").status == 0
             size, chance = whole.stat().st_size, Random(number)
             came = killed_and_gone_on(Path(folder), words, kills, chance, size)
             rows.append(
                 {
-                    "run": " ".join(Path(str(word)).name for word in factory),
+                    "run": " ".join(Path(str(word)).name for word in shown),
                     "lasts_s": float(read_log(whole).time[-1]),
                     "from_s": came,
                     "same": ticks_of(Path(folder) / "run.log") == ticks_of(whole),
@@ -48,7 +56,9 @@ def section(results: dict[str, Any]) -> str:
             f"{kills} kills (`kill -9`) at random times of {len(rows)} runs, each gone on with by"
             f" `factory run --resume`. All made their units, refine the net, touched nothing, and"
             f" the monitor agrees; **{same} of {len(rows)}** logs are, tick by tick, that of a run"
-            " that was never killed.",
+            " that was never killed. Where things go wrong (`faults.toml`: parts are dropped, come"
+            " bad, askew or late, joints slip, a robot dies), a run goes on from the last moment in"
+            " which nothing was wrong, before a deputy took over or after it.",
             table(
                 ("factory run", "lasts [s]", "killed", "gone on from [s]", "the same log"),
                 [

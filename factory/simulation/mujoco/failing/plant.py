@@ -305,13 +305,17 @@ class MujocoPlant:
         world.parts.welds.write()
         world.motion.load([robot], [0.0])
 
-    def exchange(self, robot: int, layout: Layout) -> None:
-        """A dead robot and what it holds are taken away for good, and what its feeder shows goes
-        back; the others go on as in a `layout`, where all have their numbers."""
+    def clear_out(self, robot: int, layout: Layout) -> None:
+        """A dead robot is taken away for good: what it holds is too, and what is shown where nobody
+        takes it in a `layout` goes back."""
         self._empty(robot)
         self.came_back(robot)
         for label in self._world.parts.feeders.elsewhere(layout):
             self._take_back(label)
+
+    def exchange(self, robot: int, layout: Layout) -> None:
+        """A dead robot is gone, and the others go on as in a `layout`, where all have their
+        numbers."""
         self._world.exchange(robot, layout)
         self._layout = layout
 
