@@ -10,9 +10,11 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
+import numpy as np
 import pytest
 
 from factory.compiler.taking_over import Takeover
+from factory.control.mode import Limits
 from factory.export import Subject, exporters
 from factory.export.motion import motion_of
 from factory.layout import standby
@@ -101,6 +103,31 @@ def test_parts_of_two_heights(dead: str) -> None:
     run = simulated(STEPS, dead, 5.0)[0].run(max_time=150.0)
     contacts, products, residual = figures(run)
     assert (contacts, products, len(run.exchanges)) == (0, 10, 1) and residual < 0.1
+
+
+def test_each_axis_keeps_its_limits(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Robots differ, and their lifts with them; those that stay have limits of their own."""
+    seen = list[tuple[Layout, Limits]]()
+    delays = deputising.operation_delays
+
+    def look(layout: Layout, modes: Any, limits: Limits, *more: Any) -> Any:
+        seen.append((layout, limits))
+        return delays(layout, modes, limits, *more)
+
+    monkeypatch.setattr(deputising, "operation_delays", look)
+    simulation, _ = simulated(STEPS, "r2", 5.0, jitter=0.3)
+    before = speeds(simulation.layout, simulation.limits)
+    simulation.run(max_time=60.0)
+    ((alone, limits),) = seen
+    assert speeds(alone, limits) == {axis: before[axis] for axis in ("r1", "r3", "lift of r3")}
+    assert len(before) == 5 and before["lift of r2"] != before["lift of r3"]
+
+
+def speeds(layout: Layout, limits: Limits) -> dict[str, float]:
+    """How fast each axis can be [m/s], by its robot."""
+    robots = [robot.name for robot in layout.factory.robots]
+    axes = [*robots, *(f"lift of {robots[robot]}" for robot in layout.lifts)]
+    return dict(zip(axes, np.asarray(limits.speed).tolist(), strict=True))
 
 
 def test_other_faults_go_on() -> None:
