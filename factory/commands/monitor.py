@@ -104,7 +104,8 @@ def say_failures(failures: Failures, verbose: bool) -> None:
     )
     if failures.binned or failures.spilled:
         spilled = ", ".join(failures.spilled)
-        say(f"{failures.binned} fell into bins; no bin for scrap of: {spilled or 'none'}")
+        none = f"; no bin for that of {spilled}" if spilled else ""
+        say(f"scrap in bins: {failures.binned}{none}")
     for one in failures.found if verbose else ():
         say(f"  {one.t:.2f} s: {one}")
 

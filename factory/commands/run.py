@@ -256,12 +256,13 @@ def not_tested(physics: PhysicsFigures) -> str:
 def summarise(record: Run, factory: Factory, verbose: bool) -> None:
     """A run in a few lines for people."""
     cycle = f"{record.cycle_time_s:.3f} s" if record.cycle_time_s is not None else "not yet steady"
+    of_all = " with all robots" if record.exchanges else ""
     say(
         f"{record.products} of {record.units} products in {record.sim_time_s:.2f} s "
         f"({record.realtime_factor:.1f} times real time, {record.world})"
     )
     say(
-        f"cycle time {cycle}, predicted {record.predicted_cycle_time_s:.3f} s; "
+        f"cycle time {cycle}, predicted {record.predicted_cycle_time_s:.3f} s{of_all}; "
         f"bottleneck {record.bottleneck}"
     )
     say(
