@@ -20,7 +20,7 @@ import pytest
 from factory.nets.replay import replay
 from factory.record.monitor import beside
 from factory.show.live import Server, Session
-from factory.show.live.commands import KEYS, Command, command_of
+from factory.show.live.commands import FAULTS, KEYS, Command, command_of
 from factory.show.live.page import page, stage_of
 from factory.show.report.drawings import floor_plan
 from factory.show.report.links import labels_of
@@ -395,5 +395,5 @@ def test_what_is_missing_is_said_first(run: Terminal, monkeypatch: pytest.Monkey
 
 
 def test_every_key_of_a_command_is_checked() -> None:
-    keys = {key for keys in KEYS.values() for key in keys}
+    keys = {key for keys in (*KEYS.values(), *FAULTS.values()) for key in keys}
     assert keys == {field.name for field in fields(Command)} - {"do"}

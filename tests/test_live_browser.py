@@ -13,6 +13,7 @@ from factory.layout.layout import Layout
 from factory.show.live import Server
 from factory.show.live.page import page
 from factory.simulation.recovery import Campaign
+from tests import failing_runs
 from tests.live_sessions import Running, a_session
 from tests.test_takeovers import laid_out
 
@@ -167,6 +168,34 @@ def test_what_is_out_of_order_is_marked_and_said(browser: Any) -> None:
     watched.press("Play")
     watched.until("!f.outages.dead.length")
     assert_marked(watched, "dead")
+    watched.close()
+    assert watched.trouble == []
+
+
+def test_every_fault_is_a_click(browser: Any) -> None:
+    """Of a part, of what is joined, and of all sensors."""
+    watched = Watched(browser, Campaign(clear=1.0, spares=1, swap=2.0), failing_runs.paper_layout())
+    watched.until("f.products > 0")
+    parts = [watched.page.locator("#tree button", has_text=n).first for n in ("part1", "sub1")]
+    watched.press("tell nothing for 5 s")
+    watched.until("f.outages.told.some(([mark]) => mark === 'dark')")
+    watched.until("f.outages.told.length === 0")
+    parts[0].click()
+    watched.press("is empty for 5 s")
+    watched.until("f.outages.told.some(([mark]) => mark === 'empty')")
+    assert "part1 is empty" in watched.page.locator("#outages .empty").inner_text()
+    watched.until("f.outages.told.length === 0")
+    watched.press("is no good")
+    watched.until("f.failed === 1")
+    watched.press("lies askew")
+    watched.until("f.failed === 2")
+    parts[1].click()
+    watched.press("slips")
+    watched.until("f.failed === 3")
+    watched.seen("n => n === 3", "document.querySelectorAll('#said .failed').length")
+    told = watched.page.locator("#said .failed span").all_inner_texts()
+    words = ["sub1 does not fit", "part1 lies askew in its feeder", "part1 is no good"]
+    assert [one.partition(":")[0] for one in told] == words
     watched.close()
     assert watched.trouble == []
 

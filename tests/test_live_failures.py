@@ -17,15 +17,17 @@ from factory.nets.replay import replay
 from factory.nets.undone import Undone
 from factory.plant.material import joins_of
 from factory.show.live import Server
-from factory.show.live.commands import FAILURES, Command, command_of
-from factory.show.live.outages import Outages
+from factory.show.live.commands import FAULTS, Command, command_of
+from factory.show.live.outages import Outages, Watch
 from factory.show.live.page import page
 from factory.simulation.disturbance.interventions import Interventions
 from factory.simulation.recovery import Campaign
+from factory.simulation.recovery.faults import KINDS
 from factory.simulation.request import RunRequest
 from factory.simulation.run import entries_of
 from factory.simulation.simulation import Simulation
 from factory.support.errors import InputError
+from tests import failing_runs
 from tests.bench.faults.takeovers import PAPER as INSERTS
 from tests.command_line import started
 from tests.layout_values import paper_layout
@@ -37,7 +39,7 @@ WATCHED = 4.0
 
 websockets = pytest.importorskip("websockets.sync.client", reason="pip install websockets")
 
-PARTS = ("part1", "part2", "part3")
+PARTS, JOINTS = ("part1", "part2", "part3"), ("sub1", "sub2", "sub3")
 LOST = "r6 lost part2: made again"
 CAMPAIGN = Campaign(clear=1.0, spares=1, swap=2.0)
 
@@ -49,16 +51,69 @@ def running() -> Iterator[Running]:
     made.close()
 
 
-@pytest.mark.parametrize("name", FAILURES)
+VALUES: dict[str, tuple[Any, Any]] = {
+    "robot": (2, 6),
+    "part": ("part1", "sub1"),
+    "joint": ("sub1", "part1"),
+}
+"""For each key of a command a value that is valid, and one that is not."""
+
+
+@pytest.mark.parametrize("name", FAULTS)
 def test_commands_to_fail_are_read_where_it_goes_on_after_failures(name: str) -> None:
-    key, value = ("part", "part1") if name == "spoil" else ("robot", 2)
-    message = json.dumps({"do": name, key: value})
-    assert command_of(message, 6, PARTS, True) == Command(name, **{key: value})
+    good = {key: VALUES[key][0] for key in FAULTS[name]}
+    message = json.dumps({"do": name, **good})
+    assert command_of(message, 6, PARTS, JOINTS) == Command(name, **good)
     with pytest.raises(ValueError, match=f"'do' is '{name}': there are pause"):
         command_of(message, 6, PARTS)
-    bad = json.dumps({"do": name, key: "sub1" if name == "spoil" else 6})
-    with pytest.raises(ValueError, match=f"'{key}' of '{name}'"):
-        command_of(bad, 6, PARTS, True)
+    for key in good:
+        bad = json.dumps({"do": name, **good, key: VALUES[key][1]})
+        with pytest.raises(ValueError, match=f"'{key}' of '{name}'"):
+            command_of(bad, 6, PARTS, JOINTS)
+
+
+def test_every_kind_of_fault_is_a_command() -> None:
+    assert FAULTS.keys() == KINDS.keys()
+
+
+@pytest.mark.parametrize(
+    ("kind", "robot", "label", "tests"),
+    [
+        ("drop", 5, "", {"lost"}),
+        ("down", 1, "", set()),
+        ("dead", 4, "", {"jammed"}),
+        ("bad_part", None, "part1", {"rejected"}),
+        ("misplaced", None, "part1", {"misplaced"}),
+        ("no_part", None, "part2", set()),
+        ("bad_joint", None, "sub1", {"residual"}),
+        ("blackout", None, "", set()),
+    ],
+)
+def test_each_fault_by_hand_is_found(
+    kind: str, robot: int | None, label: str, tests: set[str]
+) -> None:
+    """What it is in words, and that nothing is missed; what takes time takes it."""
+    layout = failing_runs.paper_layout()
+    simulation = Simulation(layout, RunRequest(units=4, recovers=True))
+    hands, told = Interventions(simulation, CAMPAIGN), set[str]()
+    assert hands.recovery is not None
+    watch = Watch(hands.recovery)
+
+    def act(world: Any, supervisor: object) -> None:
+        if world.time == pytest.approx(3.0):
+            hands.fail(kind, robot, label, 6.0)
+        told.update(mark for mark, _ in watch.now().told)
+
+    run = simulation.run([act])
+    assert (run.products, run.trouble, run.refines_net) == (4, None, True)
+    report = hands.recovery.report()
+    assert report.struck == {kind: 1} and {one.test for one in report.found} == tests
+    assert report.missed == report.false_alarms == 0
+    marks = {"blackout": "dark", "no_part": "empty", "down": "standing", "dead": "dead"}
+    assert marks.get(kind) in (None, *told)
+    if kind in ("down", "no_part", "blackout"):
+        alone = Simulation(layout, RunRequest(units=4)).run().sim_time_s
+        assert run.sim_time_s > alone + 2.0
 
 
 def test_a_run_that_is_made_to_fail_goes_on() -> None:
@@ -71,14 +126,14 @@ def test_a_run_that_is_made_to_fail_goes_on() -> None:
         match ticks:
             case 50:
                 hands.slow(4, 0.5)
-                hands.spoil("part1")
+                hands.fail("bad_part", label="part1")
             case 150:
-                hands.drop(5)
+                hands.fail("drop", 5)
             case 700:
-                hands.halt(1, 1.0)
+                hands.fail("down", 1, seconds=1.0)
             case 900:
                 hands.slow(4, 1.0)
-                hands.kill(4)
+                hands.fail("dead", 4)
 
     run = simulation.run([act])
     assert run.products == 6 and run.trouble is None and run.refines_net
@@ -94,7 +149,7 @@ def test_a_robot_that_is_slow_stays_slow_when_others_stand() -> None:
     hands = Interventions(simulation, CAMPAIGN)
     full = simulation.limits.speed.copy()
     hands.slow(1, 0.5)
-    hands.halt(2, 0.1)
+    hands.fail("down", 2, seconds=0.1)
     for _ in range(3):
         simulation.supervisor.step()
         for act in simulation.world.hooks.ticks:
@@ -112,7 +167,7 @@ def test_a_robot_that_is_slow_stays_slow_when_others_stand() -> None:
 def test_without_a_campaign_nothing_fails() -> None:
     hands = Interventions(Simulation(paper_layout(), RunRequest(units=1)))
     with pytest.raises(InputError, match="does not go on after failures"):
-        hands.drop(1)
+        hands.fail("drop", 1)
 
 
 def test_a_session_tells_what_failed_and_begins_anew(running: Running) -> None:
@@ -203,6 +258,13 @@ def test_a_robot_whose_deputy_took_over_is_gone() -> None:
             [
                 ("closed", "something lies about, and is cleared away soon"),
                 ("standing", "r1, r2 stand still"),
+            ],
+        ),
+        (
+            Outages(dark=1.2, empty={"part1": 3.0}),
+            [
+                ("dark", "no sensor tells anything: that is over in 2 s"),
+                ("empty", "the feeder of part1 is empty: it gives parts again in 3 s"),
             ],
         ),
         (Outages(gone={"r1": ("r2", 7.0)}), [("gone", "r1 is gone: r2 does its tours")]),

@@ -17,18 +17,23 @@ SHARES = (-1.0, -0.5, 0.5, 1.0)
 """Pushes, as shares of the greatest force of a robot's drive, which can hold no more."""
 
 
-PUSH, DOWN = 0.3, 5.0
-"""How long a push lasts, and how long a robot stands [s]."""
+PUSH, LASTS = 0.3, 5.0
+"""How long a push lasts, and how long a robot stands, a feeder is empty and no sensor tells
+anything [s]."""
 
-FAILURES: Mapping[str, tuple[str, ...]] = {
+FAULTS: Mapping[str, tuple[str, ...]] = {
     "drop": ("robot",),
-    "spoil": ("part",),
     "down": ("robot",),
     "dead": ("robot",),
+    "bad_part": ("part",),
+    "misplaced": ("part",),
+    "no_part": ("part",),
+    "bad_joint": ("joint",),
+    "blackout": (),
 }
-"""The commands to a factory that goes on after failures, with the keys that each has: a robot drops
-what it holds, or carries next; the next part of a feeder is no good; a robot stands for DOWN
-seconds; a robot dies."""
+"""The commands to a factory that goes on after failures, with the keys that each has. They are the
+kinds of faults: each strikes as soon as it can, so what comes next is dropped, is no good, lies
+askew or slips."""
 
 KEYS: Mapping[str, tuple[str, ...]] = {
     "pause": (),
@@ -55,28 +60,36 @@ class Command:
     factor: float = 1.0
     share: float = 0.0
     part: str = ""
+    joint: str = ""
     blocked: bool = False
 
 
 def command_of(
-    message: str | bytes, robots: int, parts: Collection[str], fails: bool = False
+    message: str | bytes,
+    robots: int,
+    parts: Collection[str],
+    joints: Collection[str] | None = None,
 ) -> Command:
     """The command in a message such as `{"do": "slow", "robot": 3, "factor": 0.5}`, to a factory of
-    so many robots and these parts; `fails`: it goes on after failures. Raises ValueError with what
-    is wrong and what is valid."""
+    so many robots and these parts; `joints`: the labels of what is joined, None for a factory that
+    does not go on after failures. Raises ValueError with what is wrong and what is valid."""
     try:
         told = json.loads(message)
     except (ValueError, RecursionError):
         raise ValueError("a command is a JSON object") from None
     if not isinstance(told, dict):
         raise ValueError("a command is a JSON object")
-    name, keys = told.get("do"), {**KEYS, **(FAILURES if fails else {})}
+    name, keys = told.get("do"), {**KEYS, **({} if joints is None else FAULTS)}
     if not isinstance(name, str) or name not in keys:
         raise ValueError(f"'do' is {name!r}: there are {', '.join(keys)}")
     factors = SPEEDS if name == "speed" else FACTORS
     valid: Mapping[str, tuple[Callable[[Any], bool], str]] = {
         "robot": (lambda v: type(v) is int and 0 <= v < robots, f"a number from 0 to {robots - 1}"),
         "part": (lambda v: isinstance(v, str) and v in parts, "the label of a part"),
+        "joint": (
+            lambda v: isinstance(v, str) and v in (joints or ()),
+            "the label of what is joined",
+        ),
         "blocked": (lambda v: isinstance(v, bool), "true or false"),
         "share": (lambda v: _is_one(v, SHARES), f"one of {SHARES}"),
         "factor": (lambda v: _is_one(v, factors), f"one of {factors}"),

@@ -14,7 +14,8 @@ from factory.render.zones import Zone, Zones
 from factory.simulation.recovery import Recovery
 
 Told = tuple[str, str]
-"""A mark of the page, `dead`, `closed`, `standing` or `gone`, and what it says now, in words."""
+"""A mark of the page, `dead`, `closed`, `standing`, `gone`, `dark` or `empty`, and what it says, in
+words."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,7 +24,8 @@ class Outages:
     nothing takes its place, and the deputy that then does its tours, "" for a spare; `closed`,
     which may not move while something lies near, for so long still [s], `lying`; `standing` for
     another reason; `gone`, lifted out for good, each with its deputy and when that took over [s].
-    `zones`: where no robot may come, round what lies about."""
+    `zones`: where no robot may come, round what lies about. `dark`: for so long still no sensor
+    tells anything [s]; `empty`: feeders, by label, with how long each gives nothing still [s]."""
 
     dead: Mapping[str, tuple[float, str]] = field(default_factory=dict)
     closed: tuple[str, ...] = ()
@@ -31,6 +33,8 @@ class Outages:
     standing: tuple[str, ...] = ()
     gone: Mapping[str, tuple[str, float]] = field(default_factory=dict)
     zones: tuple[Zone, ...] = ()
+    dark: float = 0.0
+    empty: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def told(self) -> list[Told]:
@@ -49,6 +53,10 @@ class Outages:
             yield "closed", f"something lies about, and is cleared away {_in(self.lying)}"
         if self.standing:
             yield "standing", f"{listing(self.standing)} stand{_s(self.standing)} still"
+        if self.dark:
+            yield "dark", f"no sensor tells anything: that is over {_in(self.dark)}"
+        for label, left in self.empty.items():
+            yield "empty", f"the feeder of {label} is empty: it gives parts again {_in(left)}"
         for robot, (deputy, _) in self.gone.items():
             yield "gone", f"{robot} is gone: {deputy} does its tours"
 
@@ -76,6 +84,7 @@ class Watch:
         recovery, world = self._recovery, self._world
         dead, closed, lying = recovery.responding.dead, recovery.plant.closed, recovery.plant.lying
         deputies, time = recovery.responding.deputising.by_robot, world.time
+        striking = recovery.striking
         names = [robot.name for robot in recovery.simulation.layout.factory.robots]
         kept = tuple(names[robot] for robot in sorted(closed - dead.keys()))
         held = world.m.eq_obj2id[np.flatnonzero(world.d.eq_active)]
@@ -91,6 +100,8 @@ class Watch:
             tuple(name for name in stood if name not in by_name and name not in kept),
             {one.dead: (one.deputy, one.t) for one in recovery.exchanges},
             tuple(self._zones.at(world.d, held)) if lying else (),
+            max(striking.dark - time, 0.0),
+            {label: until - time for label, until in striking.empty.items()},
         )
 
 

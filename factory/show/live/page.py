@@ -48,6 +48,7 @@ def page(session: Session) -> bytes:
         "parts": [o.label for o in factory.leaves],
         "factors": FACTORS,
         "fails": session.fails,
+        "joints": session.joints or [],
         "scene": scene(stage, labels, pack),
         "frames": {
             "parents": {},

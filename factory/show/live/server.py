@@ -154,11 +154,12 @@ class Server(Closing):
         from websockets.exceptions import ConnectionClosed
 
         factory = self._session.simulation.layout.factory
-        parts, fails = {o.label for o in factory.leaves}, self._session.fails
+        parts = {o.label for o in factory.leaves}
+        joints = self._session.joints
         try:
             for message in connection:
                 try:
-                    command = command_of(message, len(factory.robots), parts, fails)
+                    command = command_of(message, len(factory.robots), parts, joints)
                 except ValueError as error:
                     connection.send(json.dumps({"error": str(error)}))
                 else:

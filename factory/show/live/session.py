@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from factory.nets.undo import marking_after
 from factory.nets.undone import Undone
 from factory.record.failures import Failing
-from factory.show.live.commands import DOWN, PUSH, Command
+from factory.show.live.commands import FAULTS, LASTS, PUSH, Command
 from factory.show.live.outages import Outages, Watch
 from factory.simulation.disturbance.interventions import Interventions
 from factory.simulation.recovery import Campaign
@@ -134,6 +134,12 @@ class Session:
         return self.interventions.recovery is not None
 
     @property
+    def joints(self) -> list[str] | None:
+        """The labels of what is joined, where it goes on after failures; else None."""
+        made = self.simulation.layout.factory.making
+        return [o.label for o in made if len(o.inputs) > 1] if self.fails else None
+
+    @property
     def bodies(self) -> NDArray[np.intp]:
         """The bodies that can move, by number."""
         return np.flatnonzero(self.simulation.physical.m.body_treeid >= 0)
@@ -250,14 +256,9 @@ class Session:
                 hands.slow(command.robot, command.factor)
             case "block":
                 (hands.block if command.blocked else hands.free)(command.part)
-            case "drop":
-                hands.drop(command.robot)
-            case "spoil":
-                hands.spoil(command.part)
-            case "down":
-                hands.halt(command.robot, DOWN)
-            case "dead":
-                hands.kill(command.robot)
+            case kind:
+                robot = command.robot if "robot" in FAULTS[kind] else None
+                hands.fail(kind, robot, command.part or command.joint, LASTS)
         self._clock.start(self.simulation.world.time)
 
     def _publish(self) -> None:

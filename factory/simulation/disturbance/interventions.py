@@ -1,5 +1,5 @@
 """Interventions in a running factory: robots are pushed and slowed down, feeders blocked; where it
-goes on after failures things are dropped, parts are no good, robots stand and die."""
+goes on after failures, faults of every kind strike."""
 
 from __future__ import annotations
 
@@ -84,31 +84,17 @@ class Interventions:
         self._blocked.discard(label)
         self._world.supplied = True
 
-    def drop(self, robot: int) -> None:
-        """Let a robot drop what it holds, or what it carries next."""
-        self._strike("drop", robot=self._name(robot))
-
-    def spoil(self, label: str) -> None:
-        """Let the next part that its feeder shows be no good."""
-        self._strike("bad_part", label=label)
-
-    def halt(self, robot: int, seconds: float) -> None:
-        """Let a robot stand for so long."""
-        self._strike("down", robot=self._name(robot), seconds=seconds)
-
-    def kill(self, robot: int) -> None:
-        """Let a robot never move again."""
-        self._strike("dead", robot=self._name(robot))
-
-    def _name(self, robot: int) -> str:
-        return self.simulation.layout.factory.robots[robot].name
-
-    def _strike(self, kind: str, label: str = "", robot: str = "", seconds: float = 0.0) -> None:
+    def fail(
+        self, kind: str, robot: int | None = None, label: str = "", seconds: float = 0.0
+    ) -> None:
+        """Let a fault of some kind strike as soon as it can: that of a robot (index) or of a label,
+        where the kind has one, for so long where it lasts. Raises InputError (BadFault)."""
         if self.recovery is None:
             message = "this factory does not go on after failures"
             raise InputError(Diagnostic("BadFault", message, None, "give --spares or --faults"))
+        name = "" if robot is None else self.simulation.layout.factory.robots[robot].name
         now = float(self._world.time)
-        self.recovery.strike(WorldFault(kind, label, robot, at=now, seconds=seconds))
+        self.recovery.strike(WorldFault(kind, label, name, at=now, seconds=seconds))
 
     def _let_go(self) -> None:
         """Before a timestep: end the pushes whose time is over."""

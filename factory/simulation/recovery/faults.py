@@ -22,6 +22,10 @@ KINDS: Mapping[str, str] = MappingProxyType(
 )
 """Every kind of fault, in words."""
 
+ASKEW, SLIPPED = 5e-3, 1e-3
+"""How far a part lies askew that is not turned, and how far one has slipped, unless asked otherwise
+[m]: more than the tests of the shipped templates allow."""
+
 OF_ROBOT, OF_LABEL = {"down", "dead"}, {"misplaced", "bad_part", "no_part", "bad_joint"}
 """Kinds that name a robot, and that may name a label: of a part, or of what is joined."""
 
@@ -33,7 +37,8 @@ class WorldFault:
 
     `robot`, `label`: which one it concerns; any where there is a rate and none is named. `seconds`:
     how long it lasts. `metres`, `degrees`: how far a part is off or has slipped, and how far it is
-    turned. `hidden`: a bad part that only an inspection finds. Raises ValueError.
+    turned; `way` has the usual where no `metres` are given. `hidden`: a bad part that only an
+    inspection finds. Raises ValueError.
     """
 
     kind: str
@@ -43,7 +48,7 @@ class WorldFault:
     at: float | None = None
     rate: float | None = None
     seconds: float = 5.0
-    metres: float = 1e-3
+    metres: float | None = None
     degrees: float = 0.0
     hidden: bool = False
 
@@ -67,6 +72,13 @@ class WorldFault:
             value = getattr(self, name)
             if value is not None and not (isfinite(value) and value >= 0):
                 raise ValueError(f"'{name}' is {value}: a number from 0 on is needed")
+
+    @property
+    def way(self) -> float:
+        """How far a part is off, or has slipped [m]."""
+        if self.metres is not None:
+            return self.metres
+        return ASKEW if self.kind == "misplaced" and not self.degrees else SLIPPED
 
 
 @dataclass(frozen=True, slots=True)

@@ -37,14 +37,22 @@ class Striking:
         self.standing: dict[int, float] = {}
 
     def strike(self, fault: WorldFault, now: float) -> None:
-        """A fault that names a robot or a label strikes now, or as soon as it can: a robot that
-        holds nothing drops what it carries next, a feeder shows the next part so."""
+        """A fault that names a robot or a label, or is a blackout, strikes now, or as soon as it
+        can: a robot that holds nothing drops what it carries next, a feeder shows the next part
+        so, the next joint slips."""
         robot = self._names.index(fault.robot) if fault.robot else -1
-        if fault.kind in ("down", "dead"):
-            self.stand(robot, now + fault.seconds if fault.kind == "down" else np.inf)
-        elif not (fault.kind == "drop" and robot >= 0 and self._plant.lose(robot)):
-            self._faults.append(fault)
-            return
+        match fault.kind:
+            case "down" | "dead":
+                self.stand(robot, now + fault.seconds if fault.kind == "down" else np.inf)
+            case "no_part":
+                self.empty[fault.label] = now + fault.seconds
+            case "blackout":
+                self.dark = max(self.dark, now + fault.seconds)
+            case "drop" if robot >= 0 and self._plant.lose(robot):
+                pass
+            case _:
+                self._faults.append(fault)
+                return
         self.count(fault.kind)
 
     def started(self, operation: Operation, unit: int, now: float) -> None:
@@ -59,7 +67,7 @@ class Striking:
                     self.stand(robot, now + fault.seconds if kind == "down" else np.inf)
         label, count = operation.label, len(operation.inputs)
         if count > 1 and (fault := self._strikes("bad_joint", unit, now, label)):
-            self._plant.slip(operation, fault.metres)
+            self._plant.slip(operation, fault.way)
         if not count and (fault := self._strikes("no_part", unit, now, label)):
             self.empty[label] = now + fault.seconds
         if fault := self._strikes("blackout", unit, now, label):

@@ -72,18 +72,19 @@ class Acts {
     document.querySelectorAll('[data-label]').forEach((e) => e.classList.toggle('blocked', labels.has(Number(e.dataset.label))));
   }
 
-  // The robot, and the part with a feeder, that the selection is about.
+  // The robot, the part with a feeder, and what is joined, that the selection is about.
   get meant() {
     const { chosen } = this.selection;
     if (!chosen) return {};
     const link = DATA.links[chosen.kind][chosen.number];
-    const fed = link.labels.map((n) => DATA.labels[n]).find((label) => DATA.parts.includes(label));
+    const labels = chosen.kind === 'label' ? [DATA.labels[chosen.number]] : link.labels.map((n) => DATA.labels[n]);
     const robot = chosen.kind === 'robot' ? chosen.number : link.robots[0];
-    return { robot, part: chosen.kind === 'label' ? DATA.parts.find((p) => p === DATA.labels[chosen.number]) : fed };
+    const first = (kind) => labels.find((label) => kind.includes(label));
+    return { robot, part: first(DATA.parts), joint: first(DATA.joints) };
   }
 
   draw() {
-    const { robot, part } = this.meant;
+    const { robot, part, joint } = this.meant;
     const made = [];
     const name = DATA.robots[robot];
     const deputy = robot === undefined ? robot : doer(robot, Infinity);
@@ -113,10 +114,19 @@ class Acts {
       made.push(this.group('It', [
         ['gives parts', { do: 'block', part, blocked: false }, !stopped],
         ['is blocked', { do: 'block', part, blocked: true }, stopped],
+        ...(DATA.fails ? [['is empty for 5 s', { do: 'no_part', part }]] : []),
       ]));
-      if (DATA.fails) made.push(this.group('Next', [['is no good', { do: 'spoil', part }]]));
+      if (DATA.fails)
+        made.push(this.group('The next', [
+          ['is no good', { do: 'bad_part', part }],
+          ['lies askew', { do: 'misplaced', part }],
+        ]));
     }
-    if (!made.length) made.push(this.words('p', `Choose a robot to push it${DATA.fails ? ', slow it down or let it fail' : ' or slow it down'}, or a part to block its feeder${DATA.fails ? ' or let the next be no good' : ''}: in the picture, the net, the plan or the tree.`));
+    if (joint !== undefined)
+      made.push(this.words('h3', `Joint of ${joint}`), this.group('The next', [['slips', { do: 'bad_joint', joint }]]));
+    if (!made.length) made.push(this.words('p', `Choose a robot to push it${DATA.fails ? ', slow it down or let it fail' : ' or slow it down'}, or a part to block its feeder${DATA.fails ? ' or let the next be no good, or what is joined to let it slip' : ''}: in the picture, the net, the plan or the tree.`));
+    if (DATA.fails)
+      made.push(this.group('Sensors', [['tell nothing for 5 s', { do: 'blackout' }]]));
     const changes = [
       ...Object.entries(this.slowed).map(([n, factor]) => [`${DATA.robots[n]} at ${100 * factor} % ✕`, { do: 'slow', robot: Number(n), factor: 1 }]),
       ...this.blocked.map((label) => [`${label} blocked ✕`, { do: 'block', part: label, blocked: false }]),

@@ -106,9 +106,9 @@ class Mishaps:
         about_x, turn, pose = np.array([np.cos(half), np.sin(half), 0, 0]), np.zeros(4), np.zeros(4)
         mujoco.mju_mulQuat(turn, self._nominal[weld, 6:10], about_x)
         mujoco.mju_mulQuat(pose, self._world.d.xquat[m.eq_obj1id[weld]], turn)
-        m.eq_data[weld, 5] += fault.metres
+        m.eq_data[weld, 5] += fault.way
         m.eq_data[weld, 6:10] = turn
-        parts.welds.turn(body, pose, fault.metres)
+        parts.welds.turn(body, pose, fault.way)
         self._fallen.watch([body])
 
     def take_back(self, body: int) -> None:
