@@ -39,9 +39,7 @@ def deaths(found: Iterable[Failing], entries: Iterable[Entry]) -> list[Death]:
     exchanges the two: a deputy that dies before that never takes over."""
     exchanged = {one.robots: one.t for one in exchanges(entries)}
     return [
-        Death(one.robot, one.t, _end(one, exchanged), one.deputy)
-        for one in found
-        if one.test == "jammed"
+        Death(one.robot, one.t, _end(one, exchanged), one.deputy) for one in found if one.is_death
     ]
 
 

@@ -40,6 +40,11 @@ class Failing:
         }
 
     @property
+    def is_death(self) -> bool:
+        """Whether a robot is dead, not only stuck in its operation."""
+        return self.test == "jammed" and self.robot != ""
+
+    @property
     def what(self) -> str:
         """What failed, in words."""
         things = ", ".join(self.scrapped) or self.operation
@@ -48,7 +53,7 @@ class Failing:
             case "lost":
                 return f"{self.robot or self.operation} lost {things}"
             case "jammed":
-                return f"{self.robot} is dead"
+                return f"{self.robot} is dead" if self.is_death else f"{self.operation} is jammed"
             case "misplaced":
                 return f"{self.operation} lies askew in its feeder"
             case "rejected":
@@ -60,7 +65,7 @@ class Failing:
     @property
     def done(self) -> str:
         """What is done about it, in words."""
-        if self.test == "jammed":
+        if self.is_death:
             if self.until is None or not isfinite(self.until):
                 return "a spare comes" if self.response == "spare" else "there is no spare"
             after = f"in {self.until - self.t:.0f} s"

@@ -40,7 +40,7 @@ def _notices(history: History, time: float) -> Iterator[tuple[str, Colour, float
         names = listing(robots[robot].name for robot in stands)
         yield f"{names} stand{'s' if len(stands) == 1 else ''} still", AMBER, 1.0
     failed = history.failed(time - SHOWN - FADES, time)
-    told = {one.robot for one in failed if one.test == "jammed"}
+    told = {one.robot for one in failed if one.is_death}
     if silent := [robots[robot].name for robot in sorted(dead) if robots[robot].name not in told]:
         yield f"{listing(silent)} {'is' if len(silent) == 1 else 'are'} dead", DEAD, 1.0
     for death in history.deaths():

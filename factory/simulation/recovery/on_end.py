@@ -1,11 +1,12 @@
-"""What has gone wrong how often on end."""
+"""What has gone wrong how often on end, and what its template says is done about it then."""
 
 from __future__ import annotations
 
 from collections import Counter
 from dataclasses import dataclass, field
 
-from factory.plant.factory import Factory
+from factory.plant.factory import Factory, Operation
+from factory.problem.template import Kind, Response
 from factory.simulation.keeping import LARGE, Keeper, one_of, up_to
 
 
@@ -15,6 +16,14 @@ class OnEnd:
 
     tried: Counter[int] = field(default_factory=Counter)
     scrapped: Counter[str] = field(default_factory=Counter)
+
+    def response(self, operation: Operation, test: str) -> Kind:
+        """What is done about a failure of an operation that has been tried so often."""
+        tried, none = self.tried[operation.index], tuple[Response, ...]()
+        failures = operation.template.failures
+        responses = next((f.responses for f in failures if f.test == test), none)
+        left = (r for r in responses if r.kind != "again" or tried < r.times)
+        return next((response.kind for response in left), "scrap")
 
     def keep(self, keeper: Keeper, factory: Factory) -> None:
         """Keep both counts, or take them up."""

@@ -96,9 +96,9 @@ class Recovery:
         """Whether an operation that has come to its goal is as it should be."""
         if operation.index in self.pending or not self.plant.feels(operation.robots):
             return False
-        if not operation.inputs:
-            return self.plant.offers(operation.label)
-        for failure in operation.template.failures:
+        if not operation.inputs and not self.plant.offers(operation.label):
+            return False
+        for failure in operation.template.failures if operation.inputs else ():
             if self._fails(failure, operation):
                 self.pending[operation.index] = failure.test
                 return False
@@ -156,9 +156,10 @@ class Recovery:
             if number in self.books.supervisor.active.operations:
                 respond.failed(self._factory.operations[number], test)
         excused = frozenset({*self.plant.closed, *respond.dead})
-        for robot in respond.jammed(now, excused):
-            if robot not in respond.dead:
-                respond.died(robot)
+        for robot in respond.standing.jammed(now, excused):
+            respond.stuck(robot)
+        for robot in respond.late(now):
+            respond.died(robot)
         for kind in (*self.plant.unseen(), *["bad_joint"] * len(untested - self.plant.slipped)):
             self.striking.count(kind, -1)
 

@@ -17,7 +17,6 @@ from factory.nets.undone import Undone
 from factory.plant.factory import Operation
 from factory.plant.material import joins_of
 from factory.problem.pag import NOPART
-from factory.problem.template import Kind, Response
 from factory.record.failures import Failing
 from factory.simulation.keeping import Keeper, is_size, is_text, one_of, some_of, up_to
 from factory.simulation.recovery.books import Books
@@ -92,7 +91,7 @@ class Responding:
 
     def passed(self, operation: Operation) -> None:
         """An operation has come to its goal and is good."""
-        self._on_end.tried[operation.index] = 0
+        self._on_end.tried.pop(operation.index, None)
 
     def used(self, label: str) -> None:
         """Something has been joined, and was not scrapped."""
@@ -100,6 +99,12 @@ class Responding:
 
     def refused(self, leaf: Operation, test: str) -> None:
         """A feeder takes a part back: its robot gets out of the way of the next."""
+        response = self._on_end.response(leaf, test)
+        if response == "stop":
+            self._stop(f"'{leaf.label}' fails the test '{test}'", leaf)
+            return
+        if response == "again":
+            self._on_end.tried[leaf.index] += 1
         self._scrap(test, leaf, -1, (leaf.label,))
         robot = leaf.carrier
         if self._books.operation_of(robot) is not leaf:
@@ -125,7 +130,7 @@ class Responding:
     def lost(self, robot: int) -> None:
         """A robot has lost what it held: that is made again."""
         label, operation = self._books.holds(robot), self._books.operation_of(robot)
-        if self._response(operation, "lost") == "stop":
+        if self._on_end.response(operation, "lost") == "stop":
             self._stop(f"{self._name(robot)} has lost '{label}'", operation)
             return
         self._scrap("lost", operation, robot, (label,))
@@ -134,7 +139,7 @@ class Responding:
     def failed(self, operation: Operation, test: str) -> None:
         """An operation has come to its goal and is no good: it is done again, or all that it was to
         join is made again."""
-        response, by_label = self._response(operation, test), self._books.factory.by_label
+        response, by_label = self._on_end.response(operation, test), self._books.factory.by_label
         if response == "again":
             self._on_end.tried[operation.index] += 1
             self._note(test, operation, -1, response)
@@ -142,18 +147,30 @@ class Responding:
         elif response == "stop":
             self._stop(f"'{operation.label}' fails the test '{test}'", operation)
         else:
-            self._on_end.tried[operation.index] = 0
+            self._on_end.tried.pop(operation.index, None)
             self._scrap(test, operation, -1, operation.inputs)
             ends = tuple(by_label[label].end for label in operation.inputs)
             self._undo(ends, operation, test)
 
-    def jammed(self, now: float, excused: frozenset[int]) -> list[int]:
-        """The robots that make no progress now [s], but for those that are `excused`."""
+    def late(self, now: float) -> list[int]:
+        """The robots that do not come back, and are not known to be dead, now [s]."""
         slow = self.returning.late(now - patience(max(self._simulation.delays)))
-        return [*self.standing.jammed(now, excused), *slow]
+        return [robot for robot in slow if robot not in self.dead]
+
+    def stuck(self, robot: int) -> None:
+        """A robot makes no progress. Where the template of its operation tests for that, this has
+        failed, and the robot goes back; one that does not is dead, as is any other."""
+        operation = self._books.operation_of(robot)
+        if robot in self.dead or robot in self.returning.ways:
+            return
+        begun = operation.index in self._books.supervisor.active.operations
+        if begun and operation.template.failure("jammed"):
+            self.failed(operation, "jammed")
+        else:
+            self.died(robot)
 
     def died(self, robot: int) -> None:
-        """A robot makes no progress. After some time it is taken away, and one from the depot takes
+        """A robot is dead. After some time it is taken away, and one from the depot takes
         its place, or a deputy its tours; what it held is lost with it."""
         label, operation = self._books.holds(robot), self._books.operation_of(robot)
         spare, deputy = self.used_spares < self._campaign.spares, ""
@@ -238,14 +255,6 @@ class Responding:
         robot = next(robot for robot, until in self.dead.items() if until == np.inf)
         operation = self._books.operation_of(robot)
         self._stop(f"{self._name(robot)} is dead, and there is no spare", operation)
-
-    def _response(self, operation: Operation, test: str) -> Kind:
-        """What is done about a failure of an operation that has been tried so often."""
-        tried, none = self._on_end.tried[operation.index], tuple[Response, ...]()
-        failures = operation.template.failures
-        responses = next((f.responses for f in failures if f.test == test), none)
-        left = (r for r in responses if r.kind != "again" or tried < r.times)
-        return next((response.kind for response in left), "scrap")
 
     def _undo(self, asked: tuple[int, ...], operation: Operation, reason: str) -> None:
         """The net fires backwards, and robots go back."""

@@ -1,0 +1,148 @@
+"""What a template says is done about a failure is done: `again`, `scrap`, `stop`, of the tests that
+look at robots and feeders."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from factory.layout.layout import Layout
+from factory.nets.undone import Undone
+from factory.pipeline import read
+from factory.record.failures import Failing
+from factory.simulation.recovery import Campaign, Recovery, WorldFault, recover
+from factory.simulation.recovery.counting import summed
+from factory.simulation.request import RunRequest, WorldName
+from factory.simulation.run import Run
+from factory.simulation.simulation import Simulation
+from tests.command_line import PAPER, ROOT
+
+WORLDS = "ideal", "mujoco"
+
+
+def laid_out(folder: Path, template: str, failure: str) -> Layout:
+    """The paper's example with another `failure` in one of its templates."""
+    text = (ROOT / "templates" / f"{template}.op").read_text("utf-8")
+    begin = text.index("failure = ")
+    text = text[:begin] + f"failure = {{ {failure} }};" + text[text.index(";", begin) + 1 :]
+    (folder / f"{template}.op").write_text(text, "utf-8")
+    return read(PAPER, [folder]).layout
+
+
+def stopped(
+    layout: Layout, world: WorldName, fault: WorldFault, spares: int = 0
+) -> tuple[Run, Recovery]:
+    """A run in which a fault strikes a robot in the second `sub1`."""
+    simulation = Simulation(layout, RunRequest(world, 4, recovers=True))
+    recovery = recover(simulation, Campaign(clear=1.0, spares=spares, swap=2.0))
+    number, struck = layout.factory.by_label["sub1"], list[float]()
+
+    def strike(world: Any, supervisor: Any) -> None:
+        due = supervisor.fired[number.start] == 2 and number.index in supervisor.active.operations
+        if due and not struck:
+            struck.append(world.time)
+            recovery.strike(fault)
+
+    return simulation.run([strike], 200.0), recovery
+
+
+STANDS = WorldFault("down", robot="r5", at=0.0, seconds=12.0)
+"""For longer than a robot that is not dead may be late."""
+
+
+@pytest.mark.parametrize("world", WORLDS)
+@pytest.mark.parametrize(
+    ("responses", "response", "undone"),
+    [
+        ("again 1 then stop", "again", {"sub1_s"}),
+        ("scrap", "scrap", {"sub1_s", "part1_s", "part1_e", "part2_s", "part2_e"}),
+    ],
+)
+def test_what_is_stuck_is_done_again_or_scrapped(
+    tmp_path: Path, world: WorldName, responses: str, response: str, undone: set[str]
+) -> None:
+    """The robot moves again while it is to go back, so it is not taken for dead."""
+    layout = laid_out(tmp_path, "mate", f"jammed : {responses}, lost : scrap")
+    run, recovery = stopped(layout, world, STANDS)
+    assert (run.products, run.trouble, run.refines_net) == (4, None, True)
+    (one,) = recovery.found
+    assert (one.test, one.operation, one.robot, one.response) == ("jammed", "sub1", "", response)
+    assert str(one).startswith("sub1 is jammed: ") and not one.is_death
+    (entry,) = (e for e in run.events if isinstance(e, Undone))
+    assert {*entry.transitions} >= undone
+    report = recovery.report()
+    assert (report.missed, report.false_alarms, report.spares) == (0, 0, 0)
+    assert run.physics is None or run.physics.unintended_contacts == 0
+
+
+def test_who_does_not_test_for_it_takes_the_robot_for_dead(tmp_path: Path) -> None:
+    layout = laid_out(tmp_path, "mate", "lost : scrap")
+    run, recovery = stopped(layout, "ideal", STANDS)
+    assert run.trouble is not None and "r5 is dead, and there is no spare" in run.trouble.message
+    assert [one.is_death for one in recovery.found] == [True]
+
+
+@pytest.mark.parametrize("world", WORLDS)
+def test_a_robot_that_does_not_go_back_is_dead(tmp_path: Path, world: WorldName) -> None:
+    layout = laid_out(tmp_path, "mate", "jammed : again 2 then scrap, lost : scrap")
+    run, recovery = stopped(layout, world, WorldFault("dead", robot="r5", at=0.0), spares=1)
+    assert (run.products, run.trouble, run.refines_net) == (4, None, True)
+    assert [(one.test, one.robot) for one in recovery.found] == [("jammed", ""), ("jammed", "r5")]
+    report = recovery.report()
+    assert (report.missed, report.false_alarms, report.spares) == (0, 0, 1)
+
+
+@pytest.mark.parametrize("responses", ["stop", "again 1"])
+def test_the_run_stops_where_the_template_says_so(tmp_path: Path, responses: str) -> None:
+    layout = laid_out(tmp_path, "mate", f"jammed : {responses}, lost : scrap")
+    long = WorldFault("down", robot="r5", at=0.0, seconds=500.0 if responses == "stop" else 12.0)
+    run, recovery = stopped(layout, "ideal", long)
+    if responses == "stop":
+        assert run.trouble is not None and run.trouble.code == "Failed"
+        assert run.trouble.message == "'sub1' fails the test 'jammed'"
+        assert run.trouble.position is not None, "it says where"
+    else:
+        assert run.trouble is None and recovery.found[0].response == "again"
+
+
+@pytest.mark.parametrize("world", WORLDS)
+@pytest.mark.parametrize(
+    ("responses", "units", "made"),
+    [
+        ("scrap", (2, 2, 3), 4),
+        ("stop", (2,), 1),
+        ("again 1 then stop", (2, 3), 4),
+        ("again 1 then stop", (2, 2), 1),
+    ],
+)
+def test_what_lies_askew_stops_the_run_where_the_template_says_so(
+    tmp_path: Path, world: WorldName, responses: str, units: tuple[int, ...], made: int
+) -> None:
+    """Failures on end count, and what is good ends them."""
+    layout = laid_out(tmp_path, "atomic", f"misplaced > 2e-3 : {responses}, lost : scrap")
+    faults = tuple(WorldFault("misplaced", label="part1", unit=unit) for unit in units)
+    simulation = Simulation(layout, RunRequest(world, 4, recovers=True))
+    recovery = recover(simulation, Campaign(faults, clear=1.0))
+    run = simulation.run(max_time=200.0)
+    if made == 4:
+        assert (run.products, run.trouble) == (4, None)
+        assert [one.test for one in recovery.found] == ["misplaced"] * len(units)
+    else:
+        assert run.products <= made and run.trouble is not None
+        assert run.trouble.message == "'part1' fails the test 'misplaced'"
+
+
+def test_an_input_that_slipped_may_be_found_as_it_jams() -> None:
+    """Nothing was missed where the operation was stuck, and nothing was a false alarm."""
+    stuck = Failing(3.0, "jammed", "sub1", "", "again")
+    for struck, found, counts in (
+        ({"bad_joint": 1}, [stuck], (0, 0)),
+        ({"bad_joint": 2}, [stuck], (1, 0)),
+        ({}, [stuck], (0, 0)),
+        ({"dead": 1}, [stuck, Failing(9.0, "jammed", "sub1", "r5", "spare")], (0, 0)),
+        ({}, [Failing(9.0, "jammed", "sub1", "r5", "spare")], (0, 1)),
+    ):
+        report = summed(found, struck, 0, 0, 0, ())
+        assert (report.missed, report.false_alarms) == counts
