@@ -32,18 +32,19 @@ def laid_out(folder: Path, template: str, failure: str) -> Layout:
 
 
 def stopped(
-    layout: Layout, world: WorldName, fault: WorldFault, spares: int = 0
+    layout: Layout, world: WorldName, fault: WorldFault, spares: int = 0, late: int = 8
 ) -> tuple[Run, Recovery]:
-    """A run in which a fault strikes a robot in the second `sub1`."""
+    """A run in which a fault strikes a robot in the second `sub1`, so many ticks `late`: when it is
+    on its way."""
     simulation = Simulation(layout, RunRequest(world, 4, recovers=True))
     recovery = recover(simulation, Campaign(clear=1.0, spares=spares, swap=2.0))
     number, struck = layout.factory.by_label["sub1"], list[float]()
 
     def strike(world: Any, supervisor: Any) -> None:
-        due = supervisor.fired[number.start] == 2 and number.index in supervisor.active.operations
-        if due and not struck:
+        if supervisor.fired[number.start] == 2 and number.index in supervisor.active.operations:
             struck.append(world.time)
-            recovery.strike(fault)
+            if len(struck) == late:
+                recovery.strike(fault)
 
     return simulation.run([strike], 200.0), recovery
 
@@ -84,12 +85,19 @@ def test_who_does_not_test_for_it_takes_the_robot_for_dead(tmp_path: Path) -> No
     assert [one.is_death for one in recovery.found] == [True]
 
 
-@pytest.mark.parametrize("world", WORLDS)
-def test_a_robot_that_does_not_go_back_is_dead(tmp_path: Path, world: WorldName) -> None:
+@pytest.mark.parametrize(
+    ("world", "late", "found"),
+    [("ideal", 8, ["", "r5"]), ("mujoco", 8, ["", "r5"]), ("mujoco", 1, ["r5"])],
+)
+def test_a_robot_that_does_not_go_back_is_dead(
+    tmp_path: Path, world: WorldName, late: int, found: list[str]
+) -> None:
+    """One that had not begun to move is taken for dead at once: going back would tell nothing."""
     layout = laid_out(tmp_path, "mate", "jammed : again 2 then scrap, lost : scrap")
-    run, recovery = stopped(layout, world, WorldFault("dead", robot="r5", at=0.0), spares=1)
+    dead = WorldFault("dead", robot="r5", at=0.0)
+    run, recovery = stopped(layout, world, dead, spares=1, late=late)
     assert (run.products, run.trouble, run.refines_net) == (4, None, True)
-    assert [(one.test, one.robot) for one in recovery.found] == [("jammed", ""), ("jammed", "r5")]
+    assert [(one.test, one.robot) for one in recovery.found] == [("jammed", r) for r in found]
     report = recovery.report()
     assert (report.missed, report.false_alarms, report.spares) == (0, 0, 1)
 

@@ -20,6 +20,7 @@ from factory.simulation.recovery.counting import summed
 from factory.simulation.recovery.faults import Campaign, WorldFault
 from factory.simulation.recovery.plant import Plant
 from factory.simulation.recovery.responding import Responding
+from factory.simulation.recovery.standing import patience
 from factory.simulation.recovery.striking import Striking
 from factory.simulation.run import Event
 from factory.simulation.simulation import Simulation
@@ -158,8 +159,9 @@ class Recovery:
         excused = frozenset({*self.plant.closed, *respond.dead})
         for robot in respond.standing.jammed(now, excused):
             respond.stuck(robot)
-        for robot in respond.late(now):
-            respond.died(robot)
+        for robot in respond.returning.late(now - patience(max(self.simulation.delays))):
+            if robot not in respond.dead:
+                respond.died(robot)
         for kind in (*self.plant.unseen(), *["bad_joint"] * len(untested - self.plant.slipped)):
             self.striking.count(kind, -1)
 

@@ -25,7 +25,7 @@ from factory.simulation.recovery.faults import Campaign
 from factory.simulation.recovery.on_end import OnEnd
 from factory.simulation.recovery.plant import Plant
 from factory.simulation.recovery.returning import Goal, Returning, WayBack, order_of
-from factory.simulation.recovery.standing import Standing, patience
+from factory.simulation.recovery.standing import Standing
 from factory.simulation.recovery.wasting import Wasting
 from factory.simulation.simulation import Simulation
 from factory.support.errors import Diagnostic
@@ -152,19 +152,16 @@ class Responding:
             ends = tuple(by_label[label].end for label in operation.inputs)
             self._undo(ends, operation, test)
 
-    def late(self, now: float) -> list[int]:
-        """The robots that do not come back, and are not known to be dead, now [s]."""
-        slow = self.returning.late(now - patience(max(self._simulation.delays)))
-        return [robot for robot in slow if robot not in self.dead]
-
     def stuck(self, robot: int) -> None:
         """A robot makes no progress. Where the template of its operation tests for that, this has
-        failed, and the robot goes back; one that does not is dead, as is any other."""
-        operation = self._books.operation_of(robot)
+        failed, and the robot goes back. One that does not, or that had not left where it waited, is
+        dead, as is any other."""
         if robot in self.dead or robot in self.returning.ways:
             return
+        operation = self._books.operation_of(robot)
         begun = operation.index in self._books.supervisor.active.operations
-        if begun and operation.template.failure("jammed"):
+        tests = operation.template.failure("jammed") is not None
+        if begun and tests and self.returning.has_left(robot, self._books.marking):
             self.failed(operation, "jammed")
         else:
             self.died(robot)

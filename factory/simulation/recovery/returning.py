@@ -26,6 +26,9 @@ Goal = tuple[int, float]
 EXACT = 9
 """Goals that agree to so many decimals are one."""
 
+LEFT = 2e-3
+"""A robot has left where it waits when it is so far from there [m]."""
+
 PAST = 2e-3
 """So much further than it has to does a robot go out of the way of its feeder [m]."""
 
@@ -121,6 +124,12 @@ class Returning:
         if robot in layout.factory.adjusted:
             return [*goals, rise]
         return [rise, *goals] if rise[1] else goals
+
+    def has_left(self, robot: int, marking: Marking) -> bool:
+        """Whether a robot is away from where it waits in a marking, or would, if what it does had
+        not begun."""
+        x, _ = self._supervisor.world.sense()
+        return any(abs(x[axis] - at) > LEFT for axis, at in self.rest(robot, marking))
 
     def _lift(self, robot: int) -> int | None:
         lifts = self._layout.lifts
