@@ -181,7 +181,7 @@ def test_the_pace_is_the_predicted_one(world: str) -> None:
 
 
 @given(st.integers(0, 10**6))
-@settings(max_examples=25)
+@settings(max_examples=12)
 def test_named_circuits_are_all_that_matter_with_copies(seed: int) -> None:
     rng = random.Random(seed)
     timing = Timing(rng.choice(layouts()), Settings(), rng.choice(WORLDS))  # type: ignore[arg-type]
