@@ -3,6 +3,7 @@ look at robots and feeders."""
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +19,8 @@ from factory.simulation.request import RunRequest, WorldName
 from factory.simulation.run import Run
 from factory.simulation.simulation import Simulation
 from tests.command_line import PAPER, ROOT
+from tests.test_takeovers_mujoco import STEPS
+from tests.test_takeovers_mujoco import laid_out as with_lifts
 
 WORLDS = "ideal", "mujoco"
 
@@ -32,19 +35,25 @@ def laid_out(folder: Path, template: str, failure: str) -> Layout:
 
 
 def stopped(
-    layout: Layout, world: WorldName, fault: WorldFault, spares: int = 0, late: int = 8
+    layout: Layout,
+    world: WorldName,
+    *faults: WorldFault,
+    spares: int = 0,
+    late: int = 8,
+    label: str = "sub1",
 ) -> tuple[Run, Recovery]:
-    """A run in which a fault strikes a robot in the second `sub1`, so many ticks `late`: when it is
-    on its way."""
+    """A run in which faults strike robots in the second operation of a `label`, so many ticks
+    `late`: when they are on their way."""
     simulation = Simulation(layout, RunRequest(world, 4, recovers=True))
     recovery = recover(simulation, Campaign(clear=1.0, spares=spares, swap=2.0))
-    number, struck = layout.factory.by_label["sub1"], list[float]()
+    number, struck = layout.factory.by_label[label], list[float]()
 
     def strike(world: Any, supervisor: Any) -> None:
         if supervisor.fired[number.start] == 2 and number.index in supervisor.active.operations:
             struck.append(world.time)
             if len(struck) == late:
-                recovery.strike(fault)
+                for fault in faults:
+                    recovery.strike(fault)
 
     return simulation.run([strike], 200.0), recovery
 
@@ -76,6 +85,23 @@ def test_what_is_stuck_is_done_again_or_scrapped(
     report = recovery.report()
     assert (report.missed, report.false_alarms, report.spares) == (0, 0, 0)
     assert run.physics is None or run.physics.unintended_contacts == 0
+
+
+@pytest.mark.parametrize("world", WORLDS)
+def test_robots_that_are_stuck_together_fail_once(tmp_path: Path, world: WorldName) -> None:
+    """One failure for both: none is taken for dead as it is to go back already."""
+    layout = laid_out(tmp_path, "mate", "jammed : again 1 then stop, lost : scrap")
+    run, recovery = stopped(layout, world, STANDS, replace(STANDS, robot="r6"))
+    assert (run.products, run.trouble) == (4, None)
+    assert [(one.robot, one.response) for one in recovery.found] == [("", "again")]
+    assert {robots for _, robots in recovery.stood} >= {("r5", "r6")}
+
+
+def test_a_robot_whose_lift_still_waits_has_left() -> None:
+    """One of its axes on its way is enough: it is stuck, and not dead."""
+    run, recovery = stopped(with_lifts(STEPS), "ideal", replace(STANDS, robot="r2"), label="s2")
+    assert (run.products, run.trouble) == (4, None)
+    assert [(one.robot, one.response) for one in recovery.found] == [("", "again")]
 
 
 def test_who_does_not_test_for_it_takes_the_robot_for_dead(tmp_path: Path) -> None:
