@@ -17,11 +17,11 @@ from factory.nets.replay import replay
 from factory.nets.undone import Undone
 from factory.plant.material import joins_of
 from factory.show.live import Server
-from factory.show.live.commands import FAULTS, Command, command_of
+from factory.show.live.commands import FAULTS, LASTS, Command, command_of
 from factory.show.live.outages import Outages, Watch
 from factory.show.live.page import page
 from factory.simulation.disturbance.interventions import Interventions
-from factory.simulation.recovery import Campaign
+from factory.simulation.recovery import Campaign, Recovery, WorldFault
 from factory.simulation.recovery.faults import KINDS
 from factory.simulation.request import RunRequest
 from factory.simulation.run import entries_of
@@ -114,6 +114,43 @@ def test_each_fault_by_hand_is_found(
     if kind in ("down", "no_part", "blackout"):
         alone = Simulation(layout, RunRequest(units=4)).run().sim_time_s
         assert run.sim_time_s > alone + 2.0
+
+
+def test_every_command_strikes_what_it_names(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The robot, the part or the joint, for as long as the page says."""
+    struck = list[WorldFault]()
+    monkeypatch.setattr(Recovery, "strike", lambda recovery, fault: struck.append(fault))
+    running = Running(campaign=CAMPAIGN)
+    try:
+        for name, keys in FAULTS.items():
+            running.session.send(Command(name, **{key: VALUES[key][0] for key in keys}))
+        running.until(lambda f: len(struck) == len(FAULTS))
+    finally:
+        running.close()
+    for one, (name, keys) in zip(struck, FAULTS.items(), strict=True):
+        labels = [VALUES[key][0] for key in keys if key != "robot"]
+        named = "r3" if "robot" in keys else "", labels[0] if labels else ""
+        assert (one.kind, (one.robot, one.label), one.seconds) == (name, named, LASTS)
+
+
+def test_how_long_it_lasts_still_is_told() -> None:
+    """Of a feeder that is empty and of sensors that tell nothing, at every tick."""
+    simulation = Simulation(paper_layout(), RunRequest(units=3, recovers=True))
+    hands, seen = Interventions(simulation, CAMPAIGN), set[str]()
+    assert hands.recovery is not None
+    watch = Watch(hands.recovery)
+
+    def act(world: Any, supervisor: object) -> None:
+        now = watch.now()
+        for name, left in (("dark", now.dark), ("empty", now.empty.get("part2", 0.0))):
+            if left:
+                seen.add(name)
+                assert left == pytest.approx(5.0 - world.time, abs=1e-6)
+        if world.time == pytest.approx(3.0):
+            hands.fail("blackout", seconds=2.0)
+            hands.fail("no_part", label="part2", seconds=2.0)
+
+    assert simulation.run([act]).products == 3 and seen == {"dark", "empty"}
 
 
 def test_a_run_that_is_made_to_fail_goes_on() -> None:
