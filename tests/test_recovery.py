@@ -24,7 +24,7 @@ from factory.record.failures import Failures
 from factory.simulation.mujoco.failing.plant import MujocoPlant
 from factory.simulation.mujoco.failing.sensors import Senses
 from factory.simulation.recovery import Campaign, WorldFault, recover
-from factory.simulation.recovery.faults import KINDS
+from factory.simulation.recovery.faults import ASKEW, KINDS, SLIPPED
 from factory.simulation.recovery.standing import Standing
 from factory.simulation.request import RunRequest
 from factory.simulation.run import Run, entries_of
@@ -113,6 +113,21 @@ def test_each_kind_of_fault(name: str, world: str) -> None:
     if not test:  # what lasts for 5 s is waited for
         assert not undone
         assert run.sim_time_s > run_with(world=world, jitter=0.3)[0].sim_time_s + 0.5
+
+
+@pytest.mark.parametrize(
+    ("fault", "way"),
+    [
+        (WorldFault("misplaced", label="part2", unit=1), ASKEW),
+        (WorldFault("misplaced", label="part2", unit=1, degrees=180), SLIPPED),
+        (WorldFault("misplaced", label="part2", unit=1, degrees=180, metres=0.0), 0.0),
+        (WorldFault("bad_joint", label="sub1", unit=1), SLIPPED),
+        (WorldFault("bad_joint", label="sub1", unit=1, metres=2e-3), 2e-3),
+    ],
+)
+def test_how_far_a_part_is_off(fault: WorldFault, way: float) -> None:
+    """As is asked for, or so far that a test finds it; where it is turned that is enough."""
+    assert fault.way == way
 
 
 @pytest.mark.parametrize("world", WORLDS)
