@@ -166,6 +166,8 @@ def test_what_lies_askew_stops_the_run_where_the_template_says_so(
     else:
         assert run.products <= made and run.trouble is not None
         assert run.trouble.message == "'part1' fails the test 'misplaced'"
+        scrapped = [one for one in recovery.found if one.response == "scrap"]
+        assert len(scrapped) == len(units) - 1, "where it stops nothing is made again"
 
 
 def test_an_input_that_slipped_may_be_found_as_it_jams() -> None:
