@@ -153,6 +153,21 @@ def test_how_long_it_lasts_still_is_told() -> None:
     assert simulation.run([act]).products == 3 and seen == {"dark", "empty"}
 
 
+@pytest.mark.parametrize("order", [(5.0, 1.0), (1.0, 5.0)])
+def test_what_lasts_longest_counts(order: tuple[float, float]) -> None:
+    """A fault by hand ends none that is there: sensors stay dark, robots stand, and feeders are
+    empty until the last of two is over."""
+    simulation = Simulation(paper_layout(), RunRequest(units=1, recovers=True))
+    hands = Interventions(simulation, CAMPAIGN)
+    assert hands.recovery is not None
+    for seconds in order:
+        hands.fail("blackout", seconds=seconds)
+        hands.fail("down", 1, seconds=seconds)
+        hands.fail("no_part", label="part2", seconds=seconds)
+    striking = hands.recovery.striking
+    assert (striking.dark, striking.standing, striking.empty) == (5.0, {1: 5.0}, {"part2": 5.0})
+
+
 def test_a_run_that_is_made_to_fail_goes_on() -> None:
     simulation = Simulation(paper_layout(), RunRequest(units=6, recovers=True))
     hands, ticks = Interventions(simulation, CAMPAIGN), 0

@@ -45,7 +45,8 @@ class Striking:
             case "down" | "dead":
                 self.stand(robot, now + fault.seconds if fault.kind == "down" else np.inf)
             case "no_part":
-                self.empty[fault.label] = now + fault.seconds
+                over = now + fault.seconds
+                self.empty[fault.label] = max(self.empty.get(fault.label, over), over)
             case "blackout":
                 self.dark = max(self.dark, now + fault.seconds)
             case "drop" if robot >= 0 and self._plant.lose(robot):
