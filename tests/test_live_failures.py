@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import json
+import re
 import signal
 from collections.abc import Iterator
+from importlib import resources
 from math import inf
 from pathlib import Path
 from subprocess import PIPE
@@ -17,7 +19,7 @@ from factory.nets.replay import replay
 from factory.nets.undone import Undone
 from factory.plant.material import joins_of
 from factory.show.live import Server
-from factory.show.live.commands import FAULTS, LASTS, Command, command_of
+from factory.show.live.commands import FAULTS, KEYS, LASTS, Command, command_of
 from factory.show.live.outages import Outages, Watch
 from factory.show.live.page import page
 from factory.simulation.disturbance.interventions import Interventions
@@ -384,3 +386,13 @@ def test_the_page_has_the_buttons_only_where_it_can_fail() -> None:
     for campaign, word in ((CAMPAIGN, b'"fails":true'), (None, b'"fails":false')):
         text = page(a_session(False, campaign))
         assert word in text.replace(b'"fails": ', b'"fails":')
+
+
+def test_every_button_sends_a_command_with_its_keys() -> None:
+    """By the text of the page's program: commands have the keys that are read, and no others."""
+    text = resources.files("factory.show.live").joinpath("assets/live.js").read_text("utf-8")
+    found = re.findall(r"{ do: '(\w+)'((?:, \w+(?:: [^,}]+)?)*) }", text)
+    every = {**KEYS, **FAULTS}
+    assert {name for name, _ in found} >= {*FAULTS, "push", "slow", "block"}
+    for name, keys in found:
+        assert {*re.findall(r", (\w+)", keys)} == {*every[name]}, name
