@@ -208,6 +208,16 @@ def test_every_frame_is_in_the_file_in_order(
     assert np.allclose(frames.mean(axis=(1, 2, 3)), 40 + 4 * np.arange(count), atol=3)
 
 
+def test_a_film_is_encoded_by_one_thread(tmp_path: Path) -> None:
+    """As the encoder notes down in it: so the same pictures give the same film whatever number of
+    cores a machine has."""
+    path = tmp_path / "grey.mp4"
+    with VideoFile(path, (1280, 720), FPS) as video:
+        video.write(np.full((720, 1280, 3), 40, np.uint8))
+    told = path.read_bytes()
+    assert b" threads=1 " in told and b" lookahead_threads=1 " in told
+
+
 # --- what is to be seen -----------------------------------------------------------------------
 
 
