@@ -13,11 +13,19 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from factory.layout.layout import Layout
 from factory.record.log import Log, LogWriter
 from factory.record.log.blocks import Arrays
 from factory.record.log.kept import KeptRun, kept_run
 from factory.simulation.checkpoint import checkpoint, take_up
-from factory.simulation.recovery import Campaign, Recovery, Sensors, WorldFault, recover
+from factory.simulation.recovery import (
+    Campaign,
+    Recovery,
+    Sensors,
+    WorldFault,
+    deputising,
+    recover,
+)
 from factory.simulation.recovery.faults import KINDS, OF_ROBOT, campaign_of
 from factory.simulation.request import RunRequest, WorldName
 from factory.simulation.simulation import Simulation
@@ -104,11 +112,11 @@ def check_going_on(
     assert simulation.world.sense()[0].tobytes() == whole.world.sense()[0].tobytes()
 
 
-def with_deputies(world: WorldName, seed: int) -> tuple[Simulation, Recovery]:
-    """A run in which r2 takes over for r4, while things are dropped."""
+def with_deputies(world: WorldName, seed: int, *more: WorldFault) -> tuple[Simulation, Recovery]:
+    """A run in which r2 takes over for r4, while things are dropped, with more faults."""
     request = RunRequest(world, units=8, seed=seed, jitter=0.3, recovers=True)
     simulation = Simulation(laid_out(INSERTS), request)
-    faults = (WorldFault("dead", robot="r4", at=3.0), WorldFault("drop", rate=0.03))
+    faults = (WorldFault("dead", robot="r4", at=3.0), WorldFault("drop", rate=0.03), *more)
     return simulation, recover(simulation, Campaign(faults, seed, clear=2.0, swap=2.0))
 
 
@@ -134,6 +142,26 @@ def test_a_run_goes_on_the_same_after_a_deputy_took_over(tmp_path: Path, world: 
     alone = Simulation(laid_out(INSERTS), replace(whole.request, recovers=False))
     with pytest.raises(ValueError, match="does not recover"):
         take_up(alone, state, log)
+
+
+def test_what_the_crew_that_stays_cannot_carry_back_is_known_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Robots let all that is scrap fall where they are, before the run was cut off and after."""
+
+    def every(alone: Layout) -> frozenset[tuple[int, str]]:
+        labels, robots = alone.factory.by_label, range(len(alone.factory.robots))
+        return frozenset((robot, label) for robot in robots for label in labels)
+
+    monkeypatch.setattr(deputising, "not_carried_back", every)
+    slips = [WorldFault("bad_joint", label="sub1", unit=6)] * 3
+    whole, recovery = with_deputies("mujoco", 3, *slips)
+    kept = kept_of(whole, tmp_path)
+    (change,) = recovery.exchanges
+    end, state = next(one for one in kept.checkpoints if kept.until(one[0]).time[-1] > change.t)
+    later = [one for one in recovery.found if one.t > kept.until(end).time[-1]]
+    assert any(one.test == "residual" and one.scrapped for one in later)
+    check_going_on(*with_deputies("mujoco", 3, *slips), state, kept.until(end), whole)
 
 
 def test_there_is_no_checkpoint_while_something_is_wrong() -> None:
