@@ -7,12 +7,14 @@ from dataclasses import replace
 import pytest
 
 import factory.simulation.modelling as modelling
+from factory.commands.monitor import say_failures
 from factory.layout.bins import Bin, bin_regions, bins_of
 from factory.layout.certificate import BIN_BODY, Region
 from factory.layout.clearance import ClearanceSearch
 from factory.layout.dimensions import LAYERS
 from factory.layout.layout import Layout
 from factory.layout.sweeps import piles, regions
+from factory.record.failures import Failures
 from factory.simulation.recovery import WorldFault
 from factory.simulation.request import RunRequest
 from tests.simulation_values import layout_of
@@ -94,3 +96,14 @@ def test_a_robot_that_touches_a_bin_counts(monkeypatch: pytest.MonkeyPatch) -> N
     run, _ = run_with(layout=layout, max_time=3.0)
     assert run.physics is not None and run.physics.unintended_contacts
     assert any("bin/" in pair for pair in run.physics.contacts)
+
+
+@pytest.mark.parametrize(
+    ("spilled", "words"),
+    [((), "scrap in bins: 3\n"), (("r1", "r4"), "scrap in bins: 3; no bin for that of r1, r4\n")],
+)
+def test_bins_are_told_in_words(
+    capsys: pytest.CaptureFixture[str], spilled: tuple[str, ...], words: str
+) -> None:
+    say_failures(replace(Failures(), binned=3, spilled=spilled), False)
+    assert words in "".join(capsys.readouterr())

@@ -388,6 +388,13 @@ def test_the_page_has_the_buttons_only_where_it_can_fail() -> None:
         assert word in text.replace(b'"fails": ', b'"fails":')
 
 
+def test_only_what_is_joined_of_several_may_slip() -> None:
+    session = a_session(False, CAMPAIGN)
+    made = session.simulation.layout.factory.by_label
+    assert session.joints and all(len(made[label].inputs) > 1 for label in session.joints)
+    assert a_session(False).joints is None
+
+
 def test_every_button_sends_a_command_with_its_keys() -> None:
     """By the text of the page's program: commands have the keys that are read, and no others."""
     text = resources.files("factory.show.live").joinpath("assets/live.js").read_text("utf-8")

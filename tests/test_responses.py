@@ -170,6 +170,12 @@ def test_what_lies_askew_stops_the_run_where_the_template_says_so(
         assert len(scrapped) == len(units) - 1, "where it stops nothing is made again"
 
 
+@pytest.mark.parametrize("name", ["mate", "insert", "weld", "press", "glue"])
+def test_shipped_templates_that_join_test_for_what_is_stuck(name: str) -> None:
+    text = (ROOT / "templates" / f"{name}.op").read_text("utf-8")
+    assert "jammed : again 2 then scrap" in text
+
+
 def test_an_input_that_slipped_may_be_found_as_it_jams() -> None:
     """Nothing was missed where the operation was stuck, and nothing was a false alarm."""
     stuck = Failing(3.0, "jammed", "sub1", "", "again")

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from factory.commands.run import summarise
 from factory.compiler.taking_over import Takeover
 from factory.control.mode import Limits
 from factory.export import Subject, exporters
@@ -260,6 +261,7 @@ def test_a_robot_that_dies_where_it_went_ahead() -> None:
 
     run = simulation.run([strike], max_time=60.0)
     assert (figures(run)[:2], run.trouble, len(run.exchanges)) == ((0, 6), None, 1)
+    assert [(one.robot, one.response) for one in recovery.found] == [("r3", "deputy")]
     m = simulation.physical.m
     owner = [m.body(body).name.partition("/")[0] for body in m.geom_bodyid]
     touching = {name for name, type_ in zip(owner, m.geom_contype, strict=True) if type_}
@@ -382,6 +384,15 @@ def test_the_report_counts_work_for_the_robot_that_did_it(recorded: tuple[Run, P
     assert busy == pytest.approx(run.utilisation, abs=1e-6)
     r2, r4 = busy[1], busy[3]
     assert r4 * run.sim_time_s < run.exchanges[0].t and r2 > 2 * r4
+
+
+def test_the_prediction_is_said_to_be_that_with_all_robots(
+    recorded: tuple[Run, Path], capsys: pytest.CaptureFixture[str]
+) -> None:
+    run, _ = recorded
+    for record, count in ((run, 1), (replace(run, exchanges=()), 0)):
+        summarise(record, laid_out(INSERTS).factory, False)
+        assert "".join(capsys.readouterr()).count(" s with all robots; ") == count
 
 
 def test_exports_of_motion_leave_out_the_robot_that_is_gone(recorded: tuple[Run, Path]) -> None:
