@@ -134,6 +134,7 @@ def test_the_run_stops_where_the_template_says_so(tmp_path: Path, responses: str
     long = WorldFault("down", robot="r5", at=0.0, seconds=500.0 if responses == "stop" else 12.0)
     run, recovery = stopped(layout, "ideal", long)
     if responses == "stop":
+        assert [str(one) for one in recovery.found] == ["sub1 is jammed: the run ends"]
         assert run.trouble is not None and run.trouble.code == "Failed"
         assert run.trouble.message == "'sub1' fails the test 'jammed'"
         assert run.trouble.position is not None, "it says where"
@@ -166,8 +167,11 @@ def test_what_lies_askew_stops_the_run_where_the_template_says_so(
     else:
         assert run.products <= made and run.trouble is not None
         assert run.trouble.message == "'part1' fails the test 'misplaced'"
-        scrapped = [one for one in recovery.found if one.response == "scrap"]
-        assert len(scrapped) == len(units) - 1, "where it stops nothing is made again"
+        *before, last = recovery.found
+        assert (last.response, last.done) == ("stop", "the run ends")
+        assert [one.response for one in before] == ["scrap"] * (len(units) - 1)
+        report = recovery.report()
+        assert (report.missed, report.false_alarms) == (0, 0)
 
 
 @pytest.mark.parametrize("name", ["mate", "insert", "weld", "press", "glue"])

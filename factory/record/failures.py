@@ -72,8 +72,8 @@ class Failing:
             if self.deputy:
                 return f"{self.deputy} takes over the tours of {self.robot} (deputy) {after}"
             return f"a spare comes {after}"
-        if self.response == "again":
-            return "done again"
+        if self.response in ("again", "stop"):
+            return "done again" if self.response == "again" else "the run ends"
         if self.scrapped == (self.operation,) and self.test in ("rejected", "misplaced"):
             return "taken back"
         made = ", ".join(self.scrapped)

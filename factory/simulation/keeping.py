@@ -190,6 +190,11 @@ def is_size(value: Any) -> bool:
     return type(value) in (int, float) and 0 <= value <= LARGE
 
 
+def maybe_size(value: Any) -> bool:
+    """Whether a value is a number from 0, not too large, or None."""
+    return value is None or is_size(value)
+
+
 def is_text(value: Any) -> bool:
     """Whether a value is a text."""
     return isinstance(value, str)

@@ -11,7 +11,7 @@ import numpy as np
 from factory.layout.layout import Layout
 from factory.mjcf.model import Model
 from factory.mjcf.weld_frames import residuals
-from factory.simulation.keeping import Keeper, is_size, is_text, one_of, up_to
+from factory.simulation.keeping import Keeper, is_size, is_text, maybe_size, one_of, up_to
 from factory.simulation.mujoco.contacts import ContactMasks
 from factory.simulation.mujoco.pressing import Pressing
 from factory.simulation.mujoco.product_error import ProductError
@@ -87,7 +87,7 @@ class Inspection:
         onsets = [(*pair, count) for pair, count in Counter(self.unintended).items()]
         onsets = keeper.rows("onsets", onsets, is_text, is_text, up_to(MOST_ONSETS))
         self.residual = keeper.number("residual", self.residual, 0)
-        self.error = keeper.value("error", self.error, lambda v: v is None or is_size(v))
+        self.error = keeper.value("error", self.error, maybe_size)
         self.joining = dict(joins)
         self.force = dict(force)
         self._touching = frozenset(touching)

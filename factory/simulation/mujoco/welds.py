@@ -9,7 +9,7 @@ from collections.abc import Iterable, Mapping
 import numpy as np
 
 from factory.control.mode import Array
-from factory.simulation.keeping import Keeper, is_size
+from factory.simulation.keeping import Keeper, maybe_size
 from factory.simulation.mujoco.contacts import ContactMasks
 from factory.simulation.mujoco.pad_gaps import PadGaps
 from factory.simulation.mujoco.sleep import Sleep
@@ -101,7 +101,7 @@ class Welds:
         which are on, and on what, is in the engine."""
         self.taken.keep(keeper)
         largest = self.pads.largest
-        self.pads.largest = keeper.value("pads.gap", largest, lambda v: v is None or is_size(v))
+        self.pads.largest = keeper.value("pads.gap", largest, maybe_size)
         self.closed = keeper.number("welds.closed", self.closed, low=-np.inf)
 
     def _put(self) -> None:

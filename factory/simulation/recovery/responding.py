@@ -18,7 +18,7 @@ from factory.plant.factory import Operation
 from factory.plant.material import joins_of
 from factory.problem.pag import NOPART
 from factory.record.failures import Failing
-from factory.simulation.keeping import Keeper, is_size, is_text, one_of, some_of, up_to
+from factory.simulation.keeping import Keeper, is_size, is_text, maybe_size, one_of, some_of, up_to
 from factory.simulation.recovery.books import Books
 from factory.simulation.recovery.deputising import Deputising, Successors
 from factory.simulation.recovery.faults import Campaign
@@ -76,7 +76,7 @@ class Responding:
             one_of(robots),
             is_text,
             some_of(labels),
-            _is_until,
+            maybe_size,
         )
         found = keeper.rows("failures", found, *tests, one_of(robots))
         self.found = [
@@ -101,7 +101,7 @@ class Responding:
         """A feeder takes a part back: its robot gets out of the way of the next."""
         response = self._on_end.response(leaf, test)
         if response == "stop":
-            self._stop(f"'{leaf.label}' fails the test '{test}'", leaf)
+            self._end(test, leaf, f"'{leaf.label}' fails the test '{test}'")
             return
         if response == "again":
             self._on_end.tried[leaf.index] += 1
@@ -131,7 +131,7 @@ class Responding:
         """A robot has lost what it held: that is made again."""
         label, operation = self._books.holds(robot), self._books.operation_of(robot)
         if self._on_end.response(operation, "lost") == "stop":
-            self._stop(f"{self._name(robot)} has lost '{label}'", operation)
+            self._end("lost", operation, f"{self._name(robot)} has lost '{label}'", robot)
             return
         self._scrap("lost", operation, robot, (label,))
         self._undo((self._books.factory.by_label[label].end,), operation, "lost")
@@ -145,7 +145,7 @@ class Responding:
             self._note(test, operation, -1, response)
             self._undo((operation.start,), operation, test)
         elif response == "stop":
-            self._stop(f"'{operation.label}' fails the test '{test}'", operation)
+            self._end(test, operation, f"'{operation.label}' fails the test '{test}'")
         else:
             self._on_end.tried.pop(operation.index, None)
             self._scrap(test, operation, -1, operation.inputs)
@@ -316,6 +316,11 @@ class Responding:
                 what = f"'{label}' was scrapped {SCRAPS} times on end"
                 self._stop(what, self._books.factory.by_label[label])
 
+    def _end(self, test: str, operation: Operation, what: str, robot: int = -1) -> None:
+        """A failure ends the run."""
+        self._note(test, operation, robot, "stop")
+        self._stop(what, operation)
+
     def _stop(self, what: str, operation: Operation) -> None:
         hint = "`factory run --json` lists all failures"
         trouble = Diagnostic("Failed", what, operation.position, hint)
@@ -341,7 +346,3 @@ class Responding:
     @property
     def _now(self) -> float:
         return float(self._simulation.world.time)
-
-
-def _is_until(value: object) -> bool:
-    return value is None or is_size(value)
