@@ -248,6 +248,31 @@ def test_the_gallery_has_small_stills(name: str) -> None:
         assert 5_000 < still.stat().st_size < 200_000
 
 
+SHOWN = re.compile(r"literalinclude} (\S+)\n(?::[^p].*\n)*:pyobject: (\S+)")
+
+
+def test_code_that_is_shown_is_there() -> None:
+    """Each object of a module that a page includes."""
+    found = 0
+    for page in WRITTEN:
+        text = page.read_text("utf-8")
+        for file, name in re.findall(
+            r"literalinclude} (\S+)\n(?::[^p].*\n)*:pyobject: (\S+)", text
+        ):
+            inside = ast.parse((page.parent / file).read_text("utf-8")).body
+            for part in name.split("."):
+                named = [node for node in inside if getattr(node, "name", "") == part]
+                assert named, f"{page.name} shows {name} of {file}"
+                inside = named[0].body
+            found += 1
+    assert found > 20
+
+
+def test_every_decision_is_listed() -> None:
+    listed = re.findall(r"^[a-z-]+$", (DOCS / "decisions" / "index.md").read_text("utf-8"), re.M)
+    assert {*listed} == {p.stem for p in (DOCS / "decisions").glob("*.md")} - {"index"}
+
+
 # --- the site -------------------------------------------------------------------------------------
 
 
