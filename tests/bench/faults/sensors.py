@@ -72,7 +72,8 @@ def section(results: dict[str, Any]) -> str:
             " They are counted by kind in each run, so a miss and a false alarm of the same test in"
             " one run would hide each other. *Found* has no blackouts, robots that stand for a"
             " while or empty feeders, for which nothing looks, and more than one failure for one"
-            " fault where something that fell knocks against others.",
+            " fault where something that fell knocks against others, or where a robot that is dead"
+            " was to go back first.",
             table(
                 (*head, *more),
                 [
