@@ -214,7 +214,7 @@ def test_a_part_is_taken_by_one_copy_at_a_time() -> None:
 
 
 @given(st.integers(0, 10**6), st.sampled_from([None, 1, 2]))
-@settings(max_examples=25)
+@settings(max_examples=12)
 def test_littles_law(seed: int, wip: int | None) -> None:
     layout = random.Random(seed).choice(layouts())
     timing = Timing(layout, Settings(), "ideal", seed % 99, 0.3)

@@ -155,8 +155,15 @@ def test_no_binary_lies_beside_a_device_or_upon_the_mjcf(tmp_path: Path) -> None
     assert beside(tmp_path / "m.mjb") == tmp_path / "m.mjb.mjb"
 
 
-@pytest.mark.parametrize("name", ["gearbox", "truck"])
-@pytest.mark.parametrize("fuse", [False, True])
+@pytest.mark.parametrize(
+    ("name", "fuse"),
+    [
+        ("gearbox", True),
+        ("truck", False),
+        pytest.param("gearbox", False, marks=pytest.mark.slow),
+        pytest.param("truck", True, marks=pytest.mark.slow),
+    ],
+)
 def test_a_model_read_in_pieces_is_the_same_to_the_last_byte(name, fuse, monkeypatch) -> None:
     model = physical_model(layout(name), 2, fuse=fuse)
     whole = packed(loading.load(model))

@@ -208,8 +208,15 @@ def with_parts(layout: Layout, solids: dict[str, Any]) -> Layout:
     return replace(layout, product=product)
 
 
-@pytest.mark.parametrize("fuse", [False, True])
-@pytest.mark.parametrize("make", [too_tight, on_the_wrong_side])
+@pytest.mark.parametrize(
+    ("make", "fuse"),
+    [
+        (too_tight, True),
+        (on_the_wrong_side, False),
+        pytest.param(too_tight, False, marks=pytest.mark.slow),
+        pytest.param(on_the_wrong_side, True, marks=pytest.mark.slow),
+    ],
+)
 def test_parts_that_touch_do_so_without_it(make: Callable[[], Layout], fuse: bool) -> None:
     layout = make()
     fast, plain = (traced(ready(layout, fuse=fuse, fast=f), MOST, 12.0) for f in (True, False))

@@ -185,7 +185,9 @@ def principal_axis(m: mujoco.MjModel, seen: np.ndarray) -> np.ndarray:
     return np.asarray(np.linalg.eigh(np.cov(d.geom_xpos[seen & (m.geom_bodyid > 0)].T))[1][:, -1])
 
 
-@pytest.mark.parametrize("name", ["paper", "stool", "gearbox"])
+@pytest.mark.parametrize(
+    "name", ["paper", "stool", pytest.param("gearbox", marks=pytest.mark.slow)]
+)
 def test_the_broad_phase_sweeps_along_the_floor(name: str, tmp_path: Path) -> None:
     layout = without_hands(name)
     m = compiled(physical_model(layout), tmp_path)

@@ -103,12 +103,12 @@ RUNS: list[tuple[str, dict[str, Any]]] = [
     ("fence", {"distributed": True}),
     ("fence", {}),
     ("chest", {"settings": Settings(timestep=0.004, substeps=3, stage=1)}),
-    ("20", {"settings": Settings(timestep=0.01, substeps=1)}),
     ("20", {"fuse": True, "wip": 1}),
 ]
+COARSE = "20", {"settings": Settings(timestep=0.01, substeps=1)}
 
 
-@pytest.mark.parametrize(("name", "given"), RUNS)
+@pytest.mark.parametrize(("name", "given"), [*RUNS, pytest.param(*COARSE, marks=pytest.mark.slow)])
 def test_nothing_that_moves_or_is_met_is_left_out(name: str, given: dict[str, Any]) -> None:
     """In every step, by the engine's own poses and boxes."""
     assert overlooked_in_run(name, **given) == set()

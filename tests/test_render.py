@@ -115,10 +115,10 @@ def test_filming_does_not_disturb_the_run(taken, layout, tmp_path: Path) -> None
 
 @needs_gl
 def test_the_same_pictures_are_encoded_the_same_every_time(taken, tmp_path: Path) -> None:
-    """Drawing and encoding on one thread, one film in five came out different."""
+    """With drawing and encoding on one thread, one film in five once came out different."""
     log = read_log(taken[0] / "run.log")
     films = set()
-    for _ in range(8):
+    for _ in range(5):
         render_log(log, tmp_path / "again.mp4", SMALL, 5.0)
         films.add((tmp_path / "again.mp4").read_bytes())
     assert len(films) == 1
