@@ -217,11 +217,11 @@ class Supervisor:
             elif entry.exchanged:
                 exchange(entry)
             else:
-                self.fired[:] = self.before(entry)
+                self.fired[:] = self.without(entry)
                 self._mark(marking_after(self.factory.net, self.fired))
                 self.events.append(entry)
 
-    def before(self, undone: Undone) -> tuple[int, ...]:
+    def without(self, undone: Undone) -> tuple[int, ...]:
         """How often each transition has fired once that is undone."""
         number, fired = self.factory.net.threaded.net.transition_index, [*self.fired]
         for name in undone.transitions:

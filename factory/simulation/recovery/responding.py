@@ -167,8 +167,8 @@ class Responding:
             self.died(robot)
 
     def died(self, robot: int) -> None:
-        """A robot is dead. After some time it is taken away, and one from the depot takes
-        its place, or a deputy its tours; what it held is lost with it."""
+        """A robot is dead. After some time it is taken away, and one from the depot takes its
+        place, or a deputy its tours; what it held is lost with it."""
         label, operation = self._books.holds(robot), self._books.operation_of(robot)
         spare, deputy = self.used_spares < self._campaign.spares, ""
         if not spare and not (deputy := self.deputising.appoint(robot, self.dead)):
@@ -235,7 +235,7 @@ class Responding:
 
     def exchange_again(self, undone: Undone) -> None:
         """Take over an exchange of robots in the record of this run."""
-        change, fired = self.deputising.again(undone), self._books.supervisor.before(undone)
+        change, fired = self.deputising.again(undone), self._books.supervisor.without(undone)
         self._plant.exchange(change.takeover.dead, change.layout)
         self._exchange(change, fired, undone)
 

@@ -45,10 +45,9 @@ class Striking:
             case "down" | "dead":
                 self.stand(robot, now + fault.seconds if fault.kind == "down" else np.inf)
             case "no_part":
-                over = now + fault.seconds
-                self.empty[fault.label] = max(self.empty.get(fault.label, over), over)
+                self.starve(fault.label, now + fault.seconds)
             case "blackout":
-                self.dark = max(self.dark, now + fault.seconds)
+                self.darken(now + fault.seconds)
             case "drop" if robot >= 0 and self._plant.lose(robot):
                 pass
             case _:
@@ -70,9 +69,9 @@ class Striking:
         if count > 1 and (fault := self._strikes("bad_joint", unit, now, label)):
             self._plant.slip(operation, fault.way)
         if not count and (fault := self._strikes("no_part", unit, now, label)):
-            self.empty[label] = now + fault.seconds
+            self.starve(label, now + fault.seconds)
         if fault := self._strikes("blackout", unit, now, label):
-            self.dark = max(self.dark, now + fault.seconds)
+            self.darken(now + fault.seconds)
 
     @property
     def is_calm(self) -> bool:
@@ -91,6 +90,14 @@ class Striking:
     def stand(self, robot: int, until: float) -> None:
         """A robot (index) stands until then [s]."""
         self.standing[robot] = max(self.standing.get(robot, 0.0), until)
+
+    def starve(self, label: str, until: float) -> None:
+        """A feeder gives nothing until then [s]."""
+        self.empty[label] = max(self.empty.get(label, 0.0), until)
+
+    def darken(self, until: float) -> None:
+        """No sensor tells anything until then [s]."""
+        self.dark = max(self.dark, until)
 
     def shown(self, label: str, unit: int, now: float) -> WorldFault | None:
         """What is wrong with a part that a feeder is about to show for a unit."""
