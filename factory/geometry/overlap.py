@@ -1,0 +1,253 @@
+"""Solids as drawn, and how two of them overlap: exact, by booleans of their surfaces.
+
+The convex bodies that collide for a part (`pieces`) may be larger than it is drawn: the hull of a
+plate closes its holes. Here a part is the volume that its own surface bounds. The *depth* of an
+overlap of A and B is the least distance by which one of the two must be eroded, all of its surface
+receding by it, so that they are apart: 0.4 mm for a peg of 40.8 mm in a hole of 40 mm, the radius
+of a pin in a plate that has no hole for it. It is attained in the common volume,
+
+    depth = min over S in {A, B} of max over p in A ∩ B of |p, ∂S|,
+
+and is looked for at the corners of the common volume and along chords that are normal to its faces.
+
+The volume that A sweeps as it is shifted by v is A and the prisms over its triangles that face v.
+They are taken as one body that may overlap itself: it is solid wherever A comes, on the whole way.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from factory.geometry.meshes import Array, Indices, is_closed
+from factory.geometry.pieces import closed_bodies
+from factory.geometry.solids import Product, Solid, rotation
+
+ROUND = 5e-6
+"""A round body is drawn as a polytope that differs from it by no more than this [m]."""
+
+SIDES = (24, 1024)
+"""The fewest and the most sides of the polygon that stands for a circle."""
+
+FACING = 1e-9
+"""A triangle whose normal has this cosine or less with a shift slides along itself."""
+
+SAMPLES = 128
+"""The most corners, and the most chords, of a common volume at which its depth is looked for."""
+
+BEYOND = 1e-9
+"""A chord is followed from this far behind the face that it begins at [m]."""
+
+CHUNK = 400_000
+"""The most distances of a point from a triangle that are computed at a time."""
+
+
+@dataclass(frozen=True, slots=True)
+class Common:
+    """The volume [m³] that two solids have in common, and its depth [m]; both 0 where they are
+    apart."""
+
+    volume: float
+    depth: float
+
+
+APART = Common(0.0, 0.0)
+"""Of two solids that have nothing in common."""
+
+
+class DrawnSolids:
+    """The solids of a product's parts as drawn, each made once, and their overlaps."""
+
+    def __init__(self, product: Product) -> None:
+        self._product = product
+        self._bodies: dict[str, Any] = {}
+
+    def is_drawn(self, label: str) -> bool:
+        """Whether the surface of a part bounds a volume. An open mesh bounds none."""
+        return self._body(label) is not None
+
+    def overlap(self, one: str, other: str, shift: Array | None = None) -> Common:
+        """What two parts have in common, the first shifted by `shift` (3,) [m]. Both must be drawn
+        (`is_drawn`)."""
+        body = self._body(one)
+        if shift is not None:
+            body = body.translate(shift)
+        return common(body, self._body(other))
+
+    def cut(self, one: str, other: str, shift: Array) -> Common:
+        """What a part has in common with another anywhere on its way from its place to `shift` (3,)
+        [m] from there, its place included. The depth is that in the second part alone: by how
+        much this must be eroded so that the first passes."""
+        body = self._body(one)
+        return common(swept(body, shift), self._body(other), both=False)
+
+    def _body(self, label: str) -> Any:
+        if label not in self._bodies:
+            self._bodies[label] = drawn(self._product.solids[label])
+        return self._bodies[label]
+
+
+def drawn(solid: Solid) -> Any:
+    """The volume that a part's surface bounds, as a `manifold3d.Manifold` in the frame of the
+    finished product; None for a mesh that bounds none."""
+    from manifold3d import Manifold
+
+    turn = rotation(solid.quaternion)
+    if solid.kind == "mesh":
+        mesh = solid.mesh
+        if mesh is None or not is_closed(mesh.faces):
+            return None
+        return _bounded(mesh.vertices @ turn.T + solid.position, mesh.faces)
+    if solid.kind == "box":
+        body = Manifold.cube(2 * np.array(solid.size), True)
+    elif solid.kind == "cylinder":
+        radius, half = solid.size[:2]
+        sides = _sides(radius)
+        between = radius * (1 + 1 / np.cos(np.pi / sides)) / 2
+        body = Manifold.cylinder(2 * half, between, -1.0, sides, True)
+    else:
+        sides = 4 * (_sides(solid.size[0]) // 4)
+        body = Manifold.sphere(solid.size[0], sides)
+    return body.transform(np.column_stack([turn, solid.position]))
+
+
+def _sides(radius: float) -> int:
+    needed = np.pi / np.sqrt(2 * ROUND / max(radius, ROUND))
+    return int(np.clip(np.ceil(needed), *SIDES))
+
+
+def _bounded(vertices: Array, faces: Indices) -> Any:
+    """What a closed mesh bounds; None where its triangles bound no volume. Bodies of it that share
+    an edge are told apart, and joined."""
+    from manifold3d import Error, Manifold, OpType
+
+    whole = _surface(vertices, faces)
+    if whole.status() != Error.NoError:
+        bodies = [_surface(*body) for body in closed_bodies(vertices, faces)]
+        if not bodies or any(body.status() != Error.NoError for body in bodies):
+            return None
+        filled = Manifold.batch_boolean([b for b in bodies if b.volume() > 0], OpType.Add)
+        cavities = [body for body in bodies if body.volume() < 0]
+        whole = filled + Manifold.batch_boolean(cavities, OpType.Add) if cavities else filled
+    return whole if whole.volume() > 0 else None
+
+
+def _surface(vertices: Array, faces: Indices) -> Any:
+    from manifold3d import Manifold, Mesh64
+
+    return Manifold(Mesh64(np.ascontiguousarray(vertices), faces.astype(np.uint64)))
+
+
+def swept(body: Any, shift: Array) -> Any:
+    """The volume that a body sweeps as it is shifted by `shift` (3,) [m]."""
+    from manifold3d import Error, Manifold
+
+    mesh = body.to_mesh64()
+    vertices, faces = _merged(mesh)
+    a, b, c = (vertices[faces[:, corner]] for corner in range(3))
+    normals = np.cross(b - a, c - a)
+    lengths = np.linalg.norm(normals, axis=1) * np.linalg.norm(shift)
+    front = faces[normals @ shift > FACING * lengths]
+    if not len(front):
+        return body
+    used, inverse = np.unique(front, return_inverse=True)
+    near, count = inverse.reshape(-1, 3), len(used)
+    start, end = near.ravel(), np.roll(near, -1, axis=1).ravel()
+    rim = ~np.isin(start * count + end, end * count + start)
+    start, end = start[rim], end[rim]
+    walls = np.concatenate(
+        [
+            np.column_stack([start, end, end + count]),
+            np.column_stack([start, end + count, start + count]),
+        ]
+    )
+    points = np.concatenate([vertices[used], vertices[used] + shift])
+    ahead = _surface(points, np.concatenate([near[:, ::-1], near + count, walls]))
+    if ahead.status() != Error.NoError:  # the front touches itself in an edge: prism by prism
+        tips = vertices[front]
+        prisms = [Manifold.hull_points(np.concatenate([t, t + shift])) for t in tips]
+        ahead = Manifold.compose(prisms)
+    return Manifold.compose([body, ahead])
+
+
+def _merged(mesh: Any) -> tuple[Array, Indices]:
+    """The vertices (n, 3) and faces (m, 3) of the engine's mesh, its vertices merged."""
+    vertices = np.asarray(mesh.vert_properties)[:, :3]
+    target = np.arange(len(vertices))
+    target[np.asarray(mesh.merge_from_vert, np.int64)] = np.asarray(mesh.merge_to_vert, np.int64)
+    return vertices, target[np.asarray(mesh.tri_verts, np.int64)]
+
+
+def common(one: Any, other: Any, both: bool = True) -> Common:
+    """What two bodies have in common. `both`: the depth is the lesser of the two erosions; else it
+    is that of the `other`."""
+    shared = one ^ other
+    volume = float(shared.volume())
+    if shared.is_empty() or volume <= 0:
+        return APART
+    points = _within(shared)
+    bodies = (one, other) if both else (other,)
+    depth = min(float(_distances(points, body, shared).max()) for body in bodies)
+    return Common(volume, depth)
+
+
+def _within(shared: Any) -> Array:
+    """Points (n, 3) of a volume: corners, and both ends and the middle of chords that begin in the
+    middle of a triangle, the larger triangles first. Few triangles are divided."""
+    fine = max(1, int(np.sqrt(SAMPLES / shared.num_tri())))
+    vertices, faces = _merged(shared.refine(fine).to_mesh64())
+    a, b, c = (vertices[faces[:, corner]] for corner in range(3))
+    normals = np.cross(b - a, c - a)
+    areas = np.linalg.norm(normals, axis=1)
+    reach = float(np.linalg.norm(np.ptp(vertices, axis=0)))
+    points = [vertices[np.unique(faces)]]
+    points[0] = points[0][:: -(-len(points[0]) // SAMPLES)]
+    for row in np.argsort(-areas, kind="stable")[:SAMPLES].tolist():
+        if areas[row] > 0:
+            begin, inward = (a[row] + b[row] + c[row]) / 3, -normals[row] / areas[row]
+            hits = shared.ray_cast(begin + BEYOND * inward, begin + reach * inward)
+            ends = [np.asarray(hit.position) for hit in hits[:1]]
+            points.append(np.array([begin, *ends, *((begin + end) / 2 for end in ends)]))
+    return np.concatenate(points)
+
+
+def _distances(points: Array, body: Any, shared: Any) -> Array:
+    """The distances (n,) [m] of points from the surface of a body, no more than the longest edge
+    of the box round the common volume."""
+    vertices, faces = _merged(body.to_mesh64())
+    box = np.array(shared.bounding_box()).reshape(2, 3)
+    most = float((box[1] - box[0]).max())
+    corners = vertices[faces]
+    near = (corners.max(axis=1) >= box[0] - most).all(axis=1)
+    near &= (corners.min(axis=1) <= box[1] + most).all(axis=1)
+    triangles = corners[near]
+    found = np.full(len(points), most)
+    step = max(1, CHUNK // max(1, len(triangles)))
+    for first in range(0, len(points) if len(triangles) else 0, step):
+        rows = slice(first, first + step)
+        found[rows] = np.minimum(most, _to_triangles(points[rows], triangles))
+    return found
+
+
+def _to_triangles(points: Array, triangles: Array) -> Array:
+    """The distance (n,) of each point from the nearest of triangles (m, 3, 3)."""
+    origin, edges = triangles[:, 0], np.roll(triangles, -1, axis=1) - triangles
+    normals = np.cross(edges[:, 0], -edges[:, 2])
+    area = np.einsum("ij,ij->i", normals, normals)
+    flat = area <= 0
+    area[flat] = 1.0
+    height = (points @ normals.T - np.einsum("ij,ij->i", origin, normals)) / np.sqrt(area)
+    squared, inside = np.full(height.shape, np.inf), np.broadcast_to(~flat, height.shape).copy()
+    for corner in range(3):
+        start, edge = triangles[:, corner], edges[:, corner]
+        length = np.maximum(np.einsum("ij,ij->i", edge, edge), 1e-300)
+        along = (points @ edge.T - np.einsum("ij,ij->i", start, edge)) / length
+        foot = np.clip(along, 0.0, 1.0)[..., None] * edge
+        off = points[:, None] - start - foot
+        squared = np.minimum(squared, np.einsum("ijk,ijk->ij", off, off))
+        inner = np.cross(normals, edge)
+        inside &= points @ inner.T >= np.einsum("ij,ij->i", start, inner)
+    squared = np.where(inside, height**2, squared)
+    return np.asarray(np.sqrt(squared.min(axis=1)))
