@@ -106,7 +106,7 @@ def solids_of(folder: Path, text: str, mesh: trimesh.Trimesh) -> DrawnSolids:
 
 
 def test_parts_of_a_product_overlap_as_they_are_drawn(tmp_path):
-    solids = solids_of(tmp_path, TEXT, trimesh.creation.annulus(5.0, 20.0, 10.0, sections=256))
+    solids = solids_of(tmp_path, TEXT, trimesh.creation.annulus(5.0, 20.0, 10.0, sections=64))
     assert all(map(solids.is_drawn, ("ring", "pin", "ball")))
     assert solids.overlap("ring", "pin").depth == pytest.approx(1e-4, rel=0.1)
     assert solids.overlap("pin", "ball").depth == pytest.approx(1e-4, rel=0.1)

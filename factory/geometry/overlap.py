@@ -108,7 +108,7 @@ def drawn(solid: Solid) -> Any:
         between = radius * (1 + 1 / np.cos(np.pi / sides)) / 2
         body = Manifold.cylinder(2 * half, between, -1.0, sides, True)
     else:
-        sides = 4 * (_sides(solid.size[0]) // 4)
+        sides = 2 * _sides(solid.size[0])
         body = Manifold.sphere(solid.size[0], sides)
     return body.transform(np.column_stack([turn, solid.position]))
 
