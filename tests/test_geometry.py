@@ -11,6 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from layout_values import table_pag
 
+from factory.geometry.limits import METRES
 from factory.geometry.meshes import (
     LEAST_INERTIA,
     LEAST_MASS,
@@ -261,12 +262,12 @@ def test_a_product_of_an_unlikely_size_warns(edge: float, warns: bool) -> None:
     assert bool(found) == warns
     if warns:
         assert found[0].message == f"the product is {edge:g} m long"
-        assert found[0].hint == "lengths are in metres"
+        assert found[0].hint == METRES
 
 
 def test_only_a_mesh_is_suspected_of_millimetres(tmp_path: Path) -> None:
     """And only one that is too large."""
-    for edge, advice in ((20.0, "write scale = 0.001"), (0.002, "lengths are in metres: check")):
+    for edge, advice in ((20.0, "write unit = mm;"), (0.002, f"{METRES}: check")):
         (found,) = from_mesh(tmp_path, trimesh.creation.box((edge, edge, edge))).warnings
         assert advice in found.hint
 

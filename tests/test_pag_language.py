@@ -170,6 +170,98 @@ def test_mate_takes_two_or_more_and_insert_two() -> None:
     assert codes(f"root = a; a = insert ( {inputs} ); {parts}") == ["WrongInputs"]
 
 
+# Units, colours, copies
+
+SCREWS = """unit = mm; root = all; all = mate ( plate, screw ); plate = atomic ( box = (6, 6, 4) );
+screw[2] = atomic ( cylinder = (1.5, 10), quat = (2, 0, 0, 0), mass = 3 ) at ( 10, -7, 0.3 ),
+  ( 1e1, 7, 7 )"""
+
+
+def test_lengths_are_in_the_unit_and_as_exact_as_in_metres() -> None:
+    metres = """root = all; all = mate ( plate, screw1, screw2 );
+    plate = atomic ( box = (0.006, 0.006, 0.004) );
+    screw1 = atomic ( cylinder = (0.0015, 0.01), quat = (2, 0, 0, 0), mass = 3,
+      pos = (0.01, -0.007, 0.0003) );
+    screw2 = atomic ( cylinder = (0.0015, 0.01), quat = (2, 0, 0, 0), mass = 3,
+      pos = (0.01, 0.007, 0.007) )"""
+    assert read(SCREWS) == read(metres) == read(write_pag(read(SCREWS)))
+    first, rest = SCREWS.split(";", 1)
+    assert read(f"{rest}; {first}") == read(SCREWS)
+    assert read(SCREWS.replace("mm", "m")) != read(SCREWS)
+
+
+@pytest.mark.parametrize(("unit", "one"), [("m", 1), ("cm", 0.01), ("mm", 0.001), ("in", 0.0254)])
+def test_a_mesh_is_in_the_unit(unit: str, one: float) -> None:
+    mesh = 'root = p; p = atomic ( mesh = "bricks/3001.obj"{} )'
+    bare = read(f"unit = {unit};{mesh.format('')}")["p"]
+    assert bare.parameter("scale", 1.0) == one
+    half = read(f"unit = {unit};{mesh.format(', scale = 0.5')}")["p"]
+    assert half.parameter("scale") == pytest.approx(one / 2, rel=1e-15)
+
+
+def test_a_label_may_still_be_called_unit() -> None:
+    assert read("unit = cm; root = unit; unit = atomic ( sphere = 2 )")["unit"].parameter(
+        "sphere"
+    ) == pytest.approx(0.02)
+    assert codes("root = unit; unit = atomic; ") == ["UndefinedLabel", "BadValue"]
+    assert codes("unit = mm; unit = cm; root = a; a = atomic()") == ["BadValue"]
+    for text in ('unit = "mm";', "unit = 1 mm;", "unit mm;", "units = mm;", "unit =;"):
+        (found,) = errors(f"{text} root = a; a = atomic()")
+        assert found.code == "Syntax" and "unit = mm;" in found.hint, text
+
+
+@pytest.mark.parametrize("word", ["red", "RED", '"red"', '"#ff0000"', "( 1, 0, 0, 1 )"])
+def test_colours_have_names(word: str) -> None:
+    assert part(f"rgba = {word}") == (Parameter("rgba", (1.0, 0.0, 0.0, 1.0)),)
+    (found,) = errors("root = p; p = atomic ( rgba = stealblue )")
+    assert found.code == "BadValue" and "'steelblue'" in found.hint
+
+
+@pytest.mark.parametrize(
+    ("word", "name"),
+    [("color", "rgba"), ("Colour", "rgba"), ("position", "pos"), ("at", "pos"), ("size", "box")],
+)
+def test_words_that_are_meant_otherwise(word: str, name: str) -> None:
+    (found,) = errors(f"root = p; p = atomic ( {word} = 1 )")
+    assert found.hint.startswith(f"did you mean '{name}'? for example: {name} = ")
+    (found,) = errors("root = p; p = part()")
+    assert found.hint == "did you mean 'atomic'?"
+
+
+def test_copies_are_parts_of_their_own() -> None:
+    pag = read(SCREWS)
+    assert pag["all"].inputs == ("plate", "screw1", "screw2")
+    assert [str(at) for at in pag["all"].input_positions[1:]] == ["test.pag:1:44"] * 2
+    places = [
+        next(p.position for p in pag[f"screw{n}"].parameters if p.name == "pos") for n in "12"
+    ]
+    assert [str(place) for place in places] == ["test.pag:2:78", "test.pag:3:3"]
+    assert len(read("4 parts; root = a; a = mate ( b ); b[3] = atomic()")) == 4
+    assert read("root = p; p = atomic() at ( 0, 0, 1 )") == read(
+        "root = p; p = atomic ( pos = ( 0, 0, 1 ) )"
+    )
+    assert read("root = a; a = mate ( b2, b1 ); b [ 2 ] = atomic()")["a"].inputs == ("b2", "b1")
+
+
+@pytest.mark.parametrize(
+    ("text", "wanted"),
+    [
+        ("b[2] = atomic() at ( 0, 0, 0 )", ["BadValue"]),
+        ("b[2] = atomic ( pos = ( 0, 0, 0 ) ) at ( 0, 0, 0 ), ( 0, 0, 1 )", ["BadValue"]),
+        ("b[2] = atomic() by ( 0, 0, 0 ), ( 0, 0, 1 )", ["Syntax"]),
+        ("b[2] = atomic() at ( 0, 0 ), ( 0, 0, 1 )", ["BadValue"]),
+        ("b[2] = atomic() at ( 0, 0, 0 ) ( 0, 0, 1 )", ["Syntax"]),
+        ("b[2] = atomic ( mass = -1 )", ["BadValue"]),
+        ("b[2] = atomic; ", ["Syntax"]),
+        ("b[2] = atomic(); b1 = atomic()", ["DuplicateLabel"]),
+        ("b[2] = atomic(); b = atomic()", ["DuplicateLabel"]),
+        ("b[999999999999999999] = atomic()", ["BadValue"]),
+    ],
+)
+def test_copies_that_are_not_right(text: str, wanted: list[str]) -> None:
+    assert codes(f"root = a; a = mate ( b1, b2 ); {text}") == wanted
+
+
 # The writer
 
 
@@ -351,7 +443,7 @@ def test_any_text(text: str) -> None:
     survives(text)
 
 
-WORDS = 'a b root parts 1 -1 = ( ) , ; "x" " // \n + & mate atomic'
+WORDS = 'a b root parts 1 -1 = ( ) , ; "x" " // \n + & mate atomic [2] at unit mm'
 
 
 @given(st.lists(st.sampled_from(WORDS.split(" "))))
@@ -372,7 +464,7 @@ def test_any_damage(text: str) -> None:
 
 
 def test_every_way_to_get_stuck_has_its_own_words() -> None:
-    signs = ["w", "=", "(", ")", ",", ";", '"s"', None]
+    signs = ["w", "=", "(", ")", ",", ";", '"s"', "[2]", None]
     queue = deque([""])
     while queue:
         lawful = queue.popleft()

@@ -17,6 +17,8 @@ cannot compute with it."""
 LONGEST, SHORTEST = 5.0, 0.005
 """A product outside these lengths [m] gets a warning."""
 
+METRES = "lengths are in metres, unless the text says otherwise: unit = mm;"
+
 SHAPES = ("box", "cylinder", "sphere", "mesh")
 """Parameters that give a part a shape."""
 
@@ -38,7 +40,7 @@ def beyond(node: Assembly, solid: Solid) -> Diagnostic | None:
 def too_far(node: Assembly, *names: str) -> Diagnostic:
     """A part is out of reach because of the first of these parameters that it has."""
     message = f"'{node.label}' reaches further than {FURTHEST:g} m from the origin"
-    hint = "lengths are in metres: check pos, scale and the shape"
+    hint = f"{METRES}: check pos, scale and the shape"
     return Diagnostic("BadValue", message, value_position(node, *names), hint)
 
 
@@ -53,10 +55,10 @@ def size_warnings(pag: PAG, low: Array, high: Array) -> list[Diagnostic]:
     longest = float((high - low).max())
     if SHORTEST <= longest <= LONGEST:
         return []
-    hint = "lengths are in metres"
+    hint = METRES
     if any(node.parameter("mesh") is not None for node in pag.parts()):
         hint += ": check scale, and --unit of `factory import`"
         if longest > LONGEST:
-            hint = "is a mesh in millimetres? then write scale = 0.001, or import with --unit mm"
+            hint = "is a mesh in millimetres? then write unit = mm; or import with --unit mm"
     message = f"the product is {longest:g} m long"
     return [Diagnostic("Size", message, pag[pag.root].position, hint)]

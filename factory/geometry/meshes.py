@@ -118,7 +118,7 @@ FLAT = Remark(
 TINY = Remark(
     "is tiny; its box is used instead",
     "meshes are tiny: their boxes are used",
-    "lengths are in metres: `scale` makes a mesh larger",
+    "lengths are in metres, unless the text says its unit: `scale` makes a mesh larger",
 )
 OPEN = Remark(
     "is open (not watertight); its convex hull is used instead",

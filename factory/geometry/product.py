@@ -20,6 +20,7 @@ from factory.geometry import kept_meshes
 from factory.geometry.decomposition import in_pieces
 from factory.geometry.limits import (
     FURTHEST,
+    METRES,
     SHAPES,
     SMALLEST,
     beyond,
@@ -138,7 +139,7 @@ class _Reader:
         if SMALLEST <= size.min() <= size.max() <= FURTHEST:
             return primitive(node, kind, size, place, quaternion, number)
         message = f"the {kind} of '{node.label}' is out of range"
-        hint = f"from {2 * SMALLEST:g} to {FURTHEST:g} m; lengths are in metres"
+        hint = f"from {2 * SMALLEST:g} to {FURTHEST:g} m; {METRES}"
         self.errors.append(Diagnostic("BadValue", message, value_position(node, kind), hint))
         return None
 

@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 
 from factory.importing.draft import ImportFaults
 from factory.lang.source import Source, quoted
+from factory.lang.words import UNITS
 from factory.support.errors import Diagnostic, InputError, Position
 
 COLUMNS = {
@@ -24,9 +25,6 @@ COLUMNS = {
     "density": ("density",),
 }
 """The columns that are read, and the headers that they may have, the likeliest first."""
-
-UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254}
-"""Units of length that a header may have, as `x [mm]` [m]."""
 
 EXAMPLE = "level,name,quantity,mesh,x,y,z"
 

@@ -9,11 +9,11 @@ from factory.importing.draft import ImportFaults
 from factory.importing.mesh_files import MeshFolder
 from factory.importing.places import Placement
 from factory.lang.source import quoted
-from factory.lang.values import SHAPES
+from factory.lang.values import GEOMETRY, SHAPES
 from factory.problem.pag import Parameter, Value
 from factory.support.errors import Position
 
-LENGTHS = ("scale", "pos", "box", "cylinder", "sphere")
+LENGTHS = tuple(name for name, kind in GEOMETRY.items() if kind.long)
 """Parameters in the unit of the file."""
 
 

@@ -7,17 +7,52 @@ import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import dropwhile
+from types import MappingProxyType
 
 from lark import Token
 
 from factory.lang.pag_syntax import Definition, Keyword
 from factory.lang.source import Findings, near_file, quoted, where
 from factory.lang.values import GEOMETRY, SHAPES, Kind, ValueReader, kind_of
-from factory.lang.words import LABEL_HINT, is_label, is_number
+from factory.lang.words import LABEL_HINT, UNITS, is_label, is_number
 from factory.problem.pag import RESERVED, Assembly, Parameter
 from factory.problem.template import Template
 from factory.support.errors import Position, did_you_mean
 from factory.support.settings import DWELL
+
+MEANT: Mapping[str, str] = MappingProxyType(
+    {
+        word: name
+        for name, words in {
+            "pos": "position at place location xyz translate origin",
+            "rgba": "color colour rgb col",
+            "quat": "rotation rotate rot orientation turn angle euler rpy quaternion",
+            "box": "size dimensions dims cube cuboid block",
+            "cylinder": "cyl radius height rod tube",
+            "sphere": "ball",
+            "mesh": "file path stl obj model shape geometry",
+            "mass": "weight kg",
+            "dwell": "time duration seconds wait",
+        }.items()
+        for word in words.split()
+    }
+)
+"""The parameters that are meant by words that people write in their place."""
+
+MEANT_OPERATIONS: Mapping[str, str] = MappingProxyType(
+    {
+        word: name
+        for name, words in {
+            "atomic": "part box cylinder sphere mesh component primitive leaf",
+            "mate": "join assemble attach combine connect merge union add fit",
+            "insert": "put place",
+            "weld": "solder fasten",
+            "glue": "bond stick",
+        }.items()
+        for word in words.split()
+    }
+)
+"""The operations that are meant by words that people write in their place."""
 
 MESHES = (".obj", ".stl", ".ply", ".glb")
 
@@ -50,19 +85,24 @@ def signature(template: Template) -> Signature:
 
 
 class AssemblyReader:
-    """Makes assemblies of definitions; errors go to the findings. `folder` is where mesh paths
-    start; they are not followed where it is None."""
+    """Makes assemblies of definitions, whose lengths are in a unit; errors go to the findings.
+    `folder` is where mesh paths start; they are not followed where it is None."""
 
     def __init__(
-        self, findings: Findings, signatures: Mapping[str, Signature], folder: str | None
+        self,
+        findings: Findings,
+        signatures: Mapping[str, Signature],
+        folder: str | None,
+        unit: str = "m",
     ) -> None:
         self.findings, self.signatures, self.folder = findings, signatures, folder
-        self.values = ValueReader(findings)
+        self.values, self.unit = ValueReader(findings, unit), unit
         self.meshes: dict[str, tuple[str, str] | None] = {}
 
     def read(self, definition: Definition) -> Assembly:
         """The assembly of a definition; incomplete where errors were noted."""
-        label, operation, arguments = definition
+        label, operation, arguments, _ = definition
+        assert isinstance(label, Token)
         at = self.findings.source.at
         inputs = [argument for argument in arguments if isinstance(argument, Token)]
         keywords: list[Keyword] = []
@@ -104,7 +144,10 @@ class AssemblyReader:
                 self.findings.add("Syntax", message, argument, hint)
 
     def _unknown(self, operation: Token) -> None:
-        hint = did_you_mean(operation, sorted({*self.signatures} - RESERVED), "operations")
+        known = sorted({*self.signatures} - RESERVED)
+        meant = MEANT_OPERATIONS.get(operation.lower(), "")
+        near = meant in known
+        hint = f"did you mean '{meant}'?" if near else did_you_mean(operation, known, "operations")
         message = f"there is no operation {quoted(operation)}"
         if operation == "dropoff":
             message = "'dropoff' is not an operation of a PAG"
@@ -142,6 +185,8 @@ class AssemblyReader:
                 made.append(Parameter(str(name), value, position))
                 if kind is GEOMETRY["mesh"]:
                     self._check_mesh(str(value), position)
+                    if self.unit != "m" and all(other.name != "scale" for other in keywords):
+                        made.append(Parameter("scale", UNITS[self.unit], position))
             seen.setdefault(name, name)
         if len(seen) > 1 and entry.parameters.get("mesh") is GEOMETRY["mesh"]:
             self._check_shapes([token for name, token in seen.items() if name in SHAPES])
@@ -149,7 +194,12 @@ class AssemblyReader:
 
     def _unknown_parameter(self, entry: Signature, name: Token) -> None:
         message = f"{quoted(entry.name)} has no parameter {quoted(name)}"
+        meant = MEANT.get(name.lower(), "")
         hint = did_you_mean(name, list(entry.parameters), "parameters")
+        if meant in entry.parameters:
+            hint = (
+                f"did you mean '{meant}'? for example: {meant} = {entry.parameters[meant].example}"
+            )
         if not entry.parameters:
             hint = "remove it: that operation has no parameters"
         self.findings.add("UnknownParameter", message, name, hint)

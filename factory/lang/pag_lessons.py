@@ -11,13 +11,17 @@ from factory.lang.recovery import Lesson
 FORM = "a statement reads: label = operation ( input, ..., parameter = value );"
 ARGUMENTS = "arguments lie between commas: mate ( sub1, part2, name = value )"
 NUMBERS = "numbers lie between commas in parentheses: pos = ( 0, 0, 0.1 )"
+COPIES = "copies of a part: screw[2] = atomic ( ... ) at ( 0, 0, 0 ), ( 0, 0, 0.1 );"
 VALUE = 'a value is a number, a text "..." or numbers in parentheses ( 0, 0, 1 )'
 
 FALLBACK = Lesson("unexpected {found}", FORM, "found", "")
+FALSE_UNIT = Lesson(
+    "unexpected {found} after the unit", "write one of m, cm, mm, in: unit = mm;", "found", ""
+)
 FALSE_ROOT = Lesson("unexpected {found} after the root", "write: root = label;", "found", "")
 
 LESSONS = (
-    Lesson("{found} is no statement", FORM, "found", '( a ) | ) a | , a | "a"'),
+    Lesson("{found} is no statement", FORM, "found", '( a ) | ) a | , a | "a" | [2]'),
     Lesson("'{first}' alone is no statement", FORM, "first", 'a | a "b" | a , b | a )'),
     Lesson(
         "missing label before '='",
@@ -42,6 +46,20 @@ LESSONS = (
         "name an operation: {first} = operation ( ... );",
         "behind",
         'a = | a = ( b ) | a = ) | a = , b | a = "b"',
+    ),
+    Lesson(
+        "missing '=' after {before}",
+        COPIES,
+        "behind",
+        'a [2] | a [2] b | a [2] ( b ) | a [2] , b | a [2] ) | a [2] "b" | a [2] [2]',
+    ),
+    Lesson(
+        "unexpected {found}",
+        "only a label that is defined has a number of copies: screw[2] = atomic ( ... ); they "
+        "are screw1 and screw2, and screw means both",
+        "found",
+        "a b [2] | a = [2] | a = b [2] | a = m ( [2] ) | a = m ( b [2] ) | a = m ( b , [2] ) | "
+        'a = m ( b = [2] ) | a = m ( b = c [2] ) | a = m ( b = "c" [2] ) | a = m ( b = ( 1 ) [2] )',
     ),
     Lesson("one '=' is enough", FORM, "found", "a = = b ( ) | a = m ( b = = 1 )"),
     Lesson(
@@ -96,7 +114,8 @@ LESSONS = (
         NUMBERS,
         "behind",
         "a = m ( b = ( 1 2 ) ) | a = m ( b = ( 1 , 2 3 ) ) | "
-        'a = m ( b = ( 1 "x" ) ) | a = m ( b = ( 1 , 2 "x" ) )',
+        'a = m ( b = ( 1 "x" ) ) | a = m ( b = ( 1 , 2 "x" ) ) | '
+        "a = m ( b = ( 1 [2] ) ) | a = m ( b = ( 1 , 2 [2] ) )",
     ),
     Lesson(
         "missing number",
@@ -122,7 +141,8 @@ LESSONS = (
         NUMBERS,
         "found",
         'a = m ( b = ( "x" ) ) | a = m ( b = ( 1 , "x" ) ) | a = m ( b = ( ( 1 ) ) ) | '
-        "a = m ( b = ( 1 , ( 2 ) ) ) | a = m ( b = ( = 1 ) ) | a = m ( b = ( 1 , = 1 ) )",
+        "a = m ( b = ( 1 , ( 2 ) ) ) | a = m ( b = ( = 1 ) ) | a = m ( b = ( 1 , = 1 ) ) | "
+        "a = m ( b = ( [2] ) ) | a = m ( b = ( 1 , [2] ) )",
     ),
     Lesson(
         "an operation inside another",
@@ -162,7 +182,24 @@ LESSONS = (
         "unexpected {found} after ')'",
         "a statement ends with ';' behind its last parenthesis",
         "found",
-        'a = m ( b ) c | a = m ( b ) "c" | a = m ( b ) ( c ) | a = m ( b ) = c | '
-        'a = m ( ) b | a = m ( ) = b | a = m ( ) ( b ) | a = m ( ) "b"',
+        'a = m ( b ) "c" | a = m ( b ) ( c ) | a = m ( b ) = c | a = m ( b ) [2] | '
+        'a = m ( ) = b | a = m ( ) ( b ) | a = m ( ) "b" | a = m ( ) [2]',
+    ),
+    Lesson(
+        "unexpected {before} after ')'",
+        "a statement ends with ';' behind its last parenthesis; " + COPIES,
+        "last",
+        "a = m ( b ) c | a = m ( b ) c d | a = m ( b ) c = d | a = m ( b ) c , d | "
+        'a = m ( b ) c ) | a = m ( b ) c "d" | a = m ( b ) c [2]',
+    ),
+    Lesson(
+        "unexpected {found} after a place",
+        "places lie between commas: at ( 0, 0, 0 ), ( 0, 0, 0.1 )",
+        "found",
+        "a = m ( ) at ( 1 ) ( 2 ) | a = m ( ) at ( 1 ) b | a = m ( ) at ( 1 ) = b | "
+        'a = m ( ) at ( 1 ) ) | a = m ( ) at ( 1 ) "b" | a = m ( ) at ( 1 ) [2] | '
+        "a = m ( ) at ( 1 ) , | a = m ( ) at ( 1 ) , b | a = m ( ) at ( 1 ) , = b | "
+        'a = m ( ) at ( 1 ) , , ( 2 ) | a = m ( ) at ( 1 ) , ) | a = m ( ) at ( 1 ) , "b" | '
+        "a = m ( ) at ( 1 ) , [2]",
     ),
 )

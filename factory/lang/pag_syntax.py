@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 
 from lark import Lark, Token, Transformer, UnexpectedInput, v_args
 
-from factory.lang.pag_lessons import FALLBACK, FALSE_ROOT, LESSONS
+from factory.lang.pag_lessons import FALLBACK, FALSE_ROOT, FALSE_UNIT, LESSONS
 from factory.lang.recovery import (
     UNLAWFUL,
     Lesson,
@@ -26,6 +26,10 @@ from factory.lang.recovery import (
     report_unlawful,
 )
 from factory.lang.source import Findings, quoted
+from factory.lang.words import UNITS
+
+COPIES = 10_000
+"""The most copies that one definition makes."""
 
 _SIGN_OR_WORD = re.compile(r"[=(),]|[^\s=(),]+")
 _SIGNS = {"=": "EQUAL", "(": "LPAR", ")": "RPAR", ",": "COMMA"}
@@ -38,6 +42,24 @@ class Vector(NamedTuple):
     words: list[Token]
 
 
+class CopiedLabel(NamedTuple):
+    """`screw[4]`: the name of copies, and their number in brackets."""
+
+    name: Token
+    brackets: Token
+
+    @property
+    def number(self) -> int:
+        """The number of copies, at most COPIES + 1."""
+        digits = self.brackets.strip("[] \t").lstrip("0") or "0"
+        return int(digits) if len(digits) < 9 else COPIES + 1
+
+    def labels(self) -> list[Token]:
+        """The labels screw1 to screw4, which all stand where the name does."""
+        numbers = range(1, min(self.number, COPIES) + 1)
+        return [Token.new_borrow_pos("WORD", f"{self.name}{n}", self.name) for n in numbers]
+
+
 class Keyword(NamedTuple):
     """`name = value`, an argument; a VECTOR token is a vector still in one piece."""
 
@@ -45,18 +67,26 @@ class Keyword(NamedTuple):
     value: Token | Vector
 
 
-class Definition(NamedTuple):
-    """`label = operation ( arguments )`."""
+class PlaceList(NamedTuple):
+    """`at ( 0, 0, 0 ), ( 0, 0, 1 )`: its word, whichever it is, and its vectors."""
 
-    label: Token
+    word: Token
+    vectors: Sequence[Vector]
+
+
+class Definition(NamedTuple):
+    """`label = operation ( arguments ) at places`."""
+
+    label: Token | CopiedLabel
     operation: Token
     arguments: Sequence[Token | Keyword] = ()
+    places: PlaceList | None = None
 
 
 class Equation(NamedTuple):
-    """`root = label`."""
+    """`root = label`, `unit = mm`."""
 
-    left: Token
+    left: Token | CopiedLabel
     right: Token
 
 
@@ -73,6 +103,7 @@ class Statements:
     of those does not even start with the label it defines."""
 
     definitions: list[Definition] = field(default_factory=list)
+    units: list[Token] = field(default_factory=list)
     roots: list[Token] = field(default_factory=list)
     counts: list[Token] = field(default_factory=list)
     broken: set[str] = field(default_factory=set)
@@ -83,12 +114,20 @@ class Statements:
 class _Builder(Transformer[Token, Any]):
     """Makes statements while the text is parsed; attributes are named after the grammar's rules."""
 
-    definition, equation, pair, keyword = Definition, Equation, WordPair, Keyword
+    equation, pair, keyword, copies = Equation, WordPair, Keyword, CopiedLabel
 
     def start(self, *statements: Any) -> tuple[Any, ...]:
         return statements
 
     arguments = start
+
+    def definition(self, label: Token | CopiedLabel, operation: Token, *rest: Any) -> Definition:
+        places = rest[-1] if rest and isinstance(rest[-1], PlaceList) else None
+        arguments = rest[0] if rest and rest[0] is not places else ()
+        return Definition(label, operation, arguments, places)
+
+    def places(self, word: Token, *vectors: Vector) -> PlaceList:
+        return PlaceList(word, vectors)
 
     def vector(self, opening: Token, *rest: Token) -> Vector:
         return Vector(opening, [token for token in rest if token.type == "WORD"])
@@ -147,22 +186,35 @@ def _sort_in(statement: Any, made: Statements, findings: Findings) -> None:
     first, second = statement
     if isinstance(statement, Equation) and first == "root":
         made.roots.append(second)
+    elif isinstance(statement, Equation) and first == "unit":
+        made.units.append(second)
     elif isinstance(statement, WordPair) and second == "parts":
         made.counts.append(first)
     else:
-        made.broken.update((str(first), str(second)))
+        made.broken.update((*labels_of(first), str(second)))
         _report_incomplete(statement, findings)
+
+
+def labels_of(label: Token | CopiedLabel) -> list[Token]:
+    """The labels that a statement defines."""
+    return label.labels() if isinstance(label, CopiedLabel) else [label]
 
 
 def _report_incomplete(statement: Equation | WordPair, findings: Findings) -> None:
     first, second = statement
+    if isinstance(first, CopiedLabel):
+        first = Token.new_borrow_pos("WORD", f"{first.name}{first.brackets}", first.name)
     message = f"missing '=' after {quoted(first)}"
-    hint = f"write: {first} = {second}" + (";" if first == "root" else " ( ... );")
+    whole = first == "root" or (first == "unit" and second in UNITS)
+    hint = f"write: {first} = {second}" + (";" if whole else " ( ... );")
     at = findings.source.after(first)
     if isinstance(statement, Equation):
         message = f"missing '(' after the operation {quoted(second)}"
         hint = f"an operation has parentheses, even around nothing: {first} = {second} ();"
         at = findings.source.after(second)
+        if second in UNITS:
+            message, hint = f"{quoted(first)} is no length", f"write: unit = {second};"
+            at = findings.source.at(first)
     elif first == "parts":
         message = "the number of parts stands before the word"
         hint, at = f"write: {second} parts;", findings.source.at(second)
@@ -176,6 +228,8 @@ def _recover(findings: Findings, made: Statements) -> list[Any]:
         statement = _parse_piece(piece, findings)
         if statement is None:
             made.broken.update(_words(piece))
+            if len(piece) > 1 and piece[1].type == "COPIES":
+                made.broken.update(CopiedLabel(piece[0], piece[1]).labels())
             named = piece[0].type == "WORD" and len(piece) > 1 and piece[1].type != "LPAR"
             made.nameless |= not named
             continue
@@ -207,6 +261,8 @@ def _report_stuck(stuck: Stuck, piece: list[Token], findings: Findings) -> None:
     lesson = _lessons().get((stuck.state, stuck.token.type), FALLBACK)
     if piece[0] == "root" and stuck.index >= 3 and piece[1].type == "EQUAL":
         lesson = FALSE_ROOT
+    elif piece[0] == "unit" and stuck.index >= 2 and all(t.type != "LPAR" for t in piece):
+        lesson = FALSE_UNIT
     pairs = pairwise(piece)
     operation = next((word for word, sign in pairs if sign.type == "LPAR"), piece[0])
     words = {
@@ -253,7 +309,10 @@ def _cuts(tokens: Sequence[Token], index: int) -> bool:
 
 def _starts(tokens: Sequence[Token], index: int, depth: int) -> bool:
     """Whether a statement starts here: `label = operation (`, `root =` or `6 parts`."""
-    kinds = [token.type for token in tokens[index : index + 4]]
+    kinds = [token.type for token in tokens[index : index + 5]]
+    if kinds[1:2] == ["COPIES"]:
+        del kinds[1]
+    kinds = kinds[:4]
     if kinds[:1] != ["WORD"]:
         return False
     before = tokens[index - 1] if index else None
@@ -263,4 +322,6 @@ def _starts(tokens: Sequence[Token], index: int, depth: int) -> bool:
         return False
     if depth > 0 and before and before.type != "SEMICOLON" and before.line == tokens[index].line:
         return before.type not in ("COMMA", "LPAR") and kinds[2:] == ["WORD", "LPAR"]
+    if tokens[index] == "unit" and kinds[2:3] == ["WORD"] and tokens[index + 2] in UNITS:
+        return True
     return tokens[index] == "root" or kinds[2:] == ["WORD", "LPAR"]

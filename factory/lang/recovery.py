@@ -104,6 +104,8 @@ def _way_out(character: str) -> str:
         "/": "no word contains it; a comment runs from // to the end of the line",
         "#": "a comment runs from // to the end of the line",
         ":": "write = between a name and what it is",
+        "[": "numbers lie in parentheses: ( 0, 0, 0.1 ); copies have a whole number: screw[2]",
+        "]": "numbers lie in parentheses: ( 0, 0, 0.1 ); copies have a whole number: screw[2]",
     }
     return hints.get(character, "remove it, or put it in a comment: // ...")
 

@@ -60,7 +60,7 @@ class Findings:
     def raise_if_any(self) -> None:
         """Raise one InputError with every error found, if there is any."""
         if self.diagnostics:
-            raise InputError(sorted(self.diagnostics, key=_place))
+            raise InputError(sorted(dict.fromkeys(self.diagnostics), key=_place))
 
 
 def _place(diagnostic: Diagnostic) -> tuple[int, int]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from types import MappingProxyType
@@ -13,15 +14,15 @@ from factory.lang.pag_syntax import Vector, spelled
 from factory.lang.source import Findings, quoted
 from factory.lang.words import is_number, number
 from factory.problem.pag import Value
-from factory.support.errors import Position
+from factory.support.errors import Position, did_you_mean
 
 
 @dataclass(frozen=True, slots=True)
 class Kind:
     """The kind of a parameter: `length` 0 is a text, 1 a number, n a vector of n numbers.
 
-    Each number lies in [low, high], and above 0 where `positive`; `zero`: a vector may be all zero.
-    `example` is shown with an error.
+    Each number lies in [low, high], and above 0 where `positive`; `zero`: a vector may be all zero;
+    `long`: it is a length, in the unit of the text. `example` is shown with an error.
     """
 
     length: int
@@ -30,6 +31,7 @@ class Kind:
     high: float = math.inf
     positive: bool = False
     zero: bool = True
+    long: bool = False
 
     def allows(self, number: float) -> bool:
         """Whether one number lies within the bounds."""
@@ -58,15 +60,15 @@ class Kind:
 GEOMETRY: Mapping[str, Kind] = MappingProxyType(
     {
         "mesh": Kind(0, '"bricks/3001.obj"'),
-        "scale": Kind(1, "0.001", positive=True),
-        "pos": Kind(3, "( 0, 0, 0.1 )"),
+        "scale": Kind(1, "0.001", positive=True, long=True),
+        "pos": Kind(3, "( 0, 0, 0.1 )", long=True),
         "quat": Kind(4, "( 1, 0, 0, 0 )", zero=False),
         "density": Kind(1, "1050", positive=True),
         "mass": Kind(1, "0.1", positive=True),
         "rgba": Kind(4, "( 0.8, 0.1, 0.1, 1 )", low=0.0, high=1.0),
-        "box": Kind(3, "( 0.1, 0.1, 0.05 )", positive=True),
-        "cylinder": Kind(2, "( 0.02, 0.1 )", positive=True),
-        "sphere": Kind(1, "0.05", positive=True),
+        "box": Kind(3, "( 0.1, 0.1, 0.05 )", positive=True, long=True),
+        "cylinder": Kind(2, "( 0.02, 0.1 )", positive=True, long=True),
+        "sphere": Kind(1, "0.05", positive=True, long=True),
     }
 )
 SHAPES = ("mesh", "box", "cylinder", "sphere")
@@ -87,10 +89,10 @@ def text_of(token: Token) -> str:
 
 
 class ValueReader:
-    """Reads values of one source; errors go to its findings."""
+    """Reads values of one source, whose lengths are in a unit; errors go to its findings."""
 
-    def __init__(self, findings: Findings) -> None:
-        self.findings = findings
+    def __init__(self, findings: Findings, unit: str = "m") -> None:
+        self.findings, self.unit = findings, unit
 
     def place(self, raw: Token | Vector) -> Position:
         """Where a value starts."""
@@ -106,6 +108,8 @@ class ValueReader:
             return self._vector(name, kind, raw)
         if raw.type == "STRING" and kind.length == 0:
             return text_of(raw)
+        if kind is GEOMETRY["rgba"]:
+            return self._colour(name, kind, raw)
         if raw.type == "STRING" or kind.length != 1:
             self._refuse(name, kind, raw, f"takes {kind.wanted}, not {quoted(raw)}")
             return None
@@ -117,6 +121,21 @@ class ValueReader:
             length = len(raw.words)
             return self._vector(name, Kind(length, "( 0, 0, 1 )" if length > 1 else "1.0"), raw)
         return text_of(raw) if raw.type == "STRING" else self._number(name, Kind(1, "1.0"), raw)
+
+    def _colour(self, name: str, kind: Kind, raw: Token) -> Value | None:
+        """A colour by its name in CSS, or by "#rrggbb"."""
+        from PIL.ImageColor import colormap, getrgb
+
+        word = text_of(raw) if raw.type == "STRING" else str(raw)
+        if word.lower() in colormap or re.fullmatch("#[0-9a-fA-F]{6}", word):
+            return (*[float(level) / 255 for level in getrgb(word)], 1.0)
+        if is_number(word):
+            self._refuse(name, kind, raw, f"takes {kind.wanted}, or a colour, not {quoted(raw)}")
+            return None
+        near = did_you_mean(word.lower(), sorted(colormap))
+        hint = near if near.startswith("did") else f'for example: {name} = steelblue, or "#4682b4"'
+        self.findings.add("BadValue", f"{quoted(word)} is no colour", raw, hint)
+        return None
 
     def _vector(self, name: str, kind: Kind, raw: Vector) -> Value | None:
         if kind.length < 2 or len(raw.words) != kind.length:
@@ -133,7 +152,7 @@ class ValueReader:
         return numbers
 
     def _number(self, name: str, kind: Kind, word: Token) -> float | None:
-        value = number(word)
+        value = number(word, self.unit if kind.long else "m")
         if value is not None and kind.allows(value):
             return value
         why = f"takes {kind.wanted}, not {quoted(word)}"

@@ -4,6 +4,12 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Mapping
+from decimal import Decimal
+from types import MappingProxyType
+
+UNITS: Mapping[str, float] = MappingProxyType({"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254})
+"""The units of length [m]."""
 
 LABEL_HINT = "a label has letters, digits, '_', '-' and '.'"
 
@@ -16,11 +22,14 @@ def is_number(word: str) -> bool:
     return _NUMBER.fullmatch(word) is not None
 
 
-def number(word: str) -> float | None:
-    """The finite number that a word is; None if it is none or overflows."""
+def number(word: str, unit: str = "m") -> float | None:
+    """The finite number that a word is, in metres if it is a length in `unit`: as exact as if it
+    were written in metres. None if it is none or overflows."""
     if not is_number(word):
         return None
     value = float(word)
+    if unit != "m" and math.isfinite(value):
+        value = float(Decimal(word) * Decimal(repr(UNITS[unit])))
     return value if math.isfinite(value) else None
 
 

@@ -9,9 +9,10 @@ import numpy as np
 from factory.geometry.mesh_reader import MeshFile
 from factory.geometry.meshes import Array
 from factory.geometry.pieces import components
+from factory.lang.words import UNITS as LENGTHS
 from factory.support.errors import Diagnostic
 
-UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254, "ldu": 0.0004}
+UNITS = {**LENGTHS, "ldu": 0.0004}
 """Units of length [m]; `ldu` is that of LDraw."""
 
 LONGEST = 5.0
