@@ -105,8 +105,8 @@ def language() -> str:
         [
             heading(1, "The PAG language"),
             "What a text means is told in [the theory of PAGs](../theory/pag.md). Lengths are "
-            "metres, or of the unit that the text says; turns are quaternions (w, x, y, z); a colour "
-            "may be a name of CSS; `box` has its three sides, `cylinder` radius "
+            "metres, or of the unit that the text says; turns are quaternions (w, x, y, z); a "
+            "colour may be a name of CSS; `box` has its three sides, `cylinder` radius "
             "and height, `sphere` its radius.",
             heading(2, "Geometry of a part"),
             "The parameters of `atomic`, and of every operation with `parameters = geometry`.",
