@@ -22,6 +22,7 @@ from factory.simulation.simulation import Simulation
 from factory.support import progress
 from factory.support.interruption import awaited, side_by_side
 from factory.support.progress import Progress, Waiting
+from tests.command_line import ROOT
 from tests.examples import without_hands
 
 
@@ -143,3 +144,44 @@ def test_works_are_done_side_by_side_and_given_in_order(monkeypatch: pytest.Monk
     assert [number for number, _ in found] == [1, 2, 3]
     assert len({thread for _, thread in found}) == 2
     assert side_by_side([]) == []
+
+
+STOPPED = """
+import signal, sys
+class Finder:
+    told = False
+    def find_spec(self, name, path=None, target=None):
+        if name == sys.argv[1] and not self.told:
+            self.told = True
+            signal.raise_signal(signal.SIGINT)
+sys.meta_path.insert(0, Finder())
+"""
+"""A signal comes while a module is imported: this begins a program to which that happens."""
+
+CHEST = ROOT / "examples" / "chest.pag"
+COMMAND = f"{STOPPED}from factory.commands import main; main(['check', {str(CHEST)!r}, '--json'])"
+ENGINE = f"{STOPPED}from factory.support.engine import mujoco\nraise SystemExit(5)"
+EXTRA = (
+    f"{STOPPED}from factory.support.extras import optional\n"
+    "optional('stops', 'it', 'this', 'extra')\nraise SystemExit(5)"
+)
+
+
+@pytest.mark.parametrize(
+    ("program", "name", "status"),
+    [
+        pytest.param(ENGINE, "mujoco._structs", -signal.SIGINT, id="the engine"),
+        pytest.param(EXTRA, "missing", -signal.SIGINT, id="an extra"),
+        pytest.param(COMMAND, "networkx", 130, id="the command line"),
+    ],
+)
+def test_a_signal_while_something_is_imported(
+    tmp_path: Path, program: str, name: str, status: int
+) -> None:
+    """It is raised after that, since what is imported may swallow it: `mujoco`, which is then
+    imported again, and trimesh, which goes on without."""
+    (tmp_path / "stops.py").write_text("try:\n    import missing\nexcept BaseException:\n    pass")
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join([str(tmp_path), str(ROOT)])}
+    command = [sys.executable, "-c", program, name]
+    done = subprocess.run(command, env=environment, capture_output=True, text=True)
+    assert done.returncode == status, done.stderr

@@ -14,16 +14,18 @@ from contextlib import contextmanager, suppress
 
 from factory.support.environment import environment
 from factory.support.errors import Diagnostic, MissingError
+from factory.support.interruption import put_off
 
-try:
-    import mujoco
-except Exception:  # a wrong MUJOCO_GL is a RuntimeError, a missing library anything
+with put_off():
     try:
-        with environment("MUJOCO_GL", "disable"):
-            import mujoco
-    except ImportError as error:
-        message = f"the engine cannot be loaded: {error}"
-        raise MissingError(Diagnostic("Engine", message, None, "pip install mujoco")) from error
+        import mujoco
+    except Exception:  # a wrong MUJOCO_GL is a RuntimeError, a missing library anything
+        try:
+            with environment("MUJOCO_GL", "disable"):
+                import mujoco
+        except ImportError as error:
+            message = f"the engine cannot be loaded: {error}"
+            raise MissingError(Diagnostic("Engine", message, None, "pip install mujoco")) from error
 
 
 def _warn(words: str) -> None:

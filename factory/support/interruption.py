@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import os
 import signal
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Future
-from threading import Thread
+from contextlib import contextmanager
+from threading import Thread, Timer
 from types import FrameType
 from typing import Any, Self, TypeVar
 
@@ -30,6 +31,63 @@ def stop_on_signals(handler: Callable[[int, FrameType | None], Any]) -> Mapping[
     except ValueError:  # not in the main thread
         return {}
     return heard
+
+
+@contextmanager
+def put_off() -> Iterator[None]:
+    """Within its context, an import that is guarded, the first signal is noted, and it is raised
+    again after that; the second ends the wait with KeyboardInterrupt."""
+    noted: list[int] = []
+
+    def note(number: int, frame: FrameType | None) -> None:
+        noted.append(number)
+        if len(noted) > 1:
+            raise KeyboardInterrupt
+
+    before = stop_on_signals(note)
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+    if noted:
+        signal.raise_signal(noted[0])
+
+
+class AfterImports:
+    """A handler of signals that raises KeyboardInterrupt: at once or, within an import, when that
+    is over, since what is imported may take any exception for a missing package. The second signal
+    is raised at once."""
+
+    EVERY = 0.05
+    """Time between two looks at whether an import is over [s]."""
+
+    def __init__(self) -> None:
+        self._wait: Timer | None = None
+        self._over = True
+
+    def __call__(self, number: int, frame: FrameType | None) -> None:
+        wait, first, self._wait = self._wait, self._over, None
+        if wait is not None:
+            wait.cancel()
+        if not (first and _within_an_import(frame)):
+            self._over = True
+            raise KeyboardInterrupt
+        self._over, self._wait = False, Timer(self.EVERY, self._again, [number])
+        self._wait.daemon = True
+        self._wait.start()
+
+    def _again(self, number: int) -> None:
+        self._over = True
+        signal.raise_signal(number)
+
+
+def _within_an_import(frame: FrameType | None) -> bool:
+    while frame is not None:
+        if frame.f_code.co_filename == "<frozen importlib._bootstrap>":
+            return True
+        frame = frame.f_back
+    return False
 
 
 def awaited(work: Callable[[], T]) -> T:
