@@ -234,3 +234,55 @@ def test_a_log_that_does_not_fit(
 
     monkeypatch.setattr("factory.record.log.reader.unpack_rows", full)
     assert is_refused(log, "too much")
+
+
+def planted(after: str, what: str) -> Callable[[str], str]:
+    """A model with something more after the first of these words."""
+    return lambda xml: xml.replace(after, after + what, 1)
+
+
+STRANGE: Mapping[str, tuple[Callable[[str], str], str]] = {
+    "include": (planted("<worldbody>", '<include file="/etc/passwd"/>'), "it has <include>"),
+    "mesh": (planted("<asset>", '<mesh name="x" file="/tmp/x.stl"/>'), "is not in the log"),
+    "above": (planted("<asset>", '<mesh name="x" file="../x.stl"/>'), "is not in the log"),
+    "folder": (lambda xml: xml.replace('meshdir="meshes"', 'meshdir="/tmp"'), "'/tmp'"),
+    "texture": (planted('type="skybox"', ' file="/tmp/x.png"'), "has 'file'"),
+    "large texture": (lambda xml: xml.replace('width="256"', 'width="65536"'), "width is '65536'"),
+    "hfield": (planted("<asset>", '<hfield name="h" nrow="60000" ncol="60000"/>'), "<hfield>"),
+    "replicate": (planted("<worldbody>", '<replicate count="99999999"/>'), "<replicate>"),
+    "plugin": (planted("<asset>", '<mesh name="x"><plugin plugin="x"/></mesh>'), "<plugin>"),
+    "memory": (lambda xml: xml.replace('memory="64M"', 'memory="64G"'), "64G MiB"),
+    "user": (planted('<geom name="floor"', f' user="{"1 " * 9}"'), "more than 8 numbers"),
+    "samples": (lambda xml: xml.replace('nsample="', 'nsample="9999999'), "nsample is"),
+    "deep": (planted("<worldbody>", "<body>" * 99 + "</body>" * 99), "deep in each other"),
+    "keys": (planted("<keyframe>", "<key/>" * 9), "key comes to 10"),
+    "entities": (lambda xml: f'<!DOCTYPE m [<!ENTITY a "b">]>{xml}', "document type"),
+    "no model": (lambda xml: "<robot/>", "<robot>"),
+    "no XML": (lambda xml: "words", "syntax error"),
+}
+"""What no model of a factory has: how it comes into one, and what is said of it."""
+
+
+@pytest.mark.parametrize("name", STRANGE)
+def test_models_that_are_not_written_do_not_reach_the_engine(
+    log: Path, monkeypatch: pytest.MonkeyPatch, name: str
+) -> None:
+    change, words = STRANGE[name]
+    kept = read_log(log)
+    assert change(kept.xml) != kept.xml
+    monkeypatch.setattr("factory.record.log.model.compiled", pytest.fail)
+    with pytest.raises(InputError, match=rf"BadLog the log's model is broken: .*{words}"):
+        model_of(replace(kept, xml=change(kept.xml)))
+
+
+def test_a_stranger_s_log_reads_no_file(
+    log: Path, tmp_path: Path, tried: Callable[[Path], list[int]]
+) -> None:
+    """The engine would include the pose of a robot's head from a file that the model names."""
+    (tmp_path / "secret.xml").write_text('<mujoco><worldbody><body name="x"/></worldbody></mujoco>')
+    header, blocks = taken_apart(log)
+    (kind, model), *ticks = blocks
+    xml = model["xml"].tobytes().decode()
+    told = planted("</worldbody>", f'<include file="{tmp_path / "secret.xml"}"/>')(xml)
+    bad = [(kind, {**model, "xml": np.frombuffer(told.encode(), np.uint8)}), *ticks]
+    assert tried(put_together(tmp_path / "bad.log", header, bad))[:3] == [2, 2, 2]

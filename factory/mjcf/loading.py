@@ -20,12 +20,18 @@ PIECE = 10_000
 def load(model: Model) -> mujoco.MjModel:
     """The engine's model of a factory. Raises InputError (BadMesh, BadValue, Engine) where the
     engine refuses it."""
-    files = {f"meshes/{name}": content for name, content in model.files.items()}
-    read = _by_pieces if model.xml.count("<geom") > MANY else mujoco.MjModel.from_xml_string
     try:
-        return awaited(lambda: read(model.xml, files))
+        return compiled(model.xml, model.files)
     except ValueError as error:
         raise InputError(_explained(model, str(error))) from error
+
+
+def compiled(xml: str, meshes: Mapping[str, bytes]) -> mujoco.MjModel:
+    """The engine's model of an XML with mesh files, by their names. Raises ValueError where the
+    engine refuses it."""
+    files = {f"meshes/{name}": content for name, content in meshes.items()}
+    read = _by_pieces if xml.count("<geom") > MANY else mujoco.MjModel.from_xml_string
+    return awaited(lambda: read(xml, files))
 
 
 def _by_pieces(xml: str, files: Mapping[str, bytes]) -> mujoco.MjModel:

@@ -226,7 +226,7 @@ def build_model(
     _home(section["keyframe"], layout, actuator, weights)
     if not shown:
         leave_out_what_is_shown(root)
-    fill(section["size"], memory=f"{ARENA + _broad_phase(root) // 2**20}M")
+    fill(section["size"], memory=f"{ARENA + broad_phase(root) // 2**20}M")
     ElementTree.indent(root)
     xml = ElementTree.tostring(root, encoding="unicode") + "\n"
     joints = len(factory.robots) + len(hoists) + 2 + len(sliders) + sum(copies.values())
@@ -234,7 +234,7 @@ def build_model(
     return replace(made, joints=joints, welds=len(equality), wip=wip, apart=apart, bins=bins)
 
 
-def _broad_phase(root: Element) -> int:
+def broad_phase(root: Element) -> int:
     """What the engine's broad phase sets aside [bytes]: two arrays with four bytes for each pair of
     bodies. Only what is written to is taken from the machine's memory."""
     bodies = sum(1 for _ in root.iter("body")) + 1

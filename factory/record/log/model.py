@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from factory.mjcf.loading import compiled
+from factory.record.log.admitted import admitted
 from factory.record.log.reader import Log, Ragged
 from factory.record.log.recompiled import AGAIN
 from factory.support.engine import mujoco
@@ -10,17 +12,16 @@ from factory.support.errors import Diagnostic, InputError
 
 def model_of(log: Log) -> mujoco.MjModel:
     """The model in a log. Raises InputError (BadLog) for a log of the ideal world, or one that ends
-    before its first ticks, and where the engine refuses the model or its states are not those of
-    the log."""
+    before its first ticks, where the model is none that is written (`admitted`) or the engine
+    refuses it, and where its states are not those of the log."""
     if log.header["world"] == "ideal":
         hint = "keep a log of a run in MuJoCo: `factory run FILE.pag --log OUT`"
         raise _bad("the log is of the ideal world, which has no bodies to show", hint)
     if not len(log):
         why = f": {log.cut_off.message}" if log.cut_off else ""
         raise _bad(f"the log is cut off before its first simulated second{why}")
-    files = {f"meshes/{name}": content for name, content in log.files.items()}
     try:
-        m = mujoco.MjModel.from_xml_string(log.xml, files)
+        m = compiled(admitted(log.xml, log.files), log.files)
     except ValueError as error:
         raise _bad(f"the log's model is broken: {error}") from error
     setpoints = m.nu if log.ctrl is None else log.ctrl.shape[1]
