@@ -3,7 +3,9 @@ notice."""
 
 from __future__ import annotations
 
+import csv
 import hashlib
+import io
 import json
 import os
 import random
@@ -27,7 +29,7 @@ from hypothesis import strategies as st
 
 import factory.export
 from factory import to_networkx
-from factory.export import exporters
+from factory.export import Subject, exporters
 from factory.export.bodies import file_name
 from factory.export.events import COLUMNS
 from factory.export.graphml import write_graphml
@@ -169,6 +171,22 @@ def test_the_ideal_world_has_no_bodies(run: Terminal, log: Path, out: Path) -> N
         assert "is of the ideal world, which has no bodies to show" in done.err
     assert files_in(out) == {}
     assert run("export", log, "--format", "csv").out.startswith(",".join(COLUMNS))
+
+
+def test_a_table_commands_neither_a_spreadsheet_nor_a_terminal(run: Terminal, out: Path) -> None:
+    """A label and the name of a file may begin as a formula does; a file's name may have codes."""
+    file, log = out / "=1+2\x1b[2J.pag", out / "a.log"
+    file.write_text("root = -s; -s = mate(a, b); a = atomic(); b = atomic();")
+    assert run("run", file, "--world", "ideal", "--log", log, "-q").status == 0
+    kept = read_log(log)
+    header = {**kept.header, "pag": {**kept.header["pag"], "file": file.name}}
+    text = exporters()["csv"].export(Subject(log, replace(kept, header=header)))
+    assert isinstance(text, str)
+    cells = {cell for row in csv.reader(io.StringIO(text)) for cell in row}
+    assert {"'-s", "'=1+2 [2J.pag"} <= cells
+    assert not any(cell.startswith(("=", "+", "-", "@")) for cell in cells)
+    assert "\x1b" not in text
+    assert "\x1b" not in run("monitor", log).out + run("check", file, "-v").out
 
 
 def test_a_log_of_something_else(run: Terminal, log: Path, out: Path) -> None:

@@ -15,6 +15,7 @@ from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from subprocess import PIPE
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -565,6 +566,27 @@ def test_a_cluster_survives_the_death_of_a_worker(
     at_home = Runner(recipe_of(jitter=0.3, units=5))(grid[7])
     (there,) = (o for o in seen if o.point == grid[7])
     assert there.figures["sim_time_s"] == at_home.figures["sim_time_s"]
+
+
+@pytest.mark.parametrize(
+    ("answer", "said"),
+    [
+        (OSError("Stream is closed"), "died, or was lost, as it was asked"),
+        (ModuleNotFoundError("No module named 'factory'"), "lacks factory"),
+        (ValueError("x"), "cannot tell its versions"),
+        ({"mujoco": "1.0"}, "has {'mujoco': '1.0'}, not"),
+    ],
+    ids=["dead", "bare", "broken", "older"],
+)
+def test_a_worker_that_is_not_fit(answer: object, said: str) -> None:
+    """A worker that dies as it is asked for its versions is not one of another version."""
+    from factory.study.sweep.cluster import _check_workers
+
+    client: Any = SimpleNamespace(run=lambda *_, **__: {"tcp://w:1": answer})
+    with pytest.raises(MissingError) as caught:
+        _check_workers(client)
+    assert said in caught.value.diagnostics[0].message
+    assert ("not {" in caught.value.diagnostics[0].message) == isinstance(answer, dict)
 
 
 def test_no_scheduler_at_the_address(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

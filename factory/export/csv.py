@@ -1,5 +1,8 @@
 """CSV (RFC 4180, with a line of names) of a log's events: time, transition, operation, unit,
-robots, source line."""
+robots, source line.
+
+A spreadsheet takes a text that begins as a formula does for one, and does what it says: such a text
+gets an apostrophe before it, and control codes become spaces."""
 
 from __future__ import annotations
 
@@ -9,8 +12,12 @@ from dataclasses import astuple
 
 from factory.export.events import COLUMNS, rows
 from factory.export.subject import Subject
+from factory.support.errors import one_line
 
 FORMAT, TAKES = "csv", "log"
+
+FORMULA = ("=", "+", "-", "@")
+"""What a formula begins with."""
 
 
 def export(subject: Subject) -> str:
@@ -19,5 +26,13 @@ def export(subject: Subject) -> str:
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(COLUMNS)
     for row in rows(subject.log):
-        writer.writerow([" ".join(v) if isinstance(v, tuple) else v for v in astuple(row)])
+        writer.writerow([_cell(value) for value in astuple(row)])
     return text.getvalue()
+
+
+def _cell(value: object) -> object:
+    """A value as it stands in a cell."""
+    if not isinstance(value, str | tuple):
+        return value
+    text = one_line(value if isinstance(value, str) else " ".join(value))
+    return f"'{text}" if text.lstrip().startswith(FORMULA) else text

@@ -6,6 +6,7 @@ With `--json`, stdout is one JSON document and nothing else; diagnostics and pro
 from __future__ import annotations
 
 import json
+import re
 import sys
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
@@ -13,12 +14,15 @@ from dataclasses import replace
 from math import isfinite
 from typing import Any
 
-from factory.support.errors import SHOWN, Diagnostic, FactoryError, printed
+from factory.support.errors import SHOWN, Diagnostic, FactoryError, one_line, printed
 
 SCHEMA = 1
 
 POOL_BOUND = "a larger pool of parts has too many bodies for the engine; --wip overrides this"
 """Why the factory bounds the units inside at once."""
+
+CONTROL = re.compile(r"[\x00-\x08\x0b-\x1f\x7f-\x9f\u202a-\u202e\u2066-\u2069]")
+"""Characters that command a terminal, or turn the direction of what it shows."""
 
 STDOUT = "what is printed"
 """The name of stdout in messages."""
@@ -44,9 +48,9 @@ def finite(value: Any) -> Any:
 
 
 def say(text: str = "") -> None:
-    """A line on stdout."""
+    """Lines on stdout; control codes, which a file may have brought, do not reach the terminal."""
     with _named():
-        print(text)
+        print(CONTROL.sub(" ", text))
 
 
 @contextmanager
@@ -98,7 +102,7 @@ def table(title: str, columns: tuple[str, ...], rows: Iterable[tuple[str, ...]])
     for column in columns:
         made.add_column(escape(column), overflow="fold")
     for row in rows:
-        made.add_row(*(Text(cell) for cell in row))
+        made.add_row(*(Text(one_line(cell)) for cell in row))
     console = Console(width=None if sys.stdout.isatty() else 160, highlight=False)
     with _named():
         with console.capture() as printed:

@@ -48,12 +48,12 @@ class Diagnostic:
     def __str__(self) -> str:
         """`file:line:col: CODE message`, then the source line with a caret, then the hint."""
         where = f"{self.position}: " if self.position else ""
-        lines = [_one_line(f"{where}{self.code} {_cut(self.message)}")]
+        lines = [one_line(f"{where}{self.code} {_cut(self.message)}")]
         if self.position and self.position.text:
             start, caret = _window(self.position.text, self.position.column - 1)
-            lines += [f"    {_one_line(start).rstrip()}", f"    {' ' * caret}^"]
+            lines += [f"    {one_line(start).rstrip()}", f"    {' ' * caret}^"]
         if self.hint:
-            lines.append(f"    {_one_line(_cut(self.hint))}")
+            lines.append(f"    {one_line(_cut(self.hint))}")
         return "\n".join(lines)
 
     def as_json(self) -> dict[str, object]:
@@ -74,8 +74,10 @@ def _cut(text: str) -> str:
     return text if len(text) <= LONGEST else f"{text[: LONGEST - 3]}..."
 
 
-def _one_line(text: str) -> str:
+def one_line(text: str) -> str:
     """A text with a space for every line end, tab and unprintable character."""
+    if text.isprintable():
+        return text
     return "".join(c if c.isprintable() else " " for c in text)
 
 

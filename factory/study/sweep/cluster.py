@@ -118,11 +118,24 @@ def _outcome(future: Any, point: Point) -> Outcome:
 
 
 def _check_workers(client: Client) -> None:
-    """Raises MissingError for a worker with another factory or engine, or without one."""
+    """Raises MissingError for a worker with another factory or engine, without one, or that does
+    not answer."""
     ours = versions()
     for address, theirs in client.run(versions, on_error="return").items():
         if theirs != ours:
-            message = f"the worker at {address} has {theirs}, not {ours}"
-            raise MissingError(
-                Diagnostic("Missing", message, None, "install the same klavins-factory there")
-            )
+            raise MissingError(_unfit(address, theirs, ours))
+
+
+def _unfit(address: str, theirs: object, ours: object) -> Diagnostic:
+    """What is wrong with a worker, by its versions or what was raised as it was asked for them."""
+    same = "install the same klavins-factory there"
+    if isinstance(theirs, ImportError):
+        return Diagnostic("Missing", f"the worker at {address} lacks factory: {theirs}", None, same)
+    if isinstance(theirs, OSError | TimeoutError):  # Dask's errors of closed connections are such
+        message = f"the worker at {address} died, or was lost, as it was asked for its versions"
+        hint = "see what it has printed, start it again and run this again: what is done is kept"
+        return Diagnostic("Missing", f"{message}: {theirs}", None, hint)
+    if isinstance(theirs, Exception):
+        message = f"the worker at {address} cannot tell its versions: {theirs!r}"
+        return Diagnostic("Missing", message, None, same)
+    return Diagnostic("Missing", f"the worker at {address} has {theirs}, not {ours}", None, same)
