@@ -40,7 +40,7 @@ from factory.support.errors import (
     did_you_mean,
 )
 from factory.support.files import NO_ROOM
-from factory.support.interruption import AfterImports, stop_on_signals
+from factory.support.interruption import interrupt, stop_on_signals
 from factory.support.version import __version__
 
 CONTEXT = {"help_option_names": ["-h", "--help"], "max_content_width": 100}
@@ -50,7 +50,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     """The entry point: runs a command and exits with its status, never with a traceback."""
     words = list(sys.argv[1:] if arguments is None else arguments)
     _open_streams()
-    stop_on_signals(AfterImports())
+    stop_on_signals(interrupt)
     status = run_command(words)
     try:
         sys.stdout.flush()

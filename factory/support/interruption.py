@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import os
 import signal
+import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Future
 from contextlib import contextmanager
-from threading import Thread, Timer
+from threading import Thread
 from types import FrameType
 from typing import Any, Self, TypeVar
 
@@ -54,40 +55,30 @@ def put_off() -> Iterator[None]:
         signal.raise_signal(noted[0])
 
 
-class AfterImports:
-    """A handler of signals that raises KeyboardInterrupt: at once or, within an import, when that
-    is over, since what is imported may take any exception for a missing package. The second signal
-    is raised at once."""
+def interrupt(number: int, frame: FrameType | None) -> None:
+    """A handler of signals that raises KeyboardInterrupt: at once or, within an import, in the line
+    after that, since what is imported may take any exception for a missing package. The second
+    signal is raised at once."""
+    importer = _importer(frame)
+    if importer is None or importer.f_trace is not None:
+        raise KeyboardInterrupt
 
-    EVERY = 0.05
-    """Time between two looks at whether an import is over [s]."""
+    def stop(*_: object) -> None:
+        sys.settrace(None)
+        raise KeyboardInterrupt
 
-    def __init__(self) -> None:
-        self._wait: Timer | None = None
-        self._over = True
-
-    def __call__(self, number: int, frame: FrameType | None) -> None:
-        wait, first, self._wait = self._wait, self._over, None
-        if wait is not None:
-            wait.cancel()
-        if not (first and _within_an_import(frame)):
-            self._over = True
-            raise KeyboardInterrupt
-        self._over, self._wait = False, Timer(self.EVERY, self._again, [number])
-        self._wait.daemon = True
-        self._wait.start()
-
-    def _again(self, number: int) -> None:
-        self._over = True
-        signal.raise_signal(number)
+    importer.f_trace = stop
+    sys.settrace(lambda *_: None)  # none but this frame is traced
 
 
-def _within_an_import(frame: FrameType | None) -> bool:
+def _importer(frame: FrameType | None) -> FrameType | None:
+    """The outermost frame that imports something, None within no import."""
+    found = None
     while frame is not None:
         if frame.f_code.co_filename == "<frozen importlib._bootstrap>":
-            return True
+            found = frame.f_back
         frame = frame.f_back
-    return False
+    return found
 
 
 def awaited(work: Callable[[], T]) -> T:
