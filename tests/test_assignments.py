@@ -1,0 +1,89 @@
+"""Which robot does which tour: every variant of a factory is as it was, kept as digests."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable, Iterator
+from itertools import islice
+from pathlib import Path
+
+import pytest
+
+from factory.compiler.deputies import deputies
+from factory.compiler.folding import fold
+from factory.compiler.mating.mating import judged
+from factory.compiler.parallel import in_parallel
+from factory.compiler.standing_by import chosen_pairs, standing_by
+from factory.compiler.taking_over import taken_over
+from factory.layout.durations import Pace
+from factory.layout.shapes import payload_boxes
+from factory.nets.verify import verify
+from factory.pipeline import read
+from factory.plant.factory import Factory
+from factory.problem.robot_types import Catalogue
+from factory.study.allocation.lines import Shift
+from factory.support.errors import InputError
+
+PRODUCTS = ("paper", "chair", "truck", "gearbox", "chest", "balanced", "lamp", "stool", "shelf")
+FILLINGS, TAKEOVERS = 12, 2
+"""So many ways to fill lines are looked at, and so many deputies of each robot."""
+
+
+def digest(factory: Factory) -> str:
+    """A digest of all that is compiled: operations, programs, net, parents, period."""
+    robots = [(r.name, r.type, r.operations) for r in factory.robots]
+    operations = [
+        (o.label, o.template.name, o.robots, o.before, o.after, o.dwell, o.turn)
+        for o in factory.operations
+    ]
+    net = factory.net
+    places = [(p.left, p.right, p.name, p.mode, p.label) for p in net.threaded.net.places]
+    gears = [(g.robot, g.type, g.places, g.transitions) for g in net.gears]
+    kept = robots, operations, places, gears, factory.parents, factory.period, net.initial
+    return hashlib.sha256(repr(kept).encode()).hexdigest()[:16]
+
+
+def variants(file: Path) -> Iterator[tuple[str, Factory]]:
+    """The variants of a product's factory, by name."""
+    project = read(file)
+    base, catalogue = judged(project.compiled, project.product), project.catalogue
+    yield "as written", base
+    shift = Shift.of(base, catalogue, payload_boxes(base, project.product), Pace())
+    every = dict.fromkeys(map(shift.lines, islice(shift.fillings(1.3), 60)))
+    folds = [fold(base, lines, catalogue) for lines in islice(filter(None, every), FILLINGS)]
+    for number, folded in enumerate(folds):
+        yield f"fold {number}", folded
+    for name, factory in (("written", base), *((f"fold {n}", f) for n, f in enumerate(folds[-2:]))):
+        for robot in factory.robots[1:]:
+            for label in factory.deliveries(robot.index)[:1]:
+                for k in (2, 3):
+                    try:
+                        made = in_parallel(factory, [(label, k)])
+                    except InputError:
+                        continue
+                    yield f"{name}, {label} = {k}", made
+                    yield from takeovers(f"{name}, {label} = {k}", made, catalogue)
+        if pairs := chosen_pairs(deputies(factory, catalogue)):
+            yield f"{name}, deputies stand by", standing_by(factory, pairs)
+        yield from takeovers(name, factory, catalogue)
+
+
+def takeovers(name: str, factory: Factory, catalogue: Catalogue) -> Iterator[tuple[str, Factory]]:
+    """The factories in which deputies have taken over, with those that are gone and without."""
+    for dead, row in enumerate(deputies(factory, catalogue)):
+        for deputy in row[:TAKEOVERS]:
+            over = taken_over(factory, dead, deputy, catalogue)
+            yield f"{name}, r{deputy + 1} for r{dead + 1}", over.crew
+            yield f"{name}, without r{dead + 1}, r{deputy + 1}", over.after
+
+
+@pytest.mark.parametrize("product", PRODUCTS)
+def test_every_variant_is_as_it_was(product: str, golden: Callable[[str, str], None]) -> None:
+    lines = [f"{digest(made)} {name}" for name, made in variants(Path(f"examples/{product}.pag"))]
+    golden(f"assignments/{product}.txt", "\n".join(lines) + "\n")
+
+
+def test_variants_are_live_trains() -> None:
+    for _, made in variants(Path("examples/truck.pag")):
+        if all(robot.operations for robot in made.robots):
+            assert verify(made.net).holds
