@@ -14,7 +14,7 @@ from hypothesis import assume, given, reject, settings
 from hypothesis import strategies as st
 
 from factory.compiler import taking_over
-from factory.compiler.deputies import MOST, Siblings, deputies, moved_to, postorder
+from factory.compiler.deputies import MOST, Siblings, deputies, moved_to
 from factory.compiler.folding import Line, delivery, fold
 from factory.compiler.parallel import in_parallel
 from factory.compiler.taking_over import Takeover, taken_over
@@ -153,7 +153,7 @@ def test_the_witness(seed: int, rng: random.Random) -> None:
     """Every program ascends in the postorder, in which inputs come before what is made of them; one
     of two tours exchanged does not."""
     _, _, folded = made(seed, rng, 20)
-    siblings, when = Siblings(folded, catalogue()), postorder(folded)
+    siblings, when = Siblings(folded, catalogue()), folded.postorder
     assert sorted(when) == [*range(len(folded.operations))]
     for o in folded.operations:
         assert all(when[folded.by_label[label].index] < when[o.index] for label in o.inputs)

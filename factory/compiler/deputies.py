@@ -17,14 +17,14 @@ ascends in it. Without a deputy a robot needs a spare.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import islice, pairwise, permutations
 from types import MappingProxyType
 
 from factory.compiler.folding import delivery, kind_of, mismatch, sides_at
-from factory.plant.factory import Factory, Operation
+from factory.plant.factory import Factory
 from factory.problem.robot_types import Catalogue
 from factory.support.errors import Diagnostic, InputError
 
@@ -69,45 +69,12 @@ def moved_to(factory: Factory, dead: int, deputy: int, catalogue: Catalogue) -> 
     raise InputError(Diagnostic("BadLine", text, one.position, hint))
 
 
-def program_with(factory: Factory, robots: Iterable[int], when: Sequence[int]) -> tuple[int, ...]:
-    """The program of one robot that does the tours of several (indices), in the order in which
-    their carrier asks for them; `when`: the postorder."""
-    tours = (tour for robot in robots for tour in factory.tours[robot])
-    return tuple(n for tour in sorted(tours, key=lambda tour: when[tour[-1]]) for n in tour)
-
-
-def postorder(factory: Factory) -> list[int]:
-    """When each operation comes in the order in which one period is made, operation by operation,
-    what its carrier holds first. It does not depend on the robots' programs."""
-    found = [-1] * len(factory.operations)
-    count = len(found)
-    stack = [o.index for o in factory.dropoffs]
-    while stack:  # backwards: an operation, then the last that it waits for
-        number = stack.pop()
-        count -= 1
-        found[number] = count
-        stack += [
-            factory.by_label[label].index for label in _pile_first(factory.operations[number])
-        ]
-    return found
-
-
-def _pile_first(o: Operation) -> list[str]:
-    pile = o.before[o.template.carrier - 1]
-    return sorted(o.inputs, key=lambda label: label != pile)
-
-
 @dataclass(frozen=True)
 class Siblings:
     """What robots of a factory that deliver to one carrier have in common."""
 
     factory: Factory
     catalogue: Catalogue
-
-    @cached_property
-    def when(self) -> list[int]:
-        """The witness: the postorder."""
-        return postorder(self.factory)
 
     @cached_property
     def kids(self) -> list[list[int]]:
@@ -135,7 +102,8 @@ class Siblings:
 
     def ascends(self, program: Sequence[int]) -> bool:
         """Whether the operations of a program come one after the other in the witness."""
-        return all(self.when[one] < self.when[other] for one, other in pairwise(program))
+        when = self.factory.postorder
+        return all(when[one] < when[other] for one, other in pairwise(program))
 
     def pairs(self) -> Iterator[tuple[int, int]]:
         """Robots with their deputies, each of which gives a live net."""
@@ -177,7 +145,9 @@ class Siblings:
         tours of both ascends in the witness."""
         if dead == deputy or self._deliveries[dead] & self._deliveries[deputy]:
             return False
-        return self.ascends(program_with(self.factory, (dead, deputy), self.when))
+        tours = (*self.factory.tours[dead], *self.factory.tours[deputy])
+        when = self.factory.postorder
+        return self.ascends([n for tour in sorted(tours, key=lambda t: when[t[-1]]) for n in tour])
 
     def refusal(self, dead: int, deputy: int) -> str:
         """Why a robot cannot bring what another brings, in words, "" where it can."""

@@ -19,10 +19,9 @@ Guarantees: the net is a gear train, live, safe and reversible. What is no fold 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import replace
 from itertools import pairwise
 
-from factory.compiler.compiler import gear_net
+from factory.compiler.assigning import assigned
 from factory.plant.factory import Factory, Operation, Robot
 from factory.problem.pag import NOPART
 from factory.problem.robot_types import Catalogue
@@ -50,31 +49,14 @@ def folded(factory: Factory, lines: Iterable[Line], catalogue: Catalogue) -> Fac
     on = line_of(len(factory.robots), lines)
     heads = sorted(set(on))
     number = {head: n for n, head in enumerate(heads)}
-    operations = tuple(
-        replace(o, robots=tuple(number[on[robot]] for robot in o.robots))
-        for o in factory.operations
-    )
     tours: list[list[int]] = [[] for _ in heads]
-    for robot in factory.robots:
-        tours[number[on[robot.index]]].append(robot.index)
-    programs: list[dict[int, int]] = []  # carriers' first; when each operation comes in them
-    for line in tours:
-        last = [delivery(factory, robot) for robot in line]
-        asked = [programs[number[on[o.carrier]]][o.index] if programs else 0 for o in last]
-        turns = sorted(zip(asked, line, strict=True))
-        program = (n for _, robot in turns for n in factory.robots[robot].operations)
-        programs.append({n: step for step, n in enumerate(program)})
-    robots = tuple(
-        Robot(
-            n,
-            f"r{n + 1}",
-            _type(factory, line, catalogue),
-            tuple(program),
-            factory.robots[head].position,
-        )
-        for n, (head, line, program) in enumerate(zip(heads, tours, programs, strict=True))
-    )
-    return replace(factory, robots=robots, operations=operations, net=gear_net(robots, operations))
+    for robot, head in enumerate(on):
+        tours[number[head]].append(robot)
+    robots = [
+        Robot(n, f"r{n + 1}", _type(factory, line, catalogue), (), factory.robots[head].position)
+        for n, (head, line) in enumerate(zip(heads, tours, strict=True))
+    ]
+    return assigned(factory, robots, [[number[head] for head in on]])
 
 
 def _tool_lines(factory: Factory, lines: Sequence[Line]) -> list[Line]:

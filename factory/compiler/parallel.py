@@ -19,10 +19,9 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from math import lcm
 
-from factory.compiler.compiler import gear_net
+from factory.compiler.assigning import assigned
 from factory.compiler.folding import delivery
-from factory.plant.approaches import Approach, Overlap
-from factory.plant.factory import Factory, Operation, Robot, in_turn
+from factory.plant.factory import Factory
 from factory.problem.pag import NOPART
 from factory.support.errors import Diagnostic, InputError, Position, did_you_mean
 from factory.support.settings import MOST_BRANCHES
@@ -52,81 +51,13 @@ def in_parallel(factory: Factory, branches: Branches) -> Factory:
 
 def _unrolled(factory: Factory, lines: Sequence[int], period: int) -> Factory:
     """The factory of a period of units, with so many robots for each."""
-    count, first = len(factory.making), [sum(lines[:robot]) for robot in range(len(lines))]
-
-    def number(operation: int, turn: int) -> int:
-        drops = operation == count
-        return period * count + turn if drops else turn * count + operation
-
-    operations = [
-        for_unit(
-            o,
-            number(o.index, turn),
-            turn,
-            tuple(first[robot] + turn % lines[robot] for robot in o.robots),
-        )
-        for part in (factory.making, factory.dropoffs)
-        for turn in range(period)
-        for o in part
-    ]
+    first = [sum(lines[:robot]) for robot in range(len(lines))]
+    places = [r.index for r in factory.robots for _ in range(lines[r.index])]
     robots = [
-        Robot(
-            first[robot.index] + one,
-            f"r{first[robot.index] + one + 1}",
-            robot.type,
-            tuple(
-                number(o, t)
-                for t in range(one, period, lines[robot.index])
-                for o in robot.operations
-            ),
-            robot.position,
-        )
-        for robot in factory.robots
-        for one in range(lines[robot.index])
+        replace(factory.robots[robot], index=n, name=f"r{n + 1}") for n, robot in enumerate(places)
     ]
-    parents = [number(factory.parents[o], t) for t in range(period) for o in range(count)]
-    return Factory(
-        factory.pag,
-        tuple(robots),
-        tuple(operations),
-        gear_net(tuple(robots), tuple(operations)),
-        (*parents, *[-1] * period),
-        period=period,
-    )
-
-
-def for_unit(o: Operation, index: int, turn: int, robots: tuple[int, ...]) -> Operation:
-    """An operation for a unit of a period."""
-
-    def named(label: str) -> str:
-        return label if label == NOPART else in_turn(label, turn)
-
-    approach = o.approach and _approach_for_unit(o.approach, turn)
-    before, after = (tuple(map(named, labels)) for labels in (o.before, o.after))
-    return replace(
-        o,
-        index=index,
-        label=named(o.label),
-        robots=robots,
-        before=before,
-        after=after,
-        approach=approach,
-        turn=turn,
-    )
-
-
-def _approach_for_unit(approach: Approach, turn: int) -> Approach:
-    """How inputs come together, by their names for a unit of a period."""
-
-    def named(overlap: Overlap) -> Overlap:
-        one, other = overlap.parts
-        return replace(overlap, parts=(in_turn(one, turn), in_turn(other, turn)))
-
-    return replace(
-        approach,
-        lowered=approach.lowered and in_turn(approach.lowered, turn),
-        overlaps=tuple(tuple(map(named, found)) for found in approach.overlaps),
-    )
+    turns = [[first[r] + t % count for r, count in enumerate(lines)] for t in range(period)]
+    return assigned(factory, robots, turns)
 
 
 def _brings(factory: Factory, label: str) -> int:

@@ -10,11 +10,8 @@ feeder, its hand, its regions and the certificate.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import replace
 
-from factory.compiler.compiler import gear_net
-from factory.compiler.deputies import postorder, program_with
-from factory.compiler.parallel import for_unit
+from factory.compiler.assigning import assigned
 from factory.plant.factory import Factory
 
 Pair = tuple[int, int]
@@ -47,37 +44,5 @@ def rounds_of(pairs: Iterable[Pair]) -> tuple[Mapping[int, int], ...]:
 def standing_by(factory: Factory, pairs: Iterable[Pair]) -> Factory:
     """The factory of one unit at a time in which deputies do the tours of their robots by turns.
     Its robots have the numbers that they have there."""
-    turns = ({}, *rounds_of(pairs))
-    period, count, when = len(turns), len(factory.making), postorder(factory)
-
-    def number(operation: int, turn: int) -> int:
-        return period * count + turn if operation == count else turn * count + operation
-
-    operations = tuple(
-        for_unit(
-            o, number(o.index, turn), turn, tuple(moved.get(robot, robot) for robot in o.robots)
-        )
-        for part in (factory.making, factory.dropoffs)
-        for turn, moved in enumerate(turns)
-        for o in part
-    )
-    programs: list[list[int]] = [[] for _ in factory.robots]
-    for turn, moved in enumerate(turns):
-        own: list[list[int]] = [[] for _ in factory.robots]
-        for robot in range(len(factory.robots)):
-            own[moved.get(robot, robot)].append(robot)
-        for robot, does in enumerate(own):
-            programs[robot] += [number(o, turn) for o in program_with(factory, does, when)]
-    robots = tuple(
-        replace(robot, operations=tuple(program))
-        for robot, program in zip(factory.robots, programs, strict=True)
-    )
-    parents = [number(factory.parents[o], t) for t in range(period) for o in range(count)]
-    return replace(
-        factory,
-        robots=robots,
-        operations=operations,
-        net=gear_net(robots, operations),
-        parents=(*parents, *[-1] * period),
-        period=period,
-    )
+    every, turns = range(len(factory.robots)), ({}, *rounds_of(pairs))
+    return assigned(factory, factory.robots, [[m.get(r, r) for r in every] for m in turns])

@@ -14,8 +14,8 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
-from factory.compiler.compiler import gear_net
-from factory.compiler.deputies import Moved, moved_to, postorder, program_with
+from factory.compiler.assigning import assigned
+from factory.compiler.deputies import Moved, moved_to
 from factory.nets.gears import GearNet
 from factory.nets.petri import Marking
 from factory.nets.undo import exchange, marking_after
@@ -94,41 +94,19 @@ def with_moved(factory: Factory, moved: Moved) -> Factory:
 def crew_with(factory: Factory, moved: Moved) -> Factory:
     """The factory in which tours are moved, which is not checked, with all its robots; those that
     are gone have no operations, and their lifts stay where they are."""
-    when, took = postorder(factory), dict[int, list[int]]()
-    for robot, other in moved.items():
-        took.setdefault(other, [other]).append(robot)
-
-    def program(robot: int) -> tuple[int, ...]:
-        return () if robot in moved else program_with(factory, took[robot], when)
-
-    robots = tuple(
-        replace(r, operations=program(r.index)) if r.index in moved or r.index in took else r
-        for r in factory.robots
-    )
-    operations = tuple(
-        replace(o, robots=tuple(moved.get(robot, robot) for robot in o.robots))
-        for o in factory.operations
-    )
-    return replace(
-        factory,
-        robots=robots,
-        operations=operations,
-        net=gear_net(robots, operations),
-        adjusted=factory.adjusted | (factory.strokes.keys() & moved.keys()),
-    )
+    robots = factory.robots
+    crew = assigned(factory, robots, [[moved.get(robot.index, robot.index) for robot in robots]])
+    return replace(crew, adjusted=factory.adjusted | (factory.strokes.keys() & moved.keys()))
 
 
 def without_gone(factory: Factory) -> Factory:
     """The factory without robots that have no operations; those that stay keep their names."""
     stay = present(factory)
     number = {robot: n for n, robot in enumerate(stay)}
-    robots = tuple(replace(factory.robots[robot], index=n) for robot, n in number.items())
-    operations = tuple(
-        replace(o, robots=tuple(number[robot] for robot in o.robots)) for o in factory.operations
-    )
+    robots = [replace(factory.robots[robot], index=n) for robot, n in number.items()]
+    every = [[number.get(robot.index, -1) for robot in factory.robots]]
     adjusted = frozenset(number[robot] for robot in factory.adjusted if robot in number)
-    net = gear_net(robots, operations)
-    return replace(factory, robots=robots, operations=operations, net=net, adjusted=adjusted)
+    return replace(assigned(factory, robots, every), adjusted=adjusted)
 
 
 def present(factory: Factory) -> list[int]:

@@ -213,6 +213,21 @@ class Factory:
         return tuple(found)
 
     @cached_property
+    def postorder(self) -> tuple[int, ...]:
+        """When each operation comes as one period is made operation by operation, what its carrier
+        holds first. It does not depend on the robots' programs."""
+        when, count = [-1] * len(self.operations), len(self.operations)
+        stack = [o.index for o in self.dropoffs]
+        while stack:  # backwards: an operation, then the last that it waits for
+            o = self.operations[stack.pop()]
+            count -= 1
+            when[o.index] = count
+            pile = o.before[o.template.carrier - 1]
+            inputs = sorted(o.inputs, key=lambda label: label != pile)
+            stack += [self.by_label[label].index for label in inputs]
+        return tuple(when)
+
+    @cached_property
     def strokes(self) -> Mapping[int, float]:
         """How far [m] each robot (index) with a lift lowers what it delivers, robot by robot: one
         with several tours the farthest that one of them asks for, one that is adjusted not at

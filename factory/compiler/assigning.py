@@ -1,0 +1,90 @@
+"""Assignments: which robot does which tour, unit by unit. Every variant of a factory follows from
+one.
+
+A factory as Compile makes it has one *tour* a robot, from empty hands to empty hands. A *period*
+has one turn or several, a unit is made in each, and an assignment gives for each turn and each
+robot of that factory the robot that does its tours. Each robot does what it has, turn by turn, in the
+*postorder* of the operations, the pile first. That order depends on what is made, not on the robots
+that make it, and is a witness (Theorem 1): every program ascends in it, so the net is live whatever
+is assigned (Theorem 2). Which assignments robots can do, where they stand, is what `folding`,
+`parallel` and `deputies` say.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from factory.compiler.compiler import gear_net
+from factory.plant.approaches import Approach, Overlap
+from factory.plant.factory import Factory, Operation, Robot, in_turn
+from factory.problem.pag import NOPART
+
+
+def assigned(base: Factory, robots: Sequence[Robot], turns: Sequence[Sequence[int]]) -> Factory:
+    """The factory with these `robots`, whose programs are made anew, where in turn t robot
+    `turns[t][r]` (index) does the tours of robot r of `base`. Several turns are of a base that
+    makes one unit. Near-linear."""
+    period, when = len(turns), base.postorder
+    makes, drops = range(len(base.making)), range(len(base.making), len(base.operations))
+    every = ((o, turn) for part in (makes, drops) for turn in range(period) for o in part)
+    number = {unit: n for n, unit in enumerate(every)}
+    operations = tuple(
+        _for_unit(base.operations[o], n, turn, turns[turn]) for (o, turn), n in number.items()
+    )
+    programs: list[list[int]] = [[] for _ in robots]
+    tours = sorted(
+        (when[tour[-1]], robot, tour) for robot, own in enumerate(base.tours) for tour in own
+    )
+    for turn, does in enumerate(turns):
+        for _, robot, tour in tours:
+            programs[does[robot]] += [number[o, turn] for o in tour]
+    crew = tuple(
+        replace(robot, operations=tuple(program))
+        for robot, program in zip(robots, programs, strict=True)
+    )
+    parents = [number[base.parents[o], turn] if base.parents[o] >= 0 else -1 for o, turn in number]
+    return replace(
+        base,
+        robots=crew,
+        operations=operations,
+        net=gear_net(crew, operations),
+        parents=tuple(parents),
+        period=base.period * period,
+    )
+
+
+def _for_unit(o: Operation, index: int, turn: int, does: Sequence[int]) -> Operation:
+    """An operation for a unit of a period; `does`: for each of its robots who does its tours."""
+    robots = tuple(does[robot] for robot in o.robots)
+    if not turn:
+        return replace(o, index=index, robots=robots)
+
+    def named(label: str) -> str:
+        return label if label == NOPART else in_turn(label, turn)
+
+    before, after = (tuple(map(named, labels)) for labels in (o.before, o.after))
+    return replace(
+        o,
+        index=index,
+        label=named(o.label),
+        robots=robots,
+        before=before,
+        after=after,
+        approach=o.approach and _approach_for_unit(o.approach, turn),
+        turn=turn,
+    )
+
+
+def _approach_for_unit(approach: Approach, turn: int) -> Approach:
+    """How inputs come together, by their names for a unit of a period."""
+
+    def named(overlap: Overlap) -> Overlap:
+        one, other = overlap.parts
+        return replace(overlap, parts=(in_turn(one, turn), in_turn(other, turn)))
+
+    return replace(
+        approach,
+        lowered=approach.lowered and in_turn(approach.lowered, turn),
+        overlaps=tuple(tuple(map(named, overlaps)) for overlaps in approach.overlaps),
+    )
