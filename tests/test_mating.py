@@ -252,7 +252,8 @@ def test_a_snap_fit_goes_deeper_on_its_way() -> None:
     assert (loose.approach.kind, loose.clashes[0].depth) == ("blocked", pytest.approx(1 * MM))
     assert loose.clashes[0].shift == pytest.approx(1 * MM, abs=1.1 * MM)
     tight = one(judged(ALONG_Y, a=plate(8, 1), b=[*peg, block((-8.05, 0), (-5, 5), (-7, 7))]))
-    assert (tight.approach.kind, tight.slide) == ("slide", LEFT_OUT)
+    assert (tight.approach.kind, tight.slide) == ("blocked", BLOCKED)
+    assert tight.clashes[0].finished == pytest.approx(0.05 * MM)
 
 
 @pytest.mark.parametrize(

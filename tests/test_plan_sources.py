@@ -371,27 +371,36 @@ def test_a_hull_that_stands_for_a_mesh_is_told(
     assert "decompose" in warning["hint"]
 
 
-def sleeve(top: bool = True) -> dict[str, trimesh.Trimesh]:
+def sleeve() -> dict[str, trimesh.Trimesh]:
     """A peg in a sleeve, with a plate below, in millimetres; the hull of the sleeve has the peg
-    in it. Without a `top` the plate is open."""
+    in it."""
     ring, peg = trimesh.creation.annulus(20, 40, 30), trimesh.creation.cylinder(19.5, 60)
     plate = block((-50, -50, -25), (50, 50, -15))
     peg.apply_translation((0, 0, 15))
-    plate.update_faces(np.arange(len(plate.faces)) >= (0 if top else 3))
     return {"plate": plate, "ring": ring, "peg": peg}
 
 
-def test_a_plan_that_rests_on_a_hull_is_refused_unless_hulls_are_asked_for(
+def test_a_peg_comes_out_of_a_sleeve_that_no_library_decomposes(
     terminal: Terminal, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    """The hull of the sleeve hides its hole; its volume does not."""
     monkeypatch.setattr("factory.geometry.decomposition.release", lambda package: "")
-    monkeypatch.setattr("factory.planning.hulls.release", lambda package: "")
     parts, out = folder_of(tmp_path / "parts", sleeve()), tmp_path / "out"
+    done = terminal("plan", parts, "-o", out, "--no-look", "--json")
+    (join,) = [j for j in done.json["joins"] if {"peg", "ring"} <= {*j["pile"], *j["come"]}]
+    assert [abs(x) for x in join["direction"]] == [0, 0, 1]
+
+
+def test_a_plan_that_rests_on_the_hull_of_an_open_mesh_is_refused_unless_hulls_are_asked_for(
+    terminal: Terminal, tmp_path: Path
+) -> None:
+    made = sleeve()
+    made["ring"].update_faces(np.arange(len(made["ring"].faces)) >= 9)
+    parts, out = folder_of(tmp_path / "parts", made), tmp_path / "out"
     error = refused(terminal, parts)
     assert error["code"] == "Hulls"
-    assert "'ring' fills" in error["message"] and "overlaps 'peg' by" in error["message"]
-    assert "'plate'" not in error["message"]
-    assert "decompose" in error["hint"] and "--hulls" in error["hint"]
+    assert "'ring' is open" in error["message"] and "overlaps 'peg' by" in error["message"]
+    assert "'plate'" not in error["message"] and "--hulls" in error["hint"]
     words = ("plan", parts, "-o", out, "--no-look", "--hulls")
     (pair,) = terminal(*words, "--json").json["hulls"]
     assert {pair["one"], pair["other"]} == {"peg", "ring"} and pair["depth"] > 0.018
@@ -399,21 +408,11 @@ def test_a_plan_that_rests_on_a_hull_is_refused_unless_hulls_are_asked_for(
     (ways,) = [line for line in told if "; ways: " in line]
     assert ways.endswith("for hulls only: a pair overlaps")
     assert sum(line.endswith("for hulls only: a pair overlaps") for line in told) == 2
-    # what was planned for hulls is no better known when it is read again
-    assert refused(terminal, out / "parts.pag", "--replan")["code"] == "Hulls"
-
-
-def test_hulls_are_only_warned_of_beside_open_meshes_with_a_tree(
-    terminal: Terminal, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr("factory.geometry.decomposition.release", lambda package: "")
-    parts, out = folder_of(tmp_path / "parts", sleeve(top=False)), tmp_path / "out"
-    assert refused(terminal, parts)["code"] == "Hulls"
-    assert terminal("plan", parts, "-o", out, "--no-look", "--hulls").status == 0
+    # with a tree, the hulls of open meshes are what `check` takes
     again = ("plan", out / "parts.pag", "--replan", "-o", tmp_path / "again", "--no-look")
     done = terminal(*again, "--json")
     assert done.status == 0 and "hulls" not in done.json
-    assert any("ring.obj is not convex" in w["message"] for w in done.json["warnings"])
+    assert any("ring.obj is open" in w["message"] for w in done.json["warnings"])
 
 
 def test_a_tree_is_not_thrown_away_unasked(terminal: Terminal, tmp_path: Path) -> None:

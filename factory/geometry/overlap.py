@@ -16,7 +16,7 @@ They are taken as one body that may overlap itself: it is solid wherever A comes
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -47,10 +47,11 @@ CHUNK = 400_000
 @dataclass(frozen=True, slots=True)
 class Common:
     """The volume [m³] that two solids have in common, and its depth [m]; both 0 where they are
-    apart."""
+    apart. `deepest` (3,): a point of it at that depth."""
 
     volume: float
     depth: float
+    deepest: Array = field(default_factory=lambda: np.zeros(3), compare=False, repr=False)
 
 
 APART = Common(0.0, 0.0)
@@ -180,31 +181,31 @@ def _merged(mesh: Any) -> tuple[Array, Indices]:
     return vertices, target[np.asarray(mesh.tri_verts, np.int64)]
 
 
-def common(one: Any, other: Any, both: bool = True) -> Common:
+def common(one: Any, other: Any, both: bool = True, samples: int = SAMPLES) -> Common:
     """What two bodies have in common. `both`: the depth is the lesser of the two erosions; else it
-    is that of the `other`."""
+    is that of the `other`. With few `samples` the depth is a lower bound, found sooner."""
     shared = one ^ other
     volume = float(shared.volume())
     if shared.is_empty() or volume <= 0:
         return APART
-    points = _within(shared)
+    points = _within(shared, samples)
     bodies = (one, other) if both else (other,)
-    depth = min(float(_distances(points, body, shared).max()) for body in bodies)
-    return Common(volume, depth)
+    found = min((_distances(points, body, shared) for body in bodies), key=np.max)
+    return Common(volume, float(found.max()), points[found.argmax()])
 
 
-def _within(shared: Any) -> Array:
+def _within(shared: Any, samples: int) -> Array:
     """Points (n, 3) of a volume: corners, and both ends and the middle of chords that begin in the
     middle of a triangle, the larger triangles first. Few triangles are divided."""
-    fine = max(1, int(np.sqrt(SAMPLES / shared.num_tri())))
+    fine = max(1, int(np.sqrt(samples / shared.num_tri())))
     vertices, faces = _merged(shared.refine(fine).to_mesh64())
     a, b, c = (vertices[faces[:, corner]] for corner in range(3))
     normals = np.cross(b - a, c - a)
     areas = np.linalg.norm(normals, axis=1)
     reach = float(np.linalg.norm(np.ptp(vertices, axis=0)))
     points = [vertices[np.unique(faces)]]
-    points[0] = points[0][:: -(-len(points[0]) // SAMPLES)]
-    for row in np.argsort(-areas, kind="stable")[:SAMPLES].tolist():
+    points[0] = points[0][:: -(-len(points[0]) // samples)]
+    for row in np.argsort(-areas, kind="stable")[:samples].tolist():
         if areas[row] > 0:
             begin, inward = (a[row] + b[row] + c[row]) / 3, -normals[row] / areas[row]
             hits = shared.ray_cast(begin + BEYOND * inward, begin + reach * inward)

@@ -34,8 +34,8 @@ parts that were drawn into each other get a little deeper; they pass through eac
 blocked. From LOCKED on, parts interlock."""
 
 TIMES, SLACK = 2.0, 3e-4
-"""Parts that were drawn into each other interlock if on the way they get deeper than so many times
-what they were, and so much [m]: drawings are tenths of a millimetre off, dovetails are not."""
+"""Parts of which hulls alone are known, and drawn into each other, interlock if on the way they get
+deeper than so many times what they were, and so much [m]."""
 
 NEAR = 5e-4
 """Parts no further apart than this [m] touch; where that leaves the product in several pieces,
@@ -54,8 +54,8 @@ class Blocking:
 
     `levels` (3, n, n): how much j is in the way of i that goes out along +x, +y or +z; what goes
     the other way has the transpose. `locks` (3, n, n): whether it may not go out past j. `touch`
-    (n, n): which units touch. `low`, `high` (n, 3): their boxes [m]. `drawn`: the parts of two
-    units that overlap when finished.
+    (n, n): which units touch. `low`, `high` (n, 3): their boxes [m]. `hidden`: the parts of two
+    units that overlap when finished, as far as the hull of an open mesh shows, the deepest first.
     """
 
     labels: tuple[str, ...]
@@ -64,7 +64,7 @@ class Blocking:
     touch: NDArray[np.bool_] = field(repr=False)
     low: Array = field(repr=False)
     high: Array = field(repr=False)
-    drawn: tuple[Drawn, ...] = field(default=(), repr=False)
+    hidden: tuple[Drawn, ...] = field(default=(), repr=False)
 
     def __post_init__(self) -> None:
         for array in (self.levels, self.locks, self.touch, self.low, self.high):
@@ -117,23 +117,22 @@ def blocking(source: InPlace) -> Blocking:
     np.maximum.at(bounds[1], unit[found.part], found.high)
     labels = tuple(label for label, _ in units)
     touch = _touching(finder, found, unit, count)
-    drawn = _drawn(overlaps, unit, [part.label for _, members in units for part in members])
-    return Blocking(labels, levels, levels >= LOCKED, touch, *bounds, drawn)
+    hidden = _hidden(overlaps, unit, [part.label for _, members in units for part in members])
+    return Blocking(labels, levels, levels >= LOCKED, touch, *bounds, hidden)
 
 
 def rooms(source: InPlace, axis: int) -> Array:
     """The least room (n, n) [m] between units on the way of the first out along an axis past the
     second, less than 0 where they overlap; infinite where it is more than AMPLE."""
-    finder, found, unit = _bodies(source)
+    finder, _, unit = _bodies(source)
     count = len(source.units())
     room = np.full((count, count), np.inf)
-    moving, standing, depths = finder.passing(axis, AMPLE)
-    one, other = unit[found.part[moving]], unit[found.part[standing]]
-    apart = one != other
-    least = depths.room
+    moving, standing, found = finder.rooms(axis, AMPLE)
+    one, other = unit[moving], unit[standing]
     for column, at in enumerate(((other, one), (one, other))):
-        np.minimum.at(room, (at[0][apart], at[1][apart]), least[apart, column])
-    return np.where(room > AMPLE, np.inf, room)
+        apart = one != other
+        np.minimum.at(room, (at[0][apart], at[1][apart]), found[apart, column])
+    return np.where(room >= AMPLE, np.inf, room)
 
 
 def _bodies(source: InPlace) -> tuple[Finder, ConvexBodies, Ints]:
@@ -153,10 +152,12 @@ def _one_meeting(parts: tuple[str, ...]) -> Meetings:
     return Meetings(parts, (meeting,), np.zeros(len(parts) - 1, np.int64), np.zeros(1, np.int64))
 
 
-def _drawn(found: Overlaps, unit: Ints, labels: Sequence[str]) -> tuple[Drawn, ...]:
-    """The parts of two units that overlap when finished: those that do are found along any axis."""
+def _hidden(found: Overlaps, unit: Ints, labels: Sequence[str]) -> tuple[Drawn, ...]:
+    """The parts of two units of which hulls alone show that they overlap when finished: those that
+    do are found along any axis."""
     finished = found.depths.finished
-    rows = np.flatnonzero((finished > TOLERANCE) & (unit[found.one] != unit[found.other]))
+    drawn_in = found.rough & (finished > TOLERANCE) & (unit[found.one] != unit[found.other])
+    rows = np.flatnonzero(drawn_in)[np.argsort(-finished[drawn_in], kind="stable")]
     one, other = (array[rows].tolist() for array in (found.one, found.other))
     pairs = zip(one, other, finished[rows].tolist(), strict=True)
     return tuple(Drawn(labels[one], labels[other], depth) for one, other, depth in pairs)
@@ -166,13 +167,11 @@ def _enter(found: Overlaps, unit: Ints, levels: NDArray[np.int8]) -> None:
     """Enters what is in the way along an axis. The later part of a pair comes from the lower side,
     so goes out there, and the earlier one goes to the upper side; or the other way about."""
     one, other, depths = unit[found.one], unit[found.other], found.depths
-    finished, path = depths.finished[:, None], depths.path
-    more = path > finished + TOLERANCE
-    drawn = finished > TOLERANCE
+    slack = TIMES * depths.finished[:, None] + SLACK
     level = np.where(depths.faulty, SCRAPES, FREE)
-    level[more & drawn] = DEEPER
-    level[(path > TIMES * finished + SLACK) & drawn] = LOCKED
-    level[more & ~drawn] = CLASHES
+    level[found.deeper] = DEEPER
+    level[found.deeper & (depths.path > slack)] = LOCKED
+    level[found.clashing] = CLASHES
     for column, (moving, standing) in enumerate(((one, other), (other, one))):
         apart = moving != standing
         at = moving[apart], standing[apart]

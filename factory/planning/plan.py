@@ -13,7 +13,7 @@ from factory.pipeline import Project, all_templates
 from factory.planning.blocking import CLASHES, DEEPER, LOCKED, SCRAPES, Blocking, blocking, rooms
 from factory.planning.cannot import Interlock, Removal, interlocks, removal
 from factory.planning.estimate import Expected
-from factory.planning.hulls import Drawn, hidden, refuse_hidden
+from factory.planning.hulls import Drawn, refuse_hidden
 from factory.planning.judging import Join, Judged
 from factory.planning.kept import KeptPrices
 from factory.planning.laying import LaidOut, Layouts
@@ -117,7 +117,7 @@ def plan(source: InPlace, options: PlanOptions | None = None) -> Planned | Canno
     asked.told("looking for what is in the way", 0, None, "")
     found = blocking(source)
     _check_allowed(asked.allow, found)
-    pairs = hidden(source, found.drawn)
+    pairs = found.hidden
     if not asked.hulls:
         refuse_hidden(source, pairs)
     found = found.allowing(asked.allow)

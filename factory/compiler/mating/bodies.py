@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from factory.geometry.meshes import Array
-from factory.geometry.solids import Product
+from factory.geometry.solids import Product, Solid
 
 ROUNDING = 1e-9
 """Vertices are the same within this [m]."""
@@ -18,13 +18,15 @@ ROUNDING = 1e-9
 @dataclass(frozen=True, slots=True)
 class ConvexBodies:
     """All convex bodies: `vertices` (n, 3) of each, `low`, `high` (bodies, 3) its bounding box,
-    `part` the number of the part it belongs to, `boxes` whether it is its bounding box [m]."""
+    `part` the number of the part it belongs to, `boxes` whether it is its bounding box [m]; and the
+    `solids` of the parts."""
 
     vertices: tuple[Array, ...] = field(repr=False)
     part: NDArray[np.int64]
     low: Array
     high: Array
     boxes: NDArray[np.bool_]
+    solids: tuple[Solid, ...] = field(repr=False)
 
     def shape(self, body: int) -> tuple[Array, bytes]:
         """A body's vertices from the low corner of its box, and a key that is the same for bodies
@@ -48,7 +50,8 @@ def bodies(product: Product, parts: Sequence[str]) -> ConvexBodies:
     points = np.concatenate(found)
     low, high = np.minimum.reduceat(points, starts), np.maximum.reduceat(points, starts)
     boxes = _boxes(points, starts, counts, low, high)
-    return ConvexBodies(tuple(found), np.array(part, np.int64), low, high, boxes)
+    solids = tuple(product.solids[label] for label in parts)
+    return ConvexBodies(tuple(found), np.array(part, np.int64), low, high, boxes, solids)
 
 
 def _boxes(

@@ -23,7 +23,7 @@ from factory.compiler.mating.findings import (
 )
 from factory.compiler.mating.meetings import Ints, Meeting, Meetings, meetings
 from factory.compiler.mating.overlaps import Finder, Overlaps
-from factory.compiler.mating.paths import SIGNS, TOLERANCE
+from factory.compiler.mating.paths import SIGNS
 from factory.geometry.solids import Product
 from factory.plant.approaches import MARGIN, Approach, Kind, Overlap, Pair
 from factory.plant.factory import Factory
@@ -106,17 +106,17 @@ class _Judge:
             approach = self._along(number, "blocked", [0, 1] if same else [column])
         elif slide >= lower:
             columns = [column for column in (0, 1) if slides[column] == slide]
-            approach = self._along(number, "slide", columns, slide == STRICT)
+            approach = self._along(number, "slide", columns)
         else:
             approach = self._lowering(number, lower)
         position = _position(self.pag, meeting)
         return Mating(meeting.label, meeting.inputs, approach, slide, lower, clashes, position)
 
-    def _along(self, number: int, kind: Kind, columns: list[int], clean: bool = False) -> Approach:
+    def _along(self, number: int, kind: Kind, columns: list[int]) -> Approach:
         """From some of the sides."""
         axis = self.meetings.all[number].axis
         sides = tuple(SIGNS[column] for column in columns)
-        overlaps = tuple(() if clean else self._overlaps(number, axis, c) for c in columns)
+        overlaps = tuple(self._overlaps(number, axis, column) for column in columns)
         return Approach(kind, axis, sides, "", 0.0, overlaps)
 
     def _lowering(self, number: int, level: int) -> Approach:
@@ -151,7 +151,7 @@ class _Judge:
     def _clashes(self, number: int, axis: int, column: int) -> tuple[Clash, ...]:
         """The pairs that clash from one side, the deepest first."""
         overlaps = self.overlaps[axis].of(number)
-        depths, rows = overlaps.depths, np.flatnonzero(_clashing(overlaps)[:, column])
+        depths, rows = overlaps.depths, np.flatnonzero(overlaps.clashing[:, column])
         found = [
             Clash(
                 self._pair(overlaps, row),
@@ -164,9 +164,9 @@ class _Judge:
         return tuple(sorted(found, key=lambda c: (-round(c.depth, 9), c.parts)))
 
     def _overlaps(self, number: int, axis: int, column: int) -> tuple[Overlap, ...]:
-        """What overlaps or scrapes as the inputs of an operation come from a side."""
+        """What collides or scrapes as the inputs of an operation come from a side."""
         overlaps = self.overlaps[axis].of(number)
-        rows = np.flatnonzero(overlaps.depths.faulty[:, column]).tolist()
+        rows = np.flatnonzero(overlaps.colliding.faulty[:, column]).tolist()
         found = (self._overlap(overlaps, row, column) for row in rows)
         return tuple(sorted(found, key=lambda overlap: overlap.parts))
 
@@ -176,7 +176,7 @@ class _Judge:
         bodies = overlaps.bodies.receding(rows, column)
         if self.meetings.parts[overlaps.one[row]] != parts[0]:
             bodies = [(other, one, far) for one, other, far in bodies]
-        return Overlap(parts, float(overlaps.depths.path[row, column]), tuple(sorted(bodies)))
+        return Overlap(parts, float(overlaps.colliding.path[row, column]), tuple(sorted(bodies)))
 
     def _pair(self, overlaps: Overlaps, row: int) -> Pair:
         parts = self.meetings.parts
@@ -201,16 +201,6 @@ def _position(pag: PAG, meeting: Meeting) -> Position | None:
     return node.input_positions[node.inputs.index(meeting.inputs[-1])]
 
 
-def _clashing(overlaps: Overlaps) -> NDArray[np.bool_]:
-    """Which pairs (n, 2) that are apart in the end pass through each other from each side."""
-    return _deeper(overlaps) & (overlaps.depths.finished <= TOLERANCE)[:, None]
-
-
-def _deeper(overlaps: Overlaps) -> NDArray[np.bool_]:
-    depths = overlaps.depths
-    return np.asarray(depths.path > depths.finished[:, None] + TOLERANCE)
-
-
 def levels_of(overlaps: Overlaps, count: int) -> tuple[Ints, Ints]:
     """The level of each meeting from each side (count, 2), and how many pairs clash there."""
     clashing, deeper, faulty = (
@@ -218,7 +208,7 @@ def levels_of(overlaps: Overlaps, count: int) -> tuple[Ints, Ints]:
             [np.bincount(overlaps.meeting[fault[:, side]], minlength=count) for side in (0, 1)],
             axis=1,
         )
-        for fault in (_clashing(overlaps), _deeper(overlaps), overlaps.depths.faulty)
+        for fault in (overlaps.clashing, overlaps.deeper, overlaps.depths.faulty)
     )
     found = [faulty == 0, deeper == 0, clashing == 0]
     return np.select(found, [STRICT, NO_DEEPER, LEFT_OUT], BLOCKED), clashing

@@ -7,28 +7,34 @@ two shapes are computed together, wherever they are.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import astuple, dataclass, field
 from functools import cached_property
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from factory.compiler.mating.bodies import ConvexBodies
 from factory.compiler.mating.depth import Difference, Polytope, exact, polytope
+from factory.compiler.mating.drawn import DrawnWays
 from factory.compiler.mating.meetings import Ints, Meetings
-from factory.compiler.mating.paths import CLEAR, LAST, SIGNS, Depths, depths_of
+from factory.compiler.mating.paths import CLEAR, LAST, SIGNS, TOLERANCE, Depths, depths_of
 from factory.compiler.mating.seeking import MANY, sought
+from factory.geometry import overlap
 from factory.geometry.meshes import Array
 from factory.support import array_cache
-from factory.support.array_cache import digest, program
+from factory.support.array_cache import Arrays, digest, program
 
 FOLDER = "overlaps"
 """Where overlaps are kept, in the user's cache."""
 
 KEYS = ("meeting", "moving", "standing", "finished", "path", "shift", "graze")
-"""The arrays of an entry."""
+DRAWN, ROUGH = tuple(f"drawn_{key}" for key in KEYS), "rough"
+"""The arrays of an entry: of bodies, of parts as they are drawn, and of all parts."""
+
+Flags = NDArray[np.bool_]
 
 CHUNK = 4096
 """Bodies whose candidates are sought at a time."""
@@ -54,13 +60,17 @@ class BodyPairs:
 @dataclass(frozen=True)
 class Overlaps:
     """Pairs of parts that overlap by more than the tolerance in some place of a path, or scrape, by
-    meeting. `meeting`, `one` < `other` (n,): numbers of the meeting and the parts; `bodies`: what
-    overlaps of them, those of row i from `starts[i]` to `starts[i + 1]` (n + 1,)."""
+    meeting. `meeting`, `one` < `other` (n,): numbers of the meeting and the parts; `depths` as they
+    are drawn, `colliding` as their bodies collide; `rough` (n,): whether one of them is known by
+    its hull alone; `bodies`: what overlaps of them, those of row i from `starts[i]` to
+    `starts[i + 1]` (n + 1,)."""
 
     meeting: Ints
     one: Ints
     other: Ints
     depths: Depths = field(repr=False)
+    colliding: Depths = field(repr=False)
+    rough: NDArray[np.bool_] = field(repr=False)
     bodies: BodyPairs = field(repr=False)
     starts: Ints = field(repr=False)
 
@@ -69,7 +79,25 @@ class Overlaps:
         first, end = np.searchsorted(self.meeting, [meeting, meeting + 1]).tolist()
         rows = slice(first, end)
         at = self.meeting[rows], self.one[rows], self.other[rows]
-        return Overlaps(*at, self.depths.at(rows), self.bodies, self.starts[first : end + 1])
+        depths = self.depths.at(rows), self.colliding.at(rows), self.rough[rows]
+        return Overlaps(*at, *depths, self.bodies, self.starts[first : end + 1])
+
+    @cached_property
+    def deeper(self) -> NDArray[np.bool_]:
+        """Which pairs (n, 2) get deeper into each other on the way from either side than they are
+        in the finished product."""
+        return np.asarray(self.depths.path > self.depths.finished[:, None] + TOLERANCE)
+
+    @cached_property
+    def clashing(self) -> NDArray[np.bool_]:
+        """Which of those (n, 2) pass through each other: all but those of which a hull shows no
+        more than that they are drawn into each other."""
+        unknown = self.rough & (self.depths.finished > TOLERANCE)
+        return self.deeper & ~unknown[:, None]
+
+
+Pairs = tuple[Ints, Ints, Ints, Depths]
+"""Pairs of bodies, or of parts: their meetings, what moves and what stands, and their depths."""
 
 
 class Finder:
@@ -78,6 +106,7 @@ class Finder:
 
     def __init__(self, found: ConvexBodies, where: Meetings) -> None:
         self.bodies, self.meetings = found, where
+        self.drawn = DrawnWays(found.solids)
         self._keys: dict[int, bytes] = {}
         self._shapes: dict[bytes, Array] = {}
         self._polytopes: dict[bytes, Polytope] = {}
@@ -85,37 +114,62 @@ class Finder:
 
     def along(self, axis: int, wanted: NDArray[np.bool_]) -> Overlaps:
         """The overlaps of the wanted meetings when their inputs come along an axis: x, y or z."""
-        if self.bodies.boxes.all():  # found at once
+        if self.bodies.boxes.all() and not self._meshes:  # found at once
             return self._by_parts(*self._search(axis, wanted))
         name = digest(self._product, axis, wanted)
-        kept = array_cache.find(FOLDER, name, KEYS)
+        kept = array_cache.find(FOLDER, name, (*KEYS, *DRAWN, ROUGH))
         if kept is None:
-            meeting, moving, standing, depths = self._search(axis, wanted)
-            arrays = (meeting, moving, standing, *astuple(depths))
-            kept = dict(zip(KEYS, arrays, strict=True))
+            bodies, parts, rough = self._search(axis, wanted)
+            arrays = (*_arrays(bodies), *_arrays(parts), rough)
+            kept = dict(zip((*KEYS, *DRAWN, ROUGH), arrays, strict=True))
             array_cache.keep(FOLDER, name, kept)
-        meeting, moving, standing, *rest = (kept[key] for key in KEYS)
-        return self._by_parts(meeting, moving, standing, Depths(*rest))
+        return self._by_parts(_pairs(kept, KEYS), _pairs(kept, DRAWN), kept[ROUGH])
+
+    @cached_property
+    def _meshes(self) -> list[Array | Ints]:
+        """The surfaces of parts, and where they are."""
+        meshed = [(s, s.mesh) for s in self.bodies.solids if s.mesh is not None]
+        each = {id(mesh): mesh for _, mesh in meshed}.values()
+        places = [array for solid, _ in meshed for array in (solid.position, solid.quaternion)]
+        return [*places, *(array for mesh in each for array in (mesh.vertices, mesh.faces))]
 
     @cached_property
     def _product(self) -> str:
         """A digest of all that overlaps depend on."""
         where = self.meetings.borders, self.meetings.levels, self.meetings.splits
-        own = program(Path(__file__).parent, "numpy", "scipy", "shapely")
-        return digest(own, self.bodies.part, *where, *self.bodies.vertices)
+        own = program(Path(__file__).parent, "numpy", "scipy", "shapely", "manifold3d")
+        exact = program(Path(overlap.__file__).parent)
+        return digest(own, exact, self.bodies.part, *where, *self.bodies.vertices, *self._meshes)
 
-    def _search(self, axis: int, wanted: NDArray[np.bool_]) -> tuple[Ints, Ints, Ints, Depths]:
+    def _search(self, axis: int, wanted: NDArray[np.bool_]) -> tuple[Pairs, Pairs, Flags]:
         """The bodies, moving and standing, that overlap or scrape, and the meetings at which they
-        do."""
+        do; the parts that were tested as they are drawn; and which are known by hulls alone."""
         parts = [self._near(axis, wanted, *pairs) for pairs in self._chunks(axis)]
         moving, standing, meeting = np.concatenate([np.zeros((3, 0), np.int64), *parts], axis=1)
         depths = _box_depths(self.bodies, moving, standing, axis)
         self._refine(moving, standing, axis, depths)
-        idle = self.bodies.part[moving] < self.meetings.splits[meeting]
+        part = self.bodies.part
+        idle = part[moving] < self.meetings.splits[meeting]
         depths.path[idle], depths.shift[idle] = depths.finished[idle, None], 0.0
         depths.graze[idle] = -np.inf
-        kept = np.flatnonzero(depths.faulty.any(axis=1))
-        return meeting[kept], moving[kept], standing[kept], depths.at(kept)
+        kept = np.array(depths.faulty.any(axis=1))
+        tested = np.flatnonzero(self.drawn.tested(part[moving], part[standing]))
+        first = tested[self._firsts(meeting[tested], moving[tested], standing[tested])]
+        kept[first] = True
+        by_parts = part[moving[first]], part[standing[first]]
+        exact = self.drawn.depths(*by_parts, idle[first], axis)
+        found = meeting[kept], moving[kept], standing[kept], depths.at(np.flatnonzero(kept))
+        return found, (meeting[first], *by_parts, exact), self.drawn.rough
+
+    def _firsts(self, meeting: Ints, moving: Ints, standing: Ints) -> Ints:
+        """The first row of each pair of parts."""
+        part = self.bodies.part
+        return np.unique(self._key_of(meeting, part[moving], part[standing]), return_index=True)[1]
+
+    def _key_of(self, meeting: Ints, moving: Ints, standing: Ints) -> Ints:
+        """A number (n,) of each pair of parts at a meeting, ascending as they are sorted."""
+        count = len(self.bodies.solids)
+        return (meeting * count + standing) * count + moving
 
     def _chunks(self, axis: int, apart: float = CLEAR) -> Iterator[tuple[Ints, Ints]]:
         """Pairs (moving, standing) of bodies whose boxes overlap or are at most so far `apart`
@@ -149,6 +203,23 @@ class Finder:
         depths = _box_depths(self.bodies, one, other, axis)
         self._refine(one, other, axis, depths)
         return one, other, depths
+
+    def rooms(self, axis: int, most: float) -> tuple[Ints, Ints, Array]:
+        """Pairs of parts (moving, standing), the later one moving, that come near on the way along
+        an axis, and the least room (n, 2) [m] on it from either side, but for the last bit; less
+        than 0 where they overlap."""
+        one, other, depths = self.passing(axis, most)
+        moving, standing = self.bodies.part[one], self.bodies.part[other]
+        apart = moving != standing
+        moving, standing, least = moving[apart], standing[apart], depths.room[apart]
+        key = moving * len(self.bodies.solids) + standing
+        _, first, pair = np.unique(key, return_index=True, return_inverse=True)
+        room = np.full((len(first), 2), np.inf)
+        np.minimum.at(room, pair, least)
+        moving, standing = moving[first], standing[first]
+        tested = np.flatnonzero(self.drawn.tested(moving, standing) & (room < most).any(axis=1))
+        room[tested] = self.drawn.room(moving[tested], standing[tested], axis, most)
+        return moving, standing, room
 
     def _beside(self, axis: int, gap: float, still: bool, moving: Ints, standing: Ints) -> Ints:
         depths = _box_depths(self.bodies, moving, standing, axis)
@@ -199,8 +270,9 @@ class Finder:
             self._shapes.setdefault(key, vertices)
         return self._keys[body]
 
-    def _by_parts(self, meeting: Ints, moving: Ints, standing: Ints, depths: Depths) -> Overlaps:
-        """Of all bodies of two parts the deepest."""
+    def _by_parts(self, found: Pairs, exact: Pairs, rough: Flags) -> Overlaps:
+        """Of all bodies of two parts the deepest, and how deep they are as drawn."""
+        meeting, moving, standing, depths = found
         part = self.bodies.part
         order = np.lexsort((part[moving], part[standing], meeting))
         meeting, one, other = meeting[order], part[standing[order]], part[moving[order]]
@@ -212,17 +284,31 @@ class Finder:
         starts = np.flatnonzero(new)
         ends = np.append(starts, len(order))
         if not len(starts):
-            return Overlaps(meeting, one, other, depths, bodies, ends)
+            none = np.zeros(0, bool)
+            return Overlaps(meeting, one, other, depths, depths, none, bodies, ends)
         path = np.maximum.reduceat(depths.path, starts)
         at = np.where(depths.path >= path[np.cumsum(new) - 1], depths.shift, np.inf)
-        by_parts = Depths(
+        colliding = Depths(
             np.maximum(np.maximum.reduceat(depths.finished, starts), 0.0),
             path,
             np.minimum.reduceat(at, starts),
             np.maximum.reduceat(depths.graze, starts),
         )
-        at_parts = meeting[starts], one[starts], other[starts]
-        return Overlaps(*at_parts, by_parts, bodies, ends)
+        meeting, one, other = meeting[starts], one[starts], other[starts]
+        as_drawn = colliding.at(np.arange(len(starts)))
+        rows = np.searchsorted(self._key_of(meeting, other, one), self._key_of(*exact[:3]))
+        as_drawn.put(rows, exact[3])
+        hulls = rough[one] | rough[other]
+        return Overlaps(meeting, one, other, as_drawn, colliding, hulls, bodies, ends)
+
+
+def _arrays(found: Pairs) -> tuple[NDArray[Any], ...]:
+    return (*found[:3], *astuple(found[3]))
+
+
+def _pairs(kept: Arrays, keys: Sequence[str]) -> Pairs:
+    meeting, moving, standing, *rest = (kept[key] for key in keys)
+    return meeting, moving, standing, Depths(*rest)
 
 
 def _box_depths(bodies: ConvexBodies, moving: Ints, standing: Ints, axis: int) -> Depths:

@@ -34,22 +34,17 @@ def rooms(
     least = np.full(len(found.all), np.inf)
     if not found.all:
         return {}
-    shapes = bodies(product, found.parts)
-    finder = Finder(shapes, found)
+    finder = Finder(bodies(product, found.parts), found)
     for axis in range(3):
         wanted = np.array([way == axis for way, _ in ways])
         if not wanted.any():
             continue
-        moving, standing, depths = finder.passing(axis, AMPLE)
-        one, other = shapes.part[standing], shapes.part[moving]
-        meeting = np.full(len(one), -1)
-        meeting[one != other] = found.of(one[one != other], other[one != other])
-        rows = np.flatnonzero((meeting >= 0) & wanted[meeting])
-        rows = rows[other[rows] >= found.splits[meeting[rows]]]
+        other, one, room = finder.rooms(axis, AMPLE)
+        meeting = found.of(one, other)
+        rows = np.flatnonzero(wanted[meeting] & (other >= found.splits[meeting]))
         sides = np.array([sides for _, sides in ways])[meeting[rows]]
-        room = np.where(sides, depths.room[rows], np.inf).min(axis=1)
-        np.minimum.at(least, meeting[rows], room)
-    least[least > AMPLE] = np.inf
+        np.minimum.at(least, meeting[rows], np.where(sides, room[rows], np.inf).min(axis=1))
+    least[least >= AMPLE] = np.inf
     labels = [meeting.label for meeting in found.all]
     return {label: float(r) for label, r in zip(labels, least, strict=True) if label in chosen}
 

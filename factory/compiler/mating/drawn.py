@@ -1,0 +1,177 @@
+"""How deep parts get into each other on their ways as they are drawn, where the convex bodies that
+collide for one of them are more than it is.
+
+By booleans of surfaces (`geometry/overlap.py`), not in steps: what a part sweeps on its whole way
+out has something in common with what stands, or nothing, so no wall is too thin to be met. The
+depth of a way is the least by which one of the two, eroded, would let the other pass; that of the
+finished product is measured alike.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from factory.compiler.mating.meetings import Ints
+from factory.compiler.mating.paths import CLEAR, LAST, SIGNS, TOLERANCE, Depths
+from factory.geometry.meshes import Array, Mesh, hull_of, is_closed, volume_of
+from factory.geometry.overlap import SAMPLES, Common, common, drawn, swept
+from factory.geometry.solids import Solid
+
+ALIKE = 1e-6
+"""Convex bodies are all of a mesh if their volumes differ by no more than this share."""
+
+LEAST = 1e-15
+"""Less in common than this [m³] is rounding: a millionth of a cubic millimetre."""
+
+QUICK, SURELY = 8, 10 * TOLERANCE
+"""With so few samples a clash that is deeper than this [m] is told from a touch."""
+
+
+class DrawnWays:
+    """The parts of a product by number, and how deep they get into each other as drawn. Each body
+    and what it sweeps is made once."""
+
+    def __init__(self, solids: Sequence[Solid]) -> None:
+        self._solids = solids
+        self._bodies: dict[int, Any] = {}
+        self._sweeps: dict[tuple[int, int, int], Any] = {}
+        self._finished: dict[tuple[int, int], float] = {}
+
+    @cached_property
+    def rough(self) -> NDArray[np.bool_]:
+        """The parts (n,) that are known by their hulls alone: their meshes bound no volume."""
+        return np.asarray(self._meshes[0])
+
+    @cached_property
+    def wider(self) -> NDArray[np.bool_]:
+        """The parts (n,) that are less than the convex bodies which collide for them."""
+        return np.asarray(self._meshes[1])
+
+    @cached_property
+    def _meshes(self) -> NDArray[np.bool_]:
+        found = np.zeros((2, len(self._solids)), bool)
+        kinds: dict[int, tuple[bool, bool]] = {}
+        for part, solid in enumerate(self._solids):
+            if solid.mesh is not None:
+                key = id(solid.mesh)
+                if key not in kinds:
+                    exact = is_exact(solid.mesh)
+                    is_rough = not exact and self._body(part) is None
+                    kinds[key] = is_rough, not exact and not is_rough
+                found[:, part] = kinds[key]
+        return found
+
+    @cached_property
+    def _beyond(self) -> float:
+        """A way that is as long as this leads out of the product [m]."""
+        low = np.min([solid.low for solid in self._solids], axis=0)
+        high = np.max([solid.high for solid in self._solids], axis=0)
+        return 1.01 * float((high - low).max()) + 1e-3
+
+    def tested(self, one: Ints, other: Ints) -> NDArray[np.bool_]:
+        """Which pairs of parts (n,) are tested as drawn: at least one is less than its bodies, and
+        both bound a volume."""
+        either = self.wider[one] | self.wider[other]
+        return np.asarray(either & ~self.rough[one] & ~self.rough[other])
+
+    def depths(self, moving: Ints, standing: Ints, still: NDArray[np.bool_], axis: int) -> Depths:
+        """The depths of pairs of parts on the ways of the first along an axis; of pairs that stand
+        `still` those in the finished product alone."""
+        pairs = zip(moving.tolist(), standing.tolist(), still.tolist(), strict=True)
+        rows = [self._pair(*pair, axis) for pair in pairs]
+        finished, *columns = (np.array([row[n] for row in rows], float) for n in range(4))
+        path, shift, graze = (column.reshape(-1, 2) for column in columns)
+        return Depths(finished, path, shift, graze)
+
+    def room(self, moving: Ints, standing: Ints, axis: int, most: float) -> Array:
+        """The least room (n, 2) [m] on the ways of pairs of parts from either side, but for the
+        last bit, up to `most`; less than 0 where the two overlap on it."""
+        found = np.empty((len(moving), 2))
+        for row, (one, other) in enumerate(zip(moving.tolist(), standing.tolist(), strict=True)):
+            for column, sign in enumerate(SIGNS):
+                depth = self._path(one, other, axis, sign)[0]
+                gap = self._gap(one, other, axis, sign, most) if depth <= TOLERANCE else -depth
+                found[row, column] = gap
+        return found
+
+    def _pair(self, moving: int, standing: int, still: bool, axis: int) -> tuple[Any, ...]:
+        finished = self.finished(moving, standing)
+        if still:
+            return finished, [finished] * 2, [0.0] * 2, [-np.inf] * 2
+        path, shift, graze = [], [], []
+        for sign in SIGNS:
+            depth, at = self._path(moving, standing, axis, sign)
+            free = depth <= TOLERANCE
+            path.append(max(depth, finished))
+            shift.append(at)
+            graze.append(-self._gap(moving, standing, axis, sign, CLEAR) if free else depth)
+        return finished, path, shift, graze
+
+    def finished(self, one: int, other: int) -> float:
+        """How deep two parts are in each other in the finished product [m]."""
+        if (one, other) not in self._finished:
+            bodies = self._body(one), self._body(other)
+            empty = (bodies[0] ^ bodies[1]).volume() <= LEAST
+            self._finished[one, other] = 0.0 if empty else common(*bodies).depth
+        return self._finished[one, other]
+
+    def _path(self, moving: int, standing: int, axis: int, sign: int) -> tuple[float, float]:
+        """How deep the first part gets into the second on its way, and where [m]. The depth of a
+        clash that is deep may be found too small."""
+        found = self._cut(moving, standing, axis, sign, QUICK)
+        if found is None:
+            return 0.0, 0.0
+        finished = self.finished(moving, standing)
+        if found.depth <= SURELY or finished > TOLERANCE:
+            both = [
+                self._cut(moving, standing, axis, sign, SAMPLES),
+                self._cut(standing, moving, axis, -sign, SAMPLES),
+            ]
+            depth = min(cut.depth if cut else 0.0 for cut in both)
+        else:
+            depth = found.depth
+        return depth, self._shift(found, moving, axis, sign)
+
+    def _cut(self, moving: int, standing: int, axis: int, sign: int, samples: int) -> Common | None:
+        """What a part cuts out of another on its way; None for nothing."""
+        swept, body = self._swept(moving, axis, sign), self._body(standing)
+        if (swept ^ body).volume() <= LEAST:
+            return None
+        return common(swept, body, both=False, samples=samples)
+
+    def _shift(self, found: Common, moving: int, axis: int, sign: int) -> float:
+        """How far the moving part has come where it meets the deepest point of a clash [m]."""
+        back = found.deepest - sign * self._beyond * np.eye(3)[axis]
+        hits = self._body(moving).ray_cast(found.deepest, back)
+        ends = [float(np.linalg.norm(hit.position - found.deepest)) for hit in hits[:2]]
+        return float(np.mean(ends if len(hits) % 2 == 0 and ends else [0.0, *ends[:1]]))
+
+    def _gap(self, moving: int, standing: int, axis: int, sign: int, most: float) -> float:
+        """The least room on the way of a part, but for the last bit of it [m], up to `most`."""
+        ahead = self._swept(moving, axis, sign).translate(sign * LAST * np.eye(3)[axis])
+        return float(ahead.min_gap(self._body(standing), most))
+
+    def _body(self, part: int) -> Any:
+        if part not in self._bodies:
+            self._bodies[part] = drawn(self._solids[part])
+        return self._bodies[part]
+
+    def _swept(self, part: int, axis: int, sign: int) -> Any:
+        if (part, axis, sign) not in self._sweeps:
+            out = sign * self._beyond * np.eye(3)[axis]
+            self._sweeps[part, axis, sign] = swept(self._body(part), out)
+        return self._sweeps[part, axis, sign]
+
+
+def is_exact(mesh: Mesh) -> bool:
+    """Whether the convex bodies of a mesh are the volume that it bounds, no more."""
+    if not is_closed(mesh.faces):
+        return False
+    volume = volume_of(mesh.vertices, mesh.faces)
+    bodies = [hull_of(piece) for piece in mesh.pieces] or [mesh.hull]
+    return abs(sum(body.volume for body in bodies) - volume) <= ALIKE * volume
