@@ -15,7 +15,7 @@ import yaml
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from factory.geometry.mesh_reader import EXPECTED
+from factory.geometry.mesh_file import EXPECTED
 from factory.geometry.product import product_geometry
 from factory.geometry.solids import rotation
 from factory.importing import Options, import_product

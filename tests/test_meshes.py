@@ -14,7 +14,8 @@ import trimesh
 from command_line import Terminal
 from layout_values import table_pag
 
-from factory.geometry.mesh_reader import EXPECTED, UnreadableMesh, read_mesh
+from factory.geometry.mesh_file import EXPECTED, UnreadableMesh
+from factory.geometry.mesh_reader import read_mesh
 from factory.geometry.product import product_geometry
 from factory.geometry.solids import Product
 from factory.problem.pag import PAG

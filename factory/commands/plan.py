@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from factory.commands.asking import UNITS, asked
 from factory.commands.options import OUTPUT, PATH, SECONDS
 from factory.commands.outputs import writable_folder
 from factory.commands.requests import OutputOptions
@@ -25,9 +26,6 @@ if TYPE_CHECKING:
     from factory.planning.plan import CannotAssemble, Planned, PlannedJoin, PlanOptions
     from factory.planning.searching import Aim
     from factory.plant.approaches import Kind
-
-UNITS = ("m", "cm", "mm", "in", "ldu")
-"""The names of units of length; `ldu` is that of LDraw, 0.4 mm."""
 
 AIMS = ("cycle", "robots", "floor")
 
@@ -64,6 +62,7 @@ KINDS: tuple[Kind, ...] = ("slide", "lower", "blocked")
 )
 @click.option("--hulls", is_flag=True, help="Plan with hulls, though they hide what goes in.")
 @click.option("--unit", type=click.Choice(UNITS), help="Of lengths; found out without.")
+@click.option("--in-place", is_flag=True, help="Parts are in place, whatever they look like.")
 @click.option("--library", type=PATH, envvar="LDRAWDIR", help="An LDraw parts library.")
 @click.option("--boxes", is_flag=True, help="LDraw parts whose shape is missing become boxes.")
 @click.option("--look/--no-look", default=True, help="Write an exploded view, and its film.")
@@ -86,6 +85,7 @@ def plan(
     allow: tuple[str, ...],
     hulls: bool,
     unit: str | None,
+    in_place: bool,
     library: Path | None,
     boxes: bool,
     look: bool,
@@ -103,8 +103,13 @@ def plan(
 
     templates = all_templates(folders)
     writable_folder(output)
-    with Waiting(f"reading {source.name}", out.silent):
-        found = read_source(source, templates, SourceOptions(unit, keep, replan, library, boxes))
+
+    def read_as(options: SourceOptions) -> InPlace:
+        with Waiting(f"reading {source.name}", out.silent):
+            return read_source(source, templates, options)
+
+    options = SourceOptions(unit, keep, replan, library, boxes, in_place)
+    found = asked(read_as, options, out.silent)
     folder = output or Path(f"{found.name}-planned")
     writable_folder(folder)
     warnings = announced(found.warnings, out)
@@ -112,8 +117,8 @@ def plan(
         for note in found.notes:
             say(f"  {note}")
     seconds = usual_seconds(len(found.units())) if seconds is None else seconds
-    asked = PlanOptions(aim, seconds, allow, hulls, templates=templates)
-    planned = _sought(found, asked, out)
+    search = PlanOptions(aim, seconds, allow, hulls, templates=templates)
+    planned = _sought(found, search, out)
     if isinstance(planned, CannotAssemble):
         return _refuse(found, planned, folder, look, out)
     made = planned_product(found, planned.tree, planned.orientation, source.name)

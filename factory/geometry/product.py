@@ -29,7 +29,8 @@ from factory.geometry.limits import (
     value_position,
 )
 from factory.geometry.mending import mended
-from factory.geometry.mesh_reader import ANEW, UnreadableMesh, read_mesh
+from factory.geometry.mesh_file import ANEW, UnreadableMesh
+from factory.geometry.mesh_reader import read_mesh
 from factory.geometry.meshes import (
     Array,
     Indices,

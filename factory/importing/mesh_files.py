@@ -6,7 +6,8 @@ from collections.abc import Iterable
 from hashlib import sha256
 from pathlib import Path, PurePosixPath
 
-from factory.geometry.mesh_reader import ANEW, UnreadableMesh, read_mesh
+from factory.geometry.mesh_file import ANEW, UnreadableMesh
+from factory.geometry.mesh_reader import read_mesh
 from factory.importing.draft import ImportFaults
 from factory.importing.labels import file_stem
 from factory.lang.operations import MESHES

@@ -6,17 +6,22 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from factory.geometry.mesh_reader import MeshFile
-from factory.geometry.meshes import Array
-from factory.geometry.pieces import components
+from factory.geometry.mesh_file import MeshFile
+from factory.geometry.meshes import Array, is_closed, volume_of
+from factory.geometry.pieces import closed_bodies, components, joined
 from factory.lang.words import UNITS as LENGTHS
-from factory.support.errors import Diagnostic
+from factory.support.errors import Diagnostic, InputError
 
 UNITS = {**LENGTHS, "ldu": 0.0004}
 """Units of length [m]; `ldu` is that of LDraw."""
 
-LONGEST = 5.0
-"""A product is taken to be no longer than this [m], where a file does not say its unit."""
+LONGEST, LIKELY = 5.0, 2.5
+"""A product is no longer than the first [m] whatever a file states, and no longer than the second
+where its format states the unit, which not every program heeds."""
+
+DOUBTFUL, SHEET = (1.0, 30.0), (0.1, 2.0)
+"""A product may be so long in metres, centimetres and inches alike, between the two; one that is
+longer may be in either of the latter, too, where the median part is as thin as SHEET."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,11 +43,12 @@ class FileBody:
 @dataclass(frozen=True, slots=True)
 class Bodies:
     """The bodies of a source. `unit` is the one that it states, "" for none; `by` says which rule
-    states it."""
+    states it; `sure`: whether this very file does."""
 
     found: tuple[FileBody, ...]
     unit: str = ""
     by: str = ""
+    sure: bool = False
     notes: tuple[str, ...] = ()
     warnings: tuple[Diagnostic, ...] = ()
 
@@ -55,24 +61,56 @@ def box_of(body: FileBody) -> tuple[Array, Array]:
 
 def unit_of(bodies: Bodies, asked: str | None) -> tuple[float, str]:
     """The unit of lengths [m], and in words how it is known: asked for, stated by the file, or
-    guessed: metres, or millimetres where metres make a product longer than LONGEST."""
-    low, high = zip(*map(box_of, bodies.found), strict=True)
-    length = float(np.ptp(np.concatenate([low, high]), axis=0).max())
+    guessed: metres, or millimetres where metres make a product too long. Raises
+    InputError (Unit) where several units are as likely."""
+    low, high = (np.array(ends) for ends in zip(*map(box_of, bodies.found), strict=True))
+    length = float((high.max(axis=0) - low.min(axis=0)).max())
     if asked:
         return UNITS[asked], f"lengths are in {asked}, as asked for: {_long(length, asked)}"
-    if bodies.unit and length * UNITS[bodies.unit] <= LONGEST:
+    if bodies.unit and length * UNITS[bodies.unit] <= (LONGEST if bodies.sure else LIKELY):
         return UNITS[bodies.unit], f"lengths are in {bodies.unit}: {bodies.by}"
-    unit = "m" if length <= LONGEST else "mm"
     why = (
         f"{bodies.by}, but that would be a product of {length * UNITS[bodies.unit]:.4g} m"
         if bodies.unit
         else "the files state no unit"
     )
+    thinnest = float(np.median((high - low).min(axis=1)))
+    if DOUBTFUL[0] < length < DOUBTFUL[1] or (
+        length >= DOUBTFUL[1] and SHEET[0] < thinnest < SHEET[1]
+    ):
+        ways = ", ".join(f"{length * UNITS[unit]:.3g} m in {unit}" for unit in ("m", "cm", "mm"))
+        message = (
+            f"the unit of lengths is not known: {why}; the product is {length:.4g} units long, "
+            f"{ways}, {length * UNITS['in']:.3g} m in inches"
+        )
+        raise InputError(Diagnostic("Unit", message, None, "--unit m, cm, mm or in says it"))
+    unit = "m" if length <= DOUBTFUL[0] else "mm"
     return UNITS[unit], f"lengths are taken as {unit}: {why}; {_long(length, unit)} (--unit)"
 
 
 def _long(length: float, unit: str) -> str:
     return f"the product is {length * UNITS[unit]:.4g} m long"
+
+
+def solids_of(body: FileBody) -> tuple[FileBody, ...]:
+    """The solids of a body, told apart where they touch, each with its cavities; the body itself
+    where it is one, or is not closed."""
+    vertices, faces = body.mesh.merged()
+    shells = closed_bodies(vertices, faces) if is_closed(faces) else []
+    volumes = [volume_of(*shell) for shell in shells]
+    outer = [n for n, volume in enumerate(volumes) if volume > 0]
+    if len(outer) < 2:
+        return (body,)
+    made = {n: [shells[n]] for n in outer}
+    boxes = [(shell[0].min(axis=0), shell[0].max(axis=0)) for shell in shells]
+    for number in set(range(len(shells))) - set(outer):
+        low, high = boxes[number]
+        around = [n for n in outer if (boxes[n][0] <= low).all() and (boxes[n][1] >= high).all()]
+        made[min(around or outer, key=volumes.__getitem__)].append(shells[number])
+    return tuple(
+        FileBody(body.name and f"{body.name}-{index}", MeshFile((joined(own),)), body.colour)
+        for index, own in enumerate(made.values(), 1)
+    )
 
 
 def apart(body: FileBody) -> tuple[FileBody, ...]:

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from factory.geometry.mesh_reader import ANEW, UnreadableMesh
+from factory.geometry.mesh_file import ANEW, UnreadableMesh
 from factory.geometry.meshes import Array, Indices
 from factory.geometry.solids import colour
 from factory.importing.assembling import assemble
@@ -58,7 +58,9 @@ def _folder(folder: Path) -> Bodies:
         notes.append(f"{len(left)} in the folder are no meshes, and left out: {shown}")
     units = {made.unit for made in found}
     one = found[0] if len(units) == 1 else Bodies(())
-    return Bodies(tuple(b for made in found for b in made.found), one.unit, one.by, tuple(notes))
+    notes += [note for made in found for note in made.notes]
+    every = tuple(body for made in found for body in made.found)
+    return Bodies(every, one.unit, one.by, one.sure, tuple(notes))
 
 
 def _read(path: Path, faults: list[Diagnostic], whole: bool = False) -> Bodies | None:
@@ -69,7 +71,7 @@ def _read(path: Path, faults: list[Diagnostic], whole: bool = False) -> Bodies |
         if whole or suffix in MESHES:
             return read_one(path, content)
         made = read_scene(content, suffix)
-        return replace(made, notes=(f"{len(made.found)} bodies in {path.name}",))
+        return replace(made, notes=(f"{len(made.found)} bodies in {path.name}", *made.notes))
     except (OSError, UnreadableMesh) as error:
         why = error.strerror if isinstance(error, OSError) else error
         message = f"cannot read {quoted(path.name)}: {why}"

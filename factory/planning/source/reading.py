@@ -11,7 +11,8 @@ from factory.importing.importer import LDRAW
 from factory.lang.source import quoted
 from factory.planning.parts import InPlace, Kept, PlacedPart
 from factory.planning.source.alike import Alike, alike
-from factory.planning.source.faults import check_count, check_places
+from factory.planning.source.faults import check_count, check_places, raise_if_any
+from factory.planning.source.in_place import check_in_place
 from factory.planning.source.loose import bodies_in, loose_product
 from factory.planning.source.placing import placed, shape_in_place
 from factory.planning.source.scene_file import MESHES, SCENES
@@ -27,13 +28,15 @@ SHOWN = 12
 @dataclass(frozen=True, slots=True)
 class SourceOptions:
     """`unit`: that of lengths, None to be found out; `keep`: labels of sub-trees that stay;
-    `replan`: whether a PAG's tree is thrown away; `library` and `boxes` as for an LDraw import."""
+    `replan`: whether a PAG's tree is thrown away; `library` and `boxes` as for an LDraw import;
+    `in_place`: whether parts are taken to be in place, whatever they look like."""
 
     unit: str | None = None
     keep: tuple[str, ...] = ()
     replan: bool = False
     library: Path | None = None
     boxes: bool = False
+    in_place: bool = False
 
 
 @collector_paused()
@@ -50,6 +53,8 @@ def read_source(
     firsts = zip(parts, found.kinds, strict=True)
     named = tuple(replace(part, kind=parts[first].label) for part, first in firsts)
     doubtful = check_places(named, made.has_tree, asked.unit is not None)
+    if not (made.has_tree or asked.in_place):
+        raise_if_any(check_in_place(named))
     notes = (*made.notes, _kinds(named), *_twins(named, found))
     kept = _kept(made, asked.keep)
     said = tuple(f"'{k.label}' stays as it is: {len(k.parts)} parts" for k in kept)

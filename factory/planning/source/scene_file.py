@@ -2,23 +2,17 @@
 
 from __future__ import annotations
 
-import io
-import os
 import re
-import sys
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
-from factory.geometry.mesh_reader import MeshFile, UnreadableMesh, checked, read_mesh, reading
-from factory.planning.source.bodies import Bodies, FileBody
-from factory.support.extras import optional
-
-if TYPE_CHECKING:
-    import trimesh
+from factory.geometry.glb_reader import GlbBody, read_glb
+from factory.geometry.mesh_file import MeshFile, UnreadableMesh, checked
+from factory.geometry.mesh_reader import read_mesh
+from factory.nets.verdict import listing
+from factory.planning.source import threemf_file
+from factory.planning.source.bodies import Bodies, FileBody, solids_of
+from factory.planning.source.step_file import read_step
 
 STEP, SCENES = (".step", ".stp"), (".glb", ".3mf", ".step", ".stp")
 """Endings of files whose bodies have names."""
@@ -27,20 +21,11 @@ MESHES = (".obj", ".stl", ".ply", ".off")
 """Endings of files with one body."""
 
 STATED = {
-    ".glb": ("m", "a GLB file is in metres by its standard"),
-    ".step": ("m", "a STEP file states its unit"),
+    ".glb": ("m", "a GLB file is in metres by its standard", False),
+    ".step": ("m", "a STEP file states its unit", True),
 }
-"""The unit of what trimesh makes of a file, and the rule that says so."""
-
-IN_3MF = {
-    "micron": 1e-6,
-    "millimeter": 1e-3,
-    "centimeter": 1e-2,
-    "inch": 0.0254,
-    "foot": 0.3048,
-    "meter": 1.0,
-}
-"""The units that a 3MF file may state [m]."""
+"""The unit of what is made of a file, the rule that says so, and whether the file says so
+itself."""
 
 NAMELESS = re.compile(
     r"(?i)(|=>.*|\W*\d*\W*|(nauo|node|mesh|object|geometry|solid|body|group|component|world)"
@@ -48,66 +33,57 @@ NAMELESS = re.compile(
 )
 """Names that programs make up."""
 
+SHOWN = 6
+"""So many parts of several bodies are named."""
+
 
 def read_scene(content: bytes, suffix: str) -> Bodies:
-    """The bodies of a file with this ending, lower case, by their names. Raises UnreadableMesh, and
-    MissingError where the package is missing that reads it."""
+    """The bodies of a file with this ending, lower case, by their names; the solids of a component
+    of a STEP file are a body each. Raises UnreadableMesh, and MissingError where the package is
+    missing that reads it."""
     kind = ".step" if suffix in STEP else suffix
     if not content.strip():
         raise UnreadableMesh("it is empty")
-    if kind == ".step":
-        optional("cascadio", "cascadio", "reading STEP", "step", "export it as GLB or 3MF")
     if kind == ".3mf":
-        optional("lxml.etree", "lxml", "reading 3MF", "3mf", "export it as GLB")
-    import trimesh
-
-    with reading(kind), _muted(kind == ".step"):
-        scene = trimesh.load_scene(io.BytesIO(content), file_type=kind[1:], process=False)
-        found = [_body(scene, node, kind) for node in sorted(scene.graph.nodes_geometry)]
-    bodies = tuple(body for body in found if body is not None)
+        found, unit = threemf_file.read_3mf(content)
+        metres = threemf_file.UNITS.get(unit)
+        if metres is None:
+            raise UnreadableMesh(f"it states a unit that 3MF does not have: {unit[:20]}")
+        bodies = [_body(body, kind, metres) for body in found]
+        stated = "m", f"the 3MF file states {unit}", True
+    else:
+        bodies = [
+            _body(body, kind) for body in (read_step if kind == ".step" else read_glb)(content)
+        ]
+        stated = STATED[kind]
     if not bodies:
         checked((), kind)
-    if kind != ".3mf":
-        return Bodies(bodies, *STATED[kind])
-    unit = str(scene.units or "millimeter").removesuffix("s")
-    metres = _scaled(bodies, IN_3MF.get(unit, 1e-3))
-    return Bodies(metres, "m", f"the 3MF file states {unit}")
+    if kind != ".step":
+        return Bodies(tuple(bodies), *stated, _merged(bodies))
+    parts = [solids_of(body) for body in bodies]
+    notes = [
+        f"component '{body.name}' has {len(solids)} solids: a part each"
+        for body, solids in zip(bodies, parts, strict=True)
+        if len(solids) > 1
+    ]
+    apart = [body for solids in parts for body in solids]
+    return Bodies(tuple(apart), *stated, (*notes[:SHOWN], *_merged(apart)))
 
 
-def _body(scene: trimesh.Scene, node: str, suffix: str) -> FileBody | None:
-    """The body at a node of a scene; None for what has no triangles."""
-    import trimesh
-
-    matrix, geometry = scene.graph[node]
-    mesh = scene.geometry[geometry]
-    if not isinstance(mesh, trimesh.Trimesh) or not len(mesh.faces):
-        return None
-    vertices = np.array(mesh.vertices, float) @ matrix[:3, :3].T + matrix[:3, 3]
-    faces = np.array(mesh.faces, np.int64)
-    if np.linalg.det(matrix[:3, :3]) < 0:
-        faces = faces[:, ::-1]
-    name = next((n for n in (node, geometry) if not NAMELESS.fullmatch(str(n))), "")
-    return FileBody(str(name), checked([(vertices, faces)], suffix), _colour(mesh))
+def _body(body: GlbBody, suffix: str, unit: float = 1.0) -> FileBody:
+    """A body of a file, in another unit."""
+    name = next((name for name in body.names if not NAMELESS.fullmatch(name)), "")
+    return FileBody(name, checked([(body.vertices * unit, body.faces)], suffix), body.colour)
 
 
-def _colour(mesh: Any) -> tuple[float, ...] | None:
-    """The colour of a mesh, None where the file gives it none."""
-    kind = getattr(mesh.visual, "kind", None)
-    if kind not in ("face", "vertex", "texture"):
-        return None
-    material: Any = getattr(mesh.visual, "material", None)
-    if kind == "texture" and getattr(material, "baseColorFactor", material) is None:
-        return None
-    found = material.main_color if kind == "texture" else mesh.visual.main_color
-    return tuple(round(float(x) / 255, 3) for x in np.asarray(found)[:4])
-
-
-def _scaled(bodies: tuple[FileBody, ...], unit: float) -> tuple[FileBody, ...]:
-    """Bodies with their lengths times a unit."""
-    return tuple(
-        FileBody(b.name, MeshFile(tuple((v * unit, f) for v, f in b.mesh.bodies)), b.colour)
-        for b in bodies
-    )
+def _merged(bodies: Sequence[FileBody]) -> tuple[str, ...]:
+    """That bodies which a file keeps together are one part each, in words; none where it keeps
+    none."""
+    counts = [(body.name, count) for body in bodies if (count := len(solids_of(body))) > 1]
+    if not counts:
+        return ()
+    shown = [f"'{name}' of {count}" for name, count in counts]
+    return (f"bodies that the file keeps together are one part: {listing(shown, SHOWN)}",)
 
 
 def read_one(path: Path, content: bytes) -> Bodies:
@@ -119,24 +95,8 @@ def read_one(path: Path, content: bytes) -> Bodies:
     every = tuple(body for found in scene.found for body in found.mesh.bodies)
     colours = {found.colour for found in scene.found}
     colour = colours.pop() if len(colours) == 1 else None
-    return Bodies((FileBody(path.stem, MeshFile(every), colour),), scene.unit, scene.by)
-
-
-@contextmanager
-def _muted(muted: bool) -> Iterator[None]:
-    """Within it nothing that a library prints past Python is seen: the reader of STEP does."""
-    if not muted:
-        yield
-        return
-    sys.stdout.flush()
-    sys.stderr.flush()
-    kept, nowhere = (os.dup(1), os.dup(2)), os.open(os.devnull, os.O_WRONLY)
-    try:
-        for stream in (1, 2):
-            os.dup2(nowhere, stream)
-        yield
-    finally:
-        for stream, old in zip((1, 2), kept, strict=True):
-            os.dup2(old, stream)
-            os.close(old)
-        os.close(nowhere)
+    many = len(scene.found)
+    notes = (f"{path.name} has {many} bodies: one part, as each file is",) * (many > 1)
+    return Bodies(
+        (FileBody(path.stem, MeshFile(every), colour),), scene.unit, scene.by, scene.sure, notes
+    )

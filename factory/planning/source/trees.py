@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path, PurePosixPath
 
-from factory.geometry.mesh_reader import ANEW
+from factory.geometry.mesh_file import ANEW
 from factory.importing import Options, import_product
 from factory.importing.labels import file_stem
 from factory.importing.mesh_files import MeshStore

@@ -1,0 +1,47 @@
+"""What only the user knows of a source, asked for on a terminal and refused elsewhere."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import click
+
+from factory.support.errors import InputError
+
+if TYPE_CHECKING:
+    from factory.planning.parts import InPlace
+    from factory.planning.source.reading import SourceOptions
+
+UNITS = ("m", "cm", "mm", "in", "ldu")
+"""The names of units of length; `ldu` is that of LDraw, 0.4 mm."""
+
+
+def is_terminal() -> bool:
+    """Whether someone reads questions and can answer."""
+    return sys.stdin.isatty() and sys.stderr.isatty()
+
+
+def asked(
+    read: Callable[[SourceOptions], InPlace], options: SourceOptions, silent: bool
+) -> InPlace:
+    """What `read` makes of a source. Where its unit is not known, or its parts do not seem to be in
+    place, the user is asked, unless `silent` or not on a terminal. Raises InputError as `read`
+    does, also where the user says no."""
+    while True:
+        try:
+            return read(options)
+        except InputError as error:
+            codes = {diagnostic.code for diagnostic in error.diagnostics}
+            if silent or not is_terminal() or codes not in ({"Unit"}, {"NotInPlace"}):
+                raise
+            click.echo("\n".join(d.message for d in error.diagnostics), err=True)
+            if codes == {"Unit"}:
+                unit = click.prompt("unit of lengths", type=click.Choice(UNITS), err=True)
+                options = replace(options, unit=unit)
+            elif click.confirm("plan them where they are?", err=True):
+                options = replace(options, in_place=True)
+            else:
+                raise

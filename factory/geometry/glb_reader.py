@@ -1,0 +1,327 @@
+"""GLB files (binary glTF 2.0) as triangles, with names, places and colours.
+
+Every count and offset is checked against the bytes that are there, and against MOST, before memory
+is taken for it: a file of a kilobyte may announce what takes gigabytes.
+"""
+
+from __future__ import annotations
+
+import json
+import struct
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from factory.geometry.mesh_file import EXPECTED, UnreadableMesh
+from factory.geometry.meshes import Array, Indices
+from factory.geometry.solids import rotation
+
+MOST = 10_000_000
+"""The most numbers of an accessor, and the most triangles of all bodies where they stand."""
+
+TEXT = 32 << 20
+"""The most bytes of the part of a file that is JSON."""
+
+NESTED = 500
+"""So deep, at most, nodes are nested."""
+
+TYPES = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
+"""The types of numbers, by `componentType`."""
+
+WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4}
+"""How many numbers an element has."""
+
+TRIANGLES, STRIP, FAN = 4, 5, 6
+"""The modes of primitives that have triangles."""
+
+Object = dict[str, Any]
+Matrix = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class GlbBody:
+    """A mesh at a node: the names of both, "" for none; vertices (n, 3) where they stand, in the
+    file's unit; faces (m, 3); the colour, as it is written, of most of its surface, None for
+    none."""
+
+    names: tuple[str, str]
+    vertices: Array = field(repr=False)
+    faces: Indices = field(repr=False)
+    colour: tuple[float, ...] | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class _Shape:
+    """A mesh of the file in its own frame."""
+
+    name: str
+    vertices: Array
+    faces: Indices
+    colour: tuple[float, ...] | None
+
+
+@np.errstate(all="ignore")
+def read_glb(content: bytes) -> list[GlbBody]:
+    """The bodies of a GLB file, a body a node that has triangles, in the order of the scene. Raises
+    UnreadableMesh."""
+    glb = _Glb(*_chunks(content))
+    found, total = [], 0
+    for node, matrix in glb.nodes():
+        shape = glb.shape(node["mesh"])
+        if not len(shape.faces):
+            continue
+        total += len(shape.faces)
+        if total > MOST:
+            raise _broken(f"its nodes have more than {MOST} triangles together")
+        vertices = shape.vertices @ matrix[:3, :3].T + matrix[:3, 3]
+        faces = shape.faces[:, ::-1] if np.linalg.det(matrix[:3, :3]) < 0 else shape.faces
+        found.append(GlbBody((_name(node), shape.name), vertices, faces, shape.colour))
+    return found
+
+
+def _chunks(content: bytes) -> tuple[Object, bytes]:
+    """The JSON of a file, and its bytes of arrays."""
+    if content[:4] != b"glTF" or len(content) < 20:
+        raise _broken()
+    if struct.unpack_from("<I", content, 4)[0] != 2:
+        raise _broken("its version is not 2")
+    parts: dict[bytes, bytes] = {}
+    at = 12
+    while at + 8 <= len(content):
+        size, kind = struct.unpack_from("<I4s", content, at)
+        if at + 8 + size > len(content):
+            raise _broken(f"{at + 8 + size} bytes are announced, {len(content)} are there")
+        parts.setdefault(kind, content[at + 8 : at + 8 + size])
+        at += 8 + size
+    text = parts.get(b"JSON", b"")
+    if len(text) > TEXT:
+        raise _broken(f"its JSON is larger than {TEXT >> 20} MiB, the most that is read")
+    try:
+        document = json.loads(text)
+    except (ValueError, RecursionError):
+        raise _broken("its first chunk is not JSON") from None
+    if not isinstance(document, dict):
+        raise _broken("its JSON is no object")
+    return document, parts.get(b"BIN\0", b"")
+
+
+def _broken(why: str = "") -> UnreadableMesh:
+    return UnreadableMesh(f"it is not {EXPECTED['.glb']}" + (f": {why}" if why else ""))
+
+
+def _name(entry: Object) -> str:
+    name = entry.get("name")
+    return name if isinstance(name, str) else ""
+
+
+def _whole(value: object, what: str, most: int = MOST) -> int:
+    """A whole number from 0."""
+    if isinstance(value, bool) or not isinstance(value, int) or not 0 <= value <= most:
+        raise _broken(f"{what} is no whole number from 0 to {most}")
+    return value
+
+
+def _numbers(value: object, count: int, what: str) -> Array:
+    """So many finite numbers."""
+    good = isinstance(value, list) and len(value) == count
+    if good and all(isinstance(x, int | float) and abs(x) < 1e30 for x in value):  # type: ignore[attr-defined]
+        return np.array(value, float)
+    raise _broken(f"{what} is not {count} numbers")
+
+
+class _Glb:
+    """A document, its arrays, and the meshes that were read of it."""
+
+    def __init__(self, document: Object, arrays: bytes) -> None:
+        self.document, self.arrays = document, arrays
+        self._shapes: dict[int, _Shape] = {}
+        needed = self.document.get("extensionsRequired")
+        for name in needed if isinstance(needed, list) else ():
+            if "compression" in str(name):
+                raise _broken(f"its triangles are compressed ({str(name)[:40]})")
+
+    def entry(self, kind: str, number: object) -> Object:
+        """One of the document's nodes, meshes, accessors and the like."""
+        every = self.document.get(kind)
+        many = len(every) if isinstance(every, list) else 0
+        if type(number) is not int or not 0 <= number < many:
+            raise _broken(f"it names one of its {kind} that is not there")
+        found = every[number]  # type: ignore[index]
+        if not isinstance(found, dict):
+            raise _broken(f"one of its {kind} is no object")
+        return found
+
+    def listed(self, entry: Object, key: str) -> list[Any]:
+        """A list in an entry, empty where there is none."""
+        found = entry.get(key, [])
+        if not isinstance(found, list):
+            raise _broken(f"'{key}' is no list")
+        return found
+
+    def nodes(self) -> Iterator[tuple[Object, Matrix]]:
+        """The nodes with a mesh, parents first, and where they stand (4, 4)."""
+        stack = [(number, np.eye(4), 1) for number in reversed(self._roots())]
+        seen: set[int] = set()
+        while stack:
+            number, above, depth = stack.pop()
+            node = self.entry("nodes", number)
+            if number in seen:
+                raise _broken("one of its nodes is below two others, or below itself")
+            if depth > NESTED:
+                raise _broken(f"its nodes are nested more than {NESTED} deep")
+            seen.add(number)
+            matrix = above @ _placed(node)
+            if "mesh" in node:
+                yield node, matrix
+            below = self.listed(node, "children")
+            stack += [(child, matrix, depth + 1) for child in reversed(below)]
+
+    def _roots(self) -> list[Any]:
+        """The nodes of the scene that is shown; where there is none, those below no other."""
+        if self.document.get("scenes"):
+            scene = self.entry("scenes", self.document.get("scene", 0))
+            return self.listed(scene, "nodes")
+        every = self.listed(self.document, "nodes")
+        below = {
+            child
+            for number in range(len(every))
+            for child in self.listed(self.entry("nodes", number), "children")
+            if isinstance(child, int)
+        }
+        return [number for number in range(len(every)) if number not in below]
+
+    def shape(self, number: object) -> _Shape:
+        """A mesh: the triangles of all its primitives, and the colour of the larger part."""
+        mesh = self.entry("meshes", number)
+        if number not in self._shapes:
+            self._shapes[number] = self._read(mesh)  # type: ignore[index]
+        return self._shapes[number]  # type: ignore[index]
+
+    def _read(self, mesh: Object) -> _Shape:
+        points, corners, start = [np.zeros((0, 3))], [np.zeros((0, 3), np.int64)], 0
+        areas: dict[tuple[float, ...] | None, float] = {}
+        for primitive in self.listed(mesh, "primitives"):
+            if not isinstance(primitive, dict):
+                raise _broken("one of its primitives is no object")
+            vertices, faces = self._triangles(primitive)
+            colour = self._colour(primitive)
+            a, b, c = (vertices[faces[:, corner]] for corner in range(3))
+            area = float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum())
+            areas[colour] = areas.get(colour, 0.0) + area
+            points.append(vertices)
+            corners.append(faces + start)
+            start += len(vertices)
+        colour = max(areas, key=areas.__getitem__, default=None)
+        return _Shape(_name(mesh), np.concatenate(points), np.concatenate(corners), colour)
+
+    def _triangles(self, primitive: Object) -> tuple[Array, Indices]:
+        mode, attributes = primitive.get("mode", TRIANGLES), primitive.get("attributes")
+        where = attributes.get("POSITION") if isinstance(attributes, dict) else None
+        if mode not in (TRIANGLES, STRIP, FAN) or where is None:
+            return np.zeros((0, 3)), np.zeros((0, 3), np.int64)
+        vertices = self.accessor(where, 3).astype(float)
+        if "indices" in primitive:
+            order = self.accessor(primitive["indices"], 1).ravel()
+            if order.dtype.kind != "u":
+                raise _broken("its indices are no whole numbers")
+            order = order.astype(np.int64)
+        else:
+            order = np.arange(len(vertices))
+        faces = _faces(order, mode)
+        if len(faces) and not faces.max() < len(vertices):
+            raise _broken("a triangle has a vertex that is not there")
+        return vertices, faces
+
+    def _colour(self, primitive: Object) -> tuple[float, ...] | None:
+        """The colour of a primitive's material, None where it states none."""
+        if "material" not in primitive:
+            return None
+        surface = self.entry("materials", primitive["material"]).get("pbrMetallicRoughness")
+        if not isinstance(surface, dict) or "baseColorFactor" not in surface:
+            return None
+        factor = np.clip(_numbers(surface["baseColorFactor"], 4, "a colour"), 0, 1)
+        return tuple(round(float(x), 3) for x in factor)
+
+    def accessor(self, number: object, width: int) -> NDArray[Any]:
+        """The numbers (n, width) of an accessor."""
+        entry = self.entry("accessors", number)
+        kind = TYPES.get(entry.get("componentType", 0))
+        if kind is None or WIDTHS.get(str(entry.get("type"))) != width:
+            raise _broken("an accessor has a type that it may not have here")
+        count = _whole(entry.get("count"), "the count of an accessor", MOST // width)
+        if "bufferView" in entry:
+            found = self._viewed(entry, count, np.dtype(kind), width)
+        else:
+            found = np.zeros((count, width), kind)
+        if "sparse" in entry:
+            found = self._sparse(entry["sparse"], found.copy())
+        if entry.get("normalized") is True and found.dtype.kind in "iu":
+            found = np.maximum(found / float(np.iinfo(found.dtype).max), -1.0)
+        return found
+
+    def _sparse(self, entry: object, found: NDArray[Any]) -> NDArray[Any]:
+        """An array in which some rows are replaced."""
+        parts = [entry.get(key) for key in ("indices", "values")] if isinstance(entry, dict) else []
+        if not all(isinstance(part, dict) for part in parts) or not isinstance(entry, dict):
+            raise _broken("a sparse accessor has no indices, or no values")
+        count = _whole(entry.get("count"), "the count of a sparse accessor", len(found))
+        at, values = parts
+        kind = TYPES.get(at.get("componentType", 0))  # type: ignore[union-attr]
+        if kind is None or "u" not in kind:
+            raise _broken("the indices of a sparse accessor are no whole numbers")
+        rows = self._viewed(at, count, np.dtype(kind), 1).ravel()  # type: ignore[arg-type]
+        if len(rows) and not rows.max() < len(found):
+            raise _broken("a sparse accessor has a row that is not there")
+        found[rows] = self._viewed(values, count, found.dtype, found.shape[1])  # type: ignore[arg-type]
+        return found
+
+    def _viewed(self, entry: Object, count: int, kind: np.dtype[Any], width: int) -> NDArray[Any]:
+        """Numbers (count, width) out of the file's bytes."""
+        view = self.entry("bufferViews", entry.get("bufferView"))
+        buffer = self.entry("buffers", view.get("buffer"))
+        if view.get("buffer") != 0 or "uri" in buffer:
+            raise _broken("its arrays are in another file; a GLB file has them itself")
+        size = len(self.arrays)
+        start = _whole(view.get("byteOffset", 0), "an offset", size)
+        end = start + _whole(view.get("byteLength"), "the length of an array", size)
+        start += _whole(entry.get("byteOffset", 0), "an offset", size)
+        row = kind.itemsize * width
+        stride = _whole(view.get("byteStride", row), "a stride", 252) or row
+        if not 0 <= start + (stride * (count - 1) + row if count else 0) <= min(end, size):
+            raise _broken("an array reaches beyond its bytes")
+        strides = (stride, kind.itemsize)
+        return np.ndarray((count, width), kind, self.arrays, start if count else 0, strides)
+
+
+def _placed(node: Object) -> Matrix:
+    """Where a node stands in its parent (4, 4)."""
+    if "matrix" in node:
+        return _numbers(node["matrix"], 16, "a matrix").reshape(4, 4).T
+    found = np.eye(4)
+    if "rotation" in node:
+        x, y, z, w = _numbers(node["rotation"], 4, "a rotation")
+        length = float(np.linalg.norm((x, y, z, w)))
+        if length < 1e-6:
+            raise _broken("a rotation is not a unit quaternion")
+        found[:3, :3] = rotation(np.array([w, x, y, z]) / length)
+    if "scale" in node:
+        found[:3, :3] *= _numbers(node["scale"], 3, "a scale")
+    if "translation" in node:
+        found[:3, 3] = _numbers(node["translation"], 3, "a translation")
+    return found
+
+
+def _faces(order: Indices, mode: int) -> Indices:
+    """Triangles (m, 3) of vertices in the order of a primitive."""
+    if mode == TRIANGLES:
+        return order[: len(order) // 3 * 3].reshape(-1, 3)
+    if len(order) < 3:
+        return np.zeros((0, 3), np.int64)
+    if mode == FAN:
+        return np.column_stack([np.full(len(order) - 2, order[0]), order[1:-1], order[2:]])
+    faces = np.column_stack([order[:-2], order[1:-1], order[2:]])
+    faces[1::2] = faces[1::2, ::-1]
+    return np.asarray(faces[(faces != np.roll(faces, 1, axis=1)).all(axis=1)])

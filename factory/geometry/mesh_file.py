@@ -1,0 +1,65 @@
+"""The triangles of a mesh file, by the bodies that it keeps apart, and why a file has none."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from factory.geometry.meshes import Array, Indices
+from factory.geometry.pieces import joined
+
+EXPECTED = {
+    ".obj": "an OBJ file (lines 'v x y z' for vertices, 'f 1 2 3' for faces)",
+    ".stl": "an STL file (84 bytes and 50 more a triangle, or a text that begins with 'solid')",
+    ".ply": "a PLY file (a header from 'ply' to 'end_header', then all its vertices and faces)",
+    ".glb": "a GLB file (binary glTF 2.0, complete, with triangles that are not compressed)",
+    ".off": "an OFF file (a line 'OFF', numbers of vertices, faces and edges, then these)",
+    ".3mf": "a 3MF file (a ZIP archive with 3D/3dmodel.model)",
+    ".step": "a STEP file (ISO 10303-21, which begins with 'ISO-10303-21;', with solids in it)",
+}
+"""What a file of a suffix should hold."""
+
+ANEW = "export it again as .obj, .stl, .ply or .glb with triangles"
+"""The way out of a file that cannot be read."""
+
+
+class UnreadableMesh(Exception):
+    """Why a file is no mesh, as a sentence about the file: "it has no triangles"."""
+
+
+@dataclass(frozen=True, slots=True)
+class MeshFile:
+    """The triangles of a file, by the bodies that it keeps apart: vertices (n, 3) and faces (m, 3)
+    of each, in the file's unit."""
+
+    bodies: tuple[tuple[Array, Indices], ...] = field(repr=False)
+
+    def merged(self) -> tuple[Array, Indices]:
+        """All triangles, with one vertex at a place; those with fewer than three corners are left
+        out, if any others are there."""
+        return _merged(*joined(self.bodies))
+
+
+def checked(bodies: Iterable[tuple[Array, Indices]], suffix: str) -> MeshFile:
+    """The bodies that have triangles. Raises UnreadableMesh where none has, or one is broken."""
+    found = [(vertices, faces) for vertices, faces in bodies if len(faces)]
+    if not found:
+        raise UnreadableMesh(f"it has no triangles; it should be {EXPECTED[suffix]}")
+    for vertices, faces in found:
+        if not 0 <= faces.min() <= faces.max() < len(vertices):
+            raise UnreadableMesh("a triangle has a vertex that is not there")
+        if not np.isfinite(vertices[faces]).all():
+            raise UnreadableMesh("it has vertices that are not finite (nan or inf)")
+    return MeshFile(tuple(found))
+
+
+def _merged(vertices: Array, faces: Indices) -> tuple[Array, Indices]:
+    import trimesh
+
+    body = trimesh.Trimesh(vertices, faces, process=False)
+    body.merge_vertices()
+    found = np.asarray(body.faces)
+    whole = (found != np.roll(found, 1, axis=1)).all(axis=1)
+    return np.asarray(body.vertices), found[whole] if whole.any() else found
