@@ -97,10 +97,12 @@ class Project:
     @property
     def warnings(self) -> tuple[Diagnostic, ...]:
         """What is wrong with the geometry of its parts, what is blocked, and what no hand can
-        hold."""
+        hold, unless the product is of an unlikely size."""
         product = () if is_plain(self.pag) else self.product.warnings
         blocked = self.matings.warnings if self.matings else ()
-        return (*product, *blocked, *(found.warning() for found in self.no_grips))
+        sized = any(warning.code == "Size" for warning in product)
+        grips = () if sized else tuple(found.warning() for found in self.no_grips)
+        return (*product, *blocked, *grips)
 
     @cached_property
     def _hands(self) -> Hands | None:

@@ -309,7 +309,7 @@ def test_check_warns_as_build_does(run: Terminal, tmp_path: Path) -> None:
     assert run("check", file, "-q").err == ""
     found = run("check", file, "--json").json["warnings"]
     assert found == run("build", file, "--json").json["warnings"]
-    assert [warning["code"] for warning in found] == ["Size", "NoGrip"]
+    assert [warning["code"] for warning in found] == ["Size"]
     assert run("check", PAPER, "--json").json["warnings"] == []
 
 

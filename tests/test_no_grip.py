@@ -9,6 +9,7 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
+import factory
 from factory.export.grip_picture import picture_names
 from factory.layout.hands.choosing import STRONG
 from factory.layout.hands.misses import NoGrip
@@ -49,14 +50,73 @@ def of_the_gearbox() -> tuple[NoGrip, ...]:
 
 def test_what_no_hand_can_hold_is_said(tub: Path) -> None:
     (told,) = (warning for warning in read(tub).warnings if warning.code == "NoGrip")
-    assert (
-        "no hand can hold 'axle': above, 180 of 180 places: parts that are lowered" in told.message
-    )
-    assert "at the nearest miss, (0, 9, 50) mm, gear lowered onto it; behind, " in told.message
+    assert told.message == "no hand can hold 'axle'"
+    assert told.hint.startswith("above, 180 of 180 places: parts that are lowered")
+    assert "at the nearest miss, (0, 9, 50) mm, gear lowered onto it; behind, " in told.hint
     assert told.position is not None and told.position.line == 1
     bare = read(tub, (), Settings(hands=0))
     assert not [w for w in bare.warnings if w.code == "NoGrip"]
     assert not found(ROOT / "examples" / "stool.pag")
+
+
+SCREWS = """unit = mm; root = all; all = mate ( pair, screw ); pair = mate ( base, lid );
+base = atomic ( mesh = "base.stl" ); lid = atomic ( mesh = "lid.stl" );
+screw[2] = atomic ( mesh = "screw.stl" ) at ( 20, 0, 0 ), ( -20, 0, 0 )
+"""
+"""A lid on a base, which screws with heads hold."""
+
+
+def screwed(folder: Path, size: float, head: float, long: float) -> Path:
+    """A product with two screws of a size, with heads of some diameter [mm]."""
+    import trimesh
+
+    def turned(radius: float, low: float, high: float, at: float = 0.0) -> trimesh.Trimesh:
+        body = trimesh.creation.cylinder(radius, high - low, sections=24)
+        return body.apply_translation((at, 0, (low + high) / 2))
+
+    def drilled(low: float, high: float) -> trimesh.Trimesh:
+        body = trimesh.creation.box((60, 40, high - low)).apply_translation(
+            (0, 0, (low + high) / 2)
+        )
+        holes = [turned(size / 2 + 0.1, low - 1, high + 1, x) for x in (-20, 20)]
+        return trimesh.boolean.difference([body, *holes], engine="manifold")
+
+    shank, top = turned(size / 2, 4 - long, 4), turned(head / 2, 4, 4 + size)
+    trimesh.boolean.union([shank, top], engine="manifold").export(folder / "screw.stl")
+    drilled(-12, 0).export(folder / "base.stl")
+    drilled(0, 4).export(folder / "lid.stl")
+    file = folder / "screwed.pag"
+    file.write_text(SCREWS)
+    return file
+
+
+@pytest.mark.parametrize(("size", "head", "long"), [(2, 3.8, 6), (3, 5.5, 10), (4, 7, 12)])
+def test_small_screws_are_held(tmp_path: Path, size: float, head: float, long: float) -> None:
+    file = screwed(tmp_path, size, head, long)
+    assert not found(file)
+    if size == 3:
+        made = read(file)
+        run = factory.run(made.layout, units=2)
+        assert run.succeeded, run.verdict
+
+
+def test_a_line_says_what_has_no_grip(run: Terminal, tmp_path: Path) -> None:
+    """One for all parts, and none where the product is of an unlikely size."""
+    file = tmp_path / "pins.pag"
+    places = ", ".join(f"( {10 * x}, {10 * y}, 3 )" for x in range(4) for y in range(3))
+    file.write_text(
+        "unit = mm; root = all; all = mate ( plate, pin );"
+        "plate = atomic ( box = (90, 90, 2) );"
+        f"pin[12] = atomic ( cylinder = (0.5, 4) ) at {places}"
+    )
+    pins = ", ".join(f"pin{n}" for n in range(1, 13))
+    line = f"NoGrip warning: 12 parts have no grip: {pins}; -v"
+    for command in (["check"], ["build"]):
+        assert run(*command, file).err.splitlines() == [line]
+    assert run("check", file, "-v").err.count("no hand can hold 'pin") == 12
+    file.write_text(file.read_text().replace("unit = mm;", ""))
+    (told,) = run("check", file, "--json").json["warnings"]
+    assert told["code"] == "Size"
 
 
 def test_the_nearest_miss_is_free_without_what_is_in_its_way(tub: Path) -> None:

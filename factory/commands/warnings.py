@@ -3,18 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 from factory.commands.requests import OutputOptions
+from factory.lang.words import natural
 from factory.support.console import warn
 from factory.support.errors import Diagnostic
 
 SHOWN = 24
 """The most blocked operations that are listed, unless `-v` asks for all."""
 
+NAMED = 12
+"""The most labels that a line names."""
+
 
 def told(warnings: Sequence[Diagnostic], verbose: bool) -> list[Diagnostic]:
-    """All warnings. Unless `verbose`: those of one cause as one, that counts them, where the first
-    of them is; of blocked operations the first, and how many more there are."""
+    """All warnings. Unless `verbose`: those of one cause as one line, that counts them, and names
+    what they are about; of blocked operations the first, and how many more there are."""
     if verbose:
         return list(warnings)
     causes: dict[object, list[Diagnostic]] = {}
@@ -24,7 +29,7 @@ def told(warnings: Sequence[Diagnostic], verbose: bool) -> list[Diagnostic]:
             blocked.append(warning)
         else:
             causes.setdefault(warning.many or number, []).append(warning)
-    others = [_as_one(alike) if len(alike) > 1 else alike[0] for alike in causes.values()]
+    others = [_as_one(alike) for alike in causes.values()]
     more = len(blocked) - SHOWN
     if more > 0:
         message = f"and {more} more operations are blocked"
@@ -33,7 +38,15 @@ def told(warnings: Sequence[Diagnostic], verbose: bool) -> list[Diagnostic]:
 
 
 def _as_one(alike: list[Diagnostic]) -> Diagnostic:
-    return Diagnostic(alike[0].code, f"{len(alike)} {alike[0].many}; list: -v")
+    first, names = alike[0], sorted((one.about for one in alike if one.about), key=natural)
+    if not names:
+        message = f"{len(alike)} {first.many}; list: -v"
+        return Diagnostic(first.code, message) if len(alike) > 1 else first
+    if len(alike) == 1:
+        place = first.position and replace(first.position, text="")
+        return Diagnostic(first.code, f"{first.message}; -v", place)
+    listed = f"{', '.join(names[:NAMED])}{', ...' * (len(names) > NAMED)}"
+    return Diagnostic(first.code, f"{len(alike)} {first.many}: {listed}; -v")
 
 
 def announced(warnings: Sequence[Diagnostic], out: OutputOptions) -> list[dict[str, object]]:

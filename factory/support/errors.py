@@ -37,13 +37,15 @@ class Position:
 @dataclass(frozen=True, slots=True)
 class Diagnostic:
     """One error or warning: a documented code, what was found, where, and a way out. `many`: how
-    several of the same cause are counted, "meshes are open: ..."; "" where each is told."""
+    several of the same cause are counted, "meshes are open: ..."; "" where each is told. `about`:
+    the label it is about, by which one of many is named in a line, without what the hint says."""
 
     code: str
     message: str
     position: Position | None = None
     hint: str = ""
     many: str = ""
+    about: str = ""
 
     def __str__(self) -> str:
         """`file:line:col: CODE message`, then the source line with a caret, then the hint."""

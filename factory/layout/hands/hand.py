@@ -24,7 +24,7 @@ Kind = Literal["below", "behind", "above", "none"]
 AIR = 2e-4
 """How far a pad stays off the surface that it holds [m]: it slides along it without touching."""
 
-SLENDER = 0.004
+SLENDER = 0.001
 """Least width of a finger [m]."""
 
 STEM = 0.006

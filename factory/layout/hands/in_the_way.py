@@ -15,7 +15,7 @@ from factory.geometry.meshes import Array
 from factory.layout.hands.apart import BESIDE, HandsApart, Swept
 from factory.layout.hands.hand import Hand, Kind
 from factory.layout.hands.holding import Holding, held
-from factory.layout.hands.places import Places
+from factory.layout.hands.places import SMALL, Places
 from factory.layout.hands.reach import back, halves, reach
 from factory.layout.hands.surfaces import Way, hit, retreat, swept
 from factory.layout.hands.tips import STRONG
@@ -183,7 +183,8 @@ class InTheWay:
             axis, way = (0, x) if x else (1, y)
             end = float((solid.high if way * far > 0 else solid.low)[axis])
             left = abs(end - found.at[:, axis]) - halves(found.radius)
-            least = min(ROD, float((solid.high - solid.low)[:2].min()) / 4)
+            width = float((solid.high - solid.low)[:2].min())
+            least = min(ROD, width / (8 if width <= SMALL else 4))
             room |= left >= least + BESIDE
         return room
 

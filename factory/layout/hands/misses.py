@@ -139,22 +139,19 @@ class NoGrip:
         """What is told of it."""
         if self.ways:
             ways = "; ".join(self._way(kind, labels) for kind, labels in self.ways)
-            message = (
-                f"no one hand can hold all that {self.robot} brings, {_listed(self.line)}: {ways}"
-            )
-            hint = "they are held without one; let other labels share a robot"
-            return Diagnostic("NoGrip", message, self.position, hint)
+            message = f"no one hand can hold all that {self.robot} brings, {_listed(self.line)}"
+            hint = f"{ways}; they are held without one; let other labels share a robot"
+            return self._told(message, hint, ", ".join(self.line))
         words = "; ".join(miss.words for miss in self.misses)
         hint = "it is held without one; join it in another order, or by a relay from above"
         others = [label for label in self.line if label != self.label]
         if others:
             words += f"; so {self.robot} has no hand for {_listed(others)} either"
-        return Diagnostic(
-            "NoGrip",
-            f"no hand can hold '{self.label}': {words}",
-            self.position,
-            f"{hint} (--clashes DIR draws it)",
-        )
+        hint = f"{words}; {hint} (--clashes DIR draws it)"
+        return self._told(f"no hand can hold '{self.label}'", hint, self.label)
+
+    def _told(self, message: str, hint: str, about: str) -> Diagnostic:
+        return Diagnostic("NoGrip", message, self.position, hint, "parts have no grip", about)
 
     def _way(self, kind: Kind, labels: tuple[str, ...]) -> str:
         """Which labels of a line a kind of hand can hold, in words."""

@@ -19,6 +19,10 @@ from factory.layout.hands.tips import Tip, shares, tip
 RADII = (0.02, 0.014, 0.01, 0.007, 0.005, 0.0035, 0.0025, 0.0016, 0.001)
 """Radii of pads [m]."""
 
+SMALL, FINE = 0.008, 0.0006
+"""What is no wider than the first, a fastener, is looked at more closely, and with pads of the
+second radius too [m]."""
+
 GRID = 7
 """So many places are tried along either side of a body's box."""
 
@@ -134,6 +138,8 @@ def places(
     points = _tried(low, high, centre, side)
     if kind == "below":
         points = np.concatenate([points, _lines(low, high, centre)])
+    small = float((high.max(axis=0) - low.min(axis=0))[across].min()) <= SMALL
+    radii, smaller = (*RADII, *[FINE] * small), (*SMALLER, *[len(RADII)] * small)
     points = _rounded(points, float((high - low)[:, across].min()), product.middle)
     out = surfaces.outermost(parts, points, side)
     points, out = points[np.isfinite(out)], out[np.isfinite(out)]
@@ -141,24 +147,25 @@ def places(
     away = np.linalg.norm((points - centre)[:, across], axis=1)
     # the outermost, of which nothing is in the way, and those near the centre of mass
     first = np.lexsort((away, np.round(-out, 3)))[:TRIED]
-    points = points[np.unique(np.concatenate([first, np.argsort(away)[:NEAR]]))]
-    sizes, load = np.array(RADII), loads.about(points)
+    nearest = np.argsort(away)[: len(points) if small else NEAR]
+    points = points[np.unique(np.concatenate([first, nearest]))]
+    sizes, load = np.array(radii), loads.about(points)
     used = strain(tip("suction"), side, sizes[:, None], load)
-    useful = [n for n, radius in enumerate(RADII) if radius <= LEAST or used[n].max() > EASY]
+    useful = [n for n, radius in enumerate(radii) if radius <= LEAST or used[n].max() > EASY]
     largest = max(0, useful[0] - 1)  # larger pads are of no more use
-    covered, plane = _covered(surfaces, parts, points, (axis, way), RADII[largest:])
+    covered, plane = _covered(surfaces, parts, points, (axis, way), radii[largest:])
     blank = np.zeros((largest, len(points)))
     covered, plane = np.concatenate([blank, covered]), np.concatenate([blank, plane])
     best, share = np.full(len(points), -1), np.full(len(points), np.inf)
-    for number in range(largest, len(RADII)):
+    for number in range(largest, len(radii)):
         better = (covered[number] == 1.0) & (
             (share > EASY) & (used[number] < share)
-            | (used[number] <= EASY) & (RADII[number] >= LEAST)
+            | (used[number] <= EASY) & (radii[number] >= LEAST)
         )
         best[better], share[better] = number, used[number][better]
     # smaller pads have room where large ones do not, and one that is not all covered holds less
     found = [((best >= 0).nonzero()[0], best[best >= 0])]
-    for number in SMALLER:
+    for number in smaller:
         least = PARTLY if number < SMALLER[-1] else 0.0
         chosen = ((covered[number] > least) & (number > best)).nonzero()[0]
         found.append((chosen, np.full(len(chosen), number)))

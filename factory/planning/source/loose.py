@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -17,6 +16,7 @@ from factory.importing.labels import file_stem, label_of
 from factory.importing.mesh_files import MeshStore
 from factory.importing.places import quaternion, rounded
 from factory.lang.source import quoted
+from factory.lang.words import natural
 from factory.planning.source.alike import alike, shape_of
 from factory.planning.source.bodies import Bodies, FileBody, apart, unit_of
 from factory.planning.source.faults import check_count
@@ -45,7 +45,7 @@ def bodies_in(path: Path) -> Bodies:
 def _folder(folder: Path) -> Bodies:
     seen = sorted(p for p in folder.iterdir() if not p.name.startswith("."))
     files = [p for p in seen if p.suffix.lower() in (*MESHES, *SCENES) and not p.is_dir()]
-    files.sort(key=lambda path: _natural(path.name))
+    files.sort(key=lambda path: natural(path.name))
     faults: list[Diagnostic] = []
     found = [made for path in files if (made := _read(path, faults, whole=True)) is not None]
     if faults:
@@ -78,12 +78,6 @@ def _read(path: Path, faults: list[Diagnostic], whole: bool = False) -> Bodies |
         code = "BadFile" if isinstance(error, OSError) else "BadMesh"
         faults.append(Diagnostic(code, message, None, ANEW))
         return None
-
-
-def _natural(name: str) -> tuple[tuple[int, str], ...]:
-    """The key by which `part2` comes before `part10`."""
-    words = re.split(r"(\d+)", name.lower())
-    return tuple((int(word), "") if word.isdigit() else (-1, word) for word in words)
 
 
 def loose_product(path: Path, bodies: Bodies, unit: str | None) -> TreeProduct:
