@@ -103,7 +103,7 @@ def test_the_report_has_the_way_and_the_room_of_an_operation(
     assert terminal("report", done.json["pag"], "--units", 1, "-o", to).status == 0
     text = to.read_text().partition("How parts come together")[2].partition("</table>")[0]
     (row,) = [row for row in text.split("<tr>") if f">{join['label']}<" in row]
-    assert "<td>peg + cap</td><td>slides from " in row
+    assert "<td>peg + cap</td><td>cap is lowered " in row
     room = f"{1e3 * abs(join['clearance']):.2f} mm"
     assert (f">drawn {room} into each other<" if drawn else f">{room}<") in row
     assert (">cap - peg<" if drawn else ">none<") in row

@@ -4,7 +4,7 @@ none."""
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import pytest
@@ -207,8 +207,8 @@ def test_mirrored_twins_come_from_opposite_sides(tmp_path: Path) -> None:
 def test_what_is_in_the_way_later_counts(tmp_path: Path) -> None:
     """The bolt leaves its guide on the first step, but its way out ends at a wall."""
     found = planned(tmp_path, FAR_WALL)
-    last = max(together(found, "bolt", "guide"), 0)
-    assert last < max(together(found, "plate", "east"), together(found, "plate", "west"))
+    join = found.operations[together(found, "bolt", "guide")]
+    assert not {"east", "west"} <= {*join.pile, *join.come}
 
 
 def test_what_does_not_touch_is_not_joined_first(tmp_path: Path) -> None:
@@ -222,8 +222,11 @@ def test_parts_that_were_drawn_in_do_not_interlock(tmp_path: Path) -> None:
 
 
 def test_tongues_and_grooves_that_open_one_way_need_no_relay(tmp_path: Path) -> None:
-    found = planned(tmp_path, PLANKS)
+    """They come along x: without a relay two at a time, if x is upright. As drawn, one relay."""
+    found = planned(tmp_path, PLANKS, replace(QUICK, up=(0, +1)))
     assert found.figures.relays == 0
+    assert found.orientation[2] == pytest.approx((1, 0, 0))
+    assert planned(tmp_path, PLANKS).figures.relays == 1
     assert all(abs(join.direction[0]) == 1 for join in found.operations)
 
 

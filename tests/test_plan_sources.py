@@ -386,7 +386,7 @@ def test_a_peg_comes_out_of_a_sleeve_that_no_library_decomposes(
     monkeypatch.setattr("factory.geometry.decomposition.release", lambda package: "")
     parts, out = folder_of(tmp_path / "parts", sleeve()), tmp_path / "out"
     done = terminal("plan", parts, "-o", out, "--no-look", "--json")
-    (join,) = [j for j in done.json["joins"] if {"peg", "ring"} <= {*j["pile"], *j["come"]}]
+    join = next(j for j in done.json["joins"] if {"peg", "ring"} <= {*j["pile"], *j["come"]})
     assert [abs(x) for x in join["direction"]] == [0, 0, 1]
 
 

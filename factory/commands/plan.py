@@ -20,14 +20,20 @@ from factory.support.errors import Diagnostic, InputError, MissingError
 from factory.support.progress import StepBar, Waiting
 
 if TYPE_CHECKING:
+    from factory.geometry.meshes import Array
     from factory.pipeline import Project
     from factory.planning.hulls import Drawn
     from factory.planning.parts import InPlace
     from factory.planning.plan import CannotAssemble, Planned, PlannedJoin, PlanOptions
     from factory.planning.searching import Aim
-    from factory.plant.approaches import Kind
+    from factory.plant.approaches import Approach, Kind
 
 AIMS = ("cycle", "robots", "floor")
+
+UPS = {
+    f"{sign}{name}": (n, -1 if sign else 1) for sign in ("", "-") for n, name in enumerate("xyz")
+}
+"""The directions that may be up: an axis and its side."""
 
 LOOKS = ("exploded.png", "assembly.mp4")
 """How the names of the still and of the film end."""
@@ -60,6 +66,11 @@ KINDS: tuple[Kind, ...] = ("slide", "lower", "blocked")
     multiple=True,
     help="A part that may pass through others, where there is no other way (repeatable).",
 )
+@click.option(
+    "--up",
+    type=click.Choice(UPS),
+    help="The axis of SOURCE that is up; without, z, unless the product would tip over.",
+)
 @click.option("--hulls", is_flag=True, help="Plan with hulls, though they hide what goes in.")
 @click.option("--unit", type=click.Choice(UNITS), help="Of lengths; found out without.")
 @click.option("--in-place", is_flag=True, help="Parts are in place, whatever they look like.")
@@ -83,6 +94,7 @@ def plan(
     keep: tuple[str, ...],
     replan: bool,
     allow: tuple[str, ...],
+    up: str | None,
     hulls: bool,
     unit: str | None,
     in_place: bool,
@@ -117,7 +129,7 @@ def plan(
         for note in found.notes:
             say(f"  {note}")
     seconds = usual_seconds(len(found.units())) if seconds is None else seconds
-    search = PlanOptions(aim, seconds, allow, hulls, templates=templates)
+    search = PlanOptions(aim, seconds, allow, hulls, UPS[up] if up else None, templates=templates)
     planned = _sought(found, search, out)
     if isinstance(planned, CannotAssemble):
         return _refuse(found, planned, folder, look, out)
@@ -170,6 +182,11 @@ def cannot(found: CannotAssemble, pictures: list[Path]) -> Diagnostic:
     shown = f" (see {listing(map(str, pictures), 2)})" if pictures else ""
     message = f"no straight motion along x, y or z divides these parts: {stuck}{shown}"
     hint = f"without {more} the rest can be joined ({fewest}); {options} lets parts clash"
+    if found.needs:
+        from factory.planning.posing import in_words
+
+        ways = [f"{listing(labels)} along {in_words(way)}" for labels, way in found.needs]
+        hint = f"no turn brings all ways along axes ({'; '.join(ways)}); {hint}"
     return Diagnostic("CannotAssemble", message, None, hint)
 
 
@@ -236,7 +253,8 @@ def _document(
         "kinds": len({part.kind for part in found.parts}),
         "labels": len(project.pag),
         "kept": [keep.label for keep in found.kept],
-        "notes": list(found.notes),
+        "notes": [*found.notes, *planned.notes],
+        "orientation": planned.orientation.tolist(),
         "figures": asdict(planned.figures),
         "optimal": planned.optimal,
         "joins": [{"label": labels[id(join)], **asdict(join)} for join in planned.operations],
@@ -272,13 +290,16 @@ def _tell(
     ways += _for_hulls(planned.hidden)
     say(f"{project.file}: parts {parts}, operations {len(project.pag) - parts}; ways: {ways}")
     figures = planned.figures
+    for note in planned.notes:
+        say(note)
     best = "none is better by estimate" if planned.optimal else "the best that was found"
     cycle = f", cycle time about {figures.cycle or figures.expected:.2f} s"
     say(f"{figures.robots} robots{cycle}; {best}")
     if out.verbose and matings:
         joins = _by_label(found, planned, project)
         for mating in matings.all:
-            words = f"{mating.label}: {' + '.join(mating.inputs)}, {mating.approach.told}"
+            way = _way(mating.approach, planned.orientation)
+            words = f"{mating.label}: {' + '.join(mating.inputs)}, {way}"
             join = joins.get(mating.label)
             if join:
                 words += f", {_room(join.clearance)}{_for_hulls(_hidden_at(join, found, planned))}"
@@ -286,6 +307,16 @@ def _tell(
     for path in files if out.verbose else files[-2:]:
         say(f"  {path}")
     say(f"  factory run {project.file} --units 3 --video {project.file.with_suffix('.mp4')}")
+
+
+def _way(approach: Approach, orientation: Array) -> str:
+    """How an operation is done, in words: the directions are those of the source."""
+    from factory.planning.posing import in_words
+
+    if approach.kind == "lower":
+        return f"{approach.told} from {in_words(orientation[2])}"
+    ways = [in_words(side * orientation[approach.axis]) for side in approach.sides]
+    return f"{'slides' if approach.kind == 'slide' else 'is blocked'} from {' or '.join(ways)}"
 
 
 def _hidden_at(join: PlannedJoin, found: InPlace, planned: Planned) -> list[Drawn]:

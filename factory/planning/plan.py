@@ -11,14 +11,16 @@ from factory.geometry.meshes import Array
 from factory.layout.durations import Pace
 from factory.pipeline import Project, all_templates
 from factory.planning.blocking import CLASHES, DEEPER, LOCKED, SCRAPES, Blocking, blocking, rooms
-from factory.planning.cannot import Interlock, Removal, interlocks, removal
+from factory.planning.cannot import Direction, Interlock, Removal, removal
 from factory.planning.estimate import Expected
 from factory.planning.hulls import Drawn, refuse_hidden
 from factory.planning.judging import Join, Judged
 from factory.planning.kept import KeptPrices
 from factory.planning.laying import LaidOut, Layouts
 from factory.planning.parts import InPlace
+from factory.planning.posing import Pose, along, posed, said
 from factory.planning.searching import Aim, Budget, Sought, trees
+from factory.planning.stance import stances
 from factory.planning.writing import Tree
 from factory.problem.template import Template
 from factory.support.errors import Diagnostic, InputError, did_you_mean
@@ -28,8 +30,9 @@ from factory.support.settings import Settings
 @dataclass(frozen=True)
 class PlanOptions:
     """`aim`: what the tree is chosen for; `seconds` to search; `allow`: units that may pass through
-    others; `hulls`: whether hulls may hide what goes into them; `lay_out`: whether layouts decide,
-    or estimates alone; `settings` and `templates` of the factory, None for those shipped; `told`
+    others; `hulls`: whether hulls may hide what goes into them; `up`: the axis of the file and its
+    side that is up, None for z unless the product tips then; `lay_out`: whether layouts decide, or
+    estimates alone; `settings` and `templates` of the factory, None for those shipped; `told`
     hears what goes on, and how many of how many are done; `stopped` says that the best so far is
     wanted at once."""
 
@@ -37,6 +40,7 @@ class PlanOptions:
     seconds: float = 60.0
     allow: tuple[str, ...] = ()
     hulls: bool = False
+    up: Direction | None = None
     lay_out: bool = True
     settings: Settings = field(default_factory=Settings)
     templates: Mapping[str, Template] | None = field(default=None, repr=False)
@@ -47,13 +51,13 @@ class PlanOptions:
 @dataclass(frozen=True, slots=True)
 class PlannedJoin:
     """An operation of a plan: the units of the pile and those that `come`, the `direction` (3,) in
-    the product's frame in which these leave it, so against which they come; the least room [m] on
+    the source's frame in which these leave it, so against which they come; the least room [m] on
     that way (infinite where nothing is near, less than 0 for parts drawn into each other), whether
     they are lowered (or the pile is), and whether they pass through each other."""
 
     pile: tuple[str, ...]
     come: tuple[str, ...]
-    direction: tuple[int, int, int]
+    direction: tuple[float, float, float]
     clearance: float
     lowered: bool
     blocked: bool
@@ -89,7 +93,7 @@ class Planned:
     product onto the floor, its operations, its figures, the laid-out `project` (None where
     estimates alone decided); `optimal`: whether it is proved that no tree costs less, by what is
     in the way and by the expected cycle; `hidden`: where hulls were accepted, the pairs that
-    overlap, though their meshes may not."""
+    overlap, though their meshes may not; `notes`: how the product stands, in words."""
 
     tree: Tree = field(repr=False)
     orientation: Array
@@ -98,15 +102,18 @@ class Planned:
     optimal: bool
     project: Project | None = field(default=None, repr=False, compare=False)
     hidden: tuple[Drawn, ...] = field(default=(), repr=False)
+    notes: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
 class CannotAssemble:
     """No tree of straight motions along the axes joins the parts: proved by those that interlock.
-    Without `removal`, or where its clashes are accepted (`allow`), the rest can be joined."""
+    Without `removal`, or where its clashes are accepted (`allow`), the rest can be joined. `needs`:
+    in which other directions (3,) parts with these labels would come apart, each by itself."""
 
     interlocks: tuple[Interlock, ...]
     removal: Removal
+    needs: tuple[tuple[tuple[str, ...], Array], ...] = field(default=(), compare=False)
 
 
 def plan(source: InPlace, options: PlanOptions | None = None) -> Planned | CannotAssemble:
@@ -121,13 +128,20 @@ def plan(source: InPlace, options: PlanOptions | None = None) -> Planned | Canno
     if not asked.hulls:
         refuse_hidden(source, pairs)
     found = found.allowing(asked.allow)
-    stuck = interlocks(found)
-    if stuck:
-        return CannotAssemble(stuck, removal(found))
-    return replace(_planned(source, found, asked, budget), hidden=pairs if asked.hulls else ())
+
+    def graph(source: InPlace) -> Blocking:
+        return blocking(source).allowing(asked.allow)
+
+    pose = posed(source, found, asked.up, graph)
+    if pose.stuck:
+        return CannotAssemble(pose.stuck, removal(found), pose.needs)
+    planned = _planned(pose, asked, budget)
+    notes = said(pose, planned.orientation)
+    return replace(planned, hidden=pairs if asked.hulls else (), notes=notes)
 
 
-def _planned(source: InPlace, found: Blocking, asked: PlanOptions, budget: Budget) -> Planned:
+def _planned(pose: Pose, asked: PlanOptions, budget: Budget) -> Planned:
+    source, found = pose.source, pose.found
     templates = all_templates() if asked.templates is None else asked.templates
     expected = Expected(Pace.of(asked.settings))
     seen = [0]
@@ -138,10 +152,11 @@ def _planned(source: InPlace, found: Blocking, asked: PlanOptions, budget: Budge
         asked.told("looking for a tree", seen[0], None, words)
 
     given = KeptPrices(source, templates)
-    sought = trees(Sought(found, expected, given, asked.aim, budget, told))
+    choice = stances(pose.up)
+    sought = trees(Sought(found, expected, given, asked.aim, budget, told, choice))
     layouts = Layouts(source, templates, asked.settings)
     if not asked.lay_out:
-        return _result(source, layouts.of(sought.all[0]), sought.optimal, found, 0)
+        return _result(pose, layouts.of(sought.all[0]), sought.optimal, 0)
     laid = [0]
 
     def said(best: LaidOut) -> None:
@@ -150,12 +165,10 @@ def _planned(source: InPlace, found: Blocking, asked: PlanOptions, budget: Budge
         asked.told("laying out", laid[0], len(sought.all), words)
 
     best = layouts.best(sought.all, asked.aim, budget, said)
-    return _result(source, best, sought.optimal, found, laid[0])
+    return _result(pose, best, sought.optimal, laid[0])
 
 
-def _result(
-    source: InPlace, laid: LaidOut, optimal: bool, found: Blocking, layouts: int
-) -> Planned:
+def _result(pose: Pose, laid: LaidOut, optimal: bool, layouts: int) -> Planned:
     judged = laid.judged
     figures = PlanFigures(
         operations=len(judged.joins),
@@ -179,18 +192,19 @@ def _result(
             area=laid.area if np.isfinite(laid.area) else None,
         )
     axes = sorted({join.direction[0] for join in judged.joins})
-    room = {axis: rooms(source, axis) for axis in axes}
-    joins = tuple(_join(join, found, room[join.direction[0]]) for join in judged.joins)
+    room = {axis: rooms(pose.source, axis) for axis in axes}
+    joins = tuple(_join(join, pose, room[join.direction[0]]) for join in judged.joins)
     project = laid.project if layouts else None
-    return Planned(laid.tree, judged.stance.rotation, joins, figures, optimal, project)
+    orientation = judged.stance.rotation @ pose.turn
+    return Planned(laid.tree, orientation, joins, figures, optimal, project)
 
 
-def _join(join: Join, found: Blocking, room: Array) -> PlannedJoin:
-    axis, side = join.direction
+def _join(join: Join, pose: Pose, room: Array) -> PlannedJoin:
+    _, side = join.direction
     at = (join.come, join.pile) if side > 0 else (join.pile, join.come)
     least = float(room[np.ix_(*at)].min())
-    x, y, z = (side if n == axis else 0 for n in range(3))
-    pile, come = (tuple(found.labels[n] for n in units) for units in (join.pile, join.come))
+    x, y, z = (float(n) + 0.0 for n in pose.turn.T @ along(join.direction))
+    pile, come = (tuple(pose.found.labels[n] for n in units) for units in (join.pile, join.come))
     return PlannedJoin(pile, come, (x, y, z), least, join.lowered, join.level >= LOCKED)
 
 

@@ -3,7 +3,7 @@ expected cycle."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from time import perf_counter
 from typing import Literal
@@ -28,9 +28,6 @@ BOUNDS: dict[Aim, tuple[float, ...]] = {
     "floor": (1.0, 1.4, np.inf),
 }
 """The bounds on expected cycles, as multiples of the least."""
-
-CLEARLY = 0.9
-"""A product is turned over only for less blocking, or for so much less of the expected cycle."""
 
 SEVERAL = 3
 """So many stances, at most, are tried for each bound."""
@@ -87,7 +84,8 @@ class Budget:
 
 @dataclass(frozen=True)
 class Sought:
-    """What trees are sought for, within a `budget`; `told` hears of each tree."""
+    """What trees are sought for, in some of the `stances`, within a `budget`; `told` hears of each
+    tree."""
 
     found: Blocking
     expected: Expected
@@ -95,6 +93,7 @@ class Sought:
     aim: Aim = "cycle"
     budget: Budget = field(default_factory=lambda: Budget(60.0))
     told: Callable[[Judged], None] = field(default=lambda _: None)
+    stances: tuple[Stance, ...] = field(default_factory=stances)
 
     def site(self, stance: Stance) -> Site:
         """The same in one stance."""
@@ -142,7 +141,11 @@ def _proved(sought: Sought, late: Late) -> Iterator[Judged]:
     """The best trees of a small product, in the best stances. Raises TooLate."""
     table = subsets(sought.found)
     for apart in (False, True):
-        ranks = _ranks(lambda stance, a=apart: _task(sought, table, stance, a), late)  # type: ignore[misc]
+        ranks = _ranks(
+            sought.stances,
+            lambda stance, a=apart: _task(sought, table, stance, a),  # type: ignore[misc]
+            late,
+        )
         if ranks:
             break
     judges = {stance: Judge(sought.found, stance, sought.expected) for stance, _, _ in ranks}
@@ -160,11 +163,13 @@ def _task(sought: Sought, table: Subsets, stance: Stance, apart: bool) -> TreeTa
     return TreeTask(table, sought.expected, stance.axes[2], stance.up, given, apart)
 
 
-def _ranks(task_of: Callable[[Stance], TreeTask], late: Late) -> list[tuple[Stance, float, float]]:
+def _ranks(
+    choice: Sequence[Stance], task_of: Callable[[Stance], TreeTask], late: Late
+) -> list[tuple[Stance, float, float]]:
     """The stances to be tried, each with its least price and its least expected cycle [s]."""
     found: list[tuple[Stance, float, float]] = []
     solved: dict[bytes, tuple[Array, Array]] = {}
-    for stance in stances():
+    for stance in choice:
         task = task_of(stance)
         key = bytes([task.axis]) + (b"" if task.given is None else task.given.tobytes())
         if key not in solved:
@@ -178,9 +183,6 @@ def _ranks(task_of: Callable[[Stance], TreeTask], late: Late) -> list[tuple[Stan
         return []
     least = min(price for _, price, _ in found)
     good = [rank for rank in found if rank[1] == least]
-    drawn = min((time for stance, _, time in good if stance.upright), default=np.inf)
-    good = [rank for rank in good if rank[0].upright or rank[2] < CLEARLY * drawn]
-    good.sort(key=lambda rank: not rank[0].upright)
     return good[:SEVERAL]
 
 
@@ -190,18 +192,17 @@ def _grown(sought: Sought, share: float) -> Iterator[Judged]:
     late = sought.budget.share(share)
     random = np.random.default_rng(0)
     first: list[Judged] = []
-    for stance in stances():
+    for stance in sought.stances:
         for even in EVEN:
             site = sought.site(stance)
             tree = divided(site, random, even)
             first.append(Judge(sought.found, stance, sought.expected).judged(tree))
             if late() or first[-1].price == 0.0:
                 break
-        clean = any(judged.price == 0.0 for judged in first)
-        if late() or (clean and not (stance.upright and len(first) == 1)):
+        if late():
             break
     least = min(judged.price for judged in first)
-    best = min(first, key=lambda j: (j.price > least, not j.stance.upright, j.seconds))
+    best = min(first, key=lambda j: (j.price > least, j.seconds))
     yield best
     factors, begin = BOUNDS[sought.aim], sought.budget.gone
     for number, factor in enumerate(factors):

@@ -41,8 +41,11 @@ class Stance:
         return max(turned, key=lambda m: float(np.trace(m)))
 
 
-def stances() -> tuple[Stance, ...]:
-    """All that differ in which ways are open: of the 24 rotations each two that are half a turn
-    about the vertical apart are one. As drawn comes first, the other upright one second."""
+def stances(up: tuple[int, int] | None = None) -> tuple[Stance, ...]:
+    """All that differ in which ways are open, or those with an axis and side `up`: of the 24
+    rotations each two that are half a turn about the vertical apart are one. As drawn comes
+    first, the other upright one second."""
     found = [Stance(axes, up) for axes in permutations(range(3)) for up in (+1, -1)]  # type: ignore[arg-type]
+    if up is not None:
+        found = [stance for stance in found if (stance.axes[2], stance.up) == up]
     return tuple(sorted(found, key=lambda s: (not s.upright, s.axes[2] != 2, -s.up, s.axes)))

@@ -1,0 +1,145 @@
+"""Turns of a product under which its parts come along axes: directions that contacts leave open.
+
+A robot joins along an axis of the floor. A part that comes along another direction of its file, as
+the tail of a dovetail at 45°, comes along an axis once the whole product is turned. Where parts
+touch with faces of two normals they can slide along both only across these, and from one face alone
+they come off along its normal: these are the directions that are tried.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from factory.geometry.meshes import Array
+from factory.geometry.product import product_geometry
+from factory.planning.parts import InPlace, PlacedPart
+from factory.planning.source.placing import surface
+from factory.planning.writing import planned_product
+
+NEAR = 1e-3
+"""Faces within the box of another part, made larger by this [m], may touch it."""
+
+NORMALS, WAYS, MOST = 40, 64, 8
+"""So many normals, of the largest faces, directions, and turns, the likeliest, are taken."""
+
+SAME = 1e-3
+"""Directions that differ by no more than this are one."""
+
+EXACT = 1e-7
+"""A direction is along an axis, or across another, up to this."""
+
+
+def turned(source: InPlace, turn: Array) -> InPlace:
+    """A source whose product is turned by a rotation (3, 3) about the origin."""
+    made = planned_product(source, tuple(label for label, _ in source.units()), turn)
+    solids = product_geometry(made.pag, source.files).solids
+    parts = tuple(
+        replace(part, vertices=surface(solids[part.label])[0], solid=solids[part.label], node=node)
+        for part in source.parts
+        for node in [made.pag[part.label]]
+    )
+    return replace(source, parts=parts)
+
+
+def only(source: InPlace, units: Collection[str]) -> InPlace:
+    """A source of some of its units alone."""
+    kept = tuple(keep for keep in source.kept if keep.label in units)
+    inside = {label for name, parts in source.units() if name in units for label in parts_of(parts)}
+    parts = tuple(part for part in source.parts if part.label in inside)
+    return replace(source, parts=parts, kept=kept)
+
+
+def parts_of(parts: Sequence[PlacedPart]) -> Iterator[str]:
+    """The labels of parts."""
+    return (part.label for part in parts)
+
+
+def turns(source: InPlace, up: Array, tilted: bool) -> Iterator[tuple[Array, Array]]:
+    """Rotations (3, 3) of a product by which a direction (3,) in which its parts may leave comes to
+    lie along an axis, the likeliest first, and these directions: about the direction `up` (3,), or
+    `tilted`."""
+    found = directions(source.parts)
+    seen = [np.eye(3)]
+    for way in found:
+        along = np.abs(way).max() > 1 - EXACT
+        if not tilted and (along or abs(way @ up) > EXACT):
+            continue
+        across = [up] if not tilted else [other for other in found if abs(other @ way) < EXACT]
+        for other in across[:2]:
+            turn = _onto_axes(way, other, up)
+            if not any(_same_axes(turn, before) for before in seen):
+                seen.append(turn)
+                yield turn, way
+        if len(seen) >= MOST:
+            return
+
+
+def _onto_axes(way: Array, other: Array, up: Array) -> Array:
+    """The rotation that brings two directions at right angles to axes, that which is most upright
+    to the axis along which `up` is most."""
+    if abs(other @ up) < abs(way @ up):
+        way, other = other, way
+    rows = np.array([np.cross(way, other), way, other])
+    axis = int(np.abs(up).argmax())
+    rows = np.roll(rows, axis - 2, axis=0)
+    upright = rows[axis]
+    if (upright @ up) * up[axis] < 0:
+        rows[axis], rows[axis - 1] = -upright, -rows[axis - 1]
+    return rows
+
+
+def _same_axes(one: Array, other: Array) -> bool:
+    """Whether two rotations have the same axes, in any order."""
+    return bool((np.abs(one @ other.T).max(axis=1) > 1 - SAME**2).all())
+
+
+def directions(parts: Sequence[PlacedPart]) -> list[Array]:
+    """Unit vectors (3,) in which some parts may leave others, the likeliest first: across two of
+    the normals with which they touch, or along one of them."""
+    normals, areas = _normals(parts)
+    share = areas / areas.sum()
+    crossed = np.cross(normals[:, None], normals[None]).reshape(-1, 3)
+    lengths = np.linalg.norm(crossed, axis=1)
+    weights = np.outer(share, share).ravel()
+    sharp = lengths > 0.1
+    ways = np.concatenate([crossed[sharp] / lengths[sharp, None], normals])
+    found, votes = _merged(ways, np.concatenate([weights[sharp], share**2]))
+    return list(found[np.argsort(-votes, kind="stable")][:WAYS])
+
+
+def _normals(parts: Sequence[PlacedPart]) -> tuple[Array, Array]:
+    """The normals (n, 3) of faces near another part, those of opposite ones being one, and their
+    areas (n,): the largest."""
+    found, sizes = [], []
+    for part in parts:
+        corners = part.vertices[part.faces]
+        normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        area = np.linalg.norm(normal, axis=1)
+        low, high = corners.min(axis=1) - NEAR, corners.max(axis=1) + NEAR
+        near = np.zeros(len(corners), bool)
+        for other in parts:
+            if other is not part:
+                near |= (low <= other.solid.high).all(axis=1) & (high >= other.solid.low).all(
+                    axis=1
+                )
+        near &= area > 0
+        found.append(normal[near] / area[near, None])
+        sizes.append(area[near])
+    merged, areas = _merged(np.concatenate(found), np.concatenate(sizes))
+    largest = np.argsort(-areas, kind="stable")[:NORMALS]
+    return merged[largest], areas[largest]
+
+
+def _merged(ways: Array, weights: Array) -> tuple[Array, Array]:
+    """Unit vectors (n, 3), those that are the same or opposite as one, and the sums of their
+    weights; each is the one of most weight of those that it stands for."""
+    first = np.abs(ways) > SAME
+    sign = np.sign(np.take_along_axis(ways, first.argmax(axis=1)[:, None], axis=1))
+    ways = ways * sign
+    order = np.argsort(-weights, kind="stable")
+    key = np.round(ways[order] / SAME).astype(np.int64)
+    _, chosen, group = np.unique(key, axis=0, return_index=True, return_inverse=True)
+    return ways[order][chosen], np.bincount(group.ravel(), weights[order]).astype(float)
