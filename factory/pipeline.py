@@ -65,7 +65,7 @@ class Project:
     @property
     def name(self) -> str:
         """What files about it are called: the name of the PAG's file without its ending."""
-        return self.file.stem or "factory"
+        return self.file.stem.strip("<>") or "factory"
 
     @cached_property
     def product(self) -> Product:

@@ -4,14 +4,20 @@ from __future__ import annotations
 
 import json
 import re
+import subprocess
+import sys
 import tomllib
 from pathlib import Path
 from typing import Any
 
+import click
 import pytest
 import trimesh
 
+from factory.commands import cli
 from factory.export.certificate.check import check_certificate
+from factory.record.log import read_log
+from factory.support.extras import EXTRAS
 from tests.command_line import PAPER, ROOT, Terminal, files_in, spawn
 
 NUMBER = (int, float)
@@ -202,15 +208,113 @@ def test_version_and_help(run: Terminal) -> None:
         assert run(command, "-h").out == done.out
 
 
+def test_doctor_names_all_packages_and_extras(run: Terminal) -> None:
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+
+    def names(required: list[str]) -> set[str]:
+        return {re.split(r"[>\[]", one)[0] for one in required}
+
+    for_developers = {"all", "test", "dev", "docs", "browser", "readers"}
+    extras = {
+        name: names(required)
+        for name, required in project["optional-dependencies"].items()
+        if name not in for_developers
+    }
+    assert {name: set(packages) for name, (packages, _) in EXTRAS.items()} == extras
+    found = run("doctor", "--json").json
+    assert names(project["dependencies"]) <= {check["name"] for check in found["checks"]}
+    assert {extra["name"] for extra in found["extras"]} == set(extras)
+    lines = run("doctor").out.splitlines()
+    for extra in found["extras"]:
+        (line,) = (line for line in lines if line.split()[:1] == [extra["name"]])
+        assert extra["for"] in line
+        assert extra["installed"] or f"pip install 'klavins-factory[{extra['name']}]'" in line
+
+
+def test_quiet_hides_progress_and_warnings_never_the_answer(run: Terminal, tmp_path: Path) -> None:
+    file = tmp_path / "big.pag"
+    file.write_text("root = a; a = mate ( p, q ); p = atomic ( box = (9, 1, 1) ); q = atomic()")
+    log = tmp_path / "run.log"
+    words: tuple[tuple[object, ...], ...] = (
+        ("check", file),
+        ("build", file, "-o", tmp_path / "made"),
+        ("run", PAPER, "--log", log),
+        ("monitor", log),
+        ("analyze", PAPER),
+        ("sweep", PAPER, "--world", "ideal", "--vary", "seed=0:1", "-o", tmp_path / "r.db"),
+        ("sweep", tmp_path / "r.db", "--summary"),
+        ("new", tmp_path / "bell"),
+        ("doctor",),
+    )
+    for command in words:
+        done = run(*command, "-q")
+        assert done.out.strip(), command
+        assert "warning" not in done.err and "so far" not in done.err, command
+    for module in (ROOT / "factory" / "commands").glob("*.py"):
+        assert "out.quiet" not in module.read_text(), f"{module.name}: an answer depends on -q"
+
+
+def test_a_pag_may_come_in(tmp_path: Path) -> None:
+    text = PAPER.read_text()
+
+    def piped(*words: object, text: str = text) -> tuple[int, str, str]:
+        command = [sys.executable, "-m", "factory", *map(str, words)]
+        done = subprocess.run(command, input=text, capture_output=True, text=True, cwd=ROOT)
+        return done.returncode, done.stdout, done.stderr
+
+    log = tmp_path / "run.log"
+    status, out, _ = piped("run", "-", "--units", 2, "--world", "ideal", "--log", log)
+    assert status == 0 and "2 of 2 products" in out and read_log(log).header["product"] == "stdin"
+    status, _, err = piped("check", "-", text="root = a")
+    assert status == 2 and err.startswith("<stdin>:1:8: UndefinedLabel")
+
+
+@pytest.mark.parametrize("command", ["run", "view", "programs", "build"])
+def test_what_is_no_pag_says_what_it_is(run: Terminal, tmp_path: Path, command: str) -> None:
+    for name, words in (
+        ("x.pnml", "`factory check"),
+        ("x.mpd", "`factory import"),
+        ("x.step", "`factory plan"),
+        ("x.stl", "atomic ( mesh = "),
+    ):
+        (tmp_path / name).write_text("<pnml/>")
+        done = run(command, tmp_path / name)
+        assert done.status == 2
+        assert "not the PAG of a product" in done.err and words in done.err
+
+
+def test_help_is_in_sections(run: Terminal) -> None:
+    out = run("run", "--help").out
+    titles = re.findall(r"^(\w[\w ]+):$", out, re.M)
+    assert titles == [
+        *("Options", "Run", "Failures", "Pictures", "Robots", "Floor", "Motion and physics"),
+        "Printing",
+    ]
+    assert out.index("Run:") < out.index("--units") < out.index("Failures:") < out.index("--swap")
+    for name, command in cli.commands.items():
+        shown = run(name, "--help").out
+        for option in command.params:
+            if isinstance(option, click.Option) and not option.hidden:
+                assert shown.count(f"{option.opts[-1]} ") + shown.count(f"{option.opts[-1]}\n"), (
+                    name
+                )
+
+
+def test_formats_are_completed() -> None:
+    for line, wanted in (("export x.pag --format s", "stl"), ("render x.pag --with g", "gantt")):
+        words = f"factory {line}"
+        done = spawn(
+            _FACTORY_COMPLETE="bash_complete", COMP_WORDS=words, COMP_CWORD=str(words.count(" "))
+        )
+        assert f"plain,{wanted}" in done.out.split()
+
+
 def test_people_get_a_summary(run: Terminal) -> None:
     out = run("run", PAPER, "--units", 4).out
     for word in ("4 of 4 products", "cycle time", "bottleneck r3", "Utilisation", "refines"):
         assert word in out
     assert "more robot" not in out  # six are all that there are
     assert "live: yes" in run("check", PAPER).out
-    assert run("check", PAPER, "-q").out == ""
-    assert run("run", PAPER, "-q").out == ""
-    assert run("build", PAPER, "-q").out == ""
     assert len(run("templates", "-v").out) > len(run("templates").out)
 
 

@@ -15,6 +15,7 @@ import imageio.v3 as iio
 import pytest
 
 from factory.record.log import read_log
+from factory.render.reel import Reel
 from factory.support.errors import MissingError
 from factory.support.gl import probe
 from tests.command_line import PAPER, ROOT, Terminal, files_in, spawn, started
@@ -81,7 +82,8 @@ def test_a_run_that_is_stopped_closes_its_files(out: Path, number: signal.Signal
         process.send_signal(number)
         answer, errors = process.communicate(timeout=60)
     assert process.returncode == 130
-    assert json.loads(answer)["errors"][0]["code"] == "Interrupted"
+    (told,) = json.loads(answer)["errors"]
+    assert told["code"] == "Interrupted" and f"factory run --resume {log}" in told["hint"]
     assert "Traceback" not in errors
     assert [path.name for path in out.iterdir()] == ["run.log"]
     kept = read_log(log)
@@ -110,6 +112,19 @@ def test_a_film_plays_however_its_run_ends(out: Path, number: signal.Signals) ->
     frames = len(iio.imread(film, plugin="pyav"))
     assert frames > 20
     assert abs(frames / 10 - read_log(log).time[-1]) < 2.0
+
+
+def test_a_film_that_is_stopped_in_its_first_frame_leaves_no_file(
+    run: Terminal, out: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def stopped(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(Reel, "until", stopped)
+    monkeypatch.setattr("factory.support.gl.probe", lambda: None)
+    film = out / "film.mp4"
+    assert run("render", PAPER, "-o", film, "--size", "64x48").status == 130
+    assert list(out.iterdir()) == []
 
 
 # --- what a machine may lack ----------------------------------------------------------------------

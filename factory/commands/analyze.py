@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from factory.commands.grouped import Grouped
 from factory.commands.logs import cut_off, read_partly
 from factory.commands.options import (
     DRAW,
@@ -109,7 +110,7 @@ class AnalyzeOptions:
         return ", ".join(words), change
 
 
-@click.command()
+@click.command(cls=Grouped)
 @SOURCE
 @click.option("--units", type=click.IntRange(1, 10_000), default=20, help="Products to look at.")
 @click.option(
@@ -171,7 +172,7 @@ def _analyze_net(file: Path, delays: Path | None, output: Path | None, out: Outp
     found = analyse_net(net, read_delays(delays, net), str(file))
     if out.as_json:
         emit(net_document(file.stem, found))
-    elif not out.quiet:
+    else:
         say(f"{file.stem}: cycle time {found.pace:.6g} s")
         for made in net_tables(found, out.verbose):
             table(made.title, made.columns, made.rows)
@@ -219,7 +220,7 @@ def _analyze_pag(
     if out.as_json:
         drawn = str(output) if output else None
         emit({**document(found), "picture": drawn, "warnings": warnings, **cut_off(log)})
-    elif not out.quiet:
+    else:
         _tell(found, out.verbose)
         if output is not None:
             say(f"wrote {output}")

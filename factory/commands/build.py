@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from factory.commands.grouped import Grouped
 from factory.commands.options import FLOOR, MOTION, OUTPUT, PATH, RELAY, SOURCE, WIP
 from factory.commands.outputs import writable, writable_folder
 from factory.commands.requests import OutputOptions, ProjectOptions
@@ -28,7 +29,7 @@ SHOWN = 20
 """The most files that are listed, unless `-v` asks for all."""
 
 
-@click.command()
+@click.command(cls=Grouped)
 @SOURCE
 @click.option("--mjcf", type=PATH, help="Write the model as one XML here.")
 @click.option("-o", "--output", type=PATH, help="Write everything in a folder.")
@@ -80,7 +81,7 @@ def build(
         print(text, file=sys.stderr)
     if out.as_json:
         emit(kept["document"])
-    elif not out.quiet:
+    else:
         for line in (*kept["lines"], *_listed(kept["document"]["files"], out.verbose)):
             say(line)
         if is_current:

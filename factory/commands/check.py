@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from factory.commands.grouped import Grouped
 from factory.commands.options import HANDS, OUTPUT, PATH, RELAY, SOURCE, WIP, for_a_pag
 from factory.commands.outputs import writable, writable_folder
 from factory.commands.requests import OutputOptions, ProjectOptions
@@ -38,7 +39,7 @@ POOLED = 8
 """The most parts whose copies are printed, and robots that need spares."""
 
 
-@click.command()
+@click.command(cls=Grouped)
 @SOURCE
 @click.option("--certificate", type=PATH, help="Write the proof here.")
 @click.option("--against", type=PATH, help="Check a proof that --certificate has written.")
@@ -91,7 +92,7 @@ def check(
     if out.as_json:
         found = {"certificate": {"file": str(against), **proved}} if proved else {}
         emit({**checked.as_json(), **found})
-    elif not out.quiet:
+    else:
         _describe(checked, out.verbose)
         if failures and checked.failures:
             _describe_failures(checked.failures, out.verbose)

@@ -12,6 +12,7 @@ from factory.commands.options import OUTPUT
 from factory.commands.requests import OutputOptions
 from factory.support.console import emit, say
 from factory.support.errors import FactoryError
+from factory.support.extras import EXTRAS, installs
 from factory.support.version import release
 
 PACKAGES = (
@@ -22,6 +23,7 @@ PACKAGES = (
     "trimesh",
     "scipy",
     "shapely",
+    "manifold3d",
     "imageio",
     "av",
     "pillow",
@@ -36,12 +38,17 @@ def doctor(out: OutputOptions) -> int:
     """Say what works on this machine, and what would mend the rest."""
     findings = examine()
     good = all(f.ok for f in findings)
+    extras = [_extra(name) for name in EXTRAS]
     if out.as_json:
         emit(
             {
                 "ok": good,
                 "checks": [
                     {"name": f.name, "ok": f.ok, "found": f.found, "mend": f.mend} for f in findings
+                ],
+                "extras": [
+                    {"name": f.name, "for": EXTRAS[f.name][1], "installed": f.ok, "mend": f.mend}
+                    for f in extras
                 ],
             }
         )
@@ -50,6 +57,10 @@ def doctor(out: OutputOptions) -> int:
             say(f"{'ok     ' if finding.ok else 'MISSING'} {finding.name}: {finding.found}")
             if not finding.ok:
                 say(f"        {finding.mend}")
+        say("extras, none of which is needed for the rest:")
+        for extra in extras:
+            here = extra.found if extra.ok else f"not installed: {extra.mend}"
+            say(f"  {extra.name:10} {EXTRAS[extra.name][1]}: {here}")
     return 0 if good else 3
 
 
@@ -79,6 +90,13 @@ def _package(name: str) -> Finding:
     if found := release(name):
         return Finding(name, True, found)
     return Finding(name, False, "not installed", f"pip install {name}")
+
+
+def _extra(name: str) -> Finding:
+    """Whether all packages of an extra are installed."""
+    releases = {package: release(package) for package in EXTRAS[name][0]}
+    found = ", ".join(f"{package} {version}" for package, version in releases.items())
+    return Finding(name, all(releases.values()), found, installs(name))
 
 
 def _assets() -> Finding:

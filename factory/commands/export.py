@@ -7,7 +7,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
+from click.shell_completion import CompletionItem
 
+from factory.commands.grouped import Grouped
 from factory.commands.logs import cut_off, read_partly
 from factory.commands.options import FLOOR, MOTION, OUTPUT, PATH, RELAY, SOURCE
 from factory.commands.outputs import writable, writable_folder
@@ -29,7 +31,7 @@ TAKEN = {
 """The kinds of file that an exporter can take."""
 
 
-class _Listing(click.Command):
+class _Listing(Grouped):
     """A command whose help ends with the summary of every exporter."""
 
     def format_epilog(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
@@ -39,9 +41,27 @@ class _Listing(click.Command):
             formatter.write_dl([(e.format, e.summary) for e in exporters().values()])
 
 
+class _Format(click.ParamType[str]):
+    """The name of an exporter, which the shell completes."""
+
+    name = "format"
+
+    def shell_complete(
+        self, ctx: click.Context, param: click.Parameter, incomplete: str
+    ) -> list[CompletionItem]:
+        from factory.export import exporters
+
+        known = exporters().values()
+        return [
+            CompletionItem(e.format, help=e.summary.partition(";")[0].partition(":")[0])
+            for e in known
+            if e.format.startswith(incomplete)
+        ]
+
+
 @click.command(cls=_Listing)
 @SOURCE
-@click.option("--format", "form", required=True, help="One of those below.")
+@click.option("--format", "form", type=_Format(), required=True, help="One of those below.")
 @click.option("-o", "--output", type=PATH, help="A file; stdout without, for texts.")
 @click.option("--of", default="", help="What to export of it, where a format offers a choice.")
 @FLOOR

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from factory.commands.grouped import Grouped
 from factory.commands.options import FLOOR, MOTION, OUTPUT, PATH, RELAY, SECONDS, SOURCE, Number
 from factory.commands.outputs import writable, writable_folder
 from factory.commands.requests import OutputOptions, ProjectOptions
@@ -19,7 +20,7 @@ if TYPE_CHECKING:
     from factory.study.fidelity.record import Fidelity
 
 
-@click.command()
+@click.command(cls=Grouped)
 @SOURCE
 @click.option("--seeds", type=click.IntRange(1, 10_000), default=5, help="Runs, seeds 0 to K - 1.")
 @click.option(
@@ -86,7 +87,7 @@ def fidelity(
     written = [] if output is None else write_report(output, found, studied)
     if out.as_json:
         emit({**document(found, studied), "warnings": warnings})
-    elif not out.quiet:
+    else:
         _tell(found, studied, out.verbose)
         for path in written:
             say(f"wrote {path}")

@@ -91,7 +91,7 @@ def import_(
                 "warnings": warnings,
             }
         )
-    elif not out.quiet:
+    else:
         operations = len(product.pag) - parts
         say(f"{pag}: parts {parts}, operations {operations}, meshes {meshes_made}")
         for path in files if out.verbose else ():

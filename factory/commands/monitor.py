@@ -54,7 +54,7 @@ def monitor(file: Path, lenient: bool, out: OutputOptions) -> int:
             **({} if log.failures is None else {"failures": log.failures.as_json()}),
         }
         emit(document)
-    elif not out.quiet:
+    else:
         say(found_by(report, log.cut_off))
         if log.failures is not None:
             say_failures(log.failures, out.verbose)

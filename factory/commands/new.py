@@ -39,7 +39,7 @@ def new(name: Path, out: OutputOptions) -> int:
     write_all(files)
     if out.as_json:
         emit({"folder": str(name), "files": [str(path) for path in files]})
-    elif not out.quiet:
+    else:
         say(f"{name}: {len(files)} files")
         for path in files if out.verbose else ():
             say(f"  {path}")

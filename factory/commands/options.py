@@ -51,6 +51,20 @@ class PagPath(click.Path):
 PAG_PATH = PagPath(path_type=Path, readable=False)
 
 
+class Suggested(click.ParamType[str]):
+    """A text; its completions in the shell are some usual ones."""
+
+    name = "text"
+
+    def __init__(self, *words: str) -> None:
+        self.words = words
+
+    def shell_complete(
+        self, ctx: click.Context, param: click.Parameter, incomplete: str
+    ) -> list[CompletionItem]:
+        return [CompletionItem(word) for word in self.words if word.startswith(incomplete)]
+
+
 class CameraName(click.ParamType[str]):
     """The name of a camera; its completions in the shell are those that FILE has, as far as FILE is
     given before and can be read."""
@@ -294,7 +308,10 @@ PICTURE = options(
         " from near by where it is taken.",
     ),
     click.option(
-        "--with", "panels", help="Beside the 3-D: net, gantt or net,gantt (modes over time)."
+        "--with",
+        "panels",
+        type=Suggested("net", "gantt", "net,gantt"),
+        help="Beside the 3-D: net, gantt or net,gantt (modes over time)."
     ),
     click.option("--title", default="", help="Shown at the beginning of a film."),
     click.option("--poster", type=PATH, help="A still of a film's best moment (.png)."),

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from factory.commands.grouped import Grouped
 from factory.commands.options import FLOOR, MOTION, OUTPUT, PATH, SECONDS, SOURCE
 from factory.commands.outputs import writable_folder
 from factory.commands.requests import OutputOptions, ProjectOptions
@@ -24,7 +25,7 @@ if TYPE_CHECKING:
 PAGE_NAME = "pareto.html"
 
 
-@click.command()
+@click.command(cls=Grouped)
 @SOURCE
 @click.option(
     "--validate",
@@ -78,7 +79,7 @@ def pareto(
         document["points"] = [{**p.as_json(), "command": command} for p, command in points]
         errors = {"errors": [d.as_json() for d in stopped.diagnostics]} if stopped else {}
         emit({**document, "files": [*map(str, files)], "warnings": warnings, **errors})
-    elif not out.quiet:
+    else:
         _tell(front, commands)
         if output is not None:
             say(f"wrote {output / PAGE_NAME}, and the files of {len(front.points)} points")

@@ -125,7 +125,7 @@ def plan(
     folder = output or Path(f"{found.name}-planned")
     writable_folder(folder)
     warnings = announced(found.warnings, out)
-    if not out.silent:
+    if not out.as_json:
         for note in found.notes:
             say(f"  {note}")
     seconds = usual_seconds(len(found.units())) if seconds is None else seconds
@@ -144,7 +144,7 @@ def plan(
     warnings += announced([w for w in project.warnings if id(w) not in known], out)
     if out.as_json:
         emit(_document(found, planned, project, [*files, *looked], warnings))
-    elif not out.quiet:
+    else:
         _tell(found, planned, project, [*files, *looked], out)
     return 0
 

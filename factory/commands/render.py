@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Literal
 
 import click
 
+from factory.commands.grouped import Grouped
 from factory.commands.logs import cut_off, read_partly
 from factory.commands.options import (
     FLOOR,
@@ -31,7 +32,7 @@ if TYPE_CHECKING:
     Moment = float | Literal["end"]
 
 
-@click.command()
+@click.command(cls=Grouped)
 @SOURCE
 @click.option(
     "-o",
@@ -82,15 +83,18 @@ def render(
         project = given.project(out.silent)
         warnings = announced(project.layout.product.warnings, out)
         made = Simulation(project.layout, asked.request(project))
-        taken = (
-            Still(made, output, picture, moment)
-            if is_still
-            else Film(made, output, picture, shown.fps, shown.poster)
-        )
+        films: list[Film] = []
+
+        def taken() -> Film | Still:
+            if is_still:
+                return Still(made, output, picture, moment)
+            films.append(Film(made, output, picture, shown.fps, shown.poster))
+            return films[0]
+
         enough = moment if is_still and moment != "end" else asked.max_time
-        run = carry_out(made, out.silent, enough, [lambda: taken])
+        run = carry_out(made, out.silent, enough, [taken])
         warn(run.verdict.bodies, out.silent)
-        frames = taken.frames if isinstance(taken, Film) else 1
+        frames = films[0].frames if films else 1
     seconds = 0.0 if is_still else round(frames / shown.fps, 6)
     if out.as_json:
         width, height = size
@@ -98,7 +102,7 @@ def render(
         emit(
             {**document, "fps": shown.fps, "seconds": seconds, "warnings": warnings, **cut_off(log)}
         )
-    elif not out.quiet:
+    else:
         shape = f"{size[0]}x{size[1]}"
         when = "at the end" if moment == "end" else f"at {moment:g} s"
         filmed = f"{frames} frames of {shape}, {seconds:.1f} s"

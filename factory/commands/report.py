@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from factory.commands.grouped import Grouped
 from factory.commands.options import (
     DRAW,
     FLOOR,
@@ -37,7 +38,7 @@ if TYPE_CHECKING:
     _Made = tuple[Recording, Run, list[dict[str, object]]]
 
 
-@click.command()
+@click.command(cls=Grouped)
 @SOURCE
 @click.option("-o", "--output", type=PATH, required=True, help="The page: OUT.html.")
 @click.option(
@@ -88,7 +89,7 @@ def report(given: ProjectOptions, asked: RunOptions, out: OutputOptions, output:
     }
     if out.as_json:
         emit(document)
-    elif not out.quiet:
+    else:
         say(f"{output}: {size / 1e6:.1f} MB, {recording.end:.2f} s of a run")
         if recording.missing:
             say(f"  no predictions: {recording.missing}")

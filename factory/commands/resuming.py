@@ -30,7 +30,7 @@ def resumed(file: Path, out: OutputOptions) -> Resumed | None:
     if isinstance(found, CutOff):
         if out.as_json:
             emit({"log": str(file), "units": found.units, "products": found.products})
-        elif not out.quiet:
+        else:
             say(f"'{file}' has made its units, {found.products} of {found.units}: nothing is left")
         return None
     for skipped in found.skipped:

@@ -7,10 +7,12 @@ from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
+from shlex import quote
 from typing import TYPE_CHECKING
 
 import click
 
+from factory.commands.grouped import Grouped
 from factory.commands.monitor import found_by, say_failures, say_verdict, say_violations
 from factory.commands.options import (
     FAULTS,
@@ -52,7 +54,7 @@ if TYPE_CHECKING:
     """Opens what records a run within a context, such as a log."""
 
 
-@click.command()
+@click.command(cls=Grouped)
 @SOURCE
 @FAULTS
 @RUN
@@ -105,7 +107,7 @@ def run(
     film = _film(project, asked, video, shown)
     record = run_project(project, asked, out.silent, log, film, monitor)
     status = _told(record, layout.factory, warnings, monitor, out)
-    if not (out.as_json or out.quiet):
+    if not out.as_json:
         say_files(film=video, poster=shown.poster, log=log)
     return status
 
@@ -118,14 +120,15 @@ def _go_on(going: Resumed, asked: RunOptions, monitor: bool | None, out: OutputO
 
     made = going.simulation
     with going.trusted():
-        record = carry_out(made, out.silent, asked.max_time, [going.writer], False)
+        opened = [going.writer]
+        record = carry_out(made, out.silent, asked.max_time, opened, False, going.path)
     if account := made.world.hooks.account:
         record = replace(record, failures=account.report())
     elif monitor is not False and made.model is not None:
         with Waiting("judging the whole run", out.silent):
             record = replace(record, monitor=watch_log(read_log(going.path))[0])
     status = _told(replace(record, lenient=asked.lenient), made.layout.factory, [], monitor, out)
-    if not (out.as_json or out.quiet):
+    if not out.as_json:
         say_files(log=going.path)
     return status
 
@@ -145,7 +148,7 @@ def _told(
             document["monitor"] = record.monitor.as_json()
         trouble = [record.trouble.as_json()] if record.trouble else []
         emit({**document, "warnings": warnings, **({"errors": trouble} if trouble else {})})
-    elif not out.quiet:
+    else:
         summarise(record, factory, out.verbose)
     say_violations(record.monitor)
     if record.trouble is not None:
@@ -207,7 +210,7 @@ def run_project(
         )
     if film is not None:
         recorders.append(lambda: film(made))
-    record = carry_out(made, silent, asked.max_time, recorders, monitor)
+    record = carry_out(made, silent, asked.max_time, recorders, monitor, log)
     failures = None if recovery is None else recovery.report()
     if failures is not None and log is not None and monitor is not False and made.model is not None:
         from factory.record.log import read_log
@@ -224,9 +227,11 @@ def carry_out(
     max_time: float | None = None,
     recorders: Sequence[Opening] = (),
     monitor: bool | None = None,
+    log: Path | None = None,
 ) -> Run:
     """A run with a progress bar. A signal ends it at the end of a tick, so that the recorders'
-    files are complete; StoppedError then says how far it came."""
+    files are complete; StoppedError then says how far it came, and how the run in a `log` goes
+    on."""
     from factory.record.ending import CutOff
     from factory.simulation.watched import watched
     from factory.support.interruption import Interruption
@@ -245,7 +250,9 @@ def carry_out(
             return record
     except KeyboardInterrupt as error:
         came = CutOff(made.world.time, made.world.delivered() - made.before, made.request.units)
-        raise StoppedError(Diagnostic("Interrupted", f"stopped by the user, {came}")) from error
+        message = f"stopped by the user, {came}"
+        hint = f"log: {log}; go on: factory run --resume {quote(str(log))}" if log else ""
+        raise StoppedError(Diagnostic("Interrupted", message, None, hint)) from error
 
 
 def not_tested(physics: PhysicsFigures) -> str:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from factory.commands.grouped import Grouped
 from factory.commands.options import (
     FLOOR,
     MOTION,
@@ -52,7 +53,7 @@ class SweepOptions:
     retry: bool
 
 
-@click.command()
+@click.command(cls=Grouped)
 @click.argument("source", metavar="[FILE]", type=PATH, required=False)
 @click.option("--templates", "folders", multiple=True, type=PATH, help="As of `run`.")
 @click.option(
@@ -113,7 +114,7 @@ def sweep(
         failed = tally.failed + tally.there_failed > 0
         document = {"database": str(database), "on": runs.on, **tally.as_json()}
         document["warnings"] = warnings
-        if not out.silent:
+        if not out.as_json:
             _tell(tally, database)
     elif not is_summary:
         message, hint = "nothing varies", "for example --vary seed=0:100"
@@ -195,7 +196,7 @@ def _summarise(database: Path | None, folder: Path | None, out: OutputOptions) -
 
         drawn = {folder / name: picture for name, picture in plots(found).items()}
         write_all(drawn)
-    if not out.silent:
+    if not out.as_json:
         _tell_summary(found, out.verbose)
         for path in drawn:
             say(f"wrote {path}")

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from factory.commands.grouped import Grouped
 from factory.commands.options import DRAW, FAULTS, FLOOR, MOTION, OUTPUT, RELAY, RUNS, SOURCE, WIP
 from factory.commands.requests import OutputOptions, ProjectOptions, RunOptions
 from factory.commands.warnings import announced
@@ -20,7 +21,7 @@ FOR_EVER = 10**9
 """Units of a run that does not end by itself."""
 
 
-@click.command()
+@click.command(cls=Grouped)
 @SOURCE
 @FAULTS
 @click.option("--port", type=click.IntRange(0, 65535), default=8765, help="0: a free one.")

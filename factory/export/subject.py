@@ -30,7 +30,7 @@ class Subject:
     @property
     def stem(self) -> str:
         """The name of the product."""
-        return self.file.stem or "factory"
+        return self.file.stem.strip("-") or "factory"
 
     @property
     def project(self) -> Project:

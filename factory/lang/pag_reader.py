@@ -12,13 +12,29 @@ from collections.abc import Mapping
 from factory.lang.copies import written_out
 from factory.lang.operations import AssemblyReader, signature
 from factory.lang.pag_syntax import Statements, read_statements
-from factory.lang.source import Findings, quoted, read_text, source_of
+from factory.lang.source import STDIN, Findings, quoted, read_text, source_of
 from factory.lang.tree import TreeCheck
 from factory.lang.words import UNITS
 from factory.problem.pag import PAG
 from factory.problem.template import Template
 from factory.support.collector import collector_paused
-from factory.support.errors import did_you_mean
+from factory.support.errors import Diagnostic, InputError, did_you_mean
+
+KINDS = {
+    ".pnml": (
+        "a net in PNML",
+        "it has no parts that could be moved: `factory check {}` proves it, `factory analyze {}` "
+        "finds its pace, and `export` draws it; here give a PAG",
+    ),
+    ".ldr .mpd .dat": ("an LDraw model", "`factory import {}` makes a PAG of it, `plan` too"),
+    ".step .stp .glb .3mf": ("a model of parts in place", "`factory plan {}` makes a PAG of it"),
+    ".stl .obj .ply": ("a mesh", 'name it in a PAG: part = atomic ( mesh = "{}" );'),
+    ".csv .json .yaml .yml": ("a table or a tree", "`factory import {}` makes a PAG of it"),
+    ".xml .mjb": ("a model of the engine", "give the PAG that it was built from"),
+    ".op": ("an operation", "give the PAG, and the folder of this file to --templates"),
+    ".toml": ("a file of settings", "give the PAG beside it"),
+}
+"""Files that are no PAGs, by their endings: what each is, and what can be done with it."""
 
 
 @collector_paused()
@@ -51,6 +67,18 @@ def unit_of(statements: Statements, findings: Findings) -> str:
 
 
 def load_pag(path: str | os.PathLike[str], templates: Mapping[str, Template]) -> PAG:
-    """The PAG in a file. Raises InputError, also if the file cannot be read (BadFile)."""
+    """The PAG in a file, or in what comes in for `-`. Raises InputError, also if the file cannot be
+    read (BadFile), or is something else (Usage)."""
     name = os.fspath(path)
-    return read_pag(read_text(name), templates, name, os.path.dirname(name) or ".")
+    _check_kind(name)
+    shown = "<stdin>" if name == STDIN else name
+    return read_pag(read_text(name), templates, shown, os.path.dirname(name) or ".")
+
+
+def _check_kind(name: str) -> None:
+    """Raises InputError (Usage) for a file that is something else by its ending."""
+    ending = os.path.splitext(name)[1].lower()
+    kind, hint = next((told for ends, told in KINDS.items() if ending in ends.split()), ("", ""))
+    if kind and os.path.isfile(name):
+        message = f"{quoted(name)} is {kind}, not the PAG of a product"
+        raise InputError(Diagnostic("Usage", message, None, hint.format(*[name] * 2)))

@@ -16,6 +16,10 @@ FILES = 1000
 """The most names of a folder that are compared with a missing one."""
 
 
+STDIN = "-"
+"""The name of a file that stands for what comes in."""
+
+
 @dataclass(frozen=True, slots=True)
 class Source:
     """A text and the name of its file; line ends are `\\n` and a byte-order mark is gone."""
@@ -75,12 +79,12 @@ def where(first: Position, second: Position) -> str:
 
 def read_text(path: str | os.PathLike[str], most: int = TEXT) -> str:
     """The text of a UTF-8 file of at most so many bytes. Raises InputError (BadFile, Syntax where
-    it is not UTF-8, or Usage for a log)."""
+    it is not UTF-8, or Usage for a log). `-` is what comes in."""
     name = os.fspath(path)
     try:
         data = head_of(Path(name), len(LOG))
         if data != LOG:
-            data = read_bytes(Path(name), most)
+            data = read_bytes(Path("/dev/stdin" if name == STDIN else name), most)
         if not data.startswith(LOG):
             return data.decode("utf-8")
     except UnicodeDecodeError as error:
@@ -100,6 +104,8 @@ def _unreadable(name: str, error: Exception) -> Diagnostic:
         message, hint = f"there is no file {quoted(name)}", near_file("", name) or hint
     elif isinstance(error, IsADirectoryError):
         message, hint = f"{quoted(name)} is a folder, not a file", "name a file in it"
+    elif name == STDIN:
+        message, hint = f"nothing comes in: {why}", "for example: cat FILE.pag | factory check -"
     elif getattr(error, "errno", None) == errno.EFBIG:
         hint = "take it apart, or check that it is the file that is meant"
     return Diagnostic("BadFile", message, Position(name, 1, 1), hint)

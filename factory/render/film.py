@@ -67,7 +67,11 @@ class Film(_Observer):
     ) -> None:
         super().__init__(simulation, picture)
         self.reel = Reel(self.take, Path(path), fps, None if poster is None else Path(poster))
-        self.reel.until(self.last)
+        try:
+            self.reel.until(self.last)
+        except BaseException:  # no file is left without a frame
+            self.reel.give_up()
+            raise
 
     @property
     def frames(self) -> int:

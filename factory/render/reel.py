@@ -51,12 +51,16 @@ class Reel(Closing):
 
     def close(self) -> None:
         """Finish the file, give the GL back and write the poster."""
+        self.give_up()
+        if self.poster is not None:
+            self.poster.save()
+
+    def give_up(self) -> None:
+        """Finish the file and give the GL back."""
         try:
             self.file.close()
         finally:
             self.work.close()
-        if self.poster is not None:
-            self.poster.save()
 
 
 class Poster:

@@ -2,11 +2,33 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from importlib import import_module
+from types import MappingProxyType
 from typing import Any
 
 from factory.support.errors import Diagnostic, MissingError
 from factory.support.interruption import put_off
+
+EXTRAS: Mapping[str, tuple[tuple[str, ...], str]] = MappingProxyType(
+    {
+        "decompose": (("coacd",), "meshes that are not convex collide as convex pieces"),
+        "plots": (("matplotlib",), "plots of `fidelity` and `sweep`"),
+        "live": (("websockets",), "`view`, in the browser"),
+        "export": (("ezdxf", "foxglove-sdk", "pyarrow"), "DXF, MCAP and Parquet"),
+        "usd": (("usd-core",), "USD"),
+        "yaml": (("pyyaml",), "`import` of trees in YAML"),
+        "step": (("cascadio",), "`plan` of STEP files"),
+        "3mf": (("lxml",), "`plan` of 3MF files"),
+        "cluster": (("distributed",), "`sweep --on` a Dask cluster"),
+    }
+)
+"""Each extra: its packages, and what it is for."""
+
+
+def installs(extra: str) -> str:
+    """The command that installs an extra."""
+    return f"pip install 'klavins-factory[{extra}]'"
 
 
 def optional(module: str, package: str, what: str, extra: str, otherwise: str = "") -> Any:
@@ -16,8 +38,6 @@ def optional(module: str, package: str, what: str, extra: str, otherwise: str = 
         with put_off():
             return import_module(module)
     except ImportError as error:
-        hint = f"pip install 'klavins-factory[{extra}]'" + (
-            f", or {otherwise}" if otherwise else ""
-        )
+        hint = installs(extra) + (f", or {otherwise}" if otherwise else "")
         message = f"{what} needs {package}: {error}"
         raise MissingError(Diagnostic("Missing", message, None, hint)) from error

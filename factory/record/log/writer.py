@@ -287,7 +287,7 @@ def _header(
         "fuse": simulation.request.fuse,
         "start": sorted(simulation.start),
         "settings": asdict(simulation.request.settings),
-        "product": file.stem or "factory",
+        "product": file.stem.strip("<>") or "factory",
         "pag": {
             "file": str(file),
             "text": text,
