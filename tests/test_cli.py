@@ -243,7 +243,7 @@ def test_quiet_hides_progress_and_warnings_never_the_answer(run: Terminal, tmp_p
         ("analyze", PAPER),
         ("sweep", PAPER, "--world", "ideal", "--vary", "seed=0:1", "-o", tmp_path / "r.db"),
         ("sweep", tmp_path / "r.db", "--summary"),
-        ("new", tmp_path / "bell"),
+        ("new", tmp_path / "chime"),
         ("doctor",),
     )
     for command in words:
